@@ -1,0 +1,258 @@
+"""Graphs as text: graph6 for uncoloured chains, a one-line form of our own for coloured ones.
+
+The one-line form is ``<graph6>`` followed by space-separated fields, in this order and each only when needed:
+``f<frame>``; ``<mobility>:<a>-<b>,<a>-<b>`` for each joint mobility of 2 and more, ascending; ``pi<space>`` when the
+space is not 3.  Example: ``C] f0 2:0-2``.
+
+Readers accept any text or bytes and raise nothing but :class:`~graphsynth.errors.FormatError`; their time and
+memory are bounded by the length of the input, and an input longer than any valid graph is refused before it is read.
+
+Source of graph6: B. D. McKay, *Description of graph6, sparse6 and digraph6 encodings* (formats.txt of nauty).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from math import isqrt
+
+from graphsynth.errors import FormatError
+
+__all__ = ["LINKS_MAX", "decode_graph6", "decode_text", "encode_graph6", "encode_text"]
+
+#: Joints are packed as three bytes, so a link number is at most 254.
+LINKS_MAX = 255
+
+_HEADER = ">>graph6<<"
+#: Longer than the text of the complete graph on 255 links with every joint listed by name.
+_LENGTH_MAX = 400_000
+_JOINT = re.compile(r"([0-9]{1,3})-([0-9]{1,3})")
+
+
+def encode_graph6(links: int, packed: bytes) -> str:
+    """Write a graph as graph6; joint mobilities are not written.
+
+    Parameters
+    ----------
+    links : int
+        Number of links, 1 to 255.
+    packed : bytes
+        Three bytes ``a, b, mobility`` per joint, ``a < b``.
+
+    Returns
+    -------
+    str
+        Printable ASCII, without a header or a line end.
+
+    Examples
+    --------
+    >>> encode_graph6(4, bytes([0, 1, 1, 0, 3, 1, 1, 2, 1, 2, 3, 1]))
+    'Cl'
+    """
+    size = links * (links - 1) // 2
+    chunks = bytearray(-(-size // 6))
+    for place in range(0, len(packed), 3):
+        a, b = packed[place], packed[place + 1]
+        bit = b * (b - 1) // 2 + a
+        chunks[bit // 6] |= 32 >> bit % 6
+    head = [links] if links <= 62 else [63, links >> 12, links >> 6 & 63, links & 63]
+    return bytes(value + 63 for value in (*head, *chunks)).decode("ascii")
+
+
+def decode_graph6(text: str | bytes) -> tuple[int, bytes]:
+    r"""Read graph6.
+
+    Parameters
+    ----------
+    text : str or bytes
+        One graph; the optional header ``>>graph6<<`` and one line end are accepted.
+
+    Returns
+    -------
+    links : int
+        Number of links.
+    packed : bytes
+        Joints of mobility 1, three bytes each, sorted by ``(a, b)``.
+
+    Raises
+    ------
+    FormatError
+        For anything else, with the byte where reading stopped.
+
+    Examples
+    --------
+    >>> decode_graph6("Bw")
+    (3, b'\x00\x01\x01\x00\x02\x01\x01\x02\x01')
+    """
+    line = _ascii(text)
+    line = line.removesuffix("\n").removesuffix("\r")
+    start = len(_HEADER) if line.startswith(_HEADER) else 0
+    if line[start : start + 1] in (":", ";", "&"):
+        raise FormatError(
+            f"{line[start]!r} starts sparse6 or digraph6; convert the file to graph6 first", f"byte {start}"
+        )
+    values = [ord(letter) - 63 for letter in line[start:]]
+    for index, value in enumerate(values):
+        if not 0 <= value <= 63:
+            raise FormatError(
+                f"byte value {value + 63} is not graph6, whose bytes are 63 to 126", f"byte {start + index}"
+            )
+    links, used = _read_size(values, start)
+    return links, _read_joints(links, values[used:], start + used)
+
+
+def _ascii(text: object) -> str:
+    """Return the input as a str of ASCII characters, refusing what cannot be a graph at once."""
+    if not isinstance(text, str | bytes | bytearray):
+        raise FormatError(f"a graph is read from str or bytes, not from {type(text).__name__}", "input")
+    if len(text) > _LENGTH_MAX:
+        raise FormatError(
+            f"{len(text)} characters; no graph of {LINKS_MAX} links needs more than {_LENGTH_MAX}", "input"
+        )
+    line = text if isinstance(text, str) else bytes(text).decode("latin-1")
+    if not line.isascii():
+        index = next(i for i, letter in enumerate(line) if ord(letter) > 127)
+        raise FormatError(f"character {line[index]!r} is not ASCII", f"byte {index}")
+    return line
+
+
+def _read_size(values: list[int], start: int) -> tuple[int, int]:
+    """Return the number of links and how many bytes say so."""
+    if not values:
+        raise FormatError("empty text; graph6 starts with the number of links", f"byte {start}")
+    links, used = values[0], 1
+    if links == 63:
+        used = 8 if values[1:2] == [63] else 4
+        digits = values[used // 4 : used]
+        if len(digits) < (6 if used == 8 else 3):
+            raise FormatError("the number of links is cut short", f"byte {start + len(values)}")
+        links = 0
+        for digit in digits:
+            links = links << 6 | digit
+    if not 1 <= links <= LINKS_MAX:
+        raise FormatError(f"{links} links; a mechanism graph has 1 to {LINKS_MAX}", f"byte {start}")
+    return links, used
+
+
+def _read_joints(links: int, values: list[int], start: int) -> bytes:
+    """Return the packed joints of the adjacency bits, or say which byte is missing or superfluous."""
+    size = links * (links - 1) // 2
+    expected = -(-size // 6)
+    if len(values) != expected:
+        what = "is cut short" if len(values) < expected else "goes on after its end"
+        raise FormatError(
+            f"the text {what}: {links} links need {expected} bytes of joints, not {len(values)}",
+            f"byte {start + min(len(values), expected)}",
+        )
+    pairs: list[tuple[int, int]] = []
+    for index, value in enumerate(values):
+        if not value:
+            continue
+        for offset in range(6):
+            if value & 32 >> offset:
+                bit = 6 * index + offset
+                if bit >= size:
+                    raise FormatError("the last byte has bits after the last pair of links", f"byte {start + index}")
+                b = (1 + isqrt(1 + 8 * bit)) // 2
+                pairs.append((bit - b * (b - 1) // 2, b))
+    return b"".join(bytes((a, b, 1)) for a, b in sorted(pairs))
+
+
+def encode_text(links: int, packed: bytes, frame: int | None, space: int) -> str:
+    """Write a coloured graph as one line.
+
+    Examples
+    --------
+    >>> encode_text(3, bytes([0, 1, 1, 0, 2, 1, 1, 2, 2]), 0, 3)
+    'Bw f0 2:1-2'
+    """
+    fields = [encode_graph6(links, packed)]
+    if frame is not None:
+        fields.append(f"f{frame}")
+    by_mobility: dict[int, list[str]] = {}
+    for place in range(0, len(packed), 3):
+        a, b, mobility = packed[place : place + 3]
+        if mobility > 1:
+            by_mobility.setdefault(mobility, []).append(f"{a}-{b}")
+    fields += [f"{mobility}:{','.join(pairs)}" for mobility, pairs in sorted(by_mobility.items())]
+    if space != 3:
+        fields.append(f"pi{space}")
+    return " ".join(fields)
+
+
+def decode_text(text: str | bytes) -> tuple[int, list[tuple[int, int, int]], int | None, int]:
+    """Read the one-line form.
+
+    Returns
+    -------
+    links : int
+    joints : list of (a, b, mobility)
+    frame : int or None
+    space : int
+
+    Raises
+    ------
+    FormatError
+        For anything that is not the one-line form, with the field where reading stopped.
+
+    Examples
+    --------
+    >>> decode_text("Bw f0 2:1-2")
+    (3, [(0, 1, 1), (0, 2, 1), (1, 2, 2)], 0, 3)
+    """
+    fields = _ascii(text).split()
+    if not fields:
+        raise FormatError("empty text; a graph starts with its graph6 form", "field 1")
+    links, packed = decode_graph6(fields[0])
+    mobility = {(packed[i], packed[i + 1]): packed[i + 2] for i in range(0, len(packed), 3)}
+    frame: int | None = None
+    space = 3
+    last = (0, 0)  # (kind of field, mobility): must increase from field to field
+    for index, field in enumerate(fields[1:], start=2):
+        place = f"field {index}"
+        kind, value, rest = _read_field(field, place)
+        if (kind, value if kind == 2 else 0) <= last:
+            raise FormatError(f"{_shown(field)} is out of order; the order is f, mobilities ascending, pi", place)
+        last = (kind, value if kind == 2 else 0)
+        if kind == 1:
+            frame = value
+        elif kind == 2:
+            _colour(mobility, value, rest, place)
+        else:
+            space = value
+    return links, [(a, b, m) for (a, b), m in mobility.items()], frame, space
+
+
+def _read_field(field: str, place: str) -> tuple[int, int, str]:
+    """Return (kind, number, rest): kind 1 a frame, 2 joints of one mobility, 3 the space."""
+    if match := re.fullmatch(r"f([0-9]{1,3})", field):
+        return 1, int(match[1]), ""
+    if match := re.fullmatch(r"([2-5]):(.+)", field):
+        return 2, int(match[1]), match[2]
+    if match := re.fullmatch(r"pi([2-6])", field):
+        return 3, int(match[1]), ""
+    raise FormatError(f"{_shown(field)} is none of f<frame>, <mobility 2 to 5>:<a>-<b>,... and pi<space 2 to 6>", place)
+
+
+def _colour(mobility: dict[tuple[int, int], int], value: int, rest: str, place: str) -> None:
+    """Set the mobility of the joints listed in ``rest``."""
+    for item in rest.split(","):
+        match = _JOINT.fullmatch(item)
+        if not match:
+            raise FormatError(f"{_shown(item)} is not a joint; write <link>-<link>", place)
+        pair = (min(int(match[1]), int(match[2])), max(int(match[1]), int(match[2])))
+        if pair not in mobility:
+            raise FormatError(f"{_shown(item)} is not a joint of the graph6 part", place)
+        if mobility[pair] != 1:
+            raise FormatError(f"the mobility of joint {_shown(item)} is given twice", place)
+        mobility[pair] = value
+
+
+def _shown(text: str) -> str:
+    """Return a short quotation fit for a message."""
+    return repr(text if len(text) <= 24 else text[:21] + "...")
+
+
+def pack(joints: Iterable[tuple[int, int, int]]) -> bytes:
+    """Return joints ``(a, b, mobility)`` as bytes, sorted by ``(a, b)``; no checks."""
+    return b"".join(bytes(joint) for joint in sorted(joints))
