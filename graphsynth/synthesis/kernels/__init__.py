@@ -1,0 +1,1 @@
+"""Compiled kernels of the enumerator: flat arrays in, flat arrays out."""
