@@ -1,0 +1,4 @@
+"""Closed-form kinematics: the lambda linkage, the planar parallel platform, the single-motor platform.
+
+Import from the modules (or from ``graphsynth``): this file loads none of them, so that each costs only itself.
+"""

@@ -1,0 +1,75 @@
+"""Checks of dimensions shared by the mechanisms of this room."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import GeometryError
+
+__all__ = ["choice", "finite", "finite_array", "positive", "sign", "unit_vector"]
+
+
+def finite(name: str, value: Any) -> float:
+    """Return ``value`` as a float; raise `GeometryError` if it is not a finite real number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{name} = {value!r} is not a real number; give a finite one") from error
+    if not math.isfinite(number):
+        raise GeometryError(f"{name} = {number} is not finite; give a finite number")
+    return number
+
+
+def positive(name: str, value: Any, *, zero: bool = False) -> float:
+    """Return ``value`` as a float; raise `GeometryError` unless it is positive (or zero, if allowed)."""
+    number = finite(name, value)
+    if number < 0.0 or (number == 0.0 and not zero):
+        bound = "zero or more" if zero else "positive"
+        raise GeometryError(f"{name} = {number} must be {bound}; correct the value")
+    return number
+
+
+def sign(name: str, value: Any) -> int:
+    """Return +1 or -1; raise `GeometryError` for anything else."""
+    if value not in (1, -1):
+        raise GeometryError(f"{name} = {value!r} must be +1 or -1 (the assembly branch)")
+    return int(value)
+
+
+def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
+    """Return ``value`` if it is one of ``allowed``; raise `GeometryError` otherwise."""
+    if value not in allowed:
+        raise GeometryError(f"{name} = {value!r} is unknown; use one of {', '.join(map(repr, allowed))}")
+    return str(value)
+
+
+def unit_vector(name: str, value: Any) -> tuple[float, float, float]:
+    """Return the normalised 3-vector; raise `GeometryError` for a zero, infinite or misshapen one."""
+    try:
+        parts = [finite(f"{name}[{index}]", part) for index, part in enumerate(value)]
+    except TypeError as error:
+        raise GeometryError(f"{name} = {value!r} is not a vector; give three numbers") from error
+    if len(parts) != 3:
+        raise GeometryError(f"{name} has {len(parts)} components; give three")
+    largest = max(map(abs, parts))
+    if largest == 0.0:
+        raise GeometryError(f"{name} = {tuple(parts)} has no direction; give a vector that is not zero")
+    parts = [part / largest for part in parts]  # no overflow or underflow in the norm
+    norm = math.hypot(*parts)
+    return (parts[0] / norm, parts[1] / norm, parts[2] / norm)
+
+
+def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return ``values`` as a float array; raise `GeometryError` if an entry is NaN or infinite."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{name} is not an array of real numbers: {error}") from error
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise GeometryError(f"{name} holds {array.flat[bad[0]]} at flat position {bad[0]}; give finite numbers only")
+    return array
