@@ -1,0 +1,1 @@
+"""Sketches of kinematic diagrams and graphs as plain SVG, and plots through matplotlib."""

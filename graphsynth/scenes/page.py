@@ -1,0 +1,156 @@
+"""``report.html``: one file, no external resources, readable on a phone, light or dark with the system."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.scenes.products import Picture, Record, Table
+from graphsynth.scenes.summary import summary_tables
+
+if TYPE_CHECKING:
+    from graphsynth.scenes.runner import Report
+
+__all__ = ["report_html"]
+
+_CSS = """
+:root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;--good:#00735a;--bad:#b34700}
+@media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#9aa7b4;--paper:#12181f;--card:#1a222b;--rule:#323d48;--good:#3ecf9f;--bad:#f0883e}}
+*{box-sizing:border-box}
+body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+main{max-width:66rem;margin:0 auto;padding:1.25rem 1rem 3rem}
+h1{font-size:1.65rem;line-height:1.2;margin:.4rem 0 .5rem;text-wrap:balance}
+h2{font-size:1.2rem;margin:2.2rem 0 .6rem;border-bottom:1px solid var(--rule);padding-bottom:.25rem}
+h3{font-size:1rem;margin:1.4rem 0 .4rem}
+p{margin:.4rem 0 .8rem;max-width:46rem}
+.soft,figcaption,caption{color:var(--soft);font-size:.875rem}
+.scroll{overflow-x:auto}
+table{border-collapse:collapse;font-size:.9rem;font-variant-numeric:tabular-nums}
+th,td{text-align:left;vertical-align:top;padding:.3rem .9rem .3rem 0;border-bottom:1px solid var(--rule)}
+th{font-weight:600;color:var(--soft)}
+td.num{white-space:nowrap}
+.facts{display:flex;flex-wrap:wrap;gap:.6rem;margin:1rem 0;padding:0;list-style:none}
+.facts li{background:var(--card);border-radius:.5rem;padding:.55rem .9rem;min-width:7.5rem}
+.facts b{display:block;font-size:1.3rem;line-height:1.25}
+.facts .bad{color:var(--bad)}.facts .good{color:var(--good)}
+.facts span{color:var(--soft);font-size:.85rem}
+.pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,24rem),1fr));gap:1.2rem;align-items:start}
+.sheet{display:grid;grid-template-columns:repeat(auto-fill,minmax(9.5rem,1fr));gap:.7rem}
+figure{margin:0;background:var(--card);border-radius:.5rem;padding:.7rem}
+figure.wide{grid-column:1/-1}
+figure .gs{--paper:var(--card)}
+figure svg{display:block;width:100%;height:auto;margin:0 auto}
+figure.wide svg{max-width:52rem}
+.pictures figure:not(.wide) svg{max-width:30rem}
+figcaption{margin-top:.4rem}figcaption b{color:var(--ink)}
+details{margin:.6rem 0}summary{cursor:pointer;font-weight:600}
+code{font-size:.85em;overflow-wrap:anywhere}
+"""
+
+
+def report_html(report: Report) -> str:
+    """Return the page of a run.
+
+    Everything is in the one string: styles, tables, pictures as inline SVG. Values are escaped.
+    """
+    scene = report.scene.scene
+    products = report.products
+    parts = [
+        f"<h1>{escape(scene.title)}</h1>",
+        *(f"<p>{escape(text)}</p>" for text in scene.description.strip().split("\n\n") if text),
+        _facts(report),
+    ]
+    pictures = {name: products[name] for name in ("mechanism_pictures", "plots", "graph_pictures") if name in products}
+    for name, heading in (("mechanism_pictures", "The mechanism"), ("plots", "Over a turn")):
+        parts.append(_gallery(heading, pictures.get(name, ())))
+    parts += [_table(table) for table in summary_tables(report)]
+    parts.append(_sheet(pictures.get("graph_pictures", ())))
+    if "records" in products:
+        parts.append(_records(products["records"]))
+    parts.append(_provenance(report))
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(scene.title)}</title><style>{_CSS}</style></head><body><main>"
+        + "\n".join(part for part in parts if part)
+        + "</main></body></html>\n"
+    )
+
+
+def _facts(report: Report) -> str:
+    """Give the run in a row of numbers and the verdicts of what was assessed."""
+    products, facts = report.products, []
+    if "solutions" in products:
+        facts.append((str(len(products["solutions"])), "integer solutions", ""))
+    records: tuple[Record, ...] = products.get("records", ())
+    if records:
+        assessed = [r for r in records if r.status == "assessed"]
+        failed = sum(r.status == "failed" for r in records)
+        facts += [(str(len(records)), "candidate mechanisms", ""), (str(len(assessed)), "assessed", "")]
+        if failed:
+            facts.append((str(failed), "failed", "bad"))
+        for verdict in dict.fromkeys(r.verdict for r in assessed if r.verdict):
+            facts.append((verdict, "verdict", "bad" if "jam" in verdict.lower() else "good"))
+    facts.append((f"{sum(t.seconds + t.import_seconds for t in report.times):.2f} s", "all stages", ""))
+    items = "".join(
+        f'<li><b class="{tone}">{escape(value)}</b><span>{escape(name)}</span></li>' for value, name, tone in facts
+    )
+    return f'<ul class="facts">{items}</ul>'
+
+
+def _figure(picture: Picture) -> str:
+    wide = ' class="wide"' if picture.wide else ""
+    return (
+        f"<figure{wide}>{picture.svg}<figcaption><b>{escape(picture.title)}</b>"
+        f"{'. ' if picture.caption else ''}{escape(picture.caption)}</figcaption></figure>"
+    )
+
+
+def _gallery(heading: str, pictures: Iterable[Picture]) -> str:
+    figures = "".join(map(_figure, pictures))
+    return f'<h2>{escape(heading)}</h2><div class="pictures">{figures}</div>' if figures else ""
+
+
+def _sheet(pictures: Iterable[Picture]) -> str:
+    figures = "".join(map(_figure, pictures))
+    if not figures:
+        return ""
+    note = (
+        "By adjacency levels: the frame on top, below it the links jointed to it, and so on. "
+        "A line is a joint of mobility 1, a dashed line one of mobility 2."
+    )
+    return f'<h2>Candidate graphs</h2><p class="soft">{note}</p><div class="sheet">{figures}</div>'
+
+
+def _table(table: Table) -> str:
+    return f"<h2>{escape(table.title)}</h2>{_grid(table.columns, table.rows)}" + (
+        f'<p class="soft">{escape(table.note)}</p>' if table.note else ""
+    )
+
+
+def _grid(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
+    body = "".join("<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows)
+    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _cell(text: str) -> str:
+    numeric = text[:1].isdigit() or text[:1] in "-+"
+    return f'<td class="num">{escape(text)}</td>' if numeric and len(text) < 40 else f"<td>{escape(text)}</td>"
+
+
+def _records(records: tuple[Record, ...]) -> str:
+    rows = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
+    grid = _grid(("no.", "assortment", "status", "verdict or reason", "key"), rows)
+    return f"<h2>Every candidate</h2><details><summary>{len(rows)} rows, as in results.csv</summary>{grid}</details>"
+
+
+def _provenance(report: Report) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in report.versions.items())
+    scene: Any = report.scene
+    source = f"{scene.source}{', SHA-256 ' + scene.digest if scene.digest else ''}"
+    return (
+        f'<h2>How this was made</h2><p class="soft">Scene <code>{escape(source)}</code>, seed {scene.scene.seed}. '
+        f"{escape(versions)}. The scene as read and the times are in <code>scene.json</code>.</p>"
+    )

@@ -1,0 +1,147 @@
+"""What stages hand to one another and to the report: plain frozen data, without numbers that do not say how they were had."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeVar
+
+__all__ = ["Candidate", "Picture", "Quantity", "Recognised", "Record", "Table", "each", "exact"]
+
+T = TypeVar("T")
+R = TypeVar("R")
+Guarantee = Literal["exact", "certified", "estimated"]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A mechanism graph that answers the structural question.
+
+    Attributes
+    ----------
+    number : int
+        From 1, in the order of generation.
+    graph : MechanismGraph
+        With its frame.
+    solution : str
+        The integer solution it belongs to, for example ``n2=6 n3=7 n4=1``.
+    """
+
+    number: int
+    graph: Any
+    solution: str
+
+
+@dataclass(frozen=True, slots=True)
+class Recognised:
+    """A candidate with the kinematic module that knows it, or the reason why none does."""
+
+    candidate: Candidate
+    module: str | None
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number with its unit, how it was had and how far it may be off.
+
+    Attributes
+    ----------
+    guarantee : {"exact", "certified", "estimated"}
+        ``exact``: no rounding, or a closed form evaluated in floating point with the rounding error in `error`.
+    error : float or None
+        Bound (exact, certified) or estimate (estimated) of the absolute error, in `unit`; None if unknown.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    guarantee: Guarantee = "estimated"
+    error: float | None = None
+
+    @property
+    def text(self) -> str:
+        """The value with its unit, to a readable number of digits."""
+        return f"{self.value:.10g}{' ' + self.unit if self.unit else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One row of ``results.csv``: a candidate and what became of it.
+
+    Attributes
+    ----------
+    status : {"assessed", "not recognised", "failed"}
+        A candidate no module recognises is not a failure; a failed one carries its reason.
+    """
+
+    number: int
+    key: str
+    solution: str
+    status: Literal["assessed", "not recognised", "failed"]
+    recognised_as: str = ""
+    verdict: str = ""
+    margins: tuple[Quantity, ...] = ()
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of the report: strings, ready to print."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An inline SVG with a title and a caption; `wide` pictures take the full width of the page."""
+
+    title: str
+    svg: str
+    caption: str = ""
+    wide: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """The outcome of one step for one candidate: a value, or the reason why there is none."""
+
+    candidate: Candidate
+    value: Any = None
+    reason: str = ""
+    notes: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the step gave a reason instead of a value."""
+        return bool(self.reason)
+
+
+def each(attempts: Iterable[Attempt], step: Callable[[Any], Any]) -> tuple[Attempt, ...]:
+    """Apply `step` to every value; a candidate that fails keeps its reason and does not stop the others.
+
+    Any exception counts: whatever goes wrong with one candidate is recorded under its name and shown in the report.
+
+    Examples
+    --------
+    >>> ok, bad = each([Attempt(None, 2.0), Attempt(None, 0.0)], lambda x: 1 / x)
+    >>> ok.value, bad.reason
+    (0.5, 'ZeroDivisionError: float division by zero')
+    """
+    done = []
+    for attempt in attempts:
+        if not attempt.failed:
+            try:
+                attempt = replace(attempt, value=step(attempt.value))
+            except Exception as error:
+                attempt = replace(attempt, value=None, reason=f"{type(error).__name__}: {error}")
+        done.append(attempt)
+    return tuple(done)
+
+
+def exact(name: str, value: float, unit: str = "") -> Quantity:
+    """Return a quantity that carries no rounding (a count, an order)."""
+    return Quantity(name, value, unit, "exact", 0.0)

@@ -1,0 +1,156 @@
+"""The report of a run: a summary on the terminal, and a folder with a page, a table and the scene as it was run."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import platform
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.errors import SceneError
+from graphsynth.scenes.page import report_html
+from graphsynth.scenes.products import Quantity, Record
+from graphsynth.scenes.summary import summary_tables
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from graphsynth.scenes.runner import Report
+
+__all__ = ["loaded_versions", "print_summary", "results_csv", "scene_json", "write_report"]
+
+_PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
+
+
+def loaded_versions() -> dict[str, str]:
+    """Return the versions of Python, graphsynth and the third-party packages this process has loaded."""
+    from importlib.metadata import version
+
+    from graphsynth import __version__
+
+    versions = {"python": platform.python_version(), "graphsynth": __version__}
+    return versions | {name: version(name) for name in _PACKAGES if name in sys.modules}
+
+
+def write_report(report: Report, folder: Path) -> Path:
+    """Write ``report.html``, ``results.csv`` (if the run kept its records) and ``scene.json``; return the folder.
+
+    Each file appears whole or not at all: it is written beside its place and then moved there.
+
+    Raises
+    ------
+    SceneError
+        If the folder cannot be written.
+    """
+    files = {"report.html": report_html(report), "scene.json": scene_json(report)}
+    if "records" in report.products:
+        files["results.csv"] = results_csv(report.products["records"])
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            _write_whole(folder / name, text)
+    except OSError as error:
+        raise SceneError(
+            f"cannot write the report into {folder}: {error.strerror}; choose another folder with --out"
+        ) from error
+    return folder
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a file so that nobody ever sees half of it."""
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:
+            stream.write(text)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def results_csv(records: tuple[Record, ...]) -> str:
+    """Return the records as CSV (RFC 4180): one row per candidate, three columns per margin.
+
+    For a margin ``m`` the columns are ``m [unit]``, ``m guarantee`` and ``m error [unit]``; an empty cell means not computed.
+    """
+    margins: dict[str, str] = {}
+    for record in records:
+        for margin in record.margins:
+            margins.setdefault(margin.name, _column(margin.name, margin.unit))
+    head = ["number", "key", "solution", "status", "recognised as", "verdict"]
+    for name, column in margins.items():
+        unit = column[len(name) :]
+        head += [column, f"{name} guarantee", f"{name} error{unit}"]
+    stream = io.StringIO()
+    writer = csv.writer(stream)
+    writer.writerow([*head, "reason"])
+    for record in records:
+        row: list[Any] = [
+            record.number,
+            record.key,
+            record.solution,
+            record.status,
+            record.recognised_as,
+            record.verdict,
+        ]
+        have = {margin.name: margin for margin in record.margins}
+        for name in margins:
+            row += _cells(have.get(name))
+        writer.writerow([*row, record.reason])
+    return stream.getvalue()
+
+
+def _column(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _cells(margin: Quantity | None) -> list[str]:
+    if margin is None:
+        return ["", "", ""]
+    return [repr(margin.value), margin.guarantee, "" if margin.error is None else repr(margin.error)]
+
+
+def scene_json(report: Report) -> str:
+    """Return the scene as read, versions, seed and times as JSON."""
+    scene = report.scene
+    content = {
+        "scene": scene.raw,
+        "source": scene.source,
+        "sha256": scene.digest or None,
+        "seed": scene.scene.seed,
+        "versions": dict(report.versions),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "stages": [
+            {"stage": t.stage, "import_seconds": round(t.import_seconds, 6), "seconds": round(t.seconds, 6)}
+            for t in report.times
+        ],
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n"
+
+
+def print_summary(report: Report, console: Console) -> None:
+    """Print the summary of a run on a rich console: solutions, candidates, verdicts, times, and where the files are."""
+    from rich.markup import escape
+    from rich.table import Table as RichTable
+
+    console.print(f"[bold]{escape(report.scene.scene.title)}[/bold]")
+    for table in summary_tables(report):
+        shown = RichTable(
+            title=escape(table.title), title_justify="left", caption=escape(table.note) or None, caption_justify="left"
+        )
+        for column in table.columns:
+            shown.add_column(escape(column), overflow="fold")
+        for row in table.rows:
+            shown.add_row(*map(escape, row))
+        console.print(shown)
+    if report.folder is not None:
+        names = ["report.html", "results.csv", "scene.json"]
+        console.print(
+            f"Report: {escape(str(report.folder))} ({', '.join(n for n in names if (report.folder / n).exists())})"
+        )

@@ -1,0 +1,186 @@
+"""Stages: what a scene can compute, each named by a string, and the smallest set that yields the outputs asked for.
+
+A stage is data: a name, a function as ``"package.module:function"``, the products it needs and the products it
+gives. Nothing here imports the function; the runner does, when the scene needs it. Products travel one way, from
+the stage that gives them to the stages that need them, and each product has one giver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Protocol
+
+from graphsynth.errors import SceneError
+from graphsynth.scenes.scene import Scene
+from graphsynth.scenes.tables import Place, nearest
+
+__all__ = ["Context", "Progress", "Stage", "StageFunction", "load", "registry", "resolve"]
+
+_STEPS = "graphsynth.scenes.steps"
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One arrow of the pipeline.
+
+    Attributes
+    ----------
+    name : str
+        Short name for tables and messages.
+    function : str
+        ``"package.module:function"``; called as ``function(context, *needs)`` in the order of `needs`.
+    needs, gives : tuple of str
+        Names of products. A stage that gives several returns a tuple in the order of `gives`.
+    """
+
+    name: str
+    function: str
+    needs: tuple[str, ...]
+    gives: tuple[str, ...]
+
+
+class Progress(Protocol):
+    """Told before each stage (``done`` of ``total`` finished) and once more at the end."""
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Show the progress; must not raise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What every stage may read besides the products it needs."""
+
+    scene: Scene
+    executor: Executor | None = None
+
+
+class StageFunction(Protocol):
+    """The extension point: any function of a context and products."""
+
+    def __call__(self, context: Context, *products: Any) -> Any:
+        """Return the product, or a tuple of the products in the order of ``gives``."""
+
+
+_COMMON = (
+    Stage("solve", f"{_STEPS}.structural:solve", (), ("solutions",)),
+    Stage("generate", f"{_STEPS}.structural:generate", ("solutions",), ("candidates",)),
+    Stage("sketch graphs", f"{_STEPS}.graphs:pictures", ("candidates", "recognised"), ("graph_pictures",)),
+)
+_LAMBDA = (
+    Stage("recognise", f"{_STEPS}.four_bar:recognise", ("candidates",), ("recognised",)),
+    Stage("kinematics", f"{_STEPS}.four_bar:kinematics", ("recognised",), ("motions",)),
+    Stage("jamming", f"{_STEPS}.four_bar:jamming", ("motions",), ("assessments",)),
+    Stage("judge", f"{_STEPS}.four_bar:judge", ("recognised", "motions", "assessments"), ("records", "tables")),
+    Stage(
+        "sketch mechanism", f"{_STEPS}.four_bar_pictures:sketches", ("motions", "assessments"), ("mechanism_pictures",)
+    ),
+    Stage("plot", f"{_STEPS}.four_bar_pictures:plots", ("motions", "assessments"), ("plots",)),
+)
+_PLATFORM = (
+    Stage("recognise", f"{_STEPS}.platform:recognise", ("candidates",), ("recognised",)),
+    Stage("kinematics", f"{_STEPS}.platform:kinematics", ("recognised",), ("motions",)),
+    Stage("judge", f"{_STEPS}.platform:judge", ("recognised", "motions"), ("records", "tables")),
+    Stage("sketch mechanism", f"{_STEPS}.platform_pictures:sketches", ("motions",), ("mechanism_pictures",)),
+    Stage("plot", f"{_STEPS}.platform_pictures:plots", ("motions",), ("plots",)),
+)
+_BY_MODULE = {"lambda_linkage": _LAMBDA, "single_motor_platform": _PLATFORM}
+
+
+def registry(module: str) -> tuple[Stage, ...]:
+    """Return the stages a scene with this ``[mechanism] module`` can use.
+
+    Examples
+    --------
+    >>> [stage.name for stage in registry("lambda_linkage")][:3]
+    ['solve', 'generate', 'sketch graphs']
+    """
+    return (*_COMMON, *_BY_MODULE[module])
+
+
+def _givers(stages: Iterable[Stage]) -> dict[str, Stage]:
+    """Map each product to the one stage that gives it."""
+    givers: dict[str, Stage] = {}
+    for stage in stages:
+        for product in stage.gives:
+            if product in givers:
+                raise SceneError(
+                    f"product {product!r} is given by two stages, {givers[product].name!r} and {stage.name!r}"
+                )
+            givers[product] = stage
+    return givers
+
+
+def resolve(stages: Iterable[Stage], outputs: Sequence[str], place: Place | None = None) -> tuple[Stage, ...]:
+    """Return the smallest set of stages that yields `outputs`, in an order in which each finds what it needs.
+
+    Backward from the outputs; the order depends on `outputs` and `stages` alone.
+
+    Parameters
+    ----------
+    stages : iterable of Stage
+        The registry.
+    outputs : sequence of str
+        Products wanted.
+    place : Place, optional
+        Where the outputs were named, for the message.
+
+    Raises
+    ------
+    SceneError
+        On an unknown output, a need that no stage gives, or a cycle; the message names the stages.
+
+    Examples
+    --------
+    >>> a, b, c = Stage("a", "m:a", (), ("x",)), Stage("b", "m:b", ("x",), ("y",)), Stage("c", "m:c", (), ("z",))
+    >>> [stage.name for stage in resolve([c, b, a], ["y"])]
+    ['a', 'b']
+    """
+    givers = _givers(stages)
+    at = f"{place} " if place else ""
+    order: list[Stage] = []
+    path: list[str] = []
+
+    def visit(product: str) -> None:
+        giver = givers.get(product)
+        if giver is None:
+            if path:
+                raise SceneError(
+                    f"{at}stage {path[-1]!r} needs {product!r}, which no stage gives{nearest(product, givers)}"
+                )
+            raise SceneError(f"{at}asks for {product!r}, which no stage gives{nearest(product, givers)}")
+        if giver in order:
+            return
+        if giver.name in path:
+            raise SceneError(
+                f"{at}stages need each other: {' -> '.join([*path[path.index(giver.name) :], giver.name])}"
+            )
+        path.append(giver.name)
+        for need in giver.needs:
+            visit(need)
+        path.pop()
+        order.append(giver)
+
+    for output in outputs:
+        visit(output)
+    return tuple(order)
+
+
+def load(stage: Stage) -> Callable[..., Any]:
+    """Import the function of a stage.
+
+    Raises
+    ------
+    SceneError
+        If the string does not name a function.
+    """
+    module_name, _, function_name = stage.function.partition(":")
+    try:
+        function = getattr(import_module(module_name), function_name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SceneError(f"stage {stage.name!r} names {stage.function!r}, which cannot be imported: {error}") from error
+    if not callable(function):
+        raise SceneError(f"stage {stage.name!r} names {stage.function!r}, which is not a function")
+    return function  # type: ignore[no-any-return]

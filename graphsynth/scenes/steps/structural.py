@@ -1,0 +1,127 @@
+"""From the structural question to candidate mechanism graphs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from graphsynth.errors import SceneError, TooLargeError
+from graphsynth.scenes.products import Candidate
+from graphsynth.scenes.stages import Context
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.spec import LinkAssortment, StructuralSpec
+
+__all__ = ["generate", "has_threefold_symmetry", "solve"]
+
+
+def solve(context: Context) -> tuple[LinkAssortment, ...]:
+    """Return every integer solution of the scene's structural question (exact)."""
+    return tuple(_spec(context).solve())
+
+
+def _spec(context: Context) -> StructuralSpec:
+    from graphsynth.errors import SpecError
+    from graphsynth.structure.spec import StructuralSpec
+
+    place = context.scene.place / "structure" / "question"
+    try:
+        return StructuralSpec.from_mapping(dict(context.scene.structure.question))
+    except SpecError as error:
+        raise place.error(f"cannot be read: {error}") from error
+
+
+def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> tuple[Candidate, ...]:
+    """Return the mechanisms of the question, each once up to isomorphism, filtered as ``[structure.generate]`` says.
+
+    Raises
+    ------
+    TooLargeError
+        If there are more than ``limit``.
+    """
+    options = context.scene.structure.generate
+    candidates: list[Candidate] = []
+    for graph in _mechanisms(context):
+        if len(candidates) == options.limit:
+            raise TooLargeError(
+                f"{context.scene.place / 'structure' / 'generate'} the question has more than limit = {options.limit} "
+                "mechanisms; raise the limit, or fix more variables of the question"
+            )
+        candidates.append(Candidate(len(candidates) + 1, graph, assortment_text(graph)))
+    if not candidates:
+        raise SceneError(
+            f"{context.scene.place / 'structure'} has {len(solutions)} integer solutions but no mechanism passes the "
+            "filters of [structure.generate]; relax them"
+        )
+    return tuple(candidates)
+
+
+def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
+    from graphsynth.synthesis import enumerate_mechanisms
+
+    options = context.scene.structure.generate
+    for graph in enumerate_mechanisms(_spec(context), symmetry=options.symmetry):
+        if options.fixed_moving_links is None or has_threefold_symmetry(graph, options.fixed_moving_links):
+            yield graph
+
+
+def assortment_text(graph: MechanismGraph) -> str:
+    """Return the assortment of moving links as text.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> assortment_text(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0))
+    'n2=3'
+    """
+    return " ".join(f"n{joints}={count}" for joints, count in sorted(graph.assortment.items()) if count)
+
+
+def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bool:
+    """Return whether an automorphism of order 3 fixes the frame and exactly this many moving links (exact).
+
+    Depth-first search: link by link, each either stays or starts a three-cycle, and every joint is checked as soon as
+    both of its ends are placed. Exact whatever the automorphism group is, which link orbits alone are not: when 9
+    divides the group's order, different three-fold symmetries may fix different numbers of links.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> star = MechanismGraph(5, [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)], frame=0)
+    >>> has_threefold_symmetry(star, 1), has_threefold_symmetry(star, 0)
+    (True, False)
+    """
+    mobility = {(j.a, j.b): j.mobility for j in graph.joints} | {(j.b, j.a): j.mobility for j in graph.joints}
+    profile = [sorted(m for (a, _), m in mobility.items() if a == link) for link in range(graph.links)]
+    image: dict[int, int] = {}
+
+    def consistent(placed: tuple[int, ...]) -> bool:
+        return all(mobility.get((a, b)) == mobility.get((image[a], image[b])) for a in placed for b in image)
+
+    def search(free: tuple[int, ...], fixed_left: int) -> bool:
+        if not free:
+            return fixed_left == 0
+        first, rest = free[0], free[1:]
+        if fixed_left and place((first,), rest, fixed_left - 1):
+            return True
+        alike = [link for link in rest if profile[link] == profile[first]]
+        return any(
+            place((first, a, b), tuple(link for link in rest if link not in (a, b)), fixed_left)
+            for a in alike
+            for b in alike
+            if a != b
+        )
+
+    def place(cycle: tuple[int, ...], free: tuple[int, ...], fixed_left: int) -> bool:
+        image.update(zip(cycle, (*cycle[1:], cycle[0]), strict=True))
+        found = consistent(cycle) and search(free, fixed_left)
+        for link in cycle:
+            del image[link]
+        return found
+
+    frame = graph.frame
+    if frame is None or (graph.links - 1 - fixed_moving_links) % 3 or fixed_moving_links > graph.links - 4:
+        return False  # no three-cycle left, or the rest does not fall into three-cycles
+    image[frame] = frame
+    return search(tuple(link for link in range(graph.links) if link != frame), fixed_moving_links)
