@@ -1,0 +1,232 @@
+"""Canonical labelling of mechanism graphs: canonical form, key, automorphism group, orbits.
+
+The links of a mechanism are coloured by adjacency level, so that a canonical mechanism lists its links level by level
+with the frame first; joints are coloured by mobility.  The search is :mod:`graphsynth.structure.search`; graphs of at
+most 64 links go to the compiled copy of it once that is worth loading.  Both give the same results.
+"""
+
+from __future__ import annotations
+
+import sys
+from base64 import urlsafe_b64decode, urlsafe_b64encode
+from binascii import Error as Base64Error
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isqrt, prod
+from typing import TYPE_CHECKING
+
+from graphsynth.errors import FormatError
+from graphsynth.structure.levels import bits, breadth_first
+from graphsynth.structure.search import Search
+from graphsynth.structure.text import LINKS_MAX
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import Joint, MechanismGraph
+
+__all__ = ["KEY_VERSION", "Labelling", "decode_key", "joint_orbits", "key", "label"]
+
+#: First character of every key.  It changes when any graph would get another key, and never otherwise.
+KEY_VERSION = "1"
+
+_KERNEL_LINKS_MAX = 64
+#: Loading the compiled search costs as much as labelling a few hundred small graphs without it.
+_GRAPHS_WORTH_THE_KERNEL = 300
+_labelled_without_kernel = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Labelling:
+    """Result of one canonical labelling (exact).
+
+    Parameters
+    ----------
+    permutation : tuple of int
+        Canonical position of each link.
+    generators : tuple of tuple of int
+        Automorphisms, link to link, that generate the whole automorphism group; fewer than N.
+    order : int
+        Order of the automorphism group.
+    orbits : tuple of int
+        Smallest link in the orbit of each link.
+    """
+
+    permutation: tuple[int, ...]
+    generators: tuple[tuple[int, ...], ...]
+    order: int
+    orbits: tuple[int, ...]
+
+
+def link_colours(graph: MechanismGraph) -> list[int]:
+    """Return the colour of each link: its adjacency level in a mechanism, 0 in a chain.
+
+    Links that cannot be reached from the frame share the first level that is not used.
+    """
+    if graph.frame is None:
+        return [0] * graph.links
+    levels = breadth_first(graph.neighbours, graph.frame)
+    colours = [len(levels)] * graph.links
+    for number, level in enumerate(levels):
+        for link in bits(level):
+            colours[link] = number
+    return colours
+
+
+def label(graph: MechanismGraph) -> Labelling:
+    """Label a graph canonically.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> label(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)])).order
+    8
+    """
+    global _labelled_without_kernel
+    colours = link_colours(graph)
+    if graph.links <= _KERNEL_LINKS_MAX:
+        if _labelled_without_kernel >= _GRAPHS_WORTH_THE_KERNEL or "numba" in sys.modules:
+            return _label_compiled(graph, colours)
+        _labelled_without_kernel += 1
+    return _label_python(graph, colours)
+
+
+def _label_python(graph: MechanismGraph, colours: list[int]) -> Labelling:
+    layers = [[0] * graph.links for _ in range(max(graph.packed[2::3], default=1))]
+    for a, b, mobility in graph.joints:
+        layers[mobility - 1][a] |= 1 << b
+        layers[mobility - 1][b] |= 1 << a
+    found = Search(graph.links, layers, colours).run()
+    return _labelling(found.order_of_vertices, found.generators, found.index, found.orbits)
+
+
+def _label_compiled(graph: MechanismGraph, colours: list[int]) -> Labelling:
+    import numpy as np
+
+    from graphsynth.structure.kernels import canon_packed
+
+    packed = np.frombuffer(graph.packed, dtype=np.uint8)
+    lab, generators, index, orbits = canon_packed(graph.links, packed, np.array(colours, dtype=np.int64))
+    return _labelling(lab.tolist(), generators.tolist(), index.tolist(), orbits.tolist())
+
+
+def _labelling(
+    order_of_links: list[int], generators: Sequence[list[int]], index: list[int], orbits: list[int]
+) -> Labelling:
+    permutation = [0] * len(order_of_links)
+    for position, link in enumerate(order_of_links):
+        permutation[link] = position
+    return Labelling(tuple(permutation), tuple(map(tuple, generators)), prod(index), tuple(orbits))
+
+
+def joint_orbits(graph: MechanismGraph) -> tuple[tuple[Joint, ...], ...]:
+    """Return the orbits of joints under the automorphism group, in the order of their smallest joint.
+
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> [len(orbit) for orbit in joint_orbits(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)]))]
+    [4]
+    """
+    joints = graph.joints
+    number = {(joint.a, joint.b): place for place, joint in enumerate(joints)}
+    parent = list(range(len(joints)))
+
+    def root(place: int) -> int:
+        while parent[place] != place:
+            parent[place] = parent[parent[place]]
+            place = parent[place]
+        return place
+
+    for generator in graph.labelling.generators:
+        for place, (a, b, _) in enumerate(joints):
+            a, b = generator[a], generator[b]
+            one, other = root(place), root(number[min(a, b), max(a, b)])
+            parent[max(one, other)] = min(one, other)
+    orbits: dict[int, list[Joint]] = {}
+    for place, joint in enumerate(joints):
+        orbits.setdefault(root(place), []).append(joint)
+    return tuple(tuple(orbit) for orbit in orbits.values())
+
+
+def key(graph: MechanismGraph) -> str:
+    """Return the canonical key: the version, then the canonical graph in base64url without padding.
+
+    The bytes are: links; ``space + 8 (frame) + 16 (mobilities)``; the upper triangle of the adjacency matrix, column
+    by column; and, when some joint has another mobility than 1, three bits ``mobility - 1`` per joint sorted by
+    ``(a, b)``; zero bits fill the last byte.  A frame is link 0.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> key(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)]))
+    '1BAN4'
+    """
+    canonical = graph.canonical()
+    packed = canonical.packed
+    coloured = any(mobility != 1 for mobility in packed[2::3])
+    size = graph.links * (graph.links - 1) // 2
+    total = size + (len(packed) if coloured else 0)
+    stream = bytearray(-(-total // 8))
+    for place in range(0, len(packed), 3):
+        a, b = packed[place], packed[place + 1]
+        bit = b * (b - 1) // 2 + a
+        stream[bit >> 3] |= 128 >> (bit & 7)
+        if coloured:
+            for offset in range(3):
+                if packed[place + 2] - 1 & 4 >> offset:
+                    bit = size + place + offset
+                    stream[bit >> 3] |= 128 >> (bit & 7)
+    head = bytes((graph.links, graph.space | (graph.frame is not None) << 3 | coloured << 4))
+    return KEY_VERSION + urlsafe_b64encode(head + stream).decode("ascii").rstrip("=")
+
+
+def decode_key(text: object) -> tuple[int, list[tuple[int, int, int]], int | None, int]:
+    """Return ``(links, joints, frame, space)`` of a key; whether they are canonical is not checked here.
+
+    Raises
+    ------
+    FormatError
+        For anything that no graph has as its key, as far as its form shows.
+
+    Examples
+    --------
+    >>> decode_key("1BAN4")
+    (4, [(0, 2, 1), (0, 3, 1), (1, 2, 1), (1, 3, 1)], None, 3)
+    """
+    data = _key_bytes(text)
+    links, flags = data[0], data[1]
+    space, framed, coloured = flags & 7, flags >> 3 & 1, flags >> 4 & 1
+    if not 1 <= links <= LINKS_MAX or not 2 <= space <= 6 or flags >> 5:
+        raise FormatError(f"header bytes {links}, {flags} do not describe a graph", "key character 2")
+    size = links * (links - 1) // 2
+    # One leading 1 keeps the zeros in front.
+    stream = bin(int.from_bytes(b"\x01" + data[2:], "big"))[3:]
+    pairs = []
+    bit = stream.find("1", 0, size)
+    while bit >= 0:
+        b = (1 + isqrt(1 + 8 * bit)) // 2
+        pairs.append((bit - b * (b - 1) // 2, b))
+        bit = stream.find("1", bit + 1, size)
+    pairs.sort()
+    total = size + (3 * len(pairs) if coloured else 0)
+    if len(stream) != -(-total // 8) * 8 or "1" in stream[total:]:
+        raise FormatError(f"{len(data) - 2} bytes of joints, not {-(-total // 8)}, or bits after the end", "key")
+    if not coloured:
+        return links, [(a, b, 1) for a, b in pairs], 0 if framed else None, space
+    places = range(size, total, 3)
+    joints = [(a, b, int(stream[p : p + 3], 2) + 1) for (a, b), p in zip(pairs, places, strict=True)]
+    return links, joints, 0 if framed else None, space
+
+
+def _key_bytes(text: object) -> bytes:
+    if not isinstance(text, str):
+        raise FormatError(f"a key is a str, not {type(text).__name__}", "key")
+    if len(text) > 25_000:
+        raise FormatError(f"{len(text)} characters are more than the key of any graph", "key")
+    if not text.startswith(KEY_VERSION):
+        raise FormatError(f"a key of this version starts with {KEY_VERSION!r}", "key character 1")
+    body = text[1:]
+    try:
+        data = urlsafe_b64decode(body + "=" * (-len(body) % 4))
+    except (Base64Error, ValueError):
+        raise FormatError("a key is base64url text without padding", "key") from None
+    if len(data) < 2 or urlsafe_b64encode(data).decode("ascii").rstrip("=") != body:
+        raise FormatError("a key is base64url text without padding, two bytes at least", "key")
+    return data
