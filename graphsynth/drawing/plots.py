@@ -9,6 +9,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,25 +104,24 @@ def line_plot(
     return _themed(stream.getvalue())
 
 
-def _dress(axes: object, xlabel: str, ylabel: str, xticks: Sequence[float] | None, equal: bool) -> None:
+def _dress(axes: Any, xlabel: str, ylabel: str, xticks: Sequence[float] | None, equal: bool) -> None:
     """Label the axes, put a light grid behind and a legend above the curves."""
-    ax: object = axes
     ink, soft = _COLOURS["ink"], _COLOURS["soft"]
-    ax.set_xlabel(xlabel, color=ink)  # type: ignore[attr-defined]
-    ax.set_ylabel(ylabel, color=ink)  # type: ignore[attr-defined]
-    ax.tick_params(colors=ink, which="both")  # type: ignore[attr-defined]
-    for spine in ax.spines.values():  # type: ignore[attr-defined]
+    axes.set_xlabel(xlabel, color=ink)
+    axes.set_ylabel(ylabel, color=ink)
+    axes.tick_params(colors=ink, which="both")
+    for spine in axes.spines.values():
         spine.set_color(soft)
-    ax.grid(True, color=soft, alpha=0.3, lw=0.6)  # type: ignore[attr-defined]
+    axes.grid(True, color=soft, alpha=0.3, lw=0.6)
     if equal:
-        ax.set_aspect("equal", adjustable="datalim")  # type: ignore[attr-defined]
+        axes.set_aspect("equal", adjustable="datalim")
     else:
-        ax.margins(x=0)  # type: ignore[attr-defined]
+        axes.margins(x=0)
     if xticks is not None:
-        ax.set_xticks(list(xticks))  # type: ignore[attr-defined]
-    handles, labels = ax.get_legend_handles_labels()  # type: ignore[attr-defined]
+        axes.set_xticks(list(xticks))
+    handles, labels = axes.get_legend_handles_labels()
     if labels:
-        legend = ax.legend(  # type: ignore[attr-defined]
+        legend = axes.legend(
             handles,
             labels,
             loc="lower left",

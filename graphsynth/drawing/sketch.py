@@ -20,8 +20,8 @@ __all__ = ["STYLE", "Sketch", "number"]
 
 #: Light and dark values of every colour a drawing may use. Hues from the Okabe-Ito palette, safe for colour blindness.
 STYLE = (
-    ".gs{--ink:#1b2733;--soft:#8794a1;--paper:#ffffff;--link:#1b2733;--fill:#dbe4ee;--a:#0072b2;--b:#d55e00;--c:#009e73;"
-    "--jam:#d55e00;font-family:system-ui,-apple-system,'Segoe UI',Roboto,sans-serif}"
+    ".gs{--ink:#1b2733;--soft:#8794a1;--paper:#ffffff;--link:#1b2733;--fill:#dbe4ee;--a:#0072b2;--b:#d55e00;"
+    "--c:#009e73;--jam:#d55e00;font-family:system-ui,-apple-system,'Segoe UI',Roboto,sans-serif}"
     "@media (prefers-color-scheme:dark){.gs{--ink:#e6edf3;--soft:#8b98a5;--paper:#12181f;--link:#e6edf3;--fill:#2b3a49;"
     "--a:#56b4e9;--b:#f0a060;--c:#3ecf9f;--jam:#f0883e}}"
 )
@@ -199,7 +199,8 @@ class Sketch:
             dashes = f' stroke-dasharray="{dash}"' if dash else ""
             self._add(
                 "path",
-                f'd="{data}" fill="none" stroke="var(--{colour})" stroke-width="{number(width)}" stroke-linejoin="round"{dashes}',
+                f'd="{data}" fill="none" stroke="var(--{colour})" stroke-width="{number(width)}" '
+                f'stroke-linejoin="round"{dashes}',
             )
 
     def dot(self, point: Point, colour: str = "a", radius: float = 3.5) -> None:
@@ -245,7 +246,8 @@ class Sketch:
         fill, ink = ("var(--ink)", "var(--paper)") if filled else ("var(--paper)", "var(--ink)")
         self._add(
             "circle",
-            f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}" fill="{fill}" stroke="var(--ink)" stroke-width="1.6"',
+            f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}" fill="{fill}" stroke="var(--ink)" '
+            'stroke-width="1.6"',
         )
         self._add(
             "text",

@@ -15,10 +15,13 @@ if TYPE_CHECKING:
 __all__ = ["report_html"]
 
 _CSS = """
-:root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;--good:#00735a;--bad:#b34700}
-@media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#9aa7b4;--paper:#12181f;--card:#1a222b;--rule:#323d48;--good:#3ecf9f;--bad:#f0883e}}
+:root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;
+--good:#00735a;--bad:#b34700}
+@media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#9aa7b4;--paper:#12181f;--card:#1a222b;--rule:#323d48;
+--good:#3ecf9f;--bad:#f0883e}}
 *{box-sizing:border-box}
-body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+body{margin:0;background:var(--paper);color:var(--ink);
+font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
 main{max-width:66rem;margin:0 auto;padding:1.25rem 1rem 3rem}
 h1{font-size:1.65rem;line-height:1.2;margin:.4rem 0 .5rem;text-wrap:balance}
 h2{font-size:1.2rem;margin:2.2rem 0 .6rem;border-bottom:1px solid var(--rule);padding-bottom:.25rem}
@@ -33,17 +36,21 @@ td.num{white-space:nowrap}
 .facts{display:flex;flex-wrap:wrap;gap:.6rem;margin:1rem 0;padding:0;list-style:none}
 .facts li{background:var(--card);border-radius:.5rem;padding:.55rem .9rem;min-width:7.5rem}
 .facts b{display:block;font-size:1.3rem;line-height:1.25}
-.facts .bad{color:var(--bad)}.facts .good{color:var(--good)}
+.bad b,b.bad{color:var(--bad)}.good b,b.good{color:var(--good)}
+.verdict{font-size:1.15rem}
 .facts span{color:var(--soft);font-size:.85rem}
-.pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,24rem),1fr));gap:1.2rem;align-items:start}
-.sheet{display:grid;grid-template-columns:repeat(auto-fill,minmax(9.5rem,1fr));gap:.7rem}
+.pictures{display:grid;grid-template-columns:repeat(12,1fr);gap:.9rem;align-items:stretch;margin-top:.9rem}
 figure{margin:0;background:var(--card);border-radius:.5rem;padding:.7rem}
+figure{grid-column:span 6;display:flex;flex-direction:column}
 figure.wide{grid-column:1/-1}
+figure.small{grid-column:span 4}
+.sheet figure.small{grid-column:span 2}
+@media (max-width:50rem){figure{grid-column:1/-1}
+figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 4}}
 figure .gs{--paper:var(--card)}
 figure svg{display:block;width:100%;height:auto;margin:0 auto}
-figure.wide svg{max-width:52rem}
-.pictures figure:not(.wide) svg{max-width:30rem}
-figcaption{margin-top:.4rem}figcaption b{color:var(--ink)}
+figure.wide svg{max-width:44rem;max-height:32rem}
+figcaption{margin-top:auto;padding-top:.4rem}figcaption b{color:var(--ink)}
 details{margin:.6rem 0}summary{cursor:pointer;font-weight:600}
 code{font-size:.85em;overflow-wrap:anywhere}
 """
@@ -90,19 +97,26 @@ def _facts(report: Report) -> str:
         facts += [(str(len(records)), "candidate mechanisms", ""), (str(len(assessed)), "assessed", "")]
         if failed:
             facts.append((str(failed), "failed", "bad"))
-        for verdict in dict.fromkeys(r.verdict for r in assessed if r.verdict):
-            facts.append((verdict, "verdict", "bad" if "jam" in verdict.lower() else "good"))
     facts.append((f"{sum(t.seconds + t.import_seconds for t in report.times):.2f} s", "all stages", ""))
     items = "".join(
         f'<li><b class="{tone}">{escape(value)}</b><span>{escape(name)}</span></li>' for value, name, tone in facts
     )
-    return f'<ul class="facts">{items}</ul>'
+    return f'<ul class="facts">{items}</ul>{_verdicts(records)}'
+
+
+def _verdicts(records: Iterable[Record]) -> str:
+    """Print each verdict once, in words and colour."""
+    tones = {True: "good", False: "bad", None: ""}
+    verdicts = dict.fromkeys((r.recognised_as, r.verdict, r.good) for r in records if r.status == "assessed")
+    return "".join(
+        f'<p class="verdict {tones[good]}"><b>{escape(verdict)}</b> <span class="soft">{escape(module)}</span></p>'
+        for module, verdict, good in verdicts
+    )
 
 
 def _figure(picture: Picture) -> str:
-    wide = ' class="wide"' if picture.wide else ""
     return (
-        f"<figure{wide}>{picture.svg}<figcaption><b>{escape(picture.title)}</b>"
+        f'<figure class="{picture.size}">{picture.svg}<figcaption><b>{escape(picture.title)}</b>'
         f"{'. ' if picture.caption else ''}{escape(picture.caption)}</figcaption></figure>"
     )
 
@@ -120,7 +134,7 @@ def _sheet(pictures: Iterable[Picture]) -> str:
         "By adjacency levels: the frame on top, below it the links jointed to it, and so on. "
         "A line is a joint of mobility 1, a dashed line one of mobility 2."
     )
-    return f'<h2>Candidate graphs</h2><p class="soft">{note}</p><div class="sheet">{figures}</div>'
+    return f'<h2>Candidate graphs</h2><p class="soft">{note}</p><div class="pictures sheet">{figures}</div>'
 
 
 def _table(table: Table) -> str:

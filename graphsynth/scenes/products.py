@@ -1,4 +1,4 @@
-"""What stages hand to one another and to the report: plain frozen data, without numbers that do not say how they were had."""
+"""What stages hand to one another and to the report: plain frozen data in which a number says how it was had."""
 
 from __future__ import annotations
 
@@ -73,6 +73,8 @@ class Record:
     ----------
     status : {"assessed", "not recognised", "failed"}
         A candidate no module recognises is not a failure; a failed one carries its reason.
+    good : bool or None
+        Whether the verdict is what a designer hopes for; None if there is none.
     """
 
     number: int
@@ -81,6 +83,7 @@ class Record:
     status: Literal["assessed", "not recognised", "failed"]
     recognised_as: str = ""
     verdict: str = ""
+    good: bool | None = None
     margins: tuple[Quantity, ...] = ()
     reason: str = ""
 
@@ -97,12 +100,12 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An inline SVG with a title and a caption; `wide` pictures take the full width of the page."""
+    """An inline SVG with a title and a caption, and the place it takes on the page: small ones stand in rows."""
 
     title: str
     svg: str
     caption: str = ""
-    wide: bool = False
+    size: Literal["small", "normal", "wide"] = "normal"
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,8 @@ def _write_whole(path: Path, text: str) -> None:
 def results_csv(records: tuple[Record, ...]) -> str:
     """Return the records as CSV (RFC 4180): one row per candidate, three columns per margin.
 
-    For a margin ``m`` the columns are ``m [unit]``, ``m guarantee`` and ``m error [unit]``; an empty cell means not computed.
+    For a margin ``m`` the columns are ``m [unit]``, ``m guarantee`` and ``m error [unit]``; an empty cell means
+    not computed.
     """
     margins: dict[str, str] = {}
     for record in records:

@@ -81,7 +81,8 @@ def run(
     out : str or Path, optional
         The folder for ``report.html``, ``results.csv`` and ``scene.json``; ``graphsynth-out/<scene>`` by default.
     executor : concurrent.futures.Executor, optional
-        Where stages that can work in parallel do so; without one everything runs in this process. The result is the same.
+        Where stages that can work in parallel do so; without one everything runs here. The result is
+        the same.
     progress : callable, optional
         Called as ``progress(stage, done, total)``.
 
@@ -120,7 +121,7 @@ def run_stages(
     A product nobody needs any more is dropped at once, so memory holds what is in use.
     """
     products: dict[str, Any] = {}
-    times = []
+    times: list[StageTime] = []
     for done, stage in enumerate(stages):
         if progress:
             progress(stage.name, done, len(stages))

@@ -234,7 +234,12 @@ class Scene:
         place = Place(source)
         if not isinstance(tables, Mapping):
             raise place.error("must hold tables")
-        known = {"scene": SceneTable, "structure": StructureTable, "mechanism": None, "outputs": OutputsTable}
+        known: dict[str, type | None] = {
+            "scene": SceneTable,
+            "structure": StructureTable,
+            "mechanism": None,  # chosen by its module, below
+            "outputs": OutputsTable,
+        }
         for key in tables:
             if key not in known:
                 raise place.error(f"has an unknown table [{key}]{nearest(str(key), known)}")
@@ -298,9 +303,10 @@ def find_scene(name_or_path: str | Path) -> Path:
         shipped = folder / f"{name_or_path}.toml"
         if path.name == str(name_or_path) and shipped.is_file():
             return shipped
+    hint = nearest(path.stem, available_scenes())
     raise SceneError(
-        f"no scene {str(name_or_path)!r}: neither a .toml file nor a shipped scene{nearest(path.stem, available_scenes())}"
-        f" (shipped: {', '.join(available_scenes())})"
+        f"no scene {str(name_or_path)!r}: neither the path of a .toml file nor one of the shipped scenes "
+        f"{', '.join(map(repr, available_scenes()))}{hint if 'mean' in hint else ''}"
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from graphsynth.scenes.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each
 from graphsynth.scenes.scene import LambdaTable
@@ -88,8 +88,8 @@ def jamming(context: Context, motions: tuple[Attempt, ...]) -> tuple[Attempt, ..
     table = _table(context)
     bearing = Bearing(table.bearing.radius_mm, table.bearing.height_mm, table.bearing.clearance_mm)
 
-    def assess(motion: LambdaMotion) -> dict[str, JammingReport]:
-        return {c: assess_jamming(motion.linkage, bearing, c, motion.tilted.f) for c in ("A", "B")}  # type: ignore[arg-type]
+    def assess(motion: LambdaMotion) -> dict[Literal["A", "B"], JammingReport]:
+        return {c: assess_jamming(motion.linkage, bearing, c, motion.tilted.f) for c in _CONDITIONS}
 
     return each(motions, assess)
 
@@ -100,9 +100,9 @@ def judge(
     """Give one record per candidate and the tables of the first one assessed."""
     condition = _table(context).bearing.condition
 
-    def verdict(reports: dict[str, JammingReport]) -> tuple[str, tuple[Quantity, ...]]:
+    def verdict(reports: dict[Literal["A", "B"], JammingReport]) -> tuple[str, bool, tuple[Quantity, ...]]:
         report = reports[condition]
-        return f"{report.verdict.value}, condition {condition}", _margins(report)
+        return f"{report.verdict.value}, condition {condition}", report.verdict.is_free, _margins(report)
 
     records = records_of(recognised, assessments, verdict)
     done = next((a for a in assessments if not a.failed), None)
@@ -125,20 +125,20 @@ def _margins(report: JammingReport) -> tuple[Quantity, ...]:
     return tuple(Quantity(name, value, unit) for name, value, unit in values if value is not None)
 
 
-def _jam_table(reports: dict[str, JammingReport]) -> Table:
+def _jam_table(reports: dict[Literal["A", "B"], JammingReport]) -> Table:
     """Lay the two contact conditions side by side."""
     margins = {c: {q.name: q.text for q in _margins(r)} for c, r in reports.items()}
     names = dict.fromkeys(name for values in margins.values() for name in values)
     rows = [("verdict", *(r.verdict.value for r in reports.values()))]
-    for i in range(max(len(r.arcs.arcs) for r in reports.values())):
-        rows.append((f"jam arc {i + 1}", *(_arc_text(r, i) for r in reports.values())))
+    arcs = max(len(r.arcs.arcs) for r in reports.values())
+    rows += [(f"jam arc {i + 1}", *(_arc_text(r, i) for r in reports.values())) for i in range(arcs)]
     rows += [(name, *(values.get(name, "no limit") for values in margins.values())) for name in names]
     method = next(iter(reports.values())).method
     columns = ("", *(f"condition {c} ({_CONDITIONS[c]})" for c in reports))
     return Table("Jamming of the bearing at B", columns, tuple(rows), f"How had: {method}.")
 
 
-_CONDITIONS = {"A": "short bearing in a long hole", "B": "long shaft in a short hole"}
+_CONDITIONS: dict[Literal["A", "B"], str] = {"A": "short bearing in a long hole", "B": "long shaft in a short hole"}
 
 
 def _arc_text(report: JammingReport, i: int) -> str:

@@ -25,7 +25,9 @@ def _picture(item: Recognised) -> Picture:
     caption = (
         f"Recognised as {item.module}; {item.candidate.solution}, levels of {_sizes(graph)} links" if known else ""
     )
-    return Picture(title, draw_levels(graph, 460 if known else 210, f"{title}, by levels"), caption, wide=known)
+    return Picture(
+        title, draw_levels(graph, 460 if known else 210, f"{title}, by levels"), caption, "wide" if known else "small"
+    )
 
 
 def _sizes(graph: object) -> str:

@@ -10,6 +10,9 @@ from graphsynth.scenes.products import Attempt, Candidate, Quantity, Recognised,
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
+#: Words, whether they are good news, and margins, from the value of an outcome.
+Verdict = Callable[[Any], tuple[str, bool, tuple[Quantity, ...]]]
+
 __all__ = ["UNKNOWN", "recognise_by_key", "records_of"]
 
 #: The reason of a candidate that no module knows: not a failure.
@@ -26,21 +29,19 @@ def recognise_by_key(candidates: tuple[Candidate, ...], known: MechanismGraph, m
 def records_of(
     recognised: tuple[Recognised, ...],
     outcomes: tuple[Attempt, ...],
-    verdict: Callable[[Any], tuple[str, tuple[Quantity, ...]]],
+    verdict: Verdict,
 ) -> tuple[Record, ...]:
-    """Return one record per candidate, in their order; `verdict` turns the value of an outcome into words and margins."""
+    """Return one record per candidate, in their order; `verdict` reads the value of an outcome."""
     by_number = {outcome.candidate.number: outcome for outcome in outcomes}
     return tuple(_record(item, by_number.get(item.candidate.number), verdict) for item in recognised)
 
 
-def _record(
-    item: Recognised, outcome: Attempt | None, verdict: Callable[[Any], tuple[str, tuple[Quantity, ...]]]
-) -> Record:
+def _record(item: Recognised, outcome: Attempt | None, verdict: Verdict) -> Record:
     candidate = item.candidate
     number, key, solution = candidate.number, candidate.graph.key, candidate.solution
     if outcome is None or item.module is None:
         return Record(number, key, solution, "not recognised", reason=item.reason)
     if outcome.failed:
         return Record(number, key, solution, "failed", item.module, reason=outcome.reason)
-    words, margins = verdict(outcome.value)
-    return Record(number, key, solution, "assessed", item.module, words, margins)
+    words, good, margins = verdict(outcome.value)
+    return Record(number, key, solution, "assessed", item.module, words, good, margins)
