@@ -45,7 +45,7 @@ def _segment(s: Array) -> Array:
 
 def _segment_difference(difference: Array, total: Array) -> Array:
     """``segment(a) - segment(b)`` from ``a - b`` and ``a + b``."""
-    return _xms(difference) + 2.0 * np.sin(difference) * np.sin(0.5 * total) ** 2
+    return np.asarray(_xms(difference) + 2.0 * np.sin(difference) * np.sin(0.5 * total) ** 2)
 
 
 def ellipse_circle(R1: ArrayLike, a: ArrayLike, b: ArrayLike) -> CrescentAreas:
