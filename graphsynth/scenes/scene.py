@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from graphsynth.errors import FormatError, SceneError
-from graphsynth.scenes.tables import Place, nearest, read_table
+from graphsynth.scenes.tables import Place, read_table, suggest
+from graphsynth.structure.variables import nearest
 
 __all__ = [
     "MECHANISMS",
@@ -242,7 +243,7 @@ class Scene:
         }
         for key in tables:
             if key not in known:
-                raise place.error(f"has an unknown table [{key}]{nearest(str(key), known)}")
+                raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}")
         for key in known:
             if key not in tables:
                 raise place.error(f"lacks the table [{key}]")
@@ -259,9 +260,9 @@ def _mechanism_schema(table: object, place: Place) -> type:
         raise place.error("must be a table")
     module = table.get("module")
     if not isinstance(module, str):
-        raise place.error(f"lacks the key 'module'{nearest('', MECHANISMS)}")
+        raise place.error(f"lacks the key 'module'{suggest('', MECHANISMS)}")
     if module not in MECHANISMS:
-        raise place.error(f"has module = {module!r}, which no room provides{nearest(module, MECHANISMS)}")
+        raise place.error(f"has module = {module!r}, which no room provides{suggest(module, MECHANISMS)}")
     return MECHANISMS[module]
 
 
@@ -303,10 +304,9 @@ def find_scene(name_or_path: str | Path) -> Path:
         shipped = folder / f"{name_or_path}.toml"
         if path.name == str(name_or_path) and shipped.is_file():
             return shipped
-    hint = nearest(path.stem, available_scenes())
     raise SceneError(
         f"no scene {str(name_or_path)!r}: neither the path of a .toml file nor one of the shipped scenes "
-        f"{', '.join(map(repr, available_scenes()))}{hint if 'mean' in hint else ''}"
+        f"{', '.join(map(repr, available_scenes()))}{nearest(path.stem, available_scenes())}"
     )
 
 

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.scene import Scene
-from graphsynth.scenes.tables import Place, nearest
+from graphsynth.scenes.tables import Place, suggest
 
 __all__ = ["Context", "Progress", "Stage", "StageFunction", "load", "registry", "resolve"]
 
@@ -148,9 +148,9 @@ def resolve(stages: Iterable[Stage], outputs: Sequence[str], place: Place | None
         if giver is None:
             if path:
                 raise SceneError(
-                    f"{at}stage {path[-1]!r} needs {product!r}, which no stage gives{nearest(product, givers)}"
+                    f"{at}stage {path[-1]!r} needs {product!r}, which no stage gives{suggest(product, givers)}"
                 )
-            raise SceneError(f"{at}asks for {product!r}, which no stage gives{nearest(product, givers)}")
+            raise SceneError(f"{at}asks for {product!r}, which no stage gives{suggest(product, givers)}")
         if giver in order:
             return
         if giver.name in path:

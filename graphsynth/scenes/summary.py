@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from graphsynth.scenes.products import Record, Table
 
 if TYPE_CHECKING:
     from graphsynth.scenes.runner import Report
+    from graphsynth.structure.assortment import LinkAssortment
 
 __all__ = ["summary_tables"]
 
@@ -31,20 +32,20 @@ def summary_tables(report: Report) -> tuple[Table, ...]:
     return tuple(tables)
 
 
-def _solutions_table(solutions: tuple[Any, ...]) -> Table:
-    """Lay out the integer solutions; variables that are the same in all of them are shown once, in the note."""
-    values = [solution_values(solution) for solution in solutions]
-    names = list(dict.fromkeys(name for value in values for name in value))
-    varying = [n for n in names if len(values) == 1 or len({value.get(n, 0) for value in values}) > 1]
-    rows = tuple((str(i + 1), *(str(value.get(n, 0)) for n in varying)) for i, value in enumerate(values))
-    common = ", ".join(f"{n} = {values[0].get(n, 0)}" for n in names if n not in varying) if values else ""
-    note = f"In all of them {common}." if common else ""
-    return Table(f"Integer solutions of the structural system: {len(values)}", ("no.", *varying), rows, note)
+def _solutions_table(solutions: tuple[LinkAssortment, ...]) -> Table:
+    """Lay out the integer solutions; of several, what is the same in all of them is said once, in the note."""
+    from graphsynth.structure.assortment import solutions_table
 
-
-def solution_values(solution: Any) -> dict[str, int]:
-    """Return the variables of a solution by name, ``n_a`` and ``p_i`` spelled out."""
-    return dict(solution.as_dict()) if hasattr(solution, "as_dict") else dict(solution)
+    header, rows = solutions_table(solutions)
+    several = len(rows) > 1
+    shown = [i for i, name in enumerate(header) if not several or len({row[i] for row in rows}) > 1]
+    common = ", ".join(f"{name} = {rows[0][i]}" for i, name in enumerate(header) if i not in shown) if rows else ""
+    return Table(
+        f"Integer solutions of the structural system: {len(rows)}",
+        tuple(header[i] for i in shown),
+        tuple(tuple(str(row[i]) for i in shown) for row in rows),
+        f"In all of them {common}." if common else "",
+    )
 
 
 def _verdict_table(records: tuple[Record, ...]) -> Table:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import math
 import re
 import types
@@ -19,8 +18,9 @@ from fractions import Fraction
 from typing import Any, Literal, TypeVar, Union
 
 from graphsynth.errors import SceneError
+from graphsynth.structure.variables import nearest
 
-__all__ = ["Place", "nearest", "read_table", "unknown"]
+__all__ = ["Place", "read_table", "suggest", "unknown"]
 
 T = TypeVar("T")
 
@@ -52,26 +52,23 @@ class Place:
         return SceneError(f"{self} {sentence}")
 
 
-def nearest(word: str, choices: Iterable[str]) -> str:
+def suggest(word: str, choices: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the nearest choice, or the list of choices if none is near.
 
     Examples
     --------
-    >>> nearest("lenghts", ["lengths", "tilt"])
+    >>> suggest("lenghts", ["lengths", "tilt"])
     "; did you mean 'lengths'?"
-    >>> nearest("colour", ["lengths", "tilt"])
+    >>> suggest("colour", ["lengths", "tilt"])
     "; known are 'lengths', 'tilt'"
     """
     names = sorted(choices)
-    close = difflib.get_close_matches(word, names, n=1)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return "; known are " + ", ".join(repr(name) for name in names) if names else ""
+    return nearest(word, names) or ("; known are " + ", ".join(map(repr, names)) if names else "")
 
 
 def unknown(place: Place, key: str, choices: Iterable[str]) -> SceneError:
     """Return the error for a key that the table at `place` does not have."""
-    return place.error(f"has an unknown key {key!r}{nearest(key, choices)}")
+    return place.error(f"has an unknown key {key!r}{suggest(key, choices)}")
 
 
 def read_table(schema: type[T], table: object, place: Place) -> T:
@@ -170,7 +167,7 @@ def _read_choice(choices: tuple[Any, ...], value: object, place: Place) -> Any:
             return choice
     hint = nearest(value, [c for c in choices if isinstance(c, str)]) if isinstance(value, str) else ""
     raise place.error(
-        f"must be one of {', '.join(map(repr, choices))}, not {_shown(value)}{hint if 'mean' in hint else ''}"
+        f"must be one of {', '.join(map(repr, choices))}, not {_shown(value)}{hint}"
     )
 
 

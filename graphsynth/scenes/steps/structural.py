@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from graphsynth.errors import SceneError, TooLargeError
+from graphsynth.errors import FormatError, SceneError, SpecError, TooLargeError
 from graphsynth.scenes.products import Candidate
 from graphsynth.scenes.stages import Context
 
@@ -22,13 +22,12 @@ def solve(context: Context) -> tuple[LinkAssortment, ...]:
 
 
 def _spec(context: Context) -> StructuralSpec:
-    from graphsynth.errors import SpecError
     from graphsynth.structure.spec import StructuralSpec
 
     place = context.scene.place / "structure" / "question"
     try:
-        return StructuralSpec.from_mapping(dict(context.scene.structure.question))
-    except SpecError as error:
+        return StructuralSpec.from_mapping(context.scene.structure.question)
+    except (FormatError, SpecError) as error:
         raise place.error(f"cannot be read: {error}") from error
 
 

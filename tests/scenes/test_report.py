@@ -1,0 +1,138 @@
+"""The report folder: whole files, escaped text, a table that says how each number was had."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from graphsynth.errors import SceneError
+from graphsynth.scenes.page import report_html
+from graphsynth.scenes.products import Attempt, Candidate, Picture, Quantity, Record, Table, each
+from graphsynth.scenes.report import results_csv, scene_json, write_report
+from graphsynth.scenes.runner import Report, StageTime, run_stages
+from graphsynth.scenes.scene import Scene
+from graphsynth.scenes.stages import Context, Stage
+
+RECORDS = (
+    Record(1, "k1", "n2=3", "assessed", "lambda_linkage", "free", True, (Quantity("gap", -0.25, "mm", "estimated", 1e-16),)),
+    Record(2, "k2", "n2=3", "not recognised", reason="no kinematic module yet recognises this graph"),
+    Record(3, "k3", 'a,"b"\n', "failed", "lambda_linkage", reason="ZeroDivisionError: <b>&"),
+)
+
+
+@pytest.fixture
+def report(lambda_tables: dict[str, Any]) -> Report:
+    lambda_tables["scene"]["title"] = "<script>alert(1)</script>"
+    scene = Scene.from_mapping(lambda_tables, "x.toml", "ab" * 32)
+    products = {
+        "records": RECORDS,
+        "tables": (Table("T & T", ("a", "b"), (("<i>", "1"),), "note <"),),
+        "mechanism_pictures": (Picture("P", '<svg xmlns="http://www.w3.org/2000/svg" class="gs"></svg>', "<c>"),),
+    }
+    return Report(scene, products, (StageTime("solve", 0.5, 0.25),), {"python": "3"})
+
+
+class Balance(HTMLParser):
+    """Fails on unbalanced tags, foreign resources and unescaped titles."""
+
+    VOID = frozenset({"meta", "br", "hr", "img", "link", "input", "path", "circle"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag not in ("script", "link", "img", "iframe")
+        assert not any(name in ("src", "onload") for name, _ in attrs)
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_page_is_balanced_escaped_and_self_contained(report: Report) -> None:
+    page = report_html(report)
+    parser = Balance()
+    parser.feed(page)
+    assert parser.open == []
+    assert "&lt;script&gt;" in page and "<i>" not in page and "<c>" not in page
+    assert "url(" not in page and "@import" not in page
+    assert 'name="viewport"' in page and "prefers-color-scheme:dark" in page
+
+
+def test_csv_has_one_row_per_candidate_and_says_how_each_number_was_had() -> None:
+    rows = list(csv.DictReader(io.StringIO(results_csv(RECORDS), newline="")))
+    assert [row["number"] for row in rows] == ["1", "2", "3"]
+    assert float(rows[0]["gap [mm]"]) == -0.25
+    assert (rows[0]["gap guarantee"], rows[0]["gap error [mm]"]) == ("estimated", "1e-16")
+    assert rows[1]["gap [mm]"] == "" and rows[1]["reason"].startswith("no kinematic module")
+    assert rows[2]["solution"] == 'a,"b"\n' and rows[2]["status"] == "failed"
+
+
+def test_scene_json_holds_scene_versions_seed_and_times(report: Report) -> None:
+    content = json.loads(scene_json(report))
+    assert content["scene"]["mechanism"]["tilt"]["alpha_rad"] == "1/30"
+    assert content["sha256"] == "ab" * 32 and content["seed"] == 0
+    assert content["stages"] == [{"stage": "solve", "import_seconds": 0.5, "seconds": 0.25}]
+
+
+def test_files_appear_whole_or_not_at_all(report: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_report(report, tmp_path / "out")
+    before = (tmp_path / "out" / "results.csv").read_bytes()
+
+    def full_disk(self: Path, target: object) -> Path:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full_disk)
+    with pytest.raises(SceneError, match=r"cannot write the report into .*No space left.*another folder"):
+        write_report(report, tmp_path / "out")
+    assert (tmp_path / "out" / "results.csv").read_bytes() == before
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["report.html", "results.csv", "scene.json"]
+
+
+def test_out_that_is_a_file_is_refused(report: Report, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("x")
+    with pytest.raises(SceneError, match="choose another folder"):
+        write_report(report, tmp_path / "taken")
+
+
+def test_one_bad_candidate_does_not_stop_the_others() -> None:
+    attempts = [Attempt(Candidate(i, None, ""), value) for i, value in enumerate((4.0, 0.0, 2.0))]
+    first = each(attempts, lambda x: 1 / x)
+    second = each(first, lambda x: x + 1)
+    assert [a.value for a in second] == [1.25, None, 1.5]
+    assert [a.failed for a in second] == [False, True, False]
+    assert second[1].reason == "ZeroDivisionError: float division by zero"
+
+
+def test_stages_run_once_in_order_and_unneeded_products_are_dropped(lambda_tables: dict[str, Any]) -> None:
+    told: list[tuple[str, int, int]] = []
+    stages = (
+        Stage("one", f"{__name__}:one", (), ("x",)) if __name__ in __import__("sys").modules else None,
+        Stage("two", f"{__name__}:two", ("x",), ("y", "z")),
+    )
+    if stages[0] is None:
+        pytest.skip("test module is not importable by name in this import mode")
+    context = Context(Scene.from_mapping(lambda_tables))
+    products, times = run_stages(stages, ("z",), context, lambda s, d, n: told.append((s, d, n)))
+    assert products == {"z": "z1"}
+    assert [t.stage for t in times] == ["one", "two"] and all(t.seconds >= 0 for t in times)
+    assert told == [("one", 0, 2), ("two", 1, 2), ("done", 2, 2)]
+
+
+def one(context: Context) -> int:
+    return 1
+
+
+def two(context: Context, x: int) -> tuple[str, str]:
+    return f"y{x}", f"z{x}"
