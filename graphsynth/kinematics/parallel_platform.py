@@ -1,0 +1,261 @@
+"""The planar three-leg parallel platform (3-RRR): inverse problem, Jacobians, statics, all assembly modes.
+
+Points of the plane are complex numbers; a pose is ``(x, y, alpha)``.  Angles in radians, lengths in one common unit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array, positive
+from graphsynth.kinematics.assembly_modes import AssemblyModeBatch, AssemblyModes, assembly_modes, assembly_modes_batch
+from graphsynth.kinematics.leg import LegStatus, sensitivity, solve_leg
+
+__all__ = ["WORKING_MODES", "InverseSolution", "ParallelPlatform"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: The eight working modes (sigma_1, sigma_2, sigma_3), in the order of the second last axis of `InverseSolution.theta`.
+WORKING_MODES: NDArray[np.int64] = np.array([[a, b, c] for a in (1, -1) for b in (1, -1) for c in (1, -1)])
+
+
+@dataclass(frozen=True, eq=False)
+class InverseSolution:
+    """Rocker angles of every leg and their reach.
+
+    Attributes
+    ----------
+    theta : ndarray, shape (..., 8, 3) or (..., 3)
+        Rocker angles in (-pi, pi]: all eight working modes in the order of ``WORKING_MODES``, or the one asked for.
+        NaN for a leg out of reach or free; see ``status``.
+    status : ndarray of int8, shape (..., 3)
+        `LegStatus` of every leg.
+    deficit : ndarray, shape (..., 3)
+        Signed distance missing (positive) or margin left (negative).
+    S : ndarray, shape (..., 3)
+        Magnitude of the Jacobian entry ``JT_kk``; 0 on the boundary of the reach, NaN beyond it.
+    sensitivity : ndarray, shape (..., 3)
+        Bound of ``|d theta| / |dF|``; infinite on the boundary.
+    """
+
+    theta: Array
+    status: NDArray[np.int8]
+    deficit: Array
+    S: Array
+    sensitivity: Array
+
+    @property
+    def reachable(self) -> NDArray[np.bool_]:
+        """True where all three legs reach the pose with a definite angle, shape (...)."""
+        return np.asarray((self.status <= LegStatus.BOUNDARY).all(axis=-1))
+
+
+def _points(name: str, values: Any) -> tuple[complex, complex, complex]:
+    array = np.asarray(values, dtype=np.complex128)
+    if array.shape != (3,):
+        raise GeometryError(f"{name} has shape {array.shape}; give three complex numbers, one per leg")
+    for leg, value in enumerate(array, start=1):
+        if not np.isfinite(value):
+            raise GeometryError(f"{name} of leg {leg} is {value}; give a finite point")
+    return (complex(array[0]), complex(array[1]), complex(array[2]))
+
+
+def _lengths(name: str, values: Any) -> tuple[float, float, float]:
+    array = np.broadcast_to(np.asarray(values, dtype=np.float64), (3,))
+    first, second, third = (positive(f"{name} of leg {leg}", value, zero=True) for leg, value in enumerate(array, 1))
+    return (first, second, third)
+
+
+@dataclass(frozen=True)
+class ParallelPlatform:
+    """Three legs, each a rocker on the base and an intermediate link to a vertex of the moving platform.
+
+    Parameters
+    ----------
+    D : sequence of 3 complex
+        Rocker pivots in the fixed frame.
+    b : sequence of 3 complex
+        Platform vertices in the platform frame.
+    l1, l2 : float or sequence of 3 floats
+        Rocker arms and intermediate links, zero or more.
+
+    Raises
+    ------
+    GeometryError
+        A negative or NaN length, a point that is not finite; the message names the leg.
+
+    Notes
+    -----
+    Specification parallel_platform, sections 2 to 5.  All batch methods take poses of shape (..., 3) and angles of
+    shape (..., 3) and broadcast.
+
+    Examples
+    --------
+    >>> platform = ParallelPlatform.g1()
+    >>> platform.inverse([1.2, 0.9, 0.15], sigma=(1, 1, 1)).theta.round(6).tolist()
+    [1.820204, -2.644475, -0.161983]
+    """
+
+    D: tuple[complex, complex, complex]
+    b: tuple[complex, complex, complex]
+    l1: tuple[float, float, float]
+    l2: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "D", _points("D", self.D))
+        object.__setattr__(self, "b", _points("b", self.b))
+        object.__setattr__(self, "l1", _lengths("l1", self.l1))
+        object.__setattr__(self, "l2", _lengths("l2", self.l2))
+
+    @classmethod
+    def g1(cls) -> ParallelPlatform:
+        """Return the generic asymmetric reference platform G1 (section 2.5; no unit)."""
+        return cls(
+            (0, 2.5 + 0.2j, 1.1 + 2.3j), (-0.4 - 0.25j, 0.45 - 0.3j, 0.05 + 0.5j), (0.9, 1.0, 0.8), (1.1, 0.95, 1.05)
+        )
+
+    @classmethod
+    def mock(cls) -> ParallelPlatform:
+        """Return the symmetric mock-up MOCK-RECT (sections 2.5 and 8.2; millimetres)."""
+        turn = leg_directions()
+        return cls(tuple((105 + 45j) * turn), tuple(45 * turn), (45.0,) * 3, (60.0,) * 3)
+
+    def vertices(self, pose: ArrayLike) -> Complex:
+        """Platform vertices F_k in the fixed frame, shape (..., 3), for poses (..., 3)."""
+        X = finite_array("pose", pose)
+        return np.asarray(_complex(X)[..., None] + np.exp(1j * X[..., 2:3]) * np.array(self.b))
+
+    def elbows(self, theta: ArrayLike) -> Complex:
+        """Joints A_k between rocker and intermediate link, shape (..., 3), for rocker angles (..., 3)."""
+        theta = np.asarray(theta, dtype=np.float64)
+        return np.asarray(np.array(self.D) + np.array(self.l1) * np.exp(1j * theta))
+
+    def inverse(self, pose: ArrayLike, sigma: ArrayLike | None = None) -> InverseSolution:
+        """Rocker angles for poses (..., 3): all eight working modes, or the mode ``sigma`` (section 3).
+
+        Angles are accurate to a few 1e-16 rad for the vertices as computed, also for extreme length ratios and beside
+        the boundary of the reach.  A leg out of reach gives NaN and a status, never a clipped angle.
+
+        Raises
+        ------
+        GeometryError
+            A pose that is not finite, or a sigma that is not made of +1 and -1.
+        """
+        w = self.vertices(pose) - np.array(self.D)
+        leg = solve_leg(w.real, w.imag, np.array(self.l1), np.array(self.l2))
+        if sigma is None:
+            theta = np.stack([leg.angle(mode) for mode in WORKING_MODES], axis=-2)
+        else:
+            mode = np.asarray(sigma)
+            if not bool(np.all(np.abs(mode) == 1)) or mode.shape[-1:] != (3,):
+                raise GeometryError(f"sigma = {sigma!r} must hold three entries +1 or -1, the working mode")
+            theta = leg.angle(mode)
+        return InverseSolution(theta, leg.status, leg.deficit, leg.S, sensitivity(leg, np.array(self.l2)))
+
+    def closure(self, pose: ArrayLike, theta: ArrayLike) -> Array:
+        """Residuals ``f_k = |F_k - A_k|^2 - l2_k^2``, shape (..., 3), unit length^2."""
+        gap = np.abs(self.vertices(pose) - self.elbows(theta))
+        l2 = np.array(self.l2)
+        return np.asarray((gap - l2) * (gap + l2))
+
+    def jacobians(self, pose: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
+        """Exact partial derivatives of the closure (section 4.1).
+
+        Returns
+        -------
+        JX : ndarray, shape (..., 3, 3)
+            ``df/dX``; columns in length, length, length^2.
+        JT : ndarray, shape (..., 3)
+            Diagonal of ``df/dtheta``; on the closure ``JT_k = sigma_k S_k``.
+        """
+        X = finite_array("pose", pose)
+        d = self.vertices(X) - self.elbows(theta)
+        arm = np.exp(1j * X[..., 2:3]) * np.array(self.b)
+        rocker = np.array(self.l1) * np.exp(1j * np.asarray(theta, dtype=np.float64))
+        JX = 2.0 * np.stack([d.real, d.imag, _cross(arm, d)], axis=-1)
+        return JX, np.asarray(-2.0 * _cross(rocker, d))
+
+    def determinant(self, pose: ArrayLike, theta: ArrayLike) -> Array:
+        """``det JX``, shape (...), unit length^4; zero at a type-II singularity."""
+        return np.asarray(np.linalg.det(self.jacobians(pose, theta)[0]))
+
+    def working_mode(self, pose: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
+        """Working mode (..., 3) of closed poses from the sign of JT; 0 on the boundary of the reach."""
+        return np.asarray(np.sign(self.jacobians(pose, theta)[1]), dtype=np.int64)
+
+    def velocity_matrix(self, pose: ArrayLike, theta: ArrayLike) -> Array:
+        """``J = -JX^-1 JT``: platform velocity per unit rocker speed, shape (..., 3, 3).
+
+        Raises
+        ------
+        GeometryError
+            At an exactly singular pose (type II), where J does not exist.
+        """
+        JX, JT = self.jacobians(pose, theta)
+        try:
+            return np.asarray(np.linalg.solve(JX, -JT[..., None, :] * np.eye(3)))
+        except np.linalg.LinAlgError as error:
+            raise GeometryError("det JX = 0: the platform is singular (type II) and has no velocity matrix") from error
+
+    def scaled_velocity_matrix(self, pose: ArrayLike, theta: ArrayLike, Lc: float) -> Array:
+        """``diag(1/Lc, 1/Lc, 1) J`` with the characteristic length ``Lc`` (section 4.3), dimensionless."""
+        Lc = positive("Lc", Lc)
+        return np.asarray(self.velocity_matrix(pose, theta) / np.array([Lc, Lc, 1.0])[:, None])
+
+    def accelerations(
+        self, pose: ArrayLike, theta: ArrayLike, rate: ArrayLike, rate2: ArrayLike
+    ) -> tuple[Array, Array]:
+        """X' and X'' for given theta' and theta'' with respect to any parameter (section 4.2), shapes (..., 3)."""
+        X = finite_array("pose", pose)
+        t1, t2 = np.asarray(rate, dtype=np.float64), np.asarray(rate2, dtype=np.float64)
+        JX, JT = self.jacobians(X, theta)
+        first = np.linalg.solve(JX, -(JT * t1)[..., None])[..., 0]
+        rocker = np.array(self.l1) * np.exp(1j * np.asarray(theta, dtype=np.float64))
+        arm = np.exp(1j * X[..., 2:3]) * np.array(self.b)
+        d = self.vertices(X) - self.elbows(theta)
+        turn = first[..., 2:3]
+        speed = _complex(first)[..., None] + 1j * arm * turn - 1j * rocker * t1  # F' - A'
+        push = rocker * (1j * t2 - t1 * t1) + arm * turn * turn
+        right = 2.0 * ((np.conj(d) * push).real - np.abs(speed) ** 2)
+        return first, np.asarray(np.linalg.solve(JX, right[..., None])[..., 0])
+
+    def rocker_torques(self, pose: ArrayLike, theta: ArrayLike, wrench: ArrayLike) -> Array:
+        """Torques ``J^T W`` at the rockers that balance the wrench W exerted by the platform (section 4.4)."""
+        J = self.velocity_matrix(pose, theta)
+        return np.asarray(np.einsum("...ij,...i->...j", J, np.asarray(wrench, dtype=np.float64)))
+
+    def direct(self, theta: ArrayLike) -> AssemblyModes:
+        """All assembly modes for rocker angles ``theta``, shape (3,) (section 5).
+
+        An empty list is a valid answer.  Near a type-II singularity the computation continues at 50 digits and says so.
+        """
+        theta = finite_array("theta", theta).reshape(3)
+        return assembly_modes(
+            self.elbows(theta), np.array(self.b), np.array(self.l2), arms=(self.D, self.l1, tuple(theta))
+        )
+
+    def direct_batch(self, theta: ArrayLike) -> AssemblyModeBatch:
+        """All assembly modes for many rocker angles, shape (N, 3); problems that need escalation are flagged."""
+        theta = np.atleast_2d(finite_array("theta", theta))
+        return assembly_modes_batch(self.elbows(theta), np.array(self.b), np.array(self.l2))
+
+
+def leg_directions() -> Complex:
+    """``exp(i beta_k)`` for beta = -150, -30, 90 degrees, correctly rounded."""
+    half, root = 0.5, 0.5 * math.sqrt(3.0)
+    return np.array([complex(-root, -half), complex(root, -half), 1j])
+
+
+def _complex(X: Array) -> Complex:
+    return np.asarray(X[..., 0] + 1j * X[..., 1])
+
+
+def _cross(a: Complex, b: Complex) -> Array:
+    return np.asarray(a.real * b.imag - a.imag * b.real)
