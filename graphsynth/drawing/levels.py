@@ -12,11 +12,12 @@ if TYPE_CHECKING:
 __all__ = ["draw_levels", "level_order"]
 
 
-def level_order(graph: MechanismGraph, sweeps: int = 8) -> tuple[tuple[int, ...], ...]:
+def level_order(graph: MechanismGraph, sweeps: int = 12) -> tuple[tuple[int, ...], ...]:
     """Order the links inside each adjacency level so that edges cross little.
 
     The barycentre heuristic (Sugiyama, Tagawa and Toda 1981): each level in turn is sorted by the mean position of its
-    neighbours, down and up. Ties keep the order of link numbers, so the result depends on the graph alone.
+    neighbours, down and up, and the order with the fewest crossings of all passes is kept. Ties go to link numbers, so
+    the result depends on the graph alone.
 
     Parameters
     ----------
@@ -26,26 +27,54 @@ def level_order(graph: MechanismGraph, sweeps: int = 8) -> tuple[tuple[int, ...]
         Passes down and up.
     """
     levels = [list(level) for level in graph.levels]
+    edges = [(joint.a, joint.b) for joint in graph.joints]
     neighbours: dict[int, list[int]] = {link: [] for link in range(graph.links)}
-    for joint in graph.joints:
-        neighbours[joint.a].append(joint.b)
-        neighbours[joint.b].append(joint.a)
+    for a, b in edges:
+        neighbours[a].append(b)
+        neighbours[b].append(a)
     place: dict[int, float] = {}
     for level in levels:
         _spread(level, place)
+    best, fewest = tuple(map(tuple, levels)), _tangle(edges, graph, place)
     for sweep in range(sweeps):
         for level in levels[1:] if sweep % 2 == 0 else reversed(levels[1:]):
-            level.sort(
-                key=lambda link: (round(sum(place[n] for n in neighbours[link]) / len(neighbours[link]), 9), link)
-            )
-            _spread(level, place)
-    return tuple(map(tuple, levels))
+            _sort_level(level, neighbours, place)
+        tangle = _tangle(edges, graph, place)
+        if tangle < fewest:
+            best, fewest = tuple(map(tuple, levels)), tangle
+    return best
 
 
 def _spread(level: list[int], place: dict[int, float]) -> None:
     """Give the links of a level evenly spaced positions around 0."""
     for i, link in enumerate(level):
         place[link] = i - (len(level) - 1) / 2
+
+
+def _sort_level(level: list[int], neighbours: dict[int, list[int]], place: dict[int, float]) -> None:
+    """Sort a level by the mean position of each link's neighbours, its own level included."""
+    mean = {link: round(sum(place[n] for n in neighbours[link]) / len(neighbours[link]), 9) for link in level}
+    level.sort(key=lambda link: (mean[link], link))
+    _spread(level, place)
+
+
+def _tangle(edges: list[tuple[int, int]], graph: MechanismGraph, place: dict[int, float]) -> float:
+    """Count crossings of edges between levels; an edge inside a level costs half of each link it passes over."""
+    depth = {link: k for k, level in enumerate(graph.levels) for link in level}
+    between: dict[int, list[tuple[float, float]]] = {}
+    cost = 0.0
+    for a, b in edges:
+        if depth[a] == depth[b]:
+            cost += 0.5 * (abs(place[a] - place[b]) - 1)
+        else:
+            upper, lower = sorted((a, b), key=depth.__getitem__)
+            between.setdefault(depth[upper], []).append((place[upper], place[lower]))
+    for pairs in between.values():
+        pairs.sort()
+        cost += sum(
+            low > later for i, (up, low) in enumerate(pairs) for next_up, later in pairs[i + 1 :] if next_up > up
+        )
+    return cost
 
 
 def draw_levels(graph: MechanismGraph, width: float = 420.0, title: str = "") -> str:

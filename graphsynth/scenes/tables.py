@@ -166,9 +166,7 @@ def _read_choice(choices: tuple[Any, ...], value: object, place: Place) -> Any:
         if type(choice) is type(value) and choice == value:
             return choice
     hint = nearest(value, [c for c in choices if isinstance(c, str)]) if isinstance(value, str) else ""
-    raise place.error(
-        f"must be one of {', '.join(map(repr, choices))}, not {_shown(value)}{hint}"
-    )
+    raise place.error(f"must be one of {', '.join(map(repr, choices))}, not {_shown(value)}{hint}")
 
 
 def _read_tuple(kinds: tuple[Any, ...], value: object, place: Place) -> tuple[Any, ...]:

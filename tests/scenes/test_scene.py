@@ -29,7 +29,11 @@ def test_lambda_scene_has_the_published_dimensions() -> None:
         2.5,
     )
     assert mechanism.tilt.alpha_rad == 1 / 30
-    assert (mechanism.bearing.radius_mm, mechanism.bearing.height_mm, mechanism.bearing.clearance_mm) == (17.5, 10, 0.03)
+    assert (mechanism.bearing.radius_mm, mechanism.bearing.height_mm, mechanism.bearing.clearance_mm) == (
+        17.5,
+        10,
+        0.03,
+    )
 
 
 def test_unknown_scene_names_the_available_ones() -> None:

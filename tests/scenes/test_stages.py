@@ -62,7 +62,7 @@ def test_random_pipelines_are_minimal_and_ordered(data: st.DataObject) -> None:
 def test_every_registered_stage_can_be_loaded_and_resolved(module: str) -> None:
     stages = registry(module)
     products = [product for s in stages for product in s.gives]
-    assert set(s.name for s in resolve(stages, products)) == {s.name for s in stages}
+    assert {s.name for s in resolve(stages, products)} == {s.name for s in stages}
     assert all(callable(load(s)) for s in stages)
     assert all(a.name != b.name for a, b in pairwise(sorted(stages, key=lambda s: s.name)))
 
