@@ -68,7 +68,8 @@ def is_variable(symbol: str) -> bool:
     family = _FAMILY.fullmatch(symbol)
     if not family:
         return symbol in _LEAST
-    return str(int(family[2])) == family[2] and (family[1] == "n" or int(family[2]) <= 5)
+    kind = int(family[2])
+    return str(kind) == family[2] and (kind >= 2 if family[1] == "n" else 1 <= kind <= 5)
 
 
 def read_range(symbol: str, value: Any) -> Range:
