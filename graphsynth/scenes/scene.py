@@ -159,6 +159,8 @@ class PlatformTable:
     crank_mm: tuple[float, float, float]
     crank_phase_rad: tuple[float, float, float]
     rocker_angle_deg: float
+    pinion_teeth: int
+    wheel_teeth: int
     drive_branch: Literal[1, -1] = 1
     working_mode: tuple[Literal[1, -1], Literal[1, -1], Literal[1, -1]] = (-1, -1, -1)
     positions: int = 360
@@ -166,6 +168,8 @@ class PlatformTable:
     def __post_init__(self) -> None:
         for name in ("arm_mm", "intermediate_mm", "rocker_mm", "coupler_mm"):
             _require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
+        for name in ("pinion_teeth", "wheel_teeth"):
+            _require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a gear needs teeth")
         _require(min(self.crank_mm) >= 0, f"has crank_mm = {list(self.crank_mm)}; a crank must not be negative")
         _check_positions(self.positions)
 

@@ -27,7 +27,7 @@ def sketches(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, .
     motion = _first(motions)
     if motion is None:
         return ()
-    count = len(motion.psi) - 1
+    count = len(motion.motion.psi) - 1
     chosen = [round(i * count / _SHOWN) for i in range(_SHOWN)]
     caption = (
         "Wheel angle 0. The pinion in the middle turns three wheels; a crank pin B on each drives a coupler BC and the "
@@ -36,21 +36,22 @@ def sketches(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, .
     )
     pictures = [Picture("The single-motor platform", _sketch(motion, 0, 640, True), caption, "wide")]
     for i in chosen:
-        name = f"Wheel at {degrees(float(motion.psi[i]))}"
+        name = f"Wheel at {degrees(float(motion.motion.psi[i]))}"
         pictures.append(Picture(name, _sketch(motion, i, 270, False), "", "small"))
     return tuple(pictures)
 
 
 def _sketch(motion: PlatformMotion, i: int, width: float, labels: bool) -> str:
     """Draw one position: pitch circles and ground, then the links leg by leg, the platform, the joints."""
-    O, B, C, D, A, F = (points[i] for points in (motion.O, motion.B, motion.C, motion.D, motion.A, motion.F))
+    O, D = motion.O, motion.D
+    B, C, A, F = (points[i] for points in (motion.B, motion.C, motion.A, motion.F))
     lower, upper = _box(motion)
     sketch = Sketch(
         lower,
         upper,
         width,
         margin=34 if labels else 18,
-        title=f"Single-motor platform, wheel at {degrees(float(motion.psi[i]))}",
+        title=f"Single-motor platform, wheel at {degrees(float(motion.motion.psi[i]))}",
     )
     thick = 4.0 if labels else 2.6
     ring = 5.0 if labels else 3.2
@@ -90,7 +91,7 @@ def _label_leg(sketch: Sketch, *points: complex) -> None:
 
 def _box(motion: PlatformMotion) -> tuple[complex, complex]:
     points = [p for group in (motion.D, motion.A, motion.C, motion.F) for p in group.ravel() if cmath.isfinite(p)]
-    points += [o + motion.wheel_radius * d for o in motion.O[0] for d in (1, -1, 1j, -1j)]
+    points += [o + motion.wheel_radius * d for o in motion.O for d in (1, -1, 1j, -1j)]
     return (
         complex(min(p.real for p in points), min(p.imag for p in points)),
         complex(max(p.real for p in points), max(p.imag for p in points)),
@@ -106,19 +107,20 @@ def plots(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, ...]
 
     from graphsynth.drawing.plots import Line, line_plot
 
-    psi, ticks = np.degrees(motion.psi), tuple(range(0, 361, 45))
-    x, y, alpha = motion.poses.T
+    turn = motion.motion
+    psi, ticks = np.degrees(turn.psi), tuple(range(0, 361, 45))
+    x, y, alpha = turn.pose.T
     path = line_plot([Line(x, y)], "x [mm]", "y [mm]", equal=True)
     shift = line_plot(
         [Line(psi, x, "x", "a"), Line(psi, y, "y", "b", "--")], "wheel angle [°]", "displacement [mm]", xticks=ticks
     )
-    turn = line_plot([Line(psi, np.degrees(alpha))], "wheel angle [°]", "rotation [°]", xticks=ticks)
-    relative = motion.determinant / abs(motion.determinant[0])
+    swing = line_plot([Line(psi, np.degrees(alpha))], "wheel angle [°]", "rotation [°]", xticks=ticks)
+    relative = turn.determinant / abs(turn.determinant[0])
     zero = Line((), 0.0, "singular", "jam", "--")
     far = line_plot([Line(psi, relative)], "wheel angle [°]", "det JX / |det JX at 0|", xticks=ticks, levels=[zero])
     return (
         Picture("Path of the platform's centre", path),
         Picture("Displacement", shift),
-        Picture("Rotation", turn),
+        Picture("Rotation", swing),
         Picture("Distance from singular poses", far, "The platform is held as long as the determinant keeps its sign."),
     )
