@@ -121,13 +121,14 @@ def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Cre
     return CrescentAreas(*(np.where(defined, area, np.nan) for area in areas))
 
 
-def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, G0: Array, d: Array) -> Array:
-    """Crescent of the disc of radius R outside the lid ellipse with centre d, on the near side with gap ``G0 > 0``."""
-    p, q = Rh * C, Rh
-    k = (S / C) ** 2 / (q * q)
-    H = k * R + d / (p * p)
-    G = G0 * (R + d + p) / (p * p)
-    m = G / (H + np.sqrt(np.maximum(H * H - k * G, 0.0)))
+def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, h: float) -> Array:
+    """Crescent of the disc of radius R outside the lid ellipse, on the side with ``gap > 0``; h < 0 is the far side.
+
+    The discriminant of section 5.4 simplifies: ``H^2 - k G = (S wB / (C q^2))^2`` with ``wB`` of section 4.7, so that
+    the crossing point needs neither a division by C nor a subtraction.
+    """
+    p, q, d = Rh * C, Rh, h * S
+    m = gap * (R + d + p) / (S * (R * S + h + C * math.sqrt(h * h + ring)))
     X, y = R - m, np.sqrt(np.maximum(m * (2.0 * R - m), 0.0))
     s1, s2 = np.arctan2(y, X), np.arctan2(y / q, (d + X) / p)
     thin = q * S * S / (1.0 + C)  # q - p
@@ -146,9 +147,9 @@ def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     gap, p, d = bearing.gap(S, C, "B"), Rh * C, h * S
     missed = (d - p >= R) | (p <= 0.0)
     area = np.zeros(S.shape)
-    for near, centre in ((gap, d), (np.asarray(R - d - p), -d)):
+    for near, side in ((gap, h), (np.asarray(R - d - p), -h)):
         use = (near > 0.0) & ~missed
-        area[use] += _lid_side(R, Rh, ring, S[use], C[use], near[use], centre[use])
+        area[use] += _lid_side(R, Rh, ring, S[use], C[use], near[use], side)
     return np.where(missed, disc, np.minimum(area, disc))
 
 
@@ -182,10 +183,9 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
 
 
 def _rim_side(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, gap: Array) -> Array:
-    p, d, cc = R * C, h * S, C * C
-    H = S * (h - Rh * S) / cc
-    G = gap * (p + Rh - d) / cc
-    m = G / (H + np.sqrt(np.maximum(H * H + (S / C) ** 2 * G, 0.0)))
+    """Crescent of the rim outside the hole; the discriminant of section 5.4 is ``(S wA / C)^2``."""
+    p, d = R * C, h * S
+    m = gap * (p + Rh - d) / (S * (h - Rh * S + C * math.sqrt(max(h * h - ring, 0.0))))
     x, y = Rh - m, np.sqrt(np.maximum(m * (2.0 * Rh - m), 0.0))
     s1, s2 = np.arctan2(y, x), np.arctan2(y / R, (x - d) / p)
     bend = S * S / (1.0 + C)

@@ -161,7 +161,7 @@ def _batch(A: Complex, b: Complex, l2: Array) -> AssemblyModeBatch:
     s = sextic(As - origin, bs, ls)
     roots = real_roots(s)
     i = roots.problem
-    pose, size = _poses(s, i, roots.alpha, np.zeros(i.size), bs[i, 0])
+    pose, size = _poses(s, i, roots.alpha, np.zeros(i.size, dtype=np.complex128), bs[i, 0])
     flagged = roots.near_double.copy()
     usable = size > 1e-12
     flagged[i[~usable]] = True

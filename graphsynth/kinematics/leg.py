@@ -86,7 +86,7 @@ def _sum3(terms: list[Array]) -> Array:
 
 
 def _dot2(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """``a b + c d`` without cancellation error from the products."""
+    """Return ``a b + c d`` without cancellation error from the products."""
     p, e = _two_product(a, b)
     q, f = _two_product(c, d)
     total, rest = _two_sum(p, q)
@@ -120,10 +120,13 @@ def solve_leg(u: ArrayLike, v: ArrayLike, l1: ArrayLike, l2: ArrayLike) -> LegSo
     >>> LegStatus(int(leg.status)).name, round(float(leg.angle(-1)), 12)
     ('REACHABLE', -0.0)
     """
-    u, v, l1, l2 = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (u, v, l1, l2)))
-    largest = np.maximum(np.maximum(np.abs(u), np.abs(v)), np.maximum(l1, l2))
-    exponent = np.frexp(largest)[1]
-    u, v, l1, l2 = (np.ldexp(x, -exponent) for x in (u, v, l1, l2))  # exact: no overflow in the squares
+    given = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (u, v, l1, l2)))
+    exponent = np.frexp(np.max(np.abs(np.stack(given)), axis=0))[1]
+    scaled: list[Array] = [np.asarray(np.ldexp(x, -exponent)) for x in given]  # exact: no overflow in the squares
+    return _solve_scaled(scaled[0], scaled[1], scaled[2], scaled[3], exponent)
+
+
+def _solve_scaled(u: Array, v: Array, l1: Array, l2: Array, exponent: NDArray[np.int32]) -> LegSolution:
     C, P1, P2 = _discriminants(u, v, l1, l2)
     rho = np.hypot(u, v)
     far, near = _quotient(-P1, rho + (l1 + l2)), _quotient(-P2, rho + np.abs(l1 - l2))

@@ -216,7 +216,7 @@ class ParallelPlatform:
         X = finite_array("pose", pose)
         t1, t2 = np.asarray(rate, dtype=np.float64), np.asarray(rate2, dtype=np.float64)
         JX, JT = self.jacobians(X, theta)
-        first = np.linalg.solve(JX, -(JT * t1)[..., None])[..., 0]
+        first = np.asarray(np.linalg.solve(JX, -(JT * t1)[..., None])[..., 0], dtype=np.float64)
         rocker = np.array(self.l1) * np.exp(1j * np.asarray(theta, dtype=np.float64))
         arm = np.exp(1j * X[..., 2:3]) * np.array(self.b)
         d = self.vertices(X) - self.elbows(theta)

@@ -59,7 +59,7 @@ def sextic(anchors: Complex, vertices: Complex, lengths: Array) -> Sextic:
     conj = np.conj
     a2, a3 = A[..., 1] - A[..., 0], A[..., 2] - A[..., 0]
     b2, b3 = b[..., 1] - b[..., 0], b[..., 2] - b[..., 0]
-    L = l2[..., 0] ** 2
+    L: Array = np.asarray(l2[..., 0] ** 2)
 
     def offset(k: int, a: Complex, c: Complex) -> Array:
         legs = (l2[..., k] - l2[..., 0]) * (l2[..., k] + l2[..., 0])
@@ -70,12 +70,12 @@ def sextic(anchors: Complex, vertices: Complex, lengths: Array) -> Sextic:
     n1 = w20 * b3 - w21 * a3 - w30 * b2 + w31 * a2
     n0 = -w20 * a3 + conj(w21) * b3 + w30 * a2 - conj(w31) * b2
     nm = -conj(w21) * a3 + conj(w31) * a2
-    d0 = 2j * (conj(b2) * b3 + conj(a2) * a3).imag
+    d0: Complex = np.asarray(2j * (conj(b2) * b3 + conj(a2) * a3).imag, dtype=np.complex128)
     de = b2 * conj(a3) - conj(a2) * b3
     g3 = n2 * conj(nm)
     g2 = n2 * conj(n0) + n1 * conj(nm) + L * de * de
     g1 = n2 * conj(n1) + n1 * conj(n0) + n0 * conj(nm) + 2.0 * L * d0 * de
-    squares = _square(n2) + _square(n1) + _square(n0) + _square(nm)
+    squares: Array = _square(n2) + _square(n1) + _square(n0) + _square(nm)
     g0 = squares - L * (_square(d0) + 2.0 * _square(de))
     return Sextic((g0, g1, g2, g3), (n2, n1, n0, nm), (d0, de))
 

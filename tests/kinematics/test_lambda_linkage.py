@@ -275,8 +275,14 @@ angles = st.floats(-7.0, 7.0)
 
 @settings(max_examples=150, deadline=None)
 @given(
-    lengths, lengths, lengths, lengths, st.sampled_from((1, -1)), st.floats(-1.4, 1.4),
-    st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 1)), angles,
+    lengths,
+    lengths,
+    lengths,
+    lengths,
+    st.sampled_from((1, -1)),
+    st.floats(-1.4, 1.4),
+    st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 1)),
+    angles,
 )
 def test_against_fifty_digits(l1, l2, l3, l4, sgn, alpha, axis, f):
     linkage = LambdaLinkage(l1, l2, l3, l4, sgn, alpha=alpha, axis=axis)
