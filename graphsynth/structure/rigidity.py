@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.errors import TooLargeError
 from graphsynth.structure.levels import bits
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ __all__ = ["GenericMobility", "PebbleGame", "RigidSubchain", "find_rigid_subchai
 
 #: Rank is taken over the integers modulo this prime (2^31 - 1), so that products fit in 64 bits.
 _PRIME = 2_147_483_647
+#: Largest number of entries of a loop matrix: some seconds of elimination.
+_ENTRIES_MAX = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +232,7 @@ remove or free one of the joints 0-1, 0-2, 1-2
     """
     if not first_violation(graph.links, graph.joints, graph.space):
         return None
-    bodies = _bodies(graph)
+    bodies = rigid_bodies(graph.links, graph.joints, graph.space)
     body = max(bodies, key=int.bit_count)  # the first of the largest
     culprit = _minimal(graph, first_violation(graph.links, graph.joints, graph.space, body))
     return RigidSubchain(
@@ -237,15 +240,26 @@ remove or free one of the joints 0-1, 0-2, 1-2
     )
 
 
-def _bodies(graph: MechanismGraph) -> list[int]:
-    """Return the rigid components of two links or more as bit masks, in the order of their smallest link."""
-    space = graph.space
-    game = PebbleGame([space] * graph.links)
-    for a, b, mobility in graph.joints:
-        for _ in range(space - mobility):
-            game.insert(a, b, space)
+def rigid_bodies(links: int, joints: Iterable[Sequence[int]], space: int, within: int = -1) -> list[int]:
+    """Return the sets of two links or more that generically move as one body, as bit masks (exact).
+
+    Parameters
+    ----------
+    links, joints, space, within
+        As in :func:`first_violation`.
+
+    Examples
+    --------
+    >>> rigid_bodies(6, [(0, 1, 1), (1, 2, 1), (0, 2, 1), (2, 3, 1), (3, 4, 1), (4, 5, 1), (0, 5, 1)], 3)
+    [7]
+    """
+    game = PebbleGame([space] * links)
+    for a, b, mobility in joints:
+        if within >> a & 1 and within >> b & 1:
+            for _ in range(space - mobility):
+                game.insert(a, b, space)
     bodies: list[int] = []
-    for link in range(graph.links):
+    for link in bits(within & (1 << links) - 1):
         for place, body in enumerate(bodies):
             # Two links have Pi + 1 free pebbles between them exactly when they can move relative to each other.
             if not game.gather((body & -body).bit_length() - 1, link, space + 1):
@@ -290,6 +304,11 @@ def generic_mobility(graph: MechanismGraph, seed: int = 0) -> GenericMobility:
     GenericMobility
         Exact with probability at least ``1 - failure_bound``; never too small.
 
+    Raises
+    ------
+    TooLargeError
+        If the loop matrix has more than a million entries (a dense graph of more than about 60 links).
+
     Examples
     --------
     The triangle is rigid; the second brace of a square is redundant.
@@ -300,6 +319,12 @@ def generic_mobility(graph: MechanismGraph, seed: int = 0) -> GenericMobility:
     >>> generic_mobility(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3), (0, 2), (1, 3)])).redundant_constraints
     3
     """
+    entries = graph.space * graph.loops * graph.sub_edges
+    if entries > _ENTRIES_MAX:
+        raise TooLargeError(
+            f"the loop matrix has {entries} entries, more than {_ENTRIES_MAX}; use rigid_subchain(), which counts",
+            float(entries),
+        )
     matrix = _loop_matrix(graph, seed)
     rank = _rank(matrix)
     parts = len(graph.components)

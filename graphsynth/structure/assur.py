@@ -1,0 +1,447 @@
+"""Assur groups: decomposition of a mechanism, and the tests for Assur groups and Baranov trusses.
+
+A driver takes one freedom from its joint; a driven joint of mobility 1 makes one body of its two links.  With the
+bodies so formed, a *group* is a smallest set S of bodies not yet placed with Pi |S| constraints in the joints
+between S and what is placed or inside S: placing what it hangs on places it, and no part of it alone.
+
+Assign every constraint to one of its two bodies so that each moving body gets exactly Pi of them.  Let a body depend on
+the other ends of its constraints.  A set that depends on nothing outside itself and what is placed is a zero-mobility
+set, and the reverse; so the groups are the strongly connected components of this relation and the
+decomposition is unique, whatever the assignment (Dulmage-Mendelsohn).  The assignment is a flow, found with the pebble
+game.
+
+A driver away from the frame can lock a loop of moving links (a hydraulic cylinder in a boom): such links are one body
+of their group, assembled first, from *floating* groups that hang on one of its links.
+
+Sources: L. V. Assur (1914); I. I. Artobolevsky, *Theory of Mechanisms and Machines*, on class and order;
+C. Galletti, *A note on modular approaches to planar linkage kinematic analysis*, Mech. Mach. Theory 21 (1986);
+O. Shai, A. Sljoka and W. Whiteley, *Directed graphs, decompositions, and spatial linkages*, Discrete Appl. Math. 161
+(2013) 3028-3047.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from graphsynth.errors import GraphError
+from graphsynth.structure.levels import bits
+from graphsynth.structure.rigidity import PebbleGame, is_sparse, rigid_bodies
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import Joint, MechanismGraph
+
+__all__ = ["AssurGroup", "Decomposition", "Fault", "decompose", "find_fault", "is_assur_group", "is_baranov_truss"]
+
+_ROMAN = ("", "I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X")
+
+
+@dataclass(frozen=True, slots=True)
+class AssurGroup:
+    """One structural group of a mechanism.
+
+    Parameters
+    ----------
+    links : tuple of int
+        Links of the group, ascending.
+    inner, outer : tuple of Joint
+        Joints inside the group, and joints to links placed before it.
+    group_class : int
+        Class: the largest number of joints on a contour of the group (see :func:`contour_class`); 2 for a dyad.
+    order : int
+        Order: the number of outer joints.
+    stage : int
+        1 for a group that hangs on the frame and the driven links only, else one more than the latest it hangs on.
+    bodies : tuple of tuple of int
+        The links by body; a body has several links only where drivers inside the group lock them.
+    floating : tuple of AssurGroup
+        Groups that assemble the bodies of several links, each body on its smallest link; they come before the group.
+    """
+
+    links: tuple[int, ...]
+    inner: tuple[Joint, ...]
+    outer: tuple[Joint, ...]
+    group_class: int
+    order: int
+    stage: int
+    bodies: tuple[tuple[int, ...], ...]
+    floating: tuple[AssurGroup, ...] = ()
+
+    def __str__(self) -> str:
+        links = ", ".join(map(str, self.links))
+        text = f"class {_roman(self.group_class)} order {self.order}: links {links}"
+        return f"{text} ({', '.join(map(str, self.floating))})" if self.floating else text
+
+
+@dataclass(frozen=True, slots=True)
+class Decomposition:
+    """A mechanism as drivers and structural groups in the order of assembly.
+
+    Parameters
+    ----------
+    drivers : tuple of Joint
+        Joints whose motion is given.
+    driven : tuple of int
+        Links that the drivers place together with the frame, the frame included.
+    groups : tuple of AssurGroup
+        Each hangs on the frame, driven links and groups before it; among those that could come next, the one with the
+        smallest link comes first.
+    """
+
+    drivers: tuple[Joint, ...]
+    driven: tuple[int, ...]
+    groups: tuple[AssurGroup, ...]
+
+    @property
+    def mechanism_class(self) -> int:
+        """The highest class of a group; 1 when there is none."""
+        return max((group.group_class for group in self.groups), default=1)
+
+    def __str__(self) -> str:
+        steps = "; ".join(map(str, self.groups)) or "no groups"
+        return f"mechanism of class {_roman(self.mechanism_class)}: {steps}"
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Why a mechanism with these drivers has no decomposition.
+
+    Parameters
+    ----------
+    kind : {"drivers", "over-constrained"}
+        The number of drivers is not the mobility; or a set of links has too many constraints and others too few.
+    links : tuple of int
+        The set concerned (for "drivers", the links that remain free, if any).
+    message : str
+        The sentence shown to the user.
+    """
+
+    kind: str
+    links: tuple[int, ...]
+    message: str
+
+
+class _System:
+    """Bodies, constraints between them, and their assignment to bodies.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+    drivers : tuple of Joint
+    base : int
+        Link that is placed from the start: the frame, or a link of a floating body.
+    within : int, optional
+        Bit mask of the links that count; all by default.
+    """
+
+    def __init__(self, graph: MechanismGraph, drivers: tuple[Joint, ...], base: int, within: int = -1) -> None:
+        self.graph = graph
+        self.drivers = drivers
+        self.body_of = self._bodies(drivers)
+        self.placed = self.body_of[base]
+        #: (body, body, mobility left, joint); a driven joint keeps one freedom less.
+        self.constraints = [
+            (self.body_of[j.a], self.body_of[j.b], j.mobility - (j in drivers), j)
+            for j in graph.joints
+            if within >> j.a & within >> j.b & 1 and not (j.mobility == 1 and j in drivers)
+        ]
+        moving = {body for link, body in enumerate(self.body_of) if within >> link & 1 and body != self.placed}
+        self.moving = sorted(moving)
+        self.game = PebbleGame(graph.space if link in moving else 0 for link in range(graph.links))
+
+    def _bodies(self, drivers: tuple[Joint, ...]) -> list[int]:
+        """Return for each link the smallest link of its body."""
+        body_of = list(range(self.graph.links))
+        for a, b, mobility in drivers:
+            if mobility == 1:
+                low, high = sorted((body_of[a], body_of[b]))
+                body_of = [low if body == high else body for body in body_of]
+        return body_of
+
+    def assign(self) -> int:
+        """Assign the constraints; return a bit mask of bodies that have too many, or 0."""
+        refused = 0
+        for a, b, mobility, _ in self.constraints:
+            for _ in range(self.graph.space - mobility):
+                # A constraint inside one body is one too many whatever the assignment.
+                if (a == b or not self.game.insert(a, b, 0)) and not refused:
+                    refused = self.game.reach(a, b)
+        return refused
+
+    def links_of(self, bodies: Iterable[int]) -> tuple[int, ...]:
+        wanted = set(bodies)
+        return tuple(link for link, body in enumerate(self.body_of) if body in wanted)
+
+    def free(self) -> tuple[int, ...]:
+        """Return the links whose place the constraints leave open."""
+        loose = [body for body in self.moving if any(self.game.free[other] for other in bits(self.game.reach(body)))]
+        return self.links_of(loose)
+
+    def inner(self, group: int) -> list[tuple[int, int, int]]:
+        """Return the constraints ``(body, body, mobility)`` inside a set of bodies."""
+        return [(a, b, mobility) for a, b, mobility, _ in self.constraints if group >> a & group >> b & 1]
+
+    def groups(self) -> list[int]:
+        """Return the groups as bit masks of bodies, in the order of assembly."""
+        reach = {body: self.game.reach(body) for body in self.moving}
+        left: dict[int, int] = {}
+        for body in self.moving:
+            group = sum(1 << other for other in bits(reach[body]) if other in reach and reach[other] >> body & 1)
+            left[group] = reach[body]
+        placed = 1 << self.placed
+        ordered = []
+        while left:
+            # dicts keep the order of the smallest body
+            group = next(group for group, needs in left.items() if not needs & ~(group | placed))
+            del left[group]
+            placed |= group
+            ordered.append(group)
+        return ordered
+
+
+def find_fault(mechanism: MechanismGraph, drivers: Iterable[int | tuple[int, int]]) -> Fault | None:
+    """Return why a mechanism with these drivers cannot be decomposed, or None if it can (exact).
+
+    Parameters
+    ----------
+    mechanism : MechanismGraph
+        A graph with a frame.
+    drivers : iterable of int or (int, int)
+        Driven joints: a link stands for its joint with the frame, a pair for the joint between the two links.
+
+    Raises
+    ------
+    GraphError
+        If there is no frame, or a driver is not a joint or is given twice.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> find_fault(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), [1, 3]).message
+    'mobility 1 needs 1 driver, not 2; links 2 have too many constraints'
+    """
+    return _assign(_start(mechanism, drivers))
+
+
+def _start(graph: MechanismGraph, drivers: Iterable[int | tuple[int, int]]) -> _System:
+    if graph.frame is None:
+        raise GraphError("structural groups hang on the frame, and this chain has none; use with_frame()")
+    return _System(graph, _resolve(graph, graph.frame, drivers), graph.frame)
+
+
+def _assign(system: _System) -> Fault | None:
+    """Assign the constraints of a fresh system; return what stands in the way of groups."""
+    graph, given = system.graph, len(system.drivers)
+    refused = system.assign()
+    too_many = system.links_of(bits(refused & ~(1 << system.placed))) or system.links_of(bits(refused))
+    free = system.free()
+    if graph.mobility != given:
+        text = f"mobility {graph.mobility} needs {graph.mobility} driver{'s' * (graph.mobility != 1)}, not {given}"
+        if graph.mobility < 0:
+            text = f"mobility {graph.mobility}: the structure is over-constrained and no choice of drivers helps"
+        text += f"; links {_list(too_many)} have too many constraints" if refused else ""
+        text += f"; links {_list(free)} remain free" if free else ""
+        return Fault("drivers", free, text)
+    if refused:
+        text = (
+            f"links {_list(too_many)} have too many constraints with these drivers, and links {_list(free)} remain free"
+        )
+        return Fault("over-constrained", too_many, text + "; drive another joint")
+    for group in system.groups():
+        # Moving bodies that no assignment can save: more than Pi (|S| - 1) constraints among themselves.
+        game = PebbleGame([graph.space] * graph.links)
+        for a, b, mobility in system.inner(group):
+            for _ in range(graph.space - mobility):
+                if not game.insert(a, b, graph.space):
+                    links = system.links_of(bits(game.reach(a, b)))
+                    text = f"moving links {_list(links)} have too many constraints among themselves; remove a joint"
+                    return Fault("over-constrained", links, text)
+    return None
+
+
+def decompose(mechanism: MechanismGraph, drivers: Iterable[int | tuple[int, int]]) -> Decomposition:
+    """Decompose a mechanism into its drivers and structural groups (exact; unique).
+
+    Parameters
+    ----------
+    mechanism : MechanismGraph
+        A graph with a frame; joints of mobility 2 and more (gears, cams) and any space Pi are allowed.
+    drivers : iterable of int or (int, int)
+        Driven joints: a link stands for its joint with the frame, a pair for the joint between the two links.
+
+    Returns
+    -------
+    Decomposition
+        Groups in the order of assembly.
+
+    Raises
+    ------
+    GraphError
+        If there is no frame, a driver is not a joint or is given twice, or :func:`find_fault` finds a fault; the
+        message names the links.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> print(decompose(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), [1]))
+    mechanism of class II: class II order 2: links 2, 3
+    """
+    system = _start(mechanism, drivers)
+    fault = _assign(system)
+    if fault:
+        raise GraphError(fault.message)
+    return Decomposition(system.drivers, system.links_of([system.placed]), _groups(system))
+
+
+def _groups(system: _System) -> tuple[AssurGroup, ...]:
+    """Describe the groups of a system whose constraints are assigned, in the order of assembly."""
+    stage_of = {system.placed: 0}
+    groups = []
+    for mask in system.groups():
+        group = _describe(system, mask, stage_of)
+        stage_of.update(dict.fromkeys(bits(mask), group.stage))
+        groups.append(group)
+    return tuple(groups)
+
+
+def _describe(system: _System, mask: int, stage_of: dict[int, int]) -> AssurGroup:
+    """Return the report on a group; ``stage_of`` holds the stages of the bodies placed before it."""
+    locked = rigid_bodies(system.graph.links, system.inner(mask), system.graph.space, mask)
+    merged = {body: min(bits(rigid)) for rigid in locked for body in bits(rigid)}
+    floating = tuple(group for rigid in locked for group in _assemble(system, rigid))
+    inner, outer, contours, stage = [], [], [], 0
+    for a, b, mobility, joint in system.constraints:
+        near, far = (a, b) if mask >> a & 1 else (b, a)
+        if mask >> a & mask >> b & 1:
+            inner.append(joint)
+            contours.append((merged.get(a, a), merged.get(b, b), mobility))
+        elif mask >> near & 1 and far in stage_of:
+            outer.append(joint)
+            contours.append((merged.get(near, near), -1, mobility))
+            stage = max(stage, stage_of[far])
+    own = contour_class((a, b, mobility) for a, b, mobility in contours if a != b)
+    bodies = [bits(rigid) for rigid in locked] + [[body] for body in bits(mask) if body not in merged]
+    return AssurGroup(
+        links=system.links_of(bits(mask)),
+        inner=tuple(inner),
+        outer=tuple(outer),
+        group_class=max([own, *(group.group_class for group in floating)]),
+        order=len(outer),
+        stage=stage + 1,
+        bodies=tuple(sorted(system.links_of(body) for body in bodies)),
+        floating=floating,
+    )
+
+
+def _assemble(system: _System, rigid: int) -> tuple[AssurGroup, ...]:
+    """Return the groups that assemble bodies rigid among themselves, on the smallest of them."""
+    links = system.links_of(bits(rigid))
+    part = _System(system.graph, system.drivers, links[0], sum(1 << link for link in links))
+    part.assign()
+    return _groups(part)
+
+
+def contour_class(joints: Iterable[tuple[int, int, int]]) -> int:
+    """Return the class of a group: the largest number of joints on one of its contours, 2 at least.
+
+    A contour is rigid, a link with three or more joints of the group; or movable, a closed loop of links of the
+    group.  Of the loops those of a minimum cycle basis count; their lengths do not depend on the basis.  A joint of
+    mobility 2 or more counts as a link with two joints in its place.
+
+    Parameters
+    ----------
+    joints : iterable of (a, b, mobility)
+        Inner joints, and outer joints with -1 for ``b``.
+
+    Examples
+    --------
+    A dyad, a triad on its ternary link, and four links in a loop:
+
+    >>> contour_class([(1, 2, 1), (1, -1, 1), (2, -1, 1)])
+    2
+    >>> contour_class([(0, 1, 1), (0, 2, 1), (0, 3, 1), (1, -1, 1), (2, -1, 1), (3, -1, 1)])
+    3
+    >>> contour_class([(0, 1, 1), (1, 2, 1), (2, 3, 1), (0, 3, 1), (0, -1, 1), (2, -1, 1)])
+    4
+    """
+    degree: dict[int, int] = {}
+    edges: list[tuple[object, object]] = []
+    for a, b, mobility in joints:
+        degree[a] = degree.get(a, 0) + 1
+        if b < 0:
+            continue
+        degree[b] = degree.get(b, 0) + 1
+        middle = ("joint", len(edges))
+        edges += [(a, b)] if mobility == 1 else [(a, middle), (middle, b)]
+    largest = max(2, *degree.values())
+    nodes = {node for edge in edges for node in edge}
+    if len(edges) < max(len(nodes), 1):
+        return largest  # inner joints without a loop
+    import networkx
+
+    return max(largest, *map(len, networkx.minimum_cycle_basis(networkx.Graph(edges))))
+
+
+def is_assur_group(graph: MechanismGraph) -> bool:
+    """Return whether a graph is a structural group with its frame as one link (exact).
+
+    Mobility 0, and DOF(S) >= 1 for every proper subset S of two links or more, with or without the frame.
+
+    Raises
+    ------
+    GraphError
+        If no frame is chosen.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> is_assur_group(MechanismGraph(3, [(0, 1), (1, 2), (0, 2)], frame=0))
+    True
+    """
+    if graph.frame is None:
+        raise GraphError("a structural group hangs on a frame, and this chain has none; use with_frame()")
+    return is_baranov_truss(graph)
+
+
+def is_baranov_truss(graph: MechanismGraph) -> bool:
+    """Return whether a graph is a Baranov truss: a group whichever link is made the frame (exact).
+
+    The condition does not mention the frame (mobility 0, and every proper subset of two links or more can move), so
+    one link that makes a group implies that each does.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> is_baranov_truss(MechanismGraph(3, [(0, 1), (1, 2), (0, 2)]))
+    True
+    >>> is_baranov_truss(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)]))
+    False
+    """
+    if graph.mobility != 0 or graph.links < 2:
+        return False
+    everything = (1 << graph.links) - 1
+    return all(is_sparse(graph, everything & ~(1 << link)) for link in range(graph.links))
+
+
+def _resolve(graph: MechanismGraph, frame: int, drivers: Iterable[int | tuple[int, int]]) -> tuple[Joint, ...]:
+    """Return the driven joints in the order given."""
+    by_pair = {(joint.a, joint.b): joint for joint in graph.joints}
+    found: list[Joint] = []
+    for driver in drivers:
+        pair = (frame, driver) if isinstance(driver, int) else (driver[0], driver[1])
+        joint = by_pair.get((min(pair), max(pair)))
+        if joint is None:
+            raise GraphError(f"links {pair[0]} and {pair[1]} have no joint to drive; name a joint of the graph")
+        if joint in found:
+            raise GraphError(f"joint {joint.a}-{joint.b} is driven twice")
+        found.append(joint)
+    return tuple(found)
+
+
+def _list(links: Iterable[int]) -> str:
+    return ", ".join(map(str, links)) or "none"
+
+
+def _roman(number: int) -> str:
+    return _ROMAN[number] if number < len(_ROMAN) else str(number)
