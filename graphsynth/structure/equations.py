@@ -104,6 +104,8 @@ def rows_of(problem: Problem, space: int, equations: Collection[str] = EQUATIONS
         _equation(7, [("G", -1), *freedoms]),
         Row(_TAIL, (("e", 1), ("k", -problem.largest_kind - 1)), 0, None),
     ]
+    if problem.link_limit is not None:
+        rows.append(Row(_TAIL, (("e", -1), ("k", problem.link_limit)), 0, None))
     rows = [row for row in rows if row.label in equations or row.label == _TAIL]
     consequences = (
         Row("", (("n", space), ("W", -1), *freedom), parents=(0, 1, 2, 7)),
@@ -186,6 +188,8 @@ def _limit_kinds(problem: Problem, domains: Domains, bounded_kinds: bool) -> boo
     for a in range(limit + 1, problem.largest_kind + 1):
         if a >= 2:
             domains[f"n{a}"] = _meet(domains[f"n{a}"], (0, 0))
+    if limit <= problem.largest_kind:
+        domains["k"] = domains["e"] = (0, 0)
     row = Row(_TAIL, (("e", -1), ("k", limit)), 0, None)
     empty = any(lo is not None and hi is not None and lo > hi for lo, hi in domains.values())
     return not empty and _tighten(row, domains)

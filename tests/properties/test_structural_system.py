@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth import StructuralSpec
-from graphsynth.errors import InfeasibleSpecError
+from graphsynth.errors import InfeasibleSpecError, SpecError
 
 MOST_LINKS, MOST_JOINTS = 5, 8
 PLAIN = ("W", "Pi", "n", "p", "v", "v_ct", "v_P", "t0", "G")
@@ -131,9 +131,12 @@ def expected(question, spaces, options):
     return oracle(question, spaces, options["fractionated"], options["max_joint_mobility"], most_joints)
 
 
-@settings(max_examples=300, deadline=None)
-@given(questions())
-def test_all_solutions_and_no_others_in_the_stated_order(case):
+@pytest.mark.parametrize("examples", [100, pytest.param(2000, marks=pytest.mark.slow)])
+def test_all_solutions_and_no_others_in_the_stated_order(examples):
+    settings(max_examples=examples, deadline=None)(given(questions())(compare))()
+
+
+def compare(case):
     question, spaces, options = case
     wanted = expected(question, spaces, options)
     try:
@@ -186,6 +189,31 @@ def test_a_contradiction_is_true_and_speaks_only_of_what_was_said(case):
     spoken = spaces if any(c.startswith("Pi = ") for c in clashes) else (2, 3, 4)
     # The named values alone leave the oracle's box empty.
     assert oracle(named, spoken, options["fractionated"], most, 19 if limit == "all" else limit) == []
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.dictionaries(st.sampled_from(("n2", "n3", "n4", "t0", "v_P")), st.integers(0, 4), min_size=1),
+    st.integers(1, 3),
+    st.sampled_from(("all", 3, 4)),
+)
+def test_a_question_is_called_open_exactly_when_its_answers_never_end(question, mobility, most):
+    """Small links counts are fixed, the size is not: 3n - 2p = W bounds it or leaves it open."""
+    spec = StructuralSpec(W=mobility, **question, max_link_joints=most) if question.get("t0", 2) else None
+    if spec is None:
+        return
+    try:
+        found = spec.solve()
+    except InfeasibleSpecError:
+        found = []
+    except SpecError as error:
+        assert "bound n" in str(error)
+        assert any(solution.n > 24 for solution in spec.replace(n=(25, 30)).iter_solutions())
+        return
+    try:
+        assert spec.replace(n=(1, 31)).solve() == found
+    except InfeasibleSpecError:
+        assert found == []
 
 
 @settings(max_examples=100, deadline=None)
