@@ -55,6 +55,8 @@ class Sketch:
         Free space around, in pixels, for symbols and labels.
     title : str
         Read out by screen readers.
+    symbol : float
+        Scale of symbols, line widths and labels; below 1 for small pictures.
 
     Raises
     ------
@@ -74,6 +76,7 @@ class Sketch:
     width: float = 480.0
     margin: float = 28.0
     title: str = ""
+    symbol: float = 1.0
     _shapes: list[str] = field(default_factory=list)
     _scale: float = 1.0
     _height: float = 0.0
@@ -106,34 +109,31 @@ class Sketch:
     def _add(self, tag: str, attributes: str, body: str = "") -> None:
         self._shapes.append(f"<{tag} {attributes}>{body}</{tag}>" if body else f"<{tag} {attributes}/>")
 
-    def bar(self, p: Point, q: Point, opacity: float = 1.0, colour: str = "link", width: float = 4.0) -> None:
+    def _stroke(self, colour: str, width: float) -> str:
+        return f'stroke="var(--{colour})" stroke-width="{number(width * self.symbol)}"'
+
+    def bar(self, p: Point, q: Point, colour: str = "link", width: float = 4.0) -> None:
         """Draw a link with two joints."""
         self._add(
             "path",
-            f'd="{self._path((p, q))}" stroke="var(--{colour})" stroke-width="{number(width)}" '
-            f'stroke-linecap="round" fill="none"{_faded(opacity)}',
+            f'd="{self._path((p, q))}" {self._stroke(colour, width)} stroke-linecap="round" fill="none"',
         )
 
-    def plate(self, points: Sequence[Point], opacity: float = 1.0, colour: str = "link", width: float = 3.0) -> None:
+    def plate(self, points: Sequence[Point], colour: str = "link", width: float = 3.0) -> None:
         """Draw a link with three or more joints as a shaded polygon."""
         self._add(
             "path",
-            f'd="{self._path(points, closed=True)}" fill="var(--fill)" fill-opacity="0.8" '
-            f'stroke="var(--{colour})" stroke-width="{number(width)}" stroke-linejoin="round"{_faded(opacity)}',
+            f'd="{self._path(points, closed=True)}" fill="var(--fill)" '
+            f'{self._stroke(colour, width)} stroke-linejoin="round"',
         )
 
-    def corner(self, p: Point, vertex: Point, q: Point, size: float = 12.0) -> None:
-        """Mark a bell crank: its two arms p-vertex-q are one rigid link."""
-        u, w = _unit(p - vertex) * size * self.pixel, _unit(q - vertex) * size * self.pixel
-        self._add("path", f'd="{self._path((vertex + u, vertex + w, vertex), closed=True)}" fill="var(--link)"')
-
-    def joint(self, point: Point, radius: float = 5.0, opacity: float = 1.0) -> None:
+    def joint(self, point: Point, radius: float = 5.0) -> None:
         """Draw a revolute joint: an open circle."""
         x, y = self._xy(point)
         self._add(
             "circle",
-            f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}" fill="var(--paper)" stroke="var(--link)" '
-            f'stroke-width="2"{_faded(opacity)}',
+            f'cx="{number(x)}" cy="{number(y)}" r="{number(radius * self.symbol)}" fill="var(--paper)" '
+            f"{self._stroke('link', 2)}",
         )
 
     def ground(self, point: Point, size: float = 17.0, direction: Point = -1j) -> None:
@@ -141,28 +141,29 @@ class Sketch:
 
         `direction` points from the joint to the ground.
         """
-        down = _unit(direction) * self.pixel
+        down = _unit(direction) * self.pixel * self.symbol
         side = down * 1j
         foot = point + down * size
         self._add(
             "path",
             f'd="{self._path((point, foot + side * size * 0.62, foot - side * size * 0.62), closed=True)}" '
-            'fill="var(--paper)" stroke="var(--link)" stroke-width="2" stroke-linejoin="round"',
+            f'fill="var(--paper)" {self._stroke("link", 2)} stroke-linejoin="round"',
         )
         self._hatch(foot - side * size, foot + side * size, down)
         self.joint(point)
 
     def _hatch(self, start: Point, end: Point, down: Point) -> None:
-        """Draw a ground line with short strokes on its far side; `down` is one pixel towards that side."""
+        """Draw a ground line with short strokes on its far side; `down` is the unit of length towards that side."""
         across = end - start
         strokes = 5
         pieces = [self._path((start, end))]
-        slant = (down - _unit(across) * self.pixel) * 6.5
+        slant = (down - _unit(across) * abs(down)) * 6.5
         for i in range(strokes):
             foot = start + across * ((i + 0.9) / strokes)
             pieces.append(self._path((foot, foot + slant)))
         self._add(
-            "path", f'd="{" ".join(pieces)}" fill="none" stroke="var(--link)" stroke-width="1.6" stroke-linecap="round"'
+            "path",
+            f'd="{" ".join(pieces)}" fill="none" {self._stroke("link", 1.6)} stroke-linecap="round"',
         )
 
     def hatch_over(self, point: Point, radius: float) -> None:
@@ -180,7 +181,7 @@ class Sketch:
         self._add(
             "circle",
             f'cx="{number(x)}" cy="{number(y)}" r="{number(radius * self._scale)}" fill="none" '
-            f'stroke="var(--{colour})" stroke-width="{number(width)}"{dashes}',
+            f"{self._stroke(colour, width)}{dashes}",
         )
 
     def trace(
@@ -199,14 +200,15 @@ class Sketch:
             dashes = f' stroke-dasharray="{dash}"' if dash else ""
             self._add(
                 "path",
-                f'd="{data}" fill="none" stroke="var(--{colour})" stroke-width="{number(width)}" '
-                f'stroke-linejoin="round"{dashes}',
+                f'd="{data}" fill="none" {self._stroke(colour, width)} stroke-linejoin="round"{dashes}',
             )
 
     def dot(self, point: Point, colour: str = "a", radius: float = 3.5) -> None:
         """Draw a filled dot of fixed size."""
         x, y = self._xy(point)
-        self._add("circle", f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}" fill="var(--{colour})"')
+        self._add(
+            "circle", f'cx="{number(x)}" cy="{number(y)}" r="{number(radius * self.symbol)}" fill="var(--{colour})"'
+        )
 
     def label(
         self,
@@ -237,7 +239,7 @@ class Sketch:
         self._add(
             "path",
             f'd="M{number(x1)} {number(y1)} Q{number(x2)} {number(y2)} {number(x3)} {number(y3)}" fill="none" '
-            f'stroke="var(--{colour})" stroke-width="{number(width)}"{dashes}',
+            f"{self._stroke(colour, width)}{dashes}",
         )
 
     def node(self, point: Point, text: str, radius: float = 10.0, filled: bool = False) -> None:
@@ -269,10 +271,6 @@ class Sketch:
 def _unit(vector: Point) -> Point:
     size = abs(vector)
     return vector / size if size > 0 else 1 + 0j
-
-
-def _faded(opacity: float) -> str:
-    return f' opacity="{number(opacity)}"' if opacity < 1 else ""
 
 
 def degrees(angle: float) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 from typing import TYPE_CHECKING
 
 from graphsynth.drawing.sketch import Sketch, degrees
@@ -23,74 +22,76 @@ def _first(attempts: tuple[Attempt, ...]) -> PlatformMotion | None:
 
 
 def sketches(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, ...]:
-    """Draw the mechanism large at the start of the turn, then small at six wheel angles."""
+    """Draw the mechanism large where its joints are well apart, then small at six wheel angles."""
     motion = _first(motions)
     if motion is None:
         return ()
-    count = len(motion.motion.psi) - 1
-    chosen = [round(i * count / _SHOWN) for i in range(_SHOWN)]
+    psi = motion.motion.psi
+    count = len(psi) - 1
+    leg = max(range(3), key=lambda k: motion.mechanism.crank[k])
+    clear = max(range(count), key=lambda i: _spread(motion, i, leg))
     caption = (
-        "Wheel angle 0. The pinion in the middle turns three wheels; a crank pin B on each drives a coupler BC and the "
-        "bell crank CDA, whose other arm moves the platform through AF. The small closed curves are the paths of the "
-        "platform's corners."
+        f"Wheel at {degrees(float(psi[clear]))}. The pinion in the middle turns three wheels; a crank pin B on each "
+        "moves a coupler BC and the bell crank CDA, whose other arm moves the platform through AF. The closed curves "
+        "at the corners of the platform are their paths."
     )
-    pictures = [Picture("The single-motor platform", _sketch(motion, 0, 640, True), caption, "wide")]
-    for i in chosen:
-        name = f"Wheel at {degrees(float(motion.motion.psi[i]))}"
-        pictures.append(Picture(name, _sketch(motion, i, 270, False), "", "small"))
+    pictures = [Picture("The single-motor platform", _sketch(motion, clear, 680, leg), caption, "wide")]
+    pictures += [
+        Picture(f"Wheel at {degrees(float(psi[i]))}", _sketch(motion, i, 270, None), "", "small")
+        for i in (round(i * count / _SHOWN) for i in range(_SHOWN))
+    ]
     return tuple(pictures)
 
 
-def _sketch(motion: PlatformMotion, i: int, width: float, labels: bool) -> str:
-    """Draw one position: pitch circles and ground, then the links leg by leg, the platform, the joints."""
+def _spread(motion: PlatformMotion, i: int, k: int) -> float:
+    """Return the smallest distance between wheel axis, crank pin and platform corner of leg k, in position i."""
+    O, B, F = motion.O[k], motion.B[i, k], motion.F[i, k]
+    return float(min(abs(O - B), abs(B - F), abs(F - O)))
+
+
+def _sketch(motion: PlatformMotion, i: int, width: float, labelled: int | None) -> str:
+    """Draw one position: plates at the back, then pitch circles, ground, links and joints."""
     O, D = motion.O, motion.D
     B, C, A, F = (points[i] for points in (motion.B, motion.C, motion.A, motion.F))
-    lower, upper = _box(motion)
-    sketch = Sketch(
-        lower,
-        upper,
-        width,
-        margin=34 if labels else 18,
-        title=f"Single-motor platform, wheel at {degrees(float(motion.motion.psi[i]))}",
-    )
-    thick = 4.0 if labels else 2.6
-    ring = 5.0 if labels else 3.2
-    pinion = min(abs(O)) - motion.wheel_radius
-    sketch.circle(0j, pinion)
+    large = labelled is not None
+    title = f"Single-motor platform, wheel at {degrees(float(motion.motion.psi[i]))}"
+    sketch = Sketch(*_box(motion), width, 40 if large else 16, title, symbol=1.0 if large else 0.5)
+    sketch.plate(list(F), width=4)
     for k in range(3):
+        sketch.plate((C[k], D[k], A[k]))
         sketch.circle(O[k], motion.wheel_radius)
-        sketch.ground(D[k], 17 if labels else 9, direction=D[k])
-        sketch.ground(O[k], 12 if labels else 7)
-    sketch.ground(0j, 12 if labels else 7)
-    if not all(map(cmath.isfinite, (*B, *C, *A, *F))):
-        sketch.label(0j, "cannot be assembled")
-        return sketch.svg()
+        sketch.ground(D[k], direction=D[k])
+        sketch.ground(O[k], 12)
+    sketch.circle(0j, min(abs(O)) - motion.wheel_radius)
+    sketch.ground(0j, 12)
     for k, colour in enumerate(_LEG_COLOURS):
-        sketch.trace(list(motion.F[:, k]), colour, 1.6, closed=True)
-        sketch.bar(O[k], B[k], width=thick)
-        sketch.bar(B[k], C[k], colour=colour, width=thick * 0.75)
-        sketch.plate((C[k], D[k], A[k]), width=thick * 0.75)
-        sketch.bar(A[k], F[k], colour=colour, width=thick * 0.75)
-    sketch.plate(list(F), opacity=0.85, width=thick)
-    for k in range(3):
+        sketch.trace(list(motion.F[:, k]), colour, 1.6 if large else 1.0, closed=True)
+        sketch.bar(O[k], B[k], width=5)
+        sketch.bar(B[k], C[k], colour=colour, width=3)
+        sketch.bar(A[k], F[k], colour=colour, width=3)
         for point in (O[k], B[k], C[k], D[k], A[k], F[k]):
-            sketch.joint(point, ring)
-    sketch.joint(0j, ring)
-    if labels:
-        _label_leg(sketch, O[1], B[1], C[1], D[1], A[1], F[1])
+            sketch.joint(point)
+    if labelled is not None:
+        _label_leg(sketch, *(points[labelled] for points in (O, B, C, D, A, F)))
     return sketch.svg()
 
 
-def _label_leg(sketch: Sketch, *points: complex) -> None:
-    """Name the joints of one leg, each label pushed away from the middle of the leg."""
-    middle = sum(points) / len(points)
-    for name, point in zip("OBCDAF", points, strict=True):
-        away = point - middle
-        sketch.label(point, name, 17 * away / abs(away) if away else 17j)
+def _label_leg(sketch: Sketch, O: complex, B: complex, C: complex, D: complex, A: complex, F: complex) -> None:
+    """Name the joints of one leg, each label pushed away from its neighbours; D's also from its ground."""
+    near = (O + B + F) / 3
+    for name, point in {"O": O, "B": B, "F": F}.items():
+        sketch.label(point, name, 17 * _direction(point - near))
+    for name, point in {"C": C, "A": A}.items():
+        sketch.label(point, name, 17 * _direction(point - (A + C + D) / 3))
+    sketch.label(D, "D", 20 * _direction((A + C) / 2 - D))
+
+
+def _direction(vector: complex) -> complex:
+    return vector / abs(vector) if vector else 1j
 
 
 def _box(motion: PlatformMotion) -> tuple[complex, complex]:
-    points = [p for group in (motion.D, motion.A, motion.C, motion.F) for p in group.ravel() if cmath.isfinite(p)]
+    points = [p for group in (motion.D, motion.A, motion.C, motion.F) for p in group.ravel()]
     points += [o + motion.wheel_radius * d for o in motion.O for d in (1, -1, 1j, -1j)]
     return (
         complex(min(p.real for p in points), min(p.imag for p in points)),
