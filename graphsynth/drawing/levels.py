@@ -107,7 +107,9 @@ def draw_levels(graph: MechanismGraph, width: float = 420.0, title: str = "") ->
     }
     half = max(1.2, *(abs(p.real) for p in where.values())) + 0.1
     radius = 10.0 if width >= 260 else 6.5
-    bottom = -row * (len(order) - 1) - (0.55 if len(order) > 1 else 0.1)
+    width = min(width, 2 * half * 7 * radius + 4.4 * radius)  # a small graph does not need the whole width
+    arcs_below = any(joint.a in order[-1] and joint.b in order[-1] for joint in graph.joints)
+    bottom = -row * (len(order) - 1) - (0.6 if arcs_below else 0.1)
     sketch = Sketch(complex(-half, bottom), complex(half, 0.1), width, margin=2.2 * radius, title=title)
     for joint in graph.joints:
         p, q = where[joint.a], where[joint.b]

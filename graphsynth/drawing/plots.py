@@ -22,7 +22,7 @@ _RC = {
     "svg.fonttype": "none",  # text stays text: readable by screen readers and in the page's font
     "svg.hashsalt": "graphsynth",  # the same bytes for the same plot
     "font.family": "sans-serif",
-    "font.size": 11,
+    "font.size": 10,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.9,
@@ -59,7 +59,7 @@ def line_plot(
     xticks: Sequence[float] | None = None,
     levels: Sequence[Line] = (),
     equal: bool = False,
-    size: tuple[float, float] = (6.6, 3.1),
+    size: tuple[float, float] = (5.4, 2.8),
 ) -> str:
     """Draw curves over one axis.
 

@@ -45,10 +45,12 @@ figure{grid-column:span 6;display:flex;flex-direction:column}
 figure.wide{grid-column:1/-1}
 figure.small{grid-column:span 4}
 .sheet figure.small{grid-column:span 2}
-@media (max-width:50rem){figure{grid-column:1/-1}
+@media (max-width:50rem){table{font-size:.8rem}td:not(.num){min-width:6.5rem}
+figure{grid-column:1/-1}
 figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 4}}
 figure .gs{--paper:var(--card)}
-figure svg{display:block;width:100%;height:auto;margin:0 auto}
+figure svg{display:block;max-width:100%;height:auto;margin:0 auto}
+.pictures:not(.sheet) svg{width:100%}
 figure.wide svg{max-width:44rem;max-height:32rem}
 figcaption{margin-top:auto;padding-top:.4rem}figcaption b{color:var(--ink)}
 details{margin:.6rem 0}summary{cursor:pointer;font-weight:600}

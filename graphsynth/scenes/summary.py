@@ -52,7 +52,8 @@ def _verdict_table(records: tuple[Record, ...]) -> Table:
     counts = Counter(
         (r.solution, r.status, r.recognised_as, r.verdict, "" if r.status == "assessed" else r.reason) for r in records
     )
-    rows = tuple((str(count), *key) for key, count in counts.items())
-    return Table(
-        f"Candidates: {len(records)}", ("count", "assortment", "status", "recognised as", "verdict", "reason"), rows
-    )
+    columns = ("count", "assortment", "status", "recognised as", "verdict", "reason")
+    rows = [(str(count), *key) for key, count in counts.items()]
+    told = [i for i in range(len(columns)) if any(row[i] for row in rows)]
+    shown = tuple(tuple(row[i] for i in told) for row in rows)
+    return Table(f"Candidates: {len(records)}", tuple(columns[i] for i in told), shown)

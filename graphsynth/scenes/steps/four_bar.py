@@ -115,7 +115,7 @@ def judge(
 def _margins(report: JammingReport) -> tuple[Quantity, ...]:
     """Margins of one bearing; the closed forms carry no error bound in floating point."""
     values = [
-        ("clearance left over the turn", -report.worst_gap, "mm"),
+        ("least clearance over the turn", -report.worst_gap, "mm"),
         ("largest tilt", report.largest_tilt, "rad"),
         ("critical tilt", report.critical_tilt, "rad"),
         ("jammed part of the turn", sum(arc.length for arc in report.arcs.arcs) / math.tau, ""),
