@@ -131,7 +131,7 @@ def expected(question, spaces, options):
     return oracle(question, spaces, options["fractionated"], options["max_joint_mobility"], most_joints)
 
 
-@pytest.mark.parametrize("examples", [100, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [100, pytest.param(1500, marks=pytest.mark.slow)])
 def test_all_solutions_and_no_others_in_the_stated_order(examples):
     settings(max_examples=examples, deadline=None)(given(questions())(compare))()
 
