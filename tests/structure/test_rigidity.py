@@ -91,9 +91,7 @@ def test_report_is_a_sentence():
 
 def test_generic_mobility_finds_hidden_freedom():
     # K4 on links 0-3 wastes three constraints: the count says 0 + ... but the rest moves.
-    graph = MechanismGraph(
-        8, [*itertools.combinations(range(4), 2), (3, 4), (4, 5), (5, 6), (6, 7), (7, 0)]
-    )
+    graph = MechanismGraph(8, [*itertools.combinations(range(4), 2), (3, 4), (4, 5), (5, 6), (6, 7), (7, 0)])
     found = graph.generic_mobility(seed=1)
     assert found.redundant_constraints == 3
     assert found.mobility == graph.mobility + 3 == 2
