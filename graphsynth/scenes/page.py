@@ -44,10 +44,10 @@ figure{margin:0;background:var(--card);border-radius:.5rem;padding:.7rem}
 figure{grid-column:span 6;display:flex;flex-direction:column}
 figure.wide{grid-column:1/-1}
 figure.small{grid-column:span 4}
-.sheet figure.small{grid-column:span 2}
+.sheet figure.small{grid-column:span 3}
 @media (max-width:50rem){table{font-size:.8rem}td:not(.num){min-width:6.5rem}
 figure{grid-column:1/-1}
-figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 4}}
+figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
 figure .gs{--paper:var(--card)}
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}
 .pictures:not(.sheet) svg{width:100%}
@@ -159,7 +159,8 @@ def _cell(text: str) -> str:
 def _records(records: tuple[Record, ...]) -> str:
     rows = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
     grid = _grid(("no.", "assortment", "status", "verdict or reason", "key"), rows)
-    return f"<h2>Every candidate</h2><details><summary>{len(rows)} rows, as in results.csv</summary>{grid}</details>"
+    summary = f"{len(rows)} row{'s' if len(rows) != 1 else ''}, as in results.csv"
+    return f"<h2>Every candidate</h2><details><summary>{summary}</summary>{grid}</details>"
 
 
 def _provenance(report: Report) -> str:

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -30,6 +31,16 @@ ALLOWED = {
     ("didenko", "graph_pictures"): ENUMERATOR,
 }
 NEVER = {"sympy", "dask", "distributed", "pandas"}
+
+FIGURE_3 = MechanismGraph(
+    15,
+    [
+        *((0, k) for k in (1, 2, 3, 4, 8, 9, 10)),
+        *((2, 5), (3, 6), (4, 7), (5, 8), (6, 9), (7, 10), (8, 11), (9, 12), (10, 13), (11, 14), (12, 14), (13, 14)),
+        *((1, 2, 2), (1, 3, 2), (1, 4, 2)),
+    ],
+    frame=0,
+)
 
 PROBE = """
 import sys
@@ -127,10 +138,22 @@ TURN = [
 ]
 
 
-def test_didenko_turn_reproduces_the_published_poses(didenko: Any) -> None:
-    (attempt,) = didenko["motions"]
+@pytest.fixture(scope="module")
+def moved() -> Any:
+    """The turn of the Figure 3 mechanism with the dimensions of the shipped scene."""
+    from graphsynth.scenes.products import Candidate
+    from graphsynth.scenes.stages import Context
+    from graphsynth.scenes.steps.platform import kinematics, recognise
+
+    context = Context(load_scene("didenko"))
+    shuffled = FIGURE_3.relabelled([0, *range(14, 0, -1)])
+    (attempt,) = kinematics(context, recognise(context, (Candidate(1, shuffled, ""),)))
     assert attempt.reason == ""
-    motion = attempt.value.motion
+    return attempt.value
+
+
+def test_didenko_turn_reproduces_the_published_poses(moved: Any) -> None:
+    motion = moved.motion
     for angle, *pose, determinant in TURN:
         i = round(angle * 180)
         assert np.allclose(motion.pose[i][:2], pose[:2], rtol=0, atol=2e-13)
@@ -139,8 +162,7 @@ def test_didenko_turn_reproduces_the_published_poses(didenko: Any) -> None:
     assert np.allclose(motion.pose[-1], motion.pose[0], rtol=0, atol=1e-12)
 
 
-def test_didenko_joints_keep_their_distances(didenko: Any) -> None:
-    moved = didenko["motions"][0].value
+def test_didenko_joints_keep_their_distances(moved: Any) -> None:
     for one, other, length in [
         (moved.B, moved.C, 45.0),
         (moved.C, moved.D, 60.0),
@@ -165,17 +187,6 @@ def test_didenko_finds_figure_3_among_46_symmetric_mechanisms(didenko: Any) -> N
     assert [r.candidate.graph.key for r in known] == [FIGURE_3.key]
     statuses = [record.status for record in didenko["records"]]
     assert statuses.count("assessed") == 1 and statuses.count("not recognised") == 45
-
-
-FIGURE_3 = MechanismGraph(
-    15,
-    [
-        *((0, k) for k in (1, 2, 3, 4, 8, 9, 10)),
-        *((2, 5), (3, 6), (4, 7), (5, 8), (6, 9), (7, 10), (8, 11), (9, 12), (10, 13), (11, 14), (12, 14), (13, 14)),
-        *((1, 2, 2), (1, 3, 2), (1, 4, 2)),
-    ],
-    frame=0,
-)
 
 
 def test_threefold_symmetry_against_all_automorphisms() -> None:
@@ -211,8 +222,20 @@ def test_a_candidate_that_fails_is_recorded_with_its_reason(lambda_tables: dict[
     lambda_tables["mechanism"]["lengths"] = {"frame": 1, "crank": 1, "coupler": 10, "rocker": 1}
     report = execute(Scene.from_mapping(lambda_tables))
     (record,) = report["records"]
-    assert record.status in ("failed", "assessed")
-    assert record.reason or "cannot be assembled" in record.verdict
+    assert (record.status, record.recognised_as) == ("failed", "lambda_linkage")
+    assert record.reason.startswith("GeometryError: the linkage cannot be assembled at any crank angle")
+    assert report["tables"] == () and report["plots"] == () and report["mechanism_pictures"] == ()
+
+
+def test_a_crank_that_cannot_turn_fully_is_assessed_and_drawn(lambda_tables: dict[str, Any]) -> None:
+    lambda_tables["mechanism"]["lengths"] = {"frame": 2, "crank": 1, "coupler": 1, "rocker": 1}
+    report = execute(Scene.from_mapping(lambda_tables))
+    (record,) = report["records"]
+    assert record.status == "assessed"
+    motion = next(t for t in report["tables"] if t.title == "Motion")
+    assert "cannot make a full turn" in motion.rows[0][1] and motion.rows[2][1].startswith("none")
+    assert any("cannot be assembled" in picture.svg for picture in report["mechanism_pictures"])
+    assert not any(re.search(r"\bnan\b", picture.svg) for picture in report["mechanism_pictures"])
 
 
 def test_a_wider_question_lists_what_no_module_knows(lambda_tables: dict[str, Any]) -> None:

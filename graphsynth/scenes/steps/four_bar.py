@@ -61,6 +61,7 @@ def _move(table: LambdaTable) -> LambdaMotion:
 
     import numpy as np
 
+    from graphsynth.errors import GeometryError
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
     lengths = table.lengths
@@ -75,6 +76,8 @@ def _move(table: LambdaTable) -> LambdaMotion:
     )
     f = np.linspace(0.0, math.tau, table.positions + 1)
     tilted = linkage.positions(f)
+    if not tilted.assembled.any():
+        raise GeometryError(f"the linkage cannot be assembled at any crank angle ({'; '.join(tilted.reasons())})")
     rod = np.sqrt(((tilted.A - tilted.B) ** 2).sum(axis=-1))
     residual = float(np.nanmax(np.abs(rod / linkage.l3 - 1.0)))
     return LambdaMotion(linkage, replace(linkage, alpha=0.0).positions(f), tilted, residual)
@@ -152,7 +155,7 @@ def _motion_table(motion: LambdaMotion) -> Table:
     """State what the motion is, with and without the tilt."""
     import numpy as np
 
-    turn, stroke = motion.linkage.full_turn(), motion.linkage.straightness()
+    turn = motion.linkage.full_turn()
     away = float(np.nanmax(np.abs(motion.tilted.M[..., 2])))
     shift = float(np.nanmax(np.hypot(*(motion.tilted.M - motion.planar.M)[..., :2].T)))
     rows = (
@@ -160,7 +163,7 @@ def _motion_table(motion: LambdaMotion) -> Table:
         ("crank positions computed", str(len(motion.tilted.f)), "exact"),
         (
             "straight stroke of M, crank 90° to 270°",
-            f"{stroke.chord:.8g} long, {stroke.deviation:.6g} wide",
+            _stroke(motion.linkage),
             "estimated",
         ),
         ("M leaves the plane by at most", f"{away:.8g}", "estimated, largest sample"),
@@ -168,3 +171,14 @@ def _motion_table(motion: LambdaMotion) -> Table:
         ("relative error of the rod length", f"{motion.residual:.1e}", "estimated, largest sample"),
     )
     return Table("Motion", ("quantity", "value", "how had"), rows, "Lengths in the unit of the link lengths.")
+
+
+def _stroke(linkage: LambdaLinkage) -> str:
+    """Say how long and how straight the working stroke is, or why there is none."""
+    from graphsynth.errors import GeometryError
+
+    try:
+        stroke = linkage.straightness()
+    except GeometryError as error:
+        return f"none: {error}"
+    return f"{stroke.chord:.8g} long, {stroke.deviation:.6g} wide"
