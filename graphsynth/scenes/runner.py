@@ -81,8 +81,8 @@ def run(
     out : str or Path, optional
         The folder for ``report.html``, ``results.csv`` and ``scene.json``; ``graphsynth-out/<scene>`` by default.
     executor : concurrent.futures.Executor, optional
-        Where stages that can work in parallel do so; without one everything runs here. The result is
-        the same.
+        Handed to every stage in its context, for stages that can work in parallel; the shipped ones are quick and
+        run here, so the result does not depend on it.
     progress : callable, optional
         Called as ``progress(stage, done, total)``.
 

@@ -238,6 +238,16 @@ def test_a_crank_that_cannot_turn_fully_is_assessed_and_drawn(lambda_tables: dic
     assert not any(re.search(r"\bnan\b", picture.svg) for picture in report["mechanism_pictures"])
 
 
+@pytest.mark.parametrize(("clearance", "good"), [(0.0650992730735, False), (0.0650992730736, True)])
+def test_the_verdict_turns_at_the_published_clearance(
+    lambda_tables: dict[str, Any], clearance: float, good: bool
+) -> None:
+    lambda_tables["mechanism"]["bearing"]["clearance_mm"] = clearance
+    lambda_tables["outputs"]["products"] = ["records"]
+    (record,) = execute(Scene.from_mapping(lambda_tables))["records"]
+    assert record.good is good
+
+
 def test_a_wider_question_lists_what_no_module_knows(lambda_tables: dict[str, Any]) -> None:
     lambda_tables["structure"]["question"] = {"W": 1, "links": 6}
     lambda_tables["outputs"]["products"] = ["records"]
