@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from operator import index
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from graphsynth.errors import FormatError, GraphError
+from graphsynth.structure.checks import integer, packed_joints
 from graphsynth.structure.levels import bits, breadth_first, component_of
 from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, encode_graph6, encode_text
 
 if TYPE_CHECKING:
     from graphsynth.structure.canonical import Labelling
-    from graphsynth.structure.rigidity import GenericMobility, RigidSubchain
+    from graphsynth.structure.loop_rank import GenericMobility
+    from graphsynth.structure.rigidity import RigidSubchain
 
 __all__ = ["Joint", "MechanismGraph"]
 
@@ -76,12 +77,12 @@ class MechanismGraph:
         frame: int | None = None,
         space: int = 3,
     ) -> None:
-        links = _integer(links, "links", 1, LINKS_MAX, "number of links")
-        space = _integer(space, "space", 2, 6, "mobility of a free link")
+        links = integer(links, "links", 1, LINKS_MAX, "number of links")
+        space = integer(space, "space", 2, 6, "mobility of a free link")
         if frame is not None:
-            frame = _integer(frame, "frame", 0, links - 1, "frame")
+            frame = integer(frame, "frame", 0, links - 1, "frame")
         _set_links(self, links)
-        _set_packed(self, _checked(links, joints, space))
+        _set_packed(self, packed_joints(links, joints, space))
         _set_frame(self, frame)
         _set_space(self, space)
 
@@ -284,7 +285,7 @@ class MechanismGraph:
         >>> MechanismGraph(3, [(0, 1), (1, 2)]).with_frame(1).joints
         (Joint(a=0, b=1, mobility=1), Joint(a=0, b=2, mobility=1))
         """
-        link = _integer(link, "link", 0, self.links - 1, "frame")
+        link = integer(link, "link", 0, self.links - 1, "frame")
         permutation = [0 if i == link else i + 1 if i < link else i for i in range(self.links)]
         moved = self.relabelled(permutation)
         return MechanismGraph._unchecked(moved.links, moved.packed, 0, moved.space)
@@ -352,9 +353,9 @@ class MechanismGraph:
     def generic_mobility(self, seed: int = 0) -> GenericMobility:
         """Return the mobility at random geometry, W = G - rank of the loop matrix.
 
-        See :func:`graphsynth.structure.rigidity.generic_mobility`.
+        See :func:`graphsynth.structure.loop_rank.generic_mobility`.
         """
-        from graphsynth.structure.rigidity import generic_mobility
+        from graphsynth.structure.loop_rank import generic_mobility
 
         return generic_mobility(self, seed)
 
@@ -420,45 +421,6 @@ _new = object.__new__
 _set_links, _set_packed, _set_frame, _set_space, _set_cache = (
     MechanismGraph.__dict__[name].__set__ for name in ("links", "packed", "frame", "space", "_cache")
 )
-
-
-def _integer(value: object, place: str, low: int, high: int, what: str) -> int:
-    """Return a plain int within its bounds or raise FormatError."""
-    try:
-        number = index(value)  # type: ignore[arg-type]
-    except Exception:  # whatever a foreign __index__ raises
-        raise FormatError(f"the {what} must be an integer, not {type(value).__name__}", place) from None
-    if not low <= number <= high:
-        shown = number if abs(number) < 10**18 else "a number of many digits"
-        raise FormatError(f"the {what} must be within {low} to {high}, not {shown}", place)
-    return number
-
-
-def _checked(links: int, joints: Iterable[Any], space: int) -> bytes:
-    """Return valid joints packed and sorted."""
-    found: dict[tuple[int, int], bytes] = {}
-    try:
-        items = iter(joints)
-    except TypeError:
-        raise FormatError(f"joints must be pairs of links, not {type(joints).__name__}", "joints") from None
-    for count, item in enumerate(items, start=1):
-        place = f"joint {count}"
-        try:
-            a, b, *rest = item
-        except (TypeError, ValueError):
-            raise FormatError("a joint is (a, b) or (a, b, mobility)", place) from None
-        if len(rest) > 1:
-            raise FormatError(f"a joint is (a, b) or (a, b, mobility), not {len(rest) + 2} values", place)
-        a = _integer(a, place, 0, links - 1, "number of a link")
-        b = _integer(b, place, 0, links - 1, "number of a link")
-        mobility = _integer(rest[0], place, 1, space - 1, "mobility of a joint") if rest else 1
-        if a == b:
-            raise FormatError(f"link {a} is jointed to itself", place)
-        a, b = min(a, b), max(a, b)
-        if (a, b) in found:
-            raise FormatError(f"links {a} and {b} are jointed twice; merge the two joints or add a link", place)
-        found[a, b] = bytes((a, b, mobility))
-    return b"".join(sorted(found.values()))
 
 
 def _joints(graph: MechanismGraph) -> tuple[Joint, ...]:
