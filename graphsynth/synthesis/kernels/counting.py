@@ -1,7 +1,8 @@
 """Counting the labellings of contracted graphs up to symmetry, without visiting them one by one.
 
-Burnside: the number of orbits is the average, over the automorphisms g, of the number of labellings fixed by g.  A
-depth-first search assigns the variables of one g until no critical set needs anything; the rest is read from a table.
+Burnside: the number of orbits is the average, over the automorphisms g, of the number of labellings fixed by g.  For
+each g the variables are taken one by one, and partial choices that leave the same needs and the same resources are
+merged into one state with a count; as soon as no critical set needs anything, the rest is read from a table.
 """
 
 from __future__ import annotations
@@ -12,101 +13,187 @@ from numba import njit
 from graphsynth.synthesis.kernels.automorphisms import automorphisms
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
+    fits,
     load_graph,
-    start_needs,
+    merged_entries,
     unconstrained_ways,
 )
 
 FRAME_NONE, FRAME_VERTEX, FRAME_PATH = 1, 2, 4
 TOO_LARGE = -1
+NO_ROOM = -2
 _LIMIT = 2.0**62
+_BYTE = 127
+_TOP = np.uint64(0x8080808080808080)
+_ONES = np.uint64(0x0101010101010101)
 
 
 @njit(cache=True)
-def count_fixed(count, unmet, tables, work, rank):
-    """Count the admissible choices of all variables; stop inside the one numbered ``rank`` when rank >= 0.
+def _lay_lanes(count, sets, words, work):
+    """Write, for each variable, its coefficients and what the later variables can contribute, a byte for each set.
 
-    Stopping leaves the choices in ``work.at[: depth + 1]`` and returns ``(depth + 1, rank left)`` in ``work.state``:
-    the remaining variables are free.
+    Returns False when a byte could overflow.
     """
-    if unmet == 0:
-        work.state[0] = 0
-        work.state[1] = rank
-        return work.ways[0, tables.target]
-    total = np.int64(0)
-    depth = 0
-    own_kind = 2 * work.class_kind[work.var_rep[0]] + work.var_own[0]
-    work.at[0] = tables.group_lo[own_kind]
-    work.used_index[0] = tables.target
-    work.product[0] = 1
-    while True:
-        own_kind = 2 * work.class_kind[work.var_rep[depth]] + work.var_own[depth]
-        g = work.at[depth]
-        if g == tables.group_hi[own_kind]:
-            depth -= 1
-            if depth < 0:
-                return total
-            g = work.at[depth]
-            y = work.class_heaviest[work.var_rep[depth]] - tables.group_weight[g]
-            for q in range(work.row[depth], work.row[depth + 1]):
-                s = work.row_set[q]
-                old = work.left[s]
-                work.left[s] = old + work.row_coef[q] * y
-                if old <= 0 and work.left[s] > 0:
-                    unmet += 1
-            work.at[depth] = g + 1
-            continue
-        size = work.var_size[depth]
-        index = work.used_index[depth]
-        if ((tables.packed_of[index] | tables.guard) - tables.group_packed[g] * size) & tables.guard != tables.guard:
-            work.at[depth] = g + 1
-            continue
-        index -= tables.group_index[g] * size
-        ways = work.ways[depth + 1, index]
-        if ways == 0:
-            work.at[depth] = g + 1
-            continue
-        y = work.class_heaviest[work.var_rep[depth]] - tables.group_weight[g]
-        alive = True
-        for q in range(work.row[depth], work.row[depth + 1]):
+    for i in range(2 * count * words):
+        work.lanes[i] = 0
+    for s in range(sets):
+        work.left[s] = 0
+        if work.set_need[s] > _BYTE:
+            return False
+    for j in range(count - 1, -1, -1):
+        base = 2 * j * words
+        for s in range(sets):
+            rest = min(work.left[s], _BYTE)
+            work.lanes[base + words + s // 8] |= np.uint64(rest) << np.uint64(8 * (s % 8))
+        most = 0
+        for g in range(work.entry_lo[j], work.entry_lo[j + 1]):
+            most = max(most, work.entry_gain[g])
+        for q in range(work.row[j], work.row[j + 1]):
             s = work.row_set[q]
-            old = work.left[s]
-            new = old - work.row_coef[q] * y
-            work.left[s] = new
-            if old > 0 and new <= 0:
-                unmet -= 1
-            if new > work.row_rest[q]:
-                alive = False
-        if alive and unmet > 0:
-            work.product[depth + 1] = work.product[depth] * tables.group_count[g]
-            depth += 1
-            work.used_index[depth] = index
-            work.at[depth] = tables.group_lo[2 * work.class_kind[work.var_rep[depth]] + work.var_own[depth]]
-            continue
-        if alive:
-            found = work.product[depth] * tables.group_count[g] * ways
-            if rank >= 0 and total + found > rank:
-                work.state[0] = depth + 1
-                work.state[1] = rank - total
-                work.used_index[depth + 1] = index
-                return found
-            total += found
-        for q in range(work.row[depth], work.row[depth + 1]):
-            s = work.row_set[q]
-            old = work.left[s]
-            work.left[s] = old + work.row_coef[q] * y
-            if old <= 0 and work.left[s] > 0:
-                unmet += 1
-        work.at[depth] = g + 1
+            if work.row_coef[q] * most > _BYTE:
+                return False
+            work.left[s] += work.row_coef[q] * most
+            work.lanes[base + s // 8] |= np.uint64(work.row_coef[q]) << np.uint64(8 * (s % 8))
+    return True
 
 
 @njit(cache=True)
-def fixed_by(member, m, sets, tables, work, rank):
-    """Count the admissible labellings fixed by automorphism number ``member``, or TOO_LARGE."""
-    count = build_variables(m, sets, work.perms[member], tables, work)
-    if unconstrained_ways(count, tables, work) > _LIMIT:
+def _lay_gains(count, tables, work):
+    """Fill ``work.gains[j, r]``: the most that variables j, j+1, ... give one critical set while using up r."""
+    resources = tables.final.shape[0]
+    for i in range(resources):
+        work.gains[count, i] = 0
+    for j in range(count - 1, -1, -1):
+        factor = np.int64(0)
+        for q in range(work.row[j], work.row[j + 1]):
+            factor = max(factor, work.row_coef[q])
+        for i in range(resources):
+            work.gains[j, i] = 0
+        for g in range(work.entry_lo[j], work.entry_lo[j + 1]):
+            shift = work.entry_index[g]
+            for i in range(shift, resources):
+                if work.ways[j + 1, i - shift] and fits(tables.packed_of[i], work.entry_packed[g], tables.guard):
+                    gain = work.gains[j + 1, i - shift] + factor * work.entry_gain[g]
+                    if gain > work.gains[j, i]:
+                        work.gains[j, i] = gain
+
+
+@njit(cache=True)
+def _store(key, words, number, layer, shift, value, work):
+    """Add ``value`` to the state ``key[:words]`` of a layer; return its number of states, or -1 when full.
+
+    ``shift`` is where the layer starts: key words in ``work.keys``; sums start at half of that.
+    """
+    capacity = work.slots.shape[0]
+    h = np.uint64(1469598103934665603)
+    for i in range(words):
+        h = (h ^ key[i]) * np.uint64(0x9E3779B97F4A7C15)
+        h ^= h >> np.uint64(29)
+    slot = np.int64(h & np.uint64(capacity - 1))
+    half = shift >> 1
+    while work.stamps[slot] == layer:
+        at = work.slots[slot]
+        same = True
+        for i in range(words):
+            if work.keys[shift + at * words + i] != key[i]:
+                same = False
+                break
+        if same:
+            work.sums[half + at] += value
+            return number
+        slot = (slot + 1) & (capacity - 1)
+    if (number + 1) * words > capacity or 2 * (number + 1) > capacity:
+        return -1
+    work.stamps[slot] = layer
+    work.slots[slot] = number
+    for i in range(words):
+        work.keys[shift + number * words + i] = key[i]
+    work.sums[half + number] = value
+    return number + 1
+
+
+@njit(cache=True)
+def count_states(count, sets, tables, work):
+    """Count the admissible choices of all variables by dynamic programming.
+
+    A state is what each critical set still needs (a byte each, never below 0) and the resources left.  States in
+    which no set needs anything are finished by ``work.ways``.
+
+    Returns
+    -------
+    int
+        The number, TOO_LARGE when the arithmetic does not suffice, or NO_ROOM when the workspace is too small.
+    """
+    if sets == 0:
+        return work.ways[0, tables.target]
+    needs = (sets + 7) // 8
+    words = needs + 1
+    if not _lay_lanes(count, sets, needs, work):
         return np.int64(TOO_LARGE)
-    return count_fixed(count, start_needs(sets, work), tables, work, rank)
+    _lay_gains(count, tables, work)
+    capacity = work.slots.shape[0]
+    key = np.zeros(words, np.uint64)
+    for s in range(sets):
+        key[s // 8] |= np.uint64(work.set_need[s]) << np.uint64(8 * (s % 8))
+    key[needs] = np.uint64(tables.target)
+    work.state[1] += 1
+    states = _store(key, words, 0, work.state[1], 0, 1, work)
+    total = np.int64(0)
+    shift = np.int64(0)
+    for j in range(count):
+        coefs = 2 * j * needs
+        rests = coefs + needs
+        other = capacity - shift
+        work.state[1] += 1
+        layer = work.state[1]
+        fresh = np.int64(0)
+        for at in range(states):
+            base = shift + at * words
+            left = np.int64(work.keys[base + needs])
+            value = work.sums[(shift >> 1) + at]
+            for g in range(work.entry_lo[j], work.entry_lo[j + 1]):
+                if not fits(tables.packed_of[left], work.entry_packed[g], tables.guard):
+                    continue
+                index = left - work.entry_index[g]
+                ways = work.ways[j + 1, index]
+                if ways == 0:
+                    continue
+                gain = np.uint64(work.entry_gain[g])
+                cap = np.uint64(min(work.gains[j + 1, index], _BYTE)) * _ONES
+                alive = _TOP
+                open_ = np.uint64(0)
+                for i in range(needs):
+                    raised = (work.keys[base + i] | _TOP) - work.lanes[coefs + i] * gain
+                    keep = raised & _TOP
+                    need = raised & (keep - (keep >> np.uint64(7)))
+                    alive &= (work.lanes[rests + i] | _TOP) - need
+                    alive &= (cap | _TOP) - need
+                    open_ |= need
+                    key[i] = need
+                if alive != _TOP:
+                    continue
+                if open_ == 0:
+                    total += value * work.entry_count[g] * ways
+                    continue
+                key[needs] = np.uint64(index)
+                fresh = _store(key, words, fresh, layer, other, value * work.entry_count[g], work)
+                if fresh < 0:
+                    return np.int64(NO_ROOM)
+        states = fresh
+        shift = other
+        if states == 0:
+            break
+    return total
+
+
+@njit(cache=True)
+def fixed_by(member, m, sets, tables, work):
+    """Count the admissible labellings fixed by automorphism number ``member``; negative: see ``count_states``."""
+    count = build_variables(m, sets, work.perms[member], tables, work)
+    count = merged_entries(count, tables, work)
+    if count < 0 or unconstrained_ways(count, False, tables, work) > _LIMIT:
+        return np.int64(TOO_LARGE)
+    return count_states(count, sets, tables, work)
 
 
 @njit(cache=True)
@@ -142,7 +229,7 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
     """Count the orbits of labellings of the contracted graphs ``mults[start:stop]``; one number each in ``out``.
 
     ``frame_modes`` is a sum of FRAME_NONE, FRAME_VERTEX, FRAME_PATH; ``frame_degree`` restricts FRAME_VERTEX to
-    vertices of that degree (0: any).  Returns 0, or TOO_LARGE when a count passes 2**62 or a group is too large.
+    vertices of that degree (0: any).  Returns 0, TOO_LARGE when a count passes 2**62 or a group is too large, or NO_ROOM.
     """
     for h in range(start, stop):
         mult = mults[h]
@@ -165,8 +252,10 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                     work.class_kind[frame] += 1
                 fixed = np.int64(0)
                 for i in range(kept):
-                    n = fixed_by(work.members[i], m, sets, tables, work, -1)
-                    if n < 0 or fixed > (np.int64(1) << 62) - n:
+                    n = fixed_by(work.members[i], m, sets, tables, work)
+                    if n < 0:
+                        return n
+                    if fixed > (np.int64(1) << 62) - n:
                         return TOO_LARGE
                     fixed += n
                 if mode == FRAME_PATH:

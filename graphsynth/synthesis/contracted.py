@@ -1,0 +1,144 @@
+"""Contracted graphs: what is left of a chain when every path of binary links becomes one edge.
+
+They are the 2-connected loopless multigraphs of minimum degree 3 with a given number of independent loops
+(``docs/explanation/enumeration.md``).  There are few of them, so the lists up to eight loops are shipped as package
+data; ``python -m graphsynth.synthesis.contracted`` makes them anew with the project's own generator.
+"""
+
+from __future__ import annotations
+
+import lzma
+from functools import lru_cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import FormatError, TooLargeError
+
+__all__ = ["SHIPPED_LOOPS", "contracted_graphs", "decode", "encode"]
+
+SHIPPED_LOOPS = 8
+_MAGIC = b"gsH1"
+
+Layers = dict[int, NDArray[np.uint8]]
+"""Multiplicity matrices ``(graphs, k, k)`` by number of vertices k."""
+
+
+def encode(layers: Layers) -> bytes:
+    """Pack contracted graphs: for each k the upper triangles, transposed (like with like), then compressed."""
+    parts = [_MAGIC, bytes([len(layers)])]
+    for k, mults in sorted(layers.items()):
+        upper = mults[:, *np.triu_indices(k, 1)]
+        parts.append(bytes([k]) + len(mults).to_bytes(4, "little"))
+        parts.append(np.ascontiguousarray(upper.T).tobytes())
+    filters = [{"id": lzma.FILTER_LZMA2, "preset": 9, "lc": 0, "lp": 0, "pb": 0}]
+    return lzma.compress(b"".join(parts), format=lzma.FORMAT_XZ, filters=filters)
+
+
+def decode(data: bytes) -> Layers:
+    """Unpack what ``encode`` packed.
+
+    Raises
+    ------
+    FormatError
+        If the data are not a list of contracted graphs.
+    """
+    try:
+        raw = lzma.decompress(data)
+    except lzma.LZMAError as error:
+        raise FormatError(f"not a list of contracted graphs ({error})", "contracted graphs") from None
+    if raw[:4] != _MAGIC:
+        raise FormatError(f"starts with {raw[:4]!r}, expected {_MAGIC!r}", "contracted graphs")
+    at, layers = 5, Layers()
+    for _ in range(raw[4]):
+        k, count = raw[at], int.from_bytes(raw[at + 1 : at + 5], "little")
+        size = k * (k - 1) // 2 * count
+        upper = np.frombuffer(raw, np.uint8, size, at + 5).reshape(-1, count).T
+        at += 5 + size
+        mults = np.zeros((count, k, k), np.uint8)
+        rows, columns = np.triu_indices(k, 1)
+        mults[:, rows, columns] = upper
+        mults[:, columns, rows] = upper
+        layers[k] = mults
+    return layers
+
+
+@lru_cache(maxsize=4)
+def contracted_graphs(loops: int) -> Layers:
+    """Return all contracted graphs with the given number of loops (2..8), by number of vertices.
+
+    The matrices are shared: do not write to them.
+
+    Raises
+    ------
+    TooLargeError
+        For more than eight loops: no complete list is shipped.
+    """
+    if not 2 <= loops <= SHIPPED_LOOPS:
+        raise TooLargeError(
+            f"{loops} loops need contracted graphs that are not shipped (2 <= loops <= {SHIPPED_LOOPS}); "
+            "ask for fewer links"
+        )
+    layers = decode(files("graphsynth.synthesis").joinpath("data", f"contracted-{loops}.xz").read_bytes())
+    for mults in layers.values():
+        mults.setflags(write=False)
+    return layers
+
+
+def _unique_rows(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the distinct rows in lexicographic order."""
+    rows = np.ascontiguousarray(rows)
+    keys = rows.view(np.dtype((np.void, rows.shape[1]))).ravel()
+    return np.unique(keys).view(np.uint8).reshape(-1, rows.shape[1])
+
+
+def _from_codes(codes: NDArray[np.uint8], k: int) -> NDArray[np.uint8]:
+    mults = np.zeros((len(codes), k, k), np.uint8)
+    rows, columns = np.triu_indices(k, 1)
+    mults[:, rows, columns] = codes
+    mults[:, columns, rows] = codes
+    return mults
+
+
+def generate(loops: int, vertices: int | None = None, smaller: dict[int, Layers] | None = None) -> dict[int, Layers]:
+    """Make the contracted graphs with 2..loops loops and at most the given number of vertices, from the dipole up.
+
+    Every 2-connected multigraph of minimum degree 3 on k > 2 vertices has two joined vertices whose merging leaves
+    such a multigraph on k - 1 vertices (with as many loops less as there were parallel edges besides the first), so
+    splitting vertices reaches all of them.
+
+    Parameters
+    ----------
+    loops : int
+        Largest number of loops.
+    vertices : int, optional
+        Largest number of vertices; default ``2 * (loops - 1)``, which makes the lists complete.
+    smaller : dict, optional
+        Lists that are known already; completed in place and returned.
+
+    Returns
+    -------
+    dict
+        ``result[loops][vertices]``: the multiplicity matrices, in the order of their canonical codes.
+    """
+    from graphsynth.synthesis.kernels.splitting import split_all
+
+    found: dict[int, Layers] = {} if smaller is None else smaller
+    for v in range(2, loops + 1):
+        layers = found.setdefault(v, {})
+        dipole = np.array([[[0, v + 1], [v + 1, 0]]], np.uint8)
+        layers.setdefault(2, dipole)
+        for k in range(3, min(2 * (v - 1), vertices or 2 * (v - 1)) + 1):
+            if k in layers:
+                continue
+            buffer = np.empty((1 << 18, k * (k - 1) // 2), np.uint8)
+            codes = np.empty((0, buffer.shape[1]), np.uint8)
+            for joined in range(1, v):
+                parents = found[v - joined + 1].get(k - 1)
+                at = 0
+                while parents is not None and at < len(parents):
+                    at, count = split_all(k - 1, parents, at, joined, v + 1, buffer)
+                    codes = _unique_rows(np.concatenate([codes, _unique_rows(buffer[:count])]))
+            layers[k] = _from_codes(codes, k)
+    return found

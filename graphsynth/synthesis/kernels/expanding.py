@@ -1,0 +1,213 @@
+"""From labels back to links and joints: packed joints, and the one-line text form."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from graphsynth.synthesis.kernels.counting import FRAME_PATH, FRAME_VERTEX
+from graphsynth.synthesis.kernels.listing import HEADER
+
+
+class Spelling(NamedTuple):
+    """What the labels of an alphabet say."""
+
+    label_words: NDArray[np.int32]  # (labels, multiplicity) word numbers, the marked one first
+    label_mark: NDArray[np.int32]  # (labels,) position of the frame in the first word, 0: none
+    word_length: NDArray[np.int32]  # (words,) number of joints
+    word_joints: NDArray[np.uint8]  # (words, longest) joint mobilities
+    level_index: NDArray[np.int64]  # wanted sizes of adjacency levels: which (negative: from the end)
+    level_low: NDArray[np.int64]
+    level_high: NDArray[np.int64]
+
+
+@njit(cache=True)
+def _spell(k, mult, row, spelling, joints):
+    """Write the joint mobilities of one row into the square matrix ``joints``; return (links, frame)."""
+    joints[:, :] = 0
+    links = k
+    frame = row[2] if row[1] == FRAME_VERTEX else -1
+    e = 0
+    for u in range(k):
+        for v in range(u + 1, k):
+            copies = mult[u, v]
+            if copies == 0:
+                continue
+            label = row[HEADER + e]
+            mark = spelling.label_mark[label]
+            for i in range(copies):
+                word = spelling.label_words[label, i]
+                length = spelling.word_length[word]
+                at = u
+                for j in range(length):
+                    if j + 1 < length:
+                        to = links
+                        links += 1
+                        if i == 0 and mark == j + 1 and row[1] == FRAME_PATH:
+                            frame = to
+                    else:
+                        to = v
+                    joints[at, to] = spelling.word_joints[word, j]
+                    joints[to, at] = spelling.word_joints[word, j]
+                    at = to
+            e += 1
+    return links, frame
+
+
+@njit(cache=True)
+def _level_order(links, frame, joints, order, level):
+    """Order the links by adjacency level from the frame; return the number of levels."""
+    level[:links] = -1
+    level[frame] = 0
+    order[0] = frame
+    done = 1
+    depth = 0
+    while done < links:
+        depth += 1
+        for v in range(links):
+            if level[v] >= 0:
+                continue
+            for w in range(links):
+                if joints[v, w] and level[w] == depth - 1:
+                    level[v] = depth
+                    order[done] = v
+                    done += 1
+                    break
+    return depth + 1
+
+
+@njit(cache=True)
+def _levels_fit(links, levels, level, spelling):
+    """Check the wanted sizes of the adjacency levels."""
+    for i in range(spelling.level_index.shape[0]):
+        which = spelling.level_index[i]
+        if which < 0:
+            which += levels
+        size = 0
+        for v in range(links):
+            if level[v] == which:
+                size += 1
+        if size < spelling.level_low[i] or size > spelling.level_high[i]:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _arrange(k, mult, row, spelling, joints, order, level):
+    """Spell one row and order its links; return (links, frame), links = 0 when the levels do not fit."""
+    links, frame = _spell(k, mult, row, spelling, joints)
+    if frame < 0:
+        for v in range(links):
+            order[v] = v
+        return links, frame
+    levels = _level_order(links, frame, joints, order, level)
+    if not _levels_fit(links, levels, level, spelling):
+        return 0, frame
+    return links, frame
+
+
+@njit(cache=True)
+def expand_packed(k, mults, rows, count, spelling, out):
+    """Write the joints of rows as byte triples (a, b, mobility), a < b, sorted; link 0 is the frame if there is one.
+
+    ``out`` is (capacity, 3 * joints) uint8.  Returns the number of rows kept (those whose levels fit).
+    """
+    size = 256
+    joints = np.empty((size, size), np.uint8)
+    order = np.empty(size, np.int64)
+    level = np.empty(size, np.int64)
+    kept = 0
+    for r in range(count):
+        links, _ = _arrange(k, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
+        if links == 0:
+            continue
+        at = 0
+        for a in range(links):
+            for b in range(a + 1, links):
+                mobility = joints[order[a], order[b]]
+                if mobility:
+                    out[kept, at] = a
+                    out[kept, at + 1] = b
+                    out[kept, at + 2] = mobility
+                    at += 3
+        kept += 1
+    return kept
+
+
+@njit(cache=True)
+def _put_number(out, at, n):
+    if n >= 100:
+        out[at] = 48 + n // 100
+        at += 1
+    if n >= 10:
+        out[at] = 48 + n // 10 % 10
+        at += 1
+    out[at] = 48 + n % 10
+    return at + 1
+
+
+@njit(cache=True)
+def expand_text(k, mults, rows, count, spelling, space, highest, out):
+    """Write rows as lines of the text form (graph6, then frame, higher joints and space); return (bytes, lines)."""
+    size = 256
+    joints = np.empty((size, size), np.uint8)
+    order = np.empty(size, np.int64)
+    level = np.empty(size, np.int64)
+    at = 0
+    kept = 0
+    for r in range(count):
+        links, frame = _arrange(k, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
+        if links == 0:
+            continue
+        out[at] = 63 + links
+        at += 1
+        bits = 0
+        filled = 0
+        for b in range(1, links):
+            for a in range(b):
+                bits = bits * 2 + (1 if joints[order[a], order[b]] else 0)
+                filled += 1
+                if filled == 6:
+                    out[at] = 63 + bits
+                    at += 1
+                    bits = 0
+                    filled = 0
+        if filled:
+            out[at] = 63 + (bits << (6 - filled))
+            at += 1
+        if frame >= 0:
+            out[at] = 32
+            out[at + 1] = 102  # f
+            out[at + 2] = 48
+            at += 3
+        for mobility in range(2, highest + 1):
+            first = True
+            for a in range(links):
+                for b in range(a + 1, links):
+                    if joints[order[a], order[b]] != mobility:
+                        continue
+                    if first:
+                        out[at] = 32
+                        out[at + 1] = 48 + mobility
+                        out[at + 2] = 58  # :
+                        at += 3
+                    else:
+                        out[at] = 44  # ,
+                        at += 1
+                    first = False
+                    at = _put_number(out, at, a)
+                    out[at] = 45  # -
+                    at = _put_number(out, at + 1, b)
+        if space != 3:
+            out[at] = 32
+            out[at + 1] = 112  # pi
+            out[at + 2] = 105
+            out[at + 3] = 48 + space
+            at += 4
+        out[at] = 10
+        at += 1
+        kept += 1
+    return at, kept

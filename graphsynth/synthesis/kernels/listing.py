@@ -1,0 +1,292 @@
+"""Listing the labellings of contracted graphs, one from each orbit, as a stream that can stop anywhere.
+
+Every labelling is met once by a depth-first search and kept when no automorphism maps it to a lexicographically
+smaller one: nothing is stored to compare with.  With a required symmetry of prime order p the searches run only over
+labellings fixed by a *witness*: an automorphism of order p of the contracted graph, or a class with p equal paths
+(these two cases are all: an automorphism of order p of the mechanism acts on the contracted graph with order p or 1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from graphsynth.synthesis.kernels.automorphisms import automorphisms
+from graphsynth.synthesis.kernels.counting import (
+    FRAME_NONE,
+    FRAME_PATH,
+    FRAME_VERTEX,
+    TOO_LARGE,
+    degree_of,
+    frame_stabiliser,
+)
+from graphsynth.synthesis.kernels.variables import (
+    build_variables,
+    fits,
+    load_graph,
+    plain_entries,
+    remaining_gains,
+    start_needs,
+    unconstrained_ways,
+)
+
+# work.state: where the stream stands
+GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT = range(2, 13)
+HEADER = 3  # columns of a row before the labels: graph, frame mode, frame
+
+
+@njit(cache=True)
+def _has_order(perm, k, p):
+    """Tell whether a vertex permutation has prime order p."""
+    moved = False
+    for v in range(k):
+        w = v
+        for _ in range(p):
+            w = np.int64(perm[w])
+        if w != v:
+            return False
+        if perm[v] != v:
+            moved = True
+    return moved
+
+
+@njit(cache=True)
+def _is_fixed(perm, m, tables, work):
+    """Tell whether the labelling of the current leaf is fixed by a vertex permutation."""
+    for e in range(m):
+        a = perm[work.class_u[e]]
+        b = perm[work.class_v[e]]
+        want = work.label[e]
+        if a > b:
+            want = tables.label_reverse[want]
+        if work.label[work.class_of[a, b]] != want:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _is_first(kept, m, tables, work):
+    """Tell whether no automorphism that keeps the frame maps the current leaf to a smaller labelling."""
+    for i in range(kept):
+        perm = work.perms[work.members[i]]
+        for e in range(m):
+            a = perm[work.class_u[e]]
+            b = perm[work.class_v[e]]
+            image = work.label[work.class_of[a, b]]
+            if a > b:
+                image = tables.label_reverse[image]
+            if image != work.label[e]:
+                if image < work.label[e]:
+                    return False
+                break
+    return True
+
+
+@njit(cache=True)
+def _is_new(k, symmetry, tables, work):
+    """Tell whether the current leaf has no earlier witness than the one being searched."""
+    kept = work.state[KEPT]
+    witness = work.state[WITNESS]
+    m = work.state[CLASSES]
+    for i in range(min(witness, kept)):
+        perm = work.perms[work.members[i]]
+        if _has_order(perm, k, symmetry) and _is_fixed(perm, m, tables, work):
+            return False
+    return all(tables.label_fold[work.label[e]] < symmetry for e in range(witness - kept))
+
+
+@njit(cache=True)
+def _open_frame(k, mult, mode, frame, frame_degree, work):
+    """Try one choice of the frame; return the number of automorphisms that keep it (0: not a choice)."""
+    if mode == FRAME_VERTEX and frame_degree and degree_of(k, mult, frame) != frame_degree:
+        return 0
+    return frame_stabiliser(work.state[ORDER], mode, frame, work)
+
+
+@njit(cache=True)
+def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work):
+    """Advance to the next (graph, frame, witness); return 1, 0 at the end, or TOO_LARGE."""
+    st = work.state
+    while st[GRAPH] < stop:
+        mult = mults[st[GRAPH]]
+        if st[ORDER] == 0:
+            st[ORDER] = automorphisms(k, mult, work.perms)
+            st[CLASSES], st[SETS] = load_graph(k, mult, tables, work)
+            if st[ORDER] < 0 or st[SETS] < 0:
+                return TOO_LARGE
+            st[MODE] = FRAME_NONE
+            st[FRAME] = -1
+            st[KEPT] = 0
+        m = st[CLASSES]
+        st[WITNESS] += 1
+        witnesses = 0
+        if st[KEPT]:
+            witnesses = st[KEPT] + m if symmetry else 1
+        while st[WITNESS] < witnesses:
+            w = st[WITNESS]
+            if symmetry == 0:
+                return 1
+            if w < st[KEPT]:
+                if _has_order(work.perms[work.members[w]], k, symmetry):
+                    return 1
+            elif work.class_kind[w - st[KEPT]] >= 2 * symmetry:
+                return 1
+            st[WITNESS] += 1
+        # next frame
+        if st[KEPT] and st[MODE] == FRAME_PATH:
+            work.class_kind[st[FRAME]] -= 1
+        st[KEPT] = 0
+        st[FRAME] += 1
+        frames = 1 if st[MODE] == FRAME_NONE else (k if st[MODE] == FRAME_VERTEX else m)
+        if st[FRAME] >= frames or not frame_modes & st[MODE]:
+            st[MODE] *= 2
+            st[FRAME] = -1
+            if st[MODE] > FRAME_PATH:
+                st[GRAPH] += 1
+                st[ORDER] = 0
+            continue
+        st[KEPT] = _open_frame(k, mult, st[MODE], st[FRAME], frame_degree, work)
+        st[WITNESS] = -1
+        if st[KEPT] and st[MODE] == FRAME_PATH:
+            work.class_kind[st[FRAME]] += 1
+    return 0
+
+
+@njit(cache=True)
+def _open_search(symmetry, tables, work):
+    """Lay out the variables of the search the state points to."""
+    st = work.state
+    member = work.members[st[WITNESS]] if st[WITNESS] < st[KEPT] and symmetry else np.int64(0)
+    st[COUNT] = build_variables(st[CLASSES], st[SETS], work.perms[member], tables, work)
+    plain_entries(st[COUNT], tables, work)
+    unconstrained_ways(st[COUNT], True, tables, work)
+    remaining_gains(st[COUNT], st[SETS], work)
+    start_needs(st[SETS], work)
+    st[DEPTH] = 0
+    work.at[0] = tables.label_lo[work.class_kind[work.var_rep[0]]]
+    work.used_index[0] = tables.target
+    st[ACTIVE] = 1
+
+
+@njit(cache=True)
+def _emit(k, symmetry, tables, work, rows, n):
+    """Keep the current leaf if it is the first of its orbit; return the new number of rows."""
+    st = work.state
+    m = st[CLASSES]
+    for e in range(m):
+        label = work.at[work.class_var[e]]
+        if work.class_flip[e]:
+            label = tables.label_reverse[label]
+        work.label[e] = label
+    if not _is_first(st[KEPT], m, tables, work):
+        return n
+    if symmetry and not _is_new(k, symmetry, tables, work):
+        return n
+    rows[n, 0] = st[GRAPH]
+    rows[n, 1] = st[MODE]
+    rows[n, 2] = st[FRAME]
+    for e in range(m):
+        rows[n, HEADER + e] = work.label[e]
+    return n + 1
+
+
+@njit(cache=True)
+def _shift(j, label, sign, tables, work):
+    """Apply (+1) or take back (-1) the label of variable j; return 0 when a critical set can no longer be served."""
+    y = (work.class_heaviest[work.var_rep[j]] - tables.label_weight[label]) * sign
+    alive = 1
+    for q in range(work.row[j], work.row[j + 1]):
+        s = work.row_set[q]
+        new = work.left[s] - work.row_coef[q] * y
+        work.left[s] = new
+        if new > work.row_rest[q]:
+            alive = 0
+    return alive
+
+
+@njit(cache=True)
+def _search(k, symmetry, tables, work, rows, n):
+    """Run or go on with the search the state points to until it ends or the rows are full."""
+    st = work.state
+    fold_class = st[WITNESS] - st[KEPT] if symmetry else np.int64(-1)
+    count = st[COUNT]
+    depth = st[DEPTH]
+    while n < rows.shape[0]:
+        kind = work.class_kind[work.var_rep[depth]]
+        label = work.at[depth]
+        if label == tables.label_hi[kind]:
+            depth -= 1
+            if depth < 0:
+                st[ACTIVE] = 0
+                return n
+            _shift(depth, work.at[depth], -1, tables, work)
+            work.at[depth] += 1
+            continue
+        size = work.var_size[depth]
+        index = work.used_index[depth]
+        packed = tables.label_packed[label] * size
+        usable = fits(tables.packed_of[index], packed, tables.guard)
+        if usable:
+            index -= tables.label_index[label] * size
+            usable = work.ways[depth + 1, index] != 0
+        if work.var_own[depth] and tables.label_reverse[label] != label:
+            usable = False
+        if fold_class >= 0 and work.var_rep[depth] == fold_class and tables.label_fold[label] < symmetry:
+            usable = False
+        if not usable:
+            work.at[depth] = label + 1
+            continue
+        alive = _shift(depth, label, 1, tables, work)
+        if alive and depth + 1 < count:
+            depth += 1
+            work.used_index[depth] = index
+            work.at[depth] = tables.label_lo[work.class_kind[work.var_rep[depth]]]
+            continue
+        if alive:
+            n = _emit(k, symmetry, tables, work, rows, n)
+        _shift(depth, label, -1, tables, work)
+        work.at[depth] = label + 1
+    st[DEPTH] = depth
+    return n
+
+
+@njit(cache=True)
+def rewind(start, work):
+    """Put the stream before contracted graph number ``start``."""
+    for i in range(work.state.shape[0]):
+        work.state[i] = 0
+    work.state[GRAPH] = start
+    work.state[WITNESS] = -1
+
+
+@njit(cache=True)
+def list_rows(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work, rows):
+    """Fill ``rows`` with the next labellings of the contracted graphs up to number ``stop``.
+
+    Parameters
+    ----------
+    k : int
+        Number of vertices of the contracted graphs.
+    mults : (graphs, k, k) uint8
+        Their multiplicity matrices.
+    frame_modes, frame_degree : int
+        As in ``count_block``.
+    symmetry : int
+        0, or the prime order of a required automorphism.
+    rows : (capacity, HEADER + classes) int32
+        Output: graph, frame mode, frame, label of each class.
+
+    Returns
+    -------
+    int
+        Number of rows written; fewer than the capacity only at the end of the stream; TOO_LARGE on overflow.
+    """
+    n = 0
+    while n < rows.shape[0]:
+        if not work.state[ACTIVE]:
+            more = _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work)
+            if more <= 0:
+                return n if more == 0 else TOO_LARGE
+            _open_search(symmetry, tables, work)
+        n = _search(k, symmetry, tables, work, rows, n)
+    return n
