@@ -41,7 +41,7 @@ td.num{white-space:nowrap}
 .facts span{color:var(--soft);font-size:.85rem}
 .pictures{display:grid;grid-template-columns:repeat(12,1fr);gap:.9rem;align-items:stretch;margin-top:.9rem}
 figure{margin:0;background:var(--card);border-radius:.5rem;padding:.7rem}
-figure{grid-column:span 6;display:flex;flex-direction:column}
+figure{grid-column:span 6;min-width:0;display:flex;flex-direction:column}
 figure.wide{grid-column:1/-1}
 figure.small{grid-column:span 4}
 .sheet figure.small{grid-column:span 3}
@@ -51,7 +51,7 @@ figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
 figure .gs{--paper:var(--card)}
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}
 .pictures:not(.sheet) svg{width:100%}
-figure.wide svg{max-width:44rem;max-height:32rem}
+figure.wide svg{max-width:min(100%,44rem);max-height:32rem}
 figcaption{margin-top:auto;padding-top:.4rem}figcaption b{color:var(--ink)}
 details{margin:.6rem 0}summary{cursor:pointer;font-weight:600}
 code{font-size:.85em;overflow-wrap:anywhere}
