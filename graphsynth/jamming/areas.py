@@ -60,7 +60,7 @@ def ellipse_circle(R1: ArrayLike, a: ArrayLike, b: ArrayLike) -> CrescentAreas:
 
     Examples
     --------
-    >>> ellipse_circle(5.0, 6.0, 4.0).circle_only.round(10).item()
+    >>> round(ellipse_circle(5.0, 6.0, 4.0).circle_only.item(), 9)
     11.487371022
     """
     R1, a, b = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (R1, a, b)))
@@ -86,8 +86,8 @@ def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> Cresce
 
     Examples
     --------
-    >>> ellipse_circle_stable(1.0, 1e-9, 1e-9).ellipse_only.item()
-    1.999999998429204e-09
+    >>> print(f"{ellipse_circle_stable(1.0, 1e-9, 1e-9).ellipse_only.item():.14e}")
+    1.99999999842920e-09
     """
     R1, pa, qb = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (R1, pa, qb)))
     if not bool(np.all((R1 > 0.0) & (qb < R1) & (pa + qb >= 0.0))):

@@ -18,6 +18,9 @@ __all__ = ["escalate"]
 Array = NDArray[np.float64]
 
 _DIGITS = 50
+_COINCIDENT = 1e-12  # relative; the given numbers are rounded at 1e-16
+_TRANSLATES = "congruent triangles and equal legs: the platform translates on a circle at one orientation"
+_LARGEST_WORK = 20000  # intervals
 _MERGED = 1e-20  # width at which two modes are reported as one double mode
 
 
@@ -41,8 +44,14 @@ def escalate(
         g, n, d = _coefficients(mp, A, b, l2)
         if max(abs(c) for c in g) < mp.mpf(10) ** -14:  # below the resolution of the given numbers
             return np.zeros((0, 3)), np.zeros(0, dtype=bool), "the sextic vanishes: a continuous family of poses"
+        family = _congruent(A, b, l2)
+        if family:
+            return np.zeros((0, 3)), np.zeros(0, dtype=bool), family
         found: list[tuple[Any, Any, bool]] = []
-        for alpha, merged in _roots(mp, g):
+        roots = _roots(mp, g)
+        if roots is None:
+            return np.zeros((0, 3)), np.zeros(0, dtype=bool), "not decided: a root of the sextic is too flat to isolate"
+        for alpha, merged in roots:
             z = mp.expj(alpha)
             N, Delta = ((n[0] * z + n[1]) * z + n[2]) + n[3] / z, d[0] + d[1] * z - mp.conj(d[1]) / z
             if abs(Delta) > mp.mpf(10) ** -15:
@@ -51,7 +60,8 @@ def escalate(
             family, points = _geometric(mp, A, b, l2, z)
             if family:
                 return np.zeros((0, 3)), np.zeros(0, dtype=bool), family
-            found += [(p, alpha, False) for p in points]
+            known = [q for q, other, _ in found if abs(other - alpha) < _COINCIDENT]  # a split double root comes twice
+            found += [(p, alpha, False) for p in points if all(abs(p - q) > _COINCIDENT for q in known)]
         poses = [[float(p.real * unit), float(p.imag * unit), float(alpha)] for p, alpha, _ in found]
         return np.array(poses).reshape(-1, 3), np.array([merged for *_, merged in found], dtype=bool), ""
 
@@ -74,40 +84,54 @@ def _coefficients(mp: Any, A: list[Any], b: list[Any], l2: list[Any]) -> tuple[l
     return [g0, g1, g2, n2 * c(nm)], [n2, n1, n0, nm], [d0, de]
 
 
-def _roots(mp: Any, g: list[Any]) -> list[tuple[Any, bool]]:
-    """Real roots of G, sorted, with a mark on those that stay double at this precision."""
-    bend = 2 * (abs(g[1]) + 4 * abs(g[2]) + 9 * abs(g[3]))
-    eta = (abs(g[0]) + bend) * mp.mpf(10) ** (5 - _DIGITS)
+def _roots(mp: Any, g: list[Any]) -> list[tuple[Any, bool]] | None:
+    """Real roots of G, sorted, with a mark on those that stay merged at this precision; None if undecided.
+
+    G'' is bounded on each interval through its Taylor expansion to the fourth derivative, so that the work stays small
+    beside a quadruple root (similar triangles, section 5.3).
+    """
+    fourth = 2 * (abs(g[1]) + 16 * abs(g[2]) + 81 * abs(g[3]))
+    eta = (abs(g[0]) + fourth) * mp.mpf(10) ** (5 - _DIGITS)
+
+    def derivative(order: int, x: Any) -> Any:
+        z = mp.expj(x)
+        total = sum((mp.j * k) ** order * g[k] * z**k for k in (1, 2, 3))
+        return 2 * total.real + (g[0] if order == 0 else 0)
 
     def value(x: Any) -> Any:
-        z = mp.expj(x)
-        return g[0] + 2 * (z * (g[1] + z * (g[2] + z * g[3]))).real
+        return derivative(0, x)
 
     def slope(x: Any) -> Any:
-        z = mp.expj(x)
-        return -2 * (z * (g[1] + z * (2 * g[2] + 3 * z * g[3]))).imag
+        return derivative(1, x)
 
     shift = mp.mpf(1) / 1000  # no node on the symmetric positions
     nodes = [-mp.pi + shift + 2 * mp.pi * k / 32 for k in range(33)]
     stack = [(nodes[k], nodes[k + 1]) for k in range(32)]
     roots: list[tuple[Any, bool]] = []
-    while stack:
+    for _ in range(_LARGEST_WORK):
+        if not stack:
+            break
         low, high = stack.pop()
         at_low, at_high, width, middle = value(low), value(high), high - low, (low + high) / 2
+        bend = abs(derivative(2, middle)) + abs(derivative(3, middle)) * width / 2 + fourth * width**2 / 8
         same = (at_low >= 0) == (at_high >= 0)
         if same and min(abs(at_low), abs(at_high)) > bend * width**2 / 8 + eta:
             continue
         if abs(slope(middle)) > bend * width / 2 + 3 * eta:
             if not same:
                 roots.append((_bracketed(value, slope, low, high, at_low >= 0), False))
-            continue
-        if width < _MERGED:
-            if not roots or not roots[-1][1] or abs(roots[-1][0] - middle) > 10 * _MERGED:
-                roots.append((middle, True))
-            continue
-        stack += [(low, middle), (middle, high)]
-    wrapped = [(x - 2 * mp.pi if x > mp.pi else x, merged) for x, merged in roots]
-    return sorted(wrapped, key=lambda root: root[0])
+        elif width < _MERGED:
+            roots.append((middle, True))
+        else:
+            stack += [(low, middle), (middle, high)]
+    if stack:
+        return None
+    wrapped = sorted(((x - 2 * mp.pi if x > mp.pi else x, merged) for x, merged in roots), key=lambda root: root[0])
+    return [root for k, root in enumerate(wrapped) if k == 0 or not _same_root(root, wrapped[k - 1])]
+
+
+def _same_root(root: tuple[Any, bool], previous: tuple[Any, bool]) -> bool:
+    return root[1] and previous[1] and bool(abs(root[0] - previous[0]) < 100 * _MERGED)
 
 
 def _bracketed(value: Any, slope: Any, low: Any, high: Any, positive: bool) -> Any:
@@ -128,6 +152,15 @@ def _bracketed(value: Any, slope: Any, low: Any, high: Any, positive: bool) -> A
     return x
 
 
+def _congruent(A: list[Any], b: list[Any], l2: list[Any]) -> str:
+    """Self-motion of a platform that is congruent to its anchors, with equal legs (to the rounding of the input)."""
+    if b[1] == b[0] or A[1] == A[0] or max(abs(l2[k] - l2[0]) for k in (1, 2)) > _COINCIDENT / 100:
+        return ""
+    z = (A[1] - A[0]) / (b[1] - b[0])
+    off = max(abs(abs(z) - 1), abs(z * (b[2] - b[0]) - (A[2] - A[0])))
+    return _TRANSLATES if off < _COINCIDENT / 100 else ""
+
+
 def _geometric(mp: Any, A: list[Any], b: list[Any], l2: list[Any], z: Any) -> tuple[str, list[Any]]:
     """Poses at an orientation where Delta vanishes (section 5.3): a line met with the circle ``|Q| = l2_1``."""
     e = [z * (b[k] - b[0]) - (A[k] - A[0]) for k in (1, 2)]
@@ -135,7 +168,7 @@ def _geometric(mp: Any, A: list[Any], b: list[Any], l2: list[Any], z: Any) -> tu
     tiny = mp.mpf(10) ** -14
     if max(abs(v) for v in e) < tiny:
         if max(abs(l2[k] - l2[0]) for k in (1, 2)) < tiny:
-            return "congruent triangles and equal legs: the platform translates on a circle at this orientation", []
+            return _TRANSLATES, []
         return "", []
     k = 0 if abs(e[0]) >= abs(e[1]) else 1
     if abs(w[1 - k] * abs(e[k]) ** 2 - w[k] * (mp.conj(e[k]) * e[1 - k]).real) > tiny:

@@ -58,9 +58,15 @@ class LegSolution:
     def angle(self, sigma: ArrayLike) -> Array:
         """Angle of the arm (radians, in (-pi, pi]) on branch ``sigma`` = +1 or -1; NaN if out of reach or free."""
         sigma = np.asarray(sigma, dtype=np.float64)
-        y = _dot2(self.v, self.C, sigma * self.u, self.S)
-        x = _dot2(self.u, self.C, -sigma * self.v, self.S)
+        (u, v), (C, S) = _normalised(self.u, self.v), _normalised(self.C, self.S)
+        y, x = _dot2(v, C, sigma * u, S), _dot2(u, C, -sigma * v, S)
         return np.where(self.status == LegStatus.FREE, np.nan, np.arctan2(y, x))
+
+
+def _normalised(a: Array, b: Array) -> tuple[Array, Array]:
+    """Both numbers divided by one power of two, so that products neither overflow nor underflow."""
+    shift = -np.frexp(np.fmax(np.abs(a), np.abs(b)))[1]
+    return np.asarray(np.ldexp(a, shift)), np.asarray(np.ldexp(b, shift))
 
 
 def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:

@@ -242,7 +242,7 @@ class SingleMotorPlatform:
             determinant=determinant, leg=leg, drive=state.h_phi, gap=gap,
             residual=float(np.abs(self.platform.closure(pose, theta)).max()) / scale,
             complete=complete and not mismatch.any(), closed=period > 0, closure_error=error, period=period,
-            events=tuple(sorted(events, key=lambda event: event.psi)),
+            events=tuple(sorted(events, key=lambda event: (event.psi, event.ends_motion))),
             label=BranchLabel(self.tau, sigma, int(np.sign(determinant[0])), rank, 0),
             Lc=self.Lc, method=_METHOD, seconds=perf_counter() - begin,
         )  # fmt: skip

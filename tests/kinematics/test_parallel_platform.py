@@ -75,7 +75,7 @@ def test_direct_g1():
         (1.2, 0.9, 0.15),
     ]
     # theta is rounded to a double: the condition number of JX is about 3
-    np.testing.assert_allclose(modes.poses, expected, rtol=3e-15)
+    np.testing.assert_allclose(modes.poses, expected, rtol=0, atol=3e-15)
     np.testing.assert_allclose(
         modes.determinants, [-9.399469232873439330251628961, 9.146291682729941930803887605], rtol=1e-14
     )
@@ -97,7 +97,7 @@ def test_direct_g1_at_zero_and_sextic():
             0.4780458846922180136167385177734372,
         ),
     ]
-    np.testing.assert_allclose(modes.poses, expected, rtol=3e-15)
+    np.testing.assert_allclose(modes.poses, expected, rtol=0, atol=3e-15)
     np.testing.assert_allclose(
         modes.determinants, [-5.160695960119047064362753245, 5.193397665195021007556334361], rtol=1e-14
     )
@@ -215,22 +215,22 @@ def test_leg_out_of_reach():
 @pytest.mark.parametrize(
     ("l1", "l2", "u", "v", "status"),
     [
-        (1, 1, 0, 0, LegStatus.FREE), (0, 1, 0.6, 0.8, LegStatus.TOO_NEAR), (0, 1, 1, 0, LegStatus.FREE),
+        (1, 1, 0, 0, LegStatus.FREE), (0, 1, 0.6, 0.8, LegStatus.TOO_FAR), (0, 1, 1, 0, LegStatus.FREE),
         (0, 0, 0, 0, LegStatus.FREE), (1, 0, 1, 0, LegStatus.BOUNDARY), (1, 0, 0.5, 0, LegStatus.TOO_NEAR),
         (0, 1, 2, 0, LegStatus.TOO_FAR), (1, 1, 2, 0, LegStatus.BOUNDARY), (1, 0.5, 0.5, 0, LegStatus.BOUNDARY),
     ],
 )  # fmt: skip
 def test_special_legs(l1, l2, u, v, status):
-    # 0.6^2 + 0.8^2 of the doubles is below 1 by 1e-17: the status is exact for the given numbers
     assert solve_leg(u, v, l1, l2).status == status
-    if (u, v) == (0.6, 0.8):
-        assert mp.mpf(0.6) ** 2 + mp.mpf(0.8) ** 2 < 1
+    if (u, v) == (0.6, 0.8):  # the status is exact for the given doubles, not for the decimals
+        with mp.workdps(60):
+            assert mp.mpf(0.6) ** 2 + mp.mpf(0.8) ** 2 > 1
 
 
 @settings(max_examples=300, deadline=None)
 @given(
-    st.floats(-6, 6), st.floats(-6, 6), st.floats(0, 1), st.floats(-math.pi, math.pi), st.sampled_from((1, -1)),
-    st.sampled_from((1.0, 1e-150, 1e150)),
+    st.floats(-6, 6), st.floats(-6, 6), st.floats(1e-90, 1), st.floats(-math.pi, math.pi), st.sampled_from((1, -1)),
+    st.sampled_from((1.0, 1e-100, 1e100)),
 )  # fmt: skip
 def test_legs_against_sixty_digits(log1, log2, t, direction, sigma, unit):
     l1, l2 = 10**log1, 10**log2
@@ -381,7 +381,7 @@ def test_delta_vanishing_at_a_real_mode():
     modes = assembly_modes(A, b, lengths)
     at_zero = modes.poses[np.abs(modes.poses[:, 2]) < 1e-9]
     expected = [(Q.real, -Q.imag), (Q.real, Q.imag)]
-    np.testing.assert_allclose(at_zero[np.argsort(at_zero[:, 1]), :2], expected, atol=1e-12)
+    np.testing.assert_allclose(at_zero[np.argsort(at_zero[:, 1]), :2], expected, rtol=0, atol=1e-12)
 
 
 def test_scale_invariance():
