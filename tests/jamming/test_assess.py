@@ -1,3 +1,4 @@
+# ruff: noqa: E501  (published reference values are kept on one line with all their digits)
 """Jam arcs, inverse questions and the report against published values and against the gap itself."""
 
 from __future__ import annotations

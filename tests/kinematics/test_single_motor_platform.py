@@ -1,3 +1,4 @@
+# ruff: noqa: E501  (published reference values are kept on one line with all their digits)
 """Single-motor platform against published values, events, and limits."""
 
 from __future__ import annotations
