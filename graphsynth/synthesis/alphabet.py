@@ -15,9 +15,10 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.errors import TooLargeError
-from graphsynth.synthesis.kernels.variables import Tables
+from graphsynth.synthesis.kernels.layout import Tables
 
 __all__ = ["Alphabet", "Label", "Word"]
 
@@ -230,16 +231,20 @@ def _tables(alphabet: Alphabet) -> Tables:
     ]
     packed_of, final = _resource_states(alphabet)
 
-    def ints(values: list[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    def ints(values: list[int] | list[list[int]]) -> NDArray[np.int64]:
         return np.array(values, dtype=np.int64)
 
     return Tables(
-        ints(lo), ints(hi), ints(weight), ints(index), ints(packed), ints(reverse), ints(fold),
-        ints(g_lo), ints(g_hi), ints(g_weight), ints(g_index), ints(g_packed), ints(g_count),
-        ints(heaviest), ints(packed_of), ints(final),
-        np.int64(alphabet.space), np.int64(alphabet._index(alphabet.limits)),
-        np.int64(alphabet._pack((0x80,) * len(alphabet.limits))),
-    )  # fmt: skip
+        kinds=ints([lo, hi]),
+        labels=ints([weight, index, packed, reverse, fold]),
+        group_kinds=ints([g_lo, g_hi]),
+        groups=ints([g_weight, g_index, g_packed, g_count]),
+        heaviest=ints(heaviest),
+        resources=ints([packed_of, final]),
+        space=np.int64(alphabet.space),
+        target=np.int64(alphabet._index(alphabet.limits)),
+        guard=np.int64(alphabet._pack((0x80,) * len(alphabet.limits))),
+    )
 
 
 def _resource_states(alphabet: Alphabet) -> tuple[list[int], list[int]]:

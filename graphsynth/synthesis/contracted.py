@@ -65,10 +65,20 @@ def decode(data: bytes) -> Layers:
 
 
 @lru_cache(maxsize=4)
-def contracted_graphs(loops: int) -> Layers:
-    """Return all contracted graphs with the given number of loops (2..8), by number of vertices.
+def _shipped(loops: int) -> Layers:
+    layers = decode(files("graphsynth.synthesis").joinpath("data", f"contracted-{loops}.xz").read_bytes())
+    for mults in layers.values():
+        mults.setflags(write=False)
+    return layers
 
-    The matrices are shared: do not write to them.
+
+def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
+    """Return all contracted graphs with the given numbers of loops (2..8) and vertices.
+
+    Returns
+    -------
+    (graphs, k, k) uint8
+        Multiplicity matrices, in the order of their canonical codes; shared and read-only.
 
     Raises
     ------
@@ -80,10 +90,8 @@ def contracted_graphs(loops: int) -> Layers:
             f"{loops} loops need contracted graphs that are not shipped (2 <= loops <= {SHIPPED_LOOPS}); "
             "ask for fewer links"
         )
-    layers = decode(files("graphsynth.synthesis").joinpath("data", f"contracted-{loops}.xz").read_bytes())
-    for mults in layers.values():
-        mults.setflags(write=False)
-    return layers
+    layers = _shipped(loops)
+    return layers.get(vertices, np.zeros((0, vertices, vertices), np.uint8))
 
 
 def _unique_rows(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:

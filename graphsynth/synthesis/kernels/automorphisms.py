@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from graphsynth.synthesis.kernels.layout import inner
 
 _GOLDEN = np.int64(-7046029254386353131)
 _MIX = np.int64(-4658895280553007687)
 
 
-@njit(cache=True)
+@inner
 def _mix(x):
     x = (x ^ (x >> 31)) * _MIX
     return x ^ (x >> 29)
 
 
-@njit(cache=True)
+@inner
 def _refine(k, mult, colour):
     """Colour refinement by hashing: equivalent vertices keep equal colours (a collision only weakens pruning)."""
     fresh = np.empty(k, np.int64)
@@ -44,7 +45,7 @@ def _refine(k, mult, colour):
     return distinct
 
 
-@njit(cache=True)
+@inner
 def _search_order(k, mult, colour):
     """Vertices so that each one has as many earlier neighbours as possible, rare colours first."""
     order = np.empty(k, np.int64)
@@ -72,7 +73,7 @@ def _search_order(k, mult, colour):
     return order
 
 
-@njit(cache=True)
+@inner
 def automorphisms(k, mult, perms):
     """Write every automorphism of the multigraph ``mult`` into ``perms``; the identity comes first.
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from graphsynth.synthesis.kernels.layout import inner
 
 
-@njit(cache=True)
+@inner
 def popcount(x):
     """Count the set bits of a non-negative 64-bit integer."""
     x = x - ((x >> 1) & 0x5555555555555555)
@@ -15,7 +16,7 @@ def popcount(x):
     return ((x * 0x0101010101010101) >> 56) & 0xFF
 
 
-@njit(cache=True)
+@inner
 def critical_sets(k, m, class_u, class_v, class_dmax, space, need, best, set_mask, set_need):
     """Find the vertex sets whose sparsity condition is neither automatic nor implied by a smaller set.
 

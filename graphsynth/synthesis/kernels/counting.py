@@ -11,11 +11,35 @@ import numpy as np
 from numba import njit
 
 from graphsynth.synthesis.kernels.automorphisms import automorphisms
+from graphsynth.synthesis.kernels.layout import (
+    COEF,
+    COPIES,
+    DIGITS,
+    ENTRY,
+    GAIN,
+    GAINS,
+    INDEX,
+    KIND,
+    LEFT,
+    NEED,
+    PACKED,
+    ROW,
+    SET,
+    SLOT,
+    STAMP,
+    SUM,
+    WAYS,
+    U,
+    V,
+    inner,
+)
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
+    lay_classes,
     load_graph,
     merged_entries,
+    plain_entries,
     unconstrained_ways,
 )
 
@@ -28,7 +52,7 @@ _TOP = np.uint64(0x8080808080808080)
 _ONES = np.uint64(0x0101010101010101)
 
 
-@njit(cache=True)
+@inner
 def _lay_lanes(count, sets, words, work):
     """Write, for each variable, its coefficients and what the later variables can contribute, a byte for each set.
 
@@ -37,87 +61,87 @@ def _lay_lanes(count, sets, words, work):
     for i in range(2 * count * words):
         work.lanes[i] = 0
     for s in range(sets):
-        work.left[s] = 0
-        if work.set_need[s] > _BYTE:
+        work.sets[LEFT, s] = 0
+        if work.sets[NEED, s] > _BYTE:
             return False
     for j in range(count - 1, -1, -1):
         base = 2 * j * words
         for s in range(sets):
-            rest = min(work.left[s], _BYTE)
+            rest = min(work.sets[LEFT, s], _BYTE)
             work.lanes[base + words + s // 8] |= np.uint64(rest) << np.uint64(8 * (s % 8))
         most = 0
-        for g in range(work.entry_lo[j], work.entry_lo[j + 1]):
-            most = max(most, work.entry_gain[g])
-        for q in range(work.row[j], work.row[j + 1]):
-            s = work.row_set[q]
-            if work.row_coef[q] * most > _BYTE:
+        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
+            most = max(most, work.entries[GAIN, g])
+        for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
+            s = work.rows[SET, q]
+            if work.rows[COEF, q] * most > _BYTE:
                 return False
-            work.left[s] += work.row_coef[q] * most
-            work.lanes[base + s // 8] |= np.uint64(work.row_coef[q]) << np.uint64(8 * (s % 8))
+            work.sets[LEFT, s] += work.rows[COEF, q] * most
+            work.lanes[base + s // 8] |= np.uint64(work.rows[COEF, q]) << np.uint64(8 * (s % 8))
     return True
 
 
-@njit(cache=True)
+@inner
 def _lay_gains(count, tables, work):
-    """Fill ``work.gains[j, r]``: the most that variables j, j+1, ... give one critical set while using up r."""
-    resources = tables.final.shape[0]
+    """Fill ``work.tables[GAINS, j, r]``: the most that variables j, j+1, ... give one critical set while using up r."""
+    resources = tables.resources.shape[1]
     for i in range(resources):
-        work.gains[count, i] = 0
+        work.tables[GAINS, count, i] = 0
     for j in range(count - 1, -1, -1):
         factor = np.int64(0)
-        for q in range(work.row[j], work.row[j + 1]):
-            factor = max(factor, work.row_coef[q])
+        for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
+            factor = max(factor, work.rows[COEF, q])
         for i in range(resources):
-            work.gains[j, i] = 0
-        for g in range(work.entry_lo[j], work.entry_lo[j + 1]):
-            shift = work.entry_index[g]
+            work.tables[GAINS, j, i] = 0
+        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
+            shift = work.entries[INDEX, g]
             for i in range(shift, resources):
-                if work.ways[j + 1, i - shift] and fits(tables.packed_of[i], work.entry_packed[g], tables.guard):
-                    gain = work.gains[j + 1, i - shift] + factor * work.entry_gain[g]
-                    if gain > work.gains[j, i]:
-                        work.gains[j, i] = gain
+                if work.tables[WAYS, j + 1, i - shift] and fits(tables.resources[DIGITS, i], work.entries[PACKED, g], tables.guard):
+                    gain = work.tables[GAINS, j + 1, i - shift] + factor * work.entries[GAIN, g]
+                    if gain > work.tables[GAINS, j, i]:
+                        work.tables[GAINS, j, i] = gain
 
 
-@njit(cache=True)
+@inner
 def _store(key, words, number, layer, shift, value, work):
     """Add ``value`` to the state ``key[:words]`` of a layer; return its number of states, or -1 when full.
 
     ``shift`` is where the layer starts: key words in ``work.keys``; sums start at half of that.
     """
-    capacity = work.slots.shape[0]
+    capacity = work.states.shape[1]
     h = np.uint64(1469598103934665603)
     for i in range(words):
         h = (h ^ key[i]) * np.uint64(0x9E3779B97F4A7C15)
         h ^= h >> np.uint64(29)
     slot = np.int64(h & np.uint64(capacity - 1))
     half = shift >> 1
-    while work.stamps[slot] == layer:
-        at = work.slots[slot]
+    while work.states[STAMP, slot] == layer:
+        at = work.states[SLOT, slot]
         same = True
         for i in range(words):
             if work.keys[shift + at * words + i] != key[i]:
                 same = False
                 break
         if same:
-            work.sums[half + at] += value
+            work.states[SUM, half + at] += value
             return number
         slot = (slot + 1) & (capacity - 1)
     if (number + 1) * words > capacity or 2 * (number + 1) > capacity:
         return -1
-    work.stamps[slot] = layer
-    work.slots[slot] = number
+    work.states[STAMP, slot] = layer
+    work.states[SLOT, slot] = number
     for i in range(words):
         work.keys[shift + number * words + i] = key[i]
-    work.sums[half + number] = value
+    work.states[SUM, half + number] = value
     return number + 1
 
 
-@njit(cache=True)
+@inner
 def count_states(count, sets, tables, work):
     """Count the admissible choices of all variables by dynamic programming.
 
     A state is what each critical set still needs (a byte each, never below 0) and the resources left.  States in
-    which no set needs anything are finished by ``work.ways``.
+    which no set needs anything are finished by ``work.tables[WAYS]``.
 
     Returns
     -------
@@ -125,21 +149,21 @@ def count_states(count, sets, tables, work):
         The number, TOO_LARGE when the arithmetic does not suffice, or NO_ROOM when the workspace is too small.
     """
     if sets == 0:
-        return work.ways[0, tables.target]
+        return work.tables[WAYS, 0, tables.target]
     needs = (sets + 7) // 8
     words = needs + 1
     if not _lay_lanes(count, sets, needs, work):
         return np.int64(TOO_LARGE)
     _lay_gains(count, tables, work)
-    capacity = work.slots.shape[0]
+    capacity = work.states.shape[1]
     key = np.zeros(words, np.uint64)
     for s in range(sets):
-        key[s // 8] |= np.uint64(work.set_need[s]) << np.uint64(8 * (s % 8))
+        key[s // 8] |= np.uint64(work.sets[NEED, s]) << np.uint64(8 * (s % 8))
     key[needs] = np.uint64(tables.target)
     work.state[1] += 1
-    states = _store(key, words, 0, work.state[1], 0, 1, work)
-    total = np.int64(0)
     shift = np.int64(0)
+    states = _store(key, words, np.int64(0), work.state[1], shift, np.int64(1), work)
+    total = np.int64(0)
     for j in range(count):
         coefs = 2 * j * needs
         rests = coefs + needs
@@ -150,16 +174,16 @@ def count_states(count, sets, tables, work):
         for at in range(states):
             base = shift + at * words
             left = np.int64(work.keys[base + needs])
-            value = work.sums[(shift >> 1) + at]
-            for g in range(work.entry_lo[j], work.entry_lo[j + 1]):
-                if not fits(tables.packed_of[left], work.entry_packed[g], tables.guard):
+            value = work.states[SUM, (shift >> 1) + at]
+            for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
+                if not fits(tables.resources[DIGITS, left], work.entries[PACKED, g], tables.guard):
                     continue
-                index = left - work.entry_index[g]
-                ways = work.ways[j + 1, index]
+                index = left - work.entries[INDEX, g]
+                ways = work.tables[WAYS, j + 1, index]
                 if ways == 0:
                     continue
-                gain = np.uint64(work.entry_gain[g])
-                cap = np.uint64(min(work.gains[j + 1, index], _BYTE)) * _ONES
+                gain = np.uint64(work.entries[GAIN, g])
+                cap = np.uint64(min(work.tables[GAINS, j + 1, index], _BYTE)) * _ONES
                 alive = _TOP
                 open_ = np.uint64(0)
                 for i in range(needs):
@@ -173,10 +197,10 @@ def count_states(count, sets, tables, work):
                 if alive != _TOP:
                     continue
                 if open_ == 0:
-                    total += value * work.entry_count[g] * ways
+                    total += value * work.entries[COPIES, g] * ways
                     continue
                 key[needs] = np.uint64(index)
-                fresh = _store(key, words, fresh, layer, other, value * work.entry_count[g], work)
+                fresh = _store(key, words, fresh, layer, other, value * work.entries[COPIES, g], work)
                 if fresh < 0:
                     return np.int64(NO_ROOM)
         states = fresh
@@ -186,7 +210,7 @@ def count_states(count, sets, tables, work):
     return total
 
 
-@njit(cache=True)
+@inner
 def fixed_by(member, m, sets, tables, work):
     """Count the admissible labellings fixed by automorphism number ``member``; negative: see ``count_states``."""
     count = build_variables(m, sets, work.perms[member], tables, work)
@@ -196,7 +220,7 @@ def fixed_by(member, m, sets, tables, work):
     return count_states(count, sets, tables, work)
 
 
-@njit(cache=True)
+@inner
 def frame_stabiliser(order, frame_mode, frame, work):
     """Collect the automorphisms that keep the frame; return their number, 0 if the frame is not the first of its orbit."""
     kept = 0
@@ -206,7 +230,7 @@ def frame_stabiliser(order, frame_mode, frame, work):
         elif frame_mode == FRAME_VERTEX:
             image = np.int64(work.perms[g, frame])
         else:
-            image = work.class_of[work.perms[g, work.class_u[frame]], work.perms[g, work.class_v[frame]]]
+            image = work.class_of[work.perms[g, work.classes[U, frame]], work.perms[g, work.classes[V, frame]]]
         if image < frame:
             return 0
         if image == frame:
@@ -215,7 +239,7 @@ def frame_stabiliser(order, frame_mode, frame, work):
     return kept
 
 
-@njit(cache=True)
+@inner
 def degree_of(k, mult, v):
     """Sum the multiplicities at vertex v."""
     total = 0
@@ -249,7 +273,7 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                 if kept == 0:
                     continue
                 if mode == FRAME_PATH:
-                    work.class_kind[frame] += 1
+                    work.classes[KIND, frame] += 1
                 fixed = np.int64(0)
                 for i in range(kept):
                     n = fixed_by(work.members[i], m, sets, tables, work)
@@ -259,7 +283,22 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                         return TOO_LARGE
                     fixed += n
                 if mode == FRAME_PATH:
-                    work.class_kind[frame] -= 1
+                    work.classes[KIND, frame] -= 1
                 total += fixed // kept
         out[h - start] = total
+    return 0
+
+
+@njit(cache=True)
+def estimate_block(k, mults, start, stop, tables, work, out):
+    """Bound the labellings of each contracted graph from above, sparsity and symmetry ignored."""
+    for h in range(start, stop):
+        m = lay_classes(k, mults[h], tables, work)
+        for v in range(k):
+            work.perms[0, v] = v
+        count = build_variables(m, np.int64(0), work.perms[0], tables, work)
+        if not plain_entries(count, tables, work):
+            return TOO_LARGE
+        bound = unconstrained_ways(count, False, tables, work)
+        out[h - start] = bound if bound > _LIMIT else np.float64(work.tables[WAYS, 0, tables.target])
     return 0

@@ -20,6 +20,35 @@ from graphsynth.synthesis.kernels.counting import (
     degree_of,
     frame_stabiliser,
 )
+from graphsynth.synthesis.kernels.layout import (
+    AT,
+    COEF,
+    DIGITS,
+    FLIP,
+    FOLD,
+    HEAVIEST,
+    INDEX,
+    KIND,
+    LABEL,
+    LABELS,
+    LABELS_END,
+    LEFT,
+    OWN,
+    PACKED,
+    REP,
+    REST,
+    REVERSE,
+    ROW,
+    SET,
+    SIZE,
+    USED,
+    VAR,
+    WAYS,
+    WEIGHT,
+    U,
+    V,
+    inner,
+)
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
@@ -31,11 +60,12 @@ from graphsynth.synthesis.kernels.variables import (
 )
 
 # work.state: where the stream stands
-GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT = range(2, 13)
+GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT, PART, PARTS, MET = range(2, 16)
+PREFIX = 5  # variables that number the parts of one contracted graph
 HEADER = 3  # columns of a row before the labels: graph, frame mode, frame
 
 
-@njit(cache=True)
+@inner
 def _has_order(perm, k, p):
     """Tell whether a vertex permutation has prime order p."""
     moved = False
@@ -50,39 +80,39 @@ def _has_order(perm, k, p):
     return moved
 
 
-@njit(cache=True)
+@inner
 def _is_fixed(perm, m, tables, work):
     """Tell whether the labelling of the current leaf is fixed by a vertex permutation."""
     for e in range(m):
-        a = perm[work.class_u[e]]
-        b = perm[work.class_v[e]]
-        want = work.label[e]
+        a = perm[work.classes[U, e]]
+        b = perm[work.classes[V, e]]
+        want = work.classes[LABEL, e]
         if a > b:
-            want = tables.label_reverse[want]
-        if work.label[work.class_of[a, b]] != want:
+            want = tables.labels[REVERSE, want]
+        if work.classes[LABEL, work.class_of[a, b]] != want:
             return False
     return True
 
 
-@njit(cache=True)
+@inner
 def _is_first(kept, m, tables, work):
     """Tell whether no automorphism that keeps the frame maps the current leaf to a smaller labelling."""
     for i in range(kept):
         perm = work.perms[work.members[i]]
         for e in range(m):
-            a = perm[work.class_u[e]]
-            b = perm[work.class_v[e]]
-            image = work.label[work.class_of[a, b]]
+            a = perm[work.classes[U, e]]
+            b = perm[work.classes[V, e]]
+            image = work.classes[LABEL, work.class_of[a, b]]
             if a > b:
-                image = tables.label_reverse[image]
-            if image != work.label[e]:
-                if image < work.label[e]:
+                image = tables.labels[REVERSE, image]
+            if image != work.classes[LABEL, e]:
+                if image < work.classes[LABEL, e]:
                     return False
                 break
     return True
 
 
-@njit(cache=True)
+@inner
 def _is_new(k, symmetry, tables, work):
     """Tell whether the current leaf has no earlier witness than the one being searched."""
     kept = work.state[KEPT]
@@ -92,10 +122,13 @@ def _is_new(k, symmetry, tables, work):
         perm = work.perms[work.members[i]]
         if _has_order(perm, k, symmetry) and _is_fixed(perm, m, tables, work):
             return False
-    return all(tables.label_fold[work.label[e]] < symmetry for e in range(witness - kept))
+    for e in range(witness - kept):  # noqa: SIM110 (no generators in compiled code)
+        if tables.labels[FOLD, work.classes[LABEL, e]] >= symmetry:
+            return False
+    return True
 
 
-@njit(cache=True)
+@inner
 def _open_frame(k, mult, mode, frame, frame_degree, work):
     """Try one choice of the frame; return the number of automorphisms that keep it (0: not a choice)."""
     if mode == FRAME_VERTEX and frame_degree and degree_of(k, mult, frame) != frame_degree:
@@ -103,7 +136,7 @@ def _open_frame(k, mult, mode, frame, frame_degree, work):
     return frame_stabiliser(work.state[ORDER], mode, frame, work)
 
 
-@njit(cache=True)
+@inner
 def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work):
     """Advance to the next (graph, frame, witness); return 1, 0 at the end, or TOO_LARGE."""
     st = work.state
@@ -129,12 +162,12 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
             if w < st[KEPT]:
                 if _has_order(work.perms[work.members[w]], k, symmetry):
                     return 1
-            elif work.class_kind[w - st[KEPT]] >= 2 * symmetry:
+            elif work.classes[KIND, w - st[KEPT]] >= 2 * symmetry:
                 return 1
             st[WITNESS] += 1
         # next frame
         if st[KEPT] and st[MODE] == FRAME_PATH:
-            work.class_kind[st[FRAME]] -= 1
+            work.classes[KIND, st[FRAME]] -= 1
         st[KEPT] = 0
         st[FRAME] += 1
         frames = 1 if st[MODE] == FRAME_NONE else (k if st[MODE] == FRAME_VERTEX else m)
@@ -148,11 +181,11 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
         st[KEPT] = _open_frame(k, mult, st[MODE], st[FRAME], frame_degree, work)
         st[WITNESS] = -1
         if st[KEPT] and st[MODE] == FRAME_PATH:
-            work.class_kind[st[FRAME]] += 1
+            work.classes[KIND, st[FRAME]] += 1
     return 0
 
 
-@njit(cache=True)
+@inner
 def _open_search(symmetry, tables, work):
     """Lay out the variables of the search the state points to."""
     st = work.state
@@ -163,21 +196,21 @@ def _open_search(symmetry, tables, work):
     remaining_gains(st[COUNT], st[SETS], work)
     start_needs(st[SETS], work)
     st[DEPTH] = 0
-    work.at[0] = tables.label_lo[work.class_kind[work.var_rep[0]]]
-    work.used_index[0] = tables.target
+    work.variables[AT, 0] = tables.kinds[LABELS, work.classes[KIND, work.variables[REP, 0]]]
+    work.variables[USED, 0] = tables.target
     st[ACTIVE] = 1
 
 
-@njit(cache=True)
+@inner
 def _emit(k, symmetry, tables, work, rows, n):
     """Keep the current leaf if it is the first of its orbit; return the new number of rows."""
     st = work.state
     m = st[CLASSES]
     for e in range(m):
-        label = work.at[work.class_var[e]]
-        if work.class_flip[e]:
-            label = tables.label_reverse[label]
-        work.label[e] = label
+        label = work.variables[AT, work.classes[VAR, e]]
+        if work.classes[FLIP, e]:
+            label = tables.labels[REVERSE, label]
+        work.classes[LABEL, e] = label
     if not _is_first(st[KEPT], m, tables, work):
         return n
     if symmetry and not _is_new(k, symmetry, tables, work):
@@ -186,25 +219,25 @@ def _emit(k, symmetry, tables, work, rows, n):
     rows[n, 1] = st[MODE]
     rows[n, 2] = st[FRAME]
     for e in range(m):
-        rows[n, HEADER + e] = work.label[e]
+        rows[n, HEADER + e] = work.classes[LABEL, e]
     return n + 1
 
 
-@njit(cache=True)
+@inner
 def _shift(j, label, sign, tables, work):
     """Apply (+1) or take back (-1) the label of variable j; return 0 when a critical set can no longer be served."""
-    y = (work.class_heaviest[work.var_rep[j]] - tables.label_weight[label]) * sign
+    y = (work.classes[HEAVIEST, work.variables[REP, j]] - tables.labels[WEIGHT, label]) * sign
     alive = 1
-    for q in range(work.row[j], work.row[j + 1]):
-        s = work.row_set[q]
-        new = work.left[s] - work.row_coef[q] * y
-        work.left[s] = new
-        if new > work.row_rest[q]:
+    for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
+        s = work.rows[SET, q]
+        new = work.sets[LEFT, s] - work.rows[COEF, q] * y
+        work.sets[LEFT, s] = new
+        if new > work.rows[REST, q]:
             alive = 0
     return alive
 
 
-@njit(cache=True)
+@inner
 def _search(k, symmetry, tables, work, rows, n):
     """Run or go on with the search the state points to until it ends or the rows are full."""
     st = work.state
@@ -212,51 +245,56 @@ def _search(k, symmetry, tables, work, rows, n):
     count = st[COUNT]
     depth = st[DEPTH]
     while n < rows.shape[0]:
-        kind = work.class_kind[work.var_rep[depth]]
-        label = work.at[depth]
-        if label == tables.label_hi[kind]:
+        kind = work.classes[KIND, work.variables[REP, depth]]
+        label = work.variables[AT, depth]
+        if label == tables.kinds[LABELS_END, kind]:
             depth -= 1
             if depth < 0:
                 st[ACTIVE] = 0
                 return n
-            _shift(depth, work.at[depth], -1, tables, work)
-            work.at[depth] += 1
+            _shift(depth, work.variables[AT, depth], -1, tables, work)
+            work.variables[AT, depth] += 1
             continue
-        size = work.var_size[depth]
-        index = work.used_index[depth]
-        packed = tables.label_packed[label] * size
-        usable = fits(tables.packed_of[index], packed, tables.guard)
+        size = work.variables[SIZE, depth]
+        index = work.variables[USED, depth]
+        packed = tables.labels[PACKED, label] * size
+        usable = fits(tables.resources[DIGITS, index], packed, tables.guard)
         if usable:
-            index -= tables.label_index[label] * size
-            usable = work.ways[depth + 1, index] != 0
-        if work.var_own[depth] and tables.label_reverse[label] != label:
+            index -= tables.labels[INDEX, label] * size
+            usable = work.tables[WAYS, depth + 1, index] != 0
+        if work.variables[OWN, depth] and tables.labels[REVERSE, label] != label:
             usable = False
-        if fold_class >= 0 and work.var_rep[depth] == fold_class and tables.label_fold[label] < symmetry:
+        if fold_class >= 0 and work.variables[REP, depth] == fold_class and tables.labels[FOLD, label] < symmetry:
             usable = False
         if not usable:
-            work.at[depth] = label + 1
+            work.variables[AT, depth] = label + 1
             continue
         alive = _shift(depth, label, 1, tables, work)
+        if alive and st[PARTS] > 1 and depth + 1 == min(PREFIX, count):
+            st[MET] += 1
+            alive = st[MET] % st[PARTS] == st[PART]
         if alive and depth + 1 < count:
             depth += 1
-            work.used_index[depth] = index
-            work.at[depth] = tables.label_lo[work.class_kind[work.var_rep[depth]]]
+            work.variables[USED, depth] = index
+            work.variables[AT, depth] = tables.kinds[LABELS, work.classes[KIND, work.variables[REP, depth]]]
             continue
         if alive:
             n = _emit(k, symmetry, tables, work, rows, n)
         _shift(depth, label, -1, tables, work)
-        work.at[depth] = label + 1
+        work.variables[AT, depth] = label + 1
     st[DEPTH] = depth
     return n
 
 
 @njit(cache=True)
-def rewind(start, work):
-    """Put the stream before contracted graph number ``start``."""
+def rewind(start, part, parts, work):
+    """Put the stream before contracted graph number ``start``; keep one part of ``parts`` of its search prefixes."""
     for i in range(work.state.shape[0]):
         work.state[i] = 0
     work.state[GRAPH] = start
     work.state[WITNESS] = -1
+    work.state[PART] = part
+    work.state[PARTS] = parts
 
 
 @njit(cache=True)

@@ -1,0 +1,166 @@
+"""Families: sets of chains that one kind of contracted graph and one alphabet of labels generate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import SpecError
+from graphsynth.structure.spec import LinkAssortment
+from graphsynth.synthesis.alphabet import Alphabet, alphabet_for
+from graphsynth.synthesis.contracted import contracted_graphs
+from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
+
+__all__ = ["Family", "chain_families", "chain_joints", "mechanism_families", "truss_families"]
+
+Levels = tuple[tuple[int, int, int], ...]
+"""Wanted sizes of adjacency levels: (level, lowest, highest); negative levels count from the last."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """All chains (or mechanisms) with given numbers of loops, of links with three or more joints, and of joints.
+
+    Parameters
+    ----------
+    space : int
+        Mobility Pi of the space.
+    mobility : int
+        W; 0 for Baranov trusses.
+    loops : int
+        Independent loops, at least 2.
+    vertices : int
+        Vertices of the contracted graph.
+    binary_links : int
+        Binary links on its edges (a binary frame included).
+    higher : tuple of (int, int)
+        ``(i, p_i)`` for mobilities i >= 2 that occur.
+    frames : int
+        Sum of FRAME_NONE (chains), FRAME_VERTEX, FRAME_PATH (binary frame).
+    frame_degree : int
+        Joints of a frame that is a vertex of the contracted graph; 0: any.
+    degrees : tuple of int, optional
+        The sorted degrees the contracted graph must have.
+    levels : tuple, optional
+        Wanted sizes of adjacency levels.
+    """
+
+    space: int
+    mobility: int
+    loops: int
+    vertices: int
+    binary_links: int
+    higher: tuple[tuple[int, int], ...]
+    frames: int = FRAME_NONE
+    frame_degree: int = 0
+    degrees: tuple[int, ...] | None = None
+    levels: Levels = ()
+
+    @property
+    def links(self) -> int:
+        """Number of links N, the frame included."""
+        return self.vertices + self.binary_links
+
+    @property
+    def joints(self) -> int:
+        """Number of joints p."""
+        return self.loops + self.links - 1
+
+    @property
+    def framed(self) -> bool:
+        """Whether a frame is chosen."""
+        return self.frames != FRAME_NONE
+
+    @property
+    def alphabet(self) -> Alphabet:
+        """The labels of the paths."""
+        return alphabet_for(self.space, self.mobility, self.binary_links, self.higher, self.loops, self.vertices)
+
+    @property
+    def graphs(self) -> NDArray[np.uint8]:
+        """Multiplicity matrices ``(graphs, k, k)`` of the contracted graphs."""
+        return _graphs(self.loops, self.vertices, self.degrees)
+
+
+@lru_cache(maxsize=64)
+def _graphs(loops: int, vertices: int, degrees: tuple[int, ...] | None) -> NDArray[np.uint8]:
+    mults = contracted_graphs(loops, vertices)
+    if degrees is None:
+        return mults
+    found = np.sort(mults.sum(axis=2, dtype=np.int64), axis=1)
+    return np.ascontiguousarray(mults[(found == np.array(degrees)).all(axis=1)])
+
+
+def chain_joints(links: int, mobility: int, space: int, higher: Mapping[int, int]) -> int | None:
+    """Return p_1 of a chain from W = Pi (N - 1) - sum_i p_i (Pi - i), or None when it is not a whole number >= 0.
+
+    Raises
+    ------
+    SpecError
+        For values out of their bounds.
+    """
+    for name, value, low, high in (("links", links, 2, 255), ("mobility", mobility, 0, 50), ("space", space, 2, 6)):
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise SpecError(f"{name} = {value!r} must be a whole number from {low} to {high}")
+    for i, count in higher.items():
+        if isinstance(i, bool) or not isinstance(i, int) or not 1 <= i <= space - 1:
+            raise SpecError(f"a joint of mobility {i!r} does not exist in a space of mobility {space}: use 1..{space - 1}")
+        if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= 100:
+            raise SpecError(f"p{i} = {count!r} must be a whole number from 0 to 100")
+    rest = space * (links - 1) - mobility - sum(count * (space - i) for i, count in higher.items() if i > 1)
+    joints, remainder = divmod(rest, space - 1)
+    if remainder or joints < 0 or higher.get(1, joints) != joints:
+        return None
+    return joints
+
+
+def _layers(
+    links: int, mobility: int, space: int, higher: Mapping[int, int], frames: int
+) -> Iterator[Family]:
+    lower = chain_joints(links, mobility, space, higher)
+    if lower is None:
+        return
+    placed = tuple(sorted((i, count) for i, count in higher.items() if i > 1 and count))
+    loops = lower + sum(count for _, count in placed) - links + 1
+    for vertices in range(2, min(2 * (loops - 1), links) + 1):
+        yield Family(space, mobility, loops, vertices, links - vertices, placed, frames)
+
+
+def chain_families(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> list[Family]:
+    """List the families of non-fractionated chains with two or more loops (with every frame, if ``framed``)."""
+    return list(_layers(links, mobility, space, higher, FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE))
+
+
+def truss_families(links: int, space: int, framed: bool) -> list[Family]:
+    """List the families of Baranov trusses with two or more loops (of Assur groups, if ``framed``)."""
+    return list(_layers(links, 0, space, {}, FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE))
+
+
+def mechanism_families(assortment: LinkAssortment, levels: Levels = ()) -> list[Family]:
+    """List the families of non-fractionated mechanisms with a given assortment: none or one, for two or more loops."""
+    frame = assortment.frame_joints
+    kinds = {a: count for a, count in assortment.n_a.items() if a >= 3 and count}
+    degrees = sorted([a for a, count in kinds.items() for _ in range(count)] + ([frame] if frame >= 3 else []))
+    if assortment.loops < 2 or frame < 2 or len(degrees) < 2 or assortment.mobility < 1:
+        return []
+    if assortment.frame_loops != frame - 1:
+        return []  # the links without the frame fall apart: fractionated
+    higher = tuple((i, count) for i, count in enumerate(assortment.p_i, 1) if i > 1 and count)
+    return [
+        Family(
+            assortment.space,
+            assortment.mobility,
+            assortment.loops,
+            len(degrees),
+            assortment.n_a.get(2, 0) + (frame == 2),
+            higher,
+            FRAME_PATH if frame == 2 else FRAME_VERTEX,
+            0 if frame == 2 else frame,
+            tuple(degrees),
+            levels,
+        )
+    ]

@@ -1,0 +1,195 @@
+"""Units of work: pieces of a family that depend on the problem alone, never on who computes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import TooLargeError
+from graphsynth.structure.graph import MechanismGraph
+from graphsynth.synthesis.alphabet import Alphabet
+from graphsynth.synthesis.families import Family, Levels
+from graphsynth.synthesis.kernels.counting import NO_ROOM, count_block, estimate_block
+from graphsynth.synthesis.kernels.expanding import Spelling, expand_packed, expand_text
+from graphsynth.synthesis.kernels.layout import Work, make_work
+from graphsynth.synthesis.kernels.listing import HEADER, list_rows, rewind
+
+__all__ = ["Unit", "count_each", "count_unit", "cut", "estimates", "graphs_of", "packed_of", "text_of"]
+
+LISTING_SIZE = 200_000.0  # bound on the labellings of a unit to list, before sparsity and symmetry
+COUNTING_SIZE = 512  # contracted graphs in a unit to count
+_ROWS = 4096
+_MOST_STATES = 1 << 24
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Contracted graphs ``start..stop - 1`` of a family; of a single one, possibly one part of its search prefixes."""
+
+    family: Family
+    start: int
+    stop: int
+    part: int = 0
+    parts: int = 1
+    symmetry: int = 0
+    weight: float = 1.0
+
+
+@lru_cache(maxsize=8)
+def _work(resources: int, key_words: int = 1 << 18) -> Work:
+    return make_work(resources, key_words=key_words)
+
+
+def estimates(family: Family) -> NDArray[np.float64]:
+    """Bound the number of chains of each contracted graph from above."""
+    graphs, alphabet = family.graphs, family.alphabet
+    out = np.zeros(len(graphs))
+    if len(graphs):
+        work = _work(alphabet.resources)
+        if estimate_block(family.vertices, graphs, 0, len(graphs), alphabet.tables, work, out):
+            raise TooLargeError("a contracted graph has too many kinds of paths: ask for fewer links or higher pairs")
+    return out * family.links if family.framed else out
+
+
+def cut(families: Sequence[Family], *, listing: bool, symmetry: int = 0) -> list[Unit]:
+    """Cut families into units, in the order in which their results are listed."""
+    units = []
+    for family in families:
+        if not listing:
+            count = len(family.graphs)
+            units += [
+                Unit(family, at, min(at + COUNTING_SIZE, count), weight=float(min(COUNTING_SIZE, count - at)))
+                for at in range(0, count, COUNTING_SIZE)
+            ]
+            continue
+        bounds = estimates(family)
+        at = 0
+        while at < len(bounds):
+            if bounds[at] > 8 * LISTING_SIZE:
+                parts = min(4096, ceil(bounds[at] / (4 * LISTING_SIZE)))
+                units += [Unit(family, at, at + 1, i, parts, symmetry, bounds[at] / parts) for i in range(parts)]
+                at += 1
+                continue
+            sums = np.cumsum(bounds[at : at + 100_000])
+            big = np.flatnonzero(bounds[at : at + len(sums)] > 8 * LISTING_SIZE)
+            stop = int(np.searchsorted(sums, LISTING_SIZE)) + 1
+            stop = min(stop, len(sums), int(big[0]) if len(big) else stop)
+            units.append(Unit(family, at, at + stop, 0, 1, symmetry, float(sums[stop - 1])))
+            at += stop
+    return units
+
+
+def count_each(family: Family, start: int, stop: int) -> NDArray[np.int64]:
+    """Count the chains of each contracted graph (exact).
+
+    Raises
+    ------
+    TooLargeError
+        If one contracted graph carries more than 2**62 chains.
+    """
+    alphabet = family.alphabet
+    out = np.zeros(stop - start, np.int64)
+    key_words = 1 << 18
+    while True:
+        work = _work(alphabet.resources, key_words)
+        outcome = count_block(
+            family.vertices, family.graphs, start, stop, family.frames, family.frame_degree, alphabet.tables, work, out
+        )
+        if outcome == 0:
+            return out
+        key_words *= 4
+        if outcome != NO_ROOM or key_words > _MOST_STATES:
+            raise TooLargeError(
+                f"a contracted graph with {family.vertices} vertices carries more than 2**62 chains, or too many "
+                "partial ones: fix more of the question"
+            )
+
+
+def count_unit(unit: Unit) -> int:
+    """Count the chains of a unit (exact)."""
+    if unit.symmetry or unit.family.levels:
+        return sum(len(block) for block in packed_of(unit))
+    return sum(map(int, count_each(unit.family, unit.start, unit.stop)))
+
+
+@lru_cache(maxsize=64)
+def _spelling(alphabet: Alphabet, levels: Levels) -> Spelling:
+    labels = alphabet.flat
+    number = {word: i for i, word in enumerate(alphabet.words)}
+    widest = max((len(label.words) for label in labels), default=1)
+    longest = max(map(len, alphabet.words), default=1)
+    words = np.zeros((max(1, len(labels)), widest), np.int32)
+    joints = np.zeros((max(1, len(number)), longest), np.uint8)
+    for i, label in enumerate(labels):
+        words[i, : len(label.words)] = [number[word] for word in label.words]
+    for word, i in number.items():
+        joints[i, : len(word)] = word
+    return Spelling(
+        label_words=words,
+        label_mark=np.array([label.mark for label in labels] or [0], np.int32),
+        word_length=np.array([len(word) for word in alphabet.words] or [0], np.int32),
+        word_joints=joints,
+        level_index=np.array([level for level, _, _ in levels], np.int64),
+        level_low=np.array([low for _, low, _ in levels], np.int64),
+        level_high=np.array([high for _, _, high in levels], np.int64),
+    )
+
+
+def _blocks(unit: Unit) -> Iterator[tuple[NDArray[np.int32], int]]:
+    """Stream the labellings of a unit as (rows, count); the rows are overwritten by the next step."""
+    family, alphabet = unit.family, unit.family.alphabet
+    work = make_work(alphabet.resources, key_words=1)
+    rows = np.zeros((_ROWS, HEADER + family.loops + family.vertices), np.int32)
+    rewind(unit.start, unit.part, unit.parts, work)
+    while True:
+        count = list_rows(
+            family.vertices, family.graphs, unit.stop, family.frames, family.frame_degree, unit.symmetry,
+            alphabet.tables, work, rows,
+        )  # fmt: skip
+        if count < 0:
+            raise TooLargeError("an automorphism group is too large to list: ask for fewer links")
+        if count:
+            yield rows, count
+        if count < _ROWS:
+            return
+
+
+def packed_of(unit: Unit) -> Iterator[NDArray[np.uint8]]:
+    """Stream the chains of a unit as blocks of packed joints ``(chains, 3 * joints)``."""
+    family = unit.family
+    spelling = _spelling(family.alphabet, family.levels)
+    for rows, count in _blocks(unit):
+        out = np.empty((count, 3 * family.joints), np.uint8)
+        kept = expand_packed(family.vertices, family.graphs, rows, count, spelling, out)
+        yield out[:kept]
+
+
+def graphs_of(unit: Unit) -> Iterator[MechanismGraph]:
+    """Stream the chains of a unit."""
+    links, space = unit.family.links, unit.family.space
+    frame = 0 if unit.family.framed else None
+    size = 3 * unit.family.joints
+    make = MechanismGraph._unchecked
+    for block in packed_of(unit):
+        data = block.tobytes()
+        for at in range(0, len(data), size):
+            yield make(links, data[at : at + size], frame, space)
+
+
+def text_of(unit: Unit) -> Iterator[tuple[bytes, int]]:
+    """Stream the chains of a unit as (lines of the text form, number of lines)."""
+    family = unit.family
+    spelling = _spelling(family.alphabet, family.levels)
+    highest = max((i for i, _ in family.higher), default=1)
+    line = 16 + family.links * family.links // 12 + 8 * sum(count for _, count in family.higher) + 4 * highest
+    out = np.empty(_ROWS * line, np.uint8)
+    for rows, count in _blocks(unit):
+        size, kept = expand_text(
+            family.vertices, family.graphs, rows, count, spelling, family.space, highest, out
+        )
+        yield out[:size].tobytes(), kept
