@@ -19,7 +19,7 @@ from graphsynth.synthesis.kernels.expanding import Spelling, expand_packed, expa
 from graphsynth.synthesis.kernels.layout import Work, make_work
 from graphsynth.synthesis.kernels.listing import HEADER, list_rows, rewind
 
-__all__ = ["Unit", "count_each", "count_unit", "cut", "estimates", "graphs_of", "packed_of", "text_of"]
+__all__ = ["Unit", "count_each", "count_unit", "cut", "estimates", "graphs_of", "packed_of", "spelling_of", "text_of"]
 
 LISTING_SIZE = 200_000.0  # bound on the labellings of a unit to list, before sparsity and symmetry
 COUNTING_SIZE = 512  # contracted graphs in a unit to count
@@ -68,6 +68,8 @@ def cut(families: Sequence[Family], *, listing: bool, symmetry: int = 0) -> list
             ]
             continue
         bounds = estimates(family)
+        if symmetry:  # only labellings fixed by an automorphism are searched: far fewer
+            bounds = np.sqrt(bounds) * 100.0
         at = 0
         while at < len(bounds):
             if bounds[at] > 8 * LISTING_SIZE:
@@ -140,6 +142,11 @@ def _spelling(alphabet: Alphabet, levels: Levels) -> Spelling:
     )
 
 
+def spelling_of(family: Family) -> Spelling:
+    """Return what the labels of a family say."""
+    return _spelling(family.alphabet, family.levels)
+
+
 def _blocks(unit: Unit) -> Iterator[tuple[NDArray[np.int32], int]]:
     """Stream the labellings of a unit as (rows, count); the rows are overwritten by the next step."""
     family, alphabet = unit.family, unit.family.alphabet
@@ -162,7 +169,7 @@ def _blocks(unit: Unit) -> Iterator[tuple[NDArray[np.int32], int]]:
 def packed_of(unit: Unit) -> Iterator[NDArray[np.uint8]]:
     """Stream the chains of a unit as blocks of packed joints ``(chains, 3 * joints)``."""
     family = unit.family
-    spelling = _spelling(family.alphabet, family.levels)
+    spelling = spelling_of(family)
     for rows, count in _blocks(unit):
         out = np.empty((count, 3 * family.joints), np.uint8)
         kept = expand_packed(family.vertices, family.graphs, rows, count, spelling, out)
@@ -184,7 +191,7 @@ def graphs_of(unit: Unit) -> Iterator[MechanismGraph]:
 def text_of(unit: Unit) -> Iterator[tuple[bytes, int]]:
     """Stream the chains of a unit as (lines of the text form, number of lines)."""
     family = unit.family
-    spelling = _spelling(family.alphabet, family.levels)
+    spelling = spelling_of(family)
     highest = max((i for i, _ in family.higher), default=1)
     line = 16 + family.links * family.links // 12 + 8 * sum(count for _, count in family.higher) + 4 * highest
     out = np.empty(_ROWS * line, np.uint8)

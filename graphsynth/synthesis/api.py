@@ -1,0 +1,226 @@
+"""The public functions of the enumerator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor
+
+from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.spec import LinkAssortment, StructuralSpec
+from graphsynth.synthesis import parallel, sampling
+from graphsynth.synthesis.problem import Problem
+
+__all__ = [
+    "count_assur_groups",
+    "count_baranov_trusses",
+    "count_chains",
+    "count_mechanisms",
+    "enumerate_assur_groups",
+    "enumerate_baranov_trusses",
+    "enumerate_chains",
+    "enumerate_mechanisms",
+    "sample_mechanisms",
+]
+
+
+def _list(problem: Problem, executor: Executor | None) -> Iterator[MechanismGraph]:
+    return parallel.graphs(problem.pieces(listing=True), executor)
+
+
+def _count(problem: Problem, executor: Executor | None) -> int:
+    return sum(parallel.counts(problem.pieces(listing=False), executor))
+
+
+def enumerate_chains(
+    links: int,
+    mobility: int = 1,
+    *,
+    space: int = 3,
+    joints_by_mobility: Mapping[int, int] | None = None,
+    fractionated: bool = False,
+    symmetry: int | None = None,
+    executor: Executor | None = None,
+) -> Iterator[MechanismGraph]:
+    """Enumerate kinematic chains: every one, each once up to isomorphism, none with a rigid sub-chain (exact).
+
+    Parameters
+    ----------
+    links : int
+        Number of links N.
+    mobility : int
+        Mobility W >= 1.
+    space : int
+        Mobility Pi of the space, 2..6; 3 is the plane.
+    joints_by_mobility : mapping, optional
+        ``{i: p_i}`` for i >= 2; p_1 follows from the structural formula.  Default: mobility-1 joints only.
+    fractionated : bool
+        For W >= 2: include chains that fall apart at a link or a joint.
+    symmetry : int, optional
+        Only chains with an automorphism of this prime order.
+    executor : concurrent.futures.Executor, optional
+        Who does the work; the result is the same for any.  Default: this process.
+
+    Yields
+    ------
+    MechanismGraph
+        In a fixed order; links with three or more joints come first.  Memory does not grow with their number.
+
+    Raises
+    ------
+    SpecError
+        For a value out of its bounds.
+    TooLargeError
+        For more loops than the shipped contracted graphs have (8), at once.
+
+    References
+    ----------
+    docs/explanation/enumeration.md; counts: OEIS A233288 (W = 1).
+
+    Examples
+    --------
+    >>> [chain.graph6() for chain in enumerate_chains(6)]
+    ['E{O_', 'ExGO']
+    """
+    problem = Problem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
+    return _list(problem, executor)
+
+
+def count_chains(
+    links: int,
+    mobility: int = 1,
+    *,
+    space: int = 3,
+    joints_by_mobility: Mapping[int, int] | None = None,
+    fractionated: bool = False,
+    symmetry: int | None = None,
+    executor: Executor | None = None,
+) -> int:
+    """Count what ``enumerate_chains`` yields, without making the graphs (exact).
+
+    Examples
+    --------
+    >>> [count_chains(n) for n in (4, 6, 8, 10, 12, 14)]
+    [1, 2, 16, 230, 6856, 318162]
+    """
+    problem = Problem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
+    return _count(problem, executor)
+
+
+def enumerate_mechanisms(
+    spec: StructuralSpec | LinkAssortment, *, symmetry: int | None = None, executor: Executor | None = None
+) -> Iterator[MechanismGraph]:
+    """Enumerate the mechanisms that answer a structural question: every one, each once (exact).
+
+    Parameters
+    ----------
+    spec : StructuralSpec or LinkAssortment
+        The question, or one of its integer solutions.
+    symmetry : int, optional
+        Only mechanisms with an automorphism of this prime order (the frame stays where it is).
+    executor : concurrent.futures.Executor, optional
+        Who does the work; the result is the same for any.  Default: this process.
+
+    Yields
+    ------
+    MechanismGraph
+        With the frame at link 0 and the links numbered level by level.
+
+    Raises
+    ------
+    InfeasibleSpecError, SpecError, TooLargeError
+        When the question has no answer, is ill posed, or cannot finish.
+
+    Examples
+    --------
+    >>> from graphsynth import StructuralSpec
+    >>> sum(1 for _ in enumerate_mechanisms(StructuralSpec(W=1, links=8)))
+    71
+    """
+    return _list(Problem.mechanisms(spec, symmetry), executor)
+
+
+def count_mechanisms(
+    spec: StructuralSpec | LinkAssortment, *, symmetry: int | None = None, executor: Executor | None = None
+) -> int:
+    """Count what ``enumerate_mechanisms`` yields, without making the graphs (exact).
+
+    With a required symmetry, or wanted sizes of levels, the mechanisms are made and counted.
+
+    Examples
+    --------
+    >>> from graphsynth import StructuralSpec
+    >>> count_mechanisms(StructuralSpec(W=1, Pi=3, v_ct=6, p=22, p2=3, n=14, t0=7, n4=4))
+    9663907
+    """
+    return _count(Problem.mechanisms(spec, symmetry), executor)
+
+
+def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) -> list[MechanismGraph]:
+    """Draw k mechanisms independently and exactly uniformly from all that answer a structural question.
+
+    Parameters
+    ----------
+    spec : StructuralSpec or LinkAssortment
+        The question; wanted levels are not supported here.
+    k : int
+        Number of draws (with replacement).
+    seed : int
+        Seed of ``random.Random``; the same seed gives the same draws.
+
+    Examples
+    --------
+    >>> from graphsynth import StructuralSpec
+    >>> len(sample_mechanisms(StructuralSpec(W=1, links=10), 5, seed=1))
+    5
+    """
+    return sampling.sample(Problem.mechanisms(spec, None), k, seed)
+
+
+def enumerate_assur_groups(
+    links: int, *, space: int = 3, executor: Executor | None = None
+) -> Iterator[MechanismGraph]:
+    """Enumerate the Assur groups with n moving links and mobility-1 joints, each once (exact).
+
+    The group is given with the frame, contracted to one link, as link 0.
+
+    Examples
+    --------
+    >>> [group.to_text() for group in enumerate_assur_groups(2)]
+    ['Bw f0']
+    """
+    return _list(Problem.trusses(links + 1, space, True), executor)
+
+
+def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
+    """Count what ``enumerate_assur_groups`` yields (exact).
+
+    Examples
+    --------
+    >>> [count_assur_groups(n) for n in (2, 4, 6, 8, 10)]
+    [1, 2, 10, 173, 5438]
+    """
+    return _count(Problem.trusses(links + 1, space, True), executor)
+
+
+def enumerate_baranov_trusses(
+    links: int, *, space: int = 3, executor: Executor | None = None
+) -> Iterator[MechanismGraph]:
+    """Enumerate the Baranov trusses with N links and mobility-1 joints, each once (exact).
+
+    Examples
+    --------
+    >>> sum(1 for _ in enumerate_baranov_trusses(9))
+    28
+    """
+    return _list(Problem.trusses(links, space, False), executor)
+
+
+def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
+    """Count what ``enumerate_baranov_trusses`` yields (exact).
+
+    Examples
+    --------
+    >>> [count_baranov_trusses(n) for n in (3, 5, 7, 9, 11)]
+    [1, 1, 3, 28, 562]
+    """
+    return _count(Problem.trusses(links, space, False), executor)

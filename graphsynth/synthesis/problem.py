@@ -1,0 +1,283 @@
+"""A problem: everything one call enumerates or counts, cut into pieces that can be done anywhere in any order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+
+from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
+from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.spec import LinkAssortment, StructuralSpec
+from graphsynth.synthesis.contracted import SHIPPED_LOOPS
+from graphsynth.synthesis.families import (
+    Family,
+    Levels,
+    chain_families,
+    chain_joints,
+    mechanism_families,
+    truss_families,
+)
+from graphsynth.synthesis.fractionated import fractionated_chains
+from graphsynth.synthesis.rings import rings
+from graphsynth.synthesis.units import Unit, count_unit, cut, graphs_of, text_of
+
+__all__ = ["Piece", "Problem", "count_piece", "graphs_of_piece", "text_of_piece"]
+
+_PRIMES = (2, 3, 5, 7, 11, 13)
+
+
+@dataclass(frozen=True)
+class Handful:
+    """Rings, or fractionated chains: few enough to be made one by one.
+
+    ``assortment`` and ``levels`` restrict mechanisms, ``symmetry`` asks for an automorphism of that prime order.
+    """
+
+    kind: str  # "rings" or "fractionated"
+    links: int
+    mobility: int
+    space: int
+    higher: tuple[tuple[int, int], ...]
+    framed: bool
+    assortment: LinkAssortment | None = None
+    levels: Levels = ()
+    symmetry: int = 0
+    weight: float = 1.0
+
+    def graphs(self) -> Iterator[MechanismGraph]:
+        """Yield the graphs."""
+        for graph in self._all():
+            if self.symmetry and graph.automorphism_order % self.symmetry:  # Cauchy: p divides the order of the group
+                continue
+            if self._fits(graph):
+                yield graph
+
+    def _all(self) -> Iterator[MechanismGraph]:
+        if self.kind == "rings":
+            yield from rings(self.links, self.mobility, self.space, dict(self.higher), self.framed)
+            return
+        for chain in fractionated_chains(self.links, self.mobility, self.space, self.higher):
+            if self.framed:
+                yield from (_by_levels(graph) for graph in chain.inversions())
+            else:
+                yield chain
+
+    def _fits(self, graph: MechanismGraph) -> bool:
+        wanted = self.assortment
+        if wanted is not None:
+            if graph.degrees[0] != wanted.frame_joints or graph.assortment != {a: n for a, n in wanted.n_a.items() if n}:
+                return False
+            rest = [v for v in range(1, graph.links)]
+            parts = _parts(graph, rest)
+            if wanted.frame_loops != wanted.frame_joints - parts:
+                return False
+        return all(
+            low <= (len(graph.levels[at]) if -len(graph.levels) <= at < len(graph.levels) else 0) <= high
+            for at, low, high in self.levels
+        )
+
+
+def _by_levels(graph: MechanismGraph) -> MechanismGraph:
+    order = [link for level in graph.levels for link in sorted(level)]
+    place = [0] * graph.links
+    for position, link in enumerate(order):
+        place[link] = position
+    return graph.relabelled(place)
+
+
+def _parts(graph: MechanismGraph, links: list[int]) -> int:
+    """Count the connected parts of the sub-graph on some links."""
+    left, parts = set(links), 0
+    while left:
+        parts += 1
+        stack = [left.pop()]
+        while stack:
+            mask = graph.neighbours[stack.pop()]
+            near = {v for v in left if mask >> v & 1}
+            left -= near
+            stack.extend(near)
+    return parts
+
+
+Piece = Unit | Handful
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What to enumerate or to count.
+
+    Parameters
+    ----------
+    title : str
+        One line for people; also identifies the problem when interrupted work is resumed.
+    families : tuple of Family
+        What the search kernels generate.
+    handfuls : tuple of Handful
+        What is made one by one; listed first.
+    symmetry : int
+        0, or the prime order of a required automorphism.
+    """
+
+    title: str
+    families: tuple[Family, ...]
+    handfuls: tuple[Handful, ...] = ()
+    symmetry: int = 0
+
+    @property
+    def signature(self) -> str:
+        """A short text that differs between problems."""
+        return sha256(repr(self).encode()).hexdigest()[:16]
+
+    def pieces(self, *, listing: bool) -> list[Piece]:
+        """Cut the problem; the cut depends on the problem alone."""
+        listing = listing or bool(self.symmetry) or any(family.levels for family in self.families)
+        return [*self.handfuls, *cut(self.families, listing=listing, symmetry=self.symmetry)]
+
+    @classmethod
+    def chains(
+        cls,
+        links: int,
+        mobility: int,
+        space: int,
+        joints_by_mobility: Mapping[int, int] | None,
+        fractionated: bool,
+        symmetry: int | None,
+        *,
+        framed: bool = False,
+    ) -> Problem:
+        """State the enumeration of chains (of mechanisms with every frame, if ``framed``)."""
+        if mobility == 0:
+            raise SpecError("mobility = 0 must be at least 1: use enumerate_baranov_trusses for structures")
+        higher = dict(joints_by_mobility or {})
+        joints = chain_joints(links, mobility, space, higher)
+        placed = tuple(sorted((i, count) for i, count in higher.items() if i > 1 and count))
+        title = f"W={mobility} N={links} Pi={space}" + "".join(f" p{i}={count}" for i, count in placed)
+        title += (" framed" if framed else "") + (" fractionated" if fractionated else "")
+        if joints is None:
+            return cls(title, ())
+        check_loops(joints + sum(count for _, count in placed) - links + 1, links, mobility)
+        order = check_symmetry(symmetry)
+        common = (links, mobility, space, placed, framed)
+        handfuls = [Handful("rings", *common, symmetry=order)]
+        if fractionated and mobility > 1:
+            handfuls.append(Handful("fractionated", *common, symmetry=order))
+        families = chain_families(links, mobility, space, higher, framed)
+        return cls(title + (f" symmetry={order}" if order else ""), tuple(families), tuple(handfuls), order)
+
+    @classmethod
+    def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> Problem:
+        """State the enumeration of the mechanisms that answer a structural question."""
+        order = check_symmetry(symmetry)
+        levels: Levels = ()
+        fractionated = False
+        if isinstance(question, LinkAssortment):
+            assortments = [question]
+            fractionated = question.frame_parts > 1
+        elif isinstance(question, StructuralSpec):
+            assortments = question.solve()
+            fractionated = question.fractionated
+            levels = tuple((at, low or 0, 255 if high is None else high) for at, (low, high) in question.levels.items())
+        else:
+            raise SpecError(f"{question!r} is not a structural question: give a StructuralSpec or a LinkAssortment")
+        families: list[Family] = []
+        handfuls: list[Handful] = []
+        for assortment in assortments:
+            if assortment.mobility < 1:
+                raise InfeasibleSpecError(
+                    f"W = {assortment.mobility} must be at least 1 for a mechanism: fix W, or ask for Assur groups"
+                )
+            check_loops(assortment.loops, assortment.moving_links + 1, assortment.mobility)
+            families += mechanism_families(assortment, levels)
+            higher = tuple((i, count) for i, count in enumerate(assortment.p_i, 1) if i > 1 and count)
+            common = (assortment.moving_links + 1, assortment.mobility, assortment.space, higher, True)
+            if assortment.loops == 1:
+                handfuls.append(Handful("rings", *common, assortment, levels, order))
+            if fractionated and assortment.mobility > 1:
+                handfuls.append(Handful("fractionated", *common, assortment, levels, order))
+        title = question.describe() if isinstance(question, StructuralSpec) else str(question)
+        title = " ".join(title.split()) + (f" symmetry={order}" if order else "")
+        return cls(title, tuple(families), tuple(handfuls), order)
+
+    @classmethod
+    def trusses(cls, links: int, space: int, framed: bool) -> Problem:
+        """State the enumeration of Baranov trusses (of Assur groups, if ``framed``)."""
+        joints = chain_joints(links, 0, space, {})
+        title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
+        if joints is None:
+            return cls(title, ())
+        check_loops(joints - links + 1, links, 0)
+        return cls(
+            title, tuple(truss_families(links, space, framed)), (Handful("rings", links, 0, space, (), framed),)
+        )
+
+
+def check_symmetry(symmetry: int | None) -> int:
+    """Return the required order, 0 for none.
+
+    Raises
+    ------
+    SpecError
+        For an order that is not a small prime.
+    """
+    if symmetry is None:
+        return 0
+    if isinstance(symmetry, bool) or symmetry not in _PRIMES:
+        raise SpecError(
+            f"symmetry = {symmetry!r} must be a prime {_PRIMES}; for a composite order take its prime factors and "
+            "look at automorphism_order"
+        )
+    return int(symmetry)
+
+
+# 1-DOF planar chains, N = 4, 6, ..., 18 (published and recomputed); the ratios grow by about 15.7 a step
+_KNOWN = {4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318162, 16: 19819281, 18: 1535380884}
+
+
+def extrapolated(links: int) -> float:
+    """Estimate the number of 1-DOF planar chains with more than 18 links from the growth of the known ratios."""
+    count, ratio = float(_KNOWN[18]), _KNOWN[18] / _KNOWN[16]
+    for _ in range(18, links, 2):
+        ratio += 15.7
+        count *= ratio
+    return count
+
+
+def check_loops(loops: int, links: int, mobility: int) -> None:
+    """Refuse at once what cannot finish.
+
+    Raises
+    ------
+    TooLargeError
+        For more loops than the shipped contracted graphs have.
+    """
+    if loops <= SHIPPED_LOOPS:
+        return
+    about = f"about {extrapolated(2 * loops + 2):.0e} chains of mobility 1 have {loops} loops"
+    most = 2 * SHIPPED_LOOPS + mobility + 1
+    raise TooLargeError(
+        f"{links} links with {loops} independent loops are out of reach ({about}; the bound is {SHIPPED_LOOPS} loops, "
+        f"for mobility-1 joints in the plane N = {most}): fix more of the question, and cut what remains with --shard i/m "
+        "over several machines",
+        extrapolated(2 * loops + 2),
+    )
+
+
+def count_piece(piece: Piece) -> int:
+    """Count the graphs of a piece (exact)."""
+    return count_unit(piece) if isinstance(piece, Unit) else sum(1 for _ in piece.graphs())
+
+
+def graphs_of_piece(piece: Piece) -> Iterator[MechanismGraph]:
+    """Stream the graphs of a piece."""
+    return graphs_of(piece) if isinstance(piece, Unit) else piece.graphs()
+
+
+def text_of_piece(piece: Piece) -> Iterator[tuple[bytes, int]]:
+    """Stream a piece as (lines of the text form, number of lines)."""
+    if isinstance(piece, Unit):
+        yield from text_of(piece)
+        return
+    lines = [graph.to_text() + "\n" for graph in piece.graphs()]
+    if lines:
+        yield "".join(lines).encode("ascii"), len(lines)

@@ -1,0 +1,86 @@
+"""Exactly uniform random mechanisms.
+
+Of all pairs (g, x) with x a labelling fixed by the automorphism g, each orbit of labellings has as many as the group
+has elements.  So: draw a contracted graph by its number of orbits, a pair of frame and g by the number of labellings
+it fixes, and x uniformly among these.  Labellings are numbered without regard to sparsity; inadmissible ones are drawn
+again.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from itertools import accumulate
+from random import Random
+
+import numpy as np
+
+from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
+from graphsynth.structure.graph import MechanismGraph
+from graphsynth.synthesis.families import Family
+from graphsynth.synthesis.kernels.drawing_lots import decode_fixed, fixed_table, open_fixed
+from graphsynth.synthesis.kernels.expanding import expand_packed
+from graphsynth.synthesis.kernels.layout import make_work
+from graphsynth.synthesis.kernels.listing import HEADER
+from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.units import count_each, spelling_of
+
+__all__ = ["sample"]
+
+_PAIRS = 1 << 16
+
+
+def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
+    """Draw k graphs of a problem, independently and exactly uniformly.
+
+    Raises
+    ------
+    SpecError
+        If k is negative, or the problem asks for a symmetry or for levels.
+    InfeasibleSpecError
+        If there is nothing to draw from.
+    """
+    if isinstance(k, bool) or not isinstance(k, int) or k < 0:
+        raise SpecError(f"k = {k!r} must be a whole number >= 0")
+    if problem.symmetry or any(family.levels for family in problem.families):
+        raise SpecError("sampling with a required symmetry or wanted levels is not supported: list them and choose")
+    listed = [graph for handful in problem.handfuls for graph in handful.graphs()]
+    sources: list[tuple[Family, int]] = []
+    weights: list[int] = []
+    for family in problem.families:
+        graphs = len(family.graphs)
+        for h, count in enumerate(count_each(family, 0, graphs).tolist() if graphs else ()):
+            if count:
+                sources.append((family, h))
+                weights.append(count)
+    sums = list(accumulate([len(listed), *weights]))
+    if sums[-1] == 0 and k:
+        raise InfeasibleSpecError(f"no mechanism answers the question ({problem.title}): nothing to draw from")
+    random = Random(seed)
+    drawn = []
+    for _ in range(k):
+        at = bisect_right(sums, random.randrange(sums[-1]))
+        drawn.append(random.choice(listed) if at == 0 else _draw(*sources[at - 1], random))
+    return drawn
+
+
+def _draw(family: Family, h: int, random: Random) -> MechanismGraph:
+    tables = family.alphabet.tables
+    work = make_work(family.alphabet.resources, key_words=1 << 20)
+    mult = family.graphs[h]
+    table = np.zeros((_PAIRS, 5), np.int64)
+    count = fixed_table(family.vertices, mult, family.frames, family.frame_degree, tables, work, table)
+    if count < 0:
+        raise TooLargeError("a contracted graph has too many symmetries to draw from: fix more of the question")
+    rows = table[:count].tolist()
+    # orbits of a frame = sum of fixed / kept: put the frames over a common denominator
+    common = int(np.lcm.reduce([row[3] for row in rows]))
+    sums = list(accumulate(fixed * (common // kept) for *_, kept, fixed in rows))
+    mode, frame, member, _, _ = rows[bisect_right(sums, random.randrange(sums[-1]))]
+    variables, classes, sets, ways = open_fixed(family.vertices, mult, mode, frame, member, tables, work)
+    row = np.zeros((1, HEADER + family.loops + family.vertices), np.int32)
+    while not decode_fixed(variables, classes, sets, random.randrange(ways), tables, work, row[0]):
+        pass
+    row[0, :HEADER] = h, mode, frame
+    out = np.empty((1, 3 * family.joints), np.uint8)
+    expand_packed(family.vertices, family.graphs, row, 1, spelling_of(family), out)
+    return MechanismGraph._unchecked(family.links, out.tobytes(), 0 if family.framed else None, family.space)
