@@ -1,0 +1,213 @@
+"""Mechanisms as TOML and JSON; the round trip is exact.
+
+Floats are written with ``repr``, the shortest text that reads back as the same double.  Readers accept any text or bytes
+and raise nothing but `FormatError`, whose place is the line or the key.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any, TypeVar
+
+from graphsynth.errors import FormatError, GeometryError
+from graphsynth.mechanism.joints import KINDS, JointGeometry
+from graphsynth.mechanism.laws import LAWS, Linear
+from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+from graphsynth.structure.graph import MechanismGraph
+
+__all__ = ["from_dict", "from_json", "from_toml", "to_dict", "to_json", "to_toml"]
+
+FORMAT = "graphsynth mechanism"
+VERSION = 1
+_KEYS = {"format", "version", "graph", "joints", "drivers", "points", "pose"}
+#: Longer than any mechanism of 255 links.
+_LENGTH_MAX = 20_000_000
+_T = TypeVar("_T")
+
+
+def to_dict(mechanism: Mechanism) -> dict[str, Any]:
+    """Return plain lists, numbers and texts that describe a mechanism.
+
+    Raises
+    ------
+    GeometryError
+        If a driver has a law that is not one of :mod:`graphsynth.mechanism.laws`.
+    """
+    data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "graph": mechanism.graph.to_text()}
+    if mechanism.pose is not None:
+        data["pose"] = [list(row) for row in mechanism.pose]
+    data["joints"] = [{"kind": joint.kind, **_plain(joint)} for joint in mechanism.joints]
+    data["drivers"] = [
+        {"base": driver.base, "link": driver.link, "law": _law_dict(driver)} for driver in mechanism.drivers
+    ]
+    data["points"] = {name: {"link": p.link, "at": list(p.at)} for name, p in mechanism.points.items()}
+    return data
+
+
+def _plain(value: Any) -> dict[str, Any]:
+    found = {item.name: getattr(value, item.name) for item in fields(value)}
+    return {name: list(part) if isinstance(part, tuple) else part for name, part in found.items()}
+
+
+def _law_dict(driver: Driver) -> dict[str, Any]:
+    law = driver.law
+    kind = getattr(law, "kind", None)
+    if not isinstance(kind, str) or type(law) is not LAWS.get(kind):
+        raise GeometryError(
+            f"the law {law!r} of driver {driver.base}-{driver.link} cannot be written; use a Table of its values"
+        )
+    return {"kind": kind, **_plain(law)}
+
+
+def to_json(mechanism: Mechanism) -> str:
+    """Write JSON, indented, with a final line end."""
+    return json.dumps(to_dict(mechanism), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def to_toml(mechanism: Mechanism) -> str:
+    """Write TOML: one table per joint, driver and point."""
+    data = to_dict(mechanism)
+    lines = [f"{key} = {_toml(data[key])}" for key in ("format", "version", "graph", "pose") if key in data]
+    for key in ("joints", "drivers"):
+        if not data[key]:
+            lines += ["", f"{key} = []"] if key == "drivers" else []
+    for key in ("joints", "drivers"):
+        for entry in data[key]:
+            lines += ["", f"[[{key}]]", *(f"{name} = {_toml(value)}" for name, value in entry.items())]
+    if data["points"]:
+        lines += ["", "[points]", *(f"{_toml(name)} = {_toml(p)}" for name, p in data["points"].items())]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{name} = {_toml(part)}" for name, part in value.items()) + " }"
+    return "[" + ", ".join(map(_toml, value)) + "]"
+
+
+def _decoded(text: str | bytes) -> str:
+    if len(text) > _LENGTH_MAX:
+        raise FormatError(f"{len(text)} characters are more than a mechanism can need ({_LENGTH_MAX})", "length")
+    if isinstance(text, str):
+        return text
+    try:
+        return text.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"not UTF-8 text ({error.reason})", f"byte {error.start}") from error
+
+
+def from_json(text: str | bytes) -> Mechanism:
+    """Read JSON; anything that is not a mechanism is a `FormatError` with the line or key."""
+    try:
+        data = json.loads(_decoded(text))
+    except json.JSONDecodeError as error:
+        raise FormatError(f"not JSON ({error.msg})", f"line {error.lineno}, column {error.colno}") from error
+    except (RecursionError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"not JSON that can be read ({error})", "text") from error
+    return from_dict(data)
+
+
+def from_toml(text: str | bytes) -> Mechanism:
+    """Read TOML; anything that is not a mechanism is a `FormatError` with the line or key."""
+    try:
+        data = tomllib.loads(_decoded(text))
+    except tomllib.TOMLDecodeError as error:
+        raise FormatError(f"not TOML ({error})", "text") from error
+    except (RecursionError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"not TOML that can be read ({error})", "text") from error
+    return from_dict(data)
+
+
+def from_dict(data: Any) -> Mechanism:
+    """Build a mechanism from what :func:`to_dict` returns; `FormatError` with the key for anything else."""
+    table = _table(data, "top level", _KEYS, {"format", "version", "graph", "joints"})
+    if table["format"] != FORMAT:
+        raise FormatError(f"found {table['format']!r}, expected {FORMAT!r}", "format")
+    if table["version"] != VERSION or isinstance(table["version"], bool):
+        raise FormatError(f"found {table['version']!r}, this program reads version {VERSION}", "version")
+    if not isinstance(table["graph"], str):
+        raise FormatError("expected the text form of a graph", "graph")
+    try:
+        graph = MechanismGraph.from_text(table["graph"])
+    except FormatError as error:
+        raise FormatError(str(error), "graph") from error
+    joints = [_joint(entry, f"joints[{k}]") for k, entry in enumerate(_list(table["joints"], "joints"))]
+    drivers = [_driver(entry, f"drivers[{k}]") for k, entry in enumerate(_list(table.get("drivers", []), "drivers"))]
+    named = table.get("points", {})
+    if not isinstance(named, dict):
+        raise FormatError("expected a table of points", "points")
+    points = {name: _point(entry, f"points.{name}") for name, entry in named.items()}
+    pose = table.get("pose")
+    if pose is not None:
+        pose = tuple(tuple(_list(row, f"pose[{k}]")) for k, row in enumerate(_list(pose, "pose")))
+    return _build(lambda: Mechanism(graph, tuple(joints), tuple(drivers), points, pose), "mechanism")
+
+
+def _build(make: Callable[[], _T], place: str) -> _T:
+    try:
+        return make()
+    except GeometryError as error:
+        raise FormatError(str(error), place) from error
+
+
+def _list(value: Any, place: str) -> list[Any]:
+    if not isinstance(value, list):
+        raise FormatError(f"expected a list, found {type(value).__name__}", place)
+    return value
+
+
+def _table(value: Any, place: str, known: set[str], needed: set[str]) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise FormatError(f"expected a table, found {type(value).__name__}", place)
+    unknown = sorted(set(value) - known)
+    if unknown:
+        raise FormatError(f"unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}", place)
+    missing = sorted(needed - set(value))
+    if missing:
+        raise FormatError(f"key {missing[0]!r} is missing", place)
+    return value
+
+
+def _kind(value: Any, place: str, known: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    if not isinstance(value, dict) or not isinstance(value.get("kind"), str) or value["kind"] not in known:
+        raise FormatError(f"expected a table with kind = one of {', '.join(known)}", place)
+    made = known[value["kind"]]
+    names = {item.name for item in fields(made)}
+    return made, {k: v for k, v in _table(value, place, names | {"kind"}, set()).items() if k != "kind"}
+
+
+def _joint(value: Any, place: str) -> JointGeometry:
+    made, parts = _kind(value, place, KINDS)
+    _table(value, place, set(value), {"a", "b"})
+    joint: JointGeometry = _build(lambda: made(**parts), place)
+    return joint
+
+
+def _driver(value: Any, place: str) -> Driver:
+    table = _table(value, place, {"base", "link", "law"}, {"base", "link"})
+    law = Linear()
+    if "law" in table:
+        made, parts = _kind(table["law"], f"{place}.law", LAWS)
+        try:
+            law = _build(lambda: made(**parts), f"{place}.law")
+        except TypeError as error:  # a table law without its values
+            raise FormatError(str(error), f"{place}.law") from error
+    return _build(lambda: Driver(table["base"], table["link"], law), place)
+
+
+def _point(value: Any, place: str) -> TracePoint:
+    table = _table(value, place, {"link", "at"}, {"link", "at"})
+    return TracePoint(table["link"], table["at"])

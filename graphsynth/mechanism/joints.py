@@ -1,0 +1,149 @@
+"""Joints with geometry: where each joint sits on its two links.
+
+Every point and direction is given in the frame of its own link; the frame link's own frame is the fixed one.
+Complex notation below: link k carries the point p to ``r_k + exp(i theta_k) p``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import Point, finite, link_number, nonzero, point
+
+__all__ = ["COLUMNS", "Gear", "JointGeometry", "PinSlot", "Prismatic", "Revolute"]
+
+#: Numbers of a joint in one row: point on a, direction on a, point on b, direction on b, radii, sign, offset.
+COLUMNS = ("ax", "ay", "a_angle", "bx", "by", "b_angle", "radius_a", "radius_b", "sign", "offset")
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two links joined; the order a, b is the user's and need not ascend."""
+
+    a: int
+    b: int
+
+    mobility: ClassVar[int] = 1
+    kind: ClassVar[str] = ""
+
+    def _check(self, points: tuple[str, ...], angles: tuple[str, ...]) -> None:
+        for name in ("a", "b"):
+            object.__setattr__(self, name, link_number(f"link {name} of a joint", getattr(self, name)))
+        if self.a == self.b:
+            raise GeometryError(f"link {self.a} cannot be jointed to itself; name two links")
+        for name in points:
+            object.__setattr__(self, name, point(f"{name} of joint {self.a}-{self.b}", getattr(self, name)))
+        for name in angles:
+            object.__setattr__(self, name, finite(f"{name} of joint {self.a}-{self.b}", getattr(self, name)))
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """The two links, ascending."""
+        return (self.a, self.b) if self.a < self.b else (self.b, self.a)
+
+
+@dataclass(frozen=True)
+class Revolute(_Pair):
+    """Turning pair: the point ``at_a`` of link a and the point ``at_b`` of link b coincide (two equations)."""
+
+    at_a: Point = (0.0, 0.0)
+    at_b: Point = (0.0, 0.0)
+
+    kind: ClassVar[str] = "R"
+
+    def __post_init__(self) -> None:
+        self._check(("at_a", "at_b"), ())
+
+    def row(self) -> tuple[float, ...]:
+        """Numbers in the order of `COLUMNS`."""
+        return (*self.at_a, 0.0, *self.at_b, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Prismatic(_Pair):
+    """Sliding pair: ``at_b`` stays on the line of link a, and the two directions stay parallel (two equations).
+
+    The line passes through ``at_a`` in the direction ``angle_a``; ``theta_a + angle_a = theta_b + angle_b``.  The
+    displacement is that of ``at_b`` from ``at_a`` along the direction.
+    """
+
+    at_a: Point = (0.0, 0.0)
+    at_b: Point = (0.0, 0.0)
+    angle_a: float = 0.0
+    angle_b: float = 0.0
+
+    kind: ClassVar[str] = "P"
+
+    def __post_init__(self) -> None:
+        self._check(("at_a", "at_b"), ("angle_a", "angle_b"))
+
+    def row(self) -> tuple[float, ...]:
+        """Numbers in the order of `COLUMNS`."""
+        return (*self.at_a, self.angle_a, *self.at_b, self.angle_b, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class PinSlot(_Pair):
+    """Pin in a straight slot: the point ``at_b`` of link b stays on the line of link a (one equation)."""
+
+    at_a: Point = (0.0, 0.0)
+    at_b: Point = (0.0, 0.0)
+    angle_a: float = 0.0
+
+    mobility: ClassVar[int] = 2
+    kind: ClassVar[str] = "pin-slot"
+
+    def __post_init__(self) -> None:
+        self._check(("at_a", "at_b"), ("angle_a",))
+
+    def row(self) -> tuple[float, ...]:
+        """Numbers in the order of `COLUMNS`."""
+        return (*self.at_a, self.angle_a, *self.at_b, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Gear(_Pair):
+    """Gear pair with pitch radii, external or internal (one equation).
+
+    With phi the direction from the centre ``at_a`` to the centre ``at_b``, followed continuously,
+    ``radius_a (theta_a - phi) + s radius_b (theta_b - phi - offset) = 0``; s = +1 external, -1 internal.  The angles
+    are turned relative to the line of centres, so a moving carrier needs no name; for involute teeth the
+    relation holds at any centre distance.  Angles are not reduced modulo a turn: at the first input they are the ones
+    nearest to the start pose.
+    """
+
+    at_a: Point = (0.0, 0.0)
+    at_b: Point = (0.0, 0.0)
+    radius_a: float = 1.0
+    radius_b: float = 1.0
+    internal: bool = False
+    offset: float = 0.0
+
+    mobility: ClassVar[int] = 2
+    kind: ClassVar[str] = "gear"
+
+    def __post_init__(self) -> None:
+        self._check(("at_a", "at_b"), ("offset",))
+        for name in ("radius_a", "radius_b"):
+            value = nonzero(f"{name} of gear {self.a}-{self.b}", getattr(self, name))
+            object.__setattr__(self, name, value)
+        if not isinstance(self.internal, bool):
+            raise GeometryError(f"internal = {self.internal!r} of gear {self.a}-{self.b} must be true or false")
+        if self.internal and self.radius_a == self.radius_b:
+            raise GeometryError(
+                f"internal gear {self.a}-{self.b} has equal radii {self.radius_a}, so the centres coincide; "
+                "give different radii"
+            )
+
+    def row(self) -> tuple[float, ...]:
+        """Numbers in the order of `COLUMNS`."""
+        sign = -1.0 if self.internal else 1.0
+        return (*self.at_a, 0.0, *self.at_b, 0.0, self.radius_a, self.radius_b, sign, self.offset)
+
+
+JointGeometry = Revolute | Prismatic | PinSlot | Gear
+
+#: Class by kind, for readers.
+KINDS: dict[str, Any] = {joint.kind: joint for joint in (Revolute, Prismatic, PinSlot, Gear)}

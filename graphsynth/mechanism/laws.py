@@ -1,0 +1,125 @@
+"""Motion laws of drivers: joint coordinate q as a function of the input u, with two derivatives.
+
+A law is called with an array of inputs and returns ``(q, dq/du, d2q/du2)`` of the same shape; any callable that does
+so is a law, but only the classes here can be written to a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import finite
+
+__all__ = ["LAWS", "Harmonic", "Law", "Linear", "Polynomial", "Table"]
+
+Array = NDArray[np.float64]
+Law = Callable[[Array], tuple[Array, Array, Array]]
+
+
+@dataclass(frozen=True)
+class Linear:
+    """``q = offset + rate u``: the input itself by default.
+
+    >>> import numpy as np
+    >>> [float(v[0]) for v in Linear(rate=2.0)(np.array([0.5]))]
+    [1.0, 2.0, 0.0]
+    """
+
+    rate: float = 1.0
+    offset: float = 0.0
+    kind: ClassVar[str] = "linear"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rate", finite("rate", self.rate))
+        object.__setattr__(self, "offset", finite("offset", self.offset))
+
+    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+        """Coordinate and derivatives."""
+        return self.offset + self.rate * u, np.full_like(u, self.rate), np.zeros_like(u)
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """``q = mean + amplitude sin(order u + phase)``."""
+
+    mean: float = 0.0
+    amplitude: float = 1.0
+    order: float = 1.0
+    phase: float = 0.0
+    kind: ClassVar[str] = "harmonic"
+
+    def __post_init__(self) -> None:
+        for name in ("mean", "amplitude", "order", "phase"):
+            object.__setattr__(self, name, finite(name, getattr(self, name)))
+
+    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+        """Coordinate and derivatives."""
+        angle = self.order * u + self.phase
+        wave = self.amplitude * np.sin(angle)
+        return self.mean + wave, self.order * self.amplitude * np.cos(angle), -(self.order**2) * wave
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """``q = c0 + c1 u + c2 u^2 + ...``, coefficients ascending."""
+
+    coefficients: tuple[float, ...] = (0.0, 1.0)
+    kind: ClassVar[str] = "polynomial"
+
+    def __post_init__(self) -> None:
+        values = _numbers("coefficients", self.coefficients, 1)
+        object.__setattr__(self, "coefficients", values)
+
+    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+        """Coordinate and derivatives."""
+        p = np.polynomial.Polynomial(self.coefficients)
+        first, second = p.deriv(1), p.deriv(2)
+        return np.asarray(p(u)), np.asarray(first(u)) + 0.0 * u, np.asarray(second(u)) + 0.0 * u
+
+
+@dataclass(frozen=True)
+class Table:
+    """Values at increasing inputs, joined by a cubic spline (natural ends); NaN outside the table."""
+
+    inputs: tuple[float, ...]
+    values: tuple[float, ...]
+    kind: ClassVar[str] = "table"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inputs", _numbers("inputs", self.inputs, 2))
+        object.__setattr__(self, "values", _numbers("values", self.values, 2))
+        if len(self.inputs) != len(self.values):
+            raise GeometryError(f"the table has {len(self.inputs)} inputs and {len(self.values)} values; give as many")
+        if any(b <= a for a, b in zip(self.inputs, self.inputs[1:])):
+            raise GeometryError("the inputs of a table must increase; sort them and remove duplicates")
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicSpline
+
+        return CubicSpline(self.inputs, self.values, bc_type="natural", extrapolate=False)
+
+    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+        """Coordinate and derivatives."""
+        return (np.asarray(self._spline(u)), np.asarray(self._spline(u, 1)), np.asarray(self._spline(u, 2)))
+
+
+def _numbers(name: str, values: Any, least: int) -> tuple[float, ...]:
+    try:
+        found = tuple(finite(f"{name}[{index}]", value) for index, value in enumerate(values))
+    except TypeError as error:
+        raise GeometryError(f"{name} = {values!r} is not a list of numbers; give one") from error
+    if len(found) < least:
+        raise GeometryError(f"{name} has {len(found)} entries; give {least} or more")
+    return found
+
+
+#: Class by kind, for readers and writers.
+LAWS: dict[str, Any] = {law.kind: law for law in (Linear, Harmonic, Polynomial, Table)}

@@ -1,0 +1,247 @@
+"""`Mechanism`: a mechanism graph with the geometry of its joints, drivers and named points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import Point, finite, link_number, point
+from graphsynth.mechanism.joints import COLUMNS, Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.laws import Law, Linear
+from graphsynth.structure.graph import MechanismGraph
+
+if TYPE_CHECKING:
+    from graphsynth.mechanism.rank import MobilityReport
+
+__all__ = ["Driver", "Mechanism", "TracePoint"]
+
+Array = NDArray[np.float64]
+Pose = tuple[float, float, float]
+
+
+class TracePoint(NamedTuple):
+    """A named point of a link, in the link's frame."""
+
+    link: int
+    at: Point
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A joint whose relative coordinate is prescribed.
+
+    Parameters
+    ----------
+    base, link : int
+        The two links of the joint; the coordinate is that of ``link`` relative to ``base``: the angle
+        ``theta_link - theta_base`` of a turning pair, the displacement along the line of a sliding pair.
+    law : Law
+        Coordinate as a function of the input; the input itself by default.
+    """
+
+    base: int
+    link: int
+    law: Law = field(default_factory=Linear)
+
+    def __post_init__(self) -> None:
+        link_number("base of a driver", self.base)
+        link_number("link of a driver", self.link)
+        if not callable(self.law):
+            raise GeometryError(f"law = {self.law!r} of driver {self.base}-{self.link} is not callable; give a law")
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """The two links, ascending."""
+        return min(self.base, self.link), max(self.base, self.link)
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A dimensioned planar mechanism.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+        A graph with a frame, space 3.
+    joints : iterable of Revolute, Prismatic, PinSlot or Gear
+        One for every joint of the graph, in any order; kept in the order of ``graph.joints``.
+    drivers : iterable of Driver
+        Driven joints, R or P.
+    points : mapping of str to (link, (x, y)), optional
+        Named points of links.
+    pose : sequence of (x, y, theta), optional
+        A pose of every link close to an assembled one; it selects the assembly modes.  The frame is at rest at
+        (0, 0, 0).
+
+    Raises
+    ------
+    GeometryError
+        A joint without geometry, a geometry without a joint or of another mobility, zero-length or non-finite
+        dimensions, a driver that is not an R or P joint, a point on a link that does not exist.
+
+    Examples
+    --------
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> four_bar = Mechanism(graph, [
+    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)), Revolute(0, 3, (2.0, 0.0)),
+    ... ], [Driver(0, 1)])
+    >>> four_bar.joint(2, 3).at_a
+    (2.5, 0.0)
+    """
+
+    graph: MechanismGraph
+    joints: tuple[JointGeometry, ...]
+    drivers: tuple[Driver, ...] = ()
+    points: Mapping[str, TracePoint] = field(default_factory=dict)
+    pose: tuple[Pose, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", _ordered(self.graph, tuple(self.joints)))
+        object.__setattr__(self, "drivers", self._checked_drivers(tuple(self.drivers)))
+        object.__setattr__(self, "points", {name: self._checked_point(name, p) for name, p in self.points.items()})
+        if self.pose is not None:
+            object.__setattr__(self, "pose", self._checked_pose(self.pose))
+        self._check_links()
+
+    def __hash__(self) -> int:
+        return hash((self.graph, self.joints, self.drivers))
+
+    def _checked_drivers(self, drivers: tuple[Driver, ...]) -> tuple[Driver, ...]:
+        seen: set[tuple[int, int]] = set()
+        by_pair = {joint.pair: joint for joint in self.joints}
+        for driver in drivers:
+            joint = by_pair.get(driver.pair)
+            if joint is None:
+                raise GeometryError(
+                    f"driver {driver.base}-{driver.link} drives no joint; name two links that are jointed"
+                )
+            if not isinstance(joint, Revolute | Prismatic):
+                raise GeometryError(
+                    f"driver {driver.base}-{driver.link} drives a {joint.kind} joint; only R and P joints are driven"
+                )
+            if driver.pair in seen:
+                raise GeometryError(f"joint {driver.base}-{driver.link} is driven twice; remove a driver")
+            seen.add(driver.pair)
+        return drivers
+
+    def _checked_point(self, name: str, value: Any) -> TracePoint:
+        if not isinstance(name, str) or not name:
+            raise GeometryError(f"point name {name!r} must be a text that is not empty")
+        try:
+            link, at = value
+        except (TypeError, ValueError) as error:
+            raise GeometryError(f"point {name} = {value!r} is not (link, (x, y))") from error
+        link_number(f"link of point {name}", link)
+        if link >= self.graph.links:
+            raise GeometryError(f"point {name} is on link {link}, but the links are 0..{self.graph.links - 1}")
+        return TracePoint(link, point(f"point {name}", at))
+
+    def _checked_pose(self, pose: Iterable[Iterable[float]]) -> tuple[Pose, ...]:
+        rows = [tuple(finite(f"pose of link {k}", v) for v in row) for k, row in enumerate(pose)]
+        if len(rows) != self.graph.links or any(len(row) != 3 for row in rows):
+            raise GeometryError(f"pose must give (x, y, theta) for each of the {self.graph.links} links")
+        if rows[self.frame] != (0.0, 0.0, 0.0):
+            raise GeometryError(f"the frame, link {self.frame}, stays at (0, 0, 0); its pose is {rows[self.frame]}")
+        return tuple((row[0], row[1], row[2]) for row in rows)
+
+    def _check_links(self) -> None:
+        """No moving binary R-R link of zero length: its direction would be undefined."""
+        for link, degree in enumerate(self.graph.degrees):
+            if degree != 2 or link == self.frame:
+                continue
+            own = [joint for joint in self.joints if link in (joint.a, joint.b)]
+            ends = [joint.at_a if joint.a == link else joint.at_b for joint in own]
+            if all(isinstance(joint, Revolute) for joint in own) and ends[0] == ends[1]:
+                raise GeometryError(f"link {link} has length 0 between its two joints; give it a positive length")
+
+    @property
+    def frame(self) -> int:
+        """The fixed link."""
+        assert self.graph.frame is not None  # checked when made
+        return self.graph.frame
+
+    @cached_property
+    def dimensions(self) -> Array:
+        """Every number of the joints, shape (joints, 10), columns `COLUMNS`; the form batches use."""
+        table = np.array([joint.row() for joint in self.joints]).reshape(-1, len(COLUMNS))
+        table.setflags(write=False)
+        return table
+
+    def joint(self, a: int, b: int) -> JointGeometry:
+        """Return the joint between two links; `GeometryError` if there is none."""
+        for joint in self.joints:
+            if joint.pair == (min(a, b), max(a, b)):
+                return joint
+        raise GeometryError(f"links {a} and {b} have no joint")
+
+    def mobility(self, pose: ArrayLike | None = None) -> MobilityReport:
+        """Mobility by count and by rank of the constraint matrix at a pose.
+
+        See :func:`graphsynth.mechanism.rank.mobility_report`.
+        """
+        from graphsynth.mechanism.rank import mobility_report
+
+        return mobility_report(self, pose)
+
+    def to_json(self) -> str:
+        """Write as JSON; see :mod:`graphsynth.mechanism.files`."""
+        from graphsynth.mechanism.files import to_json
+
+        return to_json(self)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Mechanism:
+        """Read JSON; anything else is a `FormatError` with the place."""
+        from graphsynth.mechanism.files import from_json
+
+        return from_json(text)
+
+    def to_toml(self) -> str:
+        """Write as TOML; see :mod:`graphsynth.mechanism.files`."""
+        from graphsynth.mechanism.files import to_toml
+
+        return to_toml(self)
+
+    @classmethod
+    def from_toml(cls, text: str | bytes) -> Mechanism:
+        """Read TOML; anything else is a `FormatError` with the place."""
+        from graphsynth.mechanism.files import from_toml
+
+        return from_toml(text)
+
+
+def _ordered(graph: MechanismGraph, joints: tuple[JointGeometry, ...]) -> tuple[JointGeometry, ...]:
+    """Return the joints in the order of the graph's, each checked against it."""
+    if not isinstance(graph, MechanismGraph):
+        raise GeometryError(f"graph = {graph!r} is not a MechanismGraph")
+    if graph.frame is None:
+        raise GeometryError("a mechanism needs a frame; choose one with graph.with_frame(link)")
+    if graph.space != 3:
+        raise GeometryError(f"space = {graph.space}: only planar mechanisms (space 3) have joint geometry here")
+    by_pair: dict[tuple[int, int], JointGeometry] = {}
+    for joint in joints:
+        if not isinstance(joint, Revolute | Prismatic | PinSlot | Gear):
+            raise GeometryError(f"{joint!r} is not a joint; use Revolute, Prismatic, PinSlot or Gear")
+        if joint.pair in by_pair:
+            raise GeometryError(f"joint {joint.pair[0]}-{joint.pair[1]} has two geometries; remove one")
+        by_pair[joint.pair] = joint
+    found = []
+    for a, b, mobility in graph.joints:
+        own = by_pair.pop((a, b), None)
+        if own is None:
+            raise GeometryError(f"joint {a}-{b} of the graph has no geometry; add a joint")
+        if own.mobility != mobility:
+            raise GeometryError(
+                f"joint {a}-{b} has mobility {mobility} in the graph, but a {own.kind} joint has {own.mobility}"
+            )
+        found.append(own)
+    if by_pair:
+        a, b = min(by_pair)
+        raise GeometryError(f"joint {a}-{b} has a geometry but is not in the graph; remove it or change the graph")
+    return tuple(found)
