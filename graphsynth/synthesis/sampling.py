@@ -9,6 +9,7 @@ again.
 from __future__ import annotations
 
 from bisect import bisect_right
+from functools import lru_cache
 from itertools import accumulate
 from random import Random
 
@@ -19,7 +20,7 @@ from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.kernels.drawing_lots import decode_fixed, fixed_table, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed
-from graphsynth.synthesis.kernels.layout import make_work
+from graphsynth.synthesis.kernels.layout import Work, make_work
 from graphsynth.synthesis.kernels.listing import HEADER
 from graphsynth.synthesis.problem import Problem
 from graphsynth.synthesis.units import count_each, spelling_of
@@ -63,11 +64,16 @@ def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
     return drawn
 
 
+@lru_cache(maxsize=4)
+def _work(resources: int) -> Work:
+    return make_work(resources, key_words=1 << 20)
+
+
 def _draw(family: Family, h: int, random: Random) -> MechanismGraph:
     tables = family.alphabet.tables
-    work = make_work(family.alphabet.resources, key_words=1 << 20)
+    work = _work(family.alphabet.resources)
     mult = family.graphs[h]
-    table = np.zeros((_PAIRS, 5), np.int64)
+    table = np.empty((_PAIRS, 5), np.int64)
     count = fixed_table(family.vertices, mult, family.frames, family.frame_degree, tables, work, table)
     if count < 0:
         raise TooLargeError("a contracted graph has too many symmetries to draw from: fix more of the question")

@@ -1,0 +1,40 @@
+"""``graphsynth count``."""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+from graphsynth.cli import console
+from graphsynth.cli.question import problem_of
+from graphsynth.cli.workers import announce_compilation, workers_for
+
+__all__ = ["run"]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the count; the number stands alone on the last line."""
+    announce_compilation()
+    from graphsynth.synthesis.parallel import processes
+    from graphsynth.synthesis.writing import count_with_checkpoint
+
+    begin = time.perf_counter()
+    problem = problem_of(options)
+    size = sum(len(family.graphs) for family in problem.families)
+    try:
+        with processes(workers_for(options.workers, size > 100_000)) as executor, console.progress("counting") as watch:
+            count = count_with_checkpoint(
+                problem, shard=options.shard, checkpoint=options.checkpoint, executor=executor, watch=watch
+            )
+    except KeyboardInterrupt:
+        if options.checkpoint:
+            console.note(f"{options.checkpoint} keeps what was counted: give the same command to go on")
+        raise
+    seconds = time.perf_counter() - begin
+    shard = f"{options.shard[0]}/{options.shard[1]}" if options.shard else None
+    if options.json:
+        console.put_json({"question": problem.title, "shard": shard, "count": count, "seconds": round(seconds, 3)})
+        return 0
+    console.put(f"{problem.title}{f' shard {shard}' if shard else ''} ({seconds:.2f} s)")
+    console.put(str(count))
+    return 0

@@ -1,0 +1,87 @@
+"""``graphsynth enumerate``."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from graphsynth.cli import console
+from graphsynth.cli.question import problem_of
+from graphsynth.cli.workers import announce_compilation, workers_for
+from graphsynth.errors import SpecError, TooLargeError
+
+if TYPE_CHECKING:
+    from graphsynth.synthesis.problem import Problem
+
+__all__ = ["run"]
+
+BIG = 5e7  # labellings (before sparsity) from which all cores are used
+
+
+def run(options: argparse.Namespace) -> int:
+    """List to a file, or to standard output."""
+    if options.json and (options.output is None or options.output.suffix != ".jsonl"):
+        raise SpecError("--json needs -o FILE.jsonl here: the graphs go to the file, a summary to standard output")
+    if options.output is None and (options.resume or options.force):
+        raise SpecError("--resume and --force need -o FILE")
+    announce_compilation()
+    from graphsynth.synthesis.parallel import processes
+
+    begin = time.perf_counter()
+    problem = problem_of(options)
+    weight = sum(piece.weight for piece in problem.pieces(listing=True))
+    with processes(workers_for(options.workers, weight > BIG)) as executor:
+        if options.output is None:
+            from graphsynth.synthesis.parallel import texts
+            from graphsynth.synthesis.writing import shard_of
+
+            for data, _ in texts(shard_of(problem.pieces(listing=True), options.shard), executor):
+                sys.stdout.buffer.write(data)
+            return 0
+        if not options.force:
+            _check_disk(problem, options, weight)
+        from graphsynth.synthesis.writing import write_listing
+
+        try:
+            with console.progress("listing") as watch:
+                graphs = write_listing(
+                    problem,
+                    options.output,
+                    shard=options.shard,
+                    resume=options.resume,
+                    overwrite=options.force,
+                    executor=executor,
+                    watch=watch,
+                )
+        except KeyboardInterrupt:
+            console.note(f"{options.output} holds whole lines so far: go on with the same command and --resume")
+            raise
+    seconds = time.perf_counter() - begin
+    if options.json:
+        console.put_json(
+            {"question": problem.title, "file": str(options.output), "count": graphs, "seconds": round(seconds, 3)}
+        )
+    else:
+        console.note(f"{problem.title}: {graphs} graphs written to {options.output} ({seconds:.2f} s)")
+    return 0
+
+
+def _check_disk(problem: Problem, options: argparse.Namespace, weight: float) -> None:
+    """Refuse at once a listing that cannot fit the disk.
+
+    About a quarter of the labellings bounded by the weights are admissible (a third for 12 to 18 links).
+    """
+    links = max((family.links for family in problem.families), default=1)
+    share = options.shard[1] if options.shard else 1
+    graphs = weight / 4 / share
+    needed = graphs * (links * links / 12 + 24)
+    free = shutil.disk_usage(options.output.absolute().parent).free if options.output.absolute().parent.is_dir() else 0
+    if free and needed > free:
+        raise TooLargeError(
+            f"about {graphs:.0e} graphs need about {needed / 1e9:.0f} GB and {free / 1e9:.0f} GB are free: list a part "
+            f"with --shard i/{int(needed / free * 2) + 1} --force, or only count them",
+            graphs,
+        )

@@ -1,0 +1,139 @@
+"""Parsing the command line, and turning errors into one sentence and an exit status."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+import graphsynth
+from graphsynth.cli.question import add_question
+from graphsynth.errors import GraphsynthError, SpecError
+
+__all__ = ["main"]
+
+USAGE_ERROR = 2
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return the exit status.
+
+    0: done; 2: bad input, told in one sentence on standard error; 130: interrupted.
+    """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        # each verb lives in a module of its own, imported when it is used
+        status: int = import_module(f"graphsynth.cli.{options.module}").run(options)
+        sys.stdout.flush()
+    except GraphsynthError as error:
+        print(f"graphsynth: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
+        return USAGE_ERROR
+    except KeyboardInterrupt:
+        print("graphsynth: interrupted", file=sys.stderr)  # noqa: T201
+        return INTERRUPTED
+    except BrokenPipeError:
+        # the reader (head, a pager) has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        print(f"graphsynth: {error.filename or 'input/output'}: {error.strerror}", file=sys.stderr)  # noqa: T201
+        return USAGE_ERROR
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="graphsynth", description="Structural synthesis and analysis of mechanisms.", allow_abbrev=False
+    )
+    parser.add_argument("--version", action="version", version=f"graphsynth {graphsynth.__version__}")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    _add_solve(verbs)
+    _add_count(verbs)
+    _add_enumerate(verbs)
+    _add_show(verbs)
+    _add_run(verbs)
+    return parser
+
+
+def _verb(
+    verbs: argparse._SubParsersAction[argparse.ArgumentParser], name: str, module: str, summary: str
+) -> argparse.ArgumentParser:
+    parser = verbs.add_parser(name, help=summary, description=summary, allow_abbrev=False)
+    parser.set_defaults(module=module)
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    return parser
+
+
+def _add_solve(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "solve", "solve", "Print all integer solutions of the structural system.")
+    add_question(parser)
+
+
+def _add_work(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--frame", action="store_true", help="choose a frame: mechanisms instead of chains")
+    parser.add_argument("--assur", type=int, metavar="N", help="Assur groups with N moving links instead of chains")
+    parser.add_argument("--truss", type=int, metavar="N", help="Baranov trusses with N links instead of chains")
+    parser.add_argument("--symmetry", type=int, metavar="P", help="require an automorphism of prime order P")
+    parser.add_argument("--shard", type=_shard, metavar="I/M", help="do only shard I of M (1 <= I <= M)")
+    parser.add_argument("--workers", type=_workers, metavar="K", help="worker processes (default: one; all for big work)")
+
+
+def _add_count(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "count", "count", "Count chains or mechanisms without listing them.")
+    add_question(parser)
+    _add_work(parser)
+    parser.add_argument("--checkpoint", type=Path, metavar="FILE", help="remember what is counted, and go on from there")
+
+
+def _add_enumerate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "enumerate", "enumerate_", "List every chain or mechanism, each once.")
+    add_question(parser)
+    _add_work(parser)
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=".g6 or .txt: text form; .jsonl: JSON lines")
+    parser.add_argument("--resume", action="store_true", help="go on with an interrupted FILE")
+    parser.add_argument("--force", action="store_true", help="replace FILE; list even what may not fit the disk")
+
+
+def _add_show(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "show", "show", "Describe one chain or mechanism.")
+    parser.add_argument("graph", metavar="KEY|TEXT|FILE", help="canonical key, text form (graph6 ...), or a file of them")
+    parser.add_argument("--line", type=int, default=1, metavar="N", help="line of FILE (default 1)")
+    parser.add_argument("--driver", type=int, metavar="LINK", help="driven link: give the Assur groups for it only")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE.svg", help="draw it by adjacency levels")
+
+
+def _add_run(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "run", "run", "Run a scene: from the question to a report.")
+    parser.add_argument("scene", metavar="SCENE", help="name of a shipped scene, or a TOML file")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="report folder (default graphsynth-out/SCENE)")
+
+
+def _shard(text: str) -> tuple[int, int]:
+    try:
+        i, m = map(int, text.split("/"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} must be I/M, for example 3/16") from None
+    if m < 1 or not 1 <= i <= m:
+        raise argparse.ArgumentTypeError(f"{text!r} must be I/M with 1 <= I <= M")
+    return i, m
+
+
+def _workers(text: str) -> int:
+    try:
+        count = int(text)
+    except ValueError:
+        count = 0
+    if not 1 <= count <= 1024:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number from 1 to 1024")
+    return count
+
+
+def require(condition: bool, sentence: str) -> None:
+    """Raise SpecError with the sentence unless the condition holds."""
+    if not condition:
+        raise SpecError(sentence)

@@ -1,0 +1,109 @@
+"""The structural question on the command line, shared by ``solve``, ``count`` and ``enumerate``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from graphsynth.errors import SpecError
+
+if TYPE_CHECKING:
+    from graphsynth.structure.spec import StructuralSpec
+    from graphsynth.synthesis.problem import Problem
+
+__all__ = ["add_question", "problem_of", "spec_of"]
+
+_VARIABLES = {
+    "mobility": ("W", "mobility"),
+    "space": ("Pi", "mobility of the space (default 3, the plane)"),
+    "links": ("N", "links, the frame included"),
+    "moving-links": ("n", "moving links"),
+    "joints": ("p", "joints"),
+    "loops": ("v", "independent loops"),
+    "frame-loops": ("v_ct", "loops through the frame"),
+    "moving-loops": ("v_P", "loops among moving links"),
+    "frame-joints": ("t0", "joints on the frame"),
+    "sub-edges": ("G", "sub-edges"),
+}
+_KINDS = [*(f"p{i}" for i in range(1, 6)), *(f"n{a}" for a in range(2, 10))]
+_OF_CHAINS = {"W", "Pi", "N", "p1", "p2", "p3", "p4", "p5"}
+
+
+def add_question(parser: argparse.ArgumentParser) -> None:
+    """Add the options that state a structural question."""
+    group = parser.add_argument_group("structural question", "each X is a number, or a range such as 0..2 or 3..")
+    for name, (symbol, meaning) in _VARIABLES.items():
+        group.add_argument(f"--{name}", f"--{symbol}", dest=f"var_{symbol}", metavar="X", help=meaning)
+    for kind in _KINDS:
+        meaning = f"joints of mobility {kind[1:]}" if kind[0] == "p" else f"moving links with {kind[1:]} joints"
+        group.add_argument(f"--{kind}", dest=f"var_{kind}", metavar="X", help=meaning)
+    group.add_argument("--spec", type=Path, metavar="FILE", help="read the question from a TOML file")
+    group.add_argument("--set", action="append", default=[], metavar="NAME=X", help="any variable or option by name")
+    group.add_argument("--fractionated", action="store_true", help="include fractionated chains (mobility >= 2)")
+
+
+def _assignments(options: argparse.Namespace) -> list[str]:
+    found = [
+        f"{name[4:]}={value}" for name, value in vars(options).items() if name.startswith("var_") and value is not None
+    ]
+    found += options.set
+    if options.fractionated:
+        found.append("fractionated=true")
+    return found
+
+
+def spec_of(options: argparse.Namespace) -> StructuralSpec:
+    """Return the question; options on the command line add to the file, or replace what it says."""
+    from graphsynth.structure.spec import StructuralSpec
+
+    assignments = _assignments(options)
+    if options.spec is None:
+        return StructuralSpec.from_assignments(assignments)
+    question = StructuralSpec.from_toml(options.spec).as_dict()
+    question.update(StructuralSpec.from_assignments(assignments).as_dict() if assignments else {})
+    return StructuralSpec(**question)
+
+
+def _chain_numbers(options: argparse.Namespace) -> dict[str, int] | None:
+    """Return the numbers of a question about chains without a frame, or None when it is about mechanisms."""
+    given = {name[4:]: value for name, value in vars(options).items() if name.startswith("var_") and value is not None}
+    if options.frame or options.spec or options.set or set(given) - _OF_CHAINS:
+        return None
+    numbers = {}
+    for symbol, text in given.items():
+        if not text.isdecimal():
+            raise SpecError(f"{symbol} = {text} must be a whole number for chains; with --frame it may be a range")
+        numbers[symbol] = int(text)
+    if "N" not in numbers:
+        raise SpecError("the number of links is missing: give --links N, or a question with a frame (see --help)")
+    return numbers
+
+
+def problem_of(options: argparse.Namespace) -> Problem:
+    """Return what ``count`` and ``enumerate`` are asked to do."""
+    from graphsynth.synthesis.problem import Problem
+
+    if options.assur is not None or options.truss is not None:
+        if options.assur is not None and options.truss is not None:
+            raise SpecError("--assur and --truss ask for different things: give one of them")
+        if options.symmetry:
+            raise SpecError("--symmetry is for chains and mechanisms; --assur and --truss have none: leave it out")
+        space = int(options.var_Pi or 3)
+        if options.assur is not None:
+            return Problem.trusses(options.assur + 1, space, True)
+        return Problem.trusses(options.truss, space, False)
+    numbers = _chain_numbers(options)
+    if numbers is None:
+        spec = spec_of(options)
+        if spec.bounds("W") == (None, None) and "p" not in spec.ranges:
+            spec = spec.replace(W=1)  # the default of chains
+        return Problem.mechanisms(spec, options.symmetry)
+    return Problem.chains(
+        numbers["N"],
+        numbers.get("W", 1),
+        numbers.get("Pi", 3),
+        {int(symbol[1:]): count for symbol, count in numbers.items() if symbol[0] == "p"},
+        options.fractionated,
+        options.symmetry,
+    )

@@ -1,0 +1,125 @@
+"""``graphsynth show``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.cli import console
+from graphsynth.errors import FormatError, GraphError, GraphsynthError, SpecError
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+
+__all__ = ["run"]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Describe one graph, and draw it if asked."""
+    graph = _read(options.graph, options.line)
+    facts = _facts(graph, options.driver)
+    if options.json:
+        console.put_json(facts)
+    else:
+        width = max(map(len, facts))
+        for name, value in facts.items():
+            lines = value if isinstance(value, list) and value and isinstance(value[0], str) else [value]
+            for i, line in enumerate(lines):
+                console.put(f"{name if i == 0 else '':{width}}  {_plain(line)}")
+    if options.output:
+        _draw(graph, options.output)
+    return 0
+
+
+def _read(text: str, line: int) -> MechanismGraph:
+    from graphsynth.structure.graph import MechanismGraph
+
+    path = Path(text)
+    if len(text) < 1000 and path.is_file():
+        lines = path.read_text(errors="replace").splitlines()
+        if not 1 <= line <= len(lines):
+            raise FormatError(f"line {line} does not exist, the file has {len(lines)}: choose another --line", text)
+        return _one(lines[line - 1].strip(), f"{text} line {line}")
+    if text.startswith("1") and " " not in text:
+        return MechanismGraph.from_key(text)
+    return _one(text, "")
+
+
+def _one(text: str, place: str) -> MechanismGraph:
+    from graphsynth.structure.graph import MechanismGraph
+
+    try:
+        if text.startswith("{"):
+            import json
+
+            record = json.loads(text)
+            return MechanismGraph(
+                record["links"], map(tuple, record["joints"]), frame=record.get("frame"), space=record.get("space", 3)
+            )
+        return MechanismGraph.from_key(text) if text.startswith("1") else MechanismGraph.from_text(text)
+    except FormatError as error:
+        raise FormatError(str(error), place) from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise FormatError(f"not a JSON record of a graph ({error})", place) from None
+
+
+def _facts(graph: MechanismGraph, driver: int | None) -> dict[str, Any]:
+    facts: dict[str, Any] = {
+        "key": graph.key,
+        "text": graph.to_text(),
+        "links": graph.links,
+        "joints": " ".join(f"{a}-{b}" + (f":{f}" if f > 1 else "") for a, b, f in graph.joints),
+        "mobility": graph.mobility,
+        "loops": graph.loops,
+        "assortment": " ".join(f"n{a}={count}" for a, count in graph.assortment.items()),
+        "planar graph": graph.is_planar,
+        "fractionated": graph.is_fractionated,
+        "automorphisms": graph.automorphism_order,
+        "link orbits": " ".join(_set(orbit) for orbit in graph.orbits),
+    }
+    rigid = graph.rigid_subchain()
+    facts["rigid sub-chain"] = str(rigid) if rigid else "none"
+    if graph.frame is None:
+        if driver is not None:
+            raise SpecError("--driver needs a mechanism: choose a frame first (text form '... f0')")
+        return facts
+    facts["levels"] = " ".join(_set(level) for level in graph.levels)
+    if not rigid:
+        facts["Assur groups"] = _groups(graph, driver)
+    return facts
+
+
+def _groups(graph: MechanismGraph, driver: int | None) -> list[str]:
+    """Say how the mechanism is assembled, for one driven link or for every link jointed to the frame."""
+    from graphsynth.structure.assur import decompose
+
+    if graph.mobility != 1 and driver is None:
+        return [f"{graph.mobility} drivers needed: not listed"]
+    drivers = [driver] if driver is not None else list(graph.levels[1])
+    lines = []
+    for link in drivers:
+        try:
+            lines.append(f"driver {link}: {decompose(graph, [link])}")
+        except GraphError as error:
+            lines.append(f"driver {link}: {error}")
+    return lines
+
+
+def _set(links: tuple[int, ...]) -> str:
+    return "{" + ",".join(map(str, links)) + "}"
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value)
+
+
+def _draw(graph: MechanismGraph, path: Path) -> None:
+    if path.suffix != ".svg":
+        raise GraphsynthError(f"{path} must end in .svg")
+    from graphsynth.drawing.levels import draw_levels
+
+    framed = graph if graph.frame is not None else graph.with_frame(0)
+    path.write_text(draw_levels(framed, title=graph.key))
