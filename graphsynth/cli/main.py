@@ -80,14 +80,18 @@ def _add_work(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--truss", type=int, metavar="N", help="Baranov trusses with N links instead of chains")
     parser.add_argument("--symmetry", type=int, metavar="P", help="require an automorphism of prime order P")
     parser.add_argument("--shard", type=_shard, metavar="I/M", help="do only shard I of M (1 <= I <= M)")
-    parser.add_argument("--workers", type=_workers, metavar="K", help="worker processes (default: one; all for big work)")
+    parser.add_argument(
+        "--workers", type=_workers, metavar="K", help="worker processes (default: one; all for big work)"
+    )
 
 
 def _add_count(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = _verb(verbs, "count", "count", "Count chains or mechanisms without listing them.")
     add_question(parser)
     _add_work(parser)
-    parser.add_argument("--checkpoint", type=Path, metavar="FILE", help="remember what is counted, and go on from there")
+    parser.add_argument(
+        "--checkpoint", type=Path, metavar="FILE", help="remember what is counted, and go on from there"
+    )
 
 
 def _add_enumerate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -101,7 +105,9 @@ def _add_enumerate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -
 
 def _add_show(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = _verb(verbs, "show", "show", "Describe one chain or mechanism.")
-    parser.add_argument("graph", metavar="KEY|TEXT|FILE", help="canonical key, text form (graph6 ...), or a file of them")
+    parser.add_argument(
+        "graph", metavar="KEY|TEXT|FILE", help="canonical key, text form (graph6 ...), or a file of them"
+    )
     parser.add_argument("--line", type=int, default=1, metavar="N", help="line of FILE (default 1)")
     parser.add_argument("--driver", type=int, metavar="LINK", help="driven link: give the Assur groups for it only")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.svg", help="draw it by adjacency levels")

@@ -28,7 +28,7 @@ def escalate(
     anchors: NDArray[np.complex128], vertices: NDArray[np.complex128], lengths: Array, arms: Arms | None
 ) -> tuple[Array, NDArray[np.bool_], str]:
     """Poses (m, 3), which of them are double, and a description of a self-motion (empty if none)."""
-    import mpmath  # type: ignore[import-untyped]
+    import mpmath
 
     with mpmath.workdps(_DIGITS):
         mp = mpmath.mp

@@ -1,0 +1,1 @@
+"""What a mechanism is, combinatorially: the integer system, graphs, keys, rigid sub-chains, structural groups."""

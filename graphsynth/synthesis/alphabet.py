@@ -100,18 +100,18 @@ class Alphabet:
         """Every word that fits the limits, in lexicographic order."""
         lightest = 1 if self.mobility == 0 else 1 - self.mobility
         mobilities = (1, *(i for i, _ in self.higher))
-        found = []
-        for length in range(1, self.space - lightest + 1):
-            if length > self.binary_links + 1:
-                break
-            for word in product(mobilities, repeat=length):
-                if self.space - sum(word) >= lightest and self._fits(self._cost(word)):
-                    found.append(word)
+        longest = min(self.space - lightest, self.binary_links + 1)
+        found = [
+            word
+            for length in range(1, longest + 1)
+            for word in product(mobilities, repeat=length)
+            if self.space - sum(word) >= lightest and self._fits(self._cost(word))
+        ]
         return tuple(sorted(found))
 
-    def _multisets(self, count: int, first: int, cost: tuple[int, ...], weight: int, direct: bool) -> Iterator[
-        tuple[Word, ...]
-    ]:
+    def _multisets(
+        self, count: int, first: int, cost: tuple[int, ...], weight: int, direct: bool
+    ) -> Iterator[tuple[Word, ...]]:
         if count == 0:
             yield ()
             return
@@ -201,7 +201,8 @@ class Alphabet:
 
 def _tables(alphabet: Alphabet) -> Tables:
     lo, hi, weight, index, packed, reverse, fold = [], [], [], [], [], [], []
-    g_lo, g_hi, g_weight, g_index, g_packed, g_count = [], [], [], [], [], []
+    g_lo, g_hi, g_weight, g_index, g_packed = [], [], [], [], []
+    g_count: list[int] = []
     start = 0
     for labels in alphabet.by_kind:
         number = {label: start + i for i, label in enumerate(labels)}

@@ -176,9 +176,7 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     return sampling.sample(Problem.mechanisms(spec, None), k, seed)
 
 
-def enumerate_assur_groups(
-    links: int, *, space: int = 3, executor: Executor | None = None
-) -> Iterator[MechanismGraph]:
+def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Iterator[MechanismGraph]:
     """Enumerate the Assur groups with n moving links and mobility-1 joints, each once (exact).
 
     The group is given with the frame, contracted to one link, as link 0.

@@ -2,23 +2,28 @@
 
 They are the 2-connected loopless multigraphs of minimum degree 3 with a given number of independent loops
 (``docs/explanation/enumeration.md``).  There are few of them, so the lists up to eight loops are shipped as package
-data; ``python -m graphsynth.synthesis.contracted`` makes them anew with the project's own generator.
+data.  ``python -m graphsynth.synthesis.contracted LOOPS FOLDER`` makes the lists anew, or those for more loops; the
+environment variable ``GRAPHSYNTH_CONTRACTED`` names a folder where lists for more than eight loops are looked for.
 """
 
 from __future__ import annotations
 
 import lzma
+import os
+import sys
 from functools import lru_cache
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import FormatError, TooLargeError
 
-__all__ = ["SHIPPED_LOOPS", "contracted_graphs", "decode", "encode"]
+__all__ = ["SHIPPED_LOOPS", "contracted_graphs", "decode", "encode", "generate", "has_contracted_graphs"]
 
 SHIPPED_LOOPS = 8
+FOLDER_VARIABLE = "GRAPHSYNTH_CONTRACTED"
 _MAGIC = b"gsH1"
 
 Layers = dict[int, NDArray[np.uint8]]
@@ -65,15 +70,28 @@ def decode(data: bytes) -> Layers:
 
 
 @lru_cache(maxsize=4)
-def _shipped(loops: int) -> Layers:
-    layers = decode(files("graphsynth.synthesis").joinpath("data", f"contracted-{loops}.xz").read_bytes())
+def _layers(loops: int) -> Layers:
+    name = f"contracted-{loops}.xz"
+    if 2 <= loops <= SHIPPED_LOOPS:
+        data = files("graphsynth.synthesis").joinpath("data", name).read_bytes()
+    else:
+        data = (Path(os.environ[FOLDER_VARIABLE]) / name).read_bytes()
+    layers = decode(data)
     for mults in layers.values():
         mults.setflags(write=False)
     return layers
 
 
+def has_contracted_graphs(loops: int) -> bool:
+    """Tell whether the list for a number of loops is shipped, or stands in the folder of the user."""
+    if loops <= SHIPPED_LOOPS:
+        return True
+    folder = os.environ.get(FOLDER_VARIABLE)
+    return bool(folder) and (Path(str(folder)) / f"contracted-{loops}.xz").is_file()
+
+
 def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
-    """Return all contracted graphs with the given numbers of loops (2..8) and vertices.
+    """Return all contracted graphs with the given numbers of loops (at least 2) and vertices.
 
     Returns
     -------
@@ -83,15 +101,19 @@ def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
     Raises
     ------
     TooLargeError
-        For more than eight loops: no complete list is shipped.
+        For more loops than there are lists for.
+
+    Examples
+    --------
+    >>> [len(contracted_graphs(3, k)) for k in (2, 3, 4)]
+    [1, 1, 2]
     """
-    if not 2 <= loops <= SHIPPED_LOOPS:
+    if loops < 2 or not has_contracted_graphs(loops):
         raise TooLargeError(
-            f"{loops} loops need contracted graphs that are not shipped (2 <= loops <= {SHIPPED_LOOPS}); "
-            "ask for fewer links"
+            f"there is no list of contracted graphs with {loops} loops (2..{SHIPPED_LOOPS} are shipped): make it with "
+            f"'python -m graphsynth.synthesis.contracted {loops} FOLDER' and set {FOLDER_VARIABLE}=FOLDER"
         )
-    layers = _shipped(loops)
-    return layers.get(vertices, np.zeros((0, vertices, vertices), np.uint8))
+    return _layers(loops).get(vertices, np.zeros((0, vertices, vertices), np.uint8))
 
 
 def _unique_rows(rows: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -150,3 +172,25 @@ def generate(loops: int, vertices: int | None = None, smaller: dict[int, Layers]
                     codes = _unique_rows(np.concatenate([codes, _unique_rows(buffer[:count])]))
             layers[k] = _from_codes(codes, k)
     return found
+
+
+def _main(arguments: list[str]) -> int:
+    """Make the lists for 2..LOOPS loops and write them to FOLDER."""
+    if len(arguments) != 2 or not arguments[0].isdecimal() or not 2 <= int(arguments[0]) <= 10:
+        sys.stderr.write("usage: python -m graphsynth.synthesis.contracted LOOPS FOLDER, with LOOPS from 2 to 10\n")
+        return 2
+    folder = Path(arguments[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    found: dict[int, Layers] = {}
+    for loops in range(2, int(arguments[0]) + 1):
+        found = generate(loops, smaller=found)
+        data = encode(found[loops])
+        (folder / f"contracted-{loops}.xz").write_bytes(data)
+        count = sum(map(len, found[loops].values()))
+        sys.stdout.write(f"{loops} loops: {count} contracted graphs, {len(data)} bytes\n")
+        sys.stdout.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main(sys.argv[1:]))

@@ -108,7 +108,9 @@ def chain_joints(links: int, mobility: int, space: int, higher: Mapping[int, int
             raise SpecError(f"{name} = {value!r} must be a whole number from {low} to {high}")
     for i, count in higher.items():
         if isinstance(i, bool) or not isinstance(i, int) or not 1 <= i <= space - 1:
-            raise SpecError(f"a joint of mobility {i!r} does not exist in a space of mobility {space}: use 1..{space - 1}")
+            raise SpecError(
+                f"a joint of mobility {i!r} does not exist in a space of mobility {space}: use 1..{space - 1}"
+            )
         if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= 100:
             raise SpecError(f"p{i} = {count!r} must be a whole number from 0 to 100")
     rest = space * (links - 1) - mobility - sum(count * (space - i) for i, count in higher.items() if i > 1)
@@ -118,9 +120,7 @@ def chain_joints(links: int, mobility: int, space: int, higher: Mapping[int, int
     return joints
 
 
-def _layers(
-    links: int, mobility: int, space: int, higher: Mapping[int, int], frames: int
-) -> Iterator[Family]:
+def _layers(links: int, mobility: int, space: int, higher: Mapping[int, int], frames: int) -> Iterator[Family]:
     lower = chain_joints(links, mobility, space, higher)
     if lower is None:
         return

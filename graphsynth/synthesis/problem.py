@@ -9,7 +9,7 @@ from hashlib import sha256
 from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.spec import LinkAssortment, StructuralSpec
-from graphsynth.synthesis.contracted import SHIPPED_LOOPS
+from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
 from graphsynth.synthesis.families import (
     Family,
     Levels,
@@ -24,6 +24,8 @@ from graphsynth.synthesis.units import Unit, count_unit, cut, graphs_of, text_of
 
 __all__ = ["Piece", "Problem", "count_piece", "graphs_of_piece", "text_of_piece"]
 
+LISTED_PER_SECOND = 1e6  # order of magnitude, one core
+MOST_LOOPS = 10  # what the kernels are laid out for
 _PRIMES = (2, 3, 5, 7, 11, 13)
 
 
@@ -66,9 +68,11 @@ class Handful:
     def _fits(self, graph: MechanismGraph) -> bool:
         wanted = self.assortment
         if wanted is not None:
-            if graph.degrees[0] != wanted.frame_joints or graph.assortment != {a: n for a, n in wanted.n_a.items() if n}:
+            if graph.degrees[0] != wanted.frame_joints or graph.assortment != {
+                a: n for a, n in wanted.n_a.items() if n
+            }:
                 return False
-            rest = [v for v in range(1, graph.links)]
+            rest = list(range(1, graph.links))
             parts = _parts(graph, rest)
             if wanted.frame_loops != wanted.frame_joints - parts:
                 return False
@@ -156,7 +160,7 @@ class Problem:
         title += (" framed" if framed else "") + (" fractionated" if fractionated else "")
         if joints is None:
             return cls(title, ())
-        check_loops(joints + sum(count for _, count in placed) - links + 1, links, mobility)
+        check_loops(joints + sum(count for _, count in placed) - links + 1, links)
         order = check_symmetry(symmetry)
         common = (links, mobility, space, placed, framed)
         handfuls = [Handful("rings", *common, symmetry=order)]
@@ -187,7 +191,7 @@ class Problem:
                 raise InfeasibleSpecError(
                     f"W = {assortment.mobility} must be at least 1 for a mechanism: fix W, or ask for Assur groups"
                 )
-            check_loops(assortment.loops, assortment.moving_links + 1, assortment.mobility)
+            check_loops(assortment.loops, assortment.moving_links + 1)
             families += mechanism_families(assortment, levels)
             higher = tuple((i, count) for i, count in enumerate(assortment.p_i, 1) if i > 1 and count)
             common = (assortment.moving_links + 1, assortment.mobility, assortment.space, higher, True)
@@ -206,10 +210,8 @@ class Problem:
         title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
         if joints is None:
             return cls(title, ())
-        check_loops(joints - links + 1, links, 0)
-        return cls(
-            title, tuple(truss_families(links, space, framed)), (Handful("rings", links, 0, space, (), framed),)
-        )
+        check_loops(joints - links + 1, links)
+        return cls(title, tuple(truss_families(links, space, framed)), (Handful("rings", links, 0, space, (), framed),))
 
 
 def check_symmetry(symmetry: int | None) -> int:
@@ -243,23 +245,29 @@ def extrapolated(links: int) -> float:
     return count
 
 
-def check_loops(loops: int, links: int, mobility: int) -> None:
+def check_loops(loops: int, links: int) -> None:
     """Refuse at once what cannot finish.
 
     Raises
     ------
     TooLargeError
-        For more loops than the shipped contracted graphs have.
+        For more loops than there are contracted graphs for.
     """
-    if loops <= SHIPPED_LOOPS:
+    if has_contracted_graphs(loops):
         return
-    about = f"about {extrapolated(2 * loops + 2):.0e} chains of mobility 1 have {loops} loops"
-    most = 2 * SHIPPED_LOOPS + mobility + 1
+    count = extrapolated(2 * loops + 2)
+    years = count / LISTED_PER_SECOND / 3.15e7
+    estimate = f"about {count:.0e} chains of mobility 1 with mobility-1 joints have so many; listing them would take "
+    estimate += f"{years:.0e} years on one core" if years >= 1 else f"{years * 365:.0f} days on one core"
+    remedy = "ask for fewer links, or fix more of the question"
+    if loops <= MOST_LOOPS:
+        remedy = (
+            f"make their contracted graphs once with 'python -m graphsynth.synthesis.contracted {loops} FOLDER', set "
+            f"{FOLDER_VARIABLE}=FOLDER, and share the work out with --shard i/m over m machines"
+        )
     raise TooLargeError(
-        f"{links} links with {loops} independent loops are out of reach ({about}; the bound is {SHIPPED_LOOPS} loops, "
-        f"for mobility-1 joints in the plane N = {most}): fix more of the question, and cut what remains with --shard i/m "
-        "over several machines",
-        extrapolated(2 * loops + 2),
+        f"{links} links make {loops} independent loops, more than the bound of {SHIPPED_LOOPS}: {estimate}; {remedy}",
+        count,
     )
 
 

@@ -30,9 +30,7 @@ def _is_first(word: tuple[int, ...], framed: bool) -> bool:
     return all(word <= turned[i:] + turned[:i] for turned in (word, back) for i in shifts)
 
 
-def rings(
-    links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool
-) -> Iterator[MechanismGraph]:
+def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> Iterator[MechanismGraph]:
     """Yield the chains (mechanisms, if ``framed``) that are one ring of links, each once.
 
     Joint i connects links i and i + 1 modulo N, so with the frame at link 0 the only symmetry left is the reflection.

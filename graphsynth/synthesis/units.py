@@ -196,7 +196,5 @@ def text_of(unit: Unit) -> Iterator[tuple[bytes, int]]:
     line = 16 + family.links * family.links // 12 + 8 * sum(count for _, count in family.higher) + 4 * highest
     out = np.empty(_ROWS * line, np.uint8)
     for rows, count in _blocks(unit):
-        size, kept = expand_text(
-            family.vertices, family.graphs, rows, count, spelling, family.space, highest, out
-        )
+        size, kept = expand_text(family.vertices, family.graphs, rows, count, spelling, family.space, highest, out)
         yield out[:size].tobytes(), kept

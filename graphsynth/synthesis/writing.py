@@ -7,7 +7,6 @@ A resumed run cuts the file back to whole pieces and goes on, so the result is t
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -55,9 +54,7 @@ def shard_of(pieces: Sequence[Piece], shard: tuple[int, int] | None) -> list[Pie
     if not sums:
         return []
     return [
-        piece
-        for piece, upto in zip(pieces, sums)
-        if min(m, int((upto - piece.weight / 2) / sums[-1] * m) + 1) == i
+        piece for piece, upto in zip(pieces, sums) if min(m, int((upto - piece.weight / 2) / sums[-1] * m) + 1) == i
     ]
 
 
@@ -76,7 +73,7 @@ def _read_progress(path: Path) -> dict[str, Any]:
 def _write_progress(path: Path, **progress: Any) -> None:
     fresh = path.with_name(path.name + ".new")
     fresh.write_text(json.dumps(progress) + "\n")
-    os.replace(fresh, path)
+    fresh.replace(path)
 
 
 def _json_lines(piece: Piece) -> tuple[bytes, int]:

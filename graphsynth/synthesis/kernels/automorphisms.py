@@ -39,7 +39,7 @@ def _refine(k, mult, colour):
                 count += 1
         for v in range(k):
             colour[v] = fresh[v]
-        if count == distinct or count == k:
+        if count in (distinct, k):
             return count
         distinct = count
     return distinct

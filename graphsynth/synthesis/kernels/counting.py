@@ -96,7 +96,9 @@ def _lay_gains(count, tables, work):
         for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
             shift = work.entries[INDEX, g]
             for i in range(shift, resources):
-                if work.tables[WAYS, j + 1, i - shift] and fits(tables.resources[DIGITS, i], work.entries[PACKED, g], tables.guard):
+                if work.tables[WAYS, j + 1, i - shift] and fits(
+                    tables.resources[DIGITS, i], work.entries[PACKED, g], tables.guard
+                ):
                     gain = work.tables[GAINS, j + 1, i - shift] + factor * work.entries[GAIN, g]
                     if gain > work.tables[GAINS, j, i]:
                         work.tables[GAINS, j, i] = gain
@@ -222,7 +224,7 @@ def fixed_by(member, m, sets, tables, work):
 
 @inner
 def frame_stabiliser(order, frame_mode, frame, work):
-    """Collect the automorphisms that keep the frame; return their number, 0 if the frame is not the first of its orbit."""
+    """Collect the automorphisms that keep the frame; return their number, 0 unless it is the first of its orbit."""
     kept = 0
     for g in range(order):
         if frame_mode == FRAME_NONE:
@@ -253,7 +255,7 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
     """Count the orbits of labellings of the contracted graphs ``mults[start:stop]``; one number each in ``out``.
 
     ``frame_modes`` is a sum of FRAME_NONE, FRAME_VERTEX, FRAME_PATH; ``frame_degree`` restricts FRAME_VERTEX to
-    vertices of that degree (0: any).  Returns 0, TOO_LARGE when a count passes 2**62 or a group is too large, or NO_ROOM.
+    vertices of that degree (0: any).  Returns 0, TOO_LARGE (a count passes 2**62, or a group is too large), or NO_ROOM.
     """
     for h in range(start, stop):
         mult = mults[h]
