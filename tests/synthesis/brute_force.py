@@ -47,9 +47,7 @@ def _signature(g: nx.Graph) -> tuple[object, ...]:
     """An isomorphism invariant: degrees, neighbours' degrees, distances."""
     lengths = dict(nx.all_pairs_shortest_path_length(g))
     return tuple(
-        sorted(
-            (g.degree(v), tuple(sorted(g.degree(w) for w in g[v])), tuple(sorted(lengths[v].values()))) for v in g
-        )
+        sorted((g.degree(v), tuple(sorted(g.degree(w) for w in g[v])), tuple(sorted(lengths[v].values()))) for v in g)
     )
 
 
@@ -158,7 +156,9 @@ class Identifier:
         for number, g in enumerate(underlying):
             self.buckets[_signature(g)].append((number, g, automorphisms(g)))
 
-    def __call__(self, links: int, joints: Iterable[tuple[int, int, int]], frame: int | None) -> tuple[int, int, Coloured]:
+    def __call__(
+        self, links: int, joints: Iterable[tuple[int, int, int]], frame: int | None
+    ) -> tuple[int, int, Coloured]:
         joints = tuple(joints)
         g = nx.empty_graph(links)
         g.add_edges_from((a, b) for a, b, _ in joints)
@@ -172,7 +172,7 @@ class Identifier:
 
 
 def labelled_count(links: int, joints: int) -> int:
-    """Count labelled planar graphs (mobility-1 joints) without rigid sub-chain, 2-connected, by trying all joint sets."""
+    """Count labelled 2-connected planar chains without rigid sub-chain by trying all joint sets."""
     pairs = list(combinations(range(links), 2))
     total = 0
     degree = [0] * links
