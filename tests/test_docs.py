@@ -10,6 +10,8 @@ from urllib.parse import unquote
 
 import pytest
 
+from graphsynth.cli import main
+
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"])
 FLAGS = doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL
@@ -113,25 +115,41 @@ def test_every_page_can_be_reached_from_the_index():
 
 
 def commands():
+    """Yield (page, words after ``graphsynth``, the number a count is said to print or None)."""
     for page in PAGES:
         for language, body, _ in fences(page):
             if language not in ("", "sh", "bash", "console"):
                 continue
-            for line in body.replace("\\\n", " ").splitlines():
-                if "$(" in line:
+            lines = body.replace("\\\n", " ").splitlines()
+            for line, after in zip(lines, [*lines[1:], ""]):
+                if not re.match(r"(\$ )?graphsynth ", line) or "$(" in line:
                     continue
-                words = (
-                    shlex.split(line.removeprefix("$ "), comments=True) if re.match(r"(\$ )?graphsynth ", line) else []
-                )
-                if len(words) > 1 and not any(word.isupper() or word in ("...", "|") or "[" in word for word in words):
-                    yield pytest.param(words[1:], id=f"{name_of(page)}: {' '.join(words[1:])}")
+                words = shlex.split(line.removeprefix("$ "), comments=True)[1:]
+                # a synopsis is not a command
+                if not words or any(word.isupper() or word in ("...", "|") or "[" in word for word in words):
+                    continue
+                said = re.search(r"# (\d+)\b", line) or re.fullmatch(r"(\d+)", after)
+                yield page, words, int(said[1]) if said else None
 
 
-@pytest.mark.parametrize("words", list(commands()))
+def title(page, words):
+    return f"{name_of(page)}: {' '.join(words)}"
+
+
+@pytest.mark.parametrize("words", [pytest.param(words, id=title(page, words)) for page, words, _ in commands()])
 def test_documented_commands_parse(words):
-    """The options exist; running the commands is the business of the tests of the command line."""
     from graphsynth.cli.main import _parser
 
-    words = words[: next((i for i, word in enumerate(words) if word in (">", ";", "&&")), len(words))]
     options = _parser().parse_args([re.sub(r"\$\{?\w+\}?", "1", word) for word in words])
-    assert callable(getattr(options, "run", None)) or options.module
+    assert options.verb == words[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [pytest.param(words, said, id=title(page, words)) for page, words, said in commands() if said is not None],
+)
+def test_documented_counts(words, said, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    assert words[0] == "count"
+    assert main(words) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(said)

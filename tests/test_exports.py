@@ -49,7 +49,8 @@ def test_dir_lists_the_public_names():
 
 def loaded_by(statement):
     """Return the top-level modules that a statement loads in a fresh process."""
-    code = f"import sys; before = set(sys.modules); {statement}; import json; print(json.dumps(sorted(set(sys.modules) - before)))"
+    new = "sorted(set(sys.modules) - before)"
+    code = f"import json, sys; before = set(sys.modules); {statement}; print(json.dumps({new}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return {name.partition(".")[0] for name in json.loads(done.stdout)}
 
