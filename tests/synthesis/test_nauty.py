@@ -81,7 +81,7 @@ def test_fractionated_mechanisms(links, mobility):
 
 @pytest.mark.parametrize(
     ("links", "p1", "p2"),
-    [(7, 8, 1), pytest.param(7, 7, 3, marks=pytest.mark.slow), pytest.param(8, 9, 2, marks=pytest.mark.slow)],
+    [(7, 8, 1), (7, 7, 3), (8, 9, 2)],
 )
 def test_higher_pairs(links, p1, p2):
     lines = nauty.run("geng", "-C", str(links), f"{p1 + p2}:{p1 + p2}")
