@@ -7,7 +7,6 @@ most 64 links go to the compiled copy of it once that is worth loading.  Both gi
 
 from __future__ import annotations
 
-import sys
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from binascii import Error as Base64Error
 from collections.abc import Sequence
@@ -29,7 +28,7 @@ __all__ = ["KEY_VERSION", "Labelling", "decode_key", "joint_orbits", "key", "lab
 KEY_VERSION = "1"
 
 _KERNEL_LINKS_MAX = 64
-#: Loading the compiled search costs as much as labelling a few hundred small graphs without it.
+#: Loading the compiled search costs as much as labelling a few hundred small graphs without it; compiling it, far more.
 _GRAPHS_WORTH_THE_KERNEL = 300
 _labelled_without_kernel = 0
 
@@ -83,7 +82,7 @@ def label(graph: MechanismGraph) -> Labelling:
     global _labelled_without_kernel
     colours = link_colours(graph)
     if graph.links <= _KERNEL_LINKS_MAX:
-        if _labelled_without_kernel >= _GRAPHS_WORTH_THE_KERNEL or "numba" in sys.modules:
+        if _labelled_without_kernel >= _GRAPHS_WORTH_THE_KERNEL:
             return _label_compiled(graph, colours)
         _labelled_without_kernel += 1
     return _label_python(graph, colours)

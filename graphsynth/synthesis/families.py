@@ -92,7 +92,9 @@ def _graphs(loops: int, vertices: int, degrees: tuple[int, ...] | None) -> NDArr
     if degrees is None:
         return mults
     found = np.sort(mults.sum(axis=2, dtype=np.int64), axis=1)
-    return np.ascontiguousarray(mults[(found == np.array(degrees)).all(axis=1)])
+    chosen = np.ascontiguousarray(mults[(found == np.array(degrees)).all(axis=1)])
+    chosen.setflags(write=False)  # the kernels are compiled once, for read-only lists
+    return chosen
 
 
 def chain_joints(links: int, mobility: int, space: int, higher: Mapping[int, int]) -> int | None:

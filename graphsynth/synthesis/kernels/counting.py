@@ -38,7 +38,6 @@ from graphsynth.synthesis.kernels.variables import (
     fits,
     lay_classes,
     load_graph,
-    merged_entries,
     plain_entries,
     unconstrained_ways,
 )
@@ -216,7 +215,8 @@ def count_states(count, sets, tables, work):
 def fixed_by(member, m, sets, tables, work):
     """Count the admissible labellings fixed by automorphism number ``member``; negative: see ``count_states``."""
     count = build_variables(m, sets, work.perms[member], tables, work)
-    count = merged_entries(count, tables, work)
+    if not plain_entries(count, tables, work):
+        return np.int64(TOO_LARGE)
     if count < 0 or unconstrained_ways(count, False, tables, work) > _LIMIT:
         return np.int64(TOO_LARGE)
     return count_states(count, sets, tables, work)

@@ -20,7 +20,6 @@ MAX_VERTICES = 18
 MAX_CLASSES = 48
 MAX_SETS = 1024
 MAX_ENTRIES = 1 << 18
-MAX_GAIN = 256
 
 # rows of Tables.kinds and Tables.group_kinds: where the labels (groups) of a kind start and end
 LABELS, LABELS_END = 0, 1
@@ -34,11 +33,11 @@ DIGITS, FINAL = 0, 1
 # rows of Work.classes
 U, V, KIND, HEAVIEST, VAR, FLIP, LABEL = range(7)
 # rows of Work.variables
-REP, SIZE, OWN, ROW, MERGED_ROW, ENTRY, AT, USED = range(8)
+REP, SIZE, OWN, ROW, ENTRY, AT, USED = range(7)
 # rows of Work.sets, Work.rows, Work.tables, Work.states
 MASK, NEED, LEFT = range(3)
 SET, COEF, REST = range(3)
-FRESH, STALE, WAYS, GAINS = range(4)
+WAYS, GAINS = range(2)
 SUM, SLOT, STAMP = range(3)
 
 
@@ -73,10 +72,10 @@ class Work(NamedTuple):
     classes: NDArray[np.int64]  # (7, MAX_CLASSES) ends U < V, KIND, HEAVIEST, VAR and FLIP, LABEL at a leaf
     subsets: NDArray[np.int16]  # (2, 2**MAX_VERTICES) needs of vertex sets
     sets: NDArray[np.int64]  # (3, MAX_SETS) MASK of classes inside, NEED, what is LEFT of it
-    variables: NDArray[np.int64]  # (8, MAX_CLASSES + 1) REP, SIZE, OWN reversal; first ROW and ENTRY; search stack
+    variables: NDArray[np.int64]  # (7, MAX_CLASSES + 1) REP, SIZE, OWN reversal; first ROW and ENTRY; search stack
     rows: NDArray[np.int64]  # (3, MAX_SETS * MAX_CLASSES) SET, COEF and REST (what later variables can contribute)
     entries: NDArray[np.int64]  # (4, MAX_ENTRIES) choices of a variable: GAIN, INDEX, PACKED, COPIES
-    tables: NDArray[np.int64]  # (4, rows, states) FRESH and STALE products; WAYS and GAINS of variables j, j+1, ...
+    tables: NDArray[np.int64]  # (2, MAX_CLASSES + 1, states) WAYS and GAINS of variables j, j+1, ...
     lanes: NDArray[np.uint64]  # per variable: coefficients, then what later variables can contribute; a byte per set
     keys: NDArray[np.uint64]  # two layers of states of the dynamic program
     states: NDArray[np.int64]  # (3, key_words) SUM of a state; hash table: SLOT -> state, STAMP = its layer
@@ -99,10 +98,10 @@ def make_work(resources: int, group: int = 20_000, key_words: int = 1 << 18) -> 
         classes=ints(7, MAX_CLASSES),
         subsets=np.zeros((2, 1 << MAX_VERTICES), np.int16),
         sets=ints(3, MAX_SETS),
-        variables=ints(8, MAX_CLASSES + 1),
+        variables=ints(7, MAX_CLASSES + 1),
         rows=ints(3, MAX_SETS * MAX_CLASSES),
         entries=ints(4, MAX_ENTRIES),
-        tables=ints(4, MAX_GAIN, resources),
+        tables=ints(2, MAX_CLASSES + 1, resources),
         lanes=np.zeros(2 * MAX_CLASSES * (MAX_SETS // 8), np.uint64),
         keys=np.zeros(2 * key_words, np.uint64),
         states=ints(3, key_words),

@@ -12,7 +12,6 @@ from graphsynth.synthesis.kernels.layout import (
     ENTRY,
     FINAL,
     FLIP,
-    FRESH,
     GAIN,
     GROUPS,
     GROUPS_END,
@@ -22,8 +21,6 @@ from graphsynth.synthesis.kernels.layout import (
     LEFT,
     MASK,
     MAX_ENTRIES,
-    MAX_GAIN,
-    MERGED_ROW,
     NEED,
     OWN,
     PACKED,
@@ -32,7 +29,6 @@ from graphsynth.synthesis.kernels.layout import (
     ROW,
     SET,
     SIZE,
-    STALE,
     VAR,
     WAYS,
     WEIGHT,
@@ -204,107 +200,6 @@ def plain_entries(count, tables, work):
 def fits(available, packed, guard):
     """Tell whether every digit of ``packed`` is at most that of ``available``."""
     return ((available | guard) - packed) & guard == guard
-
-
-@inner
-def _same_row(i, j, work):
-    """Tell whether two variables enter the critical sets with the same coefficients."""
-    size = work.variables[ROW, i + 1] - work.variables[ROW, i]
-    if work.variables[ROW, j + 1] - work.variables[ROW, j] != size:
-        return False
-    for q in range(size):
-        a = work.variables[ROW, i] + q
-        b = work.variables[ROW, j] + q
-        if work.rows[SET, a] != work.rows[SET, b] or work.rows[COEF, a] != work.rows[COEF, b]:
-            return False
-    return True
-
-
-@inner
-def _multiply_in(j, top, tables, work):
-    """Multiply the table of gains and resources by the choices of variable j; return the new largest gain."""
-    resources = tables.resources.shape[1]
-    own_kind = 2 * work.classes[KIND, work.variables[REP, j]] + work.variables[OWN, j]
-    size = work.variables[SIZE, j]
-    heaviest = work.classes[HEAVIEST, work.variables[REP, j]]
-    most = 0
-    for g in range(tables.group_kinds[GROUPS, own_kind], tables.group_kinds[GROUPS_END, own_kind]):
-        most = max(most, heaviest - tables.groups[WEIGHT, g])
-    if top + most >= MAX_GAIN:
-        return -1
-    for y in range(top + 1):
-        for i in range(resources):
-            work.tables[STALE, y, i] = work.tables[FRESH, y, i]
-    for y in range(top + most + 1):
-        for i in range(resources):
-            work.tables[FRESH, y, i] = 0
-    limit = tables.resources[DIGITS, tables.target]
-    for g in range(tables.group_kinds[GROUPS, own_kind], tables.group_kinds[GROUPS_END, own_kind]):
-        gain = heaviest - tables.groups[WEIGHT, g]
-        shift = tables.groups[INDEX, g] * size
-        packed = tables.groups[PACKED, g] * size
-        for y in range(top + 1):
-            for i in range(resources - shift):
-                n = work.tables[STALE, y, i]
-                if n and fits(limit, tables.resources[DIGITS, i] + packed, tables.guard):
-                    work.tables[FRESH, y + gain, i + shift] += n * tables.groups[COPIES, g]
-    return top + most
-
-
-@inner
-def merged_entries(count, tables, work):
-    """Merge variables that enter all critical sets alike: only the sum of their gains matters.
-
-    Variables outside every critical set stay as they are; their choices are counted by ``unconstrained_ways``.
-
-    Returns
-    -------
-    int
-        The new number of variables, or -1 on overflow.
-    """
-    resources = tables.resources.shape[1]
-    kept = 0
-    at = 0
-    row_at = 0
-    done = np.zeros(count, np.bool_)
-    for j in range(count):
-        if done[j]:
-            continue
-        for i in range(resources):
-            work.tables[FRESH, 0, i] = 0
-        work.tables[FRESH, 0, 0] = 1
-        top = np.int64(0)
-        first, last = work.variables[ROW, j], work.variables[ROW, j + 1]
-        for i in range(j, count):
-            if done[i] or (i > j and (first == last or not _same_row(j, i, work))):
-                continue
-            done[i] = True
-            top = _multiply_in(i, top, tables, work)
-            if top < 0:
-                return -1
-        work.variables[ENTRY, kept] = at
-        for y in range(top + 1):
-            for i in range(resources):
-                if work.tables[FRESH, y, i]:
-                    if at == MAX_ENTRIES:
-                        return -1
-                    work.entries[GAIN, at] = y
-                    work.entries[INDEX, at] = i
-                    work.entries[PACKED, at] = tables.resources[DIGITS, i]
-                    work.entries[COPIES, at] = work.tables[FRESH, y, i]
-                    at += 1
-        # rows move to the front; row[j + 1] of a variable not yet looked at is never overwritten before it is read
-        work.variables[MERGED_ROW, kept] = row_at
-        for q in range(first, last):
-            work.rows[SET, row_at] = work.rows[SET, q]
-            work.rows[COEF, row_at] = work.rows[COEF, q]
-            row_at += 1
-        kept += 1
-    work.variables[ENTRY, kept] = at
-    work.variables[MERGED_ROW, kept] = row_at
-    for j in range(kept + 1):
-        work.variables[ROW, j] = work.variables[MERGED_ROW, j]
-    return kept
 
 
 @inner
