@@ -1,0 +1,33 @@
+"""Numbers shared by the compiler (`program`) and the compiled kernels."""
+
+from __future__ import annotations
+
+# Rows: one equation each, between links a and b.  P, Q: points of a and b; t, n: direction of a's line and its normal.
+RX, RY = 0, 1  #: Q - P = 0
+DIST = 2  #: |Q - P| = h
+LINE = 3  #: n . (Q - P) = h
+ANGLE = 4  #: theta_b - theta_a = h
+GEAR = 5  #: radius_a (theta_a - phi) + sign radius_b (theta_b - phi - h) = 0
+DRIVE_ANGLE = 6  #: theta_b - theta_a = sign q
+DRIVE_SLIDE = 7  #: t . (Q - P) = sign q
+
+# Links eliminated from a group: placed after it, from the two links they join.
+E_RR, E_RP, E_PP = 0, 1, 2
+
+# Steps of a program.
+DRIVE_R, DRIVE_P = 0, 1
+R_DIST, R_LINE_PIN, R_LINE_SLOT, R_ANGLE, R_GEAR, P_DIST, P_LINE, NEWTON = 2, 3, 4, 5, 6, 7, 8, 9
+
+#: Steps with two assembly modes.
+TWO_MODES = (R_DIST, R_LINE_PIN, R_LINE_SLOT, P_DIST)
+
+# Row parameters (columns of a float table).
+PAX, PAY, PBX, PBY, TX, TY, H, RA, RB, SIGN, SLOT, HT = range(12)
+ROW_WIDTH = 12
+#: Parameters of an eliminated link: a's point, e's point there, b's point, e's point there, directions, angle.
+ELIM_WIDTH = 13
+#: Parameters of a driver step: known point, direction in the known link, placed link's point, sign, angle.
+DRIVE_WIDTH = 8
+
+# Why a run stopped.
+DONE, UNREACHABLE, STEP_TOO_LONG, NO_CONVERGENCE, SINGULAR, BAD_INPUT = 0, 1, 2, 3, 4, 5

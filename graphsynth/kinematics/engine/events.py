@@ -1,0 +1,235 @@
+"""Events along a branch: where it ends and why, change points that samples step over, dead centres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
+from graphsynth.kinematics.engine.result import MotionEvent
+from graphsynth.mechanism.joints import Prismatic, Revolute
+
+__all__ = ["dead_centres", "ending", "first_touch"]
+
+Array = NDArray[np.float64]
+
+#: A margin that dips below this between samples is examined.
+_NEAR = 0.2
+#: A smallest margin below this is a change point: the modes meet to rounding.
+_TOUCH = 1e-13
+
+
+def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
+    """Return the event that ended a trace, its input located."""
+    assert trace.stop is not None
+    stop = trace.stop
+    step = tracker.program.steps[stop.step]
+    if stop.code == codes.BAD_INPUT:
+        text = f"the driver of link {step.links[0]} has no value at the input {stop.at:.12g}"
+        return MotionEvent("input", stop.at, -1, step.links, 0, 0.0, True, text)
+    if trace.done == 0:
+        text = f"group {step.group} ({step.kind}, links {_list(step.links)}) cannot be assembled at the first input"
+        return MotionEvent("not assembled", stop.at, step.group, step.links, 0, 0.0, True, text)
+    if stop.code == codes.UNREACHABLE:
+        return _limit(tracker, trace, float(trace.u[trace.done]))
+    return _singular(tracker, stop)
+
+
+def _list(links: tuple[int, ...]) -> str:
+    return ", ".join(map(str, links))
+
+
+def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
+    """Bisect for the last input at which the closed forms can be assembled."""
+    k = trace.done - 1
+    good, step_index = float(trace.u[k]), trace.stop.step if trace.stop else 0
+    source, at = trace, k
+    while True:
+        middle = 0.5 * (good + bad)
+        if middle in (good, bad):
+            break
+        pair, code, where = tracker.near(source, at, middle)
+        if code == codes.DONE:
+            good = middle
+            if abs(bad - good) > 1e-9:  # near the limit velocities are useless as predictors
+                source, at = pair, 1
+        else:
+            bad, step_index = middle, where
+    step = tracker.program.steps[step_index]
+    if step.has_two_modes:
+        text = (
+            f"group {step.group} ({step.kind}, links {_list(step.links)}) is stretched or folded at the input "
+            f"{good:.12g}: its two modes merge and it cannot be assembled beyond"
+        )
+        return MotionEvent("fold", good, step.group, step.links, 2, abs(bad - good), True, text)
+    text = f"group {step.group} ({step.kind}, links {_list(step.links)}) has no definite place at the input {good:.12g}"
+    return MotionEvent("singular", good, step.group, step.links, 0, abs(bad - good), True, text)
+
+
+def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:
+    """Judge where a Newton group stopped: a fold if the square of the determinant goes to zero linearly."""
+    step = tracker.program.steps[stop.step]
+    where = f"group {step.group} ({step.kind}, links {_list(step.links)})"
+    points = stop.history
+    if len(points) >= 4:
+        (u0, d0), (u1, d1) = points[-3], points[-1]
+        if d0 * d0 > d1 * d1 > 0.0:
+            at = u1 + d1 * d1 * (u1 - u0) / (d0 * d0 - d1 * d1)
+            power = math.log(abs(d0 / d1)) / math.log(abs((at - u0) / (at - u1)))
+            check = _power(points, at)
+            if abs(check - 0.5) < 0.1:
+                text = (
+                    f"{where} is singular at the input {at:.12g}: two assembly modes merge and the branch ends "
+                    f"(the determinant goes to zero like the power {check:.2f} of the distance)"
+                )
+                del power
+                return MotionEvent("fold", at, step.group, step.links, 2, abs(at - u1), True, text)
+    text = f"{where} becomes singular near the input {stop.at:.12g}: modes meet and the branch after it is ambiguous"
+    return MotionEvent("singular", stop.at, step.group, step.links, 0, stop.uncertainty, True, text)
+
+
+def _power(points: tuple[tuple[float, float], ...], at: float) -> float:
+    """Exponent of the determinant in the distance from ``at``, from the farther points."""
+    (u0, d0), (u1, d1) = points[0], points[2]
+    if at in (u0, u1) or d0 == 0.0 or d1 == 0.0:
+        return math.nan
+    ratio = math.log(abs((at - u0) / (at - u1)))
+    return math.log(abs(d0 / d1)) / ratio if ratio else math.nan
+
+
+def first_touch(tracker: Tracker, trace: Trace) -> MotionEvent | None:
+    """First place where a dyad's margin touches zero, or dips below it between samples; None if there is none."""
+    found: list[MotionEvent] = []
+    for s, step in enumerate(tracker.program.steps):
+        if not step.has_two_modes:
+            continue
+        M = trace.M[: trace.done, s]
+        low = [
+            k for k in range(1, len(M) - 1) if M[k] < _NEAR and M[k] <= M[k - 1] and M[k] <= M[k + 1]
+        ]  # fmt: skip
+        for k in low:
+            event = _touch(tracker, trace, k, s)
+            if event is not None:
+                found.append(event)
+                break
+        found += [_at_end(trace, k, s, step) for k in (0, len(M) - 1) if len(M) and M[k] <= _TOUCH]
+    sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
+    return min(found, key=lambda event: (not event.ends_motion, sense * event.input), default=None)
+
+
+def _at_end(trace: Trace, k: int, s: int, step: object) -> MotionEvent:
+    group, kind, links = step.group, step.kind, step.links  # type: ignore[attr-defined]
+    text = f"group {group} ({kind}) is stretched or folded at the input {trace.u[k]:.12g}: its two modes meet there"
+    return MotionEvent("change point", float(trace.u[k]), group, links, 2, 0.0, False, text)
+
+
+def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None:
+    from scipy.optimize import brentq, minimize_scalar
+
+    def margin(u: float) -> float:
+        pair, _, where = tracker.near(trace, k - 1, u)
+        return float(pair.M[1, s]) if where in (-1, s) else math.nan
+
+    low, high = sorted((float(trace.u[k - 1]), float(trace.u[k + 1])))
+    best = minimize_scalar(margin, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)})
+    least, at = min((float(best.fun), float(best.x)), (float(trace.M[k, s]), float(trace.u[k])))
+    step = tracker.program.steps[s]
+    name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
+    if least < -_TOUCH:
+        start = float(trace.u[k - 1])
+        at = float(brentq(margin, start, at, xtol=1e-15, rtol=1e-15))
+        text = f"{name} is stretched or folded at the input {at:.12g}: it cannot be assembled on a stretch beyond"
+        return MotionEvent("fold", at, step.group, step.links, 2, 1e-14, True, text)
+    if least > _TOUCH:
+        return None
+    at = _flat(margin, at, 0.25 * (high - low))
+    text = (
+        f"{name} passes a change point at the input {at:.12g}: its two modes meet and both continue, so the branch "
+        "after it is a choice"
+    )
+    return MotionEvent("change point", at, step.group, step.links, 2, 1e-12, True, text)
+
+
+def _flat(value: Callable[[float], float], at: float, width: float) -> float:
+    """Where the derivative vanishes: far better than a search for the smallest value, which is flat."""
+    h = min(width, 1e-3)
+
+    def slope(u: float) -> float:
+        return 8.0 * (value(u + h) - value(u - h)) - (value(u + 2.0 * h) - value(u - 2.0 * h))
+
+    x0, x1 = at - h, at + h
+    f0, f1 = slope(x0), slope(x1)
+    for _ in range(20):
+        if f1 == f0 or not math.isfinite(f1):
+            break
+        x0, x1, f0 = x1, x1 - f1 * (x1 - x0) / (f1 - f0), f1
+        f1 = slope(x1)
+        if abs(x1 - x0) < 1e-15:
+            break
+    return x1 if math.isfinite(x1) and abs(x1 - at) < h else at
+
+
+def dead_centres(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
+    """Inputs at which the coordinate of an undriven joint on the frame reverses (order 2: its rate changes sign)."""
+    mechanism = tracker.program.mechanism
+    driven = {driver.pair for driver in mechanism.drivers}
+    found: list[MotionEvent] = []
+    for joint in mechanism.joints:
+        if mechanism.frame not in joint.pair or joint.pair in driven:
+            continue
+        link = joint.b if joint.a == mechanism.frame else joint.a
+        group = next((step.group for step in tracker.program.steps if link in step.links), -1)
+        if isinstance(joint, Revolute):
+            rate = _angular(link)
+        elif isinstance(joint, Prismatic):
+            at, angle = (joint.at_b, joint.angle_a) if link == joint.b else (joint.at_a, joint.angle_b)
+            rate = _along(link, at, angle)
+        else:
+            continue
+        values = np.array([rate(trace, k) for k in range(trace.done)])
+        for k in np.flatnonzero(values[1:] * values[:-1] < 0.0):
+            event = _reversal(tracker, trace, int(k), rate, group, link)
+            if event is not None:
+                found.append(event)
+    return found
+
+
+Rate = Callable[[Trace, int], float]
+
+
+def _angular(link: int) -> Rate:
+    return lambda trace, k: float(trace.V[k, link, 2])
+
+
+def _along(link: int, at: tuple[float, float], angle: float) -> Rate:
+    direction = np.exp(1j * angle)
+
+    def rate(trace: Trace, k: int) -> float:
+        x, v = trace.X[k, link], trace.V[k, link]
+        arm = complex(x[2], x[3]) * complex(*at)
+        return float((np.conj(direction) * (complex(v[0], v[1]) + 1j * v[2] * arm)).real)
+
+    return rate
+
+
+def _reversal(tracker: Tracker, trace: Trace, k: int, rate: Rate, group: int, link: int) -> MotionEvent | None:
+    from scipy.optimize import brentq
+
+    low, high = float(trace.u[k]), float(trace.u[k + 1])
+
+    def at(u: float) -> float:
+        pair, code, _ = tracker.near(trace, k, u)
+        return rate(pair, 1) if code == codes.DONE else math.nan
+
+    ends = at(low), at(high)
+    if not ends[0] * ends[1] < 0.0:
+        return None
+    where = float(brentq(at, low, high, xtol=1e-14, rtol=1e-15))
+    if not math.isfinite(at(where)) or abs(at(where)) > max(abs(ends[0]), abs(ends[1])):
+        return None  # a pole, not a zero
+    text = f"link {link} reverses on the frame at the input {where:.12g}"
+    return MotionEvent("dead centre", where, group, (link,), 2, 1e-13, False, text)

@@ -1,0 +1,333 @@
+"""A mechanism as a program: drivers and groups in the order of assembly, in flat tables for the kernels.
+
+Inside a group, a link with exactly two plain joints (R or P) is eliminated: what is left of it is one equation between
+its neighbours (a distance, a point on a line, an angle).  So a dyad has one core link and three equations, a
+triad of class III one core link and three equations, and the kernels solve 3 x 3 systems where link by link would mean
+6 x 6 and 12 x 12.  The eliminated links are placed afterwards, in closed form.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import GeometryError, GraphError
+from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.model import Mechanism
+from graphsynth.mechanism.rank import characteristic_length
+from graphsynth.structure.assur import Decomposition, decompose
+
+__all__ = ["Program", "Step", "compile_program"]
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_WIDE = 1e-14
+
+
+class Row(NamedTuple):
+    """One equation between links a and b with its parameters."""
+
+    kind: int
+    a: int
+    b: int
+    parameters: list[float]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step of a program places.
+
+    Attributes
+    ----------
+    code : int
+        See :mod:`.codes`.
+    group : int
+        Index of the Assur group, or -1 for a driver.
+    links : tuple of int
+        Links placed.
+    kind : str
+        "driver R", "driver P", "RRR", "RRP", "RPR", "PRP", "RPP", or a description of the group.
+    core : tuple of int
+        Links whose poses are the unknowns.
+    """
+
+    code: int
+    group: int
+    links: tuple[int, ...]
+    kind: str
+    core: tuple[int, ...] = ()
+
+    @property
+    def has_two_modes(self) -> bool:
+        """Whether a sign +1 or -1 selects the assembly mode in closed form."""
+        return self.code in codes.TWO_MODES
+
+    @property
+    def iterative(self) -> bool:
+        """Whether the step is solved by Newton's method."""
+        return self.code == codes.NEWTON
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Flat tables that the kernels run, and what they mean."""
+
+    mechanism: Mechanism
+    decomposition: Decomposition
+    steps: tuple[Step, ...]
+    step_table: IntArray
+    rows: IntArray
+    row_table: Array
+    core: IntArray
+    eliminated: IntArray
+    eliminated_table: Array
+    drives: IntArray
+    drive_table: Array
+    need_angle: NDArray[np.bool_]
+    gears: IntArray
+    Lc: float
+
+
+def compile_program(mechanism: Mechanism) -> Program:
+    """Compile a mechanism.
+
+    Raises
+    ------
+    GeometryError
+        If the drivers do not fit the mobility, or a group can have no definite place with these joint kinds.
+    """
+    try:
+        found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
+    except GraphError as error:
+        raise GeometryError(f"the mechanism cannot be simulated: {error}") from error
+    return _Compiler(mechanism, found).program()
+
+
+class _Compiler:
+    def __init__(self, mechanism: Mechanism, found: Decomposition) -> None:
+        self.mechanism = mechanism
+        self.found = found
+        self.joint = {joint.pair: joint for joint in mechanism.joints}
+        self.driven = {driver.pair: (k, driver) for k, driver in enumerate(mechanism.drivers)}
+        self.steps: list[Step] = []
+        self.table: list[list[int]] = []
+        self.rows: list[list[int]] = []
+        self.row_parameters: list[list[float]] = []
+        self.core: list[int] = []
+        self.eliminated: list[list[int]] = []
+        self.eliminated_parameters: list[list[float]] = []
+        self.drives: list[list[int]] = []
+        self.drive_parameters: list[list[float]] = []
+        self.gears: list[int] = []
+
+    def program(self) -> Program:
+        placed = {self.mechanism.frame}
+        self._place_driven(placed)
+        for index, group in enumerate(self.found.groups):
+            self._group(index, group.links, placed)
+            placed |= set(group.links)
+        links = self.mechanism.graph.links
+        need = np.zeros(links, dtype=np.bool_)
+        for joint in self.mechanism.joints:
+            if isinstance(joint, Gear):
+                need[[joint.a, joint.b]] = True
+        return Program(
+            mechanism=self.mechanism, decomposition=self.found, steps=tuple(self.steps),
+            step_table=_ints(self.table, 9), rows=_ints(self.rows, 5),
+            row_table=_floats(self.row_parameters, codes.ROW_WIDTH), core=np.array(self.core or [0], dtype=np.int64),
+            eliminated=_ints(self.eliminated, 4),
+            eliminated_table=_floats(self.eliminated_parameters, codes.ELIM_WIDTH), drives=_ints(self.drives, 4),
+            drive_table=_floats(self.drive_parameters, codes.DRIVE_WIDTH), need_angle=need,
+            gears=np.array(self.gears, dtype=np.int64), Lc=characteristic_length(self.mechanism),
+        )  # fmt: skip
+
+    def _place_driven(self, placed: set[int]) -> None:
+        """Place the links that drivers hang on the frame, one after another."""
+        left = [pair for pair in self.driven if set(pair) <= set(self.found.driven)]
+        while left:
+            pair = next(p for p in left if len(placed & set(p)) == 1)
+            left.remove(pair)
+            link = pair[0] if pair[1] in placed else pair[1]
+            self._drive(pair, link)
+            placed.add(link)
+
+    def _drive(self, pair: tuple[int, int], link: int) -> None:
+        joint, (index, driver) = self.joint[pair], self.driven[pair]
+        sign = 1.0 if driver.base == joint.a else -1.0
+        base, own, forward = (joint.at_a, joint.at_b, 1.0) if link == joint.b else (joint.at_b, joint.at_a, -1.0)
+        turn, direction, code = 0.0, 1.0 + 0.0j, codes.DRIVE_R
+        if isinstance(joint, Prismatic):
+            turn = forward * (joint.angle_a - joint.angle_b)
+            direction = cmath.exp(1j * (joint.angle_a if link == joint.b else joint.angle_b))
+            code = codes.DRIVE_P
+        other = joint.a if link == joint.b else joint.b
+        self.table.append([code, len(self.drives), 0, 0, 0, 0, 0, 0, -1])
+        self.steps.append(Step(code, -1, (link,), f"driver {joint.kind}"))
+        self.drives.append([code, other, link, index])
+        self.drive_parameters.append([*base, direction.real, direction.imag, *own, sign * forward, turn])
+
+    def _group(self, index: int, links: tuple[int, ...], placed: set[int]) -> None:
+        inside = set(links)
+        own = [
+            joint for joint in self.mechanism.joints
+            if (joint.a in inside or joint.b in inside) and {joint.a, joint.b} <= inside | placed
+        ]  # fmt: skip
+        gone = self._choose(links, own)
+        rows = [row for joint in own if not gone & {joint.a, joint.b} for row in self._rows(joint)]
+        first_eliminated = len(self.eliminated)
+        for link in sorted(gone):
+            ends = [joint for joint in own if link in (joint.a, joint.b)]
+            rows.append(self._eliminate(link, ends[0], ends[1]))
+        core = tuple(link for link in links if link not in gone)
+        code, rows = _closed(core, rows)
+        place = {link: k for k, link in enumerate(core)}
+        self.table.append([
+            code, len(self.rows), len(rows), len(self.core), len(core), first_eliminated, len(gone), 0, index,
+        ])  # fmt: skip
+        self.steps.append(Step(code, index, links, _describe(code, links, own), core))
+        for kind, a, b, parameters in rows:
+            if kind == codes.GEAR:
+                parameters[codes.SLOT] = float(len(self.gears))
+                self.gears.append(len(self.rows))
+            self.rows.append([kind, a, b, place.get(a, -1), place.get(b, -1)])
+            self.row_parameters.append(parameters)
+        self.core.extend(core)
+
+    def _choose(self, links: tuple[int, ...], own: list[JointGeometry]) -> set[int]:
+        """Links to eliminate: two plain joints each, no two of them joined."""
+        gone: set[int] = set()
+        for link in sorted(links, reverse=True):
+            ends = [joint for joint in own if link in (joint.a, joint.b)]
+            near = {other for joint in ends for other in joint.pair} - {link}
+            plain = all(isinstance(j, Revolute | Prismatic) and j.pair not in self.driven for j in ends)
+            if len(ends) == 2 and plain and not near & gone and len(near) == 2 and len(gone) < len(links) - 1:
+                gone.add(link)
+        return gone
+
+    def _rows(self, joint: JointGeometry) -> list[Row]:
+        """Return the equations of a joint, the driven coordinate included."""
+        a, b = joint.a, joint.b
+        base = [*joint.at_a, *joint.at_b, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        found = []
+        if isinstance(joint, Gear):
+            base[codes.H], base[codes.RA], base[codes.RB] = joint.offset, joint.radius_a, joint.radius_b
+            base[codes.SIGN] = -1.0 if joint.internal else 1.0
+            return [Row(codes.GEAR, a, b, base)]
+        if isinstance(joint, Revolute):
+            found = [Row(codes.RX, a, b, list(base)), Row(codes.RY, a, b, list(base))]
+        else:
+            base[codes.TX], base[codes.TY] = math.cos(joint.angle_a), math.sin(joint.angle_a)
+            found = [Row(codes.LINE, a, b, list(base))]
+            if isinstance(joint, Prismatic):
+                turned = list(base)
+                turned[codes.H] = joint.angle_a - joint.angle_b
+                found.append(Row(codes.ANGLE, a, b, turned))
+        if joint.pair in self.driven:
+            index, driver = self.driven[joint.pair]
+            base[codes.SIGN], base[codes.SLOT] = (1.0 if driver.base == a else -1.0), float(index)
+            found.append(Row(codes.DRIVE_ANGLE if isinstance(joint, Revolute) else codes.DRIVE_SLIDE, a, b, base))
+        return found
+
+    def _eliminate(self, link: int, first: JointGeometry, second: JointGeometry) -> Row:
+        """Record an eliminated link and return the equation that replaces it."""
+        if isinstance(first, Prismatic) and isinstance(second, Revolute):
+            first, second = second, first
+        a, pa, ea, da, dea = _seen(first, link)
+        b, pb, eb, db, deb = _seen(second, link)
+        kind = codes.E_PP if isinstance(first, Prismatic) else codes.E_RP
+        kind = codes.E_RR if isinstance(second, Revolute) else kind
+        ta, tb = cmath.exp(1j * da), cmath.exp(1j * db)
+        turn = {codes.E_RR: 0.0, codes.E_RP: db - deb, codes.E_PP: da - dea}[kind]
+        self.eliminated.append([kind, link, a, b])
+        self.eliminated_parameters.append(
+            [pa.real, pa.imag, ea.real, ea.imag, pb.real, pb.imag, eb.real, eb.imag, ta.real, ta.imag, tb.real, tb.imag]
+            + [turn]
+        )
+        parameters = [0.0] * codes.ROW_WIDTH
+        if kind == codes.E_RP:  # the pin of a runs on a line of b
+            t = cmath.exp(1j * deb)
+            offset = (t.conjugate() * (ea - eb)).imag
+            parameters[:7] = [pb.real, pb.imag, pa.real, pa.imag, tb.real, tb.imag, offset]
+            return Row(codes.LINE, b, a, parameters)
+        parameters[:6] = [pa.real, pa.imag, pb.real, pb.imag, 1.0, 0.0]
+        if kind == codes.E_RR:
+            parameters[codes.H] = abs(eb - ea)
+            return Row(codes.DIST, a, b, parameters)
+        if abs(math.sin(dea - deb)) <= _WIDE:
+            raise GeometryError(
+                f"link {link} slides along two parallel lines, so its place is not defined; turn one direction"
+            )
+        parameters[codes.H] = da - dea + deb - db
+        return Row(codes.ANGLE, a, b, parameters)
+
+
+def _seen(joint: JointGeometry, link: int) -> tuple[int, complex, complex, float, float]:
+    """Other link, its point, the link's point, and the directions there (0 for a turning pair)."""
+    angle_a = joint.angle_a if isinstance(joint, Prismatic | PinSlot) else 0.0
+    angle_b = joint.angle_b if isinstance(joint, Prismatic) else 0.0
+    if link == joint.b:
+        return joint.a, complex(*joint.at_a), complex(*joint.at_b), angle_a, angle_b
+    return joint.b, complex(*joint.at_b), complex(*joint.at_a), angle_b, angle_a
+
+
+def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
+    """Choose the closed form of a group, with its rows in the order that the form expects."""
+    if len(core) != 1:
+        return codes.NEWTON, rows
+    kinds = sorted(row.kind for row in rows)
+    own = core[0]
+
+    def order(*wanted: int) -> list[Row]:
+        left = list(rows)
+        return [left.pop(next(k for k, row in enumerate(left) if row.kind == kind)) for kind in wanted]
+
+    if kinds[:2] == [codes.RX, codes.RY]:
+        third = order(codes.RX, codes.RY, kinds[2])
+        held, last = third[0], third[2]
+        if last.kind == codes.DIST:
+            return codes.R_DIST, third
+        if last.kind == codes.LINE:
+            return (codes.R_LINE_PIN if last.b == own else codes.R_LINE_SLOT), third
+        if last.kind == codes.ANGLE:
+            return codes.R_ANGLE, third
+        if last.kind == codes.GEAR and _own_point(held, own) == _own_point(last, own):
+            return codes.R_GEAR, third
+    if kinds == [codes.DIST, codes.LINE, codes.ANGLE]:
+        return codes.P_DIST, order(codes.LINE, codes.ANGLE, codes.DIST)
+    if kinds == [codes.LINE, codes.LINE, codes.ANGLE]:
+        return codes.P_LINE, order(codes.LINE, codes.ANGLE, codes.LINE)
+    if kinds.count(codes.ANGLE) > 1:
+        raise GeometryError(f"link {own} has its direction fixed twice by sliding pairs; its place is not defined")
+    return codes.NEWTON, rows
+
+
+def _own_point(row: Row, link: int) -> list[float]:
+    return row.parameters[2:4] if row.b == link else row.parameters[0:2]
+
+
+def _describe(code: int, links: tuple[int, ...], own: list[JointGeometry]) -> str:
+    """Name of a group by its joints: a dyad as outer, inner, outer."""
+    inside = set(links)
+    inner = [joint for joint in own if {joint.a, joint.b} <= inside]
+    outer = [joint for joint in own if not {joint.a, joint.b} <= inside]
+    if len(links) == 2 and len(inner) == 1 and len(outer) == 2:
+        ends = sorted((joint.kind for joint in outer), reverse=True)
+        return f"{ends[0]}{inner[0].kind}{ends[1]}"
+    if len(links) == 1:
+        return "+".join(joint.kind for joint in outer)
+    return f"group of {len(links)} links"
+
+
+def _ints(rows: list[list[int]], width: int) -> IntArray:
+    return np.array(rows, dtype=np.int64).reshape(-1, width)
+
+
+def _floats(rows: list[list[float]], width: int) -> Array:
+    return np.array(rows, dtype=np.float64).reshape(-1, width)

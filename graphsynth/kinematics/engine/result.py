@@ -1,0 +1,236 @@
+"""The result of a simulation: arrays over the inputs, branch identity, events, closure, errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.constraints import jacobian, residual
+from graphsynth.mechanism.joints import Prismatic
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.program import Step
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["Closure", "Motion", "MotionEvent", "PointPath"]
+
+Array = NDArray[np.float64]
+
+
+class MotionEvent(NamedTuple):
+    """Something that happens at one input.
+
+    ``kind`` is "fold" (two assembly modes of a group merge and end), "change point" (two modes meet and both go on),
+    "singular" (a group is not held; the order tells what was seen), "not assembled", "dead centre" (the
+    coordinate of a joint on the frame reverses), or "input" (the driver has no value).  ``order`` is the number
+    of modes that meet, or of a dead centre the first derivative that does not vanish.  ``group`` is the index of the Assur
+    group, -1 for none; ``links`` those concerned; ``uncertainty`` bounds the error of ``input`` as estimated; ``ends_motion`` tells whether the
+    branch ends there.
+    """
+
+    kind: str
+    input: float
+    group: int
+    links: tuple[int, ...]
+    order: int
+    uncertainty: float
+    ends_motion: bool
+    statement: str
+
+
+class Closure(NamedTuple):
+    """Whether the mechanism returns to its first pose after the driver has turned fully.
+
+    ``tested`` is False if the inputs are no full turn or the motion is incomplete; ``error`` is the largest
+    distance of link poses after one turn, over the characteristic length; ``period`` the number of turns until closure,
+    0 if none was found; ``changed`` the groups that are elsewhere after one turn.
+    """
+
+    tested: bool
+    closed: bool
+    error: float
+    period: int
+    changed: tuple[int, ...]
+    statement: str
+
+
+class PointPath(NamedTuple):
+    """A point of a link: positions, first and second derivatives by the input, each (inputs, 2)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    def straightness(self) -> float:
+        """Largest distance of the sampled points from the chord between the first and the last (NaN left out)."""
+        p = self.position[np.isfinite(self.position).all(axis=1)]
+        if len(p) < 2 or not (p[-1] - p[0]).any():
+            raise GeometryError("straightness needs a path with two different ends; choose other inputs")
+        chord = p[-1] - p[0]
+        return float(np.abs(chord[0] * (p[:, 1] - p[0, 1]) - chord[1] * (p[:, 0] - p[0, 0])).max() / np.hypot(*chord))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One branch of a mechanism over the inputs (estimated: floating point; NaN where the branch does not reach).
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    inputs : ndarray, shape (n,)
+    poses, velocities, accelerations : ndarray, shape (n, links, 3)
+        ``(x, y, theta)`` of every link, theta continuous, and derivatives by the input.
+    modes : ndarray of int8, shape (n, groups)
+        +1 or -1: the assembly mode of a dyad, the sign of the determinant of a larger group; 0 for a group with one
+        mode, and where the branch does not reach.
+    margins : ndarray, shape (n, groups)
+        Distance to singularity: of a dyad the square of the sine of the angle at the joint that closes it (0 when
+        stretched or folded); of a larger group the determinant of its reduced system with the length ``Lc``.
+    assembled : ndarray of bool, shape (n,)
+    steps : tuple of Step
+        Drivers and groups in the order of assembly.
+    events : tuple of MotionEvent
+        In the order of the motion.
+    completed : bool
+        All inputs were reached.
+    reason : str
+        Why the motion is not complete; empty if it is.
+    stopped_at : float
+        Input at which it stops; NaN if complete.
+    closure : Closure
+    Lc : float
+        Characteristic length.
+    seconds : float
+        Run time.
+    """
+
+    mechanism: Mechanism
+    inputs: Array
+    poses: Array
+    velocities: Array
+    accelerations: Array
+    modes: NDArray[np.int8]
+    margins: Array
+    assembled: NDArray[np.bool_]
+    steps: tuple[Step, ...]
+    events: tuple[MotionEvent, ...]
+    completed: bool
+    reason: str
+    stopped_at: float
+    closure: Closure
+    Lc: float
+    seconds: float
+
+    @cached_property
+    def residuals(self) -> Array:
+        """Largest violation of the joints' own equations at every sample, over ``Lc``; shape (n,)."""
+        return np.asarray(np.abs(residual(self.mechanism.joints, self.poses)).max(axis=1, initial=0.0) / self.Lc)
+
+    @property
+    def residual(self) -> float:
+        """Largest of `residuals` over the samples reached; NaN if there are none."""
+        found = self.residuals[self.assembled]
+        return float(found.max()) if found.size else float("nan")
+
+    @cached_property
+    def errors(self) -> Array:
+        """Estimated error of the poses at every sample, over ``Lc``; shape (n,).
+
+        Norm of the inverse constraint matrix times (residual + 4 units of rounding of the largest coordinate): first
+        order, so it is an estimate, and infinite at a singular pose.
+        """
+        keep = self.assembled
+        found = np.full(len(self.inputs), np.nan)
+        if not keep.any():
+            return found
+        smallest = self._smallest_singular_value(keep)
+        size = np.abs(self.poses[keep][:, :, :2]).max(axis=(1, 2)) / self.Lc
+        unit = np.finfo(np.float64).eps
+        with np.errstate(divide="ignore"):
+            found[keep] = (self.residuals[keep] + 4.0 * unit * np.maximum(size, 1.0)) / smallest
+        return found
+
+    def _smallest_singular_value(self, keep: NDArray[np.bool_]) -> Array:
+        """Of the constraint matrix with the driver coordinates held, lengths in units of Lc."""
+        mechanism = self.mechanism
+        links, poses = mechanism.graph.links, self.poses[keep]
+        J = jacobian(mechanism.joints, poses)
+        held = np.zeros((len(poses), len(mechanism.drivers), 3 * links))
+        for k, driver in enumerate(mechanism.drivers):
+            joint = mechanism.joint(*driver.pair)
+            if isinstance(joint, Prismatic):
+                t = poses[:, joint.a, 2] + joint.angle_a
+                for link, sign in ((joint.a, -1.0), (joint.b, 1.0)):
+                    held[:, k, 3 * link], held[:, k, 3 * link + 1] = sign * np.cos(t), sign * np.sin(t)
+            else:
+                held[:, k, 3 * driver.link + 2], held[:, k, 3 * driver.base + 2] = 1.0, -1.0
+        moving = [3 * k + c for k in range(links) if k != mechanism.frame for c in range(3)]
+        matrix = np.concatenate([J, held], axis=1)[:, :, moving]
+        matrix = matrix * np.tile([1.0, 1.0, 1.0 / self.Lc], links)[moving]
+        return np.asarray(np.linalg.svd(matrix, compute_uv=False)[:, -1])
+
+    @cached_property
+    def singularity_distance(self) -> Array:
+        """Smallest singular value of the scaled constraint matrix at every sample; 0 at a singular pose."""
+        found = np.full(len(self.inputs), np.nan)
+        if self.assembled.any():
+            found[self.assembled] = self._smallest_singular_value(self.assembled)
+        return found
+
+    def point(self, name_or_link: str | int, local: ArrayLike | None = None) -> PointPath:
+        """Path of a named point, or of the point ``local`` (x, y) of a link, with derivatives by the input."""
+        if isinstance(name_or_link, str):
+            if name_or_link not in self.mechanism.points:
+                known = ", ".join(self.mechanism.points) or "none"
+                raise GeometryError(f"point {name_or_link!r} is not defined; the mechanism has {known}")
+            link, at = self.mechanism.points[name_or_link]
+        else:
+            link = name_or_link
+            if not 0 <= link < self.mechanism.graph.links:
+                raise GeometryError(f"link {link} does not exist; the links are 0..{self.mechanism.graph.links - 1}")
+            values = np.asarray((0.0, 0.0) if local is None else local, dtype=np.float64)
+            if values.shape != (2,) or not np.isfinite(values).all():
+                raise GeometryError(f"local = {local!r} is not a point; give two finite numbers")
+            at = (float(values[0]), float(values[1]))
+        pose, v, w = self.poses[:, link], self.velocities[:, link], self.accelerations[:, link]
+        arm = np.exp(1j * pose[:, 2]) * complex(*at)
+        P = pose[:, 0] + 1j * pose[:, 1] + arm
+        P1 = v[:, 0] + 1j * v[:, 1] + 1j * v[:, 2] * arm
+        P2 = w[:, 0] + 1j * w[:, 1] + (1j * w[:, 2] - v[:, 2] ** 2) * arm
+        return PointPath(*(np.column_stack([z.real, z.imag]) for z in (P, P1, P2)))
+
+    def transmission_angle(self) -> dict[int, Array]:
+        """Transmission angle of every dyad with two modes, by group, radians in [0, pi/2].
+
+        The sine of the angle is the square root of the margin: the angle at the inner joint of RRR; of RRP, RPR and
+        PRR the angle between the link (or the line from pivot to pin) and the normal of the guide, as its
+        complement.  0 where the dyad is stretched or folded.
+        """
+        groups = [step for step in self.steps if step.group >= 0]
+        return {
+            step.group: np.arcsin(np.sqrt(np.clip(self.margins[:, step.group], 0.0, 1.0)))
+            for step in groups
+            if step.has_two_modes
+        }
+
+    def to_pandas(self) -> Any:
+        """Return a table: input, pose, velocity and acceleration of every moving link, modes, residual, error."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"input": self.inputs, "assembled": self.assembled}
+        for link in range(self.mechanism.graph.links):
+            if link == self.mechanism.frame:
+                continue
+            for name, array in (("", self.poses), ("d_", self.velocities), ("dd_", self.accelerations)):
+                for axis, label in enumerate(("x", "y", "theta")):
+                    columns[f"{name}{label}_{link}"] = array[:, link, axis]
+        for group in range(self.modes.shape[1]):
+            columns[f"mode_{group}"] = self.modes[:, group]
+            columns[f"margin_{group}"] = self.margins[:, group]
+        columns["residual"], columns["error"] = self.residuals, self.errors
+        return pd.DataFrame(columns)

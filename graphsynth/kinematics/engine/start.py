@@ -1,0 +1,136 @@
+"""Where a branch starts: assembly modes of the groups at one input."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.follow import Trace, Tracker
+from graphsynth.kinematics.engine.program import Program
+
+__all__ = ["group_modes", "initial", "sign_table"]
+
+Array = NDArray[np.float64]
+
+_STARTS = 200
+
+
+def sign_table(program: Program, modes: Mapping[int, int]) -> Array:
+    """Mode signs by step; +1 unless given.
+
+    Raises
+    ------
+    GeometryError
+        If a group does not exist, has one mode only, or the mode is not +1 or -1 (a rank for larger groups).
+    """
+    signs = np.ones(len(program.steps))
+    by_group = {step.group: k for k, step in enumerate(program.steps) if step.group >= 0}
+    for group, mode in modes.items():
+        if group not in by_group:
+            raise GeometryError(f"modes names group {group}, but the groups are 0..{len(by_group) - 1}")
+        step = program.steps[by_group[group]]
+        if isinstance(mode, bool) or not isinstance(mode, int):
+            raise GeometryError(f"mode {mode!r} of group {group} is not an integer")
+        if step.has_two_modes and mode not in (1, -1):
+            raise GeometryError(f"mode {mode} of group {group} ({step.kind}) must be +1 or -1")
+        if step.iterative and mode < 0:
+            raise GeometryError(f"mode {mode} of group {group} ({step.kind}) is a rank among its modes: 0 or more")
+        if step.has_two_modes:
+            signs[by_group[group]] = mode
+    return signs
+
+
+def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array | None) -> tuple[Array, int, int]:
+    """Poses (links, 3) close to the branch at ``u0``; also a code and step where no pose was found.
+
+    Groups solved by Newton start from ``guess`` if there is one, else from the mode of the given rank (0 by default)
+    among all modes found.
+    """
+    program = tracker.program
+    links = program.mechanism.graph.links
+    poses = np.zeros((links, 3)) if guess is None else np.array(guess, dtype=np.float64)
+    for k, step in enumerate(program.steps):
+        if not step.iterative or (guess is not None and step.group not in modes):
+            continue
+        trace = tracker.blank(np.array([u0]))
+        tracker.seed(trace, poses)
+        done, code, where = tracker.run(trace, 0)
+        if done == 0 and where < k:
+            return poses, code, where
+        found = group_modes(tracker, trace, k)
+        rank = modes.get(step.group, 0)
+        if not len(found):
+            return poses, codes.UNREACHABLE, k
+        if rank >= len(found):
+            raise GeometryError(
+                f"mode {rank} of group {step.group} ({step.kind}) does not exist: {len(found)} modes were found"
+            )
+        poses[list(step.core)] = found[rank]
+    return poses, codes.DONE, -1
+
+
+def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
+    """All assembly modes found of the group of step ``k``, core poses (modes, core links, 3), sorted by angle.
+
+    Three distances between one core link and placed links: the explicit sextic, all modes.  Otherwise Newton from
+    many starts (estimated: modes may be missing).
+    """
+    program = tracker.program
+    row0, count = program.step_table[k, 1:3]
+    kinds = program.rows[row0 : row0 + count, 0]
+    step = program.steps[k]
+    if len(step.core) == 1 and (kinds == codes.DIST).all():
+        return _platform_modes(program, trace, k)
+    return _searched_modes(tracker, trace, k)
+
+
+def _platform_modes(program: Program, trace: Trace, k: int) -> Array:
+    from graphsynth.kinematics.assembly_modes import assembly_modes
+
+    own = program.steps[k].core[0]
+    row0, count = program.step_table[k, 1:3]
+    anchors, vertices, lengths = [], [], []
+    for r in range(row0, row0 + count):
+        _, a, b, _, _ = program.rows[r]
+        pa, pb = complex(*program.row_table[r, 0:2]), complex(*program.row_table[r, 2:4])
+        other, far, near = (b, pb, pa) if a == own else (a, pa, pb)
+        x, y, c, s = trace.X[0, other]
+        anchors.append(complex(x, y) + complex(c, s) * far)
+        vertices.append(near)
+        lengths.append(program.row_table[r, codes.H])
+    return np.asarray(assembly_modes(anchors, vertices, lengths).poses)[:, None, :]
+
+
+def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
+    from graphsynth.kinematics.engine import kernels
+
+    p = tracker.program
+    row0, count, core0, cores = (int(v) for v in p.step_table[k, 1:5])
+    step = p.steps[k]
+    random = np.random.default_rng(20190 + k)
+    reached = trace.X[0, sorted({link for s in p.steps[:k] for link in s.links} | {p.mechanism.frame}), :2]
+    centre, size = reached.mean(axis=0), 2.0 * max(p.Lc, float(np.ptp(reached, axis=0).max()))
+    J, f, g, out = np.empty((count, count)), np.empty(count), np.empty(6), np.zeros(3)
+    pivots = np.empty(count, dtype=np.int64)
+    found: list[Array] = []
+    for _ in range(_STARTS * cores):
+        X, TH = trace.X[0].copy(), trace.TH[0].copy()
+        for link in step.core:
+            angle = random.uniform(-np.pi, np.pi)
+            X[link] = (*(centre + random.uniform(-size, size, 2)), np.cos(angle), np.sin(angle))
+            TH[link] = angle
+        code = kernels.newton(
+            p.rows, p.row_table, row0, count, p.core, core0, cores, X, TH, trace.PHI[0], trace.q[0], trace.V[0], J, f,
+            g, pivots, p.Lc, out,
+        )  # fmt: skip
+        if code:
+            continue
+        core = X[list(step.core)]
+        if all(np.abs((core - other) / [p.Lc, p.Lc, 1.0, 1.0]).max() > 1e-7 for other in found):
+            found.append(core)
+    poses = [np.column_stack([core[:, 0], core[:, 1], np.arctan2(core[:, 3], core[:, 2])]) for core in found]
+    return np.array(sorted(poses, key=lambda pose: tuple(pose[:, 2]))).reshape(-1, cores, 3)

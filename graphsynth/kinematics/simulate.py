@@ -1,0 +1,297 @@
+"""`simulate`: any planar mechanism over its input, on one branch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.events import dead_centres, ending, first_touch
+from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
+from graphsynth.kinematics.engine.program import Program, compile_program
+from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
+from graphsynth.kinematics.engine.start import initial, sign_table
+from graphsynth.mechanism.joints import Prismatic
+from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["Motion", "simulate"]
+
+Array = NDArray[np.float64]
+
+#: Largest step of a turning driver on the internal grid, radians: events between samples are looked for on it.
+_FINE = math.tau / 360.0
+_TURNS = 12
+_CLOSED = 1e-9
+
+
+def simulate(
+    mechanism: Mechanism,
+    inputs: ArrayLike,
+    *,
+    modes: Mapping[int, int] | None = None,
+    start: ArrayLike | None = None,
+    events: bool = True,
+) -> Motion:
+    """Positions, velocities and accelerations of a planar mechanism over its input, on one branch.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With as many drivers as its mobility.
+    inputs : array_like, shape (n,)
+        Inputs u in the order of the motion, strictly increasing or decreasing; each driver's law turns u into its
+        coordinate (the input itself by default: radians or lengths).
+    modes : mapping of int to int, optional
+        Assembly mode by group index: +1 or -1 for a dyad, the rank among all its modes at the first input for a
+        larger group (0 by default).  The sign is that of the third point left of the way from the lower link's
+        outer joint for RRR; see ``docs/explanation/planar-engine.md`` for the others.
+    start : array_like, shape (links, 3), optional
+        A pose close to the wanted branch at the first input; ``mechanism.pose`` by default.  Gives the modes that
+        ``modes`` leaves open.
+    events : bool, optional
+        Look for dead centres and for change points between samples.
+
+    Returns
+    -------
+    Motion
+        Estimated (floating point).  Where the branch ends the arrays are NaN from there on, and ``reason`` and
+        ``stopped_at`` say why and where.
+
+    Raises
+    ------
+    GeometryError
+        Inputs that are not finite or not monotonic, a mode that does not exist, or drivers that do not fit the
+        mobility.
+
+    Examples
+    --------
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph, Revolute
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> rocker = Mechanism(graph, [
+    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+    ...     Revolute(0, 3, (2.0, 0.0)),
+    ... ], [Driver(0, 1)])
+    >>> motion = simulate(rocker, np.linspace(0.0, 2.0 * np.pi, 73))
+    >>> motion.completed, motion.closure.closed, motion.residual < 1e-14
+    (True, True, True)
+    """
+    begin = perf_counter()
+    u = _monotonic(inputs)
+    program = compile_program(mechanism)
+    given = start if start is not None else mechanism.pose
+    guess = None if given is None else _poses(given, mechanism)
+    signs = sign_table(program, modes or {})
+    tracker = Tracker(program, signs)
+    if guess is not None:
+        _signs_from(tracker, float(u[0]), guess, modes or {})
+    grid, where = _grid(mechanism, u)
+    seed, code, step = initial(tracker, float(u[0]), modes or {}, guess)
+    if code == codes.DONE:
+        trace = tracker.follow(grid, seed)
+    else:
+        trace = tracker.blank(grid)
+        trace.stop = Stop(code, step, float(u[0]), 0.0)
+    found = _events(tracker, trace, events)
+    return _motion(tracker, trace, where, found, begin)
+
+
+def _monotonic(inputs: ArrayLike) -> Array:
+    u = finite_array("inputs", inputs)
+    if u.ndim != 1 or u.size == 0:
+        raise GeometryError(f"inputs have shape {u.shape}; give one list of one or more inputs")
+    steps = np.diff(u)
+    if not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise GeometryError("inputs must increase or decrease strictly; sort them and remove duplicates")
+    return u
+
+
+def _poses(start: ArrayLike, mechanism: Mechanism) -> Array:
+    poses = finite_array("start", start)
+    if poses.shape != (mechanism.graph.links, 3):
+        raise GeometryError(f"start has shape {poses.shape}; give (x, y, theta) for {mechanism.graph.links} links")
+    return poses
+
+
+def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, int]) -> None:
+    """Choose the sign of every dyad left open so that its links come closest to the guess."""
+    trace = tracker.blank(np.array([u0]))
+    for k, step in enumerate(tracker.program.steps):
+        if not step.has_two_modes or step.group in modes:
+            continue
+        errors = []
+        for sign in (1.0, -1.0):
+            tracker.modes[k] = sign
+            tracker.seed(trace, guess)
+            done, _, where = tracker.run(trace, 0)
+            if done == 0 and where <= k:
+                errors.append(math.inf)
+                continue
+            own = list(step.links)
+            X, pose = trace.X[0, own], guess[own]
+            turned = (X[:, 2] - np.cos(pose[:, 2])) ** 2 + (X[:, 3] - np.sin(pose[:, 2])) ** 2
+            apart = ((X[:, :2] - pose[:, :2]) ** 2).sum(axis=1) / tracker.program.Lc**2
+            errors.append(float((turned + apart).sum()))
+        tracker.modes[k] = 1.0 if errors[0] <= errors[1] else -1.0
+
+
+def _grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Inputs with extra samples where a turning driver would step too far, and where the given ones are."""
+    if u.size < 2:
+        return u, np.zeros(u.size, dtype=np.intp)
+    parts = np.ones(u.size - 1, dtype=np.intp)
+    span = abs(float(u[-1] - u[0]))
+    for driver in mechanism.drivers:
+        q = driver.law(u)[0]
+        if isinstance(mechanism.joint(*driver.pair), Prismatic):
+            size = np.abs(np.diff(u)) * (200.0 / span)
+        else:
+            size = np.abs(np.diff(q)) / _FINE
+        parts = np.maximum(parts, np.ceil(np.nan_to_num(size, nan=1.0) - 1e-9).astype(np.intp))
+    where = np.concatenate([[0], np.cumsum(parts)]).astype(np.intp)
+    if (parts == 1).all():
+        return u, where
+    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(u[:-1], u[1:], parts)]
+    return np.concatenate([*pieces, u[-1:]]), where
+
+
+def _events(tracker: Tracker, trace: Trace, wanted: bool) -> list[MotionEvent]:
+    """Events in order; shortens the trace where a branch ends between samples."""
+    found: list[MotionEvent] = []
+    if trace.stop is not None:
+        found.append(ending(tracker, trace))
+    touch = first_touch(tracker, trace) if trace.done > 0 else None
+    sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
+    if touch is not None:
+        if touch.ends_motion:
+            found = [touch]
+            trace.done = int(np.sum(sense * trace.u < sense * touch.input))
+        elif not any(event.kind == "fold" and event.input == touch.input for event in found):
+            found.append(touch)
+    if wanted:
+        found += dead_centres(tracker, trace)
+    return sorted(found, key=lambda event: sense * event.input)
+
+
+def _motion(tracker: Tracker, trace: Trace, where: NDArray[np.intp], events: list[MotionEvent], begin: float) -> Motion:
+    program = tracker.program
+    poses, velocities, accelerations, margins, modes = _arrays(tracker, trace)
+    reached = where < trace.done
+    last = next((event for event in reversed(events) if event.ends_motion), None)
+    completed = bool(reached.all()) and last is None
+    closure = _closure(tracker, trace, completed, events)
+    return Motion(
+        mechanism=program.mechanism, inputs=trace.u[where], poses=poses[where], velocities=velocities[where],
+        accelerations=accelerations[where], modes=modes[where], margins=margins[where], assembled=reached,
+        steps=program.steps, events=tuple(events), completed=completed, reason="" if last is None else last.statement,
+        stopped_at=math.nan if last is None else last.input, closure=closure, Lc=program.Lc,
+        seconds=perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _arrays(tracker: Tracker, trace: Trace) -> tuple[Array, Array, Array, Array, NDArray[np.int8]]:
+    """Poses with continuous angles, derivatives, margins and modes by group; NaN beyond the samples reached."""
+    program, n = tracker.program, trace.done
+    angle = np.arctan2(trace.X[:, :, 3], trace.X[:, :, 2])
+    kept = np.where(program.need_angle, trace.TH, angle)
+    kept[:n] = np.where(program.need_angle, kept[:n], np.unwrap(kept[:n], axis=0) if n else kept[:n])
+    poses = np.concatenate([trace.X[:, :, :2], kept[:, :, None]], axis=2)
+    groups = [k for k, step in enumerate(program.steps) if step.group >= 0]
+    margins = trace.M[:, groups]
+    modes = np.zeros(margins.shape, dtype=np.int8)
+    for column, k in enumerate(groups):
+        step = program.steps[k]
+        if step.has_two_modes:
+            modes[:n, column] = int(tracker.modes[k])
+        elif step.iterative:
+            modes[:n, column] = np.sign(trace.M[:n, k])
+    velocities, accelerations = trace.V, trace.W
+    merged = np.zeros(len(trace.u), dtype=bool)
+    for k, step in enumerate(program.steps):
+        if step.has_two_modes:
+            merged |= trace.M[:, k] <= 1e-14
+    for array in (velocities, accelerations):
+        array[merged] = np.nan  # both modes meet: the velocity does not exist
+        array[:, program.mechanism.frame] = 0.0
+    for array in (poses, velocities, accelerations, margins):
+        array[n:] = np.nan
+    return poses, velocities, accelerations, margins, modes
+
+
+def _full_turn(mechanism: Mechanism, u: Array) -> bool:
+    """Whether every driver returns to its place over the inputs, at least one of them after full turns."""
+    if u.size < 2 or not mechanism.drivers:
+        return False
+    ends = np.array([u[0], u[-1]])
+    moved = False
+    for driver in mechanism.drivers:
+        q, rate, _ = driver.law(ends)
+        turns = 0.0 if isinstance(mechanism.joint(*driver.pair), Prismatic) else round((q[1] - q[0]) / math.tau)
+        if abs(q[1] - q[0] - turns * math.tau) > 1e-9 or abs(rate[1] - rate[0]) > 1e-9 * max(1.0, abs(rate[0])):
+            return False
+        moved = moved or turns != 0 or bool(q[1] == q[0])
+    return moved
+
+
+def _closure(tracker: Tracker, trace: Trace, completed: bool, events: list[MotionEvent]) -> Closure:
+    mechanism = tracker.program.mechanism
+    if not completed or not _full_turn(mechanism, trace.u):
+        text = "not tested: the motion is incomplete" if not completed else "not tested: the inputs are no full turn"
+        return Closure(False, False, math.nan, 0, (), text)
+    first, last = trace.X[0], trace.X[-1]
+    error, changed = _apart(tracker, first, last)
+    meeting = [event for event in events if event.kind == "change point"]
+    if meeting:
+        text = f"not closed for certain: {meeting[0].statement}"
+        return Closure(True, False, error, 0, (meeting[0].group,), text)
+    if error <= _CLOSED:
+        return Closure(True, True, error, 1, (), "closed after one turn")
+    period = _period(tracker, trace)
+    names = ", ".join(map(str, changed)) or "none"
+    text = f"after one turn groups {names} are in another place; " + (
+        f"closed after {period} turns" if period else f"not closed after {_TURNS} turns"
+    )
+    return Closure(True, False, error, period, changed, text)
+
+
+def _apart(tracker: Tracker, first: Array, last: Array) -> tuple[float, tuple[int, ...]]:
+    distance = np.abs((last - first) / [tracker.program.Lc, tracker.program.Lc, 1.0, 1.0]).max(axis=1)
+    changed = tuple(
+        step.group
+        for step in tracker.program.steps
+        if step.group >= 0 and max(distance[link] for link in step.links) > _CLOSED
+    )
+    return float(distance.max()), changed
+
+
+def _period(tracker: Tracker, trace: Trace) -> int:
+    """Turns until the mechanism is where it began; 0 if it is not within the limit.
+
+    The state is carried on, angles and all, while the inputs begin again: the laws must be periodic, or driven
+    angles would be out of step with those that gears count.
+    """
+    mechanism = tracker.program.mechanism
+    span = float(trace.u[-1] - trace.u[0])
+    q = [driver.law(np.array([trace.u[0], trace.u[-1], trace.u[-1] + span])) for driver in mechanism.drivers]
+    if not all(np.isfinite(part[0]).all() and abs(part[0][2] - 2 * part[0][1] + part[0][0]) < 1e-9 for part in q):
+        return 0
+    u, current = trace.u, trace
+    for turn in range(2, _TURNS + 1):
+        u = u + span
+        pose = np.column_stack([current.X[-1, :, :2], _angles(tracker, current)])
+        current = tracker.follow(u, pose, current.PHI[-1])
+        if current.stop is not None:
+            return 0
+        if _apart(tracker, trace.X[0], current.X[-1])[0] <= _CLOSED:
+            return turn
+    return 0
+
+
+def _angles(tracker: Tracker, trace: Trace) -> Array:
+    angle = np.arctan2(trace.X[-1, :, 3], trace.X[-1, :, 2])
+    return np.where(tracker.program.need_angle, trace.TH[-1], angle)
