@@ -79,6 +79,8 @@ def _check_disk(problem: Problem, options: argparse.Namespace, weight: float) ->
     graphs = weight / 4 / share
     needed = graphs * (links * links / 12 + 24)
     free = shutil.disk_usage(options.output.absolute().parent).free if options.output.absolute().parent.is_dir() else 0
+    if options.resume and options.output.exists():
+        needed -= options.output.stat().st_size
     if free and needed > free:
         raise TooLargeError(
             f"about {graphs:.0e} graphs need about {needed / 1e9:.0f} GB and {free / 1e9:.0f} GB are free: list a part "

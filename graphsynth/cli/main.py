@@ -11,7 +11,7 @@ from pathlib import Path
 
 import graphsynth
 from graphsynth.cli.question import add_question
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.errors import GraphsynthError
 
 __all__ = ["main"]
 
@@ -137,9 +137,3 @@ def _workers(text: str) -> int:
     if not 1 <= count <= 1024:
         raise argparse.ArgumentTypeError(f"{text!r} must be a whole number from 1 to 1024")
     return count
-
-
-def require(condition: bool, sentence: str) -> None:
-    """Raise SpecError with the sentence unless the condition holds."""
-    if not condition:
-        raise SpecError(sentence)

@@ -89,6 +89,16 @@ def problem_of(options: argparse.Namespace) -> Problem:
             raise SpecError("--assur and --truss ask for different things: give one of them")
         if options.symmetry:
             raise SpecError("--symmetry is for chains and mechanisms; --assur and --truss have none: leave it out")
+        given = sorted(
+            {name[4:] for name, value in vars(options).items() if name.startswith("var_") and value} - {"Pi"}
+        )
+        if given or options.spec or options.set or options.frame or options.fractionated:
+            raise SpecError(
+                f"--assur N and --truss N take no other part of a question than --space "
+                f"(given: {', '.join(given) or 'more'}): leave the rest out"
+            )
+        if options.var_Pi is not None and not options.var_Pi.isdecimal():
+            raise SpecError(f"Pi = {options.var_Pi} must be a whole number from 2 to 6")
         space = int(options.var_Pi or 3)
         if options.assur is not None:
             return Problem.trusses(options.assur + 1, space, True)

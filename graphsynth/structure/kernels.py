@@ -9,7 +9,11 @@ import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
+from graphsynth.compilation import drop_stale_kernels
+
 __all__ = ["canon", "canon_packed", "canon_workspace", "lowest_bit", "popcount"]
+
+drop_stale_kernels()
 
 ZERO = np.uint64(0)
 ONE = np.uint64(1)

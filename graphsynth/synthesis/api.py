@@ -79,7 +79,7 @@ def enumerate_chains(
     Examples
     --------
     >>> [chain.graph6() for chain in enumerate_chains(6)]
-    ['E{O_', 'ExGO']
+    ['Er`G', 'E]`G']
     """
     problem = Problem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
     return _list(problem, executor)

@@ -40,7 +40,7 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
     Examples
     --------
     >>> [graph.to_text() for graph in rings(4, 1, 3, {}, True)]
-    ['Cr f0']
+    ['Cl f0']
     """
     lower = chain_joints(links, mobility, space, higher)
     if lower is None or links < 3:
