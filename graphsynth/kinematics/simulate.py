@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.events import dead_centres, ending, first_touch
+from graphsynth.kinematics.engine.events import dead_centres, ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
@@ -165,11 +165,10 @@ def _events(tracker: Tracker, trace: Trace, wanted: bool) -> list[MotionEvent]:
     found: list[MotionEvent] = []
     if trace.stop is not None:
         found.append(ending(tracker, trace))
-    touch = first_touch(tracker, trace) if trace.done > 0 else None
     sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
-    if touch is not None:
+    for touch in touches(tracker, trace) if trace.done > 0 else []:
         if touch.ends_motion:
-            found = [touch]
+            found = [event for event in found if not event.ends_motion] + [touch]
             trace.done = int(np.sum(sense * trace.u < sense * touch.input))
         elif not any(event.kind == "fold" and event.input == touch.input for event in found):
             found.append(touch)
@@ -234,7 +233,7 @@ def _full_turn(mechanism: Mechanism, u: Array) -> bool:
         turns = 0.0 if isinstance(mechanism.joint(*driver.pair), Prismatic) else round((q[1] - q[0]) / math.tau)
         if abs(q[1] - q[0] - turns * math.tau) > 1e-9 or abs(rate[1] - rate[0]) > 1e-9 * max(1.0, abs(rate[0])):
             return False
-        moved = moved or turns != 0 or bool(q[1] == q[0])
+        moved = moved or turns != 0 or abs(q[1] - q[0]) <= 1e-9
     return moved
 
 

@@ -64,7 +64,7 @@ def _gear(joint: Gear, pose: Array, d: Complex) -> Array:
     value = joint.radius_a * (pose[..., joint.a, 2] - phi)
     value = value + sign * joint.radius_b * (pose[..., joint.b, 2] - phi - joint.offset)
     # phi is known modulo a turn only, which moves the value by multiples of tau (radius_a + sign radius_b)
-    period = np.tau * abs(joint.radius_a + sign * joint.radius_b)
+    period = (2.0 * np.pi) * abs(joint.radius_a + sign * joint.radius_b)
     return np.asarray(value - period * np.round(value / period))
 
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
+from graphsynth.kinematics.engine.program import Step
 from graphsynth.kinematics.engine.result import MotionEvent
 from graphsynth.mechanism.joints import Prismatic, Revolute
 
-__all__ = ["dead_centres", "ending", "first_touch"]
+__all__ = ["dead_centres", "ending", "touches"]
 
 Array = NDArray[np.float64]
 
@@ -66,7 +67,8 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
             f"{good:.12g}: its two modes merge and it cannot be assembled beyond"
         )
         return MotionEvent("fold", good, step.group, step.links, 2, abs(bad - good), True, text)
-    text = f"group {step.group} ({step.kind}, links {_list(step.links)}) has no definite place at the input {good:.12g}"
+    why = "its sliding directions become parallel" if step.code == codes.P_LINE else "two of its points coincide"
+    text = f"group {step.group} ({step.kind}, links {_list(step.links)}) has no place at the input {good:.12g}: {why}"
     return MotionEvent("singular", good, step.group, step.links, 0, abs(bad - good), True, text)
 
 
@@ -101,30 +103,30 @@ def _power(points: tuple[tuple[float, float], ...], at: float) -> float:
     return math.log(abs(d0 / d1)) / ratio if ratio else math.nan
 
 
-def first_touch(tracker: Tracker, trace: Trace) -> MotionEvent | None:
-    """First place where a dyad's margin touches zero, or dips below it between samples; None if there is none."""
+def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
+    """Where a dyad's margin touches zero, or dips below it between samples; at most one event ends the motion."""
     found: list[MotionEvent] = []
     for s, step in enumerate(tracker.program.steps):
         if not step.has_two_modes:
             continue
         M = trace.M[: trace.done, s]
-        low = [
-            k for k in range(1, len(M) - 1) if M[k] < _NEAR and M[k] <= M[k - 1] and M[k] <= M[k + 1]
-        ]  # fmt: skip
-        for k in low:
-            event = _touch(tracker, trace, k, s)
-            if event is not None:
-                found.append(event)
-                break
-        found += [_at_end(trace, k, s, step) for k in (0, len(M) - 1) if len(M) and M[k] <= _TOUCH]
+        middle = M[1:-1]
+        low = np.flatnonzero((middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])) + 1
+        events = (_touch(tracker, trace, int(k), s) for k in low)
+        found += [event for event in events if event is not None][:1]
+        found += [_at_end(trace, k, step) for k in sorted({0, len(M) - 1}) if len(M) and M[k] <= _TOUCH]
     sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
-    return min(found, key=lambda event: (not event.ends_motion, sense * event.input), default=None)
+    ends = [event for event in found if event.ends_motion]
+    if not ends:
+        return found
+    first = min(ends, key=lambda event: sense * event.input)
+    return [e for e in found if not e.ends_motion and sense * e.input < sense * first.input] + [first]
 
 
-def _at_end(trace: Trace, k: int, s: int, step: object) -> MotionEvent:
-    group, kind, links = step.group, step.kind, step.links  # type: ignore[attr-defined]
-    text = f"group {group} ({kind}) is stretched or folded at the input {trace.u[k]:.12g}: its two modes meet there"
-    return MotionEvent("change point", float(trace.u[k]), group, links, 2, 0.0, False, text)
+def _at_end(trace: Trace, k: int, step: Step) -> MotionEvent:
+    at = float(trace.u[k])
+    text = f"group {step.group} ({step.kind}) is stretched or folded at the input {at:.12g}: its two modes meet there"
+    return MotionEvent("change point", at, step.group, step.links, 2, 0.0, False, text)
 
 
 def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None:

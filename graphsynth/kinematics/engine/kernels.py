@@ -11,7 +11,7 @@ from numba import njit
 TAU = 2.0 * math.pi
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def row(kind, p, a, b, x, th, phi, q, g):
     """Value of one constraint row; its gradient by (x, y, theta) of a and of b goes to g[0:6]."""
     ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
@@ -64,7 +64,7 @@ def row(kind, p, a, b, x, th, phi, q, g):
     return scale * (p[7] * (th[a] - here) + p[9] * p[8] * (th[b] - here - p[6]))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def gamma(kind, p, a, b, x, v, q):
     """Second-order part of a row: its second derivative along the velocities v, accelerations being zero."""
     if kind == 4:
@@ -95,7 +95,7 @@ def gamma(kind, p, a, b, x, v, q):
     return -(p[7] + p[9] * p[8]) / (p[7] + p[8]) * turn
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def factor(J, n, pivots):
     """LU in place with row pivoting; returns the determinant (0 if a pivot vanishes)."""
     det = 1.0
@@ -122,7 +122,7 @@ def factor(J, n, pivots):
     return det
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def back(J, n, pivots, y):
     """Solve with the factors of `factor`, in place."""
     for k in range(n):
@@ -137,7 +137,7 @@ def back(J, n, pivots, y):
         y[k] /= J[k, k]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, moving):
     """Jacobian by the core links, residuals, or (moving) the right-hand side of the velocities; returns prod |row|."""
     norms = 1.0
@@ -168,14 +168,14 @@ def assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, moving):
     return norms
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def follow_angle(link, x, th, near):
     """Unwrapped angle of a link, nearest to ``near``."""
     raw = math.atan2(x[link, 3], x[link, 2])
     th[link] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, pivots, Lc, out):
     """Newton from x; out = (first correction, last correction, rate); returns 0 if it converged."""
     last = 0.0
@@ -214,7 +214,7 @@ def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, pivots, Lc
     return 3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def drive(step, d, p, x, th, v, w, q):
     """Place a driven link from the link it is driven on."""
     base, link, k = d[1], d[2], d[3]
@@ -244,14 +244,14 @@ def drive(step, d, p, x, th, v, w, q):
     w[link, 2] = all_
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def world(x, link, px, py):
     """World point of a local one."""
     c, s = x[link, 2], x[link, 3]
     return x[link, 0] + c * px - s * py, x[link, 1] + s * px + c * py
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def turn_to(x, link, lx, ly, wx, wy):
     """Orient a link so that its local vector (lx, ly) points along (wx, wy)."""
     re, im = lx * wx + ly * wy, lx * wy - ly * wx
@@ -259,14 +259,14 @@ def turn_to(x, link, lx, ly, wx, wy):
     x[link, 2], x[link, 3] = re / size, im / size
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pin_to(x, link, lx, ly, wx, wy):
     """Move an oriented link so that its local point lies at (wx, wy)."""
     c, s = x[link, 2], x[link, 3]
     x[link, 0], x[link, 1] = wx - (c * lx - s * ly), wy - (s * lx + c * ly)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def orient(rows, rp, k, x, th, own):
     """Orient link ``own`` by the ANGLE row k."""
     a, b, h = rows[k, 1], rows[k, 2], rp[k, 6]
@@ -276,7 +276,7 @@ def orient(rows, rp, k, x, th, own):
     th[own] = th[other] + sign * h
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def line_of(rows, rp, k, x, own):
     """For an oriented link ``own`` in a LINE row: direction t and the value kappa of n . r_own."""
     a, b = rows[k, 1], rows[k, 2]
@@ -291,7 +291,7 @@ def line_of(rows, rp, k, x, own):
     return tx, ty, -ty * (px - ox) + tx * (py - oy) - rp[k, 6]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def circles(dx, dy, l1, l2, sign, out):
     """Vector from A to C with |AC| = l1, |BC| = l2, B - A = (dx, dy); returns sin^2 of the angle at C, negative if open."""
     dd = dx * dx + dy * dy
@@ -309,7 +309,7 @@ def circles(dx, dy, l1, l2, sign, out):
     return margin
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def closed_form(code, rows, rp, r0, own, sign, x, th, phi, g):
     """Place the one core link of a group; returns its margin, negative where it cannot be assembled."""
     if code == 7 or code == 8:  # a sliding pair orients the link: rows LINE, ANGLE, then DIST or LINE
@@ -320,9 +320,9 @@ def closed_form(code, rows, rp, r0, own, sign, x, th, phi, g):
             sx, sy, other = line_of(rows, rp, k, x, own)
             det = tx * sy - ty * sx
             if det == 0.0:
-                return -5e-324
+                return 0.0
             x[own, 0], x[own, 1] = (kappa * sx - other * tx) / det, (kappa * sy - other * ty) / det
-            return abs(det)
+            return det
         a, b, l = rows[k, 1], rows[k, 2], rp[k, 6]
         if own == a:
             bx, by = world(x, b, rp[k, 2], rp[k, 3])
@@ -409,7 +409,7 @@ def closed_form(code, rows, rp, r0, own, sign, x, th, phi, g):
     return margin
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def place_eliminated(kind, e, a, b, p, x, th, v, w, derivs):
     """Place a link eliminated from its group, with velocity and acceleration."""
     ax, ay = world(x, a, p[0], p[1])
@@ -469,7 +469,7 @@ def place_eliminated(kind, e, a, b, p, x, th, v, w, derivs):
     w[e, 0], w[e, 1], w[e, 2] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det, l
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, pivots):
     """Velocities and accelerations of the core links; returns the determinant over the product of row lengths."""
     norms = assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, True)
@@ -503,7 +503,7 @@ def rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, pivots):
     return det / norms
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def track_group(rows, rp, r0, nr, core, c0, nc, x, th, px, pth, pv, pw, before, h, warm, phi, q, v, J, f, g, pivots,
                 Lc, out):  # fmt: skip
     """Newton for a group: predictor from the last sample (warm), corrector, and the tests against a jump."""
@@ -530,7 +530,7 @@ def track_group(rows, rp, r0, nr, core, c0, nc, x, th, px, pth, pv, pw, before, 
     return 0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def run(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, u, modes, X, TH, V, W, PHI, M, first, Lc, derivs):
     """Run a program over the samples first..n-1; returns (samples done, code, step).
 
@@ -565,7 +565,10 @@ def run(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, u, modes, X, T
                     return i, why, s
             else:
                 M[i, s] = closed_form(code, rows, rp, r0, own, modes[s], x, th, phi, g)
-                if M[i, s] < 0.0:
+                if code == 8:  # one mode; its determinant keeps its sign
+                    if M[i, s] == 0.0 or (warm and not M[i, s] * M[j, s] > 0.0):
+                        return i, 1, s
+                elif M[i, s] < 0.0:
                     return i, 1, s
                 if not math.isfinite(M[i, s]):
                     return i, 3, s
