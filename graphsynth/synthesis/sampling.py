@@ -88,5 +88,5 @@ def _draw(family: Family, h: int, random: Random) -> MechanismGraph:
         pass
     row[0, :HEADER] = h, mode, frame
     out = np.empty((1, 3 * family.joints), np.uint8)
-    expand_packed(family.vertices, family.graphs, row, 1, spelling_of(family), out)
+    expand_packed(family.vertices, family.links, family.graphs, row, 1, spelling_of(family), out)
     return MechanismGraph._unchecked(family.links, out.tobytes(), 0 if family.framed else None, family.space)

@@ -172,7 +172,7 @@ def packed_of(unit: Unit) -> Iterator[NDArray[np.uint8]]:
     spelling = spelling_of(family)
     for rows, count in _blocks(unit):
         out = np.empty((count, 3 * family.joints), np.uint8)
-        kept = expand_packed(family.vertices, family.graphs, rows, count, spelling, out)
+        kept = expand_packed(family.vertices, family.links, family.graphs, rows, count, spelling, out)
         yield out[:kept]
 
 
@@ -196,5 +196,7 @@ def text_of(unit: Unit) -> Iterator[tuple[bytes, int]]:
     line = 16 + family.links * family.links // 12 + 8 * sum(count for _, count in family.higher) + 4 * highest
     out = np.empty(_ROWS * line, np.uint8)
     for rows, count in _blocks(unit):
-        size, kept = expand_text(family.vertices, family.graphs, rows, count, spelling, family.space, highest, out)
+        size, kept = expand_text(
+            family.vertices, family.links, family.graphs, rows, count, spelling, family.space, highest, out
+        )
         yield out[:size].tobytes(), kept

@@ -37,6 +37,7 @@ from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
     lay_classes,
+    lay_gains,
     load_graph,
     plain_entries,
     unconstrained_ways,
@@ -78,29 +79,6 @@ def _lay_lanes(count, sets, words, work):
             work.sets[LEFT, s] += work.rows[COEF, q] * most
             work.lanes[base + s // 8] |= np.uint64(work.rows[COEF, q]) << np.uint64(8 * (s % 8))
     return True
-
-
-@inner
-def _lay_gains(count, tables, work):
-    """Fill ``work.tables[GAINS, j, r]``: the most that variables j, j+1, ... give one critical set while using up r."""
-    resources = tables.resources.shape[1]
-    for i in range(resources):
-        work.tables[GAINS, count, i] = 0
-    for j in range(count - 1, -1, -1):
-        factor = np.int64(0)
-        for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
-            factor = max(factor, work.rows[COEF, q])
-        for i in range(resources):
-            work.tables[GAINS, j, i] = 0
-        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
-            shift = work.entries[INDEX, g]
-            for i in range(shift, resources):
-                if work.tables[WAYS, j + 1, i - shift] and fits(
-                    tables.resources[DIGITS, i], work.entries[PACKED, g], tables.guard
-                ):
-                    gain = work.tables[GAINS, j + 1, i - shift] + factor * work.entries[GAIN, g]
-                    if gain > work.tables[GAINS, j, i]:
-                        work.tables[GAINS, j, i] = gain
 
 
 @inner
@@ -155,7 +133,7 @@ def count_states(count, sets, tables, work):
     words = needs + 1
     if not _lay_lanes(count, sets, needs, work):
         return np.int64(TOO_LARGE)
-    _lay_gains(count, tables, work)
+    lay_gains(count, tables, work)
     capacity = work.states.shape[1]
     key = np.zeros(words, np.uint64)
     for s in range(sets):

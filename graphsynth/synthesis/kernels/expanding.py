@@ -25,9 +25,11 @@ class Spelling(NamedTuple):
 
 
 @njit(cache=True)
-def _spell(k, mult, row, spelling, joints):
-    """Write the joint mobilities of one row into the square matrix ``joints``; return (links, frame)."""
-    joints[:, :] = 0
+def _spell(k, total, mult, row, spelling, joints):
+    """Write the joint mobilities of one row into ``joints[:total, :total]``; return (links, frame)."""
+    for a in range(total):
+        for b in range(total):
+            joints[a, b] = 0
     links = k
     frame = row[2] if row[1] == FRAME_VERTEX else -1
     e = 0
@@ -96,9 +98,9 @@ def _levels_fit(links, levels, level, spelling):
 
 
 @njit(cache=True)
-def _arrange(k, mult, row, spelling, joints, order, level):
+def _arrange(k, total, mult, row, spelling, joints, order, level):
     """Spell one row and order its links; return (links, frame), links = 0 when the levels do not fit."""
-    links, frame = _spell(k, mult, row, spelling, joints)
+    links, frame = _spell(k, total, mult, row, spelling, joints)
     if frame < 0:
         for v in range(links):
             order[v] = v
@@ -110,18 +112,19 @@ def _arrange(k, mult, row, spelling, joints, order, level):
 
 
 @njit(cache=True)
-def expand_packed(k, mults, rows, count, spelling, out):
-    """Write the joints of rows as byte triples (a, b, mobility), a < b, sorted; link 0 is the frame if there is one.
+def expand_packed(k, total, mults, rows, count, spelling, out):
+    """Write the joints of rows (of ``total`` links) as byte triples (a, b, mobility), a < b, sorted.
+
+    Link 0 is the frame if there is one.
 
     ``out`` is (capacity, 3 * joints) uint8.  Returns the number of rows kept (those whose levels fit).
     """
-    size = 256
-    joints = np.empty((size, size), np.uint8)
-    order = np.empty(size, np.int64)
-    level = np.empty(size, np.int64)
+    joints = np.empty((total, total), np.uint8)
+    order = np.empty(total, np.int64)
+    level = np.empty(total, np.int64)
     kept = 0
     for r in range(count):
-        links, _ = _arrange(k, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
+        links, _ = _arrange(k, total, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
         if links == 0:
             continue
         at = 0
@@ -150,16 +153,18 @@ def _put_number(out, at, n):
 
 
 @njit(cache=True)
-def expand_text(k, mults, rows, count, spelling, space, highest, out):
-    """Write rows as lines of the text form (graph6, then frame, higher joints and space); return (bytes, lines)."""
-    size = 256
-    joints = np.empty((size, size), np.uint8)
-    order = np.empty(size, np.int64)
-    level = np.empty(size, np.int64)
+def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
+    """Write rows (of ``total`` links) as lines of the text form; return (bytes, lines).
+
+    A line is graph6, then the frame, the joints of higher mobility, and the space unless it is the plane.
+    """
+    joints = np.empty((total, total), np.uint8)
+    order = np.empty(total, np.int64)
+    level = np.empty(total, np.int64)
     at = 0
     kept = 0
     for r in range(count):
-        links, frame = _arrange(k, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
+        links, frame = _arrange(k, total, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
         if links == 0:
             continue
         out[at] = 63 + links

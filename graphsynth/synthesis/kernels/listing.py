@@ -26,6 +26,7 @@ from graphsynth.synthesis.kernels.layout import (
     DIGITS,
     FLIP,
     FOLD,
+    GAINS,
     HEAVIEST,
     INDEX,
     KIND,
@@ -52,6 +53,7 @@ from graphsynth.synthesis.kernels.layout import (
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
+    lay_gains,
     load_graph,
     plain_entries,
     remaining_gains,
@@ -97,7 +99,7 @@ def _is_fixed(perm, m, tables, work):
 @inner
 def _is_first(kept, m, tables, work):
     """Tell whether no automorphism that keeps the frame maps the current leaf to a smaller labelling."""
-    for i in range(kept):
+    for i in range(1, kept):  # the first one is the identity
         perm = work.perms[work.members[i]]
         for e in range(m):
             a = perm[work.classes[U, e]]
@@ -193,6 +195,7 @@ def _open_search(symmetry, tables, work):
     st[COUNT] = build_variables(st[CLASSES], st[SETS], work.perms[member], tables, work)
     plain_entries(st[COUNT], tables, work)
     unconstrained_ways(st[COUNT], True, tables, work)
+    lay_gains(st[COUNT], tables, work)
     remaining_gains(st[COUNT], st[SETS], work)
     start_needs(st[SETS], work)
     st[DEPTH] = 0
@@ -224,15 +227,19 @@ def _emit(k, symmetry, tables, work, rows, n):
 
 
 @inner
-def _shift(j, label, sign, tables, work):
-    """Apply (+1) or take back (-1) the label of variable j; return 0 when a critical set can no longer be served."""
+def _shift(j, label, sign, most, tables, work):
+    """Apply (+1) or take back (-1) the label of variable j.
+
+    Returns 0 when a critical set can no longer be served: by the later variables, or by the resources left, which give
+    it ``most`` at best.
+    """
     y = (work.classes[HEAVIEST, work.variables[REP, j]] - tables.labels[WEIGHT, label]) * sign
     alive = 1
     for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
         s = work.rows[SET, q]
         new = work.sets[LEFT, s] - work.rows[COEF, q] * y
         work.sets[LEFT, s] = new
-        if new > work.rows[REST, q]:
+        if new > work.rows[REST, q] or new > most:
             alive = 0
     return alive
 
@@ -252,7 +259,7 @@ def _search(k, symmetry, tables, work, rows, n):
             if depth < 0:
                 st[ACTIVE] = 0
                 return n
-            _shift(depth, work.variables[AT, depth], -1, tables, work)
+            _shift(depth, work.variables[AT, depth], -1, 0, tables, work)
             work.variables[AT, depth] += 1
             continue
         size = work.variables[SIZE, depth]
@@ -269,7 +276,7 @@ def _search(k, symmetry, tables, work, rows, n):
         if not usable:
             work.variables[AT, depth] = label + 1
             continue
-        alive = _shift(depth, label, 1, tables, work)
+        alive = _shift(depth, label, 1, work.tables[GAINS, depth + 1, index], tables, work)
         if alive and st[PARTS] > 1 and depth + 1 == min(PREFIX, count):
             st[MET] += 1
             alive = st[MET] % st[PARTS] == st[PART]
@@ -280,7 +287,7 @@ def _search(k, symmetry, tables, work, rows, n):
             continue
         if alive:
             n = _emit(k, symmetry, tables, work, rows, n)
-        _shift(depth, label, -1, tables, work)
+        _shift(depth, label, -1, 0, tables, work)
         work.variables[AT, depth] = label + 1
     st[DEPTH] = depth
     return n

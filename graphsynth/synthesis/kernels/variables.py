@@ -13,6 +13,7 @@ from graphsynth.synthesis.kernels.layout import (
     FINAL,
     FLIP,
     GAIN,
+    GAINS,
     GROUPS,
     GROUPS_END,
     HEAVIEST,
@@ -233,6 +234,29 @@ def unconstrained_ways(count, yes_or_no, tables, work):
                         work.tables[WAYS, j, i] += work.entries[COPIES, g] * work.tables[WAYS, j + 1, i - shift]
         top *= choices
     return top
+
+
+@inner
+def lay_gains(count, tables, work):
+    """Fill ``work.tables[GAINS, j, r]``: the most that variables j, j+1, ... give one critical set while using up r."""
+    resources = tables.resources.shape[1]
+    for i in range(resources):
+        work.tables[GAINS, count, i] = 0
+    for j in range(count - 1, -1, -1):
+        factor = np.int64(0)
+        for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
+            factor = max(factor, work.rows[COEF, q])
+        for i in range(resources):
+            work.tables[GAINS, j, i] = 0
+        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
+            shift = work.entries[INDEX, g]
+            for i in range(shift, resources):
+                if work.tables[WAYS, j + 1, i - shift] and fits(
+                    tables.resources[DIGITS, i], work.entries[PACKED, g], tables.guard
+                ):
+                    gain = work.tables[GAINS, j + 1, i - shift] + factor * work.entries[GAIN, g]
+                    if gain > work.tables[GAINS, j, i]:
+                        work.tables[GAINS, j, i] = gain
 
 
 @inner
