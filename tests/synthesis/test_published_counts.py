@@ -167,3 +167,22 @@ def test_samples_of_the_worked_example_are_answers():
         assert (g.mobility, g.degrees[0], g.assortment) == (1, 7, {2: 6, 3: 7, 4: 1})
         assert Counter(joint.mobility for joint in g.joints) == {1: 19, 2: 3}
         assert g.rigid_subchain() is None and not g.is_fractionated
+
+
+def golden():
+    """Read the graphs that nauty's generator found (made once, so that nauty is not needed here)."""
+    chains = {}
+    for line in (Path(__file__).parents[1] / "golden/enumeration.tsv").read_text(encoding="ascii").splitlines():
+        if not line.startswith("#"):
+            mobility, links, graph6 = line.split("\t")
+            chains.setdefault((int(mobility), int(links)), []).append(MechanismGraph.from_graph6(graph6))
+    return chains
+
+
+@pytest.mark.parametrize(("mobility", "links"), golden())
+def test_same_graphs_as_on_file(mobility, links):
+    expected = golden()[mobility, links]
+    found = enumerate_chains(links, mobility, fractionated=True)
+    assert sorted(g.key for g in found) == sorted(g.key for g in expected)
+    strict = enumerate_chains(links, mobility)
+    assert sorted(g.key for g in strict) == sorted(g.key for g in expected if not g.is_fractionated)
