@@ -14,7 +14,7 @@ __all__ = ["run"]
 
 def run(options: argparse.Namespace) -> int:
     """Print the count; the number stands alone on the last line."""
-    announce_compilation()
+    announce_compilation("counting.count_block")
     from graphsynth.synthesis.parallel import processes
     from graphsynth.synthesis.writing import count_with_checkpoint
 

@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
         raise SpecError("--json needs -o FILE.jsonl here: the graphs go to the file, a summary to standard output")
     if options.output is None and (options.resume or options.force):
         raise SpecError("--resume and --force need -o FILE")
-    announce_compilation()
+    announce_compilation("listing.list_rows")
     from graphsynth.synthesis.parallel import processes
 
     begin = time.perf_counter()

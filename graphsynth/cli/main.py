@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
+from types import FrameType
 
 import graphsynth
 from graphsynth.cli.question import add_question
@@ -24,8 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0: done; 2: bad input, told in one sentence on standard error; 130: interrupted.
     """
-    parser = _parser()
-    options = parser.parse_args(arguments)
+    options = _parser().parse_args(arguments)
+    interrupted = _note_interrupts()
     try:
         # each verb lives in a module of its own, imported when it is used
         status: int = import_module(f"graphsynth.cli.{options.module}").run(options)
@@ -34,8 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"graphsynth: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
         return USAGE_ERROR
     except KeyboardInterrupt:
-        print("graphsynth: interrupted", file=sys.stderr)  # noqa: T201
-        return INTERRUPTED
+        return _interrupted()
     except BrokenPipeError:
         # the reader (head, a pager) has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -43,7 +45,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"graphsynth: {error.filename or 'input/output'}: {error.strerror}", file=sys.stderr)  # noqa: T201
         return USAGE_ERROR
+    except Exception:
+        # an interruption inside the compiler of the kernels comes out as an exception of its own
+        if interrupted:
+            return _interrupted()
+        raise
     return status
+
+
+def _interrupted() -> int:
+    print("graphsynth: interrupted", file=sys.stderr)  # noqa: T201
+    return INTERRUPTED
+
+
+def _note_interrupts() -> list[int]:
+    """Return a list that receives the signal when Ctrl-C is pressed (which raises KeyboardInterrupt as always)."""
+    received: list[int] = []
+
+    def handler(number: int, frame: FrameType | None) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, handler)
+    return received
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -12,7 +12,7 @@ __all__ = ["run"]
 
 def run(options: argparse.Namespace) -> int:
     """Run a scene and print its summary."""
-    announce_compilation()
+    announce_compilation("listing.list_rows")
     from graphsynth.scenes.report import print_summary
     from graphsynth.scenes.runner import run as run_scene
 

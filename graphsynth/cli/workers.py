@@ -17,15 +17,17 @@ def workers_for(asked: int | None, big: bool) -> int:
     return (os.cpu_count() or 1) if big else 1
 
 
-def announce_compilation() -> None:
-    """Say so when the kernels of the enumerator are not compiled yet: the first use takes some seconds more."""
+def announce_compilation(kernel: str) -> None:
+    """Say so when a kernel (``module.function``) is not compiled yet: the first use takes some seconds more."""
     import graphsynth
+    from graphsynth.compilation import drop_stale_kernels
 
+    drop_stale_kernels()
     package = Path(graphsynth.__file__).parent / "synthesis" / "kernels"
     compiled = [package / "__pycache__"]
     if folder := os.environ.get("NUMBA_CACHE_DIR"):
         compiled = [Path(folder)]
     elif not os.access(package, os.W_OK):
         return  # numba keeps its cache elsewhere
-    if not any(next(place.rglob("counting.count_block*.nbi"), None) for place in compiled if place.is_dir()):
+    if not any(next(place.rglob(f"{kernel}-*.nbi"), None) for place in compiled if place.is_dir()):
         console.note("compiling kernels (first use only, some seconds) ...")

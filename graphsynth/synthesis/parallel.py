@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.synthesis.problem import Piece, count_piece, graphs_of_piece, text_of_piece
+from graphsynth.synthesis.problem import Piece, Problem, count_piece, graphs_of_piece, text_of_piece
 
 __all__ = ["counts", "graphs", "in_order", "processes", "texts"]
 
@@ -70,22 +70,40 @@ def graphs(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[Mecha
 
 @contextmanager
 def processes(workers: int) -> Iterator[Executor | None]:
-    """Give a pool of worker processes, or None for one worker (then everything is done in this process)."""
+    """Give a pool of worker processes, or None for one worker (then everything is done in this process).
+
+    The kernels are compiled here first, so that the workers find them in the cache.  When the block is left by an
+    exception (Ctrl-C), the workers are stopped at once; what was already written stays.
+    """
     if workers <= 1:
         yield None
         return
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+    from multiprocessing import active_children, get_context
 
+    _compile_kernels()
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
     try:
         yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in active_children():
+            child.terminate()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
+def _compile_kernels() -> None:
+    smallest = Problem.chains(6, 1, 3, None, False, None)
+    for piece in smallest.pieces(listing=False):
+        count_piece(piece)
+    for piece in smallest.pieces(listing=True):
+        _text(piece)
+
+
 def _ignore_interrupts(*_: Any) -> None:
-    """Leave Ctrl-C to the parent process, which stops the workers in order."""
+    """Leave Ctrl-C to the parent process, which stops the workers."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
