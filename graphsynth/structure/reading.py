@@ -21,7 +21,7 @@ __all__ = [
     "toml_of",
 ]
 
-OPTIONS = ("fractionated", "max_joint_mobility", "max_link_joints", "levels")
+OPTIONS = ("fractionated", "simple_joints", "max_joint_mobility", "max_link_joints", "levels")
 _SYMBOLS = ("W", "Pi", "n", "N", "p", "p1", "p2", "p3", "p4", "p5", "t0", "n2", "n3", "n4", "n5", "n6")
 _KNOWN = (*_SYMBOLS, "v", "v_ct", "v_P", "G", *ALIASES, *OPTIONS)
 _FAMILIES = {"p_i": "p", "n_a": "n"}
@@ -93,6 +93,12 @@ def _add_family(ranges: dict[str, Range], name: str, value: Any) -> None:
 
 
 def _add_option(options: dict[str, Any], name: str, value: Any) -> None:
+    if name == "simple_joints":
+        if value is not True:
+            raise SpecError(
+                f"simple_joints = {value!r}: only true is possible; model a pin that joins k links as k - 1 simple joints"
+            )
+        return  # always so
     if name == "fractionated":
         if not isinstance(value, bool):
             raise SpecError(f"fractionated = {value!r}: give true or false")
@@ -181,9 +187,9 @@ def assigned_question(assignments: Iterable[str]) -> dict[str, Any]:
         if name.startswith("levels.") and _NUMBER.fullmatch(name[7:]):
             question.setdefault("levels", {})[int(name[7:])] = _parse_value(name, value)
             continue
-        if name == "fractionated":
+        if name in ("fractionated", "simple_joints"):
             if value not in ("true", "false"):
-                raise SpecError(f"fractionated = {value!r}: write true or false")
+                raise SpecError(f"{name} = {value!r}: write true or false")
             own: Any = value == "true"
         elif name == "max_link_joints" and value == "all":
             own = value

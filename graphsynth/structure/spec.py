@@ -50,6 +50,8 @@ class StructuralSpec:
     fractionated : bool
         Include mechanisms that fall into c > 1 parts without the frame: the sixth equation becomes t0 = v_ct + c with
         c <= W.  Default False.
+    simple_joints : bool
+        Always true: a joint connects exactly two links.  A pin that joins k links is k - 1 simple joints.
     max_joint_mobility : int, optional
         Largest i with p_i > 0.  Default: joint mobilities that are not mentioned do not occur, except mobility 1; if
         no i >= 2 is mentioned, but p or G is given and lower pairs alone have no solution, the least sufficient i.

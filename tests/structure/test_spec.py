@@ -428,3 +428,11 @@ def test_table():
 
 def test_public_name():
     assert graphsynth.StructuralSpec is StructuralSpec
+
+
+def test_joints_are_simple() -> None:
+    assert StructuralSpec(W=1, links=4, simple_joints=True) == StructuralSpec(W=1, links=4)
+    assert StructuralSpec.from_assignments(["W=1", "links=4", "simple_joints=true"]) == StructuralSpec(W=1, links=4)
+    for wrong in (False, 1, "true"):
+        with pytest.raises(SpecError, match="k - 1 simple joints"):
+            StructuralSpec(W=1, links=4, simple_joints=wrong)
