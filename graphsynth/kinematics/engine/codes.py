@@ -16,13 +16,15 @@ E_RR, E_RP, E_PP = 0, 1, 2
 
 # Steps of a program.
 DRIVE_R, DRIVE_P = 0, 1
-R_DIST, R_LINE_PIN, R_LINE_SLOT, R_ANGLE, R_GEAR, P_DIST, P_LINE, NEWTON = 2, 3, 4, 5, 6, 7, 8, 9
+R_DIST, R_LINE_PIN, R_LINE_SLOT, R_ANGLE, R_GEAR, P_DIST, P_LINE, NEWTON, PLATFORM = 2, 3, 4, 5, 6, 7, 8, 9, 10
 
+#: NEWTON: any core; PLATFORM: one core link held by three distances, by Newton with explicit 3 x 3 solves.
+ITERATIVE = (NEWTON, PLATFORM)
 #: Steps with two assembly modes.
 TWO_MODES = (R_DIST, R_LINE_PIN, R_LINE_SLOT, P_DIST)
 
 # Row parameters (columns of a float table).
-PAX, PAY, PBX, PBY, TX, TY, H, RA, RB, SIGN, SLOT, HT = range(12)
+PAX, PAY, PBX, PBY, TX, TY, H, RA, RB, SIGN, SLOT, INVERSE = range(12)
 ROW_WIDTH = 12
 #: Parameters of an eliminated link: a's point, e's point there, b's point, e's point there, directions, angle.
 ELIM_WIDTH = 13

@@ -12,14 +12,14 @@ TAU = 2.0 * math.pi
 
 
 @njit(cache=True, error_model="numpy")
-def row(kind, p, a, b, x, th, phi, q, g):
+def row(kind, p, k, a, b, x, th, phi, q, g):
     """Value of one constraint row; its gradient by (x, y, theta) of a and of b goes to g[0:6]."""
     ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
-    ux, uy = ca * p[0] - sa * p[1], sa * p[0] + ca * p[1]
-    wx, wy = cb * p[2] - sb * p[3], sb * p[2] + cb * p[3]
+    ux, uy = ca * p[k, 0] - sa * p[k, 1], sa * p[k, 0] + ca * p[k, 1]
+    wx, wy = cb * p[k, 2] - sb * p[k, 3], sb * p[k, 2] + cb * p[k, 3]
     dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
-    for k in range(6):
-        g[k] = 0.0
+    for c in range(6):
+        g[c] = 0.0
     if kind == 0:
         g[0], g[2], g[3], g[5] = -1.0, uy, 1.0, -wy
         return dx
@@ -27,53 +27,53 @@ def row(kind, p, a, b, x, th, phi, q, g):
         g[1], g[2], g[4], g[5] = -1.0, -ux, 1.0, wx
         return dy
     if kind == 2:
-        h = p[6]
-        ex, ey = dx / h, dy / h
+        h = p[k, 6]
+        ex, ey = dx * p[k, 11], dy * p[k, 11]
         g[0], g[1], g[2] = -ex, -ey, -(ux * ey - uy * ex)
         g[3], g[4], g[5] = ex, ey, wx * ey - wy * ex
         return 0.5 * (dx * ex + dy * ey - h)
     if kind == 3 or kind == 7:
-        tx, ty = ca * p[4] - sa * p[5], sa * p[4] + ca * p[5]
+        tx, ty = ca * p[k, 4] - sa * p[k, 5], sa * p[k, 4] + ca * p[k, 5]
         nx, ny = -ty, tx
         along = tx * dx + ty * dy
         across = nx * dx + ny * dy
         if kind == 3:
             g[0], g[1], g[2] = -nx, -ny, -along - (ux * ny - uy * nx)
             g[3], g[4], g[5] = nx, ny, wx * ny - wy * nx
-            return across - p[6]
+            return across - p[k, 6]
         g[0], g[1], g[2] = -tx, -ty, across - (ux * ty - uy * tx)
         g[3], g[4], g[5] = tx, ty, wx * ty - wy * tx
-        return along - p[9] * q[int(p[10]), 0]
+        return along - p[k, 9] * q[int(p[k, 10]), 0]
     if kind == 4 or kind == 6:
-        h = p[6] if kind == 4 else p[9] * q[int(p[10]), 0]
+        h = p[k, 6] if kind == 4 else p[k, 9] * q[int(p[k, 10]), 0]
         g[2], g[5] = -1.0, 1.0
         ch, sh = math.cos(h), math.sin(h)
         re, im = cb * ca + sb * sa, sb * ca - cb * sa
         return math.atan2(im * ch - re * sh, re * ch + im * sh)
     # gear: angles relative to the line of centres
-    total = p[7] + p[9] * p[8]
+    total = p[k, 7] + p[k, 9] * p[k, 8]
     square = dx * dx + dy * dy
     nx, ny = -dy / square, dx / square
-    slot = int(p[10])
+    slot = int(p[k, 10])
     raw = math.atan2(dy, dx)
     here = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
-    scale = 1.0 / (p[7] + p[8])
-    g[0], g[1], g[2] = scale * total * nx, scale * total * ny, scale * (p[7] + total * (ux * ny - uy * nx))
+    scale = 1.0 / (p[k, 7] + p[k, 8])
+    g[0], g[1], g[2] = scale * total * nx, scale * total * ny, scale * (p[k, 7] + total * (ux * ny - uy * nx))
     g[3], g[4] = -scale * total * nx, -scale * total * ny
-    g[5] = scale * (p[9] * p[8] - total * (wx * ny - wy * nx))
-    return scale * (p[7] * (th[a] - here) + p[9] * p[8] * (th[b] - here - p[6]))
+    g[5] = scale * (p[k, 9] * p[k, 8] - total * (wx * ny - wy * nx))
+    return scale * (p[k, 7] * (th[a] - here) + p[k, 9] * p[k, 8] * (th[b] - here - p[k, 6]))
 
 
 @njit(cache=True, error_model="numpy")
-def gamma(kind, p, a, b, x, v, q):
+def gamma(kind, p, k, a, b, x, v, q):
     """Second-order part of a row: its second derivative along the velocities v, accelerations being zero."""
     if kind == 4:
         return 0.0
     if kind == 6:
-        return -p[9] * q[int(p[10]), 2]
+        return -p[k, 9] * q[int(p[k, 10]), 2]
     ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
-    ux, uy = ca * p[0] - sa * p[1], sa * p[0] + ca * p[1]
-    wx, wy = cb * p[2] - sb * p[3], sb * p[2] + cb * p[3]
+    ux, uy = ca * p[k, 0] - sa * p[k, 1], sa * p[k, 0] + ca * p[k, 1]
+    wx, wy = cb * p[k, 2] - sb * p[k, 3], sb * p[k, 2] + cb * p[k, 3]
     oa, ob = v[a, 2], v[b, 2]
     cx, cy = oa * oa * ux - ob * ob * wx, oa * oa * uy - ob * ob * wy
     if kind == 0:
@@ -83,16 +83,16 @@ def gamma(kind, p, a, b, x, v, q):
     dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
     ex, ey = v[b, 0] - ob * wy - v[a, 0] + oa * uy, v[b, 1] + ob * wx - v[a, 1] - oa * ux
     if kind == 2:
-        return (ex * ex + ey * ey + dx * cx + dy * cy) / p[6]
+        return (ex * ex + ey * ey + dx * cx + dy * cy) * p[k, 11]
     if kind == 3 or kind == 7:
-        tx, ty = ca * p[4] - sa * p[5], sa * p[4] + ca * p[5]
+        tx, ty = ca * p[k, 4] - sa * p[k, 5], sa * p[k, 4] + ca * p[k, 5]
         if kind == 3:
             return oa * oa * (ty * dx - tx * dy) - 2.0 * oa * (tx * ex + ty * ey) - ty * cx + tx * cy
         return (-oa * oa * (tx * dx + ty * dy) + 2.0 * oa * (tx * ey - ty * ex) + tx * cx + ty * cy
-                - p[9] * q[int(p[10]), 2])  # fmt: skip
+                - p[k, 9] * q[int(p[k, 10]), 2])  # fmt: skip
     square = dx * dx + dy * dy
     turn = (dx * cy - dy * cx) / square - 2.0 * (dx * ex + dy * ey) * (dx * ey - dy * ex) / (square * square)
-    return -(p[7] + p[9] * p[8]) / (p[7] + p[8]) * turn
+    return -(p[k, 7] + p[k, 9] * p[k, 8]) / (p[k, 7] + p[k, 8]) * turn
 
 
 @njit(cache=True, error_model="numpy")
@@ -138,14 +138,14 @@ def back(J, n, pivots, y):
 
 
 @njit(cache=True, error_model="numpy")
-def assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, moving):
+def assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, G, moving):
     """Jacobian by the core links, residuals, or (moving) the right-hand side of the velocities; returns prod |row|."""
     norms = 1.0
     n = nr
     for r in range(nr):
         k = r0 + r
         kind, a, b, ia, ib = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], rows[k, 4]
-        f[r] = row(kind, rp[k], a, b, x, th, phi, q, g)
+        f[r] = row(kind, rp, k, a, b, x, th, phi, q, g)
         if moving:
             f[r] = 0.0
             if kind >= 6:
@@ -154,6 +154,7 @@ def assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, moving):
             J[r, c] = 0.0
         size = 0.0
         for c in range(3):
+            G[r, c], G[r, 3 + c] = g[c], g[3 + c]
             if ia >= 0:
                 J[r, 3 * ia + c] = g[c]
                 size += g[c] * g[c] if c < 2 else 0.0
@@ -176,12 +177,12 @@ def follow_angle(link, x, th, near):
 
 
 @njit(cache=True, error_model="numpy")
-def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, pivots, Lc, out):
+def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, G, pivots, Lc, out):
     """Newton from x; out = (first correction, last correction, rate); returns 0 if it converged."""
     last = 0.0
     out[2] = 0.0
     for it in range(30):
-        assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, False)
+        assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, G, False)
         det = factor(J, nr, pivots)
         if det == 0.0 or not math.isfinite(det):
             return 4
@@ -215,21 +216,21 @@ def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, pivots, Lc
 
 
 @njit(cache=True, error_model="numpy")
-def drive(step, d, p, x, th, v, w, q):
+def drive(step, d, p, r, x, th, v, w, q):
     """Place a driven link from the link it is driven on."""
-    base, link, k = d[1], d[2], d[3]
-    s = p[6]
+    base, link, k = d[r, 1], d[r, 2], d[r, 3]
+    s = p[r, 6]
     cb, sb = x[base, 2], x[base, 3]
-    px, py = cb * p[0] - sb * p[1], sb * p[0] + cb * p[1]
-    turn = p[7] + (s * q[k, 0] if step == 0 else 0.0)
+    px, py = cb * p[r, 0] - sb * p[r, 1], sb * p[r, 0] + cb * p[r, 1]
+    turn = p[r, 7] + (s * q[k, 0] if step == 0 else 0.0)
     c, sn = math.cos(turn), math.sin(turn)
     th[link] = th[base] + turn
     x[link, 2], x[link, 3] = cb * c - sb * sn, sb * c + cb * sn
-    ox, oy = x[link, 2] * p[4] - x[link, 3] * p[5], x[link, 3] * p[4] + x[link, 2] * p[5]
+    ox, oy = x[link, 2] * p[r, 4] - x[link, 3] * p[r, 5], x[link, 3] * p[r, 4] + x[link, 2] * p[r, 5]
     o, al = v[base, 2], w[base, 2]
     tx, ty, rate, acc = 0.0, 0.0, 0.0, 0.0
     if step == 1:
-        tx, ty = cb * p[2] - sb * p[3], sb * p[2] + cb * p[3]
+        tx, ty = cb * p[r, 2] - sb * p[r, 3], sb * p[r, 2] + cb * p[r, 3]
         px, py = px + s * q[k, 0] * tx, py + s * q[k, 0] * ty
         rate, acc = s * q[k, 1], s * q[k, 2]
     x[link, 0], x[link, 1] = x[base, 0] + px - ox, x[base, 1] + py - oy
@@ -293,7 +294,7 @@ def line_of(rows, rp, k, x, own):
 
 @njit(cache=True, error_model="numpy")
 def circles(dx, dy, l1, l2, sign, out):
-    """Vector from A to C with |AC| = l1, |BC| = l2, B - A = (dx, dy); returns sin^2 of the angle at C, negative if open."""
+    """Vector from A to C with |AC| = l1, |BC| = l2, B - A = (dx, dy); returns sin^2 of the angle at C (< 0: open)."""
     dd = dx * dx + dy * dy
     d = math.sqrt(dd)
     product = ((l1 + l2) - d) * ((l1 + l2) + d) * (d - (l1 - l2)) * (d + (l1 - l2))
@@ -410,27 +411,27 @@ def closed_form(code, rows, rp, r0, own, sign, x, th, phi, g):
 
 
 @njit(cache=True, error_model="numpy")
-def place_eliminated(kind, e, a, b, p, x, th, v, w, derivs):
+def place_eliminated(kind, e, a, b, p, r, x, th, v, w, derivs):
     """Place a link eliminated from its group, with velocity and acceleration."""
-    ax, ay = world(x, a, p[0], p[1])
-    bx, by = world(x, b, p[4], p[5])
+    ax, ay = world(x, a, p[r, 0], p[r, 1])
+    bx, by = world(x, b, p[r, 4], p[r, 5])
     if kind == 0:
-        turn_to(x, e, p[6] - p[2], p[7] - p[3], bx - ax, by - ay)
-        pin_to(x, e, p[2], p[3], ax, ay)
+        turn_to(x, e, p[r, 6] - p[r, 2], p[r, 7] - p[r, 3], bx - ax, by - ay)
+        pin_to(x, e, p[r, 2], p[r, 3], ax, ay)
     else:
         base = b if kind == 1 else a
-        c, s = math.cos(p[12]), math.sin(p[12])
+        c, s = math.cos(p[r, 12]), math.sin(p[r, 12])
         x[e, 2], x[e, 3] = x[base, 2] * c - x[base, 3] * s, x[base, 3] * c + x[base, 2] * s
-        th[e] = th[base] + p[12]
+        th[e] = th[base] + p[r, 12]
         if kind == 1:
-            pin_to(x, e, p[2], p[3], ax, ay)
+            pin_to(x, e, p[r, 2], p[r, 3], ax, ay)
     oa, ob, la, lb = v[a, 2], v[b, 2], w[a, 2], w[b, 2]
     ux, uy, wx, wy = ax - x[a, 0], ay - x[a, 1], bx - x[b, 0], by - x[b, 1]
     vax, vay, vbx, vby = v[a, 0] - oa * uy, v[a, 1] + oa * ux, v[b, 0] - ob * wy, v[b, 1] + ob * wx
     aax, aay = w[a, 0] - la * uy - oa * oa * ux, w[a, 1] + la * ux - oa * oa * uy
     abx, aby = w[b, 0] - lb * wy - ob * ob * wx, w[b, 1] + lb * wx - ob * ob * wy
     c, s = x[e, 2], x[e, 3]
-    fx, fy = c * p[2] - s * p[3], s * p[2] + c * p[3]
+    fx, fy = c * p[r, 2] - s * p[r, 3], s * p[r, 2] + c * p[r, 3]
     if kind < 2:
         if not derivs:
             return
@@ -444,9 +445,9 @@ def place_eliminated(kind, e, a, b, p, x, th, v, w, derivs):
         w[e, 0], w[e, 1], w[e, 2] = aax + l * fy + o * o * fx, aay - l * fx + o * o * fy, l
         return
     # two sliding pairs: the origin lies on two lines of known directions
-    hx, hy = c * p[6] - s * p[7], s * p[6] + c * p[7]
-    tx, ty = x[a, 2] * p[8] - x[a, 3] * p[9], x[a, 3] * p[8] + x[a, 2] * p[9]
-    sx, sy = x[b, 2] * p[10] - x[b, 3] * p[11], x[b, 3] * p[10] + x[b, 2] * p[11]
+    hx, hy = c * p[r, 6] - s * p[r, 7], s * p[r, 6] + c * p[r, 7]
+    tx, ty = x[a, 2] * p[r, 8] - x[a, 3] * p[r, 9], x[a, 3] * p[r, 8] + x[a, 2] * p[r, 9]
+    sx, sy = x[b, 2] * p[r, 10] - x[b, 3] * p[r, 11], x[b, 3] * p[r, 10] + x[b, 2] * p[r, 11]
     det = tx * sy - ty * sx
     k1 = -ty * (ax - fx) + tx * (ay - fy)
     k2 = -sy * (bx - hx) + sx * (by - hy)
@@ -470,9 +471,9 @@ def place_eliminated(kind, e, a, b, p, x, th, v, w, derivs):
 
 
 @njit(cache=True, error_model="numpy")
-def rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, pivots):
+def rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, G, pivots):
     """Velocities and accelerations of the core links; returns the determinant over the product of row lengths."""
-    norms = assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, True)
+    norms = assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, G, True)
     det = factor(J, nr, pivots)
     if det == 0.0:
         for k in range(nc):
@@ -487,14 +488,13 @@ def rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, pivots):
     for r in range(nr):
         k = r0 + r
         kind, a, b = rows[k, 0], rows[k, 1], rows[k, 2]
-        total = -gamma(kind, rp[k], a, b, x, v, q)
+        total = -gamma(kind, rp, k, a, b, x, v, q)
         if rows[k, 3] < 0 or rows[k, 4] < 0:
-            row(kind, rp[k], a, b, x, th, phi, q, g)
             for c in range(3):
                 if rows[k, 3] < 0:
-                    total -= g[c] * w[a, c]
+                    total -= G[r, c] * w[a, c]
                 if rows[k, 4] < 0:
-                    total -= g[3 + c] * w[b, c]
+                    total -= G[r, 3 + c] * w[b, c]
         f[r] = total
     back(J, nr, pivots, f)
     for k in range(nc):
@@ -504,93 +504,243 @@ def rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, pivots):
 
 
 @njit(cache=True, error_model="numpy")
-def track_group(rows, rp, r0, nr, core, c0, nc, x, th, px, pth, pv, pw, before, h, warm, phi, q, v, J, f, g, pivots,
-                Lc, out):  # fmt: skip
-    """Newton for a group: predictor from the last sample (warm), corrector, and the tests against a jump."""
-    travel = 0.0
-    if warm:
-        for k in range(nc):
-            link = core[c0 + k]
-            ax, ay = h * pv[link, 0], h * pv[link, 1]
-            at = h * pv[link, 2]
-            bx, by = 0.5 * h * h * pw[link, 0], 0.5 * h * h * pw[link, 1]
-            bt = 0.5 * h * h * pw[link, 2]
-            travel += ax * ax + ay * ay + Lc * Lc * at * at + bx * bx + by * by + Lc * Lc * bt * bt
-            x[link, 0], x[link, 1], th[link] = px[link, 0] + ax + bx, px[link, 1] + ay + by, pth[link] + at + bt
-            c, s = math.cos(at + bt), math.sin(at + bt)
-            x[link, 2], x[link, 3] = px[link, 2] * c - px[link, 3] * s, px[link, 3] * c + px[link, 2] * s
-        travel = math.sqrt(travel) / Lc
-        if not travel <= 0.5:
-            return 2
-    code = newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, pivots, Lc, out)
-    if code:
-        return code
-    if warm and (out[0] > 0.1 * travel + 1e-9 or out[2] > 0.1):
-        return 2
+def pivot_rates(rows, rp, r0, own, x, th, phi, q, v, w, g):
+    """Rates of a link that turns about a point of a placed link: one unknown, from the third row."""
+    if rows[r0, 1] == own:
+        far, ax, ay = rows[r0, 2], rp[r0, 2], rp[r0, 3]
+    else:
+        far, ax, ay = rows[r0, 1], rp[r0, 0], rp[r0, 1]
+    ax, ay = world(x, far, ax, ay)
+    ux, uy = ax - x[far, 0], ay - x[far, 1]
+    o, l = v[far, 2], w[far, 2]
+    vx, vy = v[far, 0] - o * uy, v[far, 1] + o * ux
+    bx, by = w[far, 0] - l * uy - o * o * ux, w[far, 1] + l * ux - o * o * uy
+    px, py = x[own, 0] - ax, x[own, 1] - ay
+    k = r0 + 2
+    kind, a, b = rows[k, 0], rows[k, 1], rows[k, 2]
+    row(kind, rp, k, a, b, x, th, phi, q, g)
+    other, i, j = (b, 0, 3) if a == own else (a, 3, 0)
+    coefficient = g[i + 2] - g[i] * py + g[i + 1] * px
+    total = g[i] * vx + g[i + 1] * vy + g[j] * v[other, 0] + g[j + 1] * v[other, 1] + g[j + 2] * v[other, 2]
+    o = -total / coefficient
+    v[own, 0], v[own, 1], v[own, 2] = vx - o * py, vy + o * px, o
+    bx, by = bx - o * o * px, by - o * o * py
+    total = gamma(kind, rp, k, a, b, x, v, q) + g[i] * bx + g[i + 1] * by
+    total += g[j] * w[other, 0] + g[j + 1] * w[other, 1] + g[j + 2] * w[other, 2]
+    l = -total / coefficient
+    w[own, 0], w[own, 1], w[own, 2] = bx - l * py, by + l * px, l
+
+
+@njit(cache=True, error_model="numpy")
+def anchors(rows, rp, r0, own, x, v, w, P):
+    """Of three distances to one link: far points with velocity and acceleration, near points (local), lengths."""
+    for r in range(3):
+        k = r0 + r
+        if rows[k, 1] == own:
+            far, fx, fy, P[r, 6], P[r, 7] = rows[k, 2], rp[k, 2], rp[k, 3], rp[k, 0], rp[k, 1]
+        else:
+            far, fx, fy, P[r, 6], P[r, 7] = rows[k, 1], rp[k, 0], rp[k, 1], rp[k, 2], rp[k, 3]
+        px, py = world(x, far, fx, fy)
+        ux, uy, o, l = px - x[far, 0], py - x[far, 1], v[far, 2], w[far, 2]
+        P[r, 0], P[r, 1] = px, py
+        P[r, 2], P[r, 3] = v[far, 0] - o * uy, v[far, 1] + o * ux
+        P[r, 4], P[r, 5] = w[far, 0] - l * uy - o * o * ux, w[far, 1] + l * ux - o * o * uy
+        P[r, 8], P[r, 9] = rp[k, 6], rp[k, 11]
+
+
+@njit(cache=True, error_model="numpy")
+def platform_rows(P, x, own, Q):
+    """Rows of three distances: Q[r] = (unit vector from the far point, its moment, residual, near arm)."""
+    X, Y, c, s = x[own, 0], x[own, 1], x[own, 2], x[own, 3]
+    for r in range(3):
+        ux, uy = c * P[r, 6] - s * P[r, 7], s * P[r, 6] + c * P[r, 7]
+        dx, dy = X + ux - P[r, 0], Y + uy - P[r, 1]
+        ex, ey = dx * P[r, 9], dy * P[r, 9]
+        Q[r, 0], Q[r, 1], Q[r, 2] = ex, ey, ux * ey - uy * ex
+        Q[r, 3] = 0.5 * (dx * ex + dy * ey - P[r, 8])
+        Q[r, 4], Q[r, 5] = ux, uy
+
+
+@njit(cache=True, error_model="numpy")
+def solve3(Q, a, b, c):
+    """Cramer's rule for the first three columns of Q; returns determinant and solution."""
+    m0 = Q[1, 1] * Q[2, 2] - Q[1, 2] * Q[2, 1]
+    m1 = Q[2, 1] * Q[0, 2] - Q[2, 2] * Q[0, 1]
+    m2 = Q[0, 1] * Q[1, 2] - Q[0, 2] * Q[1, 1]
+    det = Q[0, 0] * m0 + Q[1, 0] * m1 + Q[2, 0] * m2
+    n0 = Q[1, 2] * Q[2, 0] - Q[1, 0] * Q[2, 2]
+    n1 = Q[2, 2] * Q[0, 0] - Q[2, 0] * Q[0, 2]
+    n2 = Q[0, 2] * Q[1, 0] - Q[0, 0] * Q[1, 2]
+    k0 = Q[1, 0] * Q[2, 1] - Q[1, 1] * Q[2, 0]
+    k1 = Q[2, 0] * Q[0, 1] - Q[2, 1] * Q[0, 0]
+    k2 = Q[0, 0] * Q[1, 1] - Q[0, 1] * Q[1, 0]
+    f = 1.0 / det
+    return det, f * (a * m0 + b * m1 + c * m2), f * (a * n0 + b * n1 + c * n2), f * (a * k0 + b * k1 + c * k2)
+
+
+@njit(cache=True, error_model="numpy")
+def platform(P, x, th, v, w, own, Q, Lc, out, m, s):
+    """Newton and rates of a link held by three distances (class III triad); returns the code of `newton`."""
+    last = 0.0
+    out[2] = 0.0
+    for it in range(30):
+        platform_rows(P, x, own, Q)
+        det, fx, fy, ft = solve3(Q, Q[0, 3], Q[1, 3], Q[2, 3])
+        size = math.sqrt(fx * fx + fy * fy + Lc * Lc * ft * ft) / Lc
+        if not math.isfinite(size):
+            return 4 if det == 0.0 else 3
+        x[own, 0] -= fx
+        x[own, 1] -= fy
+        th[own] -= ft
+        c, sn = math.cos(ft), math.sin(ft)
+        xc, xs = x[own, 2] * c + x[own, 3] * sn, x[own, 3] * c - x[own, 2] * sn
+        inv = 1.5 - 0.5 * (xc * xc + xs * xs)
+        x[own, 2], x[own, 3] = xc * inv, xs * inv
+        if it == 0:
+            out[0] = size
+        elif it == 1:
+            out[2] = size / out[0] if out[0] > 1e-12 else 0.0
+        out[1] = size
+        if size <= 6e-16 or (it > 0 and size <= 1e-8 and size <= 1e-3 * last) or (it > 2 and size <= 1e-13):
+            break
+        if (it > 12 and size >= 0.5 * last) or it == 29:
+            return 3
+        last = size
+    platform_rows(P, x, own, Q)
+    for r in range(3):
+        Q[r, 3] = Q[r, 0] * P[r, 2] + Q[r, 1] * P[r, 3]
+    det, vx, vy, o = solve3(Q, Q[0, 3], Q[1, 3], Q[2, 3])
+    m[s] = det / Lc
+    v[own, 0], v[own, 1], v[own, 2] = vx, vy, o
+    for r in range(3):
+        ux, uy = Q[r, 4], Q[r, 5]
+        ex, ey = vx - o * uy - P[r, 2], vy + o * ux - P[r, 3]
+        Q[r, 3] = (Q[r, 0] * (P[r, 4] + o * o * ux) + Q[r, 1] * (P[r, 5] + o * o * uy)
+                   - (ex * ex + ey * ey) * P[r, 9])  # fmt: skip
+    det, w[own, 0], w[own, 1], w[own, 2] = solve3(Q, Q[0, 3], Q[1, 3], Q[2, 3])
     return 0
 
 
 @njit(cache=True, error_model="numpy")
-def run(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, u, modes, X, TH, V, W, PHI, M, first, Lc, derivs):
-    """Run a program over the samples first..n-1; returns (samples done, code, step).
+def predict(core, c0, nc, x, th, v, w, h, Lc):
+    """Move the core links to second order; returns how far, scaled."""
+    travel = 0.0
+    for k in range(nc):
+        link = core[c0 + k]
+        ax, ay, at = h * v[link, 0], h * v[link, 1], h * v[link, 2]
+        bx, by, bt = 0.5 * h * h * w[link, 0], 0.5 * h * h * w[link, 1], 0.5 * h * h * w[link, 2]
+        travel += ax * ax + ay * ay + Lc * Lc * at * at + bx * bx + by * by + Lc * Lc * bt * bt
+        x[link, 0] += ax + bx
+        x[link, 1] += ay + by
+        th[link] += at + bt
+        c, s = math.cos(at + bt), math.sin(at + bt)
+        x[link, 2], x[link, 3] = x[link, 2] * c - x[link, 3] * s, x[link, 3] * c + x[link, 2] * s
+    return math.sqrt(travel) / Lc
 
-    Sample ``first`` starts from ``first - 1`` if there is one; else cold, from the poses already in X[0], TH[0].
+
+@njit(cache=True, error_model="numpy")
+def sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, h, warm, modes, x, th, v, w, phi, m,
+           J, f, g, G, pivots, out, P, Q, Lc, derivs):  # fmt: skip
+    """Move the state (x, th, v, w, phi, margins m) to the next input, h further; returns (code, step)."""
+    for s in range(steps.shape[0]):
+        code, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
+        if code < 2:
+            if not math.isfinite(q[drv[r0, 3], 0]):
+                return 5, s
+            drive(code, drv, dp, r0, x, th, v, w, q)
+            m[s] = 1.0
+            continue
+        before, own = m[s], core[c0]
+        if code >= 9:
+            travel = predict(core, c0, nc, x, th, v, w, h, Lc) if warm else 0.0
+            if not travel <= 0.5:
+                return 2, s
+            if code == 9:
+                why = newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, G, pivots, Lc, out)
+            else:
+                anchors(rows, rp, r0, own, x, v, w, P)
+                why = platform(P, x, th, v, w, own, Q, Lc, out, m, s)
+            if why:
+                return why, s
+            if warm and (out[0] > 0.1 * travel + 1e-9 or out[2] > 0.1):
+                return 2, s
+        else:
+            near = th[own] + (h * v[own, 2] if warm and derivs else 0.0)
+            m[s] = closed_form(code, rows, rp, r0, own, modes[s], x, th, phi, g)
+            if code == 8:  # one mode; its determinant keeps its sign
+                if m[s] == 0.0 or (warm and not m[s] * before > 0.0):
+                    return 1, s
+            elif m[s] < 0.0:
+                return 1, s
+            if not math.isfinite(m[s]):
+                return 3, s
+            if need[own] and code != 6:
+                follow_angle(own, x, th, near)
+        if 2 <= code <= 6 and derivs:
+            pivot_rates(rows, rp, r0, own, x, th, phi, q, v, w, g)
+        elif code != 10 and derivs:
+            det = rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, G, pivots)
+            if code == 9:
+                m[s] = det / Lc**nc
+        if code >= 9:
+            if m[s] == 0.0:
+                return 4, s
+            if warm and not (m[s] * before > 0.0 and abs(m[s]) > 0.5 * abs(before)):
+                return 2, s
+        for k in range(steps[s, 5], steps[s, 5] + steps[s, 6]):
+            e = elim[k, 1]
+            near = th[e] + (h * v[e, 2] if warm and derivs else 0.0)
+            place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, th, v, w, derivs)
+            if need[e]:
+                follow_angle(e, x, th, near)
+    for k in range(gears.shape[0]):
+        r = gears[k]
+        ax, ay = world(x, rows[r, 1], rp[r, 0], rp[r, 1])
+        bx, by = world(x, rows[r, 2], rp[r, 2], rp[r, 3])
+        raw = math.atan2(by - ay, bx - ax)
+        phi[k] = raw + TAU * math.floor((phi[k] - raw) / TAU + 0.5)
+    return 0, -1
+
+
+@njit(cache=True, error_model="numpy")
+def run(steps, rows, RP, core, elim, EP, drv, DP, need, gears, q, u, modes, X, TH, V, W, PHI, M, done, why, first, Lc,
+        derivs):  # fmt: skip
+    """Run a program for every dimension set over the samples first..n-1.
+
+    RP, EP, DP, X, TH, V, W, PHI, M have the dimension set as first axis.  Sample ``first`` starts from ``first - 1`` if
+    there is one; else cold, from the poses already in X[b, 0], TH[b, 0].  Returns nothing: ``done`` gets the samples
+    reached, ``why`` the code and the step at which it stopped.
     """
-    L = X.shape[1]
-    size = 3
+    links, size = X.shape[2], 3
     for s in range(steps.shape[0]):
         size = max(size, steps[s, 2])
     J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(3)
-    pivots = np.empty(size, np.int64)
-    for i in range(first, u.shape[0]):
-        x, th, v, w, phi, qi = X[i], TH[i], V[i], W[i], PHI[i], q[i]
-        warm = i > 0
-        j = i - 1 if warm else i
-        h = u[i] - u[j]
-        for k in range(gears.shape[0]):
-            phi[k] = PHI[j, k]
-        for s in range(steps.shape[0]):
-            code, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
-            if code < 2:
-                drive(code, drv[r0], dp[r0], x, th, v, w, qi)
-                M[i, s] = 1.0
-                if not math.isfinite(qi[drv[r0, 3], 0]):
-                    return i, 5, s
-                continue
-            own = core[c0]
-            if code == 9:
-                why = track_group(rows, rp, r0, nr, core, c0, nc, x, th, X[j], TH[j], V[j], W[j], M[j, s], h, warm,
-                                  phi, qi, v, J, f, g, pivots, Lc, out)  # fmt: skip
-                if why:
-                    return i, why, s
-            else:
-                M[i, s] = closed_form(code, rows, rp, r0, own, modes[s], x, th, phi, g)
-                if code == 8:  # one mode; its determinant keeps its sign
-                    if M[i, s] == 0.0 or (warm and not M[i, s] * M[j, s] > 0.0):
-                        return i, 1, s
-                elif M[i, s] < 0.0:
-                    return i, 1, s
-                if not math.isfinite(M[i, s]):
-                    return i, 3, s
-                if need[own] and code != 6:
-                    follow_angle(own, x, th, TH[j, own] + (h * V[j, own, 2] if warm and derivs else 0.0))
-            if derivs or code == 9:
-                det = rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, qi, v, w, J, f, g, pivots)
-                if code == 9:
-                    M[i, s] = det / Lc**nc
-                    if warm and not (M[i, s] * M[j, s] > 0.0 and abs(M[i, s]) > 0.5 * abs(M[j, s])):
-                        return i, 2, s
-                    if M[i, s] == 0.0:
-                        return i, 4, s
-            for k in range(steps[s, 5], steps[s, 5] + steps[s, 6]):
-                e = elim[k, 1]
-                place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep[k], x, th, v, w, derivs)
-                if need[e]:
-                    follow_angle(e, x, th, TH[j, e] + (h * V[j, e, 2] if warm and derivs else 0.0))
-        for k in range(gears.shape[0]):
-            r = gears[k]
-            ax, ay = world(x, rows[r, 1], rp[r, 0], rp[r, 1])
-            bx, by = world(x, rows[r, 2], rp[r, 2], rp[r, 3])
-            raw = math.atan2(by - ay, bx - ax)
-            phi[k] = raw + TAU * math.floor((phi[k] - raw) / TAU + 0.5)
-    return u.shape[0], 0, -1
+    G, pivots = np.empty((size, 6)), np.empty(size, np.int64)
+    P, Q = np.empty((3, 10)), np.empty((3, 6))
+    x, th, v, w = np.empty((links, 4)), np.empty(links), np.empty((links, 3)), np.empty((links, 3))
+    phi, m, ql = np.empty(PHI.shape[2]), np.empty(steps.shape[0]), np.empty((q.shape[1], 3))
+    for b in range(X.shape[0]):
+        j = max(first - 1, 0)
+        x[:], th[:], v[:], w[:], phi[:], m[:] = X[b, j], TH[b, j], V[b, j], W[b, j], PHI[b, j], M[b, j]
+        rp, ep, dp = RP[b], EP[b], DP[b]
+        done[b], why[b, 0], why[b, 1] = u.shape[0], 0, -1
+        for i in range(first, u.shape[0]):
+            for k in range(ql.shape[0]):
+                ql[k, 0], ql[k, 1], ql[k, 2] = q[i, k, 0], q[i, k, 1], q[i, k, 2]
+            h = u[i] - u[i - 1] if i > 0 else 0.0
+            code, s = sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, ql, h, i > 0, modes, x, th, v, w,
+                             phi, m, J, f, g, G, pivots, out, P, Q, Lc, derivs)  # fmt: skip
+            for k in range(m.shape[0]):
+                M[b, i, k] = m[k]
+            for k in range(links):
+                X[b, i, k, 0], X[b, i, k, 1], X[b, i, k, 2], X[b, i, k, 3] = x[k, 0], x[k, 1], x[k, 2], x[k, 3]
+                TH[b, i, k] = th[k]
+            if derivs:
+                for k in range(links):
+                    for c in range(3):
+                        V[b, i, k, c], W[b, i, k, c] = v[k, c], w[k, c]
+            for k in range(phi.shape[0]):
+                PHI[b, i, k] = phi[k]
+            if code:
+                done[b], why[b, 0], why[b, 1] = i, code, s
+                break

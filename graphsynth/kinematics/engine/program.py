@@ -72,7 +72,7 @@ class Step:
     @property
     def iterative(self) -> bool:
         """Whether the step is solved by Newton's method."""
-        return self.code == codes.NEWTON
+        return self.code in codes.ITERATIVE
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,10 +246,8 @@ class _Compiler:
         ta, tb = cmath.exp(1j * da), cmath.exp(1j * db)
         turn = {codes.E_RR: 0.0, codes.E_RP: db - deb, codes.E_PP: da - dea}[kind]
         self.eliminated.append([kind, link, a, b])
-        self.eliminated_parameters.append(
-            [pa.real, pa.imag, ea.real, ea.imag, pb.real, pb.imag, eb.real, eb.imag, ta.real, ta.imag, tb.real, tb.imag]
-            + [turn]
-        )
+        points = [part for z in (pa, ea, pb, eb, ta, tb) for part in (z.real, z.imag)]
+        self.eliminated_parameters.append([*points, turn])
         parameters = [0.0] * codes.ROW_WIDTH
         if kind == codes.E_RP:  # the pin of a runs on a line of b
             t = cmath.exp(1j * deb)
@@ -259,6 +257,7 @@ class _Compiler:
         parameters[:6] = [pa.real, pa.imag, pb.real, pb.imag, 1.0, 0.0]
         if kind == codes.E_RR:
             parameters[codes.H] = abs(eb - ea)
+            parameters[codes.INVERSE] = 1.0 / parameters[codes.H]
             return Row(codes.DIST, a, b, parameters)
         if abs(math.sin(dea - deb)) <= _WIDE:
             raise GeometryError(
@@ -283,6 +282,8 @@ def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
         return codes.NEWTON, rows
     kinds = sorted(row.kind for row in rows)
     own = core[0]
+    if kinds == [codes.DIST] * 3:
+        return codes.PLATFORM, rows
 
     def order(*wanted: int) -> list[Row]:
         left = list(rows)

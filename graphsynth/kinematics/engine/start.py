@@ -115,6 +115,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     reached = trace.X[0, sorted({link for s in p.steps[:k] for link in s.links} | {p.mechanism.frame}), :2]
     centre, size = reached.mean(axis=0), 2.0 * max(p.Lc, float(np.ptp(reached, axis=0).max()))
     J, f, g, out = np.empty((count, count)), np.empty(count), np.empty(6), np.zeros(3)
+    G = np.empty((count, 6))
     pivots = np.empty(count, dtype=np.int64)
     found: list[Array] = []
     for _ in range(_STARTS * cores):
@@ -125,7 +126,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
             TH[link] = angle
         code = kernels.newton(
             p.rows, p.row_table, row0, count, p.core, core0, cores, X, TH, trace.PHI[0], trace.q[0], trace.V[0], J, f,
-            g, pivots, p.Lc, out,
+            g, G, pivots, p.Lc, out,
         )  # fmt: skip
         if code:
             continue
