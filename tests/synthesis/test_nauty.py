@@ -52,11 +52,18 @@ def test_chains(links, mobility, fractionated):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("links", "mobility"), [(13, 2), (12, 3)])
+def test_larger_chains_with_fractionated_ones(links, mobility):
+    expected = nauty.chains(links, (3 * (links - 1) - mobility) // 2, fractionated=True)
+    same([g.graph6() for g in enumerate_chains(links, mobility, fractionated=True)], expected)
+
+
+@pytest.mark.slow
 def test_fourteen_links():
     same([g.graph6() for g in enumerate_chains(14)], nauty.chains(14, 19))
 
 
-@pytest.mark.parametrize("links", [5, 7, 9, 11])
+@pytest.mark.parametrize("links", [5, 7, 9, 11, pytest.param(13, marks=pytest.mark.slow)])
 def test_trusses_and_groups(links):
     trusses = nauty.chains(links, 3 * (links - 1) // 2, fractionated=True, proper=True)
     same([g.graph6() for g in enumerate_baranov_trusses(links)], trusses)
