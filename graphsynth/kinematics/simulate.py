@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.kinematics.engine.events import dead_centres, ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, compile_program
@@ -20,7 +21,7 @@ from graphsynth.kinematics.engine.start import initial, sign_table
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Motion", "simulate"]
+__all__ = ["BatchMotion", "Motion", "simulate", "simulate_batch"]
 
 Array = NDArray[np.float64]
 

@@ -94,8 +94,8 @@ class Tracker:
         p = self.program
         done, why = np.zeros(1, dtype=np.int64), np.zeros((1, 2), dtype=np.int64)
         kernels.run(
-            p.step_table, p.rows, p.row_table[None], p.core, p.eliminated, p.eliminated_table[None], p.drives,
-            p.drive_table[None], p.need_angle, p.gears, trace.q, trace.u, self.modes, trace.X[None], trace.TH[None],
+            p.step_table, p.rows, p.row_table, p.core, p.eliminated, p.eliminated_table, p.drives,
+            p.drive_table, p.need_angle, p.gears, trace.q, trace.u, self.modes, trace.X[None], trace.TH[None],
             trace.V[None], trace.W[None], trace.PHI[None], trace.M[None], done, why, first, p.Lc, derivs,
         )  # fmt: skip
         return int(done[0]), int(why[0, 0]), int(why[0, 1])

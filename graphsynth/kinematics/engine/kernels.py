@@ -744,3 +744,19 @@ def run(steps, rows, RP, core, elim, EP, drv, DP, need, gears, q, u, modes, X, T
             if code:
                 done[b], why[b, 0], why[b, 1] = i, code, s
                 break
+
+
+@njit(cache=True, error_model="numpy")
+def rrr(A, B, l1, l2, sign, C, margin):
+    """Third joints of RRR dyads; lengths of one entry are shared by all."""
+    s1, s2 = min(1, l1.shape[0] - 1), min(1, l2.shape[0] - 1)
+    for i in range(A.shape[0]):
+        a, b = l1[s1 * i], l2[s2 * i]
+        dx, dy = B[i, 0] - A[i, 0], B[i, 1] - A[i, 1]
+        dd = dx * dx + dy * dy
+        d = math.sqrt(dd)
+        product = ((a + b) - d) * ((a + b) + d) * (d - (a - b)) * (d + (a - b))
+        f = 0.5 / dd
+        c, s = f * (dd + (a - b) * (a + b)), f * sign * math.sqrt(product)
+        margin[i] = 0.25 * product / (a * a * b * b)
+        C[i, 0], C[i, 1] = A[i, 0] + c * dx - s * dy, A[i, 1] + c * dy + s * dx

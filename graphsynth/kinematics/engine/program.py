@@ -8,8 +8,6 @@ triad of class III one core link and three equations, and the kernels solve 3 x 
 
 from __future__ import annotations
 
-import cmath
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,6 +25,9 @@ __all__ = ["Program", "Step", "compile_program"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Complex = NDArray[np.complex128]
+#: One number, or one per dimension set.
+Number = float | Array
 
 _WIDE = 1e-14
 
@@ -37,7 +38,7 @@ class Row(NamedTuple):
     kind: int
     a: int
     b: int
-    parameters: list[float]
+    parameters: list[Number]
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Flat tables that the kernels run, and what they mean."""
+    """Flat tables that the kernels run, and what they mean; parameter tables have the dimension sets as first axis."""
 
     mechanism: Mechanism
     decomposition: Decomposition
@@ -95,8 +96,14 @@ class Program:
     Lc: float
 
 
-def compile_program(mechanism: Mechanism) -> Program:
-    """Compile a mechanism.
+def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Program:
+    """Compile a mechanism, or many of the same kind.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    dimensions : ndarray, shape (sets, joints, 10), optional
+        Dimension sets in the form of ``mechanism.dimensions``, which is the default.
 
     Raises
     ------
@@ -107,24 +114,26 @@ def compile_program(mechanism: Mechanism) -> Program:
         found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
     except GraphError as error:
         raise GeometryError(f"the mechanism cannot be simulated: {error}") from error
-    return _Compiler(mechanism, found).program()
+    return _Compiler(mechanism, found, mechanism.dimensions[None] if dimensions is None else dimensions).program()
 
 
 class _Compiler:
-    def __init__(self, mechanism: Mechanism, found: Decomposition) -> None:
+    def __init__(self, mechanism: Mechanism, found: Decomposition, dimensions: Array) -> None:
         self.mechanism = mechanism
         self.found = found
+        self.sets = len(dimensions)
+        self.sizes = {joint.pair: dimensions[:, k] for k, joint in enumerate(mechanism.joints)}
         self.joint = {joint.pair: joint for joint in mechanism.joints}
         self.driven = {driver.pair: (k, driver) for k, driver in enumerate(mechanism.drivers)}
         self.steps: list[Step] = []
         self.table: list[list[int]] = []
         self.rows: list[list[int]] = []
-        self.row_parameters: list[list[float]] = []
+        self.row_parameters: list[list[Number]] = []
         self.core: list[int] = []
         self.eliminated: list[list[int]] = []
-        self.eliminated_parameters: list[list[float]] = []
+        self.eliminated_parameters: list[list[Number]] = []
         self.drives: list[list[int]] = []
-        self.drive_parameters: list[list[float]] = []
+        self.drive_parameters: list[list[Number]] = []
         self.gears: list[int] = []
 
     def program(self) -> Program:
@@ -141,10 +150,10 @@ class _Compiler:
         return Program(
             mechanism=self.mechanism, decomposition=self.found, steps=tuple(self.steps),
             step_table=_ints(self.table, 9), rows=_ints(self.rows, 5),
-            row_table=_floats(self.row_parameters, codes.ROW_WIDTH), core=np.array(self.core or [0], dtype=np.int64),
+            row_table=self._floats(self.row_parameters, codes.ROW_WIDTH), core=np.array(self.core or [0], dtype=np.int64),
             eliminated=_ints(self.eliminated, 4),
-            eliminated_table=_floats(self.eliminated_parameters, codes.ELIM_WIDTH), drives=_ints(self.drives, 4),
-            drive_table=_floats(self.drive_parameters, codes.DRIVE_WIDTH), need_angle=need,
+            eliminated_table=self._floats(self.eliminated_parameters, codes.ELIM_WIDTH), drives=_ints(self.drives, 4),
+            drive_table=self._floats(self.drive_parameters, codes.DRIVE_WIDTH), need_angle=need,
             gears=np.array(self.gears, dtype=np.int64), Lc=characteristic_length(self.mechanism),
         )  # fmt: skip
 
@@ -160,18 +169,14 @@ class _Compiler:
 
     def _drive(self, pair: tuple[int, int], link: int) -> None:
         joint, (index, driver) = self.joint[pair], self.driven[pair]
-        sign = 1.0 if driver.base == joint.a else -1.0
-        base, own, forward = (joint.at_a, joint.at_b, 1.0) if link == joint.b else (joint.at_b, joint.at_a, -1.0)
-        turn, direction, code = 0.0, 1.0 + 0.0j, codes.DRIVE_R
-        if isinstance(joint, Prismatic):
-            turn = forward * (joint.angle_a - joint.angle_b)
-            direction = cmath.exp(1j * (joint.angle_a if link == joint.b else joint.angle_b))
-            code = codes.DRIVE_P
-        other = joint.a if link == joint.b else joint.b
+        sign, forward = (1.0 if driver.base == joint.a else -1.0), (1.0 if link == joint.b else -1.0)
+        other, base, own, da, db = self._seen(joint, link)
+        code = codes.DRIVE_P if isinstance(joint, Prismatic) else codes.DRIVE_R
+        direction = np.exp(1j * da)
         self.table.append([code, len(self.drives), 0, 0, 0, 0, 0, 0, -1])
         self.steps.append(Step(code, -1, (link,), f"driver {joint.kind}"))
         self.drives.append([code, other, link, index])
-        self.drive_parameters.append([*base, direction.real, direction.imag, *own, sign * forward, turn])
+        self.drive_parameters.append([*_parts(base, direction, own), sign * forward, da - db])
 
     def _group(self, index: int, links: tuple[int, ...], placed: set[int]) -> None:
         inside = set(links)
@@ -214,20 +219,20 @@ class _Compiler:
     def _rows(self, joint: JointGeometry) -> list[Row]:
         """Return the equations of a joint, the driven coordinate included."""
         a, b = joint.a, joint.b
-        base = [*joint.at_a, *joint.at_b, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        size = self.sizes[joint.pair].T
+        base: list[Number] = [size[0], size[1], size[3], size[4], 1.0, 0.0, *[0.0] * 6]
         found = []
         if isinstance(joint, Gear):
-            base[codes.H], base[codes.RA], base[codes.RB] = joint.offset, joint.radius_a, joint.radius_b
-            base[codes.SIGN] = -1.0 if joint.internal else 1.0
+            base[codes.RA], base[codes.RB], base[codes.SIGN], base[codes.H] = size[6:10]
             return [Row(codes.GEAR, a, b, base)]
         if isinstance(joint, Revolute):
             found = [Row(codes.RX, a, b, list(base)), Row(codes.RY, a, b, list(base))]
         else:
-            base[codes.TX], base[codes.TY] = math.cos(joint.angle_a), math.sin(joint.angle_a)
+            base[codes.TX], base[codes.TY] = np.cos(size[2]), np.sin(size[2])
             found = [Row(codes.LINE, a, b, list(base))]
             if isinstance(joint, Prismatic):
                 turned = list(base)
-                turned[codes.H] = joint.angle_a - joint.angle_b
+                turned[codes.H] = size[2] - size[5]
                 found.append(Row(codes.ANGLE, a, b, turned))
         if joint.pair in self.driven:
             index, driver = self.driven[joint.pair]
@@ -239,41 +244,48 @@ class _Compiler:
         """Record an eliminated link and return the equation that replaces it."""
         if isinstance(first, Prismatic) and isinstance(second, Revolute):
             first, second = second, first
-        a, pa, ea, da, dea = _seen(first, link)
-        b, pb, eb, db, deb = _seen(second, link)
+        a, pa, ea, da, dea = self._seen(first, link)
+        b, pb, eb, db, deb = self._seen(second, link)
         kind = codes.E_PP if isinstance(first, Prismatic) else codes.E_RP
         kind = codes.E_RR if isinstance(second, Revolute) else kind
-        ta, tb = cmath.exp(1j * da), cmath.exp(1j * db)
-        turn = {codes.E_RR: 0.0, codes.E_RP: db - deb, codes.E_PP: da - dea}[kind]
+        ta, tb = np.exp(1j * da), np.exp(1j * db)
+        turn = 0.0 * da if kind == codes.E_RR else db - deb if kind == codes.E_RP else da - dea
         self.eliminated.append([kind, link, a, b])
-        points = [part for z in (pa, ea, pb, eb, ta, tb) for part in (z.real, z.imag)]
-        self.eliminated_parameters.append([*points, turn])
-        parameters = [0.0] * codes.ROW_WIDTH
+        self.eliminated_parameters.append([*_parts(pa, ea, pb, eb, ta, tb), turn])
         if kind == codes.E_RP:  # the pin of a runs on a line of b
-            t = cmath.exp(1j * deb)
-            offset = (t.conjugate() * (ea - eb)).imag
-            parameters[:7] = [pb.real, pb.imag, pa.real, pa.imag, tb.real, tb.imag, offset]
-            return Row(codes.LINE, b, a, parameters)
-        parameters[:6] = [pa.real, pa.imag, pb.real, pb.imag, 1.0, 0.0]
+            offset = (np.exp(-1j * deb) * (ea - eb)).imag
+            return Row(codes.LINE, b, a, [*_parts(pb, pa, tb), offset, *[0.0] * 5])
         if kind == codes.E_RR:
-            parameters[codes.H] = abs(eb - ea)
-            parameters[codes.INVERSE] = 1.0 / parameters[codes.H]
-            return Row(codes.DIST, a, b, parameters)
-        if abs(math.sin(dea - deb)) <= _WIDE:
+            length = np.abs(eb - ea)
+            if not (length > 0.0).all():
+                raise GeometryError(f"link {link} has length 0 between its two joints; give it a positive length")
+            return Row(codes.DIST, a, b, [*_parts(pa, pb), 1.0, 0.0, length, *[0.0] * 4, 1.0 / length])
+        if (np.abs(np.sin(dea - deb)) <= _WIDE).any():
             raise GeometryError(
                 f"link {link} slides along two parallel lines, so its place is not defined; turn one direction"
             )
-        parameters[codes.H] = da - dea + deb - db
-        return Row(codes.ANGLE, a, b, parameters)
+        return Row(codes.ANGLE, a, b, [*_parts(pa, pb), 1.0, 0.0, da - dea + deb - db, *[0.0] * 5])
+
+    def _seen(self, joint: JointGeometry, link: int) -> tuple[int, Complex, Complex, Array, Array]:
+        """Other link, its point, the link's point, and the directions there (0 for a turning pair)."""
+        size = self.sizes[joint.pair].T
+        on_a, on_b = size[0] + 1j * size[1], size[3] + 1j * size[4]
+        if link == joint.b:
+            return joint.a, on_a, on_b, size[2], size[5]
+        return joint.b, on_b, on_a, size[5], size[2]
+
+    def _floats(self, rows: list[list[Number]], width: int) -> Array:
+        """Return a parameter table, shape (sets, rows, width)."""
+        table = np.zeros((self.sets, len(rows), width))
+        for k, parameters in enumerate(rows):
+            for column, value in enumerate(parameters):
+                table[:, k, column] = value
+        return table
 
 
-def _seen(joint: JointGeometry, link: int) -> tuple[int, complex, complex, float, float]:
-    """Other link, its point, the link's point, and the directions there (0 for a turning pair)."""
-    angle_a = joint.angle_a if isinstance(joint, Prismatic | PinSlot) else 0.0
-    angle_b = joint.angle_b if isinstance(joint, Prismatic) else 0.0
-    if link == joint.b:
-        return joint.a, complex(*joint.at_a), complex(*joint.at_b), angle_a, angle_b
-    return joint.b, complex(*joint.at_b), complex(*joint.at_a), angle_b, angle_a
+def _parts(*points: Complex) -> list[Number]:
+    """Real and imaginary parts in turn."""
+    return [part for z in points for part in (z.real, z.imag)]
 
 
 def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
@@ -298,7 +310,7 @@ def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
             return (codes.R_LINE_PIN if last.b == own else codes.R_LINE_SLOT), third
         if last.kind == codes.ANGLE:
             return codes.R_ANGLE, third
-        if last.kind == codes.GEAR and _own_point(held, own) == _own_point(last, own):
+        if last.kind == codes.GEAR and _same_point(held, last, own):
             return codes.R_GEAR, third
     if kinds == [codes.DIST, codes.LINE, codes.ANGLE]:
         return codes.P_DIST, order(codes.LINE, codes.ANGLE, codes.DIST)
@@ -309,8 +321,10 @@ def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
     return codes.NEWTON, rows
 
 
-def _own_point(row: Row, link: int) -> list[float]:
-    return row.parameters[2:4] if row.b == link else row.parameters[0:2]
+def _same_point(first: Row, second: Row, link: int) -> bool:
+    """Whether two rows hold the same point of a link, in every dimension set."""
+    ends = [row.parameters[2:4] if row.b == link else row.parameters[0:2] for row in (first, second)]
+    return all(np.array_equal(p, q) for p, q in zip(*ends))
 
 
 def _describe(code: int, links: tuple[int, ...], own: list[JointGeometry]) -> str:
@@ -328,7 +342,3 @@ def _describe(code: int, links: tuple[int, ...], own: list[JointGeometry]) -> st
 
 def _ints(rows: list[list[int]], width: int) -> IntArray:
     return np.array(rows, dtype=np.int64).reshape(-1, width)
-
-
-def _floats(rows: list[list[float]], width: int) -> Array:
-    return np.array(rows, dtype=np.float64).reshape(-1, width)

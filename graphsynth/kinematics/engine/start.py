@@ -96,12 +96,12 @@ def _platform_modes(program: Program, trace: Trace, k: int) -> Array:
     anchors, vertices, lengths = [], [], []
     for r in range(row0, row0 + count):
         _, a, b, _, _ = program.rows[r]
-        pa, pb = complex(*program.row_table[r, 0:2]), complex(*program.row_table[r, 2:4])
+        pa, pb = complex(*program.row_table[0, r, 0:2]), complex(*program.row_table[0, r, 2:4])
         other, far, near = (b, pb, pa) if a == own else (a, pa, pb)
         x, y, c, s = trace.X[0, other]
         anchors.append(complex(x, y) + complex(c, s) * far)
         vertices.append(near)
-        lengths.append(program.row_table[r, codes.H])
+        lengths.append(program.row_table[0, r, codes.H])
     return np.asarray(assembly_modes(anchors, vertices, lengths).poses)[:, None, :]
 
 
@@ -125,7 +125,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
             X[link] = (*(centre + random.uniform(-size, size, 2)), np.cos(angle), np.sin(angle))
             TH[link] = angle
         code = kernels.newton(
-            p.rows, p.row_table, row0, count, p.core, core0, cores, X, TH, trace.PHI[0], trace.q[0], trace.V[0], J, f,
+            p.rows, p.row_table[0], row0, count, p.core, core0, cores, X, TH, trace.PHI[0], trace.q[0], trace.V[0], J, f,
             g, G, pivots, p.Lc, out,
         )  # fmt: skip
         if code:

@@ -1,0 +1,214 @@
+"""One mechanism with many dimension sets over the same inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.follow import Tracker
+from graphsynth.kinematics.engine.program import Program, compile_program
+from graphsynth.kinematics.engine.start import initial, sign_table
+
+if TYPE_CHECKING:
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["BatchMotion", "simulate_batch"]
+
+Array = NDArray[np.float64]
+
+_REASONS = {
+    codes.DONE: "",
+    codes.UNREACHABLE: "cannot be assembled",
+    codes.STEP_TOO_LONG: "moves too far in one step to be sure of its branch; give finer inputs or use simulate",
+    codes.NO_CONVERGENCE: "does not converge; give finer inputs or a better start",
+    codes.SINGULAR: "is singular",
+    codes.BAD_INPUT: "has no driver value",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class BatchMotion:
+    """Branches of many dimension sets (estimated: floating point; NaN where a branch does not reach).
+
+    Attributes
+    ----------
+    inputs : ndarray, shape (n,)
+    frames : ndarray, shape (sets, n, links, 4)
+        ``(x, y, cos theta, sin theta)``.
+    velocities, accelerations : ndarray, shape (sets, n, links, 3)
+        Derivatives of ``(x, y, theta)`` by the input; empty if not asked for.
+    margins : ndarray, shape (sets, n, groups)
+        As in `Motion.margins`.
+    reached : ndarray of int, shape (sets,)
+        Number of inputs reached.
+    code, group : ndarray of int, shape (sets,)
+        Why a set stopped and in which group (-1 for none); see `reason`.
+    """
+
+    inputs: Array
+    frames: Array
+    velocities: Array
+    accelerations: Array
+    margins: Array
+    reached: NDArray[np.int64]
+    code: NDArray[np.int64]
+    group: NDArray[np.int64]
+
+    @property
+    def assembled(self) -> NDArray[np.bool_]:
+        """True where a pose exists, shape (sets, n)."""
+        return np.asarray(np.arange(len(self.inputs)) < self.reached[:, None])
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """True for sets that reached every input.
+
+        Gaps narrower than a step are not looked for: confirm an accepted set with `simulate`.
+        """
+        return np.asarray(self.reached == len(self.inputs))
+
+    @property
+    def poses(self) -> Array:
+        """``(x, y, theta)``, theta in (-pi, pi], shape (sets, n, links, 3)."""
+        angle = np.arctan2(self.frames[..., 3], self.frames[..., 2])
+        return np.concatenate([self.frames[..., :2], angle[..., None]], axis=-1)
+
+    def point(self, link: int, local: ArrayLike) -> Array:
+        """Positions of a point (x, y) of a link, shape (sets, n, 2); ``local`` may differ by set, shape (sets, 2)."""
+        at = finite_array("local", local)
+        px, py = at[..., 0:1], at[..., 1:2]
+        x, y, c, s = (self.frames[:, :, link, k] for k in range(4))
+        return np.stack([x + c * px - s * py, y + s * px + c * py], axis=-1)
+
+    def reason(self, index: int) -> str:
+        """Why a set stopped, in one sentence; empty if it did not."""
+        if self.code[index] == codes.DONE:
+            return ""
+        at = self.inputs[self.reached[index]]
+        return f"group {self.group[index]} {_REASONS[int(self.code[index])]} (at the input {at:.12g})"
+
+
+def simulate_batch(
+    mechanism: Mechanism,
+    inputs: ArrayLike,
+    dimensions: ArrayLike,
+    *,
+    modes: Mapping[int, int] | None = None,
+    start: ArrayLike | None = None,
+    rates: bool = True,
+) -> BatchMotion:
+    """Move many dimension sets of one mechanism over the same inputs.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Gives graph, joint kinds, drivers and laws.
+    inputs : array_like, shape (n,)
+        Strictly increasing or decreasing.
+    dimensions : array_like, shape (sets, joints, 10)
+        In the form of ``mechanism.dimensions``.
+    modes : mapping of int to int, optional
+        As for `simulate`, the same for every set.
+    start : array_like, shape (links, 3) or (sets, links, 3), optional
+        Poses close to the branch at the first input, for groups solved by Newton.
+    rates : bool, optional
+        Also velocities and accelerations.  They are computed anyway if a group needs Newton.
+
+    Returns
+    -------
+    BatchMotion
+        Without step refinement and events: a set whose step is too long to be sure of the branch stops with that
+        reason.
+
+    Raises
+    ------
+    GeometryError
+        Shapes that do not fit, numbers that are not finite, modes that do not exist.
+
+    Examples
+    --------
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph, Revolute
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> base = Mechanism(graph, [
+    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+    ...     Revolute(0, 3, (2.0, 0.0)),
+    ... ], [Driver(0, 1)])
+    >>> sets = np.repeat(base.dimensions[None], 3, axis=0)
+    >>> sets[:, 1, 0] = [2.0, 2.6, 9.0]  # x of joint 0-3 on the frame
+    >>> simulate_batch(base, np.linspace(0.0, 6.28, 91), sets).completed.tolist()
+    [True, True, False]
+    """
+    u = finite_array("inputs", inputs)
+    steps = np.diff(u)
+    if u.ndim != 1 or u.size == 0 or not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise GeometryError("inputs must be one list that increases or decreases strictly")
+    sizes = np.ascontiguousarray(finite_array("dimensions", dimensions))
+    if sizes.ndim != 3 or sizes.shape[1:] != mechanism.dimensions.shape:
+        raise GeometryError(
+            f"dimensions have shape {sizes.shape}; give (sets, {', '.join(map(str, mechanism.dimensions.shape))})"
+        )
+    program = compile_program(mechanism, sizes)
+    signs = sign_table(program, modes or {})
+    poses, found = _starts(program, signs, float(u[0]), modes or {}, start)
+    return _run(program, signs, u, poses, found, rates)
+
+
+def _starts(
+    program: Program, signs: Array, u0: float, modes: Mapping[int, int], start: ArrayLike | None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Start poses by set, and whether they were found."""
+    sets, links = len(program.row_table), program.mechanism.graph.links
+    poses, found = np.zeros((sets, links, 3)), np.ones(sets, dtype=np.bool_)
+    given = start if start is not None else program.mechanism.pose
+    if given is not None:
+        values = finite_array("start", given)
+        if values.shape not in ((links, 3), (sets, links, 3)):
+            raise GeometryError(f"start has shape {values.shape}; give ({links}, 3) or ({sets}, {links}, 3)")
+        poses[:] = values
+    elif any(step.iterative for step in program.steps):
+        for b in range(sets):
+            one = slice(b, b + 1)
+            single = replace(
+                program, row_table=program.row_table[one], eliminated_table=program.eliminated_table[one],
+                drive_table=program.drive_table[one],
+            )  # fmt: skip
+            poses[b], code, _ = initial(Tracker(single, signs), u0, modes, None)
+            found[b] = code == codes.DONE
+    return poses, found
+
+
+def _run(program: Program, signs: Array, u: Array, poses: Array, found: NDArray[np.bool_], rates: bool) -> BatchMotion:
+    from graphsynth.kinematics.engine import kernels
+
+    sets, n, links, count = len(poses), len(u), program.mechanism.graph.links, len(program.steps)
+    needed = rates or any(step.iterative for step in program.steps)
+    X, TH = np.full((sets, n, links, 4), np.nan), np.zeros((sets, n, links))
+    X[:, 0, :, :2] = poses[..., :2]
+    X[:, 0, :, 2], X[:, 0, :, 3] = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    X[:, 0, program.mechanism.frame] = (0.0, 0.0, 1.0, 0.0)
+    TH[:, 0] = poses[..., 2]
+    V = np.zeros((sets, n if needed else 1, links, 3))
+    W, PHI = np.zeros_like(V), np.zeros((sets, n, max(1, len(program.gears))))
+    M = np.full((sets, n, count), np.nan)
+    done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
+    kernels.run(
+        program.step_table, program.rows, program.row_table, program.core, program.eliminated,
+        program.eliminated_table, program.drives, program.drive_table, program.need_angle, program.gears,
+        Tracker(program, signs).values(u), u, signs, X, TH, V, W, PHI, M, done, why, 0, program.Lc, needed,
+    )  # fmt: skip
+    done[~found], why[~found, 0] = 0, codes.UNREACHABLE
+    missing = np.arange(n) >= done[:, None]
+    groups = [k for k, step in enumerate(program.steps) if step.group >= 0]
+    for array in (X, M, V, W):
+        if array.shape[1] == n:
+            array[missing] = np.nan
+    group = np.array([program.steps[k].group if k >= 0 else -1 for k in why[:, 1]], dtype=np.int64)
+    kept = V[:, :0] if not rates else V
+    return BatchMotion(u, X, kept, W[:, :0] if not rates else W, M[:, :, groups], done, why[:, 0], group)
