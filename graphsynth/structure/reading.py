@@ -96,7 +96,7 @@ def _add_option(options: dict[str, Any], name: str, value: Any) -> None:
     if name == "simple_joints":
         if value is not True:
             raise SpecError(
-                f"simple_joints = {value!r}: only true is possible; model a pin that joins k links as k - 1 simple joints"
+                f"simple_joints = {value!r}: only true is possible; a pin that joins k links is k - 1 simple joints"
             )
         return  # always so
     if name == "fractionated":
