@@ -193,7 +193,9 @@ def test_laws_give_their_own_derivatives(law: Any) -> None:
 # --- files
 
 
-@pytest.mark.parametrize("make", [mixed, lambda: Mechanism(CYCLE, BARS, [Driver(0, 1)]), lambda: Mechanism(CYCLE, BARS)])
+@pytest.mark.parametrize(
+    "make", [mixed, lambda: Mechanism(CYCLE, BARS, [Driver(0, 1)]), lambda: Mechanism(CYCLE, BARS)]
+)
 def test_round_trip_is_exact(make: Any) -> None:
     mechanism = make()
     for write, read in ((Mechanism.to_json, Mechanism.from_json), (Mechanism.to_toml, Mechanism.from_toml)):
