@@ -1,6 +1,7 @@
 """Compiled kernels: constraint rows, Newton, closed-form dyads, eliminated links, and the run over the inputs.
 
-A pose is ``(x, y, cos theta, sin theta)``; angles are kept, unwrapped, only where gears need them.
+The state of a link is one row of eleven numbers: x, y, cos theta, sin theta, theta (unwrapped; right only where gears
+need it), the velocity (x', y', theta') and the acceleration.
 """
 
 import math
@@ -12,7 +13,7 @@ TAU = 2.0 * math.pi
 
 
 @njit(cache=True, error_model="numpy")
-def row(kind, p, k, a, b, x, th, phi, q, g):
+def row(kind, p, k, a, b, x, phi, q, g):
     """Value of one constraint row; its gradient by (x, y, theta) of a and of b goes to g[0:6]."""
     ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
     ux, uy = ca * p[k, 0] - sa * p[k, 1], sa * p[k, 0] + ca * p[k, 1]
@@ -61,12 +62,12 @@ def row(kind, p, k, a, b, x, th, phi, q, g):
     g[0], g[1], g[2] = scale * total * nx, scale * total * ny, scale * (p[k, 7] + total * (ux * ny - uy * nx))
     g[3], g[4] = -scale * total * nx, -scale * total * ny
     g[5] = scale * (p[k, 9] * p[k, 8] - total * (wx * ny - wy * nx))
-    return scale * (p[k, 7] * (th[a] - here) + p[k, 9] * p[k, 8] * (th[b] - here - p[k, 6]))
+    return scale * (p[k, 7] * (x[a, 4] - here) + p[k, 9] * p[k, 8] * (x[b, 4] - here - p[k, 6]))
 
 
 @njit(cache=True, error_model="numpy")
-def gamma(kind, p, k, a, b, x, v, q):
-    """Second-order part of a row: its second derivative along the velocities v, accelerations being zero."""
+def gamma(kind, p, k, a, b, x, q):
+    """Second-order part of a row: its second derivative along the velocities, accelerations being zero."""
     if kind == 4:
         return 0.0
     if kind == 6:
@@ -74,14 +75,14 @@ def gamma(kind, p, k, a, b, x, v, q):
     ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
     ux, uy = ca * p[k, 0] - sa * p[k, 1], sa * p[k, 0] + ca * p[k, 1]
     wx, wy = cb * p[k, 2] - sb * p[k, 3], sb * p[k, 2] + cb * p[k, 3]
-    oa, ob = v[a, 2], v[b, 2]
+    oa, ob = x[a, 7], x[b, 7]
     cx, cy = oa * oa * ux - ob * ob * wx, oa * oa * uy - ob * ob * wy
     if kind == 0:
         return cx
     if kind == 1:
         return cy
     dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
-    ex, ey = v[b, 0] - ob * wy - v[a, 0] + oa * uy, v[b, 1] + ob * wx - v[a, 1] - oa * ux
+    ex, ey = x[b, 5] - ob * wy - x[a, 5] + oa * uy, x[b, 6] + ob * wx - x[a, 6] - oa * ux
     if kind == 2:
         return (ex * ex + ey * ey + dx * cx + dy * cy) * p[k, 11]
     if kind == 3 or kind == 7:
@@ -138,14 +139,14 @@ def back(J, n, pivots, y):
 
 
 @njit(cache=True, error_model="numpy")
-def assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, G, moving):
+def assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, moving):
     """Jacobian by the core links, residuals, or (moving) the right-hand side of the velocities; returns prod |row|."""
     norms = 1.0
     n = nr
     for r in range(nr):
         k = r0 + r
         kind, a, b, ia, ib = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3], rows[k, 4]
-        f[r] = row(kind, rp, k, a, b, x, th, phi, q, g)
+        f[r] = row(kind, rp, k, a, b, x, phi, q, g)
         if moving:
             f[r] = 0.0
             if kind >= 6:
@@ -159,30 +160,30 @@ def assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, G, moving):
                 J[r, 3 * ia + c] = g[c]
                 size += g[c] * g[c] if c < 2 else 0.0
             elif moving:
-                f[r] -= g[c] * v[a, c]
+                f[r] -= g[c] * x[a, 5 + c]
             if ib >= 0:
                 J[r, 3 * ib + c] = g[3 + c]
                 size += g[3 + c] * g[3 + c] if c < 2 else 0.0
             elif moving:
-                f[r] -= g[3 + c] * v[b, c]
+                f[r] -= g[3 + c] * x[b, 5 + c]
         norms *= max(1.0, math.sqrt(size))
     return norms
 
 
 @njit(cache=True, error_model="numpy")
-def follow_angle(link, x, th, near):
+def follow_angle(link, x, near):
     """Unwrapped angle of a link, nearest to ``near``."""
     raw = math.atan2(x[link, 3], x[link, 2])
-    th[link] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
+    x[link, 4] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
 
 
 @njit(cache=True, error_model="numpy")
-def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, G, pivots, Lc, out):
+def newton(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots, Lc, out):
     """Newton from x; out = (first correction, last correction, rate); returns 0 if it converged."""
     last = 0.0
     out[2] = 0.0
     for it in range(30):
-        assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, G, False)
+        assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, False)
         det = factor(J, nr, pivots)
         if det == 0.0 or not math.isfinite(det):
             return 4
@@ -194,7 +195,7 @@ def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, G, pivots,
             size += fx * fx + fy * fy + Lc * Lc * ft * ft
             x[link, 0] -= fx
             x[link, 1] -= fy
-            th[link] -= ft
+            x[link, 4] -= ft
             c, s = math.cos(ft), math.sin(ft)
             xc, xs = x[link, 2] * c + x[link, 3] * s, x[link, 3] * c - x[link, 2] * s
             inv = 1.5 - 0.5 * (xc * xc + xs * xs)
@@ -216,7 +217,7 @@ def newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, G, pivots,
 
 
 @njit(cache=True, error_model="numpy")
-def drive(step, d, p, r, x, th, v, w, q):
+def drive(step, d, p, r, x, q):
     """Place a driven link from the link it is driven on."""
     base, link, k = d[r, 1], d[r, 2], d[r, 3]
     s = p[r, 6]
@@ -224,10 +225,10 @@ def drive(step, d, p, r, x, th, v, w, q):
     px, py = cb * p[r, 0] - sb * p[r, 1], sb * p[r, 0] + cb * p[r, 1]
     turn = p[r, 7] + (s * q[k, 0] if step == 0 else 0.0)
     c, sn = math.cos(turn), math.sin(turn)
-    th[link] = th[base] + turn
+    x[link, 4] = x[base, 4] + turn
     x[link, 2], x[link, 3] = cb * c - sb * sn, sb * c + cb * sn
     ox, oy = x[link, 2] * p[r, 4] - x[link, 3] * p[r, 5], x[link, 3] * p[r, 4] + x[link, 2] * p[r, 5]
-    o, al = v[base, 2], w[base, 2]
+    o, al = x[base, 7], x[base, 10]
     tx, ty, rate, acc = 0.0, 0.0, 0.0, 0.0
     if step == 1:
         tx, ty = cb * p[r, 2] - sb * p[r, 3], sb * p[r, 2] + cb * p[r, 3]
@@ -237,12 +238,12 @@ def drive(step, d, p, r, x, th, v, w, q):
     ol, all_ = o, al
     if step == 0:
         ol, all_ = o + s * q[k, 1], al + s * q[k, 2]
-    v[link, 0] = v[base, 0] - o * py + rate * tx + ol * oy
-    v[link, 1] = v[base, 1] + o * px + rate * ty - ol * ox
-    v[link, 2] = ol
-    w[link, 0] = w[base, 0] - al * py - o * o * px + acc * tx - 2.0 * o * rate * ty + all_ * oy + ol * ol * ox
-    w[link, 1] = w[base, 1] + al * px - o * o * py + acc * ty + 2.0 * o * rate * tx - all_ * ox + ol * ol * oy
-    w[link, 2] = all_
+    x[link, 5] = x[base, 5] - o * py + rate * tx + ol * oy
+    x[link, 6] = x[base, 6] + o * px + rate * ty - ol * ox
+    x[link, 7] = ol
+    x[link, 8] = x[base, 8] - al * py - o * o * px + acc * tx - 2.0 * o * rate * ty + all_ * oy + ol * ol * ox
+    x[link, 9] = x[base, 9] + al * px - o * o * py + acc * ty + 2.0 * o * rate * tx - all_ * ox + ol * ol * oy
+    x[link, 10] = all_
 
 
 @njit(cache=True, error_model="numpy")
@@ -268,13 +269,13 @@ def pin_to(x, link, lx, ly, wx, wy):
 
 
 @njit(cache=True, error_model="numpy")
-def orient(rows, rp, k, x, th, own):
+def orient(rows, rp, k, x, own):
     """Orient link ``own`` by the ANGLE row k."""
     a, b, h = rows[k, 1], rows[k, 2], rp[k, 6]
     other, sign = (a, 1.0) if own == b else (b, -1.0)
     c, s = math.cos(h), sign * math.sin(h)
     x[own, 2], x[own, 3] = x[other, 2] * c - x[other, 3] * s, x[other, 3] * c + x[other, 2] * s
-    th[own] = th[other] + sign * h
+    x[own, 4] = x[other, 4] + sign * h
 
 
 @njit(cache=True, error_model="numpy")
@@ -311,10 +312,10 @@ def circles(dx, dy, l1, l2, sign, out):
 
 
 @njit(cache=True, error_model="numpy")
-def closed_form(code, rows, rp, r0, own, sign, x, th, phi, g):
+def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
     """Place the one core link of a group; returns its margin, negative where it cannot be assembled."""
     if code == 7 or code == 8:  # a sliding pair orients the link: rows LINE, ANGLE, then DIST or LINE
-        orient(rows, rp, r0 + 1, x, th, own)
+        orient(rows, rp, r0 + 1, x, own)
         tx, ty, kappa = line_of(rows, rp, r0, x, own)
         k = r0 + 2
         if code == 8:
@@ -389,7 +390,7 @@ def closed_form(code, rows, rp, r0, own, sign, x, th, phi, g):
         along = sign * math.sqrt((d - e) * (d + e))
         turn_to(x, own, along * tx - e * ty, along * ty + e * tx, dx, dy)
     elif code == 5:
-        orient(rows, rp, k, x, th, own)
+        orient(rows, rp, k, x, own)
     else:  # gear with its centre on the turning pair
         other = b if own == a else a
         if own == a:
@@ -402,16 +403,16 @@ def closed_form(code, rows, rp, r0, own, sign, x, th, phi, g):
         here = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
         ra, rb = rp[k, 7], rp[k, 9] * rp[k, 8]
         if own == a:
-            th[own] = here - rb * (th[other] - here - rp[k, 6]) / ra
+            x[own, 4] = here - rb * (x[other, 4] - here - rp[k, 6]) / ra
         else:
-            th[own] = here + rp[k, 6] - ra * (th[other] - here) / rb
-        x[own, 2], x[own, 3] = math.cos(th[own]), math.sin(th[own])
+            x[own, 4] = here + rp[k, 6] - ra * (x[other, 4] - here) / rb
+        x[own, 2], x[own, 3] = math.cos(x[own, 4]), math.sin(x[own, 4])
     pin_to(x, own, hx, hy, ax, ay)
     return margin
 
 
 @njit(cache=True, error_model="numpy")
-def place_eliminated(kind, e, a, b, p, r, x, th, v, w, derivs):
+def place_eliminated(kind, e, a, b, p, r, x, derivs):
     """Place a link eliminated from its group, with velocity and acceleration."""
     ax, ay = world(x, a, p[r, 0], p[r, 1])
     bx, by = world(x, b, p[r, 4], p[r, 5])
@@ -422,14 +423,14 @@ def place_eliminated(kind, e, a, b, p, r, x, th, v, w, derivs):
         base = b if kind == 1 else a
         c, s = math.cos(p[r, 12]), math.sin(p[r, 12])
         x[e, 2], x[e, 3] = x[base, 2] * c - x[base, 3] * s, x[base, 3] * c + x[base, 2] * s
-        th[e] = th[base] + p[r, 12]
+        x[e, 4] = x[base, 4] + p[r, 12]
         if kind == 1:
             pin_to(x, e, p[r, 2], p[r, 3], ax, ay)
-    oa, ob, la, lb = v[a, 2], v[b, 2], w[a, 2], w[b, 2]
+    oa, ob, la, lb = x[a, 7], x[b, 7], x[a, 10], x[b, 10]
     ux, uy, wx, wy = ax - x[a, 0], ay - x[a, 1], bx - x[b, 0], by - x[b, 1]
-    vax, vay, vbx, vby = v[a, 0] - oa * uy, v[a, 1] + oa * ux, v[b, 0] - ob * wy, v[b, 1] + ob * wx
-    aax, aay = w[a, 0] - la * uy - oa * oa * ux, w[a, 1] + la * ux - oa * oa * uy
-    abx, aby = w[b, 0] - lb * wy - ob * ob * wx, w[b, 1] + lb * wx - ob * ob * wy
+    vax, vay, vbx, vby = x[a, 5] - oa * uy, x[a, 6] + oa * ux, x[b, 5] - ob * wy, x[b, 6] + ob * wx
+    aax, aay = x[a, 8] - la * uy - oa * oa * ux, x[a, 9] + la * ux - oa * oa * uy
+    abx, aby = x[b, 8] - lb * wy - ob * ob * wx, x[b, 9] + lb * wx - ob * ob * wy
     c, s = x[e, 2], x[e, 3]
     fx, fy = c * p[r, 2] - s * p[r, 3], s * p[r, 2] + c * p[r, 3]
     if kind < 2:
@@ -441,8 +442,8 @@ def place_eliminated(kind, e, a, b, p, r, x, th, v, w, derivs):
             dd = dx * dx + dy * dy
             o = (dx * (vby - vay) - dy * (vbx - vax)) / dd
             l = (dx * (aby - aay) - dy * (abx - aax)) / dd
-        v[e, 0], v[e, 1], v[e, 2] = vax + o * fy, vay - o * fx, o
-        w[e, 0], w[e, 1], w[e, 2] = aax + l * fy + o * o * fx, aay - l * fx + o * o * fy, l
+        x[e, 5], x[e, 6], x[e, 7] = vax + o * fy, vay - o * fx, o
+        x[e, 8], x[e, 9], x[e, 10] = aax + l * fy + o * o * fx, aay - l * fx + o * o * fy, l
         return
     # two sliding pairs: the origin lies on two lines of known directions
     hx, hy = c * p[r, 6] - s * p[r, 7], s * p[r, 6] + c * p[r, 7]
@@ -459,52 +460,52 @@ def place_eliminated(kind, e, a, b, p, r, x, th, v, w, derivs):
     # d/du of n . X = 0 with n' = -omega t
     k1 = -ty * (vax + o * fy) + tx * (vay - o * fx) + o * (tx * X1 + ty * Y1)
     k2 = -sy * (vbx + o * hy) + sx * (vby - o * hx) + o * (sx * X2 + sy * Y2)
-    v[e, 0], v[e, 1], v[e, 2] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det, o
-    p1x, p1y = v[e, 0] - o * fy - vax, v[e, 1] + o * fx - vay
-    p2x, p2y = v[e, 0] - o * hy - vbx, v[e, 1] + o * hx - vby
+    x[e, 5], x[e, 6], x[e, 7] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det, o
+    p1x, p1y = x[e, 5] - o * fy - vax, x[e, 6] + o * fx - vay
+    p2x, p2y = x[e, 5] - o * hy - vbx, x[e, 6] + o * hx - vby
     # n'' = -alpha t - omega^2 n, and n . X = 0
     k1 = (-ty * (aax + l * fy + o * o * fx) + tx * (aay - l * fx + o * o * fy)
           + 2.0 * o * (tx * p1x + ty * p1y) + l * (tx * X1 + ty * Y1))  # fmt: skip
     k2 = (-sy * (abx + l * hy + o * o * hx) + sx * (aby - l * hx + o * o * hy)
           + 2.0 * o * (sx * p2x + sy * p2y) + l * (sx * X2 + sy * Y2))  # fmt: skip
-    w[e, 0], w[e, 1], w[e, 2] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det, l
+    x[e, 8], x[e, 9], x[e, 10] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det, l
 
 
 @njit(cache=True, error_model="numpy")
-def rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, G, pivots):
+def rates(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots):
     """Velocities and accelerations of the core links; returns the determinant over the product of row lengths."""
-    norms = assemble(rows, rp, r0, nr, x, th, phi, q, v, J, f, g, G, True)
+    norms = assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, True)
     det = factor(J, nr, pivots)
     if det == 0.0:
         for k in range(nc):
             for c in range(3):
-                v[core[c0 + k], c] = math.nan
-                w[core[c0 + k], c] = math.nan
+                x[core[c0 + k], 5 + c] = math.nan
+                x[core[c0 + k], 8 + c] = math.nan
         return 0.0
     back(J, nr, pivots, f)
     for k in range(nc):
         for c in range(3):
-            v[core[c0 + k], c] = f[3 * k + c]
+            x[core[c0 + k], 5 + c] = f[3 * k + c]
     for r in range(nr):
         k = r0 + r
         kind, a, b = rows[k, 0], rows[k, 1], rows[k, 2]
-        total = -gamma(kind, rp, k, a, b, x, v, q)
+        total = -gamma(kind, rp, k, a, b, x, q)
         if rows[k, 3] < 0 or rows[k, 4] < 0:
             for c in range(3):
                 if rows[k, 3] < 0:
-                    total -= G[r, c] * w[a, c]
+                    total -= G[r, c] * x[a, 8 + c]
                 if rows[k, 4] < 0:
-                    total -= G[r, 3 + c] * w[b, c]
+                    total -= G[r, 3 + c] * x[b, 8 + c]
         f[r] = total
     back(J, nr, pivots, f)
     for k in range(nc):
         for c in range(3):
-            w[core[c0 + k], c] = f[3 * k + c]
+            x[core[c0 + k], 8 + c] = f[3 * k + c]
     return det / norms
 
 
 @njit(cache=True, error_model="numpy")
-def pivot_rates(rows, rp, r0, own, x, th, phi, q, v, w, g):
+def pivot_rates(rows, rp, r0, own, x, phi, q, g):
     """Rates of a link that turns about a point of a placed link: one unknown, from the third row."""
     if rows[r0, 1] == own:
         far, ax, ay = rows[r0, 2], rp[r0, 2], rp[r0, 3]
@@ -512,27 +513,27 @@ def pivot_rates(rows, rp, r0, own, x, th, phi, q, v, w, g):
         far, ax, ay = rows[r0, 1], rp[r0, 0], rp[r0, 1]
     ax, ay = world(x, far, ax, ay)
     ux, uy = ax - x[far, 0], ay - x[far, 1]
-    o, l = v[far, 2], w[far, 2]
-    vx, vy = v[far, 0] - o * uy, v[far, 1] + o * ux
-    bx, by = w[far, 0] - l * uy - o * o * ux, w[far, 1] + l * ux - o * o * uy
+    o, l = x[far, 7], x[far, 10]
+    vx, vy = x[far, 5] - o * uy, x[far, 6] + o * ux
+    bx, by = x[far, 8] - l * uy - o * o * ux, x[far, 9] + l * ux - o * o * uy
     px, py = x[own, 0] - ax, x[own, 1] - ay
     k = r0 + 2
     kind, a, b = rows[k, 0], rows[k, 1], rows[k, 2]
-    row(kind, rp, k, a, b, x, th, phi, q, g)
+    row(kind, rp, k, a, b, x, phi, q, g)
     other, i, j = (b, 0, 3) if a == own else (a, 3, 0)
     coefficient = g[i + 2] - g[i] * py + g[i + 1] * px
-    total = g[i] * vx + g[i + 1] * vy + g[j] * v[other, 0] + g[j + 1] * v[other, 1] + g[j + 2] * v[other, 2]
+    total = g[i] * vx + g[i + 1] * vy + g[j] * x[other, 5] + g[j + 1] * x[other, 6] + g[j + 2] * x[other, 7]
     o = -total / coefficient
-    v[own, 0], v[own, 1], v[own, 2] = vx - o * py, vy + o * px, o
+    x[own, 5], x[own, 6], x[own, 7] = vx - o * py, vy + o * px, o
     bx, by = bx - o * o * px, by - o * o * py
-    total = gamma(kind, rp, k, a, b, x, v, q) + g[i] * bx + g[i + 1] * by
-    total += g[j] * w[other, 0] + g[j + 1] * w[other, 1] + g[j + 2] * w[other, 2]
+    total = gamma(kind, rp, k, a, b, x, q) + g[i] * bx + g[i + 1] * by
+    total += g[j] * x[other, 8] + g[j + 1] * x[other, 9] + g[j + 2] * x[other, 10]
     l = -total / coefficient
-    w[own, 0], w[own, 1], w[own, 2] = bx - l * py, by + l * px, l
+    x[own, 8], x[own, 9], x[own, 10] = bx - l * py, by + l * px, l
 
 
 @njit(cache=True, error_model="numpy")
-def anchors(rows, rp, r0, own, x, v, w, P):
+def anchors(rows, rp, r0, own, x, P):
     """Of three distances to one link: far points with velocity and acceleration, near points (local), lengths."""
     for r in range(3):
         k = r0 + r
@@ -541,10 +542,10 @@ def anchors(rows, rp, r0, own, x, v, w, P):
         else:
             far, fx, fy, P[r, 6], P[r, 7] = rows[k, 1], rp[k, 0], rp[k, 1], rp[k, 2], rp[k, 3]
         px, py = world(x, far, fx, fy)
-        ux, uy, o, l = px - x[far, 0], py - x[far, 1], v[far, 2], w[far, 2]
+        ux, uy, o, l = px - x[far, 0], py - x[far, 1], x[far, 7], x[far, 10]
         P[r, 0], P[r, 1] = px, py
-        P[r, 2], P[r, 3] = v[far, 0] - o * uy, v[far, 1] + o * ux
-        P[r, 4], P[r, 5] = w[far, 0] - l * uy - o * o * ux, w[far, 1] + l * ux - o * o * uy
+        P[r, 2], P[r, 3] = x[far, 5] - o * uy, x[far, 6] + o * ux
+        P[r, 4], P[r, 5] = x[far, 8] - l * uy - o * o * ux, x[far, 9] + l * ux - o * o * uy
         P[r, 8], P[r, 9] = rp[k, 6], rp[k, 11]
 
 
@@ -579,7 +580,7 @@ def solve3(Q, a, b, c):
 
 
 @njit(cache=True, error_model="numpy")
-def platform(P, x, th, v, w, own, Q, Lc, out, m, s):
+def platform(P, x, own, Q, Lc, out, m, s):
     """Newton and rates of a link held by three distances (class III triad); returns the code of `newton`."""
     last = 0.0
     out[2] = 0.0
@@ -591,7 +592,7 @@ def platform(P, x, th, v, w, own, Q, Lc, out, m, s):
             return 4 if det == 0.0 else 3
         x[own, 0] -= fx
         x[own, 1] -= fy
-        th[own] -= ft
+        x[own, 4] -= ft
         c, sn = math.cos(ft), math.sin(ft)
         xc, xs = x[own, 2] * c + x[own, 3] * sn, x[own, 3] * c - x[own, 2] * sn
         inv = 1.5 - 0.5 * (xc * xc + xs * xs)
@@ -611,62 +612,62 @@ def platform(P, x, th, v, w, own, Q, Lc, out, m, s):
         Q[r, 3] = Q[r, 0] * P[r, 2] + Q[r, 1] * P[r, 3]
     det, vx, vy, o = solve3(Q, Q[0, 3], Q[1, 3], Q[2, 3])
     m[s] = det / Lc
-    v[own, 0], v[own, 1], v[own, 2] = vx, vy, o
+    x[own, 5], x[own, 6], x[own, 7] = vx, vy, o
     for r in range(3):
         ux, uy = Q[r, 4], Q[r, 5]
         ex, ey = vx - o * uy - P[r, 2], vy + o * ux - P[r, 3]
         Q[r, 3] = (Q[r, 0] * (P[r, 4] + o * o * ux) + Q[r, 1] * (P[r, 5] + o * o * uy)
                    - (ex * ex + ey * ey) * P[r, 9])  # fmt: skip
-    det, w[own, 0], w[own, 1], w[own, 2] = solve3(Q, Q[0, 3], Q[1, 3], Q[2, 3])
+    det, x[own, 8], x[own, 9], x[own, 10] = solve3(Q, Q[0, 3], Q[1, 3], Q[2, 3])
     return 0
 
 
 @njit(cache=True, error_model="numpy")
-def predict(core, c0, nc, x, th, v, w, h, Lc):
+def predict(core, c0, nc, x, h, Lc):
     """Move the core links to second order; returns how far, scaled."""
     travel = 0.0
     for k in range(nc):
         link = core[c0 + k]
-        ax, ay, at = h * v[link, 0], h * v[link, 1], h * v[link, 2]
-        bx, by, bt = 0.5 * h * h * w[link, 0], 0.5 * h * h * w[link, 1], 0.5 * h * h * w[link, 2]
+        ax, ay, at = h * x[link, 5], h * x[link, 6], h * x[link, 7]
+        bx, by, bt = 0.5 * h * h * x[link, 8], 0.5 * h * h * x[link, 9], 0.5 * h * h * x[link, 10]
         travel += ax * ax + ay * ay + Lc * Lc * at * at + bx * bx + by * by + Lc * Lc * bt * bt
         x[link, 0] += ax + bx
         x[link, 1] += ay + by
-        th[link] += at + bt
+        x[link, 4] += at + bt
         c, s = math.cos(at + bt), math.sin(at + bt)
         x[link, 2], x[link, 3] = x[link, 2] * c - x[link, 3] * s, x[link, 3] * c + x[link, 2] * s
     return math.sqrt(travel) / Lc
 
 
 @njit(cache=True, error_model="numpy")
-def sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, h, warm, modes, x, th, v, w, phi, m,
+def sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, h, warm, modes, x, phi, m,
            J, f, g, G, pivots, out, P, Q, Lc, derivs):  # fmt: skip
-    """Move the state (x, th, v, w, phi, margins m) to the next input, h further; returns (code, step)."""
+    """Move the state (x, phi, margins m) to the next input, h further; returns (code, step)."""
     for s in range(steps.shape[0]):
         code, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
         if code < 2:
             if not math.isfinite(q[drv[r0, 3], 0]):
                 return 5, s
-            drive(code, drv, dp, r0, x, th, v, w, q)
+            drive(code, drv, dp, r0, x, q)
             m[s] = 1.0
             continue
         before, own = m[s], core[c0]
         if code >= 9:
-            travel = predict(core, c0, nc, x, th, v, w, h, Lc) if warm else 0.0
+            travel = predict(core, c0, nc, x, h, Lc) if warm else 0.0
             if not travel <= 0.5:
                 return 2, s
             if code == 9:
-                why = newton(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, J, f, g, G, pivots, Lc, out)
+                why = newton(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots, Lc, out)
             else:
-                anchors(rows, rp, r0, own, x, v, w, P)
-                why = platform(P, x, th, v, w, own, Q, Lc, out, m, s)
+                anchors(rows, rp, r0, own, x, P)
+                why = platform(P, x, own, Q, Lc, out, m, s)
             if why:
                 return why, s
             if warm and (out[0] > 0.1 * travel + 1e-9 or out[2] > 0.1):
                 return 2, s
         else:
-            near = th[own] + (h * v[own, 2] if warm and derivs else 0.0)
-            m[s] = closed_form(code, rows, rp, r0, own, modes[s], x, th, phi, g)
+            near = x[own, 4] + (h * x[own, 7] if warm and derivs else 0.0)
+            m[s] = closed_form(code, rows, rp, r0, own, modes[s], x, phi, g)
             if code == 8:  # one mode; its determinant keeps its sign
                 if m[s] == 0.0 or (warm and not m[s] * before > 0.0):
                     return 1, s
@@ -675,11 +676,11 @@ def sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, h, warm, mo
             if not math.isfinite(m[s]):
                 return 3, s
             if need[own] and code != 6:
-                follow_angle(own, x, th, near)
+                follow_angle(own, x, near)
         if 2 <= code <= 6 and derivs:
-            pivot_rates(rows, rp, r0, own, x, th, phi, q, v, w, g)
+            pivot_rates(rows, rp, r0, own, x, phi, q, g)
         elif code != 10 and derivs:
-            det = rates(rows, rp, r0, nr, core, c0, nc, x, th, phi, q, v, w, J, f, g, G, pivots)
+            det = rates(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots)
             if code == 9:
                 m[s] = det / Lc**nc
         if code >= 9:
@@ -689,10 +690,10 @@ def sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, h, warm, mo
                 return 2, s
         for k in range(steps[s, 5], steps[s, 5] + steps[s, 6]):
             e = elim[k, 1]
-            near = th[e] + (h * v[e, 2] if warm and derivs else 0.0)
-            place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, th, v, w, derivs)
+            near = x[e, 4] + (h * x[e, 7] if warm and derivs else 0.0)
+            place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
             if need[e]:
-                follow_angle(e, x, th, near)
+                follow_angle(e, x, near)
     for k in range(gears.shape[0]):
         r = gears[k]
         ax, ay = world(x, rows[r, 1], rp[r, 0], rp[r, 1])
@@ -717,28 +718,30 @@ def run(steps, rows, RP, core, elim, EP, drv, DP, need, gears, q, u, modes, X, T
     J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(3)
     G, pivots = np.empty((size, 6)), np.empty(size, np.int64)
     P, Q = np.empty((3, 10)), np.empty((3, 6))
-    x, th, v, w = np.empty((links, 4)), np.empty(links), np.empty((links, 3)), np.empty((links, 3))
+    x = np.zeros((links, 11))
     phi, m, ql = np.empty(PHI.shape[2]), np.empty(steps.shape[0]), np.empty((q.shape[1], 3))
     for b in range(X.shape[0]):
         j = max(first - 1, 0)
-        x[:], th[:], v[:], w[:], phi[:], m[:] = X[b, j], TH[b, j], V[b, j], W[b, j], PHI[b, j], M[b, j]
+        x[:, :4], x[:, 4], phi[:], m[:] = X[b, j], TH[b, j], PHI[b, j], M[b, j]
+        if derivs:
+            x[:, 5:8], x[:, 8:] = V[b, j], W[b, j]
         rp, ep, dp = RP[b], EP[b], DP[b]
         done[b], why[b, 0], why[b, 1] = u.shape[0], 0, -1
         for i in range(first, u.shape[0]):
             for k in range(ql.shape[0]):
                 ql[k, 0], ql[k, 1], ql[k, 2] = q[i, k, 0], q[i, k, 1], q[i, k, 2]
             h = u[i] - u[i - 1] if i > 0 else 0.0
-            code, s = sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, ql, h, i > 0, modes, x, th, v, w,
+            code, s = sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, ql, h, i > 0, modes, x,
                              phi, m, J, f, g, G, pivots, out, P, Q, Lc, derivs)  # fmt: skip
             for k in range(m.shape[0]):
                 M[b, i, k] = m[k]
             for k in range(links):
                 X[b, i, k, 0], X[b, i, k, 1], X[b, i, k, 2], X[b, i, k, 3] = x[k, 0], x[k, 1], x[k, 2], x[k, 3]
-                TH[b, i, k] = th[k]
+                TH[b, i, k] = x[k, 4]
             if derivs:
                 for k in range(links):
                     for c in range(3):
-                        V[b, i, k, c], W[b, i, k, c] = v[k, c], w[k, c]
+                        V[b, i, k, c], W[b, i, k, c] = x[k, 5 + c], x[k, 8 + c]
             for k in range(phi.shape[0]):
                 PHI[b, i, k] = phi[k]
             if code:

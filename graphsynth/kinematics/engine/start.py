@@ -117,20 +117,21 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     J, f, g, out = np.empty((count, count)), np.empty(count), np.empty(6), np.zeros(3)
     G = np.empty((count, 6))
     pivots = np.empty(count, dtype=np.int64)
+    state = np.zeros((p.mechanism.graph.links, 11))
     found: list[Array] = []
     for _ in range(_STARTS * cores):
-        X, TH = trace.X[0].copy(), trace.TH[0].copy()
+        state[:, :4], state[:, 4] = trace.X[0], trace.TH[0]
         for link in step.core:
             angle = random.uniform(-np.pi, np.pi)
-            X[link] = (*(centre + random.uniform(-size, size, 2)), np.cos(angle), np.sin(angle))
-            TH[link] = angle
+            where = centre + random.uniform(-size, size, 2)
+            state[link, :5] = (*where, np.cos(angle), np.sin(angle), angle)
         code = kernels.newton(
-            p.rows, p.row_table[0], row0, count, p.core, core0, cores, X, TH, trace.PHI[0], trace.q[0], trace.V[0], J, f,
-            g, G, pivots, p.Lc, out,
+            p.rows, p.row_table[0], row0, count, p.core, core0, cores, state, trace.PHI[0], trace.q[0], J, f, g, G,
+            pivots, p.Lc, out,
         )  # fmt: skip
         if code:
             continue
-        core = X[list(step.core)]
+        core = state[list(step.core), :4]
         if all(np.abs((core - other) / [p.Lc, p.Lc, 1.0, 1.0]).max() > 1e-7 for other in found):
             found.append(core)
     poses = [np.column_stack([core[:, 0], core[:, 1], np.arctan2(core[:, 3], core[:, 2])]) for core in found]
