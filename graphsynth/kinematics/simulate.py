@@ -15,7 +15,7 @@ from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.kinematics.engine.events import dead_centres, ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
-from graphsynth.kinematics.engine.program import Program, compile_program
+from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
 from graphsynth.kinematics.engine.start import initial, sign_table
 from graphsynth.mechanism.joints import Prismatic
@@ -142,7 +142,7 @@ def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, i
 
 
 def _grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Inputs with extra samples where a turning driver would step too far, and where the given ones are."""
+    """Return inputs with extra samples where a turning driver would step too far, and where the given ones are."""
     if u.size < 2:
         return u, np.zeros(u.size, dtype=np.intp)
     parts = np.ones(u.size - 1, dtype=np.intp)
@@ -270,7 +270,7 @@ def _apart(tracker: Tracker, first: Array, last: Array) -> tuple[float, tuple[in
 
 
 def _period(tracker: Tracker, trace: Trace) -> int:
-    """Turns until the mechanism is where it began; 0 if it is not within the limit.
+    """Return the turns until the mechanism is where it began; 0 if it is not within the limit.
 
     The state is carried on, angles and all, while the inputs begin again: the laws must be periodic, or driven
     angles would be out of step with those that gears count.

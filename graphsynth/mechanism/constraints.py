@@ -41,9 +41,7 @@ def residual(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
     pose = np.asarray(poses, dtype=np.float64)
     rows: list[Array] = []
     for joint in joints:
-        P, arm_a = _place(pose, joint.a, joint.at_a)
-        Q, arm_b = _place(pose, joint.b, joint.at_b)
-        d = Q - P
+        d = _place(pose, joint.b, joint.at_b)[0] - _place(pose, joint.a, joint.at_a)[0]
         if isinstance(joint, Revolute):
             rows += [d.real, d.imag]
         elif isinstance(joint, Gear):
@@ -69,7 +67,7 @@ def _gear(joint: Gear, pose: Array, d: Complex) -> Array:
 
 
 def jacobian(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
-    """Derivatives of the constraints by the poses, shape (..., rows, 3 links).
+    """Return the derivatives of the constraints by the poses, shape (..., rows, 3 links).
 
     Angular rows (sliding pairs) are those of the plain angle equation, in radians.
     """

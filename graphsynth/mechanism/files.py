@@ -1,7 +1,7 @@
 """Mechanisms as TOML and JSON; the round trip is exact.
 
-Floats are written with ``repr``, the shortest text that reads back as the same double.  Readers accept any text or bytes
-and raise nothing but `FormatError`, whose place is the line or the key.
+Floats are written with ``repr``, the shortest text that reads back as the same double.  Readers accept any text or
+bytes and raise nothing but `FormatError`, whose place is the line or the key.
 """
 
 from __future__ import annotations

@@ -89,7 +89,8 @@ class Mechanism:
     --------
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     >>> four_bar = Mechanism(graph, [
-    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)), Revolute(0, 3, (2.0, 0.0)),
+    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+    ...     Revolute(0, 3, (2.0, 0.0)),
     ... ], [Driver(0, 1)])
     >>> four_bar.joint(2, 3).at_a
     (2.5, 0.0)

@@ -72,7 +72,7 @@ def test_dyads_agree_with_fifty_digits(kinds: str, seed: int) -> None:
         for k, u in enumerate(motion.inputs):
             crank = mp.mpf(u) + mp.mpf(mechanism.drivers[0].law.offset)
             guess = [mp.mpf(v) for v in motion.poses[k, 2:].ravel()]
-            exact = mp.findroot(lambda *x: closure_equations(mechanism, list(x), crank), guess, tol=1e-60)
+            exact = mp.findroot(lambda *x, q=crank: closure_equations(mechanism, list(x), q), guess, tol=1e-60)
             error = max(abs(float(exact[i] - guess[i])) for i in range(6))
             # the guess is double precision; its distance from the exact root is the error of the engine
             assert error <= 4.0 * motion.errors[k] * motion.Lc + 1e-15

@@ -1,4 +1,4 @@
-"""Groups of every class: all eight-link chains, sliders and slots inside larger groups, drivers between moving links."""
+"""Groups of every class: all eight-link chains, sliders and slots inside larger groups, drivers inside groups."""
 
 from __future__ import annotations
 
@@ -127,7 +127,8 @@ def test_groups_without_a_place_are_refused() -> None:
     with pytest.raises(GeometryError, match="direction fixed twice"):
         compile_program(drawn(dyad, (0, 1), 0, dict.fromkeys([(1, 2), (2, 3), (0, 3)], "P")))
     parallel = [
-        Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Prismatic(2, 3, angle_a=0.3, angle_b=0.2), Prismatic(0, 3, angle_b=0.2)
+        Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Prismatic(2, 3, angle_a=0.3, angle_b=0.2),
+        Prismatic(0, 3, angle_b=0.2),
     ]  # fmt: skip
     with pytest.raises(GeometryError, match="parallel lines"):
         compile_program(Mechanism(dyad, parallel, [Driver(0, 1)]))

@@ -32,7 +32,8 @@ def mixed() -> Mechanism:
     return Mechanism(
         MIXED,
         [
-            Revolute(0, 1), Gear(1, 2, radius_a=0.3, radius_b=0.7, internal=True, offset=0.1), Revolute(0, 2, (0.4, 0.0)),
+            Revolute(0, 1), Gear(1, 2, radius_a=0.3, radius_b=0.7, internal=True, offset=0.1),
+            Revolute(0, 2, (0.4, 0.0)),
             PinSlot(2, 3, (0.1, 0.2), (0.3, 0.4), 0.5), Prismatic(0, 3, (1.0, 2.0), (0.0, 0.1), 0.6, 0.7),
         ],
         [Driver(0, 1, Harmonic(1.0, 0.1, 2.0, 0.3))],
@@ -234,15 +235,19 @@ def damaged() -> list[tuple[str, str]]:
 
     joint = good["joints"][0]
     return [
-        ("", "line 1"), ("[]", "top level"), ("{", "line 1"), (changed(format="x"), "format"), (changed(version=2), "version"),
+        ("", "line 1"), ("[]", "top level"), ("{", "line 1"), (changed(format="x"), "format"),
+        (changed(version=2), "version"),
         (changed(graph="??"), "graph"), (changed(graph=3), "graph"), (changed(extra=1), "top level"),
         (changed(joints={}), "joints"), (changed(joints=[1]), r"joints\[0\]"),
-        (changed(joints=[{**joint, "kind": "Q"}]), r"joints\[0\]"), (changed(joints=[{**joint, "c": 1}]), r"joints\[0\]"),
-        (changed(joints=[{**joint, "at_a": [1, "2"]}]), r"joints\[0\]"), (changed(joints=[{"kind": "R", "a": 0}]), r"joints\[0\]"),
+        (changed(joints=[{**joint, "kind": "Q"}]), r"joints\[0\]"),
+        (changed(joints=[{**joint, "c": 1}]), r"joints\[0\]"),
+        (changed(joints=[{**joint, "at_a": [1, "2"]}]), r"joints\[0\]"),
+        (changed(joints=[{"kind": "R", "a": 0}]), r"joints\[0\]"),
         (changed(joints=good["joints"][1:]), "mechanism"), (changed(drivers=[{"base": 0}]), r"drivers\[0\]"),
         (changed(drivers=[{"base": 0, "link": 1, "law": {"kind": "table"}}]), r"drivers\[0\].law"),
         (changed(drivers=[{"base": 0, "link": "1"}]), r"drivers\[0\]"), (changed(points=[]), "points"),
-        (changed(points={"M": {"link": 1}}), "points.M"), (changed(points={"M": {"link": "a", "at": [0, 0]}}), "mechanism"),
+        (changed(points={"M": {"link": 1}}), "points.M"),
+        (changed(points={"M": {"link": "a", "at": [0, 0]}}), "mechanism"),
         (changed(pose=[[1]]), "mechanism"), (changed(pose=3), "pose"), ("[" * 100_000, "text|line"),
         ('{"format": 1e999}', "top level"),
     ]  # fmt: skip

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 #: A margin that dips below this between samples is examined.
 _NEAR = 0.2
+#: A smallest margin below this is reported: half the digits of the pose are lost there.
+_CLOSE = 1e-8
 #: A smallest margin below this is a change point: the modes meet to rounding.
 _TOUCH = 1e-13
 
@@ -113,7 +115,7 @@ def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
         middle = M[1:-1]
         low = np.flatnonzero((middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])) + 1
         events = (_touch(tracker, trace, int(k), s) for k in low)
-        found += [event for event in events if event is not None][:1]
+        found += [event for event in events if event is not None]
         found += [_at_end(trace, k, step) for k in sorted({0, len(M) - 1}) if len(M) and M[k] <= _TOUCH]
     sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
     ends = [event for event in found if event.ends_motion]
@@ -146,9 +148,12 @@ def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None
         at = float(brentq(margin, start, at, xtol=1e-15, rtol=1e-15))
         text = f"{name} is stretched or folded at the input {at:.12g}: it cannot be assembled on a stretch beyond"
         return MotionEvent("fold", at, step.group, step.links, 2, 1e-14, True, text)
-    if least > _TOUCH:
+    if least > _CLOSE:
         return None
     at = _flat(margin, at, 0.25 * (high - low))
+    if least > _TOUCH:
+        text = f"{name} comes close to a fold at the input {at:.12g}: its two modes nearly meet (margin {least:.2g})"
+        return MotionEvent("near fold", at, step.group, step.links, 2, 1e-9, False, text)
     text = (
         f"{name} passes a change point at the input {at:.12g}: its two modes meet and both continue, so the branch "
         "after it is a choice"
@@ -176,7 +181,7 @@ def _flat(value: Callable[[float], float], at: float, width: float) -> float:
 
 
 def dead_centres(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
-    """Inputs at which the coordinate of an undriven joint on the frame reverses (order 2: its rate changes sign)."""
+    """Return where the coordinate of an undriven joint on the frame reverses (order 2: its rate changes sign)."""
     mechanism = tracker.program.mechanism
     driven = {driver.pair for driver in mechanism.drivers}
     found: list[MotionEvent] = []

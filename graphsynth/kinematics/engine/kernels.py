@@ -1,5 +1,8 @@
 """Compiled kernels: constraint rows, Newton, closed-form dyads, eliminated links, and the run over the inputs.
 
+One file, although long: the compiler's cache notices changes of the file that holds a caller, not of its callees.
+Functions with many arguments and one caller are inlined, because passing the arrays costs more than the work.
+
 The state of a link is one row of eleven numbers: x, y, cos theta, sin theta, theta (unwrapped; right only where gears
 need it), the velocity (x', y', theta') and the acceleration.
 """
@@ -622,7 +625,7 @@ def platform(P, x, own, Q, Lc, out, m, s):
     return 0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def predict(core, c0, nc, x, h, Lc):
     """Move the core links to second order; returns how far, scaled."""
     travel = 0.0
@@ -639,7 +642,7 @@ def predict(core, c0, nc, x, h, Lc):
     return math.sqrt(travel) / Lc
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def sample(steps, rows, rp, core, elim, ep, drv, dp, need, gears, q, h, warm, modes, x, phi, m,
            J, f, g, G, pivots, out, P, Q, Lc, derivs):  # fmt: skip
     """Move the state (x, phi, margins m) to the next input, h further; returns (code, step)."""
@@ -722,9 +725,16 @@ def run(steps, rows, RP, core, elim, EP, drv, DP, need, gears, q, u, modes, X, T
     phi, m, ql = np.empty(PHI.shape[2]), np.empty(steps.shape[0]), np.empty((q.shape[1], 3))
     for b in range(X.shape[0]):
         j = max(first - 1, 0)
-        x[:, :4], x[:, 4], phi[:], m[:] = X[b, j], TH[b, j], PHI[b, j], M[b, j]
-        if derivs:
-            x[:, 5:8], x[:, 8:] = V[b, j], W[b, j]
+        for k in range(links):
+            for c in range(4):
+                x[k, c] = X[b, j, k, c]
+            x[k, 4] = TH[b, j, k]
+            for c in range(3 if derivs else 0):
+                x[k, 5 + c], x[k, 8 + c] = V[b, j, k, c], W[b, j, k, c]
+        for k in range(phi.shape[0]):
+            phi[k] = PHI[b, j, k]
+        for k in range(m.shape[0]):
+            m[k] = M[b, j, k]
         rp, ep, dp = RP[b], EP[b], DP[b]
         done[b], why[b, 0], why[b, 1] = u.shape[0], 0, -1
         for i in range(first, u.shape[0]):

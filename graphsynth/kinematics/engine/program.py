@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError, GraphError
 from graphsynth.kinematics.engine import codes
-from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Gear, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import characteristic_length
 from graphsynth.structure.assur import Decomposition, decompose
@@ -150,8 +150,8 @@ class _Compiler:
         return Program(
             mechanism=self.mechanism, decomposition=self.found, steps=tuple(self.steps),
             step_table=_ints(self.table, 9), rows=_ints(self.rows, 5),
-            row_table=self._floats(self.row_parameters, codes.ROW_WIDTH), core=np.array(self.core or [0], dtype=np.int64),
-            eliminated=_ints(self.eliminated, 4),
+            row_table=self._floats(self.row_parameters, codes.ROW_WIDTH),
+            core=np.array(self.core or [0], dtype=np.int64), eliminated=_ints(self.eliminated, 4),
             eliminated_table=self._floats(self.eliminated_parameters, codes.ELIM_WIDTH), drives=_ints(self.drives, 4),
             drive_table=self._floats(self.drive_parameters, codes.DRIVE_WIDTH), need_angle=need,
             gears=np.array(self.gears, dtype=np.int64), Lc=characteristic_length(self.mechanism),

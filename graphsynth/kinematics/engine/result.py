@@ -26,11 +26,11 @@ class MotionEvent(NamedTuple):
     """Something that happens at one input.
 
     ``kind`` is "fold" (two assembly modes of a group merge and end), "change point" (two modes meet and both go on),
-    "singular" (a group is not held; the order tells what was seen), "not assembled", "dead centre" (the
+    "near fold" (two modes nearly meet; the motion goes on), "singular" (a group is not held), "not assembled", "dead centre" (the
     coordinate of a joint on the frame reverses), or "input" (the driver has no value).  ``order`` is the number
-    of modes that meet, or of a dead centre the first derivative that does not vanish.  ``group`` is the index of the Assur
-    group, -1 for none; ``links`` those concerned; ``uncertainty`` bounds the error of ``input`` as estimated; ``ends_motion`` tells whether the
-    branch ends there.
+    of modes that meet (0: not known), or of a dead centre the first derivative that does not vanish.  ``group`` is the
+    index of the Assur group, -1 for none; ``links`` those concerned; ``uncertainty`` the estimated error of ``input``;
+    ``ends_motion`` tells whether the branch ends there.
     """
 
     kind: str
