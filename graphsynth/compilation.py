@@ -2,8 +2,9 @@
 
 numba keeps a compiled function as long as its own source file is unchanged, but the function also contains constants
 and functions of other kernel modules.  After an update of one of those, a kept function would be silently wrong.  So
-every kernel module calls ``drop_stale_kernels`` before its functions are loaded: when any kernel source of the package
-has changed since the cache was made, the cache is dropped, and the kernels are compiled anew on first use.
+every kernel package calls ``drop_stale_kernels`` before its functions are loaded: when any of its kernel sources, or
+of those it builds on, has changed since the last time, all of them are given a new modification time.  numba then
+compiles them anew on first use, wherever it keeps its cache.
 """
 
 from __future__ import annotations
@@ -17,27 +18,31 @@ __all__ = ["drop_stale_kernels"]
 _STAMP = "kernels.sha256"
 
 
-def _kernel_sources(package: Path) -> list[Path]:
-    return sorted({*package.rglob("kernels.py"), *package.rglob("kernels/*.py")})
-
-
 @cache
-def drop_stale_kernels(package: Path | None = None) -> bool:
-    """Drop the compiled kernels of the package if any kernel source has changed; return whether it had.
+def drop_stale_kernels(*places: Path) -> bool:
+    """Make numba forget the compiled kernels of ``places`` if any source there has changed; return whether it had.
 
-    A cache that cannot be written is left alone: then numba keeps another one, by modification time, for each user.
+    Parameters
+    ----------
+    places : Path
+        Kernel modules, or folders of them; the first is the caller's own, the others those it builds on.
+
+    Notes
+    -----
+    Sources that cannot be touched are left alone: an installation that is never edited needs no such care.
     """
-    package = Path(__file__).parent if package is None else package
+    sources = [source for place in places for source in ([place] if place.is_file() else sorted(place.glob("*.py")))]
     digest = sha256()
-    for source in _kernel_sources(package):
-        digest.update(source.relative_to(package).as_posix().encode() + b"\0" + source.read_bytes())
-    stamp = package / "__pycache__" / _STAMP
+    for source in sources:
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    own = places[0].parent if places[0].is_file() else places[0]
+    stamp = own / "__pycache__" / _STAMP
     try:
         if stamp.is_file() and stamp.read_text() == digest.hexdigest():
             return False
-        for pattern in ("*.nbi", "*.nbc"):
-            for kept in package.rglob(pattern):
-                kept.unlink(missing_ok=True)
+        for source in sources:
+            if source.parent == own or source == places[0]:
+                source.touch()
         stamp.parent.mkdir(exist_ok=True)
         stamp.write_text(digest.hexdigest())
     except OSError:

@@ -20,9 +20,8 @@ def workers_for(asked: int | None, big: bool) -> int:
 def announce_compilation(kernel: str) -> None:
     """Say so when a kernel (``module.function``) is not compiled yet: the first use takes some seconds more."""
     import graphsynth
-    from graphsynth.compilation import drop_stale_kernels
+    import graphsynth.synthesis.kernels  # forgets kernels that are out of date
 
-    drop_stale_kernels()
     package = Path(graphsynth.__file__).parent / "synthesis" / "kernels"
     compiled = [package / "__pycache__"]
     if folder := os.environ.get("NUMBA_CACHE_DIR"):

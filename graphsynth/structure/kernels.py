@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
@@ -13,7 +15,7 @@ from graphsynth.compilation import drop_stale_kernels
 
 __all__ = ["canon", "canon_packed", "canon_workspace", "lowest_bit", "popcount"]
 
-drop_stale_kernels()
+drop_stale_kernels(Path(__file__))
 
 ZERO = np.uint64(0)
 ONE = np.uint64(1)

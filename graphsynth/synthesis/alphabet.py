@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +157,37 @@ class Alphabet:
         """Return the resources a label uses."""
         costs = [self._cost(word) for word in label.words]
         return tuple(map(sum, zip(*costs)))
+
+    def labellings(self, pattern: tuple[int, ...]) -> float:
+        """Count the labellings of a contracted graph, sparsity and symmetry ignored.
+
+        Parameters
+        ----------
+        pattern : tuple of int
+            ``pattern[mu - 1]`` classes consist of mu parallel paths.
+        """
+        ways: dict[tuple[int, ...], float] = {(0,) * len(self.limits): 1.0}
+        for multiplicity, classes in enumerate(pattern, 1):
+            for _ in range(classes):
+                longer: Counter[tuple[int, ...]] = Counter()
+                for used, count in ways.items():
+                    for cost, labels in self._costs(multiplicity):
+                        total = tuple(map(add, used, cost))
+                        if self._fits(total):
+                            longer[total] += count * labels
+                ways = longer
+        exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
+        return sum(count for used, count in ways.items() if used[:exact] == self.limits[:exact])
+
+    def _costs(self, multiplicity: int) -> tuple[tuple[tuple[int, ...], int], ...]:
+        return self._costs_by_multiplicity[multiplicity]
+
+    @cached_property
+    def _costs_by_multiplicity(self) -> dict[int, tuple[tuple[tuple[int, ...], int], ...]]:
+        return {
+            multiplicity: tuple(Counter(map(self.cost, self.by_kind[2 * multiplicity])).items())
+            for multiplicity in self.multiplicities
+        }
 
     @cached_property
     def radix(self) -> tuple[int, ...]:

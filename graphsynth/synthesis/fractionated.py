@@ -65,12 +65,29 @@ def _glue(parent: MechanismGraph, at: int, block: MechanismGraph, link: int) -> 
 
 
 def _leaves(graph: MechanismGraph) -> list[frozenset[int]]:
-    """List the leaf blocks, each as its links other than the cut link."""
-    import networkx
+    """List the leaf blocks, each as its links other than the cut link.
 
-    blocks = [frozenset(block) for block in networkx.biconnected_components(graph.to_networkx())]
-    cuts = set(graph.cut_links)
-    return [block - cuts for block in blocks if len(block & cuts) == 1]
+    A leaf block is what falls off at a cut link and holds no other cut link.
+    """
+    everything = (1 << graph.links) - 1
+    cuts = sum(1 << v for v in graph.cut_links)
+    leaves = []
+    for cut_link in graph.cut_links:
+        left = everything & ~(1 << cut_link)
+        while left:
+            part = left & -left
+            edge = part
+            while edge:
+                near = 0
+                for v in range(graph.links):
+                    if edge >> v & 1:
+                        near |= graph.neighbours[v]
+                edge = near & left & ~part
+                part |= edge
+            left &= ~part
+            if not part & cuts:
+                leaves.append(frozenset(v for v in range(graph.links) if part >> v & 1))
+    return leaves
 
 
 def _marked_form(graph: MechanismGraph, marked: frozenset[int]) -> tuple[object, ...]:

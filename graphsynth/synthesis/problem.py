@@ -151,8 +151,8 @@ class Problem:
         framed: bool = False,
     ) -> Problem:
         """State the enumeration of chains (of mechanisms with every frame, if ``framed``)."""
-        if mobility == 0:
-            raise SpecError("mobility = 0 must be at least 1: use enumerate_baranov_trusses for structures")
+        if mobility == 0 and not isinstance(mobility, bool):
+            raise SpecError("mobility = 0 must be at least 1: Baranov trusses are the structures without mobility")
         higher = dict(joints_by_mobility or {})
         joints = chain_joints(links, mobility, space, higher)
         placed = tuple(sorted((i, count) for i, count in higher.items() if i > 1 and count))
@@ -206,6 +206,8 @@ class Problem:
     @classmethod
     def trusses(cls, links: int, space: int, framed: bool) -> Problem:
         """State the enumeration of Baranov trusses (of Assur groups, if ``framed``)."""
+        if framed and (isinstance(links, bool) or not isinstance(links, int) or links < 2):
+            raise SpecError(f"moving links = {links - 1!r} must be a whole number, at least 1")
         joints = chain_joints(links, 0, space, {})
         title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
         if joints is None:

@@ -31,12 +31,12 @@ from graphsynth.synthesis.kernels.layout import (
     WAYS,
     U,
     V,
+    glue,
     inner,
 )
 from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
-    lay_classes,
     lay_gains,
     load_graph,
     plain_entries,
@@ -189,13 +189,13 @@ def count_states(count, sets, tables, work):
     return total
 
 
-@inner
+@glue
 def fixed_by(member, m, sets, tables, work):
     """Count the admissible labellings fixed by automorphism number ``member``; negative: see ``count_states``."""
     count = build_variables(m, sets, work.perms[member], tables, work)
     if not plain_entries(count, tables, work):
         return np.int64(TOO_LARGE)
-    if count < 0 or unconstrained_ways(count, False, tables, work) > _LIMIT:
+    if count < 0 or unconstrained_ways(count, np.bool_(False), tables, work) > _LIMIT:
         return np.int64(TOO_LARGE)
     return count_states(count, sets, tables, work)
 
@@ -266,19 +266,4 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                     work.classes[KIND, frame] -= 1
                 total += fixed // kept
         out[h - start] = total
-    return 0
-
-
-@njit(cache=True)
-def estimate_block(k, mults, start, stop, tables, work, out):
-    """Bound the labellings of each contracted graph from above, sparsity and symmetry ignored."""
-    for h in range(start, stop):
-        m = lay_classes(k, mults[h], tables, work)
-        for v in range(k):
-            work.perms[0, v] = v
-        count = build_variables(m, np.int64(0), work.perms[0], tables, work)
-        if not plain_entries(count, tables, work):
-            return TOO_LARGE
-        bound = unconstrained_ways(count, False, tables, work)
-        out[h - start] = bound if bound > _LIMIT else np.float64(work.tables[WAYS, 0, tables.target])
     return 0

@@ -98,7 +98,7 @@ def open_fixed(k, mult, mode, frame, member, tables, work):
         work.classes[KIND, frame] += 1
     count = build_variables(m, sets, work.perms[member], tables, work)
     plain_entries(count, tables, work)
-    unconstrained_ways(count, False, tables, work)
+    unconstrained_ways(count, np.bool_(False), tables, work)
     return count, m, sets, work.tables[WAYS, 0, tables.target]
 
 

@@ -161,7 +161,7 @@ def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
     joints = np.empty((total, total), np.uint8)
     order = np.empty(total, np.int64)
     level = np.empty(total, np.int64)
-    at = 0
+    at = np.int64(0)
     kept = 0
     for r in range(count):
         links, frame = _arrange(k, total, mults[rows[r, 0]], rows[r], spelling, joints, order, level)

@@ -46,6 +46,11 @@ def inner(function: Any) -> Any:
     return njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
+def glue(function: Any) -> Any:
+    """Compile a short kernel into the kernels that call it."""
+    return njit(cache=True, inline="always")(function)
+
+
 class Tables(NamedTuple):
     """Labels of classes, by kind ``t = 2 * multiplicity + marked`` (made by ``graphsynth.synthesis.alphabet``).
 

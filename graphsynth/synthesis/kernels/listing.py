@@ -64,6 +64,7 @@ from graphsynth.synthesis.kernels.variables import (
 # work.state: where the stream stands
 GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT, PART, PARTS, MET = range(2, 16)
 PREFIX = 5  # variables that number the parts of one contracted graph
+_FORTH, _BACK = np.int64(1), np.int64(-1)
 HEADER = 3  # columns of a row before the labels: graph, frame mode, frame
 
 
@@ -194,7 +195,7 @@ def _open_search(symmetry, tables, work):
     member = work.members[st[WITNESS]] if st[WITNESS] < st[KEPT] and symmetry else np.int64(0)
     st[COUNT] = build_variables(st[CLASSES], st[SETS], work.perms[member], tables, work)
     plain_entries(st[COUNT], tables, work)
-    unconstrained_ways(st[COUNT], True, tables, work)
+    unconstrained_ways(st[COUNT], np.bool_(True), tables, work)
     lay_gains(st[COUNT], tables, work)
     remaining_gains(st[COUNT], st[SETS], work)
     start_needs(st[SETS], work)
@@ -259,7 +260,7 @@ def _search(k, symmetry, tables, work, rows, n):
             if depth < 0:
                 st[ACTIVE] = 0
                 return n
-            _shift(depth, work.variables[AT, depth], -1, 0, tables, work)
+            _shift(depth, work.variables[AT, depth], _BACK, _BACK, tables, work)
             work.variables[AT, depth] += 1
             continue
         size = work.variables[SIZE, depth]
@@ -276,7 +277,7 @@ def _search(k, symmetry, tables, work, rows, n):
         if not usable:
             work.variables[AT, depth] = label + 1
             continue
-        alive = _shift(depth, label, 1, work.tables[GAINS, depth + 1, index], tables, work)
+        alive = _shift(depth, label, _FORTH, work.tables[GAINS, depth + 1, index], tables, work)
         if alive and st[PARTS] > 1 and depth + 1 == min(PREFIX, count):
             st[MET] += 1
             alive = st[MET] % st[PARTS] == st[PART]
@@ -287,7 +288,7 @@ def _search(k, symmetry, tables, work, rows, n):
             continue
         if alive:
             n = _emit(k, symmetry, tables, work, rows, n)
-        _shift(depth, label, -1, 0, tables, work)
+        _shift(depth, label, _BACK, _BACK, tables, work)
         work.variables[AT, depth] = label + 1
     st[DEPTH] = depth
     return n
@@ -326,7 +327,7 @@ def list_rows(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work,
     int
         Number of rows written; fewer than the capacity only at the end of the stream; TOO_LARGE on overflow.
     """
-    n = 0
+    n = np.int64(0)
     while n < rows.shape[0]:
         if not work.state[ACTIVE]:
             more = _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work)

@@ -35,6 +35,7 @@ from graphsynth.synthesis.kernels.layout import (
     WEIGHT,
     U,
     V,
+    glue,
     inner,
 )
 
@@ -56,7 +57,7 @@ def lay_classes(k, mult, tables, work):
     return m
 
 
-@inner
+@glue
 def load_graph(k, mult, tables, work):
     """Lay out a contracted graph; return the number of its classes and of its critical sets."""
     m = lay_classes(k, mult, tables, work)
