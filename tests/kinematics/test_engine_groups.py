@@ -205,3 +205,42 @@ def test_rrr_batch() -> None:
         solve_rrr(A, B, -1.0, 1.0)
     with pytest.raises(GeometryError, match="sign"):
         solve_rrr(A, B, 1.0, 1.0, 0)
+
+
+@pytest.mark.parametrize("index", range(0, 16, 2))
+def test_branch_does_not_depend_on_the_samples(index: int) -> None:
+    """Fine, coarse and reversed inputs find the same branch, the same end and the same reason."""
+    for graph in chains()[index].inversions():
+        for link in sorted(j.b for j in graph.joints if j.a == 0):
+            mechanism = drawn(graph, (0, link), 1, {})
+            u = np.linspace(0.0, 1.0, 101)
+            fine, coarse = simulate(mechanism, u), simulate(mechanism, u[::10])
+            both = fine.assembled[::10]
+            assert (both == coarse.assembled).all()
+            np.testing.assert_allclose(coarse.poses[both], fine.poses[::10][both], atol=1e-9)
+            if not fine.completed:
+                ends = [next(e for e in motion.events if e.ends_motion) for motion in (fine, coarse)]
+                assert [e.kind for e in ends] == ["fold", "fold"] and ends[0].group == ends[1].group
+                assert ends[0].input == pytest.approx(ends[1].input, abs=1e-7)
+                continue
+            back = simulate(mechanism, u[::-1], start=fine.poses[-1])
+            assert back.completed
+            np.testing.assert_allclose(back.poses[-1, :, :2], fine.poses[0, :, :2], atol=1e-9)
+
+
+def test_fold_of_a_dyad_is_not_blamed_on_the_triad_that_hangs_on_it() -> None:
+    graph = MechanismGraph(8, [(0, 1), (1, 2), (2, 3), (0, 3), (3, 5), (4, 5), (4, 6), (0, 6), (4, 7), (0, 7)], frame=0)
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (1.0, 0.0), (1.0, 0.0)), Revolute(0, 3, (2.0, 0.0)),
+        Revolute(3, 5, (0.4, 0.0)), Revolute(4, 5, (-0.4, -0.25), (1.1, 0.0)), Revolute(4, 6, (0.45, -0.3), (0.95, 0.0)),
+        Revolute(0, 6, (4.2, 0.2)), Revolute(4, 7, (0.05, 0.5), (1.05, 0.0)), Revolute(0, 7, (3.1, 1.8)),
+    ]  # fmt: skip
+    mechanism = Mechanism(graph, joints, [Driver(0, 1)])
+    u = np.linspace(0.2, 2.0, 31)
+    motions = [simulate(mechanism, u, modes={0: mode, 1: rank}) for mode in (1, -1) for rank in (0, 1)]
+    at_limit = [m for m in motions if abs(m.stopped_at - math.acos(0.25)) < 1e-6]
+    assert at_limit
+    for motion in at_limit:
+        event = next(e for e in motion.events if e.ends_motion)
+        assert (event.kind, event.group, event.links) == ("fold", 0, (2, 3))
+        assert event.input == pytest.approx(math.acos(0.25), abs=1e-12)

@@ -39,7 +39,20 @@ def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
         return MotionEvent("not assembled", stop.at, step.group, step.links, 0, 0.0, True, text)
     if stop.code == codes.UNREACHABLE:
         return _limit(tracker, trace, float(trace.u[trace.done]))
-    return _singular(tracker, stop)
+    beyond = _limit_beyond(tracker, trace, stop)
+    return _singular(tracker, stop) if beyond is None else _limit(tracker, trace, beyond)
+
+
+def _limit_beyond(tracker: Tracker, trace: Trace, stop: Stop) -> float | None:
+    """Input just beyond a stop at which an earlier dyad cannot be assembled, if there is one.
+
+    Where a dyad folds, speeds grow without bound, and a larger group that hangs on it is lost a little before.
+    """
+    pair, lost = tracker.reach(trace, trace.done - 1, stop.at)
+    source, at = (pair, 1) if lost is None else (trace, trace.done - 1)
+    beyond = stop.at + 1e-9 * float(trace.u[-1] - trace.u[0])
+    _, code, where = tracker.near(source, at, beyond)
+    return beyond if code == codes.UNREACHABLE and where < stop.step else None
 
 
 def _list(links: tuple[int, ...]) -> str:
@@ -48,20 +61,28 @@ def _list(links: tuple[int, ...]) -> str:
 
 def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     """Bisect for the last input at which the closed forms can be assembled."""
-    k = trace.done - 1
-    good, step_index = float(trace.u[k]), trace.stop.step if trace.stop else 0
-    source, at = trace, k
+    assert trace.stop is not None
+    source, at, good = trace, trace.done - 1, float(trace.u[trace.done - 1])
+    unreachable, step_index, other = bad, trace.stop.step, None
     while True:
         middle = 0.5 * (good + bad)
         if middle in (good, bad):
             break
-        pair, code, where = tracker.near(source, at, middle)
-        if code == codes.DONE:
+        pair, stop = tracker.reach(source, at, middle)
+        if stop is None:
             good = middle
             if abs(bad - good) > 1e-9:  # near the limit velocities are useless as predictors
                 source, at = pair, 1
+            continue
+        bad = middle
+        if stop.code == codes.UNREACHABLE:
+            unreachable, step_index = middle, stop.step
         else:
-            bad, step_index = middle, where
+            other = stop
+    if other is not None and abs(unreachable - good) > 1e-9:
+        return _singular(tracker, other)  # a larger group ends before the closed form does
+    if other is not None:  # groups that hang on the limit cannot be followed to its last bits
+        good, bad = _closed_limit(tracker, source, at, step_index, unreachable)
     step = tracker.program.steps[step_index]
     if step.has_two_modes:
         text = (
@@ -72,6 +93,20 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     why = "its sliding directions become parallel" if step.code == codes.P_LINE else "two of its points coincide"
     text = f"group {step.group} ({step.kind}, links {_list(step.links)}) has no place at the input {good:.12g}: {why}"
     return MotionEvent("singular", good, step.group, step.links, 0, abs(bad - good), True, text)
+
+
+def _closed_limit(tracker: Tracker, source: Trace, at: int, step: int, bad: float) -> tuple[float, float]:
+    """Bisect for the limit of one closed form alone."""
+    good = float(source.u[at])
+    while True:
+        middle = 0.5 * (good + bad)
+        if middle in (good, bad):
+            return good, bad
+        _, code, where = tracker.near(source, at, middle)
+        if code == codes.UNREACHABLE and where == step:
+            bad = middle
+        else:
+            good = middle
 
 
 def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:
@@ -135,8 +170,8 @@ def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None
     from scipy.optimize import brentq, minimize_scalar
 
     def margin(u: float) -> float:
-        pair, _, where = tracker.near(trace, k - 1, u)
-        return float(pair.M[1, s]) if where in (-1, s) else math.nan
+        pair, stop = tracker.reach(trace, k - 1, u)
+        return float(pair.M[1, s]) if stop is None or stop.step >= s else math.nan
 
     low, high = sorted((float(trace.u[k - 1]), float(trace.u[k + 1])))
     best = minimize_scalar(margin, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)})
@@ -148,7 +183,7 @@ def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None
         at = float(brentq(margin, start, at, xtol=1e-15, rtol=1e-15))
         text = f"{name} is stretched or folded at the input {at:.12g}: it cannot be assembled on a stretch beyond"
         return MotionEvent("fold", at, step.group, step.links, 2, 1e-14, True, text)
-    if least > _CLOSE:
+    if not least <= _CLOSE:
         return None
     at = _flat(margin, at, 0.25 * (high - low))
     if least > _TOUCH:
@@ -229,8 +264,8 @@ def _reversal(tracker: Tracker, trace: Trace, k: int, rate: Rate, group: int, li
     low, high = float(trace.u[k]), float(trace.u[k + 1])
 
     def at(u: float) -> float:
-        pair, code, _ = tracker.near(trace, k, u)
-        return rate(pair, 1) if code == codes.DONE else math.nan
+        pair, stop = tracker.reach(trace, k, u)
+        return rate(pair, 1) if stop is None else math.nan
 
     ends = at(low), at(high)
     if not ends[0] * ends[1] < 0.0:

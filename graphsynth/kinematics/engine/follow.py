@@ -135,6 +135,18 @@ class Tracker:
         done, code, step = self.run(pair, 1)
         return pair, (code if done < 2 else codes.DONE), step
 
+    def reach(self, trace: Trace, k: int, u: float) -> tuple[Trace, Stop | None]:
+        """Evaluate at ``u`` from sample ``k`` of a trace, in as many steps as it takes.
+
+        Returns a two-sample trace, and why ``u`` was not reached (None if it was).
+        """
+        pair, code, step = self.near(trace, k, u)
+        if code == codes.DONE:
+            return pair, None
+        if code == codes.UNREACHABLE:
+            return pair, Stop(code, step, u, 0.0)
+        return pair, self._bridge(pair, 1, code)
+
     def _bridge(self, trace: Trace, k: int, code: int) -> Stop | None:
         """Reach sample k from sample k - 1 by smaller steps; the reason if that is not possible."""
         total = abs(float(trace.u[-1] - trace.u[0])) or 1.0
