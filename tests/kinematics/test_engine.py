@@ -16,7 +16,7 @@ from graphsynth.kinematics.assembly_modes import assembly_modes
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 from graphsynth.kinematics.simulate import simulate
 from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform, _directions
-from graphsynth.mechanism.joints import Gear, Revolute
+from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -378,6 +378,47 @@ def test_planetary_gear() -> None:
     np.testing.assert_allclose(motion.poses[:, 2, 2] - motion.poses[0, 2, 2], 3.0 * u, atol=1e-12)
     np.testing.assert_allclose(motion.velocities[:, 2, 2], 3.0, atol=1e-13)
     assert motion.closure.closed and motion.residual < 1e-13
+
+
+def test_geared_five_bar() -> None:
+    """Two cranks geared 2:3 carry an RRR dyad; the turn closes after three turns of the first crank."""
+    graph = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4), (1, 4, 2)], frame=0)
+    frame, r1, r4, l2, l3 = 3.0, 0.6, 0.5, 2.4, 2.2
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (r1, 0.0)), Revolute(2, 3, (l2, 0.0), (l3, 0.0)), Revolute(3, 4, at_b=(r4, 0.0)),
+        Revolute(0, 4, (frame, 0.0)), Gear(1, 4, radius_a=2.0, radius_b=3.0),
+    ]  # fmt: skip
+    motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), TURN, modes={1: 1})
+    assert motion.completed and motion.closure.period == 3 and not motion.closure.closed
+    A = r1 * np.exp(1j * TURN)
+    B = frame + r4 * np.exp(-2j / 3 * TURN)
+    d = np.abs(B - A)
+    along = (d**2 + l2**2 - l3**2) / (2.0 * d)
+    C = A + (B - A) / d * (along + 1j * np.sqrt(l2**2 - along**2))
+    own = motion.point(2, (l2, 0.0)).position @ [1.0, 1.0j]
+    mirror = A + (B - A) / d * (along - 1j * np.sqrt(l2**2 - along**2))
+    assert min(np.abs(own - C).max(), np.abs(own - mirror).max()) < 1e-13
+
+
+def test_slider_crank_driven_by_its_slider() -> None:
+    """The inverse of the crank-driven motion, up to the dead centre, where the crank's two modes merge."""
+    r, l = 0.3, 1.1
+    joints = [Revolute(0, 1), Revolute(1, 2, (r, 0.0)), Revolute(2, 3, (l, 0.0)), Prismatic(0, 3)]
+    forward = simulate(Mechanism(CYCLE, joints, [Driver(0, 1)]), np.linspace(0.3, 2.8, 26), modes={0: 1})
+    if forward.poses[0, 3, 0] < 0.0:
+        forward = simulate(Mechanism(CYCLE, joints, [Driver(0, 1)]), np.linspace(0.3, 2.8, 26), modes={0: -1})
+    driven = Mechanism(CYCLE, joints, [Driver(0, 3)], pose=tuple(map(tuple, forward.poses[0])))
+    back = simulate(driven, forward.poses[:, 3, 0])
+    np.testing.assert_allclose(back.poses[:, 1:3], forward.poses[:, 1:3], atol=1e-13)
+    np.testing.assert_allclose(back.velocities[:, 1, 2] * forward.velocities[:, 3, 0], 1.0, atol=1e-12)
+    stopped = simulate(driven, np.linspace(forward.poses[0, 3, 0], 2.0, 50))
+    assert stopped.stopped_at == pytest.approx(r + l, abs=1e-15 * 4) and stopped.events[-1].kind == "fold"
+
+
+def test_pressure_angle_is_the_complement() -> None:
+    motion = simulate(four_bar(4.0, 1.0, 3.0, 3.5), TURN[::30])
+    total = motion.pressure_angle()[0] + motion.transmission_angle()[0]
+    np.testing.assert_allclose(total, math.pi / 2, atol=1e-15)
 
 
 # --- input, laws, refusal

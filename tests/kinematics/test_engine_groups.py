@@ -232,7 +232,8 @@ def test_fold_of_a_dyad_is_not_blamed_on_the_triad_that_hangs_on_it() -> None:
     graph = MechanismGraph(8, [(0, 1), (1, 2), (2, 3), (0, 3), (3, 5), (4, 5), (4, 6), (0, 6), (4, 7), (0, 7)], frame=0)
     joints = [
         Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (1.0, 0.0), (1.0, 0.0)), Revolute(0, 3, (2.0, 0.0)),
-        Revolute(3, 5, (0.4, 0.0)), Revolute(4, 5, (-0.4, -0.25), (1.1, 0.0)), Revolute(4, 6, (0.45, -0.3), (0.95, 0.0)),
+        Revolute(3, 5, (0.4, 0.0)), Revolute(4, 5, (-0.4, -0.25), (1.1, 0.0)),
+        Revolute(4, 6, (0.45, -0.3), (0.95, 0.0)),
         Revolute(0, 6, (4.2, 0.2)), Revolute(4, 7, (0.05, 0.5), (1.05, 0.0)), Revolute(0, 7, (3.1, 1.8)),
     ]  # fmt: skip
     mechanism = Mechanism(graph, joints, [Driver(0, 1)])

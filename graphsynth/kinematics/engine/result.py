@@ -28,9 +28,9 @@ class MotionEvent(NamedTuple):
     ``kind`` is "fold" (two assembly modes of a group merge and end), "change point" (two modes meet and both go on),
     "near fold" (two modes nearly meet; the motion goes on), "singular" (a group is not held), "not assembled",
     "dead centre" (the coordinate of a joint on the frame reverses), or "input" (the driver has no value).  ``order`` is
-    the number of modes that meet (0: not known), or of a dead centre the first derivative that does not vanish.  ``group`` is the
-    index of the Assur group, -1 for none; ``links`` those concerned; ``uncertainty`` the estimated error of ``input``;
-    ``ends_motion`` tells whether the branch ends there.
+    the number of modes that meet (0: not known), or of a dead centre the first derivative that does not vanish.
+    ``group`` is the index of the Assur group, -1 for none; ``links`` those concerned; ``uncertainty`` the estimated
+    error of ``input``; ``ends_motion`` tells whether the branch ends there.
     """
 
     kind: str
@@ -208,8 +208,8 @@ class Motion:
         """Transmission angle of every dyad with two modes, by group, radians in [0, pi/2].
 
         The sine of the angle is the square root of the margin: the angle at the inner joint of RRR; of RRP, RPR and
-        PRR the angle between the link (or the line from pivot to pin) and the normal of the guide, as its
-        complement.  0 where the dyad is stretched or folded.
+        PRR the angle between the link (or the line from pivot to pin) and the normal of the guide.  0 where the dyad
+        is stretched or folded.
         """
         groups = [step for step in self.steps if step.group >= 0]
         return {
@@ -217,6 +217,10 @@ class Motion:
             for step in groups
             if step.has_two_modes
         }
+
+    def pressure_angle(self) -> dict[int, Array]:
+        """Pressure angle of every dyad with two modes, by group: the complement of the transmission angle."""
+        return {group: 0.5 * np.pi - angle for group, angle in self.transmission_angle().items()}
 
     def to_pandas(self) -> Any:
         """Return a table: input, pose, velocity and acceleration of every moving link, modes, residual, error."""
