@@ -154,7 +154,7 @@ def spelling_of(family: Family) -> Spelling:
 def _blocks(unit: Unit) -> Iterator[tuple[NDArray[np.int32], int]]:
     """Stream the labellings of a unit as (rows, count); the rows are overwritten by the next step."""
     family, alphabet = unit.family, unit.family.alphabet
-    work = make_work(alphabet.resources, key_words=1)
+    work = make_work(alphabet.resources, key_words=1 << 14)
     rows = np.zeros((_ROWS, HEADER + family.loops + family.vertices), np.int32)
     rewind(unit.start, unit.part, unit.parts, work)
     while True:

@@ -12,7 +12,7 @@ from numba import njit
 
 from graphsynth.synthesis.kernels.automorphisms import automorphisms
 from graphsynth.synthesis.kernels.layout import (
-    COEF,
+    BYTE,
     COPIES,
     DIGITS,
     ENTRY,
@@ -20,14 +20,13 @@ from graphsynth.synthesis.kernels.layout import (
     GAINS,
     INDEX,
     KIND,
-    LEFT,
     NEED,
+    ONES,
     PACKED,
-    ROW,
-    SET,
     SLOT,
     STAMP,
     SUM,
+    TOP,
     WAYS,
     U,
     V,
@@ -38,6 +37,7 @@ from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
     lay_gains,
+    lay_lanes,
     load_graph,
     plain_entries,
     unconstrained_ways,
@@ -47,38 +47,6 @@ FRAME_NONE, FRAME_VERTEX, FRAME_PATH = 1, 2, 4
 TOO_LARGE = -1
 NO_ROOM = -2
 _LIMIT = 2.0**62
-_BYTE = 127
-_TOP = np.uint64(0x8080808080808080)
-_ONES = np.uint64(0x0101010101010101)
-
-
-@inner
-def _lay_lanes(count, sets, words, work):
-    """Write, for each variable, its coefficients and what the later variables can contribute, a byte for each set.
-
-    Returns False when a byte could overflow.
-    """
-    for i in range(2 * count * words):
-        work.lanes[i] = 0
-    for s in range(sets):
-        work.sets[LEFT, s] = 0
-        if work.sets[NEED, s] > _BYTE:
-            return False
-    for j in range(count - 1, -1, -1):
-        base = 2 * j * words
-        for s in range(sets):
-            rest = min(work.sets[LEFT, s], _BYTE)
-            work.lanes[base + words + s // 8] |= np.uint64(rest) << np.uint64(8 * (s % 8))
-        most = 0
-        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
-            most = max(most, work.entries[GAIN, g])
-        for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
-            s = work.rows[SET, q]
-            if work.rows[COEF, q] * most > _BYTE:
-                return False
-            work.sets[LEFT, s] += work.rows[COEF, q] * most
-            work.lanes[base + s // 8] |= np.uint64(work.rows[COEF, q]) << np.uint64(8 * (s % 8))
-    return True
 
 
 @inner
@@ -131,7 +99,7 @@ def count_states(count, sets, tables, work):
         return work.tables[WAYS, 0, tables.target]
     needs = (sets + 7) // 8
     words = needs + 1
-    if not _lay_lanes(count, sets, needs, work):
+    if not lay_lanes(count, sets, needs, work):
         return np.int64(TOO_LARGE)
     lay_gains(count, tables, work)
     capacity = work.states.shape[1]
@@ -162,18 +130,18 @@ def count_states(count, sets, tables, work):
                 if ways == 0:
                     continue
                 gain = np.uint64(work.entries[GAIN, g])
-                cap = np.uint64(min(work.tables[GAINS, j + 1, index], _BYTE)) * _ONES
-                alive = _TOP
+                cap = np.uint64(min(work.tables[GAINS, j + 1, index], BYTE)) * ONES
+                alive = TOP
                 open_ = np.uint64(0)
                 for i in range(needs):
-                    raised = (work.keys[base + i] | _TOP) - work.lanes[coefs + i] * gain
-                    keep = raised & _TOP
+                    raised = (work.keys[base + i] | TOP) - work.lanes[coefs + i] * gain
+                    keep = raised & TOP
                     need = raised & (keep - (keep >> np.uint64(7)))
-                    alive &= (work.lanes[rests + i] | _TOP) - need
-                    alive &= (cap | _TOP) - need
+                    alive &= (work.lanes[rests + i] | TOP) - need
+                    alive &= (cap | TOP) - need
                     open_ |= need
                     key[i] = need
-                if alive != _TOP:
+                if alive != TOP:
                     continue
                 if open_ == 0:
                     total += value * work.entries[COPIES, g] * ways

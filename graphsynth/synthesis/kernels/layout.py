@@ -21,6 +21,11 @@ MAX_CLASSES = 48
 MAX_SETS = 1024
 MAX_ENTRIES = 1 << 18
 
+# a byte for each critical set: the largest number, the top bits, the lowest bits
+BYTE = 127
+TOP = np.uint64(0x8080808080808080)
+ONES = np.uint64(0x0101010101010101)
+
 # rows of Tables.kinds and Tables.group_kinds: where the labels (groups) of a kind start and end
 LABELS, LABELS_END = 0, 1
 GROUPS, GROUPS_END = 0, 1

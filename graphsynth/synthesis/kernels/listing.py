@@ -22,7 +22,7 @@ from graphsynth.synthesis.kernels.counting import (
 )
 from graphsynth.synthesis.kernels.layout import (
     AT,
-    COEF,
+    BYTE,
     DIGITS,
     FLIP,
     FOLD,
@@ -33,15 +33,14 @@ from graphsynth.synthesis.kernels.layout import (
     LABEL,
     LABELS,
     LABELS_END,
-    LEFT,
+    NEED,
+    ONES,
     OWN,
     PACKED,
     REP,
-    REST,
     REVERSE,
-    ROW,
-    SET,
     SIZE,
+    TOP,
     USED,
     VAR,
     WAYS,
@@ -54,17 +53,15 @@ from graphsynth.synthesis.kernels.variables import (
     build_variables,
     fits,
     lay_gains,
+    lay_lanes,
     load_graph,
     plain_entries,
-    remaining_gains,
-    start_needs,
     unconstrained_ways,
 )
 
 # work.state: where the stream stands
-GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT, PART, PARTS, MET = range(2, 16)
+GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT, PART, PARTS, MET, WORDS = range(2, 17)
 PREFIX = 5  # variables that number the parts of one contracted graph
-_FORTH, _BACK = np.int64(1), np.int64(-1)
 HEADER = 3  # columns of a row before the labels: graph, frame mode, frame
 
 
@@ -190,19 +187,24 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
 
 @inner
 def _open_search(symmetry, tables, work):
-    """Lay out the variables of the search the state points to."""
+    """Lay out the variables of the search the state points to; return False when a byte could overflow."""
     st = work.state
     member = work.members[st[WITNESS]] if st[WITNESS] < st[KEPT] and symmetry else np.int64(0)
     st[COUNT] = build_variables(st[CLASSES], st[SETS], work.perms[member], tables, work)
     plain_entries(st[COUNT], tables, work)
     unconstrained_ways(st[COUNT], np.bool_(True), tables, work)
     lay_gains(st[COUNT], tables, work)
-    remaining_gains(st[COUNT], st[SETS], work)
-    start_needs(st[SETS], work)
+    st[WORDS] = (st[SETS] + 7) // 8
+    for i in range(st[WORDS]):
+        work.keys[i] = 0
+    for i in range(st[SETS]):
+        work.keys[i // 8] |= np.uint64(work.sets[NEED, i]) << np.uint64(8 * (i % 8))
+    laid = lay_lanes(st[COUNT], st[SETS], st[WORDS], work)
     st[DEPTH] = 0
     work.variables[AT, 0] = tables.kinds[LABELS, work.classes[KIND, work.variables[REP, 0]]]
     work.variables[USED, 0] = tables.target
     st[ACTIVE] = 1
+    return laid
 
 
 @inner
@@ -228,21 +230,23 @@ def _emit(k, symmetry, tables, work, rows, n):
 
 
 @inner
-def _shift(j, label, sign, most, tables, work):
-    """Apply (+1) or take back (-1) the label of variable j.
+def _step(depth, label, most, tables, work):
+    """Let the variable at ``depth`` take a label; return whether every critical set can still be served.
 
-    Returns 0 when a critical set can no longer be served: by the later variables, or by the resources left, which give
-    it ``most`` at best.
+    What the sets need after the step goes to the next row of ``work.keys``, so nothing has to be taken back.
     """
-    y = (work.classes[HEAVIEST, work.variables[REP, j]] - tables.labels[WEIGHT, label]) * sign
-    alive = 1
-    for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
-        s = work.rows[SET, q]
-        new = work.sets[LEFT, s] - work.rows[COEF, q] * y
-        work.sets[LEFT, s] = new
-        if new > work.rows[REST, q] or new > most:
-            alive = 0
-    return alive
+    needs = work.state[WORDS]
+    gain = np.uint64(work.classes[HEAVIEST, work.variables[REP, depth]] - tables.labels[WEIGHT, label])
+    cap = np.uint64(min(most, BYTE)) * ONES | TOP
+    alive = TOP
+    for i in range(needs):
+        raised = (work.keys[depth * needs + i] | TOP) - work.lanes[2 * depth * needs + i] * gain
+        keep = raised & TOP
+        need = raised & (keep - (keep >> np.uint64(7)))
+        alive &= (work.lanes[(2 * depth + 1) * needs + i] | TOP) - need
+        alive &= cap - need
+        work.keys[(depth + 1) * needs + i] = need
+    return alive == TOP
 
 
 @inner
@@ -260,7 +264,6 @@ def _search(k, symmetry, tables, work, rows, n):
             if depth < 0:
                 st[ACTIVE] = 0
                 return n
-            _shift(depth, work.variables[AT, depth], _BACK, _BACK, tables, work)
             work.variables[AT, depth] += 1
             continue
         size = work.variables[SIZE, depth]
@@ -277,7 +280,7 @@ def _search(k, symmetry, tables, work, rows, n):
         if not usable:
             work.variables[AT, depth] = label + 1
             continue
-        alive = _shift(depth, label, _FORTH, work.tables[GAINS, depth + 1, index], tables, work)
+        alive = _step(depth, label, work.tables[GAINS, depth + 1, index], tables, work)
         if alive and st[PARTS] > 1 and depth + 1 == min(PREFIX, count):
             st[MET] += 1
             alive = st[MET] % st[PARTS] == st[PART]
@@ -288,7 +291,6 @@ def _search(k, symmetry, tables, work, rows, n):
             continue
         if alive:
             n = _emit(k, symmetry, tables, work, rows, n)
-        _shift(depth, label, _BACK, _BACK, tables, work)
         work.variables[AT, depth] = label + 1
     st[DEPTH] = depth
     return n
@@ -333,6 +335,7 @@ def list_rows(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work,
             more = _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work)
             if more <= 0:
                 return n if more == 0 else TOO_LARGE
-            _open_search(symmetry, tables, work)
+            if not _open_search(symmetry, tables, work):
+                return TOO_LARGE
         n = _search(k, symmetry, tables, work, rows, n)
     return n

@@ -6,6 +6,7 @@ import numpy as np
 
 from graphsynth.synthesis.kernels.constraints import critical_sets, popcount
 from graphsynth.synthesis.kernels.layout import (
+    BYTE,
     COEF,
     COPIES,
     DIGITS,
@@ -26,7 +27,6 @@ from graphsynth.synthesis.kernels.layout import (
     OWN,
     PACKED,
     REP,
-    REST,
     ROW,
     SET,
     SIZE,
@@ -261,17 +261,32 @@ def lay_gains(count, tables, work):
 
 
 @inner
-def remaining_gains(count, sets, work):
-    """Fill ``row_rest``: what the variables after j can still contribute to each critical set of j."""
+def lay_lanes(count, sets, words, work):
+    """Write, for each variable, its coefficients and what the later variables can contribute, a byte for each set.
+
+    Returns False when a byte could overflow.
+    """
+    for i in range(2 * count * words):
+        work.lanes[i] = 0
     for s in range(sets):
         work.sets[LEFT, s] = 0
+        if work.sets[NEED, s] > BYTE:
+            return False
     for j in range(count - 1, -1, -1):
+        base = 2 * j * words
+        for s in range(sets):
+            rest = min(work.sets[LEFT, s], BYTE)
+            work.lanes[base + words + s // 8] |= np.uint64(rest) << np.uint64(8 * (s % 8))
         most = 0
         for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
             most = max(most, work.entries[GAIN, g])
         for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
-            work.rows[REST, q] = work.sets[LEFT, work.rows[SET, q]]
-            work.sets[LEFT, work.rows[SET, q]] += work.rows[COEF, q] * most
+            s = work.rows[SET, q]
+            if work.rows[COEF, q] * most > BYTE:
+                return False
+            work.sets[LEFT, s] += work.rows[COEF, q] * most
+            work.lanes[base + s // 8] |= np.uint64(work.rows[COEF, q]) << np.uint64(8 * (s % 8))
+    return True
 
 
 @inner
