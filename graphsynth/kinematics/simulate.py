@@ -250,11 +250,11 @@ def _closure(tracker: Tracker, trace: Trace, completed: bool, events: list[Motio
         text = f"not closed for certain: {meeting[0].statement}"
         return Closure(True, False, error, 0, (meeting[0].group,), text)
     if error <= _CLOSED:
-        return Closure(True, True, error, 1, (), "closed after one turn")
+        return Closure(True, True, error, 1, (), "closed after one pass over the inputs")
     period = _period(tracker, trace)
     names = ", ".join(map(str, changed)) or "none"
-    text = f"after one turn groups {names} are in another place; " + (
-        f"closed after {period} turns" if period else f"not closed after {_TURNS} turns"
+    text = f"after one pass over the inputs groups {names} are in another place; " + (
+        f"closed after {period} passes" if period else f"not closed after {_TURNS} passes"
     )
     return Closure(True, False, error, period, changed, text)
 

@@ -251,6 +251,28 @@ def test_triad_follows_every_mode(seed: int) -> None:
         assert (apart + place > 1e-4).all()
 
 
+@pytest.mark.parametrize(("seed", "rank"), [(4, 0), (6, 0), (12, 1), (28, 0), (28, 3), (36, 2)])
+def test_fold_of_a_triad_is_located(seed: int, rank: int) -> None:
+    """Against the exact system f = 0, det f_X = 0 in pose and input, solved at 40 digits."""
+    mechanism, D, b, lengths, crank = triad(seed)
+    event = next(e for e in simulate(mechanism, TURN, modes={0: rank}).events if e.ends_motion)
+    near = simulate(mechanism, np.append(TURN[event.input - 1e-6 > TURN], event.input - 1e-8), modes={0: rank})
+    pose = near.poses[near.assembled][-1, 2]
+
+    def system(x: mp.mpf, y: mp.mpf, alpha: mp.mpf, u: mp.mpf) -> list[mp.mpf]:
+        z = mp.expj(alpha)
+        anchors = [crank * mp.expj(u), mp.mpc(D[1]), mp.mpc(D[2])]
+        arms = [z * mp.mpc(point) for point in b]
+        d = [mp.mpc(x, y) + arm - anchor for arm, anchor in zip(arms, anchors)]
+        rows = [[mp.re(v), mp.im(v), mp.im(mp.conj(arm) * v)] for arm, v in zip(arms, d)]
+        return [abs(v) ** 2 - mp.mpf(l) ** 2 for v, l in zip(d, lengths)] + [mp.det(mp.matrix(rows))]
+
+    with mp.workdps(40):
+        exact = mp.findroot(system, [mp.mpf(v) for v in (*pose, event.input)], tol=1e-60, maxsteps=30)[3]
+        error = abs(float(exact - mp.mpf(event.input)))
+    assert error <= event.uncertainty and error < 1e-11
+
+
 def test_triad_rates_agree_with_differences() -> None:
     mechanism = triad(0)[0]
     h = 1e-3

@@ -47,8 +47,8 @@ class Closure(NamedTuple):
     """Whether the mechanism returns to its first pose after the driver has turned fully.
 
     ``tested`` is False if the inputs are no full turn or the motion is incomplete; ``error`` is the largest
-    distance of link poses after one turn, over the characteristic length; ``period`` the number of turns until closure,
-    0 if none was found; ``changed`` the groups that are elsewhere after one turn.
+    distance of link poses after one pass over the inputs, over the characteristic length; ``period`` the number of
+    passes until closure, 0 if none was found; ``changed`` the groups that are elsewhere after one pass.
     """
 
     tested: bool
