@@ -53,7 +53,7 @@ def residual(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
                 turn = pose[..., joint.b, 2] + joint.angle_b - pose[..., joint.a, 2] - joint.angle_a
                 size = max(abs(complex(*joint.at_a)), abs(complex(*joint.at_b))) or 1.0
                 rows.append(2.0 * size * np.sin(0.5 * turn) * np.sign(np.cos(0.5 * turn)))
-    return np.stack(rows, axis=-1)
+    return np.stack(rows, axis=-1) if rows else np.zeros((*pose.shape[:-2], 0))
 
 
 def _gear(joint: Gear, pose: Array, d: Complex) -> Array:

@@ -71,9 +71,7 @@ def to_toml(mechanism: Mechanism) -> str:
     """Write TOML: one table per joint, driver and point."""
     data = to_dict(mechanism)
     lines = [f"{key} = {_toml(data[key])}" for key in ("format", "version", "graph", "pose") if key in data]
-    for key in ("joints", "drivers"):
-        if not data[key]:
-            lines += ["", f"{key} = []"] if key == "drivers" else []
+    lines += [f"{key} = []" for key in ("joints", "drivers") if not data[key]]
     for key in ("joints", "drivers"):
         for entry in data[key]:
             lines += ["", f"[[{key}]]", *(f"{name} = {_toml(value)}" for name, value in entry.items())]

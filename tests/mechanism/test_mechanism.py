@@ -221,6 +221,15 @@ def test_round_trip_keeps_every_bit(at: tuple[Any, ...], angle: float, rate: flo
         assert again.dimensions.tobytes() == mechanism.dimensions.tobytes()
 
 
+def test_smallest_mechanism() -> None:
+    """A frame alone: every operation has an answer."""
+    alone = Mechanism(MechanismGraph(1, [], frame=0), [], pose=((0.0, 0.0, 0.0),))
+    assert Mechanism.from_toml(alone.to_toml()) == alone == Mechanism.from_json(alone.to_json())
+    report = alone.mobility()
+    assert (report.count, report.by_rank, report.rank) == (0, 0, 0)
+    assert residual(alone.joints, alone.pose).shape == (0,)
+
+
 def test_callable_law_cannot_be_written() -> None:
     mechanism = Mechanism(CYCLE, BARS, [Driver(0, 1, lambda u: (u, 1.0 + 0.0 * u, 0.0 * u))])
     with pytest.raises(GeometryError, match="Table"):
