@@ -8,7 +8,7 @@ vertex to the higher one.  In a mechanism whose frame is a binary link, one link
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -166,24 +166,30 @@ class Alphabet:
         pattern : tuple of int
             ``pattern[mu - 1]`` classes consist of mu parallel paths.
         """
-        ways: dict[tuple[int, ...], float] = {(0,) * len(self.limits): 1.0}
-        for multiplicity, classes in enumerate(pattern, 1):
-            for _ in range(classes):
-                longer: Counter[tuple[int, ...]] = Counter()
-                for used, count in ways.items():
-                    for cost, labels in self._costs(multiplicity):
-                        total = tuple(map(add, used, cost))
-                        if self._fits(total):
-                            longer[total] += count * labels
-                ways = longer
         exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
-        return sum(count for used, count in ways.items() if used[:exact] == self.limits[:exact])
+        return sum(count for used, count in self._ways(pattern).items() if used[:exact] == self.limits[:exact])
 
-    def _costs(self, multiplicity: int) -> tuple[tuple[tuple[int, ...], int], ...]:
-        return self._costs_by_multiplicity[multiplicity]
+    def _ways(self, pattern: tuple[int, ...]) -> dict[tuple[int, ...], float]:
+        """Count the choices for some classes by the resources they use."""
+        if pattern not in self._known_ways:
+            top = max(i for i, classes in enumerate(pattern) if classes)
+            fewer = (*pattern[:top], pattern[top] - 1, *pattern[top + 1 :])
+            ways: defaultdict[tuple[int, ...], float] = defaultdict(float)
+            for used, count in self._ways(fewer).items():
+                for cost, labels in self._costs[top + 1]:
+                    total = tuple(map(add, used, cost))
+                    if self._fits(total):
+                        ways[total] += count * labels
+            self._known_ways[pattern] = ways
+        return self._known_ways[pattern]
 
     @cached_property
-    def _costs_by_multiplicity(self) -> dict[int, tuple[tuple[tuple[int, ...], int], ...]]:
+    def _known_ways(self) -> dict[tuple[int, ...], dict[tuple[int, ...], float]]:
+        nothing = (0,) * max(self.multiplicities, default=0)
+        return {nothing: {(0,) * len(self.limits): 1.0}}
+
+    @cached_property
+    def _costs(self) -> dict[int, tuple[tuple[tuple[int, ...], int], ...]]:
         return {
             multiplicity: tuple(Counter(map(self.cost, self.by_kind[2 * multiplicity])).items())
             for multiplicity in self.multiplicities

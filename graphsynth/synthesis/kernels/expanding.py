@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from graphsynth.synthesis.kernels.counting import FRAME_PATH, FRAME_VERTEX
+from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
+from graphsynth.synthesis.kernels.layout import inner
 from graphsynth.synthesis.kernels.listing import HEADER
 
 
@@ -24,14 +25,12 @@ class Spelling(NamedTuple):
     level_high: NDArray[np.int64]
 
 
-@njit(cache=True)
-def _spell(k, total, mult, row, spelling, joints):
-    """Write the joint mobilities of one row into ``joints[:total, :total]``; return (links, frame)."""
-    for a in range(total):
-        for b in range(total):
-            joints[a, b] = 0
+@inner
+def _spell(k, mult, row, spelling, ends):
+    """Write the joints of one row as columns (link, link, mobility) of ``ends``; return (links, frame, joints)."""
     links = k
     frame = row[2] if row[1] == FRAME_VERTEX else -1
+    joints = 0
     e = 0
     for u in range(k):
         for v in range(u + 1, k):
@@ -52,14 +51,34 @@ def _spell(k, total, mult, row, spelling, joints):
                             frame = to
                     else:
                         to = v
-                    joints[at, to] = spelling.word_joints[word, j]
-                    joints[to, at] = spelling.word_joints[word, j]
+                    ends[0, joints] = at
+                    ends[1, joints] = to
+                    ends[2, joints] = spelling.word_joints[word, j]
+                    joints += 1
                     at = to
             e += 1
-    return links, frame
+    return links, frame, joints
 
 
-@njit(cache=True)
+@inner
+def _put_plain(links, joints, ends, out, at):
+    """Write graph6 of a chain without frame or higher pairs; return where it ends."""
+    out[at] = 63 + links
+    at += 1
+    size = (links * (links - 1) // 2 + 5) // 6
+    for i in range(size):
+        out[at + i] = 63
+    for j in range(joints):
+        a = ends[0, j]
+        b = ends[1, j]
+        if a > b:
+            a, b = b, a
+        bit = b * (b - 1) // 2 + a
+        out[at + bit // 6] += 32 >> (bit % 6)
+    return at + size
+
+
+@inner
 def _level_order(links, frame, joints, order, level):
     """Order the links by adjacency level from the frame; return the number of levels."""
     level[:links] = -1
@@ -81,7 +100,7 @@ def _level_order(links, frame, joints, order, level):
     return depth + 1
 
 
-@njit(cache=True)
+@inner
 def _levels_fit(links, levels, level, spelling):
     """Check the wanted sizes of the adjacency levels."""
     for i in range(spelling.level_index.shape[0]):
@@ -97,15 +116,20 @@ def _levels_fit(links, levels, level, spelling):
     return True
 
 
-@njit(cache=True)
-def _arrange(k, total, mult, row, spelling, joints, order, level):
+@inner
+def _arrange(k, mult, row, spelling, ends, matrix, order, level):
     """Spell one row and order its links; return (links, frame), links = 0 when the levels do not fit."""
-    links, frame = _spell(k, total, mult, row, spelling, joints)
+    links, frame, joints = _spell(k, mult, row, spelling, ends)
+    for a in range(links):
+        order[a] = a
+        for b in range(links):
+            matrix[a, b] = 0
+    for j in range(joints):
+        matrix[ends[0, j], ends[1, j]] = ends[2, j]
+        matrix[ends[1, j], ends[0, j]] = ends[2, j]
     if frame < 0:
-        for v in range(links):
-            order[v] = v
         return links, frame
-    levels = _level_order(links, frame, joints, order, level)
+    levels = _level_order(links, frame, matrix, order, level)
     if not _levels_fit(links, levels, level, spelling):
         return 0, frame
     return links, frame
@@ -119,18 +143,19 @@ def expand_packed(k, total, mults, rows, count, spelling, out):
 
     ``out`` is (capacity, 3 * joints) uint8.  Returns the number of rows kept (those whose levels fit).
     """
-    joints = np.empty((total, total), np.uint8)
+    matrix = np.empty((total, total), np.uint8)
+    ends = np.empty((3, total * total), np.int64)
     order = np.empty(total, np.int64)
     level = np.empty(total, np.int64)
     kept = 0
     for r in range(count):
-        links, _ = _arrange(k, total, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
+        links, _ = _arrange(k, mults[rows[r, 0]], rows[r], spelling, ends, matrix, order, level)
         if links == 0:
             continue
         at = 0
         for a in range(links):
             for b in range(a + 1, links):
-                mobility = joints[order[a], order[b]]
+                mobility = matrix[order[a], order[b]]
                 if mobility:
                     out[kept, at] = a
                     out[kept, at + 1] = b
@@ -140,7 +165,7 @@ def expand_packed(k, total, mults, rows, count, spelling, out):
     return kept
 
 
-@njit(cache=True)
+@inner
 def _put_number(out, at, n):
     if n >= 100:
         out[at] = 48 + n // 100
@@ -158,13 +183,21 @@ def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
 
     A line is graph6, then the frame, the joints of higher mobility, and the space unless it is the plane.
     """
-    joints = np.empty((total, total), np.uint8)
+    matrix = np.empty((total, total), np.uint8)
+    ends = np.empty((3, total * total), np.int64)
     order = np.empty(total, np.int64)
     level = np.empty(total, np.int64)
     at = np.int64(0)
     kept = 0
     for r in range(count):
-        links, frame = _arrange(k, total, mults[rows[r, 0]], rows[r], spelling, joints, order, level)
+        if highest == 1 and space == 3 and rows[r, 1] == FRAME_NONE:
+            links, frame, joints = _spell(k, mults[rows[r, 0]], rows[r], spelling, ends)
+            at = _put_plain(links, joints, ends, out, at)
+            out[at] = 10
+            at += 1
+            kept += 1
+            continue
+        links, frame = _arrange(k, mults[rows[r, 0]], rows[r], spelling, ends, matrix, order, level)
         if links == 0:
             continue
         out[at] = 63 + links
@@ -173,7 +206,7 @@ def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
         filled = 0
         for b in range(1, links):
             for a in range(b):
-                bits = bits * 2 + (1 if joints[order[a], order[b]] else 0)
+                bits = bits * 2 + (1 if matrix[order[a], order[b]] else 0)
                 filled += 1
                 if filled == 6:
                     out[at] = 63 + bits
@@ -192,7 +225,7 @@ def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
             first = True
             for a in range(links):
                 for b in range(a + 1, links):
-                    if joints[order[a], order[b]] != mobility:
+                    if matrix[order[a], order[b]] != mobility:
                         continue
                     if first:
                         out[at] = 32

@@ -254,45 +254,50 @@ def _search(k, symmetry, tables, work, rows, n):
     """Run or go on with the search the state points to until it ends or the rows are full."""
     st = work.state
     fold_class = st[WITNESS] - st[KEPT] if symmetry else np.int64(-1)
-    count = st[COUNT]
+    last = st[COUNT] - 1
     depth = st[DEPTH]
-    while n < rows.shape[0]:
-        kind = work.classes[KIND, work.variables[REP, depth]]
-        label = work.variables[AT, depth]
-        if label == tables.kinds[LABELS_END, kind]:
-            depth -= 1
-            if depth < 0:
-                st[ACTIVE] = 0
-                return n
-            work.variables[AT, depth] += 1
-            continue
+    while depth >= 0:
+        rep = work.variables[REP, depth]
+        end = tables.kinds[LABELS_END, work.classes[KIND, rep]]
         size = work.variables[SIZE, depth]
-        index = work.variables[USED, depth]
-        packed = tables.labels[PACKED, label] * size
-        usable = fits(tables.resources[DIGITS, index], packed, tables.guard)
-        if usable:
-            index -= tables.labels[INDEX, label] * size
-            usable = work.tables[WAYS, depth + 1, index] != 0
-        if work.variables[OWN, depth] and tables.labels[REVERSE, label] != label:
-            usable = False
-        if fold_class >= 0 and work.variables[REP, depth] == fold_class and tables.labels[FOLD, label] < symmetry:
-            usable = False
-        if not usable:
-            work.variables[AT, depth] = label + 1
-            continue
-        alive = _step(depth, label, work.tables[GAINS, depth + 1, index], tables, work)
-        if alive and st[PARTS] > 1 and depth + 1 == min(PREFIX, count):
-            st[MET] += 1
-            alive = st[MET] % st[PARTS] == st[PART]
-        if alive and depth + 1 < count:
+        own = work.variables[OWN, depth]
+        left = work.variables[USED, depth]
+        available = tables.resources[DIGITS, left]
+        label = work.variables[AT, depth]
+        descend = False
+        while label < end and n < rows.shape[0]:
+            index = left - tables.labels[INDEX, label] * size
+            usable = fits(available, tables.labels[PACKED, label] * size, tables.guard)
+            usable = usable and work.tables[WAYS, depth + 1, index] != 0
+            if own and tables.labels[REVERSE, label] != label:
+                usable = False
+            if rep == fold_class and tables.labels[FOLD, label] < symmetry:
+                usable = False
+            if usable:
+                usable = _step(depth, label, work.tables[GAINS, depth + 1, index], tables, work)
+            if usable and st[PARTS] > 1 and depth + 1 == min(PREFIX, last + 1):
+                st[MET] += 1
+                usable = st[MET] % st[PARTS] == st[PART]
+            if usable:
+                work.variables[AT, depth] = label
+                if depth < last:
+                    descend = True
+                    break
+                n = _emit(k, symmetry, tables, work, rows, n)
+            label += 1
+        if descend:
             depth += 1
             work.variables[USED, depth] = index
             work.variables[AT, depth] = tables.kinds[LABELS, work.classes[KIND, work.variables[REP, depth]]]
             continue
-        if alive:
-            n = _emit(k, symmetry, tables, work, rows, n)
-        work.variables[AT, depth] = label + 1
-    st[DEPTH] = depth
+        if label < end:  # the rows are full
+            work.variables[AT, depth] = label
+            st[DEPTH] = depth
+            return n
+        depth -= 1
+        if depth >= 0:
+            work.variables[AT, depth] += 1
+    st[ACTIVE] = 0
     return n
 
 
