@@ -20,6 +20,7 @@ MAX_VERTICES = 18
 MAX_CLASSES = 48
 MAX_SETS = 1024
 MAX_ENTRIES = 1 << 18
+MAX_PAIRS = 64
 
 # a byte for each critical set: the largest number, the top bits, the lowest bits
 BYTE = 127
@@ -43,6 +44,8 @@ REP, SIZE, OWN, ROW, ENTRY, AT, USED = range(7)
 MASK, NEED, LEFT = range(3)
 SET, COEF, REST = range(3)
 WAYS, GAINS = range(2)
+# rows of Work.pairs
+PAIR_AT, ONE, OTHER, TURNED = range(4)
 SUM, SLOT, STAMP = range(3)
 
 
@@ -86,6 +89,7 @@ class Work(NamedTuple):
     rows: NDArray[np.int64]  # (3, MAX_SETS * MAX_CLASSES) SET, COEF and REST (what later variables can contribute)
     entries: NDArray[np.int64]  # (4, MAX_ENTRIES) choices of a variable: GAIN, INDEX, PACKED, COPIES
     tables: NDArray[np.int64]  # (2, MAX_CLASSES + 1, states) WAYS and GAINS of variables j, j+1, ...
+    pairs: NDArray[np.int64]  # (4, MAX_PAIRS + 1) PAIR_AT per variable; ONE <= OTHER, TURNED or not
     lanes: NDArray[np.uint64]  # per variable: coefficients, then what later variables can contribute; a byte per set
     keys: NDArray[np.uint64]  # two layers of states of the dynamic program
     states: NDArray[np.int64]  # (3, key_words) SUM of a state; hash table: SLOT -> state, STAMP = its layer
@@ -112,6 +116,7 @@ def make_work(resources: int, group: int = 20_000, key_words: int = 1 << 18) -> 
         rows=ints(3, MAX_SETS * MAX_CLASSES),
         entries=ints(4, MAX_ENTRIES),
         tables=ints(2, MAX_CLASSES + 1, resources),
+        pairs=ints(4, MAX_PAIRS + 1),
         lanes=np.zeros(2 * MAX_CLASSES * (MAX_SETS // 8), np.uint64),
         keys=np.zeros(2 * key_words, np.uint64),
         states=ints(3, key_words),

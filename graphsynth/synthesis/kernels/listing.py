@@ -33,14 +33,19 @@ from graphsynth.synthesis.kernels.layout import (
     LABEL,
     LABELS,
     LABELS_END,
+    MAX_PAIRS,
     NEED,
+    ONE,
     ONES,
+    OTHER,
     OWN,
     PACKED,
+    PAIR_AT,
     REP,
     REVERSE,
     SIZE,
     TOP,
+    TURNED,
     USED,
     VAR,
     WAYS,
@@ -186,6 +191,53 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
 
 
 @inner
+def _lay_pairs(symmetry, work):
+    """Note, for each automorphism g, the first two labels in which a labelling and its image under g can differ.
+
+    A labelling is the first of its orbit only if it has label(ONE) <= label(OTHER), read from the other end if TURNED.
+    The condition is kept with the later one of the two variables, so that it cuts the search.  Searches for a required
+    symmetry do without: their variables stand for several classes.
+    """
+    st = work.state
+    count = st[COUNT]
+    m = st[CLASSES]
+    members = min(st[KEPT], MAX_PAIRS) if symmetry == 0 else np.int64(0)
+    at = np.int64(0)
+    for depth in range(count):
+        work.pairs[PAIR_AT, depth] = at
+        for i in range(1, members):
+            perm = work.perms[work.members[i]]
+            for e in range(m):
+                a = perm[work.classes[U, e]]
+                b = perm[work.classes[V, e]]
+                image = work.class_of[a, b]
+                if image == e and a < b:
+                    continue
+                if max(work.classes[VAR, e], work.classes[VAR, image]) == depth:
+                    work.pairs[ONE, at] = work.classes[VAR, e]
+                    work.pairs[OTHER, at] = work.classes[VAR, image]
+                    work.pairs[TURNED, at] = a > b
+                    at += 1
+                break
+    work.pairs[PAIR_AT, count] = at
+
+
+@inner
+def _is_ordered(depth, label, labels, variables, pairs):
+    """Check the conditions of ``_lay_pairs`` that the variable at ``depth`` completes."""
+    for i in range(pairs[PAIR_AT, depth], pairs[PAIR_AT, depth + 1]):
+        one = pairs[ONE, i]
+        other = pairs[OTHER, i]
+        mine = label if one == depth else variables[AT, one]
+        image = label if other == depth else variables[AT, other]
+        if pairs[TURNED, i]:
+            image = labels[REVERSE, image]
+        if image < mine:
+            return False
+    return True
+
+
+@inner
 def _open_search(symmetry, tables, work):
     """Lay out the variables of the search the state points to; return False when a byte could overflow."""
     st = work.state
@@ -200,6 +252,7 @@ def _open_search(symmetry, tables, work):
     for i in range(st[SETS]):
         work.keys[i // 8] |= np.uint64(work.sets[NEED, i]) << np.uint64(8 * (i % 8))
     laid = lay_lanes(st[COUNT], st[SETS], st[WORDS], work)
+    _lay_pairs(symmetry, work)
     st[DEPTH] = 0
     work.variables[AT, 0] = tables.kinds[LABELS, work.classes[KIND, work.variables[REP, 0]]]
     work.variables[USED, 0] = tables.target
@@ -210,76 +263,77 @@ def _open_search(symmetry, tables, work):
 @inner
 def _emit(k, symmetry, tables, work, rows, n):
     """Keep the current leaf if it is the first of its orbit; return the new number of rows."""
-    st = work.state
+    st, classes, variables, labels = work.state, work.classes, work.variables, tables.labels
     m = st[CLASSES]
     for e in range(m):
-        label = work.variables[AT, work.classes[VAR, e]]
-        if work.classes[FLIP, e]:
-            label = tables.labels[REVERSE, label]
-        work.classes[LABEL, e] = label
-    if not _is_first(st[KEPT], m, tables, work):
+        label = variables[AT, classes[VAR, e]]
+        if classes[FLIP, e]:
+            label = labels[REVERSE, label]
+        classes[LABEL, e] = label
+        rows[n, HEADER + e] = label
+    if st[KEPT] > 1 and not _is_first(st[KEPT], m, tables, work):
         return n
     if symmetry and not _is_new(k, symmetry, tables, work):
         return n
     rows[n, 0] = st[GRAPH]
     rows[n, 1] = st[MODE]
     rows[n, 2] = st[FRAME]
-    for e in range(m):
-        rows[n, HEADER + e] = work.classes[LABEL, e]
     return n + 1
 
 
 @inner
-def _step(depth, label, most, tables, work):
-    """Let the variable at ``depth`` take a label; return whether every critical set can still be served.
+def _step(depth, needs, gain, most, keys, lanes):
+    """Let the variable at ``depth`` give up ``gain``; return whether every critical set can still be served.
 
-    What the sets need after the step goes to the next row of ``work.keys``, so nothing has to be taken back.
+    What the sets need after the step goes to the next row of ``keys``, so nothing has to be taken back.
     """
-    needs = work.state[WORDS]
-    gain = np.uint64(work.classes[HEAVIEST, work.variables[REP, depth]] - tables.labels[WEIGHT, label])
     cap = np.uint64(min(most, BYTE)) * ONES | TOP
     alive = TOP
     for i in range(needs):
-        raised = (work.keys[depth * needs + i] | TOP) - work.lanes[2 * depth * needs + i] * gain
+        raised = (keys[depth * needs + i] | TOP) - lanes[2 * depth * needs + i] * gain
         keep = raised & TOP
         need = raised & (keep - (keep >> np.uint64(7)))
-        alive &= (work.lanes[(2 * depth + 1) * needs + i] | TOP) - need
+        alive &= (lanes[(2 * depth + 1) * needs + i] | TOP) - need
         alive &= cap - need
-        work.keys[(depth + 1) * needs + i] = need
+        keys[(depth + 1) * needs + i] = need
     return alive == TOP
 
 
 @inner
 def _search(k, symmetry, tables, work, rows, n):
     """Run or go on with the search the state points to until it ends or the rows are full."""
-    st = work.state
+    # taken out of the tuples once: inside the loops that would cost more than the search itself
+    st, classes, variables, pairs = work.state, work.classes, work.variables, work.pairs
+    keys, lanes, ahead = work.keys, work.lanes, work.tables
+    labels, kinds, resources, guard = tables.labels, tables.kinds, tables.resources, tables.guard
     fold_class = st[WITNESS] - st[KEPT] if symmetry else np.int64(-1)
-    last = st[COUNT] - 1
+    needs, parts, last = st[WORDS], st[PARTS], st[COUNT] - 1
     depth = st[DEPTH]
     while depth >= 0:
-        rep = work.variables[REP, depth]
-        end = tables.kinds[LABELS_END, work.classes[KIND, rep]]
-        size = work.variables[SIZE, depth]
-        own = work.variables[OWN, depth]
-        left = work.variables[USED, depth]
-        available = tables.resources[DIGITS, left]
-        label = work.variables[AT, depth]
+        rep = variables[REP, depth]
+        end = kinds[LABELS_END, classes[KIND, rep]]
+        size = variables[SIZE, depth]
+        left = variables[USED, depth]
+        label = variables[AT, depth]
+        index = left
         descend = False
         while label < end and n < rows.shape[0]:
-            index = left - tables.labels[INDEX, label] * size
-            usable = fits(available, tables.labels[PACKED, label] * size, tables.guard)
-            usable = usable and work.tables[WAYS, depth + 1, index] != 0
-            if own and tables.labels[REVERSE, label] != label:
+            index = left - labels[INDEX, label] * size
+            usable = fits(resources[DIGITS, left], labels[PACKED, label] * size, guard)
+            usable = usable and ahead[WAYS, depth + 1, index] != 0
+            if variables[OWN, depth] and labels[REVERSE, label] != label:
                 usable = False
-            if rep == fold_class and tables.labels[FOLD, label] < symmetry:
+            if rep == fold_class and labels[FOLD, label] < symmetry:
                 usable = False
+            usable = usable and _is_ordered(depth, label, labels, variables, pairs)
             if usable:
-                usable = _step(depth, label, work.tables[GAINS, depth + 1, index], tables, work)
-            if usable and st[PARTS] > 1 and depth + 1 == min(PREFIX, last + 1):
+                gain = np.uint64(classes[HEAVIEST, rep] - labels[WEIGHT, label])
+                usable = _step(depth, needs, gain, ahead[GAINS, depth + 1, index], keys, lanes)
+            if usable and parts > 1 and depth + 1 == min(PREFIX, last + 1):
                 st[MET] += 1
-                usable = st[MET] % st[PARTS] == st[PART]
+                usable = st[MET] % parts == st[PART]
             if usable:
-                work.variables[AT, depth] = label
+                variables[AT, depth] = label
                 if depth < last:
                     descend = True
                     break
@@ -287,16 +341,16 @@ def _search(k, symmetry, tables, work, rows, n):
             label += 1
         if descend:
             depth += 1
-            work.variables[USED, depth] = index
-            work.variables[AT, depth] = tables.kinds[LABELS, work.classes[KIND, work.variables[REP, depth]]]
+            variables[USED, depth] = index
+            variables[AT, depth] = kinds[LABELS, classes[KIND, variables[REP, depth]]]
             continue
         if label < end:  # the rows are full
-            work.variables[AT, depth] = label
+            variables[AT, depth] = label
             st[DEPTH] = depth
             return n
         depth -= 1
         if depth >= 0:
-            work.variables[AT, depth] += 1
+            variables[AT, depth] += 1
     st[ACTIVE] = 0
     return n
 
