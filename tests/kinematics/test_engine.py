@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics import simulate
 from graphsynth.kinematics.assembly_modes import assembly_modes
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
-from graphsynth.kinematics.simulate import simulate
 from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform, _directions
 from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear

@@ -8,7 +8,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from graphsynth.kinematics.simulate import simulate
+from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Driver, Mechanism

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.engine.dyads import solve_rrr
 from graphsynth.kinematics.engine.program import compile_program
-from graphsynth.kinematics.simulate import simulate, simulate_batch
 from graphsynth.mechanism.constraints import jacobian
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
