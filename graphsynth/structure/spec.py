@@ -213,7 +213,8 @@ class StructuralSpec:
         InfeasibleSpecError
             If there is no solution; names the equations and values that contradict each other.
         SpecError
-            If there are infinitely many; names the variable to bound.
+            If the question bounds the size neither way (then there are infinitely many solutions, or none); names
+            the variable to bound.
         TooLargeError
             If there are more than ``limit``.
         """

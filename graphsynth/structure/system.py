@@ -81,7 +81,7 @@ def _open_question(symbol: str, mobility: Range) -> SpecError:
     open_mobility = symbol == "p" and None in mobility
     wanted = f"{_WORDS['W']} or {_WORDS['p']}" if open_mobility else _WORDS[symbol]
     return SpecError(
-        f"the question leaves infinitely many solutions: bound {wanted}, "
+        f"the question leaves the size open, so there may be infinitely many solutions: bound {wanted}, "
         f"for example {symbol} = (1, 15) or a fixed value"
     )
 
