@@ -261,7 +261,10 @@ def check_loops(loops: int, links: int) -> None:
     years = count / LISTED_PER_SECOND / 3.15e7
     estimate = f"about {count:.0e} chains of mobility 1 with mobility-1 joints have so many; listing them would take "
     estimate += f"{years:.0e} years on one core" if years >= 1 else f"{years * 365:.0f} days on one core"
-    remedy = "ask for fewer links, or fix more of the question"
+    remedy = (
+        f"work is shared out over m machines with --shard i/m, but a million would still need {years / 1e6:.0e} "
+        "years: ask for fewer links, or fix more of the question"
+    )
     if loops <= MOST_LOOPS:
         remedy = (
             f"make their contracted graphs once with 'python -m graphsynth.synthesis.contracted {loops} FOLDER', set "
