@@ -267,7 +267,7 @@ def check_loops(loops: int, links: int) -> None:
     )
     if loops <= MOST_LOOPS:
         remedy = (
-            f"make their contracted graphs once with 'python -m graphsynth.synthesis.contracted {loops} FOLDER', set "
+            f"make their contracted graphs once with 'python -m graphsynth.synthesis.regenerate {loops} FOLDER', set "
             f"{FOLDER_VARIABLE}=FOLDER, and share the work out with --shard i/m over m machines"
         )
     raise TooLargeError(
