@@ -163,7 +163,9 @@ def _blocks(unit: Unit) -> Iterator[tuple[NDArray[np.int32], int]]:
             alphabet.tables, work, rows,
         )  # fmt: skip
         if count < 0:
-            raise TooLargeError("an automorphism group is too large to list: ask for fewer links")
+            raise TooLargeError(
+                "a contracted graph has too many symmetries or critical sets to list: ask for fewer links"
+            )
         if count:
             yield rows, count
         if count < _ROWS:

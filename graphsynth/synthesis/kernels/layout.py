@@ -42,7 +42,7 @@ U, V, KIND, HEAVIEST, VAR, FLIP, LABEL = range(7)
 REP, SIZE, OWN, ROW, ENTRY, AT, USED = range(7)
 # rows of Work.sets, Work.rows, Work.tables, Work.states
 MASK, NEED, LEFT = range(3)
-SET, COEF, REST = range(3)
+SET, COEF = range(2)
 WAYS, GAINS = range(2)
 # rows of Work.pairs
 PAIR_AT, ONE, OTHER, TURNED = range(4)
@@ -86,7 +86,7 @@ class Work(NamedTuple):
     subsets: NDArray[np.int16]  # (2, 2**MAX_VERTICES) needs of vertex sets
     sets: NDArray[np.int64]  # (3, MAX_SETS) MASK of classes inside, NEED, what is LEFT of it
     variables: NDArray[np.int64]  # (7, MAX_CLASSES + 1) REP, SIZE, OWN reversal; first ROW and ENTRY; search stack
-    rows: NDArray[np.int64]  # (3, MAX_SETS * MAX_CLASSES) SET, COEF and REST (what later variables can contribute)
+    rows: NDArray[np.int64]  # (2, MAX_SETS * MAX_CLASSES) SET and COEF of each entry
     entries: NDArray[np.int64]  # (4, MAX_ENTRIES) choices of a variable: GAIN, INDEX, PACKED, COPIES
     tables: NDArray[np.int64]  # (2, MAX_CLASSES + 1, states) WAYS and GAINS of variables j, j+1, ...
     pairs: NDArray[np.int64]  # (4, MAX_PAIRS + 1) PAIR_AT per variable; ONE <= OTHER, TURNED or not
@@ -113,7 +113,7 @@ def make_work(resources: int, group: int = 20_000, key_words: int = 1 << 18) -> 
         subsets=np.zeros((2, 1 << MAX_VERTICES), np.int16),
         sets=ints(3, MAX_SETS),
         variables=ints(7, MAX_CLASSES + 1),
-        rows=ints(3, MAX_SETS * MAX_CLASSES),
+        rows=ints(2, MAX_SETS * MAX_CLASSES),
         entries=ints(4, MAX_ENTRIES),
         tables=ints(2, MAX_CLASSES + 1, resources),
         pairs=ints(4, MAX_PAIRS + 1),
