@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from graphsynth.errors import FormatError, GraphError
 from graphsynth.structure.checks import integer, packed_joints
-from graphsynth.structure.levels import bits, breadth_first, component_of
+from graphsynth.structure.levels import bits, breadth_first, component_of, components_of
 from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, encode_graph6, encode_text
 
 if TYPE_CHECKING:
@@ -437,13 +437,7 @@ def _neighbours(graph: MechanismGraph) -> tuple[int, ...]:
 
 
 def _components(graph: MechanismGraph) -> tuple[tuple[int, ...], ...]:
-    left = (1 << graph.links) - 1
-    parts = []
-    while left:
-        part = component_of(graph.neighbours, (left & -left).bit_length() - 1)
-        parts.append(tuple(bits(part)))
-        left &= ~part
-    return tuple(parts)
+    return tuple(tuple(bits(part)) for part in components_of(graph.neighbours, (1 << graph.links) - 1))
 
 
 def _levels(graph: MechanismGraph) -> tuple[tuple[int, ...], ...]:

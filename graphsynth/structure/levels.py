@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["bits", "breadth_first", "component_of"]
+__all__ = ["bits", "breadth_first", "component_of", "components_of"]
 
 
 def bits(mask: int) -> list[int]:
@@ -70,3 +70,17 @@ def component_of(neighbours: Sequence[int], start: int, within: int = -1) -> int
     for level in breadth_first(neighbours, start, within):
         mask |= level
     return mask
+
+
+def components_of(neighbours: Sequence[int], within: int) -> list[int]:
+    """Return the connected parts of the links in ``within``, each as a bit mask, by smallest link.
+
+    >>> components_of([0b010, 0b001, 0b000], 0b111)
+    [3, 4]
+    """
+    parts = []
+    while within:
+        part = component_of(neighbours, (within & -within).bit_length() - 1, within)
+        within &= ~part
+        parts.append(part)
+    return parts

@@ -15,6 +15,7 @@ import numpy as np
 
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.kernels import canon_packed
+from graphsynth.structure.levels import bits, components_of
 from graphsynth.synthesis.families import chain_families
 from graphsynth.synthesis.rings import rings
 from graphsynth.synthesis.units import cut, graphs_of
@@ -71,23 +72,12 @@ def _leaves(graph: MechanismGraph) -> list[frozenset[int]]:
     """
     everything = (1 << graph.links) - 1
     cuts = sum(1 << v for v in graph.cut_links)
-    leaves = []
-    for cut_link in graph.cut_links:
-        left = everything & ~(1 << cut_link)
-        while left:
-            part = left & -left
-            edge = part
-            while edge:
-                near = 0
-                for v in range(graph.links):
-                    if edge >> v & 1:
-                        near |= graph.neighbours[v]
-                edge = near & left & ~part
-                part |= edge
-            left &= ~part
-            if not part & cuts:
-                leaves.append(frozenset(v for v in range(graph.links) if part >> v & 1))
-    return leaves
+    return [
+        frozenset(bits(part))
+        for cut_link in graph.cut_links
+        for part in components_of(graph.neighbours, everything & ~(1 << cut_link))
+        if not part & cuts
+    ]
 
 
 def _marked_form(graph: MechanismGraph, marked: frozenset[int]) -> tuple[object, ...]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from hashlib import sha256
 
 from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.levels import components_of
 from graphsynth.structure.spec import LinkAssortment, StructuralSpec
 from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
 from graphsynth.synthesis.families import (
@@ -72,8 +74,7 @@ class Handful:
                 a: n for a, n in wanted.n_a.items() if n
             }:
                 return False
-            rest = list(range(1, graph.links))
-            parts = _parts(graph, rest)
+            parts = len(components_of(graph.neighbours, (1 << graph.links) - 2))  # without the frame
             if wanted.frame_loops != wanted.frame_joints - parts:
                 return False
         return all(
@@ -88,20 +89,6 @@ def _by_levels(graph: MechanismGraph) -> MechanismGraph:
     for position, link in enumerate(order):
         place[link] = position
     return graph.relabelled(place)
-
-
-def _parts(graph: MechanismGraph, links: list[int]) -> int:
-    """Count the connected parts of the sub-graph on some links."""
-    left, parts = set(links), 0
-    while left:
-        parts += 1
-        stack = [left.pop()]
-        while stack:
-            mask = graph.neighbours[stack.pop()]
-            near = {v for v in left if mask >> v & 1}
-            left -= near
-            stack.extend(near)
-    return parts
 
 
 Piece = Unit | Handful
@@ -136,7 +123,7 @@ class Problem:
     def pieces(self, *, listing: bool) -> list[Piece]:
         """Cut the problem; the cut depends on the problem alone."""
         listing = listing or bool(self.symmetry) or any(family.levels for family in self.families)
-        return [*self.handfuls, *cut(self.families, listing=listing, symmetry=self.symmetry)]
+        return list(_pieces(self, listing))
 
     @classmethod
     def chains(
@@ -214,6 +201,11 @@ class Problem:
             return cls(title, ())
         check_loops(joints - links + 1, links)
         return cls(title, tuple(truss_families(links, space, framed)), (Handful("rings", links, 0, space, (), framed),))
+
+
+@lru_cache(maxsize=4)
+def _pieces(problem: Problem, listing: bool) -> tuple[Piece, ...]:
+    return (*problem.handfuls, *cut(problem.families, listing=listing, symmetry=problem.symmetry))
 
 
 def check_symmetry(symmetry: int | None) -> int:
