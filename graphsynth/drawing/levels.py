@@ -113,7 +113,7 @@ def draw_levels(graph: MechanismGraph, width: float = 420.0, title: str = "") ->
     sketch = Sketch(complex(-half, bottom), complex(half, 0.1), width, margin=2.2 * radius, title=title)
     for joint in graph.joints:
         p, q = where[joint.a], where[joint.b]
-        dash = {1: "", 2: "5 4"}.get(joint.mobility, "1.5 4")
+        dash = {1: (), 2: (5.0, 4.0)}.get(joint.mobility, (1.5, 4.0))
         sketch.curve(p, q, _bend(p, q), colour="b" if joint.mobility > 1 else "ink", dash=dash)
     for level in order:
         for link in level:

@@ -141,7 +141,7 @@ def _themed(svg: str) -> str:
     """Cut the XML prologue, make colours CSS variables, and make ids unique to this picture."""
     from hashlib import sha256
 
-    from graphsynth.drawing.sketch import STYLE
+    from graphsynth.drawing.palette import STYLE
 
     mark = sha256(svg.encode()).hexdigest()[:8]
     body = svg[svg.index("<svg") :].strip()

@@ -1,11 +1,11 @@
-"""Kinematic diagrams as SVG, drawn the way a mechanism textbook does, without any third-party package.
+"""A drawing under construction: symbols of kinematic diagrams put together from shapes, without third-party packages.
 
-A :class:`Sketch` collects shapes in the units of the mechanism (y upwards) and turns them into one self-contained
-``<svg>``. Stroke widths and symbols keep their size on the page whatever the units. Colours are CSS variables with
-light and dark values, so a sketch follows the page it is put in, and a file opened by itself follows the system.
+A :class:`Sketch` collects shapes in the units of the mechanism (y upwards).  Symbols and line widths keep their size on
+the page whatever the units.  `Sketch.svg` writes one self-contained ``<svg>``; `graphsynth.drawing.canvas` draws the same
+list of shapes through matplotlib.
 
-Symbols: a joint is an open circle; a joint on the frame sits on a triangle with hatching; a link with three joints is
-a shaded triangle; a gear is a dash-dotted pitch circle; paths are thin coloured lines.
+Symbols (ISO 3952): a turning pair is an open circle; a pair on the frame stands on a triangle with hatching; a link
+with two pairs is a bar, with more a shaded plate; a gear is a dash-dotted pitch circle with its centre marked.
 """
 
 from __future__ import annotations
@@ -14,36 +14,19 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from html import escape
 
-__all__ = ["STYLE", "Sketch", "number"]
+from graphsynth.drawing.palette import STYLE
+from graphsynth.drawing.shapes import FIXED, LAYERS, Circle, Path, Placement, Point, Shape, Style, Text, placement
+from graphsynth.drawing.svg import element, number, picture
 
-#: Light and dark values of every colour a drawing may use. Hues from the Okabe-Ito palette, safe for colour blindness.
-STYLE = (
-    ".gs{--ink:#1b2733;--soft:#8794a1;--paper:#ffffff;--link:#1b2733;--fill:#dbe4ee;--a:#0072b2;--b:#d55e00;"
-    "--c:#009e73;--jam:#d55e00;font-family:system-ui,-apple-system,'Segoe UI',Roboto,sans-serif}"
-    "@media (prefers-color-scheme:dark){.gs{--ink:#e6edf3;--soft:#8b98a5;--paper:#12181f;--link:#e6edf3;--fill:#2b3a49;"
-    "--a:#56b4e9;--b:#f0a060;--c:#3ecf9f;--jam:#f0883e}}"
-)
+__all__ = ["STYLE", "Sketch", "degrees", "number"]
 
-Point = complex
-
-
-def number(value: float) -> str:
-    """Write a coordinate with at most two decimals and no trailing zeros.
-
-    Examples
-    --------
-    >>> number(1.0), number(-0.001), number(2.346)
-    ('1', '0', '2.35')
-    """
-    text = f"{value:.2f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
+_CHAIN = (8.0, 3.0, 2.0, 3.0)  # dash-dotted: pitch circles
 
 
 @dataclass(slots=True)
 class Sketch:
-    """A drawing under construction.
+    """A list of shapes, and the part of the plane they are shown in.
 
     Parameters
     ----------
@@ -56,7 +39,7 @@ class Sketch:
     title : str
         Read out by screen readers.
     symbol : float
-        Scale of symbols, line widths and labels; below 1 for small pictures.
+        Scale of symbols and line widths; below 1 for small pictures.
 
     Raises
     ------
@@ -77,9 +60,12 @@ class Sketch:
     margin: float = 28.0
     title: str = ""
     symbol: float = 1.0
-    _shapes: list[str] = field(default_factory=list)
+    shapes: list[Shape] = field(default_factory=list)
     _scale: float = 1.0
     _height: float = 0.0
+    _link: int = FIXED
+    _layer: str = LAYERS[0]
+    _part: str = ""
 
     def __post_init__(self) -> None:
         size = self.upper - self.lower
@@ -87,6 +73,11 @@ class Sketch:
             raise ValueError(f"a sketch needs a box with positive finite sides, not {self.lower} .. {self.upper}")
         self._scale = (self.width - 2 * self.margin) / size.real
         self._height = self._scale * size.imag + 2 * self.margin
+
+    @property
+    def scale(self) -> float:
+        """Pixels per unit of the mechanism."""
+        return self._scale
 
     @property
     def pixel(self) -> float:
@@ -98,45 +89,44 @@ class Sketch:
         """Height of the picture in pixels."""
         return self._height
 
-    def _xy(self, point: Point) -> tuple[float, float]:
+    def xy(self, point: Point) -> tuple[float, float]:
+        """Carry a point of the plane to the page, in pixels from the upper left corner."""
         offset = (point - self.lower) * self._scale
         return self.margin + offset.real, self._height - self.margin - offset.imag
 
-    def _path(self, points: Sequence[Point], closed: bool = False) -> str:
-        steps = " L".join(f"{number(x)} {number(y)}" for x, y in map(self._xy, points))
-        return f"M{steps}{'Z' if closed else ''}"
+    def on(self, link: int = FIXED, layer: str = LAYERS[0], part: str = "") -> Sketch:
+        """Fix the shapes that follow to a link, put them in a layer and name them; return the sketch itself."""
+        self._link, self._layer, self._part = link, layer, part
+        return self
 
-    def _add(self, tag: str, attributes: str, body: str = "") -> None:
-        self._shapes.append(f"<{tag} {attributes}>{body}</{tag}>" if body else f"<{tag} {attributes}/>")
+    def _path(self, runs: Sequence[Sequence[Point]], style: Style, closed: bool = False, curved: bool = False) -> None:
+        found = tuple(map(tuple, runs))
+        self.shapes.append(Path(found, style, closed, curved, self._link, self._layer, self._part))
 
-    def _stroke(self, colour: str, width: float) -> str:
-        return f'stroke="var(--{colour})" stroke-width="{number(width * self.symbol)}"'
+    def _disc(self, centre: Point, pixels: float, style: Style) -> None:
+        self.shapes.append(Circle(centre, pixels * self.pixel, style, self._link, self._layer, self._part))
 
     def bar(self, p: Point, q: Point, colour: str = "link", width: float = 4.0) -> None:
         """Draw a link with two joints."""
-        self._add(
-            "path",
-            f'd="{self._path((p, q))}" {self._stroke(colour, width)} stroke-linecap="round" fill="none"',
-        )
+        self._path([(p, q)], Style(colour, width, round_ends=True))
 
-    def plate(self, points: Sequence[Point], colour: str = "link", width: float = 3.0) -> None:
+    def line(self, points: Sequence[Point], colour: str = "link", width: float = 1.6, closed: bool = False) -> None:
+        """Draw a thin line through points."""
+        self._path([points], Style(colour, width, round_ends=True), closed)
+
+    def plate(self, points: Sequence[Point], colour: str = "link", width: float = 3.0, opacity: float = 1.0) -> None:
         """Draw a link with three or more joints as a shaded polygon."""
-        self._add(
-            "path",
-            f'd="{self._path(points, closed=True)}" fill="var(--fill)" '
-            f'{self._stroke(colour, width)} stroke-linejoin="round"',
-        )
+        self._path([points], Style(colour, width, "fill", fill_opacity=opacity), closed=True)
+
+    def outline(self, points: Sequence[Point], colour: str = "link", width: float = 2.0) -> None:
+        """Draw a closed figure filled with the colour of the paper: the block of a slider, a slot."""
+        self._path([points], Style(colour, width, "paper"), closed=True)
 
     def joint(self, point: Point, radius: float = 5.0) -> None:
         """Draw a revolute joint: an open circle."""
-        x, y = self._xy(point)
-        self._add(
-            "circle",
-            f'cx="{number(x)}" cy="{number(y)}" r="{number(radius * self.symbol)}" fill="var(--paper)" '
-            f"{self._stroke('link', 2)}",
-        )
+        self._disc(point, radius * self.symbol, Style("link", 2.0, "paper"))
 
-    def ground(self, point: Point, size: float = 17.0, direction: Point = -1j) -> None:
+    def ground(self, point: Point, size: float = 17.0, direction: Point = -1j, joint: bool = True) -> None:
         """Draw a joint on the frame: a triangle below the joint, standing on hatched ground.
 
         `direction` points from the joint to the ground.
@@ -144,48 +134,46 @@ class Sketch:
         down = _unit(direction) * self.pixel * self.symbol
         side = down * 1j
         foot = point + down * size
-        self._add(
-            "path",
-            f'd="{self._path((point, foot + side * size * 0.62, foot - side * size * 0.62), closed=True)}" '
-            f'fill="var(--paper)" {self._stroke("link", 2)} stroke-linejoin="round"',
-        )
-        self._hatch(foot - side * size, foot + side * size, down)
-        self.joint(point)
+        corners = (point, foot + side * size * 0.62, foot - side * size * 0.62)
+        self._path([corners], Style("link", 2.0, "paper"), closed=True)
+        self.hatch(foot - side * size, foot + side * size, down)
+        if joint:
+            self.joint(point)
 
-    def _hatch(self, start: Point, end: Point, down: Point) -> None:
+    def hatch(self, start: Point, end: Point, down: Point, strokes: int = 5) -> None:
         """Draw a ground line with short strokes on its far side; `down` is the unit of length towards that side."""
         across = end - start
-        strokes = 5
-        pieces = [self._path((start, end))]
         slant = (down - _unit(across) * abs(down)) * 6.5
-        for i in range(strokes):
-            foot = start + across * ((i + 0.9) / strokes)
-            pieces.append(self._path((foot, foot + slant)))
-        self._add(
-            "path",
-            f'd="{" ".join(pieces)}" fill="none" {self._stroke("link", 1.6)} stroke-linecap="round"',
-        )
+        feet = [start + across * ((i + 0.9) / strokes) for i in range(strokes)]
+        self._path([(start, end), *((foot, foot + slant) for foot in feet)], Style("link", 1.6, round_ends=True))
 
     def hatch_over(self, point: Point, radius: float) -> None:
         """Draw ground above a vertex of radius `radius` pixels: the sign of the frame in a graph."""
-        up = 1j * self.pixel
-        middle = point + up * (radius + 3)
-        self._hatch(middle + radius * 1.3 * self.pixel, middle - radius * 1.3 * self.pixel, up)
+        up = 1j * self.pixel * self.symbol
+        middle = point + 1j * self.pixel * (radius + 3)
+        half = radius * 1.3 * self.pixel
+        self.hatch(middle + half, middle - half, up)
 
     def circle(
-        self, centre: Point, radius: float, colour: str = "soft", dash: str = "8 3 2 3", width: float = 1.3
+        self,
+        centre: Point,
+        radius: float,
+        colour: str = "soft",
+        dash: Sequence[float] | str = _CHAIN,
+        width: float = 1.3,
     ) -> None:
         """Draw a circle of the mechanism's size, dash-dotted by default as a pitch circle."""
-        x, y = self._xy(centre)
-        dashes = f' stroke-dasharray="{dash}"' if dash else ""
-        self._add(
-            "circle",
-            f'cx="{number(x)}" cy="{number(y)}" r="{number(radius * self._scale)}" fill="none" '
-            f"{self._stroke(colour, width)}{dashes}",
-        )
+        dashes = tuple(map(float, dash.split())) if isinstance(dash, str) else tuple(dash)
+        style = Style(colour, width, dash=dashes)
+        self.shapes.append(Circle(centre, radius, style, self._link, self._layer, self._part))
 
     def trace(
-        self, points: Sequence[Point], colour: str = "a", width: float = 1.8, closed: bool = False, dash: str = ""
+        self,
+        points: Sequence[Point],
+        colour: str = "a",
+        width: float = 1.8,
+        closed: bool = False,
+        dash: Sequence[float] = (),
     ) -> None:
         """Draw the path of a point; a point that is not finite breaks the line."""
         runs: list[list[Point]] = [[]]
@@ -195,20 +183,13 @@ class Sketch:
             elif runs[-1]:
                 runs.append([])
         whole = closed and len(runs) == 1
-        data = " ".join(self._path(run, whole) for run in runs if len(run) > 1)
-        if data:
-            dashes = f' stroke-dasharray="{dash}"' if dash else ""
-            self._add(
-                "path",
-                f'd="{data}" fill="none" {self._stroke(colour, width)} stroke-linejoin="round"{dashes}',
-            )
+        long = [run for run in runs if len(run) > 1]
+        if long:
+            self._path(long, Style(colour, width, dash=tuple(dash)), closed=whole)
 
     def dot(self, point: Point, colour: str = "a", radius: float = 3.5) -> None:
         """Draw a filled dot of fixed size."""
-        x, y = self._xy(point)
-        self._add(
-            "circle", f'cx="{number(x)}" cy="{number(y)}" r="{number(radius * self.symbol)}" fill="var(--{colour})"'
-        )
+        self._disc(point, radius * self.symbol, Style("", 0.0, colour))
 
     def label(
         self,
@@ -220,52 +201,55 @@ class Sketch:
         size: float = 14.0,
     ) -> None:
         """Write text at a point, moved by `offset` pixels (y upwards); a halo keeps it readable over lines."""
-        x, y = self._xy(point)
-        self._add(
-            "text",
-            f'x="{number(x + offset.real)}" y="{number(y - offset.imag)}" text-anchor="{anchor}" '
-            f'dominant-baseline="central" font-size="{number(size)}" fill="var(--{colour})" stroke="var(--paper)" '
-            'stroke-width="3" paint-order="stroke" stroke-linejoin="round"',
-            escape(text),
-        )
+        self.shapes.append(
+            Text(
+                point, text, offset, anchor, colour, size, link=self._link, layer=self._layer, part=self._part
+            )
+        )  # fmt: skip
 
     def curve(
-        self, p: Point, q: Point, bend: float = 0.0, colour: str = "ink", width: float = 1.8, dash: str = ""
+        self,
+        p: Point,
+        q: Point,
+        bend: float = 0.0,
+        colour: str = "ink",
+        width: float = 1.8,
+        dash: Sequence[float] = (),
     ) -> None:
         """Draw an edge p-q as a quadratic curve bent aside by `bend` units (to the right of p-q if positive)."""
         middle = (p + q) / 2 - 1j * _unit(q - p) * bend * 2
-        (x1, y1), (x2, y2), (x3, y3) = map(self._xy, (p, middle, q))
-        dashes = f' stroke-dasharray="{dash}"' if dash else ""
-        self._add(
-            "path",
-            f'd="M{number(x1)} {number(y1)} Q{number(x2)} {number(y2)} {number(x3)} {number(y3)}" fill="none" '
-            f"{self._stroke(colour, width)}{dashes}",
-        )
+        self._path([(p, middle, q)], Style(colour, width, dash=tuple(dash), round_joins=False), curved=True)
 
     def node(self, point: Point, text: str, radius: float = 10.0, filled: bool = False) -> None:
         """Draw a vertex of a graph: a circle with its number."""
-        x, y = self._xy(point)
-        fill, ink = ("var(--ink)", "var(--paper)") if filled else ("var(--paper)", "var(--ink)")
-        self._add(
-            "circle",
-            f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}" fill="{fill}" stroke="var(--ink)" '
-            'stroke-width="1.6"',
-        )
-        self._add(
-            "text",
-            f'x="{number(x)}" y="{number(y)}" text-anchor="middle" dominant-baseline="central" '
-            f'font-size="{number(radius * 1.1)}" fill="{ink}"',
-            escape(text),
-        )
+        fill, ink = ("ink", "paper") if filled else ("paper", "ink")
+        self._disc(point, radius, Style("ink", 1.6, fill))
+        self.shapes.append(
+            Text(
+                point, text, colour=ink, size=radius * 1.1, halo=0.0, link=self._link, layer=self._layer,
+                part=self._part,
+            )
+        )  # fmt: skip
 
-    def svg(self) -> str:
-        """Return the picture as one ``<svg>`` element that needs nothing else."""
-        name = f"<title>{escape(self.title)}</title>" if self.title else ""
-        box = f"0 0 {number(self.width)} {number(self._height)}"
-        return (
-            f'<svg xmlns="http://www.w3.org/2000/svg" class="gs" viewBox="{box}" width="{number(self.width)}" '
-            f'height="{number(self._height)}" role="img">{name}<style>{STYLE}</style>{"".join(self._shapes)}</svg>'
-        )
+    def ordered(self) -> list[Shape]:
+        """Return the shapes from back to front; inside a layer in the order they were drawn."""
+        rank = {layer: k for k, layer in enumerate(LAYERS)}
+        return sorted(self.shapes, key=lambda shape: rank[shape.layer])
+
+    def svg(self, pose: Sequence[Sequence[float]] | None = None) -> str:
+        """Return the picture as one ``<svg>`` element that needs nothing else.
+
+        Parameters
+        ----------
+        pose : sequence of (x, y, theta), optional
+            Where every link is; needed if any shape is fixed to a link.
+        """
+        place = placement(pose)
+        body = [self._element(shape, place) for shape in self.ordered()]
+        return picture(body, self.width, self._height, STYLE, self.title)
+
+    def _element(self, shape: Shape, place: Placement) -> str:
+        return element(shape, lambda point: self.xy(place(shape.link, point)), self._scale, self.symbol)
 
 
 def _unit(vector: Point) -> Point:
