@@ -8,13 +8,14 @@ reach keep their digits.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["LegSolution", "LegStatus", "solve_leg"]
+__all__ = ["LegSolution", "LegStatus", "PlatformLegs", "solve_leg"]
 
 Array = NDArray[np.float64]
 
@@ -158,7 +159,68 @@ def _quotient(a: Array, b: Array) -> Array:
     return np.where(b > 0.0, a / np.where(b > 0.0, b, 1.0), 0.0)
 
 
-def sensitivity(leg: LegSolution, l2: ArrayLike) -> Array:
+def sensitivity(S: ArrayLike, l2: ArrayLike) -> Array:
     """Bound of ``|d theta| / |dF|``, ``2 l2 / S``; infinite on the boundary of the reach."""
+    S = np.asarray(S, dtype=np.float64)
     with np.errstate(divide="ignore"):
-        return np.where(leg.S > 0.0, 2.0 * np.asarray(l2) / leg.S, math.inf)
+        return np.where(S > 0.0, 2.0 * np.asarray(l2) / S, math.inf)
+
+
+class PlatformLegs:
+    """Three legs of a platform, solved in bulk by compiled code.
+
+    The compiled evaluation keeps every sum as a pair of numbers; the few legs within about 1e-15 of their boundary, free
+    legs and extreme magnitudes are solved again by `solve_leg`, so that both give the same status.
+
+    Parameters
+    ----------
+    D, b : sequence of 3 complex
+        Pivots in the fixed frame, vertices in the platform frame.
+    l1, l2 : sequence of 3 floats
+        Arms and links.
+    """
+
+    def __init__(self, D: Sequence[complex], b: Sequence[complex], l1: Sequence[float], l2: Sequence[float]) -> None:
+        from graphsynth.kinematics.kernels.leg import lengths
+
+        self._D, self._b = np.array(D, dtype=np.complex128), np.array(b, dtype=np.complex128)
+        self._l1, self._l2 = np.array(l1, dtype=np.float64), np.array(l2, dtype=np.float64)
+        self._flat = self._D.view(np.float64).reshape(3, 2), self._b.view(np.float64).reshape(3, 2)
+        self._constants = np.empty((3, 8))
+        for k in range(3):
+            lengths(self._l1[k], self._l2[k], self._constants[k])
+
+    def solve(self, pose: Array, sigma: Array, modes: int) -> tuple[Array, NDArray[np.int8]]:
+        """Angles (n, modes, 3) and status (n, 3) of poses (n, 3).
+
+        ``modes`` is 1 with sigma of shape (1, 3) or (n, 3), or 8 with sigma the table of the working modes.
+        """
+        from graphsynth.kinematics.kernels.leg import inverse
+
+        theta, status, none = np.empty((len(pose), modes, 3)), np.empty((len(pose), 3), dtype=np.int8), np.empty((0, 3))
+        if inverse(pose, *self._flat, self._constants, sigma, theta, status, none, none):
+            rows, legs, exact = self._exact(pose, status)
+            status[rows, legs] = exact.status
+            for mode in range(modes):
+                side = sigma[mode, legs] if modes > 1 else np.broadcast_to(sigma, pose.shape)[rows, legs]
+                theta[rows, mode, legs] = exact.angle(side)
+        return theta, status
+
+    def reach(self, pose: Array) -> tuple[Array, Array]:
+        """S and the signed deficit, each (n, 3); S is NaN out of reach."""
+        from graphsynth.kinematics.kernels.leg import inverse
+
+        S, deficit, status = np.empty(pose.shape), np.empty(pose.shape), np.empty(pose.shape, dtype=np.int8)
+        theta = np.empty((len(pose), 1, 3))
+        if inverse(pose, *self._flat, self._constants, np.ones((1, 3)), theta, status, S, deficit):
+            rows, legs, exact = self._exact(pose, status)
+            S[rows, legs], deficit[rows, legs] = exact.S, exact.deficit
+        return S, deficit
+
+    def _exact(self, pose: Array, status: NDArray[np.int8]) -> tuple[NDArray[np.intp], NDArray[np.intp], LegSolution]:
+        from graphsynth.kinematics.kernels.leg import HARD
+
+        rows, legs = np.nonzero(status == HARD)
+        x, y, alpha = pose[rows].T
+        w = (x + 1j * y) + np.exp(1j * alpha) * self._b[legs] - self._D[legs]
+        return rows, legs, solve_leg(w.real, w.imag, self._l1[legs], self._l2[legs])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array, positive
 from graphsynth.kinematics.assembly_modes import AssemblyModeBatch, AssemblyModes, assembly_modes, assembly_modes_batch
-from graphsynth.kinematics.leg import LegStatus, sensitivity, solve_leg
+from graphsynth.kinematics.leg import LegStatus, PlatformLegs, sensitivity
 
 __all__ = ["WORKING_MODES", "InverseSolution", "ParallelPlatform"]
 
@@ -37,19 +38,36 @@ class InverseSolution:
         NaN for a leg out of reach or free; see ``status``.
     status : ndarray of int8, shape (..., 3)
         `LegStatus` of every leg.
-    deficit : ndarray, shape (..., 3)
-        Signed distance missing (positive) or margin left (negative).
-    S : ndarray, shape (..., 3)
-        Magnitude of the Jacobian entry ``JT_kk``; 0 on the boundary of the reach, NaN beyond it.
-    sensitivity : ndarray, shape (..., 3)
-        Bound of ``|d theta| / |dF|``; infinite on the boundary.
+    pose : ndarray, shape (..., 3)
+        The poses asked for.
+    platform : ParallelPlatform
+        The platform asked.
     """
 
     theta: Array
     status: NDArray[np.int8]
-    deficit: Array
-    S: Array
-    sensitivity: Array
+    pose: Array
+    platform: ParallelPlatform
+
+    @cached_property
+    def _reach(self) -> tuple[Array, Array]:
+        S, deficit = self.platform._legs.reach(self.pose.reshape(-1, 3))
+        return S.reshape(self.status.shape), deficit.reshape(self.status.shape)
+
+    @property
+    def S(self) -> Array:
+        """Magnitude of the Jacobian entry ``JT_kk``, (..., 3); 0 on the boundary of the reach, NaN beyond it."""
+        return self._reach[0]
+
+    @property
+    def deficit(self) -> Array:
+        """Signed distance missing (positive) or margin left (negative), (..., 3)."""
+        return self._reach[1]
+
+    @property
+    def sensitivity(self) -> Array:
+        """Bound of ``|d theta| / |dF|``, (..., 3): ``2 l2 / S``; infinite on the boundary."""
+        return sensitivity(self.S, np.array(self.platform.l2))
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
@@ -114,6 +132,10 @@ class ParallelPlatform:
         object.__setattr__(self, "l1", _lengths("l1", self.l1))
         object.__setattr__(self, "l2", _lengths("l2", self.l2))
 
+    @cached_property
+    def _legs(self) -> PlatformLegs:
+        return PlatformLegs(self.D, self.b, self.l1, self.l2)
+
     @classmethod
     def g1(cls) -> ParallelPlatform:
         """Return the generic asymmetric reference platform G1 (section 2.5; no unit)."""
@@ -148,16 +170,19 @@ class ParallelPlatform:
         GeometryError
             A pose that is not finite, or a sigma that is not made of +1 and -1.
         """
-        w = self.vertices(pose) - np.array(self.D)
-        leg = solve_leg(w.real, w.imag, np.array(self.l1), np.array(self.l2))
+        X = finite_array("pose", pose)
+        rows = np.ascontiguousarray(X.reshape(-1, 3))
         if sigma is None:
-            theta = np.stack([leg.angle(mode) for mode in WORKING_MODES], axis=-2)
-        else:
-            mode = np.asarray(sigma)
-            if not bool(np.all(np.abs(mode) == 1)) or mode.shape[-1:] != (3,):
-                raise GeometryError(f"sigma = {sigma!r} must hold three entries +1 or -1, the working mode")
-            theta = leg.angle(mode)
-        return InverseSolution(theta, leg.status, leg.deficit, leg.S, sensitivity(leg, np.array(self.l2)))
+            theta, status = self._legs.solve(rows, WORKING_MODES.astype(np.float64), 8)
+            return InverseSolution(theta.reshape(*X.shape[:-1], 8, 3), status.reshape(X.shape), X, self)
+        mode = np.asarray(sigma, dtype=np.float64)
+        if not bool(np.all(np.abs(mode) == 1)) or mode.shape[-1:] != (3,):
+            raise GeometryError(f"sigma = {sigma!r} must hold three entries +1 or -1, the working mode")
+        if mode.ndim > 1:
+            X, mode = np.broadcast_arrays(X, mode)
+            rows = np.ascontiguousarray(X.reshape(-1, 3))
+        theta, status = self._legs.solve(rows, np.ascontiguousarray(mode.reshape(-1, 3)), 1)
+        return InverseSolution(theta.reshape(X.shape), status.reshape(X.shape), X, self)
 
     def closure(self, pose: ArrayLike, theta: ArrayLike) -> Array:
         """Residuals ``f_k = |F_k - A_k|^2 - l2_k^2``, shape (..., 3), unit length^2."""
