@@ -1,0 +1,146 @@
+"""What of a mechanism's links can be seen: attachment points, guides over their travel, wheels, and the room they take.
+
+Points are complex numbers in the frame of their link; nothing here draws.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic
+from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["Body", "Guide", "bodies", "bounds", "hull", "outline", "world"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class Guide:
+    """The line of a sliding pair or the middle of a slot, from the first to the last place that is used."""
+
+    joint: JointGeometry
+    start: complex
+    stop: complex
+    direction: complex
+
+    def nearest(self, point: complex) -> complex:
+        """Return the point of the guide nearest to a point."""
+        along = ((point - self.start) * self.direction.conjugate()).real
+        length = ((self.stop - self.start) * self.direction.conjugate()).real
+        return self.start + self.direction * min(max(along, 0.0), length)
+
+
+@dataclass(slots=True)
+class Body:
+    """One link: where other links or named points are attached, its guides, and the pitch circles it carries."""
+
+    link: int
+    points: list[complex] = field(default_factory=list)
+    guides: list[Guide] = field(default_factory=list)
+    wheels: list[tuple[complex, float, Gear]] = field(default_factory=list)
+
+    def vertices(self) -> list[complex]:
+        """Attachment points, and for each guide its point nearest to them."""
+        middle = sum(self.points) / len(self.points) if self.points else None
+        ends = [guide.nearest(middle if middle is not None else _first_end(self.guides, guide)) for guide in self.guides]
+        return [*self.points, *ends]
+
+
+def _first_end(guides: list[Guide], guide: Guide) -> complex:
+    """A link of guides alone: they meet nearest to the middle of the first."""
+    first = guides[0]
+    return (first.start + first.stop) / 2 if guide is not first else (guides[-1].start + guides[-1].stop) / 2
+
+
+def world(poses: Array, link: int, point: complex) -> Complex:
+    """Carry a point of a link to the plane for every pose of ``poses`` (n, links, 3)."""
+    pose = poses[:, link]
+    return np.asarray(pose[:, 0] + 1j * pose[:, 1] + np.exp(1j * pose[:, 2]) * point)
+
+
+def _travel(joint: Prismatic | PinSlot, poses: Array) -> tuple[float, float]:
+    """Least and largest displacement of ``at_b`` along the line of a."""
+    P = world(poses, joint.a, complex(*joint.at_a))
+    Q = world(poses, joint.b, complex(*joint.at_b))
+    along = ((Q - P) * np.exp(-1j * (poses[:, joint.a, 2] + joint.angle_a))).real
+    return float(along.min()), float(along.max())
+
+
+def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
+    """Return what each link shows over the poses; guides are ``reserve`` longer at both ends than the travel."""
+    found = [Body(link) for link in range(mechanism.graph.links)]
+    for joint in mechanism.joints:
+        a, b = found[joint.a], found[joint.b]
+        at_a, at_b = complex(*joint.at_a), complex(*joint.at_b)
+        if isinstance(joint, Prismatic | PinSlot):
+            t = complex(np.exp(1j * joint.angle_a))
+            least, most = _travel(joint, poses)
+            a.guides.append(Guide(joint, at_a + t * (least - reserve), at_a + t * (most + reserve), t))
+            b.points.append(at_b)
+        else:
+            a.points.append(at_a)
+            b.points.append(at_b)
+        if isinstance(joint, Gear):
+            a.wheels.append((at_a, joint.radius_a, joint))
+            b.wheels.append((at_b, joint.radius_b, joint))
+    for point in mechanism.points.values():
+        found[point.link].points.append(complex(*point.at))
+    return found
+
+
+def bounds(mechanism: Mechanism, poses: Array) -> tuple[complex, complex]:
+    """Corners of the smallest box around everything that is drawn, over all poses; never without width or height."""
+    every = []
+    for body in bodies(mechanism, poses, 0.0):
+        ends = [end for guide in body.guides for end in (guide.start, guide.stop)]
+        every += [world(poses, body.link, point) for point in (*body.points, *ends)]
+        every += [
+            world(poses, body.link, centre) + radius * d for centre, radius, _ in body.wheels for d in (1j, -1j, 1, -1)
+        ]
+    z = np.concatenate(every) if every else np.zeros(1, dtype=np.complex128)
+    lower, upper = complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
+    size = upper - lower
+    side = max(size.real, size.imag) or 1.0
+    grow = complex(max(0.0, 0.3 * side - size.real), max(0.0, 0.25 * side - size.imag)) / 2
+    return lower - grow, upper + grow
+
+
+def hull(points: list[complex]) -> list[complex]:
+    """Corners of the convex hull, anticlockwise (monotone chain, Andrew 1979); fewer than three if they are in line."""
+    ordered = sorted(set(points), key=lambda z: (z.real, z.imag))
+    if len(ordered) < 3:
+        return ordered
+    size = max(abs(z - ordered[0]) for z in ordered)
+
+    def chain(sequence: list[complex]) -> list[complex]:
+        kept: list[complex] = []
+        for z in sequence:
+            while len(kept) > 1 and ((kept[-1] - kept[-2]).conjugate() * (z - kept[-2])).imag <= 1e-9 * size * size:
+                kept.pop()
+            kept.append(z)
+        return kept
+
+    lower, upper = chain(ordered), chain(ordered[::-1])
+    return [*lower[:-1], *upper[:-1]]
+
+
+def outline(points: list[complex], merge: float) -> list[complex]:
+    """Hull of points after those closer than ``merge`` to an earlier one are left out; two ends if nearly in line."""
+    kept: list[complex] = []
+    for point in points:
+        if all(abs(point - other) > merge for other in kept):
+            kept.append(point)
+    corners = hull(kept)
+    if len(corners) < 3:
+        return corners
+    far, p, q = max(((abs(p - q), p, q) for p in corners for q in corners), key=lambda found: found[0])
+    t = (q - p) / far
+    width = [((z - p) * t.conjugate()).imag for z in corners]
+    return corners if max(width) - min(width) > merge else [p, q]
+
+

@@ -1,0 +1,201 @@
+"""Shapes drawn through matplotlib: PNG, PDF, axes of the user's own figure, frames of animations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from graphsynth.drawing.palette import LIGHT
+from graphsynth.drawing.shapes import FIXED, Circle, Path, Shape, Style, Text, placement
+from graphsynth.drawing.sketch import Sketch
+from graphsynth.errors import GraphsynthError
+
+__all__ = ["Canvas", "draw", "figure_of", "save"]
+
+Pose = Sequence[Sequence[float]]
+
+#: Pixels of a sketch per inch of a figure.
+DPI = 96.0
+
+
+class Canvas:
+    """The artists of a sketch on axes; they can be moved to another pose without being made again.
+
+    Parameters
+    ----------
+    sketch : Sketch
+    axes : matplotlib.axes.Axes
+        Its limits and aspect are set to show the whole sketch; data coordinates are those of the mechanism.
+    pose : sequence of (x, y, theta), optional
+        Where every link is; needed if any shape is fixed to a link.
+    """
+
+    def __init__(self, sketch: Sketch, axes: Any, pose: Pose | None = None) -> None:
+        self.sketch, self.axes = sketch, axes
+        self._frame_view()
+        self._points = self._points_per_pixel()
+        self._moving: list[tuple[Shape, Any]] = []
+        for order, shape in enumerate(sketch.ordered()):
+            artist = self._artist(shape, 2.0 + order * 1e-3)
+            if shape.link != FIXED:
+                self._moving.append((shape, artist))
+        self.move(pose)
+
+    def _frame_view(self) -> None:
+        sketch, edge = self.sketch, self.sketch.margin * self.sketch.pixel
+        self.axes.set_aspect("equal", adjustable="box")
+        self.axes.set_xlim(sketch.lower.real - edge, sketch.upper.real + edge)
+        self.axes.set_ylim(sketch.lower.imag - edge, sketch.upper.imag + edge)
+
+    def _points_per_pixel(self) -> float:
+        """Typographic points that one pixel of the sketch takes on these axes."""
+        box = self.axes.get_window_extent()
+        return float(min(box.width / self.sketch.width, box.height / self.sketch.height) * 72.0 / self.axes.figure.dpi)
+
+    def _artist(self, shape: Shape, order: float) -> Any:
+        from matplotlib.patches import Circle as CirclePatch
+        from matplotlib.patches import PathPatch
+
+        if isinstance(shape, Text):
+            return self._text(shape, order)
+        look = self._look(shape.style)
+        if isinstance(shape, Circle):
+            patch: Any = CirclePatch((shape.centre.real, shape.centre.imag), shape.radius, **look)
+        else:
+            patch = PathPatch(_outline(shape), **look)
+        patch.set_zorder(order)
+        patch.set_gid(shape.part or None)
+        return self.axes.add_patch(patch)
+
+    def _look(self, style: Style) -> dict[str, Any]:
+        from matplotlib.colors import to_rgba
+
+        width = style.width * self.sketch.symbol * self._points
+        look: dict[str, Any] = {
+            "facecolor": to_rgba(LIGHT[style.fill], style.fill_opacity) if style.fill else "none",
+            "edgecolor": LIGHT[style.stroke] if style.stroke and width else "none",
+            "linewidth": width,
+            "capstyle": "round" if style.round_ends else "butt",
+            "joinstyle": "round" if style.round_joins else "miter",
+        }
+        if style.dash and width:
+            # matplotlib multiplies dashes by the line width
+            look["linestyle"] = (0.0, [d * self._points / width for d in style.dash])
+        return look
+
+    def _text(self, shape: Text, order: float) -> Any:
+        from matplotlib.patheffects import withStroke
+
+        place = {"middle": "center", "start": "left", "end": "right"}[shape.anchor]
+        k = self._points
+        note = self.axes.annotate(
+            shape.text, (shape.at.real, shape.at.imag), xytext=(shape.offset.real * k, shape.offset.imag * k),
+            textcoords="offset points", ha=place, va="center_baseline" if len(shape.text) > 2 else "center",
+            fontsize=shape.size * k, color=LIGHT[shape.colour], zorder=order, annotation_clip=False,
+            fontweight=shape.weight or "normal",
+        )  # fmt: skip
+        note.set_gid(shape.part or None)
+        if shape.halo:
+            note.set_path_effects([withStroke(linewidth=shape.halo * k, foreground=LIGHT["paper"])])
+        return note
+
+    def move(self, pose: Pose | None) -> None:
+        """Carry every link to a pose."""
+        from matplotlib.transforms import Affine2D
+
+        if not self._moving:
+            return
+        if pose is None:
+            raise GraphsynthError("the sketch has moving links: give the pose of every link")
+        place = placement(pose)
+        for shape, artist in self._moving:
+            if isinstance(shape, Text):
+                point = place(shape.link, shape.at)
+                artist.xy = (point.real, point.imag)
+            else:
+                x, y, theta = pose[shape.link]
+                artist.set_transform(Affine2D().rotate(theta).translate(x, y) + self.axes.transData)
+
+
+def _outline(path: Path) -> Any:
+    """Matplotlib's path of the same points."""
+    from matplotlib.path import Path as Outline
+
+    points: list[tuple[float, float]] = []
+    codes: list[int] = []
+    for run in path.runs:
+        points += [(p.real, p.imag) for p in run]
+        if path.curved:
+            codes += [Outline.MOVETO, Outline.CURVE3, Outline.CURVE3]
+        else:
+            codes += [Outline.MOVETO, *([Outline.LINETO] * (len(run) - 1))]
+        if path.closed:
+            points.append(points[-len(run)])
+            codes.append(Outline.CLOSEPOLY)
+    return Outline(np.array(points), codes)
+
+
+def draw(sketch: Sketch, axes: Any, pose: Pose | None = None) -> Any:
+    """Draw a sketch on matplotlib axes; return the axes."""
+    Canvas(sketch, axes, pose)
+    return axes
+
+
+def figure_of(sketches: Sequence[Sketch], poses: Sequence[Pose | None], dpi: float = DPI) -> tuple[Any, list[Canvas]]:
+    """Make a figure with the sketches side by side in their own size, without frames around; return it and canvases."""
+    from matplotlib.figure import Figure
+
+    width, height = sum(s.width for s in sketches), max(s.height for s in sketches)
+    figure = Figure(figsize=(width / DPI, height / DPI), dpi=dpi)
+    figure.set_facecolor(LIGHT["paper"])
+    canvases, left = [], 0.0
+    for sketch, pose in zip(sketches, poses):
+        bottom = (1.0 - sketch.height / height) / 2
+        axes = figure.add_axes((left / width, bottom, sketch.width / width, sketch.height / height))
+        axes.set_axis_off()
+        canvases.append(Canvas(sketch, axes, pose))
+        left += sketch.width
+    return figure, canvases
+
+
+def save(path: File, sketches: Sequence[Sketch], poses: Sequence[Pose | None]) -> None:
+    """Write sketches side by side as the suffix says: ``.svg`` (own writer), ``.png`` or ``.pdf`` (matplotlib).
+
+    Raises
+    ------
+    GraphsynthError
+        Another suffix.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".svg":
+        path.write_text(beside([sketch.svg(pose) for sketch, pose in zip(sketches, poses)], sketches), "utf-8")
+        return
+    if suffix not in (".png", ".pdf"):
+        raise GraphsynthError(f"{path} must end in .svg, .png or .pdf")
+    from matplotlib import rc_context
+
+    with rc_context({"font.family": "sans-serif", "pdf.fonttype": 42}):
+        figure, _ = figure_of(sketches, poses)
+        metadata: dict[str, Any] = {"CreationDate": None} if suffix == ".pdf" else {}
+        figure.savefig(path, dpi=2 * DPI, metadata=metadata)
+
+
+def beside(pictures: Sequence[str], sketches: Sequence[Sketch]) -> str:
+    """Put SVG pictures side by side in one."""
+    if len(pictures) == 1:
+        return pictures[0]
+    from graphsynth.drawing.svg import number
+
+    width, height = sum(s.width for s in sketches), max(s.height for s in sketches)
+    body, left = [], 0.0
+    for text, sketch in zip(pictures, sketches):
+        top = (height - sketch.height) / 2
+        body.append(text.replace("<svg ", f'<svg x="{number(left)}" y="{number(top)}" ', 1))
+        left += sketch.width
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" '
+        f'width="{number(width)}" height="{number(height)}">{"".join(body)}</svg>'
+    )

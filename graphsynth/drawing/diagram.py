@@ -1,0 +1,427 @@
+"""Kinematic diagrams of dimensioned mechanisms: the joints' and links' symbols, each fixed to its link.
+
+Symbols follow ISO 3952: turning pairs are open circles, pairs on the frame stand on hatched ground, a slider is a block
+on its guide, a pin runs in a slot, gears are dash-dotted pitch circles.  The driven link and the arrow of its sense are in
+a second colour.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.drawing.bodies import Body, Guide, bodies, bounds, outline, world
+from graphsynth.drawing.lettering import place_letters
+from graphsynth.drawing.palette import TRACE_COLOURS
+from graphsynth.drawing.shapes import FIXED
+from graphsynth.drawing.sketch import Sketch
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.model import Driver, Mechanism
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+
+__all__ = ["draw_mechanism", "mechanism_sketch", "mechanism_svg"]
+
+Array = NDArray[np.float64]
+
+_BLOCK = 13.0  # half length of a slider's block, pixels
+_HALF = 8.0  # its half width
+_SLOT = 6.5  # half width of a slot
+_MARGIN = 40.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What the parts of a diagram share."""
+
+    mechanism: Mechanism
+    poses: Array
+    sketch: Sketch
+    bodies: list[Body]
+    grounded: bool
+
+    @property
+    def px(self) -> float:
+        """One symbol pixel in the units of the mechanism."""
+        return self.sketch.pixel * self.sketch.symbol
+
+    def fixed(self, link: int) -> bool:
+        """Whether a link is drawn as ground."""
+        return self.grounded and link == self.mechanism.frame
+
+    def colour(self, link: int) -> str:
+        """Ink of a link: driven links stand out."""
+        frame = self.mechanism.frame
+        driven = any(d.link == link or (d.base == link != frame and d.link == frame) for d in self.mechanism.drivers)
+        return "b" if driven and self.grounded else "link"
+
+
+def mechanism_sketch(
+    mechanism: Mechanism,
+    poses: ArrayLike,
+    *,
+    width: float = 480.0,
+    height: float = 420.0,
+    numbers: bool = True,
+    grounded: bool = True,
+    traces: bool = True,
+    title: str = "",
+) -> Sketch:
+    """Build the diagram of a mechanism, with room for all the poses given.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    poses : array_like, shape (n, links, 3) or (links, 3)
+        Assembled poses ``(x, y, theta)``.  Guides are as long as the travel in them; named points are traced over them.
+    width, height : float
+        Largest size in pixels.
+    numbers : bool
+        Write the numbers of the links.
+    grounded : bool
+        Draw the frame as ground; False shows a chain, whose links are all alike.
+    traces : bool
+        Draw the paths of the named points.
+    title : str
+        Read out by screen readers.
+
+    Returns
+    -------
+    Sketch
+        Its shapes are fixed to the links: ``sketch.svg(pose)`` for any pose.
+
+    Raises
+    ------
+    GeometryError
+        If a pose is not finite or does not fit the mechanism.
+    """
+    array = _checked(mechanism, poses)
+    lower, upper = bounds(mechanism, array)
+    size = upper - lower
+    scale = min((width - 2 * _MARGIN) / size.real, (height - 2 * _MARGIN) / size.imag)
+    least = 200.0 - 2 * _MARGIN  # a narrow mechanism is centred on a picture that has room for letters
+    spare = max(0.0, least / scale - size.real) / 2
+    lower, upper = lower - spare, upper + spare
+    sketch = Sketch(lower, upper, (upper - lower).real * scale + 2 * _MARGIN, _MARGIN, title or _title(mechanism))
+    reserve = (_BLOCK + 5.0) / scale
+    plan = _Plan(mechanism, array, sketch, bodies(mechanism, array, reserve), grounded)
+    if traces and len(array) > 1:
+        _traces(plan)
+    for body in plan.bodies:
+        _link(plan, body)
+    for joint in mechanism.joints:
+        if isinstance(joint, Prismatic | PinSlot):
+            _slider(plan, joint)
+    grounds = _joints(plan)
+    if grounded:
+        for driver in mechanism.drivers:
+            _arrow(plan, driver, grounds)
+    _points(plan)
+    place_letters(sketch, mechanism, array, plan.bodies, grounds, numbers, grounded)
+    sketch.on()
+    return sketch
+
+
+def _title(mechanism: Mechanism) -> str:
+    return f"Kinematic diagram, {mechanism.graph.links} links"
+
+
+def _checked(mechanism: Mechanism, poses: ArrayLike) -> Array:
+    array = np.asarray(poses, dtype=np.float64)
+    if array.ndim == 2:
+        array = array[None]
+    links = mechanism.graph.links
+    if array.ndim != 3 or array.shape[1:] != (links, 3) or len(array) == 0:
+        raise GeometryError(f"poses have shape {np.shape(poses)}; give (x, y, theta) for each of the {links} links")
+    if not np.isfinite(array).all():
+        raise GeometryError("a pose that is not finite cannot be drawn; give an assembled one")
+    return array
+
+
+def _traces(plan: _Plan) -> None:
+    for k, (name, (link, at)) in enumerate(plan.mechanism.points.items()):
+        path = world(plan.poses, link, complex(*at))
+        if abs(path - path[0]).max() > plan.px:
+            plan.sketch.on(layer="trace", part=f"path {name}")
+            plan.sketch.trace(path.tolist(), TRACE_COLOURS[k % len(TRACE_COLOURS)], 2.0)
+
+
+def _link(plan: _Plan, body: Body) -> None:
+    """Pitch circles, guides, and the bar or plate that joins what is attached."""
+    sketch, link = plan.sketch, body.link
+    for centre, radius, gear in body.wheels:
+        part = f"gear {gear.a}-{gear.b} of {link}"
+        sketch.on(link, "pitch", part)
+        sketch.circle(centre, radius, "link" if plan.fixed(link) else "soft")
+        if gear.internal and radius == max(gear.radius_a, gear.radius_b):
+            sketch.circle(centre, radius + 7.0 * plan.px, "soft", dash=())
+        if not plan.fixed(link):  # a spoke shows the turn
+            rim = radius * cmath.exp(0.5j)
+            sketch.line((centre + 0.8 * rim, centre + rim), "soft", 2.2)
+        sketch.on(link, "joint", f"centre {part}")
+        for d in (4.0 * plan.px, 4j * plan.px):
+            sketch.line((centre - d, centre + d), "link", 1.2)
+        if plan.fixed(link):
+            _hatched_rim(plan, centre, radius)
+    for guide in body.guides:
+        if isinstance(guide.joint, Prismatic) and not plan.fixed(link):
+            sketch.on(link, "bar", f"guide {guide.joint.a}-{guide.joint.b}")
+            sketch.bar(guide.start, guide.stop, plan.colour(link), 4.0)
+    if plan.fixed(link):
+        return
+    corners = outline(body.vertices(), 2.0 * plan.px)
+    if len(corners) > 2:
+        sketch.on(link, "plate", f"link {link}")
+        sketch.plate(corners, plan.colour(link), 2.6, 0.8)
+    elif len(corners) == 2:
+        sketch.on(link, "bar", f"link {link}")
+        sketch.bar(corners[0], corners[1], plan.colour(link), 4.0)
+
+
+def _hatched_rim(plan: _Plan, centre: complex, radius: float) -> None:
+    """A wheel that does not turn: hatching inside the lower part of its rim."""
+    plan.sketch.on(plan.mechanism.frame, "ground", "ground of a wheel")
+    for k in range(7):
+        rim = centre + radius * cmath.exp(1j * math.radians(-120 + 10 * k))
+        plan.sketch.line((rim, rim + (0.6 + 1j) * 7.0 * plan.px), "link", 1.4)
+
+
+def _rectangle(middle: complex, t: complex, half: float, across: float) -> list[complex]:
+    return [middle + t * (x * half + 1j * y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+
+
+def _slider(plan: _Plan, joint: Prismatic | PinSlot) -> None:
+    """A block on its guide, or a slot; ground where the frame is one of the two."""
+    sketch, px = plan.sketch, plan.px
+    guide = next(g for g in plan.bodies[joint.a].guides if g.joint is joint)
+    name = f"{joint.a}-{joint.b}"
+    if isinstance(joint, PinSlot):
+        sketch.on(joint.a, "block", f"slot {name}")
+        sketch.outline(_stadium(guide, _SLOT * px), plan.colour(joint.a), 1.8)
+        if plan.fixed(joint.a):
+            _guide_ground(plan, guide, _SLOT + 1.0)
+        return
+    turn = joint.angle_b if isinstance(joint, Prismatic) else 0.0
+    t = cmath.exp(1j * turn)
+    sketch.on(joint.b, "block", f"block {name}")
+    middle = complex(*joint.at_b)
+    sketch.outline(_rectangle(middle, t, _BLOCK * px, _HALF * px), plan.colour(joint.b))
+    if plan.fixed(joint.a):
+        _guide_ground(plan, guide, _HALF + 1.5)
+    elif plan.fixed(joint.b):
+        sketch.on(joint.b, "ground", f"ground {name}")
+        down = _downward(t)
+        foot = middle + down * (_HALF + 1.0) * px
+        sketch.hatch(foot - t * _BLOCK * px, foot + t * _BLOCK * px, down * px, 4)
+
+
+def _downward(t: complex) -> complex:
+    """The normal of a direction that points down (to the right of an upright direction)."""
+    normal = -1j * t
+    return normal if normal.imag < -1e-9 or (abs(normal.imag) <= 1e-9 and normal.real > 0) else -normal
+
+
+def _guide_ground(plan: _Plan, guide: Guide, aside: float) -> None:
+    down = _downward(guide.direction)
+    shift = down * aside * plan.px
+    strokes = max(4, round(abs(guide.stop - guide.start) / (9.0 * plan.px)))
+    plan.sketch.on(guide.joint.a, "ground", f"ground {guide.joint.a}-{guide.joint.b}")
+    plan.sketch.hatch(guide.start + shift, guide.stop + shift, down * plan.px, strokes)
+
+
+def _stadium(guide: Guide, half: float) -> list[complex]:
+    """Outline of a slot with round ends."""
+    ends = [(guide.stop, -0.5), (guide.start, 0.5)]
+    return [
+        end + half * guide.direction * cmath.exp(1j * math.pi * (first + k / 8))
+        for end, first in ends
+        for k in range(9)
+    ]
+
+
+def _joints(plan: _Plan) -> list[tuple[complex, complex]]:
+    """Draw every turning pair and pin once; return where ground stands and which way it points."""
+    sketch, grounds = plan.sketch, []
+    for joint in plan.mechanism.joints:
+        name = f"{joint.a}-{joint.b}"
+        if isinstance(joint, Revolute):
+            at = complex(*joint.at_a)
+            links = (joint.a, joint.b)
+            if any(map(plan.fixed, links)):
+                own, other = (joint.a, joint.b) if plan.fixed(joint.a) else (joint.b, joint.a)
+                at = complex(*(joint.at_a if own == joint.a else joint.at_b))
+                down = _ground_direction(plan, at, other)
+                grounds.append((at, down))
+                sketch.on(own, "ground", f"ground {name}")
+                sketch.ground(at, direction=down, joint=False)
+                sketch.on(own, "joint", f"joint {name}")
+            else:
+                sketch.on(joint.a, "joint", f"joint {name}")
+            sketch.joint(at)
+        elif isinstance(joint, PinSlot):
+            pin = complex(*joint.at_b)
+            if plan.fixed(joint.b):
+                sketch.on(joint.b, "ground", f"ground {name}")
+                sketch.ground(pin, joint=False)
+                grounds.append((pin, -1j))
+            sketch.on(joint.b, "joint", f"joint {name}")
+            sketch.joint(pin, 4.0)
+    return grounds
+
+
+def _ground_direction(plan: _Plan, at: complex, link: int) -> complex:
+    """Down, unless the link jointed there lies that way most of the time: then aside or up."""
+    own = [p for p in plan.bodies[link].vertices()]
+    ways = np.concatenate([world(plan.poses, link, p) for p in own]) - at if own else np.zeros(0, np.complex128)
+    ways = ways[abs(ways) > 2.0 * plan.px]
+    if ways.size == 0:
+        return -1j
+    units = ways / abs(ways)
+
+    def cost(d: complex) -> float:
+        return float(np.maximum((units * d.conjugate()).real, 0.0).mean()) + {-1j: 0.0, 1j: 0.25}.get(d, 0.3)
+
+    return min((-1j, 1j, -1 + 0j, 1 + 0j), key=cost)
+
+
+def _arrow(plan: _Plan, driver: Driver, grounds: list[tuple[complex, complex]]) -> None:
+    """Sense of a driver: an arc around a turning pair, a straight arrow beside a slider."""
+    joint = plan.mechanism.joint(*driver.pair)
+    rate = np.asarray(driver.law(np.array([0.0, 1.0]))[1], dtype=np.float64)
+    sense = -1.0 if np.isfinite(rate[0]) and rate[0] < 0.0 else 1.0
+    sketch, px = plan.sketch, plan.px
+    part = f"driver {driver.base}-{driver.link}"
+    if isinstance(joint, Revolute):
+        at = complex(*(joint.at_a if joint.a == driver.base else joint.at_b))
+        down = next((d for p, d in grounds if p == at and driver.base == plan.mechanism.frame), -1j)
+        sketch.on(driver.base, "mark", part)
+        arc = [at + 19.0 * px * -down * cmath.exp(1j * sense * math.radians(-80 + 10 * k)) for k in range(17)]
+        sketch.trace(arc, "b", 2.4)
+        _head(plan, arc[-1], (arc[-1] - at) * 1j * sense)
+    elif isinstance(joint, Prismatic):
+        sense = sense if driver.base == joint.a else -sense
+        t = cmath.exp(1j * joint.angle_b) * sense
+        foot = complex(*joint.at_b) - _downward(t) * 15.0 * px - t * 12.0 * px
+        sketch.on(joint.b, "mark", part)
+        sketch.trace([foot, foot + t * 24.0 * px], "b", 2.4)
+        _head(plan, foot + t * 24.0 * px, t)
+
+
+def _head(plan: _Plan, tip: complex, along: complex) -> None:
+    t = along / abs(along) * 9.0 * plan.px
+    plan.sketch.line((tip - t + 0.6j * t, tip + 0.25 * t, tip - t - 0.6j * t), "b", 2.4)
+
+
+def _points(plan: _Plan) -> None:
+    for k, (name, (link, at)) in enumerate(plan.mechanism.points.items()):
+        plan.sketch.on(link, "mark", f"point {name}")
+        plan.sketch.dot(complex(*at), TRACE_COLOURS[k % len(TRACE_COLOURS)], 4.2)
+
+
+def _pose_of(what: Mechanism | Motion, pose: ArrayLike | int | None) -> tuple[Mechanism, Array, Array]:
+    """Return the mechanism, the poses that the picture must hold, and the one that is drawn."""
+    if isinstance(what, Mechanism):
+        given = what.pose if pose is None else pose
+        if given is None or isinstance(given, int):
+            raise GeometryError("the mechanism has no pose to draw; give one, or a motion and a sample")
+        array = _checked(what, given)
+        return what, array, array[0]
+    reached = np.isfinite(what.poses).all(axis=(1, 2))
+    sample = 0 if pose is None else pose
+    if not isinstance(sample, int | np.integer):
+        raise GeometryError("a motion is drawn at a sample: give its number")
+    if not -len(reached) <= sample < len(reached):
+        raise GeometryError(f"sample {sample} does not exist; the motion has {len(reached)}")
+    if not reached[sample]:
+        raise GeometryError(f"sample {sample} cannot be drawn, it is not assembled: {what.reason or 'no pose'}")
+    return what.mechanism, what.poses[reached], what.poses[sample]
+
+
+def mechanism_svg(
+    what: Mechanism | Motion,
+    pose: ArrayLike | int | None = None,
+    *,
+    width: float = 480.0,
+    height: float = 420.0,
+    numbers: bool = True,
+    title: str = "",
+) -> str:
+    """Kinematic diagram as one self-contained ``<svg>``, light or dark with the page; needs no third-party package.
+
+    Parameters
+    ----------
+    what : Mechanism or Motion
+        A motion shows the paths of the named points too.
+    pose : array_like of shape (links, 3), or int, optional
+        Pose of a mechanism (its own by default), or sample of a motion (the first by default).
+    width, height : float
+        Largest size in pixels.
+    numbers : bool
+        Write the numbers of the links.
+    title : str
+        Read out by screen readers.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    GeometryError
+        There is no pose, or it is not assembled.
+
+    Examples
+    --------
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph, Revolute
+    >>> graph = MechanismGraph(2, [(0, 1)], frame=0)
+    >>> crank = Mechanism(graph, [Revolute(0, 1)], [Driver(0, 1)], {"A": (1, (1.0, 0.0))}, pose=[(0, 0, 0), (0, 0, 0.5)])
+    >>> mechanism_svg(crank).count('data-part="joint 0-1"')
+    1
+    """
+    mechanism, poses, one = _pose_of(what, pose)
+    sketch = mechanism_sketch(mechanism, poses, width=width, height=height, numbers=numbers, title=title)
+    return sketch.svg(one.tolist())
+
+
+def draw_mechanism(
+    what: Mechanism | Motion,
+    pose: ArrayLike | int | None = None,
+    *,
+    ax: object | None = None,
+    width: float = 480.0,
+    height: float = 420.0,
+    numbers: bool = True,
+) -> object:
+    """Kinematic diagram on matplotlib axes: the same shapes as :func:`mechanism_svg`, in data coordinates.
+
+    Parameters
+    ----------
+    what, pose, width, height, numbers
+        As for :func:`mechanism_svg`.
+    ax : matplotlib.axes.Axes, optional
+        Axes of a new figure by default (``ax.figure.savefig(...)`` writes it).
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    GeometryError
+        There is no pose, or it is not assembled.
+    """
+    from graphsynth.drawing.canvas import draw, figure_of
+
+    mechanism, poses, one = _pose_of(what, pose)
+    sketch = mechanism_sketch(mechanism, poses, width=width, height=height, numbers=numbers)
+    if ax is None:
+        figure, _ = figure_of([sketch], [one.tolist()])
+        return figure.axes[0]
+    return draw(sketch, ax, one.tolist())

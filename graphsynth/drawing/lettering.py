@@ -1,0 +1,112 @@
+"""Where the numbers of links and the names of points go: beside their link, away from everything else."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.drawing.bodies import Body, outline, world
+from graphsynth.drawing.sketch import Sketch
+from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["place_letters"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_SAMPLES = 12  # poses looked at
+
+
+class _Room:
+    """What letters must keep away from, over some poses of a motion; distances in pixels."""
+
+    def __init__(self, poses: Array, pixel: float) -> None:
+        pick = np.unique(np.linspace(0, len(poses) - 1, min(_SAMPLES, len(poses))).round().astype(int))
+        self.poses, self.pixel = poses[pick], pixel
+        self.taken: list[Complex] = []
+
+    def add(self, link: int, points: Sequence[complex]) -> None:
+        self.taken += [world(self.poses, link, point) for point in points]
+
+    def clearance(self, link: int, point: complex) -> float:
+        """Distance to the nearest thing, capped at 22 pixels: the worst pose and the mean count half each."""
+        if not self.taken:
+            return 22.0
+        near = np.min(np.abs(np.stack(self.taken) - world(self.poses, link, point)), axis=0) / self.pixel
+        capped = np.minimum(near, 22.0)
+        return float(0.5 * capped.min() + 0.5 * capped.mean())
+
+    def best(self, link: int, candidates: Sequence[complex]) -> complex:
+        """Choose the first of the freest candidates, and take it."""
+        scores = [self.clearance(link, point) - 0.3 * k for k, point in enumerate(candidates)]
+        chosen = candidates[scores.index(max(scores))]
+        self.add(link, [chosen])
+        return chosen
+
+
+def place_letters(
+    sketch: Sketch,
+    mechanism: Mechanism,
+    poses: Array,
+    bodies: list[Body],
+    grounds: list[tuple[complex, complex]],
+    numbers: bool,
+    grounded: bool,
+) -> None:
+    """Write the names of points and the numbers of links; the letters move with their link and stay upright."""
+    px = sketch.pixel * sketch.symbol
+    room = _Room(poses, px)
+    for body in bodies:
+        if not (grounded and body.link == mechanism.frame):
+            room.add(body.link, _along(outline(body.vertices(), 2.0 * px), 14.0 * px))
+        room.add(body.link, body.points)
+    frame = mechanism.frame
+    for at, down in grounds:
+        room.add(frame, [at + down * r * px for r in (8.0, 16.0, 23.0)])
+        room.add(frame, [at + down * 18.0 * px + 1j * down * s * 12.0 * px for s in (-1, 1)])
+    for driver in mechanism.drivers:
+        joint = mechanism.joint(*driver.pair)
+        at = complex(*(joint.at_a if joint.a == driver.base else joint.at_b))
+        room.add(driver.base, [at + 19.0 * px * cmath.exp(1j * math.radians(a)) for a in range(0, 360, 45)])
+    for name, (link, local) in mechanism.points.items():
+        centre = complex(*local)
+        ring = [centre + 15.0 * px * cmath.exp(1j * math.radians(45 * k)) for k in (1, 3, 2, 0, 4, 7, 5, 6)]
+        sketch.on(link, "label", f"name {name}").label(room.best(link, ring), name, size=14.0 * sketch.symbol)
+    if not numbers:
+        return
+    for body in bodies:
+        if grounded and body.link == frame:
+            spots = [at + down * 20.0 * px + s * 1j * down * 27.0 * px for at, down in grounds for s in (1, -1)]
+            spots = spots or [g.start - g.direction * 14.0 * px for g in body.guides] or [0j]
+        else:
+            spots = _beside(body, px)
+        sketch.on(body.link, "label", f"number {body.link}")
+        sketch.label(room.best(body.link, spots), str(body.link), colour="note", size=13.0 * sketch.symbol)
+
+
+def _along(corners: list[complex], step: float) -> list[complex]:
+    """Points along the sides of a figure, at most a step apart."""
+    sides = list(zip(corners, corners[1:] + corners[:1])) if len(corners) > 2 else list(zip(corners, corners[1:]))
+    found = []
+    for p, q in sides:
+        count = min(40, max(1, math.ceil(abs(q - p) / step)))
+        found += [p + (q - p) * k / count for k in range(count + 1)]
+    return found
+
+
+def _beside(body: Body, px: float) -> list[complex]:
+    """Candidates for a number: inside a plate, beside a bar, above a block."""
+    corners = outline(body.vertices(), 2.0 * px)
+    if len(corners) > 2:
+        middle = sum(corners) / len(corners)
+        return [middle, *((0.55 * middle + 0.45 * corner) for corner in corners)]
+    if len(corners) == 2:
+        p, q = corners
+        aside = 1j * (q - p) / abs(q - p) * 12.0 * px
+        return [p + (q - p) * s + side * aside for s in (0.5, 0.36, 0.64, 0.22, 0.78) for side in (1, -1)]
+    at = corners[0] if corners else 0j
+    return [at + 19.0 * px * d for d in (1j, -1j, 1, -1, 1 + 1j, -1 + 1j)]
