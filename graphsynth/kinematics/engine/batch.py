@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.follow import Tracker
+from graphsynth.kinematics.engine.follow import Tracker, run_program, workspace
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, sign_table
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["BatchMotion", "simulate_batch"]
 
 Array = NDArray[np.float64]
+
+#: Samples times links of one block of sets: its state stays in the cache of one core.
+_BLOCK = 8192
 
 _REASONS = {
     codes.DONE: "",
@@ -40,9 +43,11 @@ class BatchMotion:
     Attributes
     ----------
     inputs : ndarray, shape (n,)
-    frames : ndarray, shape (sets, n, links, 4)
+    links : tuple of int
+        Links kept; the third axis of the next three arrays.
+    frames : ndarray, shape (sets, n, len(links), 4)
         ``(x, y, cos theta, sin theta)``.
-    velocities, accelerations : ndarray, shape (sets, n, links, 3)
+    velocities, accelerations : ndarray, shape (sets, n, len(links), 3)
         Derivatives of ``(x, y, theta)`` by the input; empty if not asked for.
     margins : ndarray, shape (sets, n, groups)
         As in `Motion.margins`.
@@ -53,6 +58,7 @@ class BatchMotion:
     """
 
     inputs: Array
+    links: tuple[int, ...]
     frames: Array
     velocities: Array
     accelerations: Array
@@ -76,7 +82,7 @@ class BatchMotion:
 
     @property
     def poses(self) -> Array:
-        """``(x, y, theta)``, theta in (-pi, pi], shape (sets, n, links, 3)."""
+        """``(x, y, theta)`` of the links kept, theta in (-pi, pi], shape (sets, n, len(links), 3)."""
         angle = np.arctan2(self.frames[..., 3], self.frames[..., 2])
         return np.concatenate([self.frames[..., :2], angle[..., None]], axis=-1)
 
@@ -84,7 +90,9 @@ class BatchMotion:
         """Positions of a point (x, y) of a link, shape (sets, n, 2); ``local`` may differ by set, shape (sets, 2)."""
         at = finite_array("local", local)
         px, py = at[..., 0:1], at[..., 1:2]
-        x, y, c, s = (self.frames[:, :, link, k] for k in range(4))
+        if link not in self.links:
+            raise GeometryError(f"link {link} was not kept; the links kept are {', '.join(map(str, self.links))}")
+        x, y, c, s = (self.frames[:, :, self.links.index(link), k] for k in range(4))
         return np.stack([x + c * px - s * py, y + s * px + c * py], axis=-1)
 
     def reason(self, index: int) -> str:
@@ -103,6 +111,7 @@ def simulate_batch(
     modes: Mapping[int, int] | None = None,
     start: ArrayLike | None = None,
     rates: bool = True,
+    keep: Sequence[int] | None = None,
 ) -> BatchMotion:
     """Move many dimension sets of one mechanism over the same inputs.
 
@@ -120,6 +129,9 @@ def simulate_batch(
         Poses close to the branch at the first input, for groups solved by Newton.
     rates : bool, optional
         Also velocities and accelerations.  They are computed anyway if a group needs Newton.
+    keep : sequence of int, optional
+        Links whose motion is wanted; all by default.  What nobody asks for is neither stored nor, where possible,
+        computed.
 
     Returns
     -------
@@ -157,7 +169,15 @@ def simulate_batch(
     program = compile_program(mechanism, sizes)
     signs = sign_table(program, modes or {})
     poses, found = _starts(program, signs, float(u[0]), modes or {}, start)
-    return _run(program, signs, u, poses, found, rates)
+    return _run(program, signs, u, poses, found, rates, _kept(mechanism, keep))
+
+
+def _kept(mechanism: Mechanism, keep: Sequence[int] | None) -> list[int]:
+    links = list(range(mechanism.graph.links)) if keep is None else list(keep)
+    for link in links:
+        if not 0 <= link < mechanism.graph.links:
+            raise GeometryError(f"keep names link {link}, but the links are 0..{mechanism.graph.links - 1}")
+    return links
 
 
 def _starts(
@@ -184,31 +204,45 @@ def _starts(
     return poses, found
 
 
-def _run(program: Program, signs: Array, u: Array, poses: Array, found: NDArray[np.bool_], rates: bool) -> BatchMotion:
-    from graphsynth.kinematics.engine import kernels
-
-    sets, n, links, count = len(poses), len(u), program.mechanism.graph.links, len(program.steps)
+def _run(
+    program: Program, signs: Array, u: Array, poses: Array, found: NDArray[np.bool_], rates: bool, kept: list[int]
+) -> BatchMotion:
+    """Run the sets in blocks that fit the cache, and keep what is asked for."""
+    sets, n, links = len(poses), len(u), program.mechanism.graph.links
     needed = rates or any(step.iterative for step in program.steps)
-    X, TH = np.full((sets, n, links, 4), np.nan), np.zeros((sets, n, links))
-    X[:, 0, :, :2] = poses[..., :2]
-    X[:, 0, :, 2], X[:, 0, :, 3] = np.cos(poses[..., 2]), np.sin(poses[..., 2])
-    X[:, 0, program.mechanism.frame] = (0.0, 0.0, 1.0, 0.0)
-    TH[:, 0] = poses[..., 2]
-    V = np.zeros((sets, n if needed else 1, links, 3))
-    W, PHI = np.zeros_like(V), np.zeros((sets, n, max(1, len(program.gears))))
-    M = np.full((sets, n, count), np.nan)
-    done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
-    kernels.run(
-        program.step_table, program.rows, program.row_table, program.core, program.eliminated,
-        program.eliminated_table, program.drives, program.drive_table, program.need_angle, program.gears,
-        Tracker(program, signs).values(u), u, signs, X, TH, V, W, PHI, M, done, why, 0, program.Lc, needed,
-    )  # fmt: skip
-    done[~found], why[~found, 0] = 0, codes.UNREACHABLE
-    missing = np.arange(n) >= done[:, None]
     groups = [k for k, step in enumerate(program.steps) if step.group >= 0]
-    for array in (X, M, V, W):
-        if array.shape[1] == n:
-            array[missing] = np.nan
+    wanted = _wanted(program, kept)
+    tracker = Tracker(program, signs)
+    q = tracker.values(u)
+    frames, margins = np.empty((sets, len(kept), 4, n)), np.empty((sets, len(groups), n))
+    V = np.empty((sets, len(kept), 3, n if rates else 0))
+    W = np.empty_like(V)
+    done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
+    block = max(1, min(sets, _BLOCK // (n * links)))
+    memory = workspace(program, n, block, needed)
+    for begin in range(0, sets, block):
+        part = slice(begin, min(begin + block, sets))
+        size = part.stop - begin
+        own = tuple(array[:size] for array in memory)
+        X, TH = own[0], own[1]
+        X[..., :2, 0], TH[..., 0] = poses[part, :, :2], poses[part, :, 2]
+        X[..., 2, 0], X[..., 3, 0] = np.cos(poses[part, :, 2]), np.sin(poses[part, :, 2])
+        X[:, program.mechanism.frame, :, 0] = (0.0, 0.0, 1.0, 0.0)
+        done[part], why[part] = run_program(program, signs, u, q, own, 0, needed, wanted, part)
+        frames[part], margins[part] = X[:, kept], own[5][:, groups]
+        if rates:
+            V[part], W[part] = own[2][:, kept], own[3][:, kept]
+    done[~found], why[~found, 0] = 0, codes.UNREACHABLE
+    for b in np.flatnonzero(done < n):
+        for array in (frames, margins, V, W):
+            array[b, ..., done[b] :] = np.nan
     group = np.array([program.steps[k].group if k >= 0 else -1 for k in why[:, 1]], dtype=np.int64)
-    kept = V[:, :0] if not rates else V
-    return BatchMotion(u, X, kept, W[:, :0] if not rates else W, M[:, :, groups], done, why[:, 0], group)
+    frames, V, W = (np.moveaxis(array, -1, 1) for array in (frames, V, W))
+    return BatchMotion(u, tuple(kept), frames, V, W, np.moveaxis(margins, -1, 1), done, why[:, 0], group)
+
+
+def _wanted(program: Program, kept: list[int]) -> NDArray[np.bool_]:
+    """Eliminated links that must be placed: those kept, and those that carry something else."""
+    wanted = np.zeros(program.mechanism.graph.links, dtype=np.bool_)
+    wanted[kept] = wanted[program.touched] = wanted[program.eliminated[:, 2:4].ravel()] = True
+    return wanted

@@ -20,6 +20,7 @@ R_DIST, R_LINE_PIN, R_LINE_SLOT, R_ANGLE, R_GEAR, P_DIST, P_LINE, NEWTON, PLATFO
 
 #: NEWTON: any core; PLATFORM: one core link held by three distances, by Newton with explicit 3 x 3 solves.
 ITERATIVE = (NEWTON, PLATFORM)
+ITERATIVE_FROM = NEWTON
 #: Steps with two assembly modes.
 TWO_MODES = (R_DIST, R_LINE_PIN, R_LINE_SLOT, P_DIST)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.program import Program
 
-__all__ = ["Stop", "Trace", "Tracker"]
+__all__ = ["Stop", "Trace", "Tracker", "run_program", "workspace"]
 
 Array = NDArray[np.float64]
 
@@ -39,20 +39,20 @@ class Stop:
 class Trace:
     """Samples of a branch: a solver workspace, not a result.
 
-    ``X`` (n, links, 4) holds x, y, cos, sin; ``TH`` angles where gears need them; ``V``, ``W`` first and second
-    derivatives by the input; ``M`` (n, steps) margins; ``done`` the number of samples reached.
+    ``q`` (drivers, 5, n) holds the driver coordinates, their derivatives, cosine and sine.  The state has the sample as
+    last axis in memory; the names without underscore are views with the sample as first axis: ``X`` (n, links, 4) holds
+    x, y, cos, sin; ``TH`` angles where gears need them; ``V``, ``W`` first and second derivatives by the input; ``M``
+    (n, steps) margins; ``done`` the number of samples reached.
     """
 
     u: Array
     q: Array
-    X: Array
-    TH: Array
-    V: Array
-    W: Array
-    PHI: Array
-    M: Array
+    memory: tuple[Array, ...]
     done: int = 0
     stop: Stop | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        self.X, self.TH, self.V, self.W, self.PHI, self.M = (np.moveaxis(part, -1, 0) for part in self.memory)
 
     def row(self, k: int) -> tuple[Array, ...]:
         """State at sample k."""
@@ -67,37 +67,26 @@ class Tracker:
         self.modes = modes
 
     def values(self, u: Array) -> Array:
-        """Driver coordinates and derivatives, shape (n, drivers, 3)."""
+        """Driver coordinates, first and second derivatives, cosine and sine, shape (drivers, 5, n)."""
         drivers = self.program.mechanism.drivers
-        q = np.zeros((len(u), max(1, len(drivers)), 3))
+        q = np.zeros((max(1, len(drivers)), 5, len(u)))
         for k, driver in enumerate(drivers):
             for order, part in enumerate(driver.law(u)):
-                q[:, k, order] = part
+                q[k, order] = part
+        with np.errstate(invalid="ignore"):  # a law without a value is found by the kernel
+            q[:, 3], q[:, 4] = np.cos(q[:, 0]), np.sin(q[:, 0])
         return q
 
     def blank(self, u: Array) -> Trace:
         """Return an empty trace for inputs ``u`` with every link at the origin."""
         p = self.program
-        n, links = len(u), p.mechanism.graph.links
-        X = np.zeros((n, links, 4))
-        X[:, :, 2] = 1.0
-        slots = max(1, len(p.gears))
-        return Trace(
-            u, self.values(u), X, np.zeros((n, links)), np.zeros((n, links, 3)), np.zeros((n, links, 3)),
-            np.zeros((n, slots)), np.full((n, len(p.steps)), np.nan),
-        )  # fmt: skip
+        return Trace(u, self.values(u), workspace(p, len(u), None))
 
     def run(self, trace: Trace, first: int, derivs: bool = True) -> tuple[int, int, int]:
         """Run the kernel from sample ``first``."""
-        from graphsynth.kinematics.engine import kernels
-
-        p = self.program
-        done, why = np.zeros(1, dtype=np.int64), np.zeros((1, 2), dtype=np.int64)
-        kernels.run(
-            p.step_table, p.rows, p.row_table, p.core, p.eliminated, p.eliminated_table, p.drives,
-            p.drive_table, p.need_angle, p.gears, trace.q, trace.u, self.modes, trace.X[None], trace.TH[None],
-            trace.V[None], trace.W[None], trace.PHI[None], trace.M[None], done, why, first, p.Lc, derivs,
-        )  # fmt: skip
+        done, why = run_program(
+            self.program, self.modes, trace.u, trace.q, tuple(part[None] for part in trace.memory), first, derivs
+        )
         return int(done[0]), int(why[0, 0]), int(why[0, 1])
 
     def follow(self, u: Array, poses: Array, phi: Array | None = None) -> Trace:
@@ -173,3 +162,38 @@ class Tracker:
         why, where = failed
         margins = tuple((target, float(M[where])) for _, target, M in history[-6:])
         return Stop(why, where, here, abs(2.0 * step), margins)
+
+
+def workspace(program: Program, n: int, sets: int | None, derivs: bool = True) -> tuple[Array, ...]:
+    """State of every link over n samples, at the origin: X, TH, V, W, PHI, M, with the sample as last axis.
+
+    With ``sets`` the dimension set is the first axis.
+    """
+    lead = () if sets is None else (sets,)
+    links = program.mechanism.graph.links
+    X = np.zeros((*lead, links, 4, n))
+    X[..., 2, :] = 1.0
+    rates = (*lead, links, 3, n if derivs else 0)
+    return (
+        X, np.zeros((*lead, links, n)), np.zeros(rates), np.zeros(rates),
+        np.zeros((*lead, max(1, len(program.gears)), n)), np.full((*lead, len(program.steps), n), np.nan),
+    )  # fmt: skip
+
+
+def run_program(
+    program: Program, modes: Array, u: Array, q: Array, memory: tuple[Array, ...], first: int, derivs: bool,
+    wanted: NDArray[np.bool_] | None = None, sets: slice = slice(None),
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # fmt: skip
+    """Run the kernel for every dimension set of ``memory``; returns samples reached, and code and step of the stop."""
+    from graphsynth.kinematics.engine import kernels
+
+    count = len(memory[0])
+    done, why = np.zeros(count, dtype=np.int64), np.zeros((count, 2), dtype=np.int64)
+    if wanted is None:
+        wanted = np.ones(program.mechanism.graph.links, dtype=np.bool_)
+    kernels.run(
+        program.step_table, program.touched, program.rows, program.row_table[sets], program.core, program.eliminated,
+        program.eliminated_table[sets], program.drives, program.drive_table[sets], program.need_angle, wanted, q, u,
+        modes, *memory, done, why, first, program.Lc, derivs,
+    )  # fmt: skip
+    return done, why

@@ -84,6 +84,7 @@ class Program:
     decomposition: Decomposition
     steps: tuple[Step, ...]
     step_table: IntArray
+    touched: IntArray
     rows: IntArray
     row_table: Array
     core: IntArray
@@ -130,6 +131,7 @@ class _Compiler:
         self.rows: list[list[int]] = []
         self.row_parameters: list[list[Number]] = []
         self.core: list[int] = []
+        self.touched: list[int] = []
         self.eliminated: list[list[int]] = []
         self.eliminated_parameters: list[list[Number]] = []
         self.drives: list[list[int]] = []
@@ -149,7 +151,8 @@ class _Compiler:
                 need[[joint.a, joint.b]] = True
         return Program(
             mechanism=self.mechanism, decomposition=self.found, steps=tuple(self.steps),
-            step_table=_ints(self.table, 9), rows=_ints(self.rows, 5),
+            step_table=_ints(self.table, 10), touched=np.array(self.touched or [0], dtype=np.int64),
+            rows=_ints(self.rows, 5),
             row_table=self._floats(self.row_parameters, codes.ROW_WIDTH),
             core=np.array(self.core or [0], dtype=np.int64), eliminated=_ints(self.eliminated, 4),
             eliminated_table=self._floats(self.eliminated_parameters, codes.ELIM_WIDTH), drives=_ints(self.drives, 4),
@@ -173,7 +176,7 @@ class _Compiler:
         other, base, own, da, db = self._seen(joint, link)
         code = codes.DRIVE_P if isinstance(joint, Prismatic) else codes.DRIVE_R
         direction = np.exp(1j * da)
-        self.table.append([code, len(self.drives), 0, 0, 0, 0, 0, 0, -1])
+        self.table.append([code, len(self.drives), 0, 0, 0, 0, 0, 0, 0, -1])
         self.steps.append(Step(code, -1, (link,), f"driver {joint.kind}"))
         self.drives.append([code, other, link, index])
         self.drive_parameters.append([*_parts(base, direction, own), sign * forward, da - db])
@@ -193,8 +196,10 @@ class _Compiler:
         core = tuple(link for link in links if link not in gone)
         code, rows = _closed(core, rows)
         place = {link: k for k, link in enumerate(core)}
+        outside = sorted({link for joint in own for link in joint.pair} - inside)
         self.table.append([
-            code, len(self.rows), len(rows), len(self.core), len(core), first_eliminated, len(gone), 0, index,
+            code, len(self.rows), len(rows), len(self.core), len(core), first_eliminated, len(gone), len(self.touched),
+            len(outside), index,
         ])  # fmt: skip
         self.steps.append(Step(code, index, links, _describe(code, links, own), core))
         for kind, a, b, parameters in rows:
@@ -204,6 +209,7 @@ class _Compiler:
             self.rows.append([kind, a, b, place.get(a, -1), place.get(b, -1)])
             self.row_parameters.append(parameters)
         self.core.extend(core)
+        self.touched.extend(outside)
 
     def _choose(self, links: tuple[int, ...], own: list[JointGeometry]) -> set[int]:
         """Links to eliminate: two plain joints each, no two of them joined."""

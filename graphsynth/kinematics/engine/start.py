@@ -118,6 +118,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     G = np.empty((count, 6))
     pivots = np.empty(count, dtype=np.int64)
     state = np.zeros((p.mechanism.graph.links, 11))
+    phi, q = trace.PHI[0].copy(), np.ascontiguousarray(trace.q[:, :3, 0])
     found: list[Array] = []
     for _ in range(_STARTS * cores):
         state[:, :4], state[:, 4] = trace.X[0], trace.TH[0]
@@ -126,7 +127,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
             where = centre + random.uniform(-size, size, 2)
             state[link, :5] = (*where, np.cos(angle), np.sin(angle), angle)
         code = kernels.newton(
-            p.rows, p.row_table[0], row0, count, p.core, core0, cores, state, trace.PHI[0], trace.q[0], J, f, g, G,
+            p.rows, p.row_table[0], row0, count, p.core, core0, cores, state, phi, q, J, f, g, G,
             pivots, p.Lc, out,
         )  # fmt: skip
         if code:

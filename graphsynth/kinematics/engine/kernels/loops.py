@@ -1,0 +1,225 @@
+"""Steps in closed form over a range of samples: drivers, RRR dyads, links between two turning pairs.
+
+Inner loops run over samples that lie side by side in memory and do not branch, so the compiler may use vector
+instructions.  ``X[link]`` has the rows x, y, cos theta, sin theta; ``V`` and ``W`` the rows of (x, y, theta).
+"""
+
+import math
+
+from numba import njit
+
+from graphsynth.kinematics.engine.codes import DRIVE_P, PAX, PAY, PBX, PBY, H
+
+
+@njit(cache=True, error_model="numpy")
+def drive_loop(d, p, r, q, X, TH, V, W, i0, i1, derivs):
+    """Place a driven link from the link it is driven on; returns the first sample without a driver value, or i1."""
+    base, link, k = d[r, 1], d[r, 2], d[r, 3]
+    sliding = d[r, 0] == DRIVE_P
+    px, py, tx, ty, ex, ey, sign, angle = p[r, 0], p[r, 1], p[r, 2], p[r, 3], p[r, 4], p[r, 5], p[r, 6], p[r, 7]
+    ca, sa = math.cos(angle), math.sin(angle)
+    B, L, Q = X[base], X[link], q[k]
+    for i in range(i0, i1):
+        if not math.isfinite(Q[0, i]):
+            return i
+    for i in range(i0, i1):
+        cb, sb = B[2, i], B[3, i]
+        along = Q[0, i] if sliding else 0.0
+        c0, s0 = (1.0, 0.0) if sliding else (Q[3, i], sign * Q[4, i])
+        c1, s1 = c0 * ca - s0 * sa, s0 * ca + c0 * sa
+        c, s = cb * c1 - sb * s1, sb * c1 + cb * s1
+        ux, uy = px + sign * along * tx, py + sign * along * ty
+        L[2, i], L[3, i] = c, s
+        L[0, i] = B[0, i] + cb * ux - sb * uy - (c * ex - s * ey)
+        L[1, i] = B[1, i] + sb * ux + cb * uy - (s * ex + c * ey)
+    for i in range(i0, i1):
+        TH[link, i] = TH[base, i] + angle + (0.0 if sliding else sign * Q[0, i])
+    if derivs:
+        for i in range(i0, i1):
+            cb, sb, c, s = B[2, i], B[3, i], L[2, i], L[3, i]
+            o, al = V[base, 2, i], W[base, 2, i]
+            q0, q1, q2 = sign * Q[0, i], sign * Q[1, i], sign * Q[2, i]
+            on, aln = (o, al) if sliding else (o + q1, al + q2)
+            if not sliding:
+                q0, q1, q2 = 0.0, 0.0, 0.0
+            gx, gy = cb * tx - sb * ty, sb * tx + cb * ty
+            ux, uy = cb * px - sb * py + q0 * gx, sb * px + cb * py + q0 * gy
+            fx, fy = c * ex - s * ey, s * ex + c * ey
+            V[link, 0, i] = V[base, 0, i] - o * uy + q1 * gx + on * fy
+            V[link, 1, i] = V[base, 1, i] + o * ux + q1 * gy - on * fx
+            V[link, 2, i] = on
+            W[link, 0, i] = W[base, 0, i] - al * uy - o * o * ux + q2 * gx - 2.0 * o * q1 * gy + aln * fy + on * on * fx
+            W[link, 1, i] = W[base, 1, i] + al * ux - o * o * uy + q2 * gy + 2.0 * o * q1 * gx - aln * fx + on * on * fy
+            W[link, 2, i] = aln
+    return i1
+
+
+@njit(cache=True, error_model="numpy")
+def dyad_ends(rows, rp, r0, own):
+    """Of an RRR dyad: links and points of A and B, the kept link's point at A and its arm to C, the other length."""
+    if rows[r0, 1] == own:
+        la, ax, ay, hx, hy = rows[r0, 2], rp[r0, PBX], rp[r0, PBY], rp[r0, PAX], rp[r0, PAY]
+    else:
+        la, ax, ay, hx, hy = rows[r0, 1], rp[r0, PAX], rp[r0, PAY], rp[r0, PBX], rp[r0, PBY]
+    k = r0 + 2
+    if rows[k, 1] == own:
+        lb, bx, by, ex, ey = rows[k, 2], rp[k, PBX], rp[k, PBY], rp[k, PAX], rp[k, PAY]
+    else:
+        lb, bx, by, ex, ey = rows[k, 1], rp[k, PAX], rp[k, PAY], rp[k, PBX], rp[k, PBY]
+    return la, ax, ay, lb, bx, by, hx, hy, ex - hx, ey - hy, rp[k, H]
+
+
+@njit(cache=True, error_model="numpy")
+def carried(L, ax, ay, px, py, i0, i1):
+    """Path of a point of a placed link."""
+    x, y, c, s = L[0], L[1], L[2], L[3]
+    for i in range(i0, i1):
+        px[i] = x[i] + c[i] * ax - s[i] * ay
+        py[i] = y[i] + s[i] * ax + c[i] * ay
+
+
+@njit(cache=True, error_model="numpy")
+def carried_rates(L, V, W, ax, ay, vx, vy, wx, wy, i0, i1):
+    """Velocity and acceleration of a point of a placed link."""
+    c, s, o, al = L[2], L[3], V[2], W[2]
+    v0, v1, w0, w1 = V[0], V[1], W[0], W[1]
+    for i in range(i0, i1):
+        ux, uy = c[i] * ax - s[i] * ay, s[i] * ax + c[i] * ay
+        vx[i], vy[i] = v0[i] - o[i] * uy, v1[i] + o[i] * ux
+        wx[i], wy[i] = w0[i] - al[i] * uy - o[i] * o[i] * ux, w1[i] + al[i] * ux - o[i] * o[i] * uy
+
+
+@njit(cache=True, error_model="numpy")
+def pinned(L, px, py, hx, hy, i0, i1):
+    """Place an oriented link so that its point (hx, hy) follows a path."""
+    x, y, c, s = L[0], L[1], L[2], L[3]
+    for i in range(i0, i1):
+        x[i] = px[i] - (c[i] * hx - s[i] * hy)
+        y[i] = py[i] - (s[i] * hx + c[i] * hy)
+
+
+@njit(cache=True, error_model="numpy")
+def pinned_rates(L, V, W, vx, vy, wx, wy, hx, hy, i0, i1):
+    """Rates of a link whose point (hx, hy) follows a path and whose angle has the rates V[2], W[2]."""
+    c, s, o, al = L[2], L[3], V[2], W[2]
+    v0, v1, w0, w1 = V[0], V[1], W[0], W[1]
+    for i in range(i0, i1):
+        fx, fy = c[i] * hx - s[i] * hy, s[i] * hx + c[i] * hy
+        v0[i], v1[i] = vx[i] + o[i] * fy, vy[i] - o[i] * fx
+        w0[i], w1[i] = wx[i] + al[i] * fy + o[i] * o[i] * fx, wy[i] - al[i] * fx + o[i] * o[i] * fy
+
+
+@njit(cache=True, error_model="numpy")
+def apex(px, py, qx, qy, gx, gy, l2, sign, M, c, s, i0, i1):
+    """Direction of the link with the arm (gx, gy) from P to the third joint C; ``M`` is sin^2 of the angle at C.
+
+    |CQ| = l2; ``M`` is negative where the circles do not meet.
+    """
+    l1 = math.sqrt(gx * gx + gy * gy)
+    total, difference, scale = l1 + l2, l1 - l2, 1.0 / (4.0 * l1 * l1 * l2 * l2)
+    both = total * difference
+    for i in range(i0, i1):
+        dx, dy = qx[i] - px[i], qy[i] - py[i]
+        dd = dx * dx + dy * dy
+        d = math.sqrt(dd)
+        product = (total - d) * (total + d) * (d - difference) * (d + difference)
+        M[i] = product * scale if dd > 0.0 else -5e-324  # P on Q: every direction or none
+        k, m = dd + both, sign * math.sqrt(product)
+        # the arm along k d + m i d; lengths do not matter
+        ax, ay = gx * dx + gy * dy, gx * dy - gy * dx
+        re, im = k * ax - m * ay, k * ay + m * ax
+        f = 1.0 / math.sqrt(re * re + im * im)
+        c[i], s[i] = re * f, im * f
+
+
+@njit(cache=True, error_model="numpy")
+def apex_rates(px, py, qx, qy, gx, gy, T, c, s, o, al, i0, i1):
+    """Rates of the angle of that link; T has the velocities and accelerations of P (rows 4..7) and Q (8..11)."""
+    vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
+    for i in range(i0, i1):
+        kx, ky = c[i] * gx - s[i] * gy, s[i] * gx + c[i] * gy  # from P to C
+        ex, ey = px[i] + kx - qx[i], py[i] + ky - qy[i]  # from Q to C
+        rx, ry = vx[i] - ux[i], vy[i] - uy[i]
+        inverse = 1.0 / (kx * ey - ky * ex)
+        w = -(ex * rx + ey * ry) * inverse
+        rx, ry = rx - w * ky, ry + w * kx
+        tx, ty = wx[i] - w * w * kx - zx[i], wy[i] - w * w * ky - zy[i]
+        o[i], al[i] = w, -(rx * rx + ry * ry + ex * tx + ey * ty) * inverse
+
+
+@njit(cache=True, error_model="numpy")
+def towards(px, py, qx, qy, gx, gy, c, s, i0, i1):
+    """Direction of a link whose vector (gx, gy) points from P to Q."""
+    for i in range(i0, i1):
+        dx, dy = qx[i] - px[i], qy[i] - py[i]
+        re, im = gx * dx + gy * dy, gx * dy - gy * dx
+        f = 1.0 / math.sqrt(re * re + im * im)
+        c[i], s[i] = re * f, im * f
+
+
+@njit(cache=True, error_model="numpy")
+def towards_rates(px, py, qx, qy, T, o, al, i0, i1):
+    """Rates of the angle of the way from P to Q, of constant length; T as for `apex_rates`."""
+    vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
+    for i in range(i0, i1):
+        dx, dy = qx[i] - px[i], qy[i] - py[i]
+        f = 1.0 / (dx * dx + dy * dy)
+        o[i] = (dx * (uy[i] - vy[i]) - dy * (ux[i] - vx[i])) * f
+        al[i] = (dx * (zy[i] - wy[i]) - dy * (zx[i] - wx[i])) * f
+
+
+@njit(cache=True, error_model="numpy")
+def rrr_loop(rows, rp, r0, own, sign, X, V, W, M, T, i0, i1, derivs):
+    """Place the kept link of an RRR dyad; T is room for twelve rows."""
+    la, ax, ay, lb, bx, by, hx, hy, gx, gy, l2 = dyad_ends(rows, rp, r0, own)
+    L = X[own]
+    carried(X[la], ax, ay, T[0], T[1], i0, i1)
+    carried(X[lb], bx, by, T[2], T[3], i0, i1)
+    apex(T[0], T[1], T[2], T[3], gx, gy, l2, sign, M, L[2], L[3], i0, i1)
+    pinned(L, T[0], T[1], hx, hy, i0, i1)
+    if derivs:
+        carried_rates(X[la], V[la], W[la], ax, ay, T[4], T[5], T[6], T[7], i0, i1)
+        carried_rates(X[lb], V[lb], W[lb], bx, by, T[8], T[9], T[10], T[11], i0, i1)
+        apex_rates(T[0], T[1], T[2], T[3], gx, gy, T, L[2], L[3], V[own, 2], W[own, 2], i0, i1)
+        pinned_rates(L, V[own], W[own], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
+
+
+@njit(cache=True, error_model="numpy")
+def bar_loop(e, a, b, p, r, X, V, W, T, i0, i1, derivs):
+    """Place a link with two turning pairs between placed links a and b; T is room for twelve rows."""
+    L = X[e]
+    ax, ay, hx, hy, bx, by = p[r, 0], p[r, 1], p[r, 2], p[r, 3], p[r, 4], p[r, 5]
+    carried(X[a], ax, ay, T[0], T[1], i0, i1)
+    carried(X[b], bx, by, T[2], T[3], i0, i1)
+    towards(T[0], T[1], T[2], T[3], p[r, 6] - hx, p[r, 7] - hy, L[2], L[3], i0, i1)
+    pinned(L, T[0], T[1], hx, hy, i0, i1)
+    if derivs:
+        carried_rates(X[a], V[a], W[a], ax, ay, T[4], T[5], T[6], T[7], i0, i1)
+        carried_rates(X[b], V[b], W[b], bx, by, T[8], T[9], T[10], T[11], i0, i1)
+        towards_rates(T[0], T[1], T[2], T[3], T, V[e, 2], W[e, 2], i0, i1)
+        pinned_rates(L, V[e], W[e], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
+
+
+@njit(cache=True, error_model="numpy")
+def first_bad(M, i0, i1):
+    """First sample whose margin is negative or not a number, and its code; (i1, 0) if there is none."""
+    for i in range(i0, i1):
+        if not M[i] >= 0.0:
+            return i, 1 if M[i] < 0.0 else 3
+    return i1, 0
+
+
+@njit(cache=True, error_model="numpy")
+def rrr(A, B, l1, l2, sign, C, margin):
+    """Third joints of RRR dyads; lengths of one entry are shared by all."""
+    s1, s2 = min(1, l1.shape[0] - 1), min(1, l2.shape[0] - 1)
+    for i in range(A.shape[0]):
+        a, b = l1[s1 * i], l2[s2 * i]
+        dx, dy = B[i, 0] - A[i, 0], B[i, 1] - A[i, 1]
+        dd = dx * dx + dy * dy
+        d = math.sqrt(dd)
+        product = ((a + b) - d) * ((a + b) + d) * (d - (a - b)) * (d + (a - b))
+        f = 0.5 / dd
+        c, s = f * (dd + (a - b) * (a + b)), f * sign * math.sqrt(product)
+        margin[i] = 0.25 * product / (a * a * b * b)
+        C[i, 0], C[i, 1] = A[i, 0] + c * dx - s * dy, A[i, 1] + c * dy + s * dx

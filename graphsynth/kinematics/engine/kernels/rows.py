@@ -1,0 +1,127 @@
+"""Values, gradients and second-order parts of the constraint rows; points carried by links."""
+
+import math
+
+from numba import njit
+
+from graphsynth.kinematics.engine.codes import (
+    ANGLE,
+    DIST,
+    DRIVE_ANGLE,
+    DRIVE_SLIDE,
+    INVERSE,
+    LINE,
+    PAX,
+    PAY,
+    PBX,
+    PBY,
+    RA,
+    RB,
+    RX,
+    RY,
+    SIGN,
+    SLOT,
+    TX,
+    TY,
+    H,
+)
+
+TAU = 2.0 * math.pi
+
+
+@njit(cache=True, error_model="numpy")
+def world(x, link, px, py):
+    """World point of a local one."""
+    c, s = x[link, 2], x[link, 3]
+    return x[link, 0] + c * px - s * py, x[link, 1] + s * px + c * py
+
+
+@njit(cache=True, error_model="numpy")
+def follow_angle(link, x, near):
+    """Unwrapped angle of a link, nearest to ``near``."""
+    raw = math.atan2(x[link, 3], x[link, 2])
+    x[link, 4] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
+
+
+@njit(cache=True, error_model="numpy")
+def row(kind, p, k, a, b, x, phi, q, g):
+    """Value of one constraint row; its gradient by (x, y, theta) of a and of b goes to g[0:6]."""
+    ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
+    ux, uy = ca * p[k, PAX] - sa * p[k, PAY], sa * p[k, PAX] + ca * p[k, PAY]
+    wx, wy = cb * p[k, PBX] - sb * p[k, PBY], sb * p[k, PBX] + cb * p[k, PBY]
+    dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
+    for c in range(6):
+        g[c] = 0.0
+    if kind == RX:
+        g[0], g[2], g[3], g[5] = -1.0, uy, 1.0, -wy
+        return dx
+    if kind == RY:
+        g[1], g[2], g[4], g[5] = -1.0, -ux, 1.0, wx
+        return dy
+    if kind == DIST:
+        h = p[k, H]
+        ex, ey = dx * p[k, INVERSE], dy * p[k, INVERSE]
+        g[0], g[1], g[2] = -ex, -ey, -(ux * ey - uy * ex)
+        g[3], g[4], g[5] = ex, ey, wx * ey - wy * ex
+        return 0.5 * (dx * ex + dy * ey - h)
+    if kind in (LINE, DRIVE_SLIDE):
+        tx, ty = ca * p[k, TX] - sa * p[k, TY], sa * p[k, TX] + ca * p[k, TY]
+        nx, ny = -ty, tx
+        along = tx * dx + ty * dy
+        across = nx * dx + ny * dy
+        if kind == LINE:
+            g[0], g[1], g[2] = -nx, -ny, -along - (ux * ny - uy * nx)
+            g[3], g[4], g[5] = nx, ny, wx * ny - wy * nx
+            return across - p[k, H]
+        g[0], g[1], g[2] = -tx, -ty, across - (ux * ty - uy * tx)
+        g[3], g[4], g[5] = tx, ty, wx * ty - wy * tx
+        return along - p[k, SIGN] * q[int(p[k, SLOT]), 0]
+    if kind in (ANGLE, DRIVE_ANGLE):
+        h = p[k, H] if kind == ANGLE else p[k, SIGN] * q[int(p[k, SLOT]), 0]
+        g[2], g[5] = -1.0, 1.0
+        ch, sh = math.cos(h), math.sin(h)
+        re, im = cb * ca + sb * sa, sb * ca - cb * sa
+        return math.atan2(im * ch - re * sh, re * ch + im * sh)
+    # gear: angles relative to the line of centres
+    total = p[k, RA] + p[k, SIGN] * p[k, RB]
+    square = dx * dx + dy * dy
+    nx, ny = -dy / square, dx / square
+    slot = int(p[k, SLOT])
+    raw = math.atan2(dy, dx)
+    here = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
+    scale = 1.0 / (p[k, RA] + p[k, RB])
+    g[0], g[1], g[2] = scale * total * nx, scale * total * ny, scale * (p[k, RA] + total * (ux * ny - uy * nx))
+    g[3], g[4] = -scale * total * nx, -scale * total * ny
+    g[5] = scale * (p[k, SIGN] * p[k, RB] - total * (wx * ny - wy * nx))
+    return scale * (p[k, RA] * (x[a, 4] - here) + p[k, SIGN] * p[k, RB] * (x[b, 4] - here - p[k, H]))
+
+
+@njit(cache=True, error_model="numpy")
+def gamma(kind, p, k, a, b, x, q):
+    """Second-order part of a row: its second derivative along the velocities, accelerations being zero."""
+    if kind == ANGLE:
+        return 0.0
+    if kind == DRIVE_ANGLE:
+        return -p[k, SIGN] * q[int(p[k, SLOT]), 2]
+    ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
+    ux, uy = ca * p[k, PAX] - sa * p[k, PAY], sa * p[k, PAX] + ca * p[k, PAY]
+    wx, wy = cb * p[k, PBX] - sb * p[k, PBY], sb * p[k, PBX] + cb * p[k, PBY]
+    oa, ob = x[a, 7], x[b, 7]
+    cx, cy = oa * oa * ux - ob * ob * wx, oa * oa * uy - ob * ob * wy
+    if kind == RX:
+        return cx
+    if kind == RY:
+        return cy
+    dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
+    ex, ey = x[b, 5] - ob * wy - x[a, 5] + oa * uy, x[b, 6] + ob * wx - x[a, 6] - oa * ux
+    if kind == DIST:
+        return (ex * ex + ey * ey + dx * cx + dy * cy) * p[k, INVERSE]
+    if kind in (LINE, DRIVE_SLIDE):
+        tx, ty = ca * p[k, TX] - sa * p[k, TY], sa * p[k, TX] + ca * p[k, TY]
+        if kind == LINE:
+            return oa * oa * (ty * dx - tx * dy) - 2.0 * oa * (tx * ex + ty * ey) - ty * cx + tx * cy
+        return (-oa * oa * (tx * dx + ty * dy) + 2.0 * oa * (tx * ey - ty * ex) + tx * cx + ty * cy
+                - p[k, SIGN] * q[int(p[k, SLOT]), 2])  # fmt: skip
+    square = dx * dx + dy * dy
+    turn = (dx * cy - dy * cx) / square - 2.0 * (dx * ex + dy * ey) * (dx * ey - dy * ex) / (square * square)
+    return -(p[k, RA] + p[k, SIGN] * p[k, RB]) / (p[k, RA] + p[k, RB]) * turn

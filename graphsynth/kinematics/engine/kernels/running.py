@@ -1,0 +1,193 @@
+"""Running a program: step after step, each over all samples, for every dimension set."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from graphsynth.kinematics.engine.codes import (
+    BAD_INPUT,
+    GEAR,
+    ITERATIVE_FROM,
+    NEWTON,
+    NO_CONVERGENCE,
+    P_LINE,
+    R_DIST,
+    R_GEAR,
+    SINGULAR,
+    SLOT,
+    STEP_TOO_LONG,
+    UNREACHABLE,
+)  # fmt: skip
+from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, first_bad, rrr_loop
+from graphsynth.kinematics.engine.kernels.newton import anchors, newton, platform, predict, rates
+from graphsynth.kinematics.engine.kernels.rows import TAU, follow_angle, world
+from graphsynth.kinematics.engine.kernels.single import closed_form, pivot_rates, place_eliminated
+
+
+@njit(cache=True, error_model="numpy")
+def load(link, i, x, X, TH, V, W, derivs):
+    """Copy one link's state at sample i to its row of x."""
+    for c in range(4):
+        x[link, c] = X[link, c, i]
+    x[link, 4] = TH[link, i]
+    if derivs:
+        for c in range(3):
+            x[link, 5 + c], x[link, 8 + c] = V[link, c, i], W[link, c, i]
+
+
+@njit(cache=True, error_model="numpy")
+def store(link, i, x, X, TH, V, W, derivs):
+    """Copy a row of x to the link's state at sample i."""
+    for c in range(4):
+        X[link, c, i] = x[link, c]
+    TH[link, i] = x[link, 4]
+    if derivs:
+        for c in range(3):
+            V[link, c, i], W[link, c, i] = x[link, 5 + c], x[link, 8 + c]
+
+
+@njit(cache=True, error_model="numpy")
+def unwrap(link, u, X, TH, V, i0, i1, derivs):
+    """Angle of a link placed by a loop, without jumps."""
+    for i in range(i0, i1):
+        near = TH[link, i]
+        if i > 0:
+            near = TH[link, i - 1] + ((u[i] - u[i - 1]) * V[link, 2, i - 1] if derivs else 0.0)
+        raw = math.atan2(X[link, 3, i], X[link, 2, i])
+        TH[link, i] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
+
+
+@njit(cache=True, error_model="numpy")
+def carry_centres(rows, rp, r0, nr, i, x, phi, PHI):
+    """Follow the direction of the line of centres of every gear pair of a step."""
+    for k in range(r0, r0 + nr):
+        if rows[k, 0] == GEAR:
+            slot = int(rp[k, SLOT])
+            ax, ay = world(x, rows[k, 1], rp[k, 0], rp[k, 1])
+            bx, by = world(x, rows[k, 2], rp[k, 2], rp[k, 3])
+            raw = math.atan2(by - ay, bx - ax)
+            phi[slot] = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
+            PHI[slot, i] = phi[slot]
+
+
+@njit(cache=True, error_model="numpy")
+def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h, warm, need, M, s, J, f, g, G, pivots,
+          out, P, Q, Lc, derivs):  # fmt: skip
+    """Place the kept links of one group at one sample; returns why it failed, or 0."""
+    if code >= ITERATIVE_FROM:
+        travel = predict(core, c0, nc, x, h, Lc) if warm else 0.0
+        if not travel <= 0.5:
+            return STEP_TOO_LONG
+        if code == NEWTON:
+            why = newton(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots, Lc, out)
+        else:
+            anchors(rows, rp, r0, own, x, P)
+            why = platform(P, x, own, Q, Lc, out, M, s)
+        if why:
+            return why
+        if warm and (out[0] > 0.1 * travel + 1e-9 or out[2] > 0.1):
+            return STEP_TOO_LONG
+        if code == NEWTON:
+            M[s] = rates(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots) / Lc**nc
+        if M[s] == 0.0:
+            return SINGULAR
+        if warm and not (M[s] * before > 0.0 and abs(M[s]) > 0.5 * abs(before)):
+            return STEP_TOO_LONG
+        return 0
+    near = x[own, 4] + (h * x[own, 7] if warm and derivs else 0.0)
+    M[s] = closed_form(code, rows, rp, r0, own, sign, x, phi, g)
+    if code == P_LINE:  # one mode; its determinant keeps its sign
+        if M[s] == 0.0 or (warm and not M[s] * before > 0.0):
+            return UNREACHABLE
+    elif M[s] < 0.0:
+        return UNREACHABLE
+    if not math.isfinite(M[s]):
+        return NO_CONVERGENCE
+    if need[own] and code != R_GEAR:
+        follow_angle(own, x, near)
+    if derivs:
+        if code <= R_GEAR:
+            pivot_rates(rows, rp, r0, own, x, phi, ql, g)
+        else:
+            rates(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots)
+    return 0
+
+
+@njit(cache=True, error_model="numpy")
+def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, modes, X, TH, V, W, PHI, M, done, why,
+        first, Lc, derivs):  # fmt: skip
+    """Run a program for every dimension set over the samples first..n-1.
+
+    RP, EP, DP and the state have the dimension set as first axis: X (sets, links, 4, n), TH (sets, links, n), V and W
+    (sets, links, 3, n), PHI (sets, gears, n), M (sets, steps, n).  q (drivers, 5, n) holds the driver coordinate, its
+    two derivatives, cosine and sine.  Sample ``first`` starts from ``first - 1`` if there is one; else cold, from the
+    poses already at sample 0.  ``done`` gets the samples reached, ``why`` the code and the step at which it stopped.
+    Eliminated links are placed if ``wanted``.
+    """
+    n, links, size = u.shape[0], X.shape[1], 3
+    for s in range(steps.shape[0]):
+        size = max(size, steps[s, 2])
+    J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(3)
+    G, pivots = np.empty((size, 6)), np.empty(size, np.int64)
+    P, Q = np.empty((3, 10)), np.empty((3, 6))
+    x, T = np.zeros((links, 11)), np.empty((12, n))
+    phi, m, ql = np.empty(PHI.shape[1]), np.empty(steps.shape[0]), np.empty((q.shape[0], 3))
+    for b in range(X.shape[0]):
+        rp, ep, dp, Xb, Tb, Vb, Wb, Mb, phis = RP[b], EP[b], DP[b], X[b], TH[b], V[b], W[b], M[b], PHI[b]
+        stop, code, at = n, 0, -1
+        for s in range(steps.shape[0]):
+            kind, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
+            e0, ne, t0, nt = steps[s, 5], steps[s, 6], steps[s, 7], steps[s, 8]
+            own = core[c0]
+            if kind < R_DIST:
+                end = drive_loop(drv, dp, r0, q, Xb, Tb, Vb, Wb, first, stop, derivs)
+                for i in range(first, end):
+                    Mb[s, i] = 1.0
+                if end < stop:
+                    stop, code, at = end, BAD_INPUT, s
+                continue
+            if kind == R_DIST:
+                rrr_loop(rows, rp, r0, own, modes[s], Xb, Vb, Wb, Mb[s], T, first, stop, derivs)
+                end, reason = first_bad(Mb[s], first, stop)
+                if reason:
+                    stop, code, at = end, reason, s
+                if need[own]:
+                    unwrap(own, u, Xb, Tb, Vb, first, stop, derivs)
+                for k in range(e0, e0 + ne):
+                    if wanted[elim[k, 1]]:
+                        bar_loop(elim[k, 1], elim[k, 2], elim[k, 3], ep, k, Xb, Vb, Wb, T, first, stop, derivs)
+                        if need[elim[k, 1]]:
+                            unwrap(elim[k, 1], u, Xb, Tb, Vb, first, stop, derivs)
+                continue
+            # one sample after another: each starts from the one before
+            j = max(first - 1, 0)
+            for k in range(c0, c0 + nc):
+                load(core[k], j, x, Xb, Tb, Vb, Wb, derivs)
+            for k in range(e0, e0 + ne):
+                load(elim[k, 1], j, x, Xb, Tb, Vb, Wb, derivs)
+            for k in range(phi.shape[0]):
+                phi[k] = phis[k, j]
+            for i in range(first, stop):
+                for k in range(t0, t0 + nt):
+                    load(touched[k], i, x, Xb, Tb, Vb, Wb, derivs)
+                for k in range(ql.shape[0]):
+                    ql[k, 0], ql[k, 1], ql[k, 2] = q[k, 0, i], q[k, 1, i], q[k, 2, i]
+                h, before = (u[i] - u[i - 1], Mb[s, i - 1]) if i > 0 else (0.0, 0.0)
+                reason = place(kind, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, modes[s], before, h, i > 0, need,
+                               m, s, J, f, g, G, pivots, out, P, Q, Lc, derivs)  # fmt: skip
+                Mb[s, i] = m[s]
+                if reason:
+                    stop, code, at = i, reason, s
+                    break
+                for k in range(c0, c0 + nc):
+                    store(core[k], i, x, Xb, Tb, Vb, Wb, derivs)
+                for k in range(e0, e0 + ne):
+                    e = elim[k, 1]
+                    near = x[e, 4] + (h * x[e, 7] if i > 0 and derivs else 0.0)
+                    place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
+                    if need[e]:
+                        follow_angle(e, x, near)
+                    store(e, i, x, Xb, Tb, Vb, Wb, derivs)
+                carry_centres(rows, rp, r0, nr, i, x, phi, phis)
+        done[b], why[b, 0], why[b, 1] = stop, code, at
