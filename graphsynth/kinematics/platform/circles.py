@@ -17,9 +17,9 @@ Limits = tuple[float, float] | None
 class BoundaryCircle(NamedTuple):
     """One circle that bounds the reach of a leg.
 
-    ``leg`` is 1 to 3; ``side`` is "outer" (leg stretched), "inner" (leg folded), "lower limit" or "upper limit" (rocker
-    at a joint limit).  ``sense`` is +1 if the allowed side is inside the circle, -1 if outside.  ``angle`` is the rocker
-    angle of a limit, NaN for the others.
+    ``leg`` is 1 to 3; ``side`` is "outer" (leg stretched), "inner" (leg folded), "lower limit" or "upper limit"
+    (rocker at a joint limit).  ``sense`` is +1 if the allowed side is inside the circle, -1 if outside.  ``angle`` is
+    the rocker angle of a limit, NaN for the others.
     """
 
     leg: int
@@ -60,7 +60,7 @@ def leg_circles(
 
 
 def meet(a: BoundaryCircle, b: BoundaryCircle, tolerance: float) -> Meeting:
-    """Common points of two circles; closer than ``tolerance`` (a length) counts as tangent or coincident."""
+    """Return the common points of two circles; closer than ``tolerance`` (a length) counts as tangent or coincident."""
     gap = b.centre - a.centre
     d, total, difference = abs(gap), a.radius + b.radius, a.radius - b.radius
     if d <= tolerance and abs(difference) <= tolerance:

@@ -53,7 +53,7 @@ def cofactors(matrix: Array) -> Array:
 
 
 def determinant(matrix: Array) -> Array:
-    """Determinants (...) of (..., 3, 3); NaN passes silently, unlike in ``numpy.linalg.det``."""
+    """Return the determinants (...) of (..., 3, 3); NaN passes silently, unlike in ``numpy.linalg.det``."""
     return np.asarray((matrix[..., 0, :] * np.cross(matrix[..., 1, :], matrix[..., 2, :])).sum(axis=-1))
 
 

@@ -1,8 +1,8 @@
 """Workspaces over the orientation: reachable (some angle) and total-orientation (every angle of a range).
 
-For a given position the orientations that a leg allows are intervals in closed form.  An area is enclosed by subdividing
-a rectangle: the distance of every vertex from its pivot changes by at most the distance moved, so legs made longer or
-shorter by half the diagonal of a cell decide whole cells.
+For a given position the orientations that a leg allows are intervals in closed form.  An area is enclosed by
+subdividing a square: the distance of every vertex from its pivot changes by at most the distance moved, so legs made
+longer or shorter by half the diagonal of a cell decide whole cells.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite, positive
@@ -61,7 +61,7 @@ def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[floa
     Examples
     --------
     >>> [tuple(round(a, 6) for a in pair) for pair in orientations(ParallelPlatform.mock(), 0j)]
-    [(3.959478, 8.60687)]
+    [(5.522173, 7.853982)]
     """
     p = np.array([complex(point)])
     ends = _ends(platform, p)[0].ravel()
@@ -70,8 +70,8 @@ def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[floa
         return ((0.0, math.tau),) if bool(_allowed(platform, p, np.zeros((1, 1)), 0.0).all()) else ()
     following = np.append(ends[1:], ends[0] + math.tau)
     middle = 0.5 * (ends + following)
-    good = _allowed(platform, p, middle[None], 0.0).all(axis=-1)[0]
-    pieces = [(float(a), float(b)) for a, b, ok in zip(ends, following, good) if ok]
+    good = _allowed(platform, p, middle[None], 0.0)[0].all(axis=-1)
+    pieces = [(float(a), float(b)) for a, b, ok in zip(ends, following, np.atleast_1d(good)) if ok]
     joined: list[tuple[float, float]] = []
     for start, stop in pieces:
         if joined and joined[-1][1] == start:
@@ -161,7 +161,7 @@ def _ends(platform: ParallelPlatform, p: Complex, extra: float = 0.0) -> Array:
     bounds = np.stack([low, high], axis=-1)
     with np.errstate(invalid="ignore"):
         half = np.arccos(np.where(np.abs(bounds) <= 1.0, bounds, np.nan))
-    return centre[..., None] + np.concatenate([half, -half], axis=-1)
+    return np.asarray(centre[..., None] + np.concatenate([half, -half], axis=-1))
 
 
 def _allowed(platform: ParallelPlatform, p: Complex, alpha: Array, extra: float) -> NDArray[np.bool_]:
@@ -176,11 +176,13 @@ def _cover(platform: ParallelPlatform, test: Test, resolution: float, statement:
     """Subdivide a square that holds the reach of leg 1."""
     resolution = positive("resolution", resolution)
     half = platform.l1[0] + platform.l2[0] + abs(platform.b[0])
-    centres, side = np.array([platform.D[0]]), half
-    inside, inside_half, area, low = [], [], 0.0, 0.0
+    centres: Complex = np.array([platform.D[0]], dtype=np.complex128)
+    side, low = half, 0.0
+    inside: list[Complex] = []
+    inside_half: list[Array] = []
     for _ in range(max(1, math.ceil(math.log2(1.0 / resolution)))):
         side *= 0.5
-        centres = (centres[:, None] + side * np.array([-1 - 1j, 1 - 1j, -1 + 1j, 1 + 1j])).ravel()
+        centres = np.asarray(centres[:, None] + side * np.array([-1 - 1j, 1 - 1j, -1 + 1j, 1 + 1j])).ravel()
         reach = side * math.sqrt(2.0)
         centres = centres[test(centres, reach)]
         sure = test(centres, -reach)

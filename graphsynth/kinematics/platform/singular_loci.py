@@ -161,7 +161,7 @@ def _curve(
     else:
         ends = () if parts[0].end == 0 else (leg, last)
     residual = max(float(np.abs(equations.evaluate(state)[0]).max()) for state in states)
-    return SingularCurve(mode, unit * (states[:, 0] + 1j * states[:, 1]), states[:, 2:], ends, residual)
+    return SingularCurve(mode, np.asarray(unit * (states[:, 0] + 1j * states[:, 1])), states[:, 2:], ends, residual)
 
 
 def _known(curves: list[SingularCurve], state: Array, unit: float, *, ends_only: bool = False) -> bool:
@@ -188,21 +188,22 @@ def _known(curves: list[SingularCurve], state: Array, unit: float, *, ends_only:
 def _boundary_seeds(
     platform: ParallelPlatform, alpha: float, mode: tuple[int, int, int], equations: CurveEquations, unit: float
 ) -> list[tuple[Array, int]]:
-    """Ends of curves on the boundary of the workspace: states and legs."""
+    """Find the ends of curves on the boundary of the workspace: states and legs."""
     seeds = []
     for arc in constant_orientation_workspace(platform, alpha).arcs:
         leg = arc.circle.leg
         t = arc.start + (arc.stop - arc.start) * (np.arange(_ARC_SAMPLES) + 0.5) / _ARC_SAMPLES
         t = np.concatenate([[arc.start + 1e-9 * (t[1] - t[0])], t, [arc.stop - 1e-9 * (t[1] - t[0])]])
         values = _on_arc(platform, alpha, mode, arc, t)[0]
-        for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-            a, b = t[i], t[i + 1]
-            for _ in range(40):
-                middle = 0.5 * (a + b)
-                value = _on_arc(platform, alpha, mode, arc, np.array([middle]))[0][0]
-                a, b = (middle, b) if value * values[i] > 0.0 else (a, middle)
-            p, theta = _on_arc(platform, alpha, mode, arc, np.array([a]))[1:]
-            found = equations.end(np.array([p[0].real / unit, p[0].imag / unit, *theta[0]]), leg - 1)
+        change = values[:-1] * values[1:] < 0.0
+        a, b, first = t[:-1][change], t[1:][change], values[:-1][change]
+        for _ in range(20 if change.any() else 0):
+            middle = 0.5 * (a + b)
+            same = _on_arc(platform, alpha, mode, arc, middle)[0] * first > 0.0
+            a, b = np.where(same, middle, a), np.where(same, b, middle)
+        _, p, theta = _on_arc(platform, alpha, mode, arc, a)
+        for q, angles in zip(p, theta):
+            found = equations.end(np.array([q.real / unit, q.imag / unit, *angles]), leg - 1)
             if found is not None:
                 seeds.append((found, leg))
     return seeds

@@ -94,7 +94,7 @@ class CurveEquations:
         return (v, self.evaluate(v)[1]) if size <= 1e-11 else None
 
     def end(self, v: Array, k: int) -> Array | None:
-        """The state at which leg k is stretched or folded, near ``v``."""
+        """Return the state at which leg k is stretched or folded, near ``v``."""
         size = math.inf
         for _ in range(12):
             f, J = self.evaluate(v)
@@ -157,7 +157,7 @@ def _difference(a: Array, b: Array) -> Array:
 
 
 def _tangent(J: Array, along: Array) -> Array:
-    """Unit null vector of the Jacobian with a positive component along ``along``."""
+    """Return the unit null vector of the Jacobian with a positive component along ``along``."""
     t = np.linalg.svd(J)[2][-1]
     return np.asarray(-t if float(t @ along) < 0.0 else t)
 

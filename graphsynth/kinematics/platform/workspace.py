@@ -24,7 +24,7 @@ TOLERANCE = 1e-12
 
 
 class Arc(NamedTuple):
-    """A piece of the boundary: counter-clockwise from angle ``start`` to ``stop`` on ``circle`` (radians, start < stop)."""
+    """A piece of the boundary: ``circle`` counter-clockwise from angle ``start`` to ``stop`` (radians, start < stop)."""
 
     circle: BoundaryCircle
     start: float
@@ -317,14 +317,11 @@ class _Problem:
 
     def curve(self, i: int) -> list[Arc]:
         """Pieces of circle i that are the whole workspace."""
-        found = []
-        for arc in self._pieces(i) if self.circles[i].radius > 0.0 else []:
-            if self._near(complex(arc.point(0.5 * (arc.start + arc.stop)))):
-                found.append(arc)
-        return found
+        pieces = self._pieces(i) if self.circles[i].radius > 0.0 else []
+        return [arc for arc in pieces if self._near(complex(arc.point(0.5 * (arc.start + arc.stop))))]
 
     def isolated(self, arcs: list[Arc]) -> list[complex]:
-        """Common points of circles that belong to the workspace but to no arc."""
+        """Find common points of circles that belong to the workspace but to no arc."""
         points = [p for cut in self.cuts for p in cut]
         points += [c.centre for c in self.circles if c.radius == 0.0]
         ends = [complex(arc.point(t)) for arc in arcs for t in (arc.start, arc.stop)]
