@@ -47,12 +47,14 @@ class Body:
     def vertices(self) -> list[complex]:
         """Attachment points, and for each guide its point nearest to them."""
         middle = sum(self.points) / len(self.points) if self.points else None
-        ends = [guide.nearest(middle if middle is not None else _first_end(self.guides, guide)) for guide in self.guides]
+        ends = [
+            guide.nearest(middle if middle is not None else _first_end(self.guides, guide)) for guide in self.guides
+        ]
         return [*self.points, *ends]
 
 
 def _first_end(guides: list[Guide], guide: Guide) -> complex:
-    """A link of guides alone: they meet nearest to the middle of the first."""
+    """Return the place a guide of a link without points is joined at: nearest to the middle of another guide."""
     first = guides[0]
     return (first.start + first.stop) / 2 if guide is not first else (guides[-1].start + guides[-1].stop) / 2
 
@@ -142,5 +144,3 @@ def outline(points: list[complex], merge: float) -> list[complex]:
     t = (q - p) / far
     width = [((z - p) * t.conjugate()).imag for z in corners]
     return corners if max(width) - min(width) > merge else [p, q]
-
-

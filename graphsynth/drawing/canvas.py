@@ -125,7 +125,7 @@ def _outline(path: Path) -> Any:
     from matplotlib.path import Path as Outline
 
     points: list[tuple[float, float]] = []
-    codes: list[int] = []
+    codes: list[Any] = []
     for run in path.runs:
         points += [(p.real, p.imag) for p in run]
         if path.curved:
@@ -144,20 +144,44 @@ def draw(sketch: Sketch, axes: Any, pose: Pose | None = None) -> Any:
     return axes
 
 
-def figure_of(sketches: Sequence[Sketch], poses: Sequence[Pose | None], dpi: float = DPI) -> tuple[Any, list[Canvas]]:
-    """Make a figure with the sketches side by side in their own size, without frames around; return it and canvases."""
+def figure_of(
+    sketches: Sequence[Sketch],
+    poses: Sequence[Pose | None],
+    dpi: float = DPI,
+    above: str = "",
+    below: Sequence[str] = (),
+) -> tuple[Any, list[Canvas]]:
+    """Make a figure with the sketches side by side in their own size; return it and the canvases.
+
+    Parameters
+    ----------
+    sketches, poses
+        A pose for every sketch; None for one that does not move.
+    dpi : float
+        Pixels per inch; 96 gives the sketches their own size.
+    above, below : str, sequence of str
+        A title, and lines of a remark.
+    """
     from matplotlib.figure import Figure
 
-    width, height = sum(s.width for s in sketches), max(s.height for s in sketches)
+    head, foot = (26.0 if above else 0.0), (17.0 * len(below) + 8.0 if below else 0.0)
+    width, inner = sum(s.width for s in sketches), max(s.height for s in sketches)
+    height = head + inner + foot
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=dpi)
     figure.set_facecolor(LIGHT["paper"])
     canvases, left = [], 0.0
     for sketch, pose in zip(sketches, poses):
-        bottom = (1.0 - sketch.height / height) / 2
-        axes = figure.add_axes((left / width, bottom, sketch.width / width, sketch.height / height))
+        bottom = foot + (inner - sketch.height) / 2
+        axes = figure.add_axes(
+            (left / width, bottom / height, sketch.width / width, sketch.height / height), label=f"sketch {left:g}"
+        )
         axes.set_axis_off()
         canvases.append(Canvas(sketch, axes, pose))
         left += sketch.width
+    if above:
+        figure.text(12.0 / width, 1.0 - 18.0 / height, above, fontsize=10.5, color=LIGHT["ink"])
+    for k, line in enumerate(below):
+        figure.text(12.0 / width, (foot - 14.0 - 17.0 * k) / height, line, fontsize=9.0, color=LIGHT["b"])
     return figure, canvases
 
 

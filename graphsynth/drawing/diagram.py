@@ -1,8 +1,8 @@
 """Kinematic diagrams of dimensioned mechanisms: the joints' and links' symbols, each fixed to its link.
 
 Symbols follow ISO 3952: turning pairs are open circles, pairs on the frame stand on hatched ground, a slider is a block
-on its guide, a pin runs in a slot, gears are dash-dotted pitch circles.  The driven link and the arrow of its sense are in
-a second colour.
+on its guide, a pin runs in a slot, gears are dash-dotted pitch circles.  The driven link and the arrow of its sense are
+drawn in a second colour.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.drawing.bodies import Body, Guide, bodies, bounds, outline, world
 from graphsynth.drawing.lettering import place_letters
 from graphsynth.drawing.palette import TRACE_COLOURS
-from graphsynth.drawing.shapes import FIXED
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
@@ -186,7 +185,7 @@ def _link(plan: _Plan, body: Body) -> None:
 
 
 def _hatched_rim(plan: _Plan, centre: complex, radius: float) -> None:
-    """A wheel that does not turn: hatching inside the lower part of its rim."""
+    """Mark a wheel that does not turn: hatching inside the lower part of its rim."""
     plan.sketch.on(plan.mechanism.frame, "ground", "ground of a wheel")
     for k in range(7):
         rim = centre + radius * cmath.exp(1j * math.radians(-120 + 10 * k))
@@ -198,7 +197,7 @@ def _rectangle(middle: complex, t: complex, half: float, across: float) -> list[
 
 
 def _slider(plan: _Plan, joint: Prismatic | PinSlot) -> None:
-    """A block on its guide, or a slot; ground where the frame is one of the two."""
+    """Draw a block on its guide, or a slot; ground where the frame is one of the two."""
     sketch, px = plan.sketch, plan.px
     guide = next(g for g in plan.bodies[joint.a].guides if g.joint is joint)
     name = f"{joint.a}-{joint.b}"
@@ -223,7 +222,7 @@ def _slider(plan: _Plan, joint: Prismatic | PinSlot) -> None:
 
 
 def _downward(t: complex) -> complex:
-    """The normal of a direction that points down (to the right of an upright direction)."""
+    """Return the normal of a direction that points down (to the right of an upright direction)."""
     normal = -1j * t
     return normal if normal.imag < -1e-9 or (abs(normal.imag) <= 1e-9 and normal.real > 0) else -normal
 
@@ -278,7 +277,7 @@ def _joints(plan: _Plan) -> list[tuple[complex, complex]]:
 
 def _ground_direction(plan: _Plan, at: complex, link: int) -> complex:
     """Down, unless the link jointed there lies that way most of the time: then aside or up."""
-    own = [p for p in plan.bodies[link].vertices()]
+    own = plan.bodies[link].vertices()
     ways = np.concatenate([world(plan.poses, link, p) for p in own]) - at if own else np.zeros(0, np.complex128)
     ways = ways[abs(ways) > 2.0 * plan.px]
     if ways.size == 0:
@@ -333,7 +332,7 @@ def _pose_of(what: Mechanism | Motion, pose: ArrayLike | int | None) -> tuple[Me
             raise GeometryError("the mechanism has no pose to draw; give one, or a motion and a sample")
         array = _checked(what, given)
         return what, array, array[0]
-    reached = np.isfinite(what.poses).all(axis=(1, 2))
+    reached: NDArray[np.bool_] = np.asarray(np.isfinite(what.poses).all(axis=(1, 2)))
     sample = 0 if pose is None else pose
     if not isinstance(sample, int | np.integer):
         raise GeometryError("a motion is drawn at a sample: give its number")
@@ -381,7 +380,7 @@ def mechanism_svg(
     --------
     >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph, Revolute
     >>> graph = MechanismGraph(2, [(0, 1)], frame=0)
-    >>> crank = Mechanism(graph, [Revolute(0, 1)], [Driver(0, 1)], {"A": (1, (1.0, 0.0))}, pose=[(0, 0, 0), (0, 0, 0.5)])
+    >>> crank = Mechanism(graph, [Revolute(0, 1)], [Driver(0, 1)], {"A": (1, (1, 0))}, pose=[(0, 0, 0), (0, 0, 0.5)])
     >>> mechanism_svg(crank).count('data-part="joint 0-1"')
     1
     """

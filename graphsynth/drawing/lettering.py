@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,22 +28,24 @@ class _Room:
     def __init__(self, poses: Array, pixel: float) -> None:
         pick = np.unique(np.linspace(0, len(poses) - 1, min(_SAMPLES, len(poses))).round().astype(int))
         self.poses, self.pixel = poses[pick], pixel
-        self.taken: list[Complex] = []
+        self.taken: list[tuple[Complex, int]] = []
 
-    def add(self, link: int, points: Sequence[complex]) -> None:
-        self.taken += [world(self.poses, link, point) for point in points]
+    def add(self, link: int, points: Sequence[complex], own: int = -1) -> None:
+        """Keep letters away from points of a link; those of link ``own`` may come near."""
+        self.taken += [(world(self.poses, link, point), own) for point in points]
 
     def clearance(self, link: int, point: complex) -> float:
         """Distance to the nearest thing, capped at 22 pixels: the worst pose and the mean count half each."""
-        if not self.taken:
+        others = [z for z, own in self.taken if own != link]
+        if not others:
             return 22.0
-        near = np.min(np.abs(np.stack(self.taken) - world(self.poses, link, point)), axis=0) / self.pixel
+        near = np.min(np.abs(np.stack(others) - world(self.poses, link, point)), axis=0) / self.pixel
         capped = np.minimum(near, 22.0)
         return float(0.5 * capped.min() + 0.5 * capped.mean())
 
     def best(self, link: int, candidates: Sequence[complex]) -> complex:
         """Choose the first of the freest candidates, and take it."""
-        scores = [self.clearance(link, point) - 0.3 * k for k, point in enumerate(candidates)]
+        scores = [self.clearance(link, point) - 0.4 * k for k, point in enumerate(candidates)]
         chosen = candidates[scores.index(max(scores))]
         self.add(link, [chosen])
         return chosen
@@ -62,7 +65,7 @@ def place_letters(
     room = _Room(poses, px)
     for body in bodies:
         if not (grounded and body.link == mechanism.frame):
-            room.add(body.link, _along(outline(body.vertices(), 2.0 * px), 14.0 * px))
+            room.add(body.link, _along(outline(body.vertices(), 2.0 * px), 14.0 * px), body.link)
         room.add(body.link, body.points)
     frame = mechanism.frame
     for at, down in grounds:
@@ -90,7 +93,7 @@ def place_letters(
 
 def _along(corners: list[complex], step: float) -> list[complex]:
     """Points along the sides of a figure, at most a step apart."""
-    sides = list(zip(corners, corners[1:] + corners[:1])) if len(corners) > 2 else list(zip(corners, corners[1:]))
+    sides = list(pairwise([*corners, corners[0]] if len(corners) > 2 else corners))
     found = []
     for p, q in sides:
         count = min(40, max(1, math.ceil(abs(q - p) / step)))

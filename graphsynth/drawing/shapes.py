@@ -62,7 +62,7 @@ class Circle:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Upright text centred at a point moved by ``offset`` pixels (y upwards); a halo of paper colour keeps it legible."""
+    """Upright text centred at a point moved by ``offset`` pixels (y upwards); a halo keeps it legible."""
 
     at: Point
     text: str

@@ -90,7 +90,8 @@ def _text(shape: Text, xy: ToPage, part: str, upright: str) -> str:
     weight = f' font-weight="{shape.weight}"' if shape.weight else ""
     return (
         f'{around[0]}<text x="{number(x + dx)}" y="{number(y + dy)}" text-anchor="{shape.anchor}" '
-        f'dominant-baseline="central" font-size="{number(shape.size)}"{weight} fill="var(--{shape.colour})"{halo}{part}>'
+        f'dominant-baseline="central" font-size="{number(shape.size)}"{weight} '
+        f'fill="var(--{shape.colour})"{halo}{part}>'
         f"{escape(shape.text)}</text>{around[1]}"
     )
 

@@ -1,0 +1,255 @@
+"""Moving pictures: a self-contained HTML page with a player, and an SVG that moves by itself.
+
+Every link is a group of shapes that is shifted and turned as a whole, so the file holds three numbers for each link and
+frame, whatever the links look like.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from html import escape
+from importlib.resources import files
+from itertools import groupby
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.drawing.bodies import bodies
+from graphsynth.drawing.diagram import mechanism_sketch
+from graphsynth.drawing.frames import Frames, frames_of, shown_coordinate
+from graphsynth.drawing.palette import STYLE, TRACE_COLOURS
+from graphsynth.drawing.shapes import FIXED, Point, Shape
+from graphsynth.drawing.sketch import Sketch
+from graphsynth.drawing.svg import element, number, picture
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.joints import Revolute
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+
+__all__ = ["animated_svg", "animation_html"]
+
+Array = NDArray[np.float64]
+_LINE = 17.0  # height of a line of the note, pixels
+
+
+class _Stage:
+    """A sketch whose links are groups, and the pose of each group's origin in pixels and degrees over the frames."""
+
+    def __init__(self, frames: Frames, width: float, height: float, title: str) -> None:
+        self.frames = frames
+        mechanism = frames.mechanism
+        self.sketch: Sketch = mechanism_sketch(mechanism, frames.poses, width=width, height=height, title=title)
+        # the origin of a group is the middle of its link: turning errors stay small however far its frame lies
+        shown = [body.vertices() for body in bodies(mechanism, frames.poses, 0.0)]
+        self.middle: list[Point] = [sum(points) / len(points) if points else 0j for points in shown]
+        self.ends = shown
+
+    def local(self, link: int, point: Point) -> tuple[float, float]:
+        """Pixels from the origin of a link's group, y down."""
+        offset = (point - self.middle[link]) * self.sketch.scale
+        return offset.real, -offset.imag
+
+    def track(self, link: int) -> Array:
+        """Place (pixels) and turn (degrees clockwise) of a link's group in every frame, shape (n, 3)."""
+        pose = self.frames.poses[:, link]
+        z = pose[:, 0] + 1j * pose[:, 1] + np.exp(1j * pose[:, 2]) * self.middle[link]
+        x, y = np.array([self.sketch.xy(complex(value)) for value in z]).T
+        return np.column_stack([x, y, -np.degrees(pose[:, 2])])
+
+    def groups(self, moving: str, letters: str, grip: int) -> list[str]:
+        """Markup of all shapes, back to front; ``moving`` and ``letters`` are attributes with the link as ``{}``."""
+        found = []
+        for (layer, link), run in groupby(self.sketch.ordered(), key=lambda shape: (shape.layer, shape.link)):
+            shapes = list(run)
+            if link == FIXED:
+                body = "".join(element(s, self.sketch.xy, self.sketch.scale, self.sketch.symbol) for s in shapes)
+                found.append(f'<g data-layer="{layer}">{body}</g>')
+            else:
+                found.append(self._group(link, layer, shapes, moving, letters, grip == link))
+        return found
+
+    def _group(self, link: int, layer: str, shapes: list[Shape], moving: str, letters: str, grip: bool) -> str:
+        x, y, turn = self.track(link)[0]
+        upright = f'{letters.format(link)} transform="rotate({number(-turn)})"'
+        body = "".join(
+            element(s, lambda p: self.local(link, p), self.sketch.scale, self.sketch.symbol, upright) for s in shapes
+        )
+        if grip and layer == "label":
+            body += self._grip(link)
+        where = f"translate({number(x)} {number(y)}) rotate({number(turn)})"
+        return f'<g {moving.format(link)} data-layer="{layer}" transform="{where}">{body}</g>'
+
+    def _grip(self, link: int) -> str:
+        """Write an invisible thick line along the driven link, to take hold of."""
+        ends = [self.local(link, point) for point in self.ends[link]]
+        data = "M" + " L".join(f"{number(x)} {number(y)}" for x, y in (ends if len(ends) > 1 else ends * 2))
+        return (
+            f'<path class="grip" d="{data}" fill="none" stroke="#000" stroke-opacity="0" stroke-width="34" '
+            'stroke-linecap="round" pointer-events="stroke"/>'
+        )
+
+
+def animation_html(
+    motion: Motion,
+    *,
+    frames: int = 120,
+    title: str = "",
+    note: str = "",
+    seconds: float = 5.0,
+    width: float = 540.0,
+    height: float = 440.0,
+) -> str:
+    """One HTML page with the moving mechanism: play, pause, slider, dragging, speed, traces, keyboard.
+
+    The page needs no other file and no network; it is light or dark with the system, and stands still at first for
+    readers who ask for reduced motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        One that does not close is shown to and fro over the part it reaches, with the reason underneath.
+    frames : int
+        Poses in the file, 2..2000; the page interpolates between them.
+    title, note : str
+        Heading, and a remark under the picture.
+    seconds : float
+        Time of one pass at speed 1.
+    width, height : float
+        Largest size of the picture in pixels of the drawing; it scales with the page.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    GeometryError
+        Nothing of the motion is assembled, or a number is out of its bounds.
+    """
+    _check_seconds(seconds)
+    shown = frames_of(motion, frames)
+    name = title or f"Mechanism with {motion.mechanism.graph.links} links"
+    stage = _Stage(shown, width, height, name)
+    driver = _driver_link(shown)
+    svg = picture(stage.groups('data-k="{}"', 'data-r="{}"', driver), stage.sketch.width, stage.sketch.height, "", name)
+    notes = "".join(
+        f'<p class="{css}">{escape(words)}</p>' for css, words in (("", note), ("stop", shown.note)) if words
+    )
+    template = files("graphsynth.drawing").joinpath("player.html").read_text("utf-8")
+    data = json.dumps(_data(stage, seconds, driver), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {"STYLE": STYLE, "SVG": svg, "NOTES": notes, "DATA": data, "TITLE": escape(name)}
+    pieces = template.split("@")
+    return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
+
+
+def _check_seconds(seconds: float) -> None:
+    if not (math.isfinite(seconds) and seconds > 0.0):
+        raise GeometryError(f"seconds = {seconds} must be positive and finite; give the time of one pass")
+
+
+def _driver_link(frames: Frames) -> int:
+    """Return the link that is driven first, the moving one of its joint."""
+    driver = frames.mechanism.drivers[0]
+    return driver.link if driver.link != frames.mechanism.frame else driver.base
+
+
+def _data(stage: _Stage, seconds: float, driver: int) -> dict[str, Any]:
+    """Everything the player needs: poses as whole tenths of pixels and hundredths of degrees."""
+    frames, mechanism = stage.frames, stage.frames.mechanism
+    poses = [
+        np.rint(stage.track(link) * [10.0, 10.0, 100.0]).astype(int).ravel().tolist()
+        for link in range(mechanism.graph.links)
+    ]
+    drivers = []
+    for k in range(len(mechanism.drivers)):
+        name, angle, values = shown_coordinate(mechanism, k, frames.coordinates[:, k])
+        drivers.append({"name": name, "angle": angle, "values": values})
+    points = [
+        {"name": name, "link": link, "colour": TRACE_COLOURS[k % len(TRACE_COLOURS)], "at": _short(stage, link, at)}
+        for k, (name, (link, at)) in enumerate(mechanism.points.items())
+    ]
+    return {
+        "count": len(frames.poses), "loop": frames.loops, "seconds": seconds, "poses": poses, "drivers": drivers,
+        "points": points, "grip": _grip_data(stage, driver),
+    }  # fmt: skip
+
+
+def _short(stage: _Stage, link: int, at: tuple[float, float]) -> list[float]:
+    return [round(value, 2) for value in stage.local(link, complex(*at))]
+
+
+def _grip_data(stage: _Stage, link: int) -> dict[str, Any] | None:
+    """Where the driven link is held, and the centre it turns about if that is fixed."""
+    mechanism = stage.frames.mechanism
+    joint = mechanism.joint(*mechanism.drivers[0].pair)
+    own = complex(*(joint.at_a if joint.a == link else joint.at_b))
+    far = max(stage.ends[link], key=lambda point: abs(point - own), default=own)
+    centre = None
+    if isinstance(joint, Revolute) and mechanism.frame in (joint.a, joint.b) and abs(far - own) > 0.0:
+        at = joint.at_a if joint.a == mechanism.frame else joint.at_b
+        centre = [round(value, 2) for value in stage.sketch.xy(complex(*at))]
+    return {"link": link, "at": _short(stage, link, (far.real, far.imag)), "centre": centre}
+
+
+def animated_svg(
+    motion: Motion,
+    *,
+    frames: int = 90,
+    title: str = "",
+    seconds: float = 5.0,
+    width: float = 560.0,
+    height: float = 480.0,
+) -> str:
+    """One SVG that moves by itself (CSS key frames), for pages and slides where no script runs.
+
+    Parameters
+    ----------
+    motion, frames, title, seconds, width, height
+        As for :func:`animation_html`.
+
+    Returns
+    -------
+    str
+        It stands still for readers who ask for reduced motion.
+
+    Raises
+    ------
+    GeometryError
+        Nothing of the motion is assembled, or a number is out of its bounds.
+    """
+    _check_seconds(seconds)
+    shown = frames_of(motion, frames)
+    stage = _Stage(shown, width, height, title)
+    moving = sorted({shape.link for shape in stage.sketch.shapes} - {FIXED, shown.mechanism.frame})
+    way = "normal" if shown.loops else "alternate"
+    rules = [f"[class^=k],[class^=r]{{animation:{number(seconds)}s linear infinite {way}}}"]
+    for link in moving:
+        track = stage.track(link)
+        places = [f"translate({x:.1f}px,{y:.1f}px) rotate({a:.2f}deg)" for x, y, a in track]
+        rules.append(_key_frames(f"k{link}", places))
+        rules.append(_key_frames(f"r{link}", [f"rotate({-a:.2f}deg)" for a in track[:, 2]]))
+    rules.append("@media (prefers-reduced-motion:reduce){[class^=k],[class^=r]{animation:none}}")
+    body = stage.groups('class="k{}"', 'class="r{}"', FIXED)
+    lines = wrap(shown.note, max(20, int(stage.sketch.width / 6.6)))
+    tall = stage.sketch.height + _LINE * len(lines) + (8.0 if lines else 0.0)
+    body += [
+        f'<text x="12" y="{number(stage.sketch.height + _LINE * k + 6)}" font-size="12.5" '
+        f'fill="var(--b)">{escape(line)}</text>'
+        for k, line in enumerate(lines)
+    ]
+    return picture(body, stage.sketch.width, tall, STYLE + "".join(rules), title)
+
+
+def _key_frames(name: str, transforms: list[str]) -> str:
+    """Rules that carry class ``name`` through the transforms, evenly spaced; runs of equal ones are kept short."""
+    last = max(len(transforms) - 1, 1)
+    steps = "".join(
+        f"{number(100.0 * k / last)}%{{transform:{transform}}}"
+        for k, transform in enumerate(transforms)
+        if k in (0, last) or not transforms[k - 1] == transform == transforms[k + 1]
+    )
+    return f".{name}{{animation-name:{name}}}@keyframes {name}{{{steps}}}"

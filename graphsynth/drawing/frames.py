@@ -1,0 +1,140 @@
+"""The frames of an animation: samples of a motion, whether it goes round, and what to say about it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.drawing.bodies import Body, bodies
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.joints import Prismatic
+from graphsynth.mechanism.model import Mechanism, TracePoint
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+
+__all__ = ["Frames", "frames_of", "with_trace_points"]
+
+Array = NDArray[np.float64]
+
+#: Most frames an animation may have.
+FRAMES_MAX = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Poses to be shown one after the other.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    poses : ndarray, shape (n, links, 3)
+        Assembled; angles without jumps.  If ``loops``, the last is the first again.
+    coordinates : ndarray, shape (n, drivers)
+        Driver coordinates: radians or lengths.
+    loops : bool
+        The motion closes, so it goes round; otherwise it goes to and fro.
+    note : str
+        Why it does not go round; empty if it does.
+    """
+
+    mechanism: Mechanism
+    poses: Array
+    coordinates: Array
+    loops: bool
+    note: str
+
+    @property
+    def order(self) -> list[int]:
+        """Frames of one period: round, or to and fro; no frame twice in a row."""
+        n = len(self.poses)
+        if n == 1:
+            return [0]
+        return list(range(n - 1)) if self.loops else [*range(n), *range(n - 2, 0, -1)]
+
+
+def frames_of(motion: Motion, count: int = 120) -> Frames:
+    """Choose about ``count`` frames of the part of a motion that is reached.
+
+    Parameters
+    ----------
+    motion : Motion
+    count : int
+        Frames of the whole range; a motion with fewer samples gives all it has.
+
+    Returns
+    -------
+    Frames
+
+    Raises
+    ------
+    GeometryError
+        If ``count`` is out of 2..2000, or nothing of the motion is assembled.
+    """
+    if not 2 <= count <= FRAMES_MAX:
+        raise GeometryError(f"frames = {count} must be from 2 to {FRAMES_MAX}; choose another number")
+    reached = np.flatnonzero(~np.isfinite(motion.poses).all(axis=(1, 2)))
+    last = int(reached[0]) if reached.size else len(motion.inputs)
+    if last == 0:
+        raise GeometryError(f"nothing of the motion is assembled, so nothing can be shown: {motion.reason}")
+    pick = np.unique(np.linspace(0, last - 1, min(count + 1, last)).round().astype(np.intp))
+    poses = np.array(motion.poses[pick])
+    poses[:, :, 2] = np.unwrap(poses[:, :, 2], axis=0)
+    coordinates = np.column_stack([d.law(motion.inputs[pick])[0] for d in motion.mechanism.drivers])
+    loops = motion.completed and motion.closure.closed and len(pick) > 2
+    return Frames(motion.mechanism, poses, coordinates, loops, "" if loops else _note(motion))
+
+
+def _note(motion: Motion) -> str:
+    if not motion.completed:
+        reason = motion.reason[:1].upper() + motion.reason[1:]
+        return f"Shown to and fro over the part that is reached. {reason}."
+    if motion.closure.tested:
+        return f"Shown to and fro: {motion.closure.statement}."
+    return ""
+
+
+def with_trace_points(motion: Motion, most: int = 1) -> Motion:
+    """Name a point to be traced if the mechanism has none: the middle of a link that is not jointed to the frame.
+
+    Parameters
+    ----------
+    motion : Motion
+    most : int
+        Largest number of points; links with the most joints first.
+
+    Returns
+    -------
+    Motion
+        The same motion, if it has points already or no such link.
+    """
+    mechanism = motion.mechanism
+    if mechanism.points:
+        return motion
+    graph = mechanism.graph
+    near = {mechanism.frame, *(a + b - mechanism.frame for a, b, _ in graph.joints if mechanism.frame in (a, b))}
+    floating = sorted((link for link in range(graph.links) if link not in near), key=lambda k: (-graph.degrees[k], k))
+    reached = motion.poses[np.isfinite(motion.poses).all(axis=(1, 2))]
+    if not floating or not len(reached):
+        return motion
+    shown = bodies(mechanism, reached, 0.0)
+    points = {name: _middle(shown[link]) for name, link in zip("PQST", floating[:most])}
+    return replace(motion, mechanism=replace(mechanism, points=points))
+
+
+def _middle(body: Body) -> TracePoint:
+    corners = body.vertices()
+    middle = sum(corners) / len(corners)
+    return TracePoint(body.link, (middle.real, middle.imag))
+
+
+def shown_coordinate(mechanism: Mechanism, k: int, values: Array) -> tuple[str, bool, list[float]]:
+    """Name of driver k, whether it is an angle, and its values for people: degrees or lengths, rounded."""
+    driver = mechanism.drivers[k]
+    angle = not isinstance(mechanism.joint(*driver.pair), Prismatic)
+    shown = [float(f"{math.degrees(v):.2f}" if angle else f"{v:.6g}") for v in values]
+    return f"driver {driver.base}-{driver.link}", angle, shown
