@@ -266,10 +266,26 @@ class ParallelPlatform:
             self.elbows(theta), np.array(self.b), np.array(self.l2), arms=(self.D, self.l1, tuple(theta))
         )
 
-    def direct_batch(self, theta: ArrayLike) -> AssemblyModeBatch:
-        """All assembly modes for many rocker angles, shape (N, 3); problems that need escalation are flagged."""
-        theta = np.atleast_2d(finite_array("theta", theta))
-        return assembly_modes_batch(self.elbows(theta), np.array(self.b), np.array(self.l2))
+    def direct_batch(self, theta: ArrayLike, *, escalate: bool = True) -> AssemblyModeBatch:
+        """All assembly modes for many rocker angles (radians), shape (N, 3); see `assembly_modes_batch`.
+
+        Flagged problems are solved again at 50 digits from the given angles unless ``escalate`` is False.
+        """
+        from graphsynth.kinematics.kernels.modes import elbows
+
+        angles = np.require(np.atleast_2d(finite_array("theta", theta)), requirements=["C", "W"])
+        anchors = np.empty(angles.shape, dtype=np.complex128)
+        elbows(angles, np.array(self.D), np.array(self.l1), anchors)
+        arms = (np.array(self.D), np.array(self.l1), angles)
+        return assembly_modes_batch(anchors, np.array(self.b), np.array(self.l2), escalate=escalate, arms=arms)
+
+    def condition_number(self, pose: ArrayLike, theta: ArrayLike, Lc: float) -> Array:
+        """Condition number of JX with its third column divided by the characteristic length ``Lc``, shape (...).
+
+        Infinite at a type-II singularity (section 4.3).
+        """
+        JX, _ = self.jacobians(pose, theta)
+        return np.asarray(np.linalg.cond(JX / np.array([1.0, 1.0, positive("Lc", Lc)])))
 
 
 def leg_directions() -> Complex:

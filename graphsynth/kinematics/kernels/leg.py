@@ -33,7 +33,7 @@ def fma(typingctx, a, b, c):
     return signature, codegen
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def angle_of(y, x):
     """``atan2(y, x)`` in (-pi, pi] without branches; error below 0.75 ulp of pi and 2 ulp of a small result.
 
@@ -67,7 +67,7 @@ def angle_of(y, x):
     return -a if y < 0.0 else a
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def two_sum(a, b):
     """Rounded sum and its rounding error."""
     s = a + b
@@ -75,7 +75,7 @@ def two_sum(a, b):
     return s, (a - (s - t)) + (b - t)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def cross_sum(a, b, c, d):
     """``a b + c d``, both products and their sum compensated."""
     p = a * b
@@ -86,7 +86,7 @@ def cross_sum(a, b, c, d):
     return s + (rest + (fma(a, b, -p) + fma(c, d, -q)))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def square(u, v):
     """``u^2 + v^2`` as a pair."""
     p = u * u
@@ -97,7 +97,7 @@ def square(u, v):
     return s, low
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def add_pair(a, al, b, bl):
     """Sum of two pairs, rounded."""
     s = a + b
@@ -119,7 +119,7 @@ def lengths(l1, l2, out):
     out[6], out[7] = s, abs(d)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def solve(u, v, c0, c1, c2, c3, c4, c5):
     """Squared distance, C, P1, P2 of a leg that ends at (u, v); the constants are those of `lengths`."""
     r, rl = square(u, v)
