@@ -1,0 +1,27 @@
+"""Certificates: statements on poses, motions and turns that are proved in ball arithmetic (extra ``certified``).
+
+This file loads nothing: every name is resolved on first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_PUBLIC: dict[str, str] = {
+    "FullTurnCertificate": "full_turn",
+    "MotionCertificate": "poses",
+    "TurnVerdict": "full_turn",
+    "Verdict": "poses",
+    "certify": "poses",
+    "certify_full_turn": "full_turn",
+}
+
+__all__ = sorted(_PUBLIC)
+
+
+def __getattr__(name: str) -> Any:
+    module = _PUBLIC.get(name)
+    if module is None:
+        raise AttributeError(f"module 'graphsynth.kinematics.certified' has no attribute {name!r}")
+    return getattr(import_module(f"graphsynth.kinematics.certified.{module}"), name)
