@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.follow import Tracker, run_program, workspace
+from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, workspace
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, sign_table
 
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["BatchMotion", "simulate_batch"]
 
 Array = NDArray[np.float64]
-
-#: Samples times links of one block of sets: its state stays in the cache of one core.
-_BLOCK = 8192
 
 _REASONS = {
     codes.DONE: "",
@@ -207,38 +204,25 @@ def _starts(
 def _run(
     program: Program, signs: Array, u: Array, poses: Array, found: NDArray[np.bool_], rates: bool, kept: list[int]
 ) -> BatchMotion:
-    """Run the sets in blocks that fit the cache, and keep what is asked for."""
-    sets, n, links = len(poses), len(u), program.mechanism.graph.links
+    sets, n = len(poses), len(u)
+    poses[:, program.mechanism.frame] = 0.0
     needed = rates or any(step.iterative for step in program.steps)
-    groups = [k for k, step in enumerate(program.steps) if step.group >= 0]
-    wanted = _wanted(program, kept)
-    tracker = Tracker(program, signs)
-    q = tracker.values(u)
-    frames, margins = np.empty((sets, len(kept), 4, n)), np.empty((sets, len(groups), n))
-    V = np.empty((sets, len(kept), 3, n if rates else 0))
-    W = np.empty_like(V)
-    done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
-    block = max(1, min(sets, _BLOCK // (n * links)))
-    memory = workspace(program, n, block, needed)
-    for begin in range(0, sets, block):
-        part = slice(begin, min(begin + block, sets))
-        size = part.stop - begin
-        own = tuple(array[:size] for array in memory)
-        X, TH = own[0], own[1]
-        X[..., :2, 0], TH[..., 0] = poses[part, :, :2], poses[part, :, 2]
-        X[..., 2, 0], X[..., 3, 0] = np.cos(poses[part, :, 2]), np.sin(poses[part, :, 2])
-        X[:, program.mechanism.frame, :, 0] = (0.0, 0.0, 1.0, 0.0)
-        done[part], why[part] = run_program(program, signs, u, q, own, 0, needed, wanted, part)
-        frames[part], margins[part] = X[:, kept], own[5][:, groups]
-        if rates:
-            V[part], W[part] = own[2][:, kept], own[3][:, kept]
+    groups = np.array([k for k, step in enumerate(program.steps) if step.group >= 0], dtype=np.int64)
+    width = n if rates else 0
+    out = Delivery(
+        poses, np.array(kept, dtype=np.int64), groups, np.empty((sets, len(kept), 4, n)),
+        np.empty((sets, len(kept), 3, width)), np.empty((sets, len(kept), 3, width)), np.empty((sets, len(groups), n)),
+    )  # fmt: skip
+    q, memory = Tracker(program, signs).values(u), workspace(program, n, needed)
+    done, why = run_program(program, signs, u, q, memory, 0, needed, _wanted(program, kept), out)
     done[~found], why[~found, 0] = 0, codes.UNREACHABLE
-    for b in np.flatnonzero(done < n):
-        for array in (frames, margins, V, W):
-            array[b, ..., done[b] :] = np.nan
-    group = np.array([program.steps[k].group if k >= 0 else -1 for k in why[:, 1]], dtype=np.int64)
-    frames, V, W = (np.moveaxis(array, -1, 1) for array in (frames, V, W))
-    return BatchMotion(u, tuple(kept), frames, V, W, np.moveaxis(margins, -1, 1), done, why[:, 0], group)
+    for array in (out.frames, out.velocities, out.accelerations, out.margins):
+        array[~found] = np.nan
+    group = np.array([step.group for step in program.steps] + [-1], dtype=np.int64)[why[:, 1]]
+    frames, V, W, M = (
+        np.moveaxis(array, -1, 1) for array in (out.frames, out.velocities, out.accelerations, out.margins)
+    )
+    return BatchMotion(u, tuple(kept), frames, V, W, M, done, why[:, 0], group)
 
 
 def _wanted(program: Program, kept: list[int]) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.program import Program
 
-__all__ = ["Stop", "Trace", "Tracker", "run_program", "workspace"]
+__all__ = ["Delivery", "Stop", "Trace", "Tracker", "run_program", "workspace"]
 
 Array = NDArray[np.float64]
 
@@ -80,14 +80,12 @@ class Tracker:
     def blank(self, u: Array) -> Trace:
         """Return an empty trace for inputs ``u`` with every link at the origin."""
         p = self.program
-        return Trace(u, self.values(u), workspace(p, len(u), None))
+        return Trace(u, self.values(u), workspace(p, len(u)))
 
     def run(self, trace: Trace, first: int, derivs: bool = True) -> tuple[int, int, int]:
         """Run the kernel from sample ``first``."""
-        done, why = run_program(
-            self.program, self.modes, trace.u, trace.q, tuple(part[None] for part in trace.memory), first, derivs
-        )
-        return int(done[0]), int(why[0, 0]), int(why[0, 1])
+        found = run_program(self.program, self.modes, trace.u, trace.q, trace.memory, first, derivs)
+        return int(found[0][0]), int(found[1][0, 0]), int(found[1][0, 1])
 
     def follow(self, u: Array, poses: Array, phi: Array | None = None) -> Trace:
         """Follow the branch that starts near ``poses`` (links, 3) at ``u[0]``."""
@@ -164,36 +162,57 @@ class Tracker:
         return Stop(why, where, here, abs(2.0 * step), margins)
 
 
-def workspace(program: Program, n: int, sets: int | None, derivs: bool = True) -> tuple[Array, ...]:
-    """State of every link over n samples, at the origin: X, TH, V, W, PHI, M, with the sample as last axis.
-
-    With ``sets`` the dimension set is the first axis.
-    """
-    lead = () if sets is None else (sets,)
+def workspace(program: Program, n: int, derivs: bool = True) -> tuple[Array, ...]:
+    """State of every link over n samples, at the origin: X, TH, V, W, PHI, M, with the sample as last axis."""
     links = program.mechanism.graph.links
-    X = np.zeros((*lead, links, 4, n))
-    X[..., 2, :] = 1.0
-    rates = (*lead, links, 3, n if derivs else 0)
+    X = np.zeros((links, 4, n))
+    X[:, 2] = 1.0
+    V, W = (np.zeros((links, 3, n if derivs else 0)) for _ in range(2))
     return (
-        X, np.zeros((*lead, links, n)), np.zeros(rates), np.zeros(rates),
-        np.zeros((*lead, max(1, len(program.gears)), n)), np.full((*lead, len(program.steps), n), np.nan),
-    )  # fmt: skip
+        X,
+        np.zeros((links, n)),
+        V,
+        W,
+        np.zeros((max(1, len(program.gears)), n)),
+        np.full((len(program.steps), n), np.nan),
+    )
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """What a run keeps of every dimension set: start poses (sets, links, 3), links, steps, where the arrays go."""
+
+    poses: Array
+    links: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    frames: Array
+    velocities: Array
+    accelerations: Array
+    margins: Array
+
+
+_NOWHERE = np.empty((0, 0, 0, 0))
+_NOTHING = Delivery(
+    np.empty((0, 0, 0)), np.empty(0, np.int64), np.empty(0, np.int64), _NOWHERE, _NOWHERE, _NOWHERE, np.empty((0, 0, 0))
+)
 
 
 def run_program(
     program: Program, modes: Array, u: Array, q: Array, memory: tuple[Array, ...], first: int, derivs: bool,
-    wanted: NDArray[np.bool_] | None = None, sets: slice = slice(None),
+    wanted: NDArray[np.bool_] | None = None, delivery: Delivery = _NOTHING,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # fmt: skip
-    """Run the kernel for every dimension set of ``memory``; returns samples reached, and code and step of the stop."""
+    """Run the kernel for every dimension set; returns samples reached, and code and step of the stop."""
     from graphsynth.kinematics.engine import kernels
 
-    count = len(memory[0])
-    done, why = np.zeros(count, dtype=np.int64), np.zeros((count, 2), dtype=np.int64)
+    sets = len(program.row_table)
+    done, why = np.zeros(sets, dtype=np.int64), np.zeros((sets, 2), dtype=np.int64)
     if wanted is None:
         wanted = np.ones(program.mechanism.graph.links, dtype=np.bool_)
+    out = delivery
     kernels.run(
-        program.step_table, program.touched, program.rows, program.row_table[sets], program.core, program.eliminated,
-        program.eliminated_table[sets], program.drives, program.drive_table[sets], program.need_angle, wanted, q, u,
-        modes, *memory, done, why, first, program.Lc, derivs,
+        program.step_table, program.touched, program.rows, program.row_table, program.core, program.eliminated,
+        program.eliminated_table, program.drives, program.drive_table, program.need_angle, wanted, q, u, modes,
+        out.poses, *memory, out.links, out.steps, out.frames, out.velocities, out.accelerations, out.margins, done, why, first,
+        program.Lc, derivs,
     )  # fmt: skip
     return done, why

@@ -8,50 +8,7 @@ import math
 
 from numba import njit
 
-from graphsynth.kinematics.engine.codes import DRIVE_P, PAX, PAY, PBX, PBY, H
-
-
-@njit(cache=True, error_model="numpy")
-def drive_loop(d, p, r, q, X, TH, V, W, i0, i1, derivs):
-    """Place a driven link from the link it is driven on; returns the first sample without a driver value, or i1."""
-    base, link, k = d[r, 1], d[r, 2], d[r, 3]
-    sliding = d[r, 0] == DRIVE_P
-    px, py, tx, ty, ex, ey, sign, angle = p[r, 0], p[r, 1], p[r, 2], p[r, 3], p[r, 4], p[r, 5], p[r, 6], p[r, 7]
-    ca, sa = math.cos(angle), math.sin(angle)
-    B, L, Q = X[base], X[link], q[k]
-    for i in range(i0, i1):
-        if not math.isfinite(Q[0, i]):
-            return i
-    for i in range(i0, i1):
-        cb, sb = B[2, i], B[3, i]
-        along = Q[0, i] if sliding else 0.0
-        c0, s0 = (1.0, 0.0) if sliding else (Q[3, i], sign * Q[4, i])
-        c1, s1 = c0 * ca - s0 * sa, s0 * ca + c0 * sa
-        c, s = cb * c1 - sb * s1, sb * c1 + cb * s1
-        ux, uy = px + sign * along * tx, py + sign * along * ty
-        L[2, i], L[3, i] = c, s
-        L[0, i] = B[0, i] + cb * ux - sb * uy - (c * ex - s * ey)
-        L[1, i] = B[1, i] + sb * ux + cb * uy - (s * ex + c * ey)
-    for i in range(i0, i1):
-        TH[link, i] = TH[base, i] + angle + (0.0 if sliding else sign * Q[0, i])
-    if derivs:
-        for i in range(i0, i1):
-            cb, sb, c, s = B[2, i], B[3, i], L[2, i], L[3, i]
-            o, al = V[base, 2, i], W[base, 2, i]
-            q0, q1, q2 = sign * Q[0, i], sign * Q[1, i], sign * Q[2, i]
-            on, aln = (o, al) if sliding else (o + q1, al + q2)
-            if not sliding:
-                q0, q1, q2 = 0.0, 0.0, 0.0
-            gx, gy = cb * tx - sb * ty, sb * tx + cb * ty
-            ux, uy = cb * px - sb * py + q0 * gx, sb * px + cb * py + q0 * gy
-            fx, fy = c * ex - s * ey, s * ex + c * ey
-            V[link, 0, i] = V[base, 0, i] - o * uy + q1 * gx + on * fy
-            V[link, 1, i] = V[base, 1, i] + o * ux + q1 * gy - on * fx
-            V[link, 2, i] = on
-            W[link, 0, i] = W[base, 0, i] - al * uy - o * o * ux + q2 * gx - 2.0 * o * q1 * gy + aln * fy + on * on * fx
-            W[link, 1, i] = W[base, 1, i] + al * ux - o * o * uy + q2 * gy + 2.0 * o * q1 * gx - aln * fx + on * on * fy
-            W[link, 2, i] = aln
-    return i1
+from graphsynth.kinematics.engine.codes import DRIVE_R, PAX, PAY, PBX, PBY, H
 
 
 @njit(cache=True, error_model="numpy")
@@ -169,6 +126,66 @@ def towards_rates(px, py, qx, qy, T, o, al, i0, i1):
 
 
 @njit(cache=True, error_model="numpy")
+def turned(L, ca, sa, cq, sq, sign, c, s, i0, i1):
+    """Direction of a link turned against link L by a fixed angle and by sign q, both given as cosine and sine."""
+    cb, sb = L[2], L[3]
+    for i in range(i0, i1):
+        c1, s1 = cq[i] * ca - sign * sq[i] * sa, sign * sq[i] * ca + cq[i] * sa
+        c[i], s[i] = cb[i] * c1 - sb[i] * s1, sb[i] * c1 + cb[i] * s1
+
+
+@njit(cache=True, error_model="numpy")
+def slid(L, q, px, py, tx, ty, qx, qy, i0, i1):
+    """Path of a point that moves by q from (px, py) along (tx, ty), both given in link L."""
+    x, y, c, s = L[0], L[1], L[2], L[3]
+    for i in range(i0, i1):
+        ux, uy = px + q[i] * tx, py + q[i] * ty
+        qx[i], qy[i] = x[i] + c[i] * ux - s[i] * uy, y[i] + s[i] * ux + c[i] * uy
+
+
+@njit(cache=True, error_model="numpy")
+def slid_rates(L, V, W, Q, px, py, tx, ty, T, i0, i1):
+    """Velocity and acceleration of that point; Q holds q, q', q''."""
+    for i in range(i0, i1):
+        c, s, o, al, q, q1, q2 = L[2, i], L[3, i], V[2, i], W[2, i], Q[0, i], Q[1, i], Q[2, i]
+        gx, gy = c * tx - s * ty, s * tx + c * ty
+        ux, uy = c * px - s * py + q * gx, s * px + c * py + q * gy
+        T[4, i], T[5, i] = V[0, i] - o * uy + q1 * gx, V[1, i] + o * ux + q1 * gy
+        T[6, i] = W[0, i] - al * uy - o * o * ux + q2 * gx - 2.0 * o * q1 * gy
+        T[7, i] = W[1, i] + al * ux - o * o * uy + q2 * gy + 2.0 * o * q1 * gx
+
+
+@njit(cache=True, error_model="numpy")
+def drive_loop(d, p, r, q, X, TH, V, W, T, i0, i1, derivs, angles):
+    """Place a driven link from the link it is driven on; T is room for twelve rows."""
+    base, link, k = d[r, 1], d[r, 2], d[r, 3]
+    px, py, sign, angle = p[r, 0], p[r, 1], p[r, 6], p[r, 7]
+    ca, sa = math.cos(angle), math.sin(angle)
+    Q, L, turning = q[k], X[link], d[r, 0] == DRIVE_R
+    if turning:
+        turned(X[base], ca, sa, Q[3], Q[4], sign, L[2], L[3], i0, i1)
+        carried(X[base], px, py, T[0], T[1], i0, i1)
+    else:
+        for i in range(i0, i1):
+            T[2, i], T[3, i] = 1.0, 0.0
+        turned(X[base], ca, sa, T[2], T[3], sign, L[2], L[3], i0, i1)
+        slid(X[base], Q[0], px, py, sign * p[r, 2], sign * p[r, 3], T[0], T[1], i0, i1)
+    pinned(L, T[0], T[1], p[r, 4], p[r, 5], i0, i1)
+    if angles:
+        for i in range(i0, i1):
+            TH[link, i] = TH[base, i] + angle + (sign * Q[0, i] if turning else 0.0)
+    if derivs:
+        if turning:
+            carried_rates(X[base], V[base], W[base], px, py, T[4], T[5], T[6], T[7], i0, i1)
+        else:
+            slid_rates(X[base], V[base], W[base], Q, px, py, sign * p[r, 2], sign * p[r, 3], T, i0, i1)
+        for i in range(i0, i1):
+            V[link, 2, i] = V[base, 2, i] + (sign * Q[1, i] if turning else 0.0)
+            W[link, 2, i] = W[base, 2, i] + (sign * Q[2, i] if turning else 0.0)
+        pinned_rates(L, V[link], W[link], T[4], T[5], T[6], T[7], p[r, 4], p[r, 5], i0, i1)
+
+
+@njit(cache=True, error_model="numpy")
 def rrr_loop(rows, rp, r0, own, sign, X, V, W, M, T, i0, i1, derivs):
     """Place the kept link of an RRR dyad; T is room for twelve rows."""
     la, ax, ay, lb, bx, by, hx, hy, gx, gy, l2 = dyad_ends(rows, rp, r0, own)
@@ -203,7 +220,10 @@ def bar_loop(e, a, b, p, r, X, V, W, T, i0, i1, derivs):
 @njit(cache=True, error_model="numpy")
 def first_bad(M, i0, i1):
     """First sample whose margin is negative or not a number, and its code; (i1, 0) if there is none."""
+    bad = 0
     for i in range(i0, i1):
+        bad += not M[i] >= 0.0
+    for i in range(i0 if bad else i1, i1):
         if not M[i] >= 0.0:
             return i, 1 if M[i] < 0.0 else 3
     return i1, 0

@@ -115,79 +115,112 @@ def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h
 
 
 @njit(cache=True, error_model="numpy")
-def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, modes, X, TH, V, W, PHI, M, done, why,
-        first, Lc, derivs):  # fmt: skip
+def seat(poses, X, TH, PHI):
+    """Put the poses (x, y, theta) of all links into the first sample."""
+    for k in range(poses.shape[0]):
+        X[k, 0, 0], X[k, 1, 0], TH[k, 0] = poses[k, 0], poses[k, 1], poses[k, 2]
+        X[k, 2, 0], X[k, 3, 0] = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+    PHI[:, 0] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def deliver(source, rows, done, target):
+    """Copy the rows asked for, not a number beyond the samples reached."""
+    for r in range(rows.shape[0]):
+        for c in range(target.shape[1]):
+            for i in range(target.shape[2]):
+                target[r, c, i] = source[rows[r], c, i] if i < done else math.nan
+
+
+@njit(cache=True, error_model="numpy")
+def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, modes, poses, X, TH, V, W, PHI, M, kept,
+        groups, OX, OV, OW, OM, done, why, first, Lc, derivs):  # fmt: skip
     """Run a program for every dimension set over the samples first..n-1.
 
-    RP, EP, DP and the state have the dimension set as first axis: X (sets, links, 4, n), TH (sets, links, n), V and W
-    (sets, links, 3, n), PHI (sets, gears, n), M (sets, steps, n).  q (drivers, 5, n) holds the driver coordinate, its
-    two derivatives, cosine and sine.  Sample ``first`` starts from ``first - 1`` if there is one; else cold, from the
-    poses already at sample 0.  ``done`` gets the samples reached, ``why`` the code and the step at which it stopped.
-    Eliminated links are placed if ``wanted``.
+    RP, EP, DP have the dimension set as first axis.  The state is that of one set: X (links, 4, n), TH (links, n), V
+    and W (links, 3, n), PHI (gears, n), M (steps, n); it stays in the cache of the core and what is asked for (``kept``
+    links, ``groups`` of steps) is copied to OX (sets, kept, 4, n), OV, OW (sets, kept, 3, n) and OM (sets, groups, n).
+    q (drivers, 5, n) holds the driver coordinate, its two derivatives, cosine and sine.  Sample ``first`` starts from
+    ``first - 1`` if there is one; else cold, from ``poses`` (sets, links, 3), or without them from sample 0 as it is.
+    ``done`` gets the samples reached, ``why`` the code and the step at which it stopped.  Eliminated links are placed
+    if ``wanted``.
     """
-    n, links, size = u.shape[0], X.shape[1], 3
+    n, links, size = u.shape[0], X.shape[0], 3
     for s in range(steps.shape[0]):
         size = max(size, steps[s, 2])
     J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(3)
     G, pivots = np.empty((size, 6)), np.empty(size, np.int64)
     P, Q = np.empty((3, 10)), np.empty((3, 6))
     x, T = np.zeros((links, 11)), np.empty((12, n))
-    phi, m, ql = np.empty(PHI.shape[1]), np.empty(steps.shape[0]), np.empty((q.shape[0], 3))
-    for b in range(X.shape[0]):
-        rp, ep, dp, Xb, Tb, Vb, Wb, Mb, phis = RP[b], EP[b], DP[b], X[b], TH[b], V[b], W[b], M[b], PHI[b]
+    phi, m, ql = np.empty(PHI.shape[0]), np.empty(steps.shape[0]), np.empty((q.shape[0], 3))
+    limits, angles = np.full(steps.shape[0], n), need.any()
+    for s in range(steps.shape[0]):
+        for i in range(first, n if steps[s, 0] < R_DIST else first):
+            if not math.isfinite(q[drv[steps[s, 1], 3], 0, i]):
+                limits[s] = i
+                break
+    for b in range(done.shape[0]):
+        rp, ep, dp = RP[b], EP[b], DP[b]
+        if poses.shape[0] > 0:
+            seat(poses[b], X, TH, PHI)
         stop, code, at = n, 0, -1
         for s in range(steps.shape[0]):
             kind, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
             e0, ne, t0, nt = steps[s, 5], steps[s, 6], steps[s, 7], steps[s, 8]
             own = core[c0]
             if kind < R_DIST:
-                end = drive_loop(drv, dp, r0, q, Xb, Tb, Vb, Wb, first, stop, derivs)
-                for i in range(first, end):
-                    Mb[s, i] = 1.0
-                if end < stop:
-                    stop, code, at = end, BAD_INPUT, s
+                if limits[s] < stop:
+                    stop, code, at = limits[s], BAD_INPUT, s
+                drive_loop(drv, dp, r0, q, X, TH, V, W, T, first, stop, derivs, angles)
                 continue
             if kind == R_DIST:
-                rrr_loop(rows, rp, r0, own, modes[s], Xb, Vb, Wb, Mb[s], T, first, stop, derivs)
-                end, reason = first_bad(Mb[s], first, stop)
+                rrr_loop(rows, rp, r0, own, modes[s], X, V, W, M[s], T, first, stop, derivs)
+                end, reason = first_bad(M[s], first, stop)
                 if reason:
                     stop, code, at = end, reason, s
                 if need[own]:
-                    unwrap(own, u, Xb, Tb, Vb, first, stop, derivs)
+                    unwrap(own, u, X, TH, V, first, stop, derivs)
                 for k in range(e0, e0 + ne):
                     if wanted[elim[k, 1]]:
-                        bar_loop(elim[k, 1], elim[k, 2], elim[k, 3], ep, k, Xb, Vb, Wb, T, first, stop, derivs)
+                        bar_loop(elim[k, 1], elim[k, 2], elim[k, 3], ep, k, X, V, W, T, first, stop, derivs)
                         if need[elim[k, 1]]:
-                            unwrap(elim[k, 1], u, Xb, Tb, Vb, first, stop, derivs)
+                            unwrap(elim[k, 1], u, X, TH, V, first, stop, derivs)
                 continue
             # one sample after another: each starts from the one before
             j = max(first - 1, 0)
             for k in range(c0, c0 + nc):
-                load(core[k], j, x, Xb, Tb, Vb, Wb, derivs)
+                load(core[k], j, x, X, TH, V, W, derivs)
             for k in range(e0, e0 + ne):
-                load(elim[k, 1], j, x, Xb, Tb, Vb, Wb, derivs)
+                load(elim[k, 1], j, x, X, TH, V, W, derivs)
             for k in range(phi.shape[0]):
-                phi[k] = phis[k, j]
+                phi[k] = PHI[k, j]
             for i in range(first, stop):
                 for k in range(t0, t0 + nt):
-                    load(touched[k], i, x, Xb, Tb, Vb, Wb, derivs)
+                    load(touched[k], i, x, X, TH, V, W, derivs)
                 for k in range(ql.shape[0]):
                     ql[k, 0], ql[k, 1], ql[k, 2] = q[k, 0, i], q[k, 1, i], q[k, 2, i]
-                h, before = (u[i] - u[i - 1], Mb[s, i - 1]) if i > 0 else (0.0, 0.0)
+                h, before = (u[i] - u[i - 1], M[s, i - 1]) if i > 0 else (0.0, 0.0)
                 reason = place(kind, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, modes[s], before, h, i > 0, need,
                                m, s, J, f, g, G, pivots, out, P, Q, Lc, derivs)  # fmt: skip
-                Mb[s, i] = m[s]
+                M[s, i] = m[s]
                 if reason:
                     stop, code, at = i, reason, s
                     break
                 for k in range(c0, c0 + nc):
-                    store(core[k], i, x, Xb, Tb, Vb, Wb, derivs)
+                    store(core[k], i, x, X, TH, V, W, derivs)
                 for k in range(e0, e0 + ne):
                     e = elim[k, 1]
                     near = x[e, 4] + (h * x[e, 7] if i > 0 and derivs else 0.0)
                     place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
                     if need[e]:
                         follow_angle(e, x, near)
-                    store(e, i, x, Xb, Tb, Vb, Wb, derivs)
-                carry_centres(rows, rp, r0, nr, i, x, phi, phis)
+                    store(e, i, x, X, TH, V, W, derivs)
+                carry_centres(rows, rp, r0, nr, i, x, phi, PHI)
         done[b], why[b, 0], why[b, 1] = stop, code, at
+        if kept.shape[0] > 0:
+            deliver(X, kept, stop, OX[b])
+            deliver(V, kept, stop, OV[b])
+            deliver(W, kept, stop, OW[b])
+            for r in range(groups.shape[0]):
+                for i in range(n):
+                    OM[b, r, i] = M[groups[r], i] if i < stop else math.nan
