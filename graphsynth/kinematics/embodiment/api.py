@@ -1,0 +1,246 @@
+"""`embody`: dimensions for a mechanism graph."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from graphsynth.errors import GeometryError, GraphError
+from graphsynth.kinematics.embodiment.choice import Drivers, choices
+from graphsynth.kinematics.embodiment.design import Design
+from graphsynth.kinematics.embodiment.dimension import dimensioned
+from graphsynth.kinematics.embodiment.goals import Goals
+from graphsynth.kinematics.embodiment.problem import Problem
+from graphsynth.kinematics.embodiment.search import HistoryRow, search, verdict
+from graphsynth.kinematics.embodiment.verify import Figures, verify
+from graphsynth.structure.graph import MechanismGraph
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["Embodiment", "embody"]
+
+
+@dataclass(frozen=True, eq=False)
+class Embodiment:
+    """Dimensions found for a mechanism graph, and how they were judged.
+
+    Attributes
+    ----------
+    graph : MechanismGraph
+        With the frame that was chosen; link numbers are those of this graph.
+    drivers : tuple of (base, link)
+    accepted : bool
+        Every bound and the target are kept over the whole range, on one branch, verified by `simulate`.
+    mechanism : Mechanism or None
+        The accepted mechanism, else the best found; None if nothing could be assembled.
+    motion : Motion or None
+        Its motion over the range.
+    figures : Figures or None
+    reasons : dict of str to int
+        Why candidates were rejected, counted: of each first population, and of every result verified.
+    statement : str
+    goals : Goals
+    seed : int
+    evaluations : int
+        Candidate motions computed.
+    seconds : float
+    history : tuple of HistoryRow
+        Best cost by generation; see `to_pandas`.
+    """
+
+    graph: MechanismGraph
+    drivers: tuple[tuple[int, int], ...]
+    accepted: bool
+    mechanism: Mechanism | None
+    motion: Motion | None
+    figures: Figures | None
+    reasons: Mapping[str, int]
+    statement: str
+    goals: Goals
+    seed: int
+    evaluations: int
+    seconds: float
+    history: tuple[HistoryRow, ...] = field(default=(), repr=False)
+
+    def to_pandas(self) -> Any:
+        """Return the search history as a table: attempt, generation, evaluations, cost."""
+        import pandas as pd
+
+        return pd.DataFrame(self.history, columns=list(HistoryRow._fields))
+
+
+def embody(
+    graph: MechanismGraph,
+    goals: Goals | None = None,
+    seed: int = 0,
+    *,
+    driver: Drivers | None = None,
+    joints: Mapping[tuple[int, int], str] | None = None,
+    tries: int = 12,
+    seconds: float = math.inf,
+) -> Embodiment:
+    """Find dimensions with which a mechanism moves as wanted.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+        A chain (frame and driver are chosen) or a mechanism (driver chosen unless given).
+        Space 3, joint mobilities 1 and 2.
+    goals : Goals, optional
+        A full turn with the default bounds unless given.
+    seed : int
+        Same labelled graph, goals and seed, same result (unless ``seconds`` cuts the search short).
+    driver : int or (base, link), or one of these for each driver, optional
+        A link on the frame, or two jointed links.
+    joints : mapping of (a, b) to str, optional
+        Kind by pair of links of the graph given: "R" (default), "P", or "pin-slot" (default for mobility 2).
+    tries : int
+        Searches at most; each takes the next frame and driver of the order of
+        :func:`graphsynth.kinematics.embodiment.choice.choices`, and starts anew from another sketch.
+    seconds : float
+        Time limit; not exceeded by more than one generation and a verification.
+
+    Returns
+    -------
+    Embodiment
+        Accepted only after `simulate` has completed the range on a grid of half a degree or finer with events on
+        (estimated: floating point).
+
+    Raises
+    ------
+    GraphError
+        A graph that cannot move, or drivers that do not move it.
+    GeometryError
+        Joint kinds or goals that do not fit the graph.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> found = embody(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)]))
+    >>> found.accepted, found.motion.completed, found.motion.closure.closed
+    (True, True, True)
+    """
+    begin = perf_counter()
+    wanted = Goals() if goals is None else goals
+    _check(graph, wanted, seed, tries, seconds)
+    order = choices(graph, driver)
+    reasons: Counter[str] = Counter()
+    history: list[HistoryRow] = []
+    evaluations = 0
+    best: tuple[tuple[bool, float], Embodiment] | None = None
+    for attempt in range(tries):
+        inversion, drivers = order[attempt % len(order)]
+        design = Design(inversion, drivers, _kinds(graph, inversion, joints))
+        random = np.random.default_rng([seed, attempt])
+        sense = -1 if wanted.target is not None and (attempt // len(order)) % 2 else 1
+        problem = Problem(design, wanted, random, sense)
+        found = search(problem, attempt, random, begin + seconds)
+        every, complete, inside = found.start
+        reasons["first population: the range is not completed"] += every - complete
+        reasons["first population: a bound is not kept"] += complete - inside
+        evaluations += problem.evaluations
+        history += found.history
+        result = _judge(problem, found.best, found.cost, wanted, seed)
+        reasons.update(result.reasons)
+        rank = (not result.accepted, found.cost)
+        if best is None or rank < best[0]:
+            best = rank, result
+        if result.accepted or perf_counter() - begin > seconds:
+            break
+    assert best is not None
+    return _with_totals(best[1], reasons, evaluations, perf_counter() - begin, history, attempt + 1)
+
+
+def _check(graph: MechanismGraph, goals: Goals, seed: int, tries: int, seconds: float) -> None:
+    if not isinstance(graph, MechanismGraph):
+        raise GraphError(f"{graph!r} is not a MechanismGraph")
+    if not isinstance(goals, Goals):
+        raise GeometryError(f"goals = {goals!r} are not Goals")
+    if graph.space != 3 or not graph.is_connected:
+        raise GraphError("embodiment needs a connected graph of space 3 (planar mechanisms)")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise GeometryError(f"seed = {seed!r} must be a whole number, 0 or more")
+    if isinstance(tries, bool) or not isinstance(tries, int) or tries < 1:
+        raise GeometryError(f"tries = {tries!r} must be a whole number, 1 or more")
+    if not seconds > 0.0:
+        raise GeometryError(f"seconds = {seconds!r} must be positive")
+
+
+def _kinds(
+    graph: MechanismGraph, inversion: MechanismGraph, joints: Mapping[tuple[int, int], str] | None
+) -> tuple[str, ...]:
+    """Kinds of the joints of an inversion, from those of the graph given."""
+    given = {(min(pair), max(pair)): kind for pair, kind in (joints or {}).items()}
+    allowed = {1: ("R", "P"), 2: ("pin-slot",)}
+    kinds = {}
+    for a, b, mobility in graph.joints:
+        kind = given.pop((a, b), allowed.get(mobility, ("",))[0])
+        if kind not in allowed.get(mobility, ()):
+            raise GeometryError(
+                f"joint {a}-{b} has mobility {mobility} and cannot be {kind!r}; use one of {allowed.get(mobility, ())}"
+            )
+        kinds[a, b] = kind
+    if given:
+        raise GeometryError(f"joints names {min(given)}, but the graph has no such joint")
+    if inversion.frame == graph.frame:
+        return tuple(kinds.values())
+    first = _moved(graph, inversion)
+    return tuple(kinds[min(first[a], first[b]), max(first[a], first[b])] for a, b, _ in inversion.joints)
+
+
+def _moved(graph: MechanismGraph, inversion: MechanismGraph) -> list[int]:
+    """Return the old number of every link of an inversion."""
+    for link in range(graph.links):
+        if graph.with_frame(link) == inversion:
+            return [link, *(k for k in range(graph.links) if k != link)]
+    raise AssertionError("an inversion is the graph with one of its links as frame")
+
+
+def _judge(problem: Problem, x: Any, cost: float, goals: Goals, seed: int) -> Embodiment:
+    """Verify the best of a search."""
+    mechanism = dimensioned(problem, x)
+    blank = Embodiment(
+        problem.design.graph, problem.design.drivers, False, mechanism, None, None, {}, "", goals, seed, 0, 0.0
+    )
+    if mechanism is None:
+        return _changed(blank, reasons={"result: cannot be assembled": 1})
+    motion, figures, why = verify(mechanism, goals)
+    if why and verdict(cost):
+        why = tuple(dict.fromkeys((*why, verdict(cost))))
+    return _changed(
+        blank, accepted=not why, motion=motion, figures=figures, reasons={f"result: {reason}": 1 for reason in why}
+    )
+
+
+def _changed(result: Embodiment, **changes: Any) -> Embodiment:
+    from dataclasses import replace
+
+    return replace(result, **changes)
+
+
+def _with_totals(
+    result: Embodiment, reasons: Counter[str], evaluations: int, seconds: float, history: list[HistoryRow], tries: int
+) -> Embodiment:
+    frame = "" if result.graph.frame is None else f"frame {result.graph.frame}, "
+    choice = f"{frame}drivers {', '.join(f'{a}-{b}' for a, b in result.drivers)}"
+    counted = {reason: count for reason, count in reasons.items() if count}
+    if result.accepted and result.figures is not None:
+        text = (
+            f"accepted after {tries} search{'es' * (tries > 1)}: {choice}; smallest transmission angle "
+            f"{math.degrees(result.figures.transmission_angle):.1f} degrees, "
+            f"length ratio {result.figures.length_ratio:.2f}"
+        )
+    else:
+        listed = "; ".join(f"{reason}: {count}" for reason, count in counted.items()) or "no candidate"
+        text = f"nothing was accepted in {tries} search{'es' * (tries > 1)}; the best has {choice}; {listed}"
+    return _changed(
+        result, reasons=counted, statement=text, evaluations=evaluations, seconds=seconds, history=tuple(history)
+    )

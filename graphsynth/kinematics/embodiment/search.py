@@ -1,0 +1,86 @@
+"""The search: differential evolution over batches of motions, then a local polish of a target.
+
+Why there is always something to begin with: at a sketch where the structure without the driven link is held regularly,
+a crank whose joints all lie close to its pivot on the frame moves every other joint a little only, so by the implicit
+function theorem the whole turn exists.  The population holds cranks of many sizes; the search enlarges what lives.
+
+Sources: R. Storn and K. Price (1997), J. Global Optim. 11, 341-359 (differential evolution); K. Deb (2000), Comput.
+Methods Appl. Mech. Eng. 186, 311-338 (complete motions before bounds, bounds before aims).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.kinematics.embodiment.problem import INCOMPLETE, OUTSIDE, Problem
+
+__all__ = ["HistoryRow", "Search", "search"]
+
+Array = NDArray[np.float64]
+
+#: Merit at which a search without a target is content: all bounds kept with this to spare.
+_ENOUGH = 1.5
+
+
+class HistoryRow(NamedTuple):
+    """Best of one generation of one search."""
+
+    attempt: int
+    generation: int
+    evaluations: int
+    cost: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """The best vector of a search, its cost, and the way to it."""
+
+    best: Array
+    cost: float
+    history: tuple[HistoryRow, ...]
+    start: tuple[int, int, int]  # candidates of the first population: all, complete, within bounds
+
+
+def search(problem: Problem, attempt: int, random: np.random.Generator, deadline: float) -> Search:
+    """Run one search; it ends early only when ``perf_counter`` passes the deadline."""
+    from scipy.optimize import differential_evolution
+
+    aimed = problem.fit is not None
+    size = problem.unknowns.size
+    width = min(120, 15 * size) if aimed else min(60, 6 * size)
+    first = problem.population((20 if aimed else 4) * width, random)
+    outcome = problem.evaluate(first)
+    order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
+    start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
+    history = [HistoryRow(attempt, 0, problem.evaluations, float(outcome.cost[order[0]]))]
+    if size == 0:
+        return Search(first[order[0]], float(outcome.cost[order[0]]), tuple(history), start)
+
+    def cost(X: Array) -> Array:
+        found = problem.evaluate(np.atleast_2d(X.T)).cost
+        least = min(history[-1].cost, float(found.min()))
+        history.append(HistoryRow(attempt, len(history), problem.evaluations, least))
+        return found
+
+    def content(x: Array, convergence: float) -> bool:
+        return perf_counter() > deadline or (not aimed and history[-1].cost <= -_ENOUGH)
+
+    generations = (1000 if aimed else 60) if not problem.iterative else (150 if aimed else 30)
+    found = differential_evolution(
+        cost, problem.bounds(), init=first[order], vectorized=True, updating="deferred", polish=False,
+        maxiter=generations, tol=1e-10, atol=1e-12, seed=random, callback=content,
+    )  # fmt: skip
+    best, value = found.x, float(found.fun)
+    return Search(best, value, tuple(history), start)
+
+
+def verdict(cost: float) -> str:
+    """Words for a cost."""
+    if cost >= 0.5 * INCOMPLETE:
+        return "the range is not completed"
+    return "a bound is not kept" if cost > 0.5 * OUTSIDE else ""
