@@ -81,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_count(verbs)
     _add_enumerate(verbs)
     _add_show(verbs)
+    _add_animate(verbs)
     _add_run(verbs)
     return parser
 
@@ -135,7 +136,33 @@ def _add_show(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     )
     parser.add_argument("--line", type=int, default=1, metavar="N", help="line of FILE (default 1)")
     parser.add_argument("--driver", type=int, metavar="LINK", help="driven link: give the Assur groups for it only")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.svg", help="draw it by adjacency levels")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="draw it: FILE.svg, .png or .pdf")
+    parser.add_argument(
+        "--view", choices=("diagram", "levels", "both"), help="kinematic diagram (default), graph by levels, or both"
+    )
+
+
+def _add_animate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "animate", "animate", "Give a candidate dimensions and make a moving picture of it.")
+    parser.add_argument(
+        "mechanism",
+        metavar="KEY|TEXT|MECHANISM.toml",
+        help="canonical key, text form, or a file of them; or a dimensioned mechanism (.toml, .json)",
+    )
+    parser.add_argument("--line", type=int, default=1, metavar="N", help="line of a file of graphs (default 1)")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("mechanism.html"), metavar="FILE",
+        help="FILE.html (default mechanism.html), .gif or .svg",
+    )  # fmt: skip
+    parser.add_argument(
+        "--driver", type=int, action="append", metavar="LINK", help="driven link on the frame (once for each driver)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the search for dimensions (default 0)")
+    parser.add_argument("--frames", type=int, metavar="N", help="pictures of one pass (default 120, GIF 60)")
+    parser.add_argument(
+        "--range", type=float, nargs=2, metavar=("A", "B"), help="inputs of MECHANISM.toml, radians or lengths"
+    )
+    parser.add_argument("--save", type=Path, metavar="FILE", help="keep the mechanism found: FILE.toml or .json")
 
 
 def _add_run(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
-from graphsynth.errors import FormatError, GraphError, GraphsynthError, SpecError
+from graphsynth.errors import FormatError, GraphError, SpecError
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["run"]
+__all__ = ["read_graph", "run"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
-    graph = _read(options.graph, options.line)
+    graph = read_graph(options.graph, options.line)
     facts = _facts(graph, options.driver)
     if options.json:
         console.put_json(facts)
@@ -28,11 +28,12 @@ def run(options: argparse.Namespace) -> int:
             for i, line in enumerate(lines):
                 console.put(f"{name if i == 0 else '':{width}}  {_plain(line)}")
     if options.output:
-        _draw(graph, options.output)
+        _draw(graph, options.output, options.view, options.driver)
     return 0
 
 
-def _read(text: str, line: int) -> MechanismGraph:
+def read_graph(text: str, line: int = 1) -> MechanismGraph:
+    """Read a canonical key, a text form, or line ``line`` of a file of either (or of JSON lines)."""
     from graphsynth.structure.graph import MechanismGraph
 
     path = Path(text)
@@ -116,10 +117,26 @@ def _plain(value: Any) -> str:
     return str(value)
 
 
-def _draw(graph: MechanismGraph, path: Path) -> None:
-    if path.suffix != ".svg":
-        raise GraphsynthError(f"{path} must end in .svg")
-    from graphsynth.drawing.levels import draw_levels
+def _draw(graph: MechanismGraph, path: Path, view: str | None, driver: int | None) -> None:
+    """Draw the kinematic diagram, the graph by levels, or both side by side."""
+    from graphsynth.drawing.canvas import save
+    from graphsynth.drawing.graphs import graph_sketch
+    from graphsynth.drawing.levels import levels_sketch
+    from graphsynth.drawing.sketch import Sketch
 
-    framed = graph if graph.frame is not None else graph.with_frame(0)
-    path.write_text(draw_levels(framed, title=graph.key))
+    sketches: list[Sketch] = []
+    poses: list[list[tuple[float, float, float]] | None] = []
+    if view != "levels":
+        try:
+            sketch, pose = graph_sketch(graph, driver=driver, title=graph.key)
+            sketches.append(sketch)
+            poses.append(pose)
+        except GraphError as error:
+            if view is not None:
+                raise
+            console.note(f"{error}; drawn by levels instead")
+    if view in ("levels", "both") or not sketches:
+        framed = graph if graph.frame is not None else graph.with_frame(0)
+        sketches.append(levels_sketch(framed, title=graph.key))
+        poses.append(None)
+    save(path, sketches, poses)

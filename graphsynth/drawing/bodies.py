@@ -5,6 +5,8 @@ Points are complex numbers in the frame of their link; nothing here draws.
 
 from __future__ import annotations
 
+import cmath
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Body", "Guide", "bodies", "bounds", "hull", "outline", "world"]
+__all__ = ["Body", "Guide", "bodies", "bounds", "hull", "outline", "rounded", "thickness", "world"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -41,6 +43,7 @@ class Body:
 
     link: int
     points: list[complex] = field(default_factory=list)
+    joints: int = 0
     guides: list[Guide] = field(default_factory=list)
     wheels: list[tuple[complex, float, Gear]] = field(default_factory=list)
 
@@ -78,6 +81,8 @@ def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
     found = [Body(link) for link in range(mechanism.graph.links)]
     for joint in mechanism.joints:
         a, b = found[joint.a], found[joint.b]
+        a.joints += 1
+        b.joints += 1
         at_a, at_b = complex(*joint.at_a), complex(*joint.at_b)
         if isinstance(joint, Prismatic | PinSlot):
             t = complex(np.exp(1j * joint.angle_a))
@@ -144,3 +149,24 @@ def outline(points: list[complex], merge: float) -> list[complex]:
     t = (q - p) / far
     width = [((z - p) * t.conjugate()).imag for z in corners]
     return corners if max(width) - min(width) > merge else [p, q]
+
+
+def thickness(corners: list[complex]) -> float:
+    """Least width of a convex polygon; 0 for two corners."""
+    if len(corners) < 3:
+        return 0.0
+    sides = [(p, (q - p) / abs(q - p)) for p, q in zip(corners, [*corners[1:], corners[0]])]
+    return min(max(((z - p) * t.conjugate()).imag for z in corners) for p, t in sides)
+
+
+def rounded(corners: list[complex], radius: float) -> list[complex]:
+    """Outline of everything within ``radius`` of a convex polygon, or of the line between two points."""
+    count = len(corners)
+    found = []
+    for k, corner in enumerate(corners):
+        into, out = corner - corners[k - 1], corners[(k + 1) % count] - corner
+        first = cmath.phase(-1j * into)
+        turn = cmath.phase(out / into) % math.tau
+        steps = max(2, math.ceil(turn / 0.35))
+        found += [corner + cmath.rect(radius, first + turn * j / steps) for j in range(steps + 1)]
+    return found

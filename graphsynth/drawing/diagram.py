@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.drawing.bodies import Body, Guide, bodies, bounds, outline, world
+from graphsynth.drawing.bodies import Body, Guide, bodies, bounds, outline, rounded, thickness, world
 from graphsynth.drawing.lettering import place_letters
 from graphsynth.drawing.palette import TRACE_COLOURS
 from graphsynth.drawing.sketch import Sketch
@@ -34,6 +34,8 @@ _BLOCK = 13.0  # half length of a slider's block, pixels
 _HALF = 8.0  # its half width
 _SLOT = 6.5  # half width of a slot
 _MARGIN = 40.0
+_THIN = 12.0  # plates thinner than this are drawn with room around their joints
+_ROUND = 9.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +178,11 @@ def _link(plan: _Plan, body: Body) -> None:
     if plan.fixed(link):
         return
     corners = outline(body.vertices(), 2.0 * plan.px)
-    if len(corners) > 2:
+    if len(corners) > 1 and body.joints > 2 and thickness(corners) < _THIN * plan.px:
+        # a bar would look like several links that meet at a joint
+        sketch.on(link, "plate", f"link {link}")
+        sketch.plate(rounded(corners, _ROUND * plan.px), plan.colour(link), 2.0, 0.8)
+    elif len(corners) > 2:
         sketch.on(link, "plate", f"link {link}")
         sketch.plate(corners, plan.colour(link), 2.6, 0.8)
     elif len(corners) == 2:

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.drawing.bodies import Body, outline, world
+from graphsynth.drawing.bodies import Body, outline, thickness, world
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.mechanism.model import Mechanism
 
@@ -102,14 +102,16 @@ def _along(corners: list[complex], step: float) -> list[complex]:
 
 
 def _beside(body: Body, px: float) -> list[complex]:
-    """Candidates for a number: inside a plate, beside a bar, above a block."""
+    """Candidates for a number: inside a wide plate, beside the longest side of another link, above a block."""
     corners = outline(body.vertices(), 2.0 * px)
-    if len(corners) > 2:
+    if len(corners) > 2 and thickness(corners) > 26.0 * px:
         middle = sum(corners) / len(corners)
         return [middle, *((0.55 * middle + 0.45 * corner) for corner in corners)]
-    if len(corners) == 2:
-        p, q = corners
-        aside = 1j * (q - p) / abs(q - p) * 12.0 * px
-        return [p + (q - p) * s + side * aside for s in (0.5, 0.36, 0.64, 0.22, 0.78) for side in (1, -1)]
+    if len(corners) > 1:
+        p, q = max(pairwise([*corners, corners[0]]), key=lambda side: abs(side[1] - side[0]))
+        thin = thickness(corners) < 12.0 * px
+        aside = -1j * (q - p) / abs(q - p) * (18.0 if thin and body.joints > 2 else 12.0) * px
+        sides = (1, -1) if thin else (1,)  # corners run anticlockwise: the outside of a plate comes first
+        return [p + (q - p) * s + side * aside for s in (0.5, 0.36, 0.64, 0.22, 0.78) for side in sides]
     at = corners[0] if corners else 0j
     return [at + 19.0 * px * d for d in (1j, -1j, 1, -1, 1 + 1j, -1 + 1j)]

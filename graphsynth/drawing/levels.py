@@ -9,7 +9,7 @@ from graphsynth.drawing.sketch import Sketch
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["draw_levels", "level_order"]
+__all__ = ["draw_levels", "level_order", "levels_sketch"]
 
 
 def level_order(graph: MechanismGraph, sweeps: int = 12) -> tuple[tuple[int, ...], ...]:
@@ -78,7 +78,12 @@ def _tangle(edges: list[tuple[int, int]], graph: MechanismGraph, place: dict[int
 
 
 def draw_levels(graph: MechanismGraph, width: float = 420.0, title: str = "") -> str:
-    """Draw a graph by adjacency levels.
+    """Draw a graph by adjacency levels, as one ``<svg>`` element; see :func:`levels_sketch`."""
+    return levels_sketch(graph, width, title).svg()
+
+
+def levels_sketch(graph: MechanismGraph, width: float = 420.0, title: str = "") -> Sketch:
+    """Build the drawing of a graph by adjacency levels.
 
     The frame is the filled vertex on hatched ground; a joint of mobility 1 is a line, of mobility 2 a dashed line, of
     higher mobility a dotted one; joints inside a level are arcs.
@@ -94,8 +99,7 @@ def draw_levels(graph: MechanismGraph, width: float = 420.0, title: str = "") ->
 
     Returns
     -------
-    str
-        One ``<svg>`` element.
+    Sketch
     """
     order = level_order(graph)
     widest = max(map(len, order))
@@ -120,7 +124,7 @@ def draw_levels(graph: MechanismGraph, width: float = 420.0, title: str = "") ->
             sketch.node(where[link], str(link), radius, filled=link == graph.frame)
     if graph.frame is not None:
         sketch.hatch_over(where[graph.frame], radius)
-    return sketch.svg()
+    return sketch
 
 
 def _bend(p: complex, q: complex) -> float:

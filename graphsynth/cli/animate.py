@@ -1,0 +1,149 @@
+"""``graphsynth animate``."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.cli import console
+from graphsynth.errors import GraphsynthError, SpecError
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["run"]
+
+_SUFFIXES = (".html", ".gif", ".svg")
+_FRAMES = {".html": 120, ".gif": 60, ".svg": 90}
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A motion to show, and what is to be said about it."""
+
+    motion: Motion
+    title: str
+    statement: str
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Embody and animate one candidate, or animate a dimensioned mechanism."""
+    suffix = options.output.suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise GraphsynthError(f"{options.output} must end in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}")
+    if options.save and options.save.suffix.lower() not in (".toml", ".json"):
+        raise GraphsynthError(f"{options.save} must end in .toml or .json")
+    place = Path(options.mechanism)
+    dimensioned = len(options.mechanism) < 1000 and place.suffix.lower() in (".toml", ".json") and place.is_file()
+    found = _from_file(place, options) if dimensioned else _from_graph(options)
+    count = options.frames if options.frames is not None else _FRAMES[suffix]
+    _write(found, options.output, suffix, count)
+    if options.save:
+        text = found.motion.mechanism
+        options.save.write_text(text.to_toml() if options.save.suffix.lower() == ".toml" else text.to_json(), "utf-8")
+    facts = {**_facts(found.motion), **found.facts, "statement": found.statement, "file": str(options.output)}
+    if options.json:
+        console.put_json(facts)
+    else:
+        console.put(f"{found.statement}; {_closure(found.motion)}")
+        console.put(f"{options.output}, {options.output.stat().st_size / 1000:.0f} kB")
+    return 0
+
+
+def _from_file(place: Path, options: argparse.Namespace) -> _Found:
+    """Move a dimensioned mechanism over the range given, or as far as it goes."""
+    import numpy as np
+
+    from graphsynth.drawing.reach import motion_over_reach
+    from graphsynth.kinematics.simulation import simulate
+    from graphsynth.mechanism.model import Mechanism
+
+    if options.driver:
+        raise SpecError("--driver belongs to a graph: a dimensioned mechanism names its drivers in its file")
+    text = place.read_bytes()
+    mechanism = Mechanism.from_toml(text) if place.suffix.lower() == ".toml" else Mechanism.from_json(text)
+    if options.range is not None:
+        motion = simulate(mechanism, np.linspace(options.range[0], options.range[1], 361))
+    else:
+        motion = motion_over_reach(mechanism)
+    size = f"{mechanism.graph.links} links, drivers {_drivers(mechanism)}"
+    if not motion.assembled.any():
+        raise GraphsynthError(f"nothing of the motion is assembled: {motion.reason}")
+    return _Found(motion, place.stem, size, {"key": mechanism.graph.key, "text": mechanism.graph.to_text()})
+
+
+def _from_graph(options: argparse.Namespace) -> _Found:
+    """Find dimensions for a graph; the best found is shown even where nothing was accepted."""
+    from graphsynth.cli.show import read_graph
+    from graphsynth.kinematics.embodiment import embody
+
+    if options.range is not None:
+        raise SpecError("--range belongs to a dimensioned mechanism: dimensions of a graph are sought for a full turn")
+    graph = read_graph(options.mechanism, options.line)
+    driver = options.driver[0] if options.driver and len(options.driver) == 1 else options.driver
+    found = embody(graph, seed=options.seed, driver=driver)
+    if found.motion is None or found.mechanism is None:
+        raise GraphsynthError(f"{found.statement}; try another --seed or --driver")
+    facts: dict[str, Any] = {
+        "key": graph.key,
+        "text": found.graph.to_text(),
+        "accepted": found.accepted,
+        "seed": found.seed,
+        "evaluations": found.evaluations,
+        "search_seconds": round(found.seconds, 3),
+    }
+    if found.figures is not None:
+        facts |= {
+            "transmission_angle": _number(found.figures.transmission_angle),
+            "singularity_distance": _number(found.figures.singularity_distance),
+            "length_ratio": _number(found.figures.length_ratio),
+        }
+    return _Found(found.motion, graph.to_text(), found.statement, facts)
+
+
+def _write(found: _Found, path: Path, suffix: str, frames: int) -> None:
+    from graphsynth.drawing.frames import with_trace_points
+
+    motion = with_trace_points(found.motion)
+    if suffix == ".gif":
+        from graphsynth.drawing.gif import save_gif
+
+        save_gif(motion, path, frames=frames)
+        return
+    from graphsynth.drawing.animation import animated_svg, animation_html
+
+    if suffix == ".svg":
+        path.write_text(animated_svg(motion, frames=frames, title=found.title), "utf-8")
+    else:
+        note = f"{found.statement[:1].upper()}{found.statement[1:]}."
+        path.write_text(animation_html(motion, frames=frames, title=found.title, note=note), "utf-8")
+
+
+def _facts(motion: Motion) -> dict[str, Any]:
+    closure = motion.closure
+    return {
+        "links": motion.mechanism.graph.links,
+        "drivers": _drivers(motion.mechanism),
+        "completed": motion.completed,
+        "reason": motion.reason,
+        "closed": closure.closed if closure.tested else None,
+        "closure": _number(closure.error),
+        "residual": _number(motion.residual),
+    }
+
+
+def _drivers(mechanism: Mechanism) -> str:
+    return ", ".join(f"{d.base}-{d.link}" for d in mechanism.drivers)
+
+
+def _closure(motion: Motion) -> str:
+    return motion.closure.statement if motion.completed else f"not a whole turn: {motion.reason}"
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
