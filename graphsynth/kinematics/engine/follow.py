@@ -212,7 +212,7 @@ def run_program(
     kernels.run(
         program.step_table, program.touched, program.rows, program.row_table, program.core, program.eliminated,
         program.eliminated_table, program.drives, program.drive_table, program.need_angle, wanted, q, u, modes,
-        out.poses, *memory, out.links, out.steps, out.frames, out.velocities, out.accelerations, out.margins, done, why, first,
-        program.Lc, derivs,
+        out.poses, *memory, out.links, out.steps, out.frames, out.velocities, out.accelerations, out.margins, done, why,
+        first, program.Lc, derivs,
     )  # fmt: skip
     return done, why
