@@ -139,12 +139,13 @@ def _try(system: System, nodes: Nodes, left: NDArray[np.intp], right: NDArray[np
     h = (b.u.mid - a.u.mid)[:, None]
     guess = 0.5 * (a.x + b.x) + 0.125 * h * (a.V - b.V)  # cubic through both nodes
     x, V = correct(system, guess, middle, steps=2)
-    lost = ~(np.isfinite(x).all(axis=1) & np.isfinite(V).all(axis=1))
+    lost = np.isnan(x).any(axis=1) | ~np.isfinite(x + V).all(axis=1)
+    lost = np.asarray(lost, dtype=np.bool_)
     x, V = np.where(lost[:, None], guess, x), np.where(lost[:, None], 0.0, V)
     boxes = Boxes(u, x, V)
     proof = prove(system, boxes)
     turns, directions = system.branch(boxes.hull(proof.radius), middle)
-    linked = np.asarray(~lost, dtype=np.bool_)
+    linked = ~lost
     for node in (a, b):
         linked = linked & _inside(boxes, proof.radius, node)
         linked = linked & (turns == node.turns).all(axis=1)
