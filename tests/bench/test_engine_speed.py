@@ -36,8 +36,8 @@ def four_bar() -> Mechanism:
 def ten_link() -> Mechanism:
     """Return a ten-link mechanism with a triad, given at a pose with all link frames along the fixed one."""
     at = dict(zip(TEN, [
-        0j, 0.15 + 0j, 0.6 + 0.9j, 1.4 + 1.0j, 2.2 + 0.1j, 1.0 + 1.7j, 1.2 + 2.9j, 1.7 + 1.5j, 2.9 + 2.2j, 3.2 + 0.6j,
-        3.6 + 1.6j, 4.9 + 1.9j, 5.0 + 0.2j,
+        0j, 0.3 + 0j, 0.04 + 1.67j, 2.96 + 0.72j, 3.95 + 2.04j, 2.48 + 1.06j, 1.47 + 1.55j, 3.28 + 1.05j, 2.61 + 0.89j,
+        1.11 + 2.24j, 2.24 + 2.35j, 1.32 + 0.07j, 0.48 + 1.12j,
     ]))  # fmt: skip
     joints = [Revolute(a, b, (z.real, z.imag), (z.real, z.imag)) for (a, b), z in at.items()]
     return Mechanism(MechanismGraph(10, TEN, frame=0), joints, [Driver(0, 1)], pose=((0.0, 0.0, 0.0),) * 10)
