@@ -7,6 +7,7 @@ from numba import njit
 
 from graphsynth.kinematics.engine.codes import (
     BAD_INPUT,
+    E_RR,
     GEAR,
     ITERATIVE_FROM,
     NEWTON,
@@ -56,6 +57,17 @@ def unwrap(link, u, X, TH, V, i0, i1, derivs):
             near = TH[link, i - 1] + ((u[i] - u[i - 1]) * V[link, 2, i - 1] if derivs else 0.0)
         raw = math.atan2(X[link, 3, i], X[link, 2, i])
         TH[link, i] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
+
+
+@njit(cache=True, error_model="numpy")
+def bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, i0, i1, derivs):
+    """Place the eliminated links with two turning pairs, those that are wanted."""
+    for k in range(e0, e0 + ne):
+        e = elim[k, 1]
+        if elim[k, 0] == E_RR and wanted[e]:
+            bar_loop(e, elim[k, 2], elim[k, 3], ep, k, X, V, W, T, i0, i1, derivs)
+            if need[e]:
+                unwrap(e, u, X, TH, V, i0, i1, derivs)
 
 
 @njit(cache=True, error_model="numpy")
@@ -180,11 +192,7 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
                     stop, code, at = end, reason, s
                 if need[own]:
                     unwrap(own, u, X, TH, V, first, stop, derivs)
-                for k in range(e0, e0 + ne):
-                    if wanted[elim[k, 1]]:
-                        bar_loop(elim[k, 1], elim[k, 2], elim[k, 3], ep, k, X, V, W, T, first, stop, derivs)
-                        if need[elim[k, 1]]:
-                            unwrap(elim[k, 1], u, X, TH, V, first, stop, derivs)
+                bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, first, stop, derivs)
                 continue
             # one sample after another: each starts from the one before
             j = max(first - 1, 0)
@@ -210,12 +218,14 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
                     store(core[k], i, x, X, TH, V, W, derivs)
                 for k in range(e0, e0 + ne):
                     e = elim[k, 1]
-                    near = x[e, 4] + (h * x[e, 7] if i > 0 and derivs else 0.0)
-                    place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
-                    if need[e]:
-                        follow_angle(e, x, near)
-                    store(e, i, x, X, TH, V, W, derivs)
+                    if elim[k, 0] != E_RR:
+                        near = x[e, 4] + (h * x[e, 7] if i > 0 and derivs else 0.0)
+                        place_eliminated(elim[k, 0], e, elim[k, 2], elim[k, 3], ep, k, x, derivs)
+                        if need[e]:
+                            follow_angle(e, x, near)
+                        store(e, i, x, X, TH, V, W, derivs)
                 carry_centres(rows, rp, r0, nr, i, x, phi, PHI)
+            bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, first, stop, derivs)
         done[b], why[b, 0], why[b, 1] = stop, code, at
         if kept.shape[0] > 0:
             deliver(X, kept, stop, OX[b])

@@ -5,9 +5,7 @@ import math
 from numba import njit
 
 from graphsynth.kinematics.engine.codes import (
-    E_PP,
     E_RP,
-    E_RR,
     P_DIST,
     P_LINE,
     PAX,
@@ -161,19 +159,15 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
 
 @njit(cache=True, error_model="numpy")
 def place_eliminated(kind, e, a, b, p, r, x, derivs):
-    """Place a link eliminated from its group, with velocity and acceleration."""
+    """Place an eliminated link that slides on at least one of its two neighbours, with velocity and acceleration."""
     ax, ay = world(x, a, p[r, 0], p[r, 1])
     bx, by = world(x, b, p[r, 4], p[r, 5])
-    if kind == E_RR:
-        turn_to(x, e, p[r, 6] - p[r, 2], p[r, 7] - p[r, 3], bx - ax, by - ay)
+    base = b if kind == E_RP else a
+    c, s = math.cos(p[r, 12]), math.sin(p[r, 12])
+    x[e, 2], x[e, 3] = x[base, 2] * c - x[base, 3] * s, x[base, 3] * c + x[base, 2] * s
+    x[e, 4] = x[base, 4] + p[r, 12]
+    if kind == E_RP:
         pin_to(x, e, p[r, 2], p[r, 3], ax, ay)
-    else:
-        base = b if kind == E_RP else a
-        c, s = math.cos(p[r, 12]), math.sin(p[r, 12])
-        x[e, 2], x[e, 3] = x[base, 2] * c - x[base, 3] * s, x[base, 3] * c + x[base, 2] * s
-        x[e, 4] = x[base, 4] + p[r, 12]
-        if kind == E_RP:
-            pin_to(x, e, p[r, 2], p[r, 3], ax, ay)
     oa, ob, la, lb = x[a, 7], x[b, 7], x[a, 10], x[b, 10]
     ux, uy, wx, wy = ax - x[a, 0], ay - x[a, 1], bx - x[b, 0], by - x[b, 1]
     vax, vay, vbx, vby = x[a, 5] - oa * uy, x[a, 6] + oa * ux, x[b, 5] - ob * wy, x[b, 6] + ob * wx
@@ -181,15 +175,10 @@ def place_eliminated(kind, e, a, b, p, r, x, derivs):
     abx, aby = x[b, 8] - lb * wy - ob * ob * wx, x[b, 9] + lb * wx - ob * ob * wy
     c, s = x[e, 2], x[e, 3]
     fx, fy = c * p[r, 2] - s * p[r, 3], s * p[r, 2] + c * p[r, 3]
-    if kind < E_PP:
+    if kind == E_RP:
         if not derivs:
             return
         o, l = ob, lb
-        if kind == E_RR:
-            dx, dy = bx - ax, by - ay
-            dd = dx * dx + dy * dy
-            o = (dx * (vby - vay) - dy * (vbx - vax)) / dd
-            l = (dx * (aby - aay) - dy * (abx - aax)) / dd
         x[e, 5], x[e, 6], x[e, 7] = vax + o * fy, vay - o * fx, o
         x[e, 8], x[e, 9], x[e, 10] = aax + l * fy + o * o * fx, aay - l * fx + o * o * fy, l
         return
