@@ -17,7 +17,7 @@ from graphsynth.kinematics.embodiment.design import Design
 from graphsynth.kinematics.embodiment.dimension import dimensioned
 from graphsynth.kinematics.embodiment.goals import Goals
 from graphsynth.kinematics.embodiment.problem import Problem
-from graphsynth.kinematics.embodiment.search import HistoryRow, search, verdict
+from graphsynth.kinematics.embodiment.search import EXACT, HistoryRow, Search, search, verdict
 from graphsynth.kinematics.embodiment.verify import Figures, verify
 from graphsynth.structure.graph import MechanismGraph
 
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["Embodiment", "embody"]
+
+#: Searches for a target that are continued to their end.
+_CONTINUED = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,31 +135,69 @@ def embody(
     wanted = Goals() if goals is None else goals
     _check(graph, wanted, seed, tries, seconds)
     order = choices(graph, driver)
-    reasons: Counter[str] = Counter()
-    history: list[HistoryRow] = []
-    evaluations = 0
-    best: tuple[tuple[bool, float], Embodiment] | None = None
+    run = _Run(wanted, seed, begin, seconds)
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
         design = Design(inversion, drivers, _kinds(graph, inversion, joints))
-        random = np.random.default_rng([seed, attempt])
-        sense = -1 if wanted.target is not None and (attempt // len(order)) % 2 else 1
-        problem = Problem(design, wanted, random, sense)
-        found = search(problem, attempt, random, begin + seconds)
-        every, complete, inside = found.start
-        reasons["first population: the range is not completed"] += every - complete
-        reasons["first population: a bound is not kept"] += complete - inside
-        evaluations += problem.evaluations
-        history += found.history
-        result = _judge(problem, found.best, found.cost, wanted, seed)
-        reasons.update(result.reasons)
-        rank = (not result.accepted, found.cost)
-        if best is None or rank < best[0]:
-            best = rank, result
-        if result.accepted or perf_counter() - begin > seconds:
+        run.start(design, attempt, attempt // len(order))
+        if run.ended:
             break
-    assert best is not None
-    return _with_totals(best[1], reasons, evaluations, perf_counter() - begin, history, attempt + 1)
+    if wanted.target is not None:
+        run.go_on()
+    return run.result(attempt + 1)
+
+
+class _Run:
+    """Searches of one call, and what they came to."""
+
+    def __init__(self, goals: Goals, seed: int, begin: float, seconds: float) -> None:
+        self.goals, self.seed, self.begin, self.deadline = goals, seed, begin, begin + seconds
+        self.reasons: Counter[str] = Counter()
+        self.history: list[HistoryRow] = []
+        self.found: list[tuple[Search, Problem, int]] = []
+        self.best: tuple[tuple[bool, float], Embodiment] | None = None
+        self.ended = False
+
+    def start(self, design: Design, attempt: int, round_: int) -> None:
+        """Search once; without a target an accepted result ends the run."""
+        random = np.random.default_rng([self.seed, attempt])
+        problem = Problem(design, self.goals, random, round_ if self.goals.target is not None else 0)
+        found = search(problem, attempt, random, self.deadline)
+        every, complete, inside = found.start
+        self.reasons["first population: the range is not completed"] += every - complete
+        self.reasons["first population: a bound is not kept"] += complete - inside
+        self.found.append((found, problem, attempt))
+        self.history += found.history
+        late = perf_counter() > self.deadline
+        if self.goals.target is None or late:
+            self.judge(problem, found)
+        self.ended = late or (self.goals.target is None and self.best is not None and self.best[1].accepted)
+
+    def go_on(self) -> None:
+        """Continue the most promising searches to their end."""
+        for found, problem, attempt in sorted(self.found, key=lambda item: item[0].cost)[:_CONTINUED]:
+            random = np.random.default_rng([self.seed, attempt, 1])
+            final = found
+            if perf_counter() < self.deadline and found.cost > EXACT:
+                final = search(problem, attempt, random, self.deadline, found)
+                self.history += final.history
+            self.judge(problem, final)
+            if final.cost <= EXACT and self.best is not None and self.best[1].accepted:
+                break
+
+    def judge(self, problem: Problem, found: Search) -> None:
+        """Verify the best of a search and keep it if it is better than those before."""
+        result = _judge(problem, found.best, found.cost, self.goals, self.seed)
+        self.reasons.update(result.reasons)
+        rank = (not result.accepted, found.cost)
+        if self.best is None or rank < self.best[0]:
+            self.best = rank, result
+
+    def result(self, tries: int) -> Embodiment:
+        """Return the best with the totals of the run."""
+        assert self.best is not None
+        evaluations = sum(problem.evaluations for _, problem, _ in self.found)
+        return _with_totals(self.best[1], self.reasons, evaluations, perf_counter() - self.begin, self.history, tries)
 
 
 def _check(graph: MechanismGraph, goals: Goals, seed: int, tries: int, seconds: float) -> None:

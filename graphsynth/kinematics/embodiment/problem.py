@@ -21,12 +21,15 @@ from graphsynth.mechanism.model import Driver, Mechanism
 __all__ = ["Outcome", "Problem"]
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 #: Cost of a candidate that does not complete its range; below it every candidate is complete.
 INCOMPLETE = 100.0
 #: Cost from which a bound is violated.
 OUTSIDE = 10.0
 _CLOSED = 1e-6
+#: The sine of the transmission angle is asked for with this factor: its least value lies between samples.
+_SPARE = 1.002
 
 
 class Outcome(NamedTuple):
@@ -66,12 +69,14 @@ class Problem:
     goals : Goals
     random : numpy.random.Generator
         Shifts the sketch, so that repeated problems start from different ones.
-    sense : int
-        +1 or -1: direction of the drivers.
+    variant : int
+        0: the assembly modes of the sketch, drivers turn left.  With a target other curves matter too: bit 0 turns the
+        drivers the other way, bit k the mode of dyad k - 1 (only of mechanisms of dyads, which need no start pose).
     """
 
-    def __init__(self, design: Design, goals: Goals, random: np.random.Generator, sense: int = 1) -> None:
-        self.design, self.goals, self.sense = design, goals, sense
+    def __init__(self, design: Design, goals: Goals, random: np.random.Generator, variant: int = 0) -> None:
+        self.design, self.goals, self.sense = design, goals, -1 if variant & 1 else 1
+        sense = self.sense
         self.fit: Fit | None = make_fit(goals.target)
         self.link = target_link(design, goals.target) if goals.target is not None else -1
         self.ends = [(joint.a, joint.b) for joint in design.graph.joints]
@@ -95,6 +100,11 @@ class Problem:
             if step.group >= 0 and step.has_two_modes and at_rest.modes[0, step.group] != 0
         }
         self.iterative = any(step.iterative for step in at_rest.steps)
+        if not self.iterative:
+            flips = variant >> 1
+            self.modes = {
+                group: -mode if flips >> k & 1 else mode for k, (group, mode) in enumerate(self.modes.items())
+            }
         self.evaluations = 0
         self._set_inputs()
 
@@ -169,13 +179,13 @@ class Problem:
         sines = transmission_sines(self.forms, dimensions, self.ends, motion.frames, motion.margins)
         complete = motion.completed & self._closed(motion.frames)
         with np.errstate(invalid="ignore"):
-            least = np.where(complete, sines.min(axis=(1, 2), initial=1.0), 0.0)
+            least = np.where(complete, _least(sines, self.goals.full_turn), 0.0)
         ratio = self._ratio(places)
         error, placed = np.zeros(len(X)), None
         if self.fit is not None:
             error, placed, arms = self._error(motion.frames, motion.velocities, extras, places, complete)
             ratio = np.maximum(ratio, arms / self._shortest(places))
-        goal = max(math.sin(self.goals.min_transmission_angle), 1e-3)
+        goal = max(_SPARE * math.sin(self.goals.min_transmission_angle), 1e-3)
         merit = np.minimum(least / goal, self.goals.max_length_ratio / ratio)
         cost = -merit if self.fit is None else np.where(merit >= 1.0, error, OUTSIDE - merit)
         reached = motion.reached / len(self.inputs)
@@ -209,17 +219,31 @@ class Problem:
         d = places[:, joint] - places[:, other]
         return np.asarray(np.hypot(d[:, 0], d[:, 1]))
 
+    def _bar(self, places: Array) -> tuple[Complex, Complex]:
+        """Origin and direction of the target's link at the sketch pose: its first joint, towards its second."""
+        first, second = (self.design.joints_of(self.link) * 2)[:2]
+        d = places[:, second] - places[:, first]
+        z = d[:, 0] + 1j * d[:, 1]
+        size = np.abs(z)
+        along = np.where(size > 0.0, z / np.maximum(size, 1e-300), 1.0)
+        return places[:, first, 0] + 1j * places[:, first, 1], along
+
     def _error(
         self, frames: Array, velocities: Array, extras: Array, places: Array, complete: NDArray[np.bool_]
     ) -> tuple[Array, Placed, Array]:
         """Largest error of the target, its placement, and the longest arm of the tracing point."""
         assert self.fit is not None
         own = frames[:, :, self.link]
-        z, w = own[..., 0] + 1j * own[..., 1], own[..., 2] + 1j * own[..., 3]
+        origin, along = self._bar(places)
+        w = own[..., 2] + 1j * own[..., 3]
+        z, w = own[..., 0] + 1j * own[..., 1] + w * origin[:, None], w * along[:, None]
         angle = np.unwrap(np.nan_to_num(np.angle(w)), axis=1)
         if isinstance(self.fit, PathFit) and self.fit.warped:
             times = self.fit.times(extras, self.goals.span)
-            sampled = _hermite(self.inputs, z, angle, velocities[:, :, self.link], times)
+            v = velocities[:, :, self.link]
+            turn = own[..., 2] + 1j * own[..., 3]
+            dz = v[..., 0] + 1j * v[..., 1] + 1j * v[..., 2] * turn * origin[:, None]
+            sampled = _hermite(self.inputs, (z, dz), (angle, v[..., 2]), times)
         else:
             sampled = Sampled(z[:, self.at_target], w[:, self.at_target], angle[:, self.at_target])
         filler = np.exp(0.1j * np.arange(sampled.z.shape[1]))
@@ -227,7 +251,8 @@ class Problem:
         sampled = Sampled(
             np.where(keep, sampled.z, filler**2), np.where(keep, sampled.w, filler), np.where(keep, sampled.angle, 0.0)
         )
-        errors, placed = self.fit.errors(sampled, extras, self.crank(places))
+        errors, found = self.fit.errors(sampled, extras, self.crank(places))
+        placed = Placed(found.s, found.s * origin + found.q * along, found.t)
         with np.errstate(divide="ignore", invalid="ignore"):
             point = placed.q / placed.s
         joints = self.design.joints_of(self.link)
@@ -235,14 +260,29 @@ class Problem:
         return errors.max(axis=1), placed, np.nan_to_num(arms, nan=1e12, posinf=1e12)
 
 
-def _hermite(u: Array, z: NDArray[np.complex128], angle: Array, velocity: Array, times: Array) -> Sampled:
+def _least(sines: Array, periodic: bool) -> Array:
+    """Smallest value by set, shape (sets,), with the parabola through the smallest sample and its neighbours."""
+    n, groups = sines.shape[1:]
+    if not groups or n < 3:
+        return np.asarray(sines.min(axis=(1, 2), initial=1.0))
+    k = np.nan_to_num(sines, nan=2.0).argmin(axis=1)
+    last = n - 1  # the same pose as sample 0 after a full turn
+    low = np.where(k == 0, last - 1 if periodic else 0, k - 1)
+    high = np.where(k == last, 1 if periodic else last, k + 1)
+    y0, y1, y2 = (np.take_along_axis(sines, at[:, None], axis=1)[:, 0] for at in (low, k, high))
+    bend = y0 - 2.0 * y1 + y2
+    drop = np.where(bend > 0.0, (y0 - y2) ** 2 / (8.0 * np.where(bend > 0.0, bend, 1.0)), 0.0)
+    return np.asarray((y1 - drop).min(axis=1))
+
+
+def _hermite(u: Array, origin: tuple[Complex, Complex], turn: tuple[Array, Array], times: Array) -> Sampled:
     """Cubic interpolation of a link at inputs that differ by set."""
     k = np.clip(np.searchsorted(u, times, side="right") - 1, 0, len(u) - 2)
+    (z, dz), (angle, rate) = origin, turn
     row = np.arange(len(z))[:, None]
     h = u[k + 1] - u[k]
     x = (times - u[k]) / h
     a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * h, x * x * (3 - 2 * x), x * x * (x - 1) * h
-    dz = velocity[..., 0] + 1j * velocity[..., 1]
     at = a * z[row, k] + b * dz[row, k] + c * z[row, k + 1] + d * dz[row, k + 1]
-    turn = a * angle[row, k] + b * velocity[row, k, 2] + c * angle[row, k + 1] + d * velocity[row, k + 1, 2]
-    return Sampled(at, np.exp(1j * turn), turn)
+    theta = a * angle[row, k] + b * rate[row, k] + c * angle[row, k + 1] + d * rate[row, k + 1]
+    return Sampled(at, np.exp(1j * theta), theta)

@@ -10,7 +10,7 @@ Methods Appl. Mech. Eng. 186, 311-338 (complete motions before bounds, bounds be
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import NamedTuple
 
@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 
 from graphsynth.kinematics.embodiment.problem import INCOMPLETE, OUTSIDE, Problem
 
-__all__ = ["HistoryRow", "Search", "search"]
+__all__ = ["EXACT", "HistoryRow", "Search", "search", "verdict"]
 
 Array = NDArray[np.float64]
 
 #: Merit at which a search without a target is content: all bounds kept with this to spare.
 _ENOUGH = 1.5
+#: Error of a target below which nothing is gained.
+EXACT = 1e-9
 
 
 class HistoryRow(NamedTuple):
@@ -44,22 +46,32 @@ class Search:
     cost: float
     history: tuple[HistoryRow, ...]
     start: tuple[int, int, int]  # candidates of the first population: all, complete, within bounds
+    population: Array = field(repr=False)
 
 
-def search(problem: Problem, attempt: int, random: np.random.Generator, deadline: float) -> Search:
-    """Run one search; it ends early only when ``perf_counter`` passes the deadline."""
+def search(
+    problem: Problem, attempt: int, random: np.random.Generator, deadline: float, before: Search | None = None
+) -> Search:
+    """Run one search, or go on with one; it ends early only when ``perf_counter`` passes the deadline.
+
+    With a target the first search is short: it tells the promising starts, which are then continued.
+    """
     from scipy.optimize import differential_evolution
 
     aimed = problem.fit is not None
     size = problem.unknowns.size
     width = min(120, 15 * size) if aimed else min(60, 6 * size)
-    first = problem.population((20 if aimed else 4) * width, random)
-    outcome = problem.evaluate(first)
-    order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
-    start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
-    history = [HistoryRow(attempt, 0, problem.evaluations, float(outcome.cost[order[0]]))]
+    if before is None:
+        first = problem.population((20 if aimed else 4) * width, random)
+        outcome = problem.evaluate(first)
+        order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
+        start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
+        least, population = float(outcome.cost[order[0]]), first[order]
+    else:
+        start, least, population = (0, 0, 0), before.cost, before.population
+    history = [HistoryRow(attempt, 0, problem.evaluations, least)]
     if size == 0:
-        return Search(first[order[0]], float(outcome.cost[order[0]]), tuple(history), start)
+        return Search(population[0], least, tuple(history), start, population)
 
     def cost(X: Array) -> Array:
         found = problem.evaluate(np.atleast_2d(X.T)).cost
@@ -68,15 +80,15 @@ def search(problem: Problem, attempt: int, random: np.random.Generator, deadline
         return found
 
     def content(x: Array, convergence: float) -> bool:
-        return perf_counter() > deadline or (not aimed and history[-1].cost <= -_ENOUGH)
+        return perf_counter() > deadline or history[-1].cost <= (EXACT if aimed else -_ENOUGH)
 
-    generations = (1000 if aimed else 60) if not problem.iterative else (150 if aimed else 30)
+    generations = 60 if not aimed else 120 if before is None else 1000
+    generations //= 3 if problem.iterative else 1
     found = differential_evolution(
-        cost, problem.bounds(), init=first[order], vectorized=True, updating="deferred", polish=False,
+        cost, problem.bounds(), init=population, vectorized=True, updating="deferred", polish=False,
         maxiter=generations, tol=1e-10, atol=1e-12, seed=random, callback=content,
     )  # fmt: skip
-    best, value = found.x, float(found.fun)
-    return Search(best, value, tuple(history), start)
+    return Search(found.x, float(found.fun), tuple(history), start, np.asarray(found.population))
 
 
 def verdict(cost: float) -> str:
