@@ -24,7 +24,7 @@ TOLERANCE = 1e-12
 
 
 class Arc(NamedTuple):
-    """A piece of the boundary: ``circle`` counter-clockwise from angle ``start`` to ``stop`` (radians, start < stop)."""
+    """A piece of the boundary: ``circle`` counter-clockwise from angle ``start`` to ``stop`` (ascending)."""
 
     circle: BoundaryCircle
     start: float
