@@ -140,8 +140,9 @@ def deliver(source, rows, done, target):
     """Copy the rows asked for, not a number beyond the samples reached."""
     for r in range(rows.shape[0]):
         for c in range(target.shape[1]):
-            for i in range(target.shape[2]):
-                target[r, c, i] = source[rows[r], c, i] if i < done else math.nan
+            count = min(done, target.shape[2])
+            target[r, c, :count] = source[rows[r], c, :count]
+            target[r, c, count:] = math.nan
 
 
 @njit(cache=True, error_model="numpy")
@@ -232,5 +233,5 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
             deliver(V, kept, stop, OV[b])
             deliver(W, kept, stop, OW[b])
             for r in range(groups.shape[0]):
-                for i in range(n):
-                    OM[b, r, i] = M[groups[r], i] if i < stop else math.nan
+                OM[b, r, :stop] = M[groups[r], :stop]
+                OM[b, r, stop:] = math.nan
