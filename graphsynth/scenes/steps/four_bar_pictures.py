@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from typing import TYPE_CHECKING
 
-from graphsynth.drawing.sketch import Sketch, degrees
+from graphsynth.drawing.lambda_linkage import lambda_sketch, lambda_sketch_3d
+from graphsynth.drawing.sketch import degrees
 from graphsynth.scenes.products import Attempt, Picture
 from graphsynth.scenes.scene import LambdaTable
 from graphsynth.scenes.stages import Context
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from graphsynth.drawing.plots import Band
     from graphsynth.jamming.assess import JammingReport
     from graphsynth.jamming.tilt_arcs import Arc
@@ -29,11 +26,6 @@ def _first(attempts: tuple[Attempt, ...]) -> Attempt | None:
     return next((a for a in attempts if not a.failed), None)
 
 
-def _plane(points: NDArray[np.float64]) -> list[complex]:
-    """Project positions of shape (n, 3) on the plane of the linkage."""
-    return [complex(x, y) for x, y in points[:, :2].tolist()]
-
-
 def sketches(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]) -> tuple[Picture, ...]:
     """Draw the linkage with the path of M, then at six crank angles; a bearing that jams has a coloured ring."""
     moved, assessed = _first(motions), _first(assessments)
@@ -45,16 +37,29 @@ def sketches(context: Context, motions: tuple[Attempt, ...], assessments: tuple[
     chosen = [round(i * count / _SHOWN) for i in range(_SHOWN)]
     shown = degrees(float(motion.tilted.f[chosen[1]]))
     caption = (
-        f"Crank at {shown}. M traces the blue curve, whose flat lower side is the working stroke. "
+        f"Crank at {shown}. M traces the blue curve; the thick part is the nearly straight working stroke. "
         "A ring around B marks a position in which the bearing jams."
     )
     pictures = [Picture("The linkage and the path of M", _sketch(motion, chosen[1], 420, arcs, True), caption, "wide")]
+    pictures += _in_space(motion, chosen[1])
     for i in chosen:
         angle = float(motion.tilted.f[i])
         caption = f"The bearing at B {'jams' if _jams(arcs, angle) else 'is free'}."
         sketch = _sketch(motion, i, 250, arcs, False)
         pictures.append(Picture(f"Crank at {degrees(angle)}", sketch, caption, "small"))
     return tuple(pictures)
+
+
+def _in_space(motion: LambdaMotion, i: int) -> list[Picture]:
+    """Draw the tilted linkage in space, if it is tilted and assembled there."""
+    angle = float(motion.tilted.f[i])
+    if motion.linkage.pin_height <= 0.0 or not motion.tilted.assembled[i]:
+        return []
+    caption = (
+        "The motor axis is tilted, so the crank pin A leaves the plane of the frame and the rod tilts in its "
+        "bearing at B. Heights are drawn larger by the factor written in the picture."
+    )
+    return [Picture("In space", lambda_sketch_3d(motion.linkage, angle).svg(), caption, "wide")]
 
 
 def _condition(context: Context) -> str:
@@ -68,39 +73,9 @@ def _jams(arcs: tuple[Arc, ...], angle: float) -> bool:
 
 
 def _sketch(motion: LambdaMotion, i: int, width: float, arcs: tuple[Arc, ...], labels: bool) -> str:
-    """Draw one position: ground first, then the links over it, then the joints."""
-    A, B, M = (_plane(points) for points in (motion.tilted.A, motion.tilted.B, motion.tilted.M))
-    O, C = 0j, complex(motion.linkage.l1, 0)
-    every = [p for p in (O, C, *A, *B, *M) if cmath.isfinite(p)]
-    lower = complex(min(p.real for p in every), min(p.imag for p in every))
-    upper = complex(max(p.real for p in every), max(p.imag for p in every))
+    """Draw one position in the plane; a bearing that jams has a coloured ring."""
     angle = float(motion.tilted.f[i])
-    sketch = Sketch(lower, upper, width, title=f"Lambda linkage, crank at {degrees(angle)}")
-    sketch.circle(O, motion.linkage.l2, dash="4 4")
-    sketch.ground(O)
-    sketch.ground(C)
-    sketch.trace(M, "a", 2.2, closed=True)
-    if not all(map(cmath.isfinite, (A[i], B[i], M[i]))):
-        sketch.label((lower + upper) / 2, "cannot be assembled")
-        return sketch.svg()
-    for p, q in ((O, A[i]), (C, B[i]), (A[i], M[i])):
-        sketch.bar(p, q)
-    if _jams(arcs, angle):
-        sketch.dot(B[i], "jam", 10)
-    for p in (O, C, A[i], B[i]):
-        sketch.joint(p)
-    sketch.dot(M[i], "a", 5)
-    if labels:
-        names = {
-            "O": (O, -18 + 8j),
-            "A": (A[i], -14 + 10j),
-            "C": (C, 18 + 8j),
-            "B": (B[i], 20 - 4j),
-            "M": (M[i], 14 + 14j),
-        }
-        for name, (point, offset) in names.items():
-            sketch.label(point, name, offset)
-    return sketch.svg()
+    return lambda_sketch(motion.linkage, angle, width=width, labels=labels, ring=_jams(arcs, angle)).svg()
 
 
 def plots(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]) -> tuple[Picture, ...]:

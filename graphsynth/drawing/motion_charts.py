@@ -1,0 +1,220 @@
+"""Charts of a motion: coupler curves, displacements, velocities and accelerations, transmission angles, margins.
+
+Every function returns a :class:`~graphsynth.drawing.plots.Chart`; where the branch does not reach,
+the curves have gaps.  Events of the motion are upright lines.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.drawing.palette import TRACE_COLOURS
+from graphsynth.drawing.plots import Chart, Line, Mark
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.joints import Prismatic
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+
+__all__ = ["coupler_curves", "margin_chart", "motion_chart", "transmission_chart"]
+
+Array = NDArray[np.float64]
+
+_STYLES = ("-", "--", "-.", ":")
+_WORDS = ("displacement", "velocity", "acceleration")
+#: Events that end a motion, and those that it passes.
+_ENDS = ("jam", "--")
+_PASSES = ("soft", ":")
+
+
+def coupler_curves(motion: Motion, names: Sequence[str] | None = None, *, unit: str = "length") -> Chart:
+    """Paths of named points, on equal scales.
+
+    Parameters
+    ----------
+    motion : Motion
+    names : sequence of str, optional
+        All named points of the mechanism by default.
+    unit : str
+        Unit of length written at the axes, for example "m".
+
+    Returns
+    -------
+    Chart
+
+    Raises
+    ------
+    GeometryError
+        A name that is not defined, or no point at all.
+    """
+    chosen = list(motion.mechanism.points) if names is None else list(names)
+    if not chosen:
+        raise GeometryError("the mechanism has no named point, so there is no path to draw; give it points")
+    lines = []
+    for k, name in enumerate(chosen):
+        x, y = motion.point(name).position.T
+        lines.append(Line(x, y, name, TRACE_COLOURS[k % len(TRACE_COLOURS)]))
+    return Chart(lines, f"x [{unit}]", f"y [{unit}]", equal=True, size=(5.4, 3.6))
+
+
+def motion_chart(
+    motion: Motion, of: str | int | None = None, order: int = 0, *, events: bool = True, unit: str = "length"
+) -> Chart:
+    """Displacement, velocity or acceleration over the input.
+
+    Parameters
+    ----------
+    motion : Motion
+    of : str or int, optional
+        A named point (its x and y), or a link: its angle, or its displacement if it slides on the frame.  By default
+        all undriven links jointed to the frame.
+    order : {0, 1, 2}
+        0 displacement, 1 and 2 its first and second derivative by the input.
+    events : bool
+        Mark dead centres, folds and the end of the motion.
+    unit : str
+        Unit of length written at the axes.
+
+    Returns
+    -------
+    Chart
+
+    Raises
+    ------
+    GeometryError
+        Another order, an unknown point or link, or links that both turn and slide in one chart.
+    """
+    if order not in (0, 1, 2):
+        raise GeometryError(f"order = {order} must be 0, 1 or 2: displacement, velocity or acceleration")
+    if isinstance(of, str):
+        path = motion.point(of)
+        values = (path.position, path.velocity, path.acceleration)[order]
+        lines = [Line(motion.inputs, values[:, c], f"{of}, {'xy'[c]}", "ab"[c], _STYLES[c]) for c in (0, 1)]
+        return _over_input(motion, lines, order, unit, events)
+    links = _outputs(motion) if of is None else [of]
+    sliding = {_slides(motion, link) for link in links}
+    if len(sliding) > 1:
+        raise GeometryError(f"links {links} turn and slide, so they have no common axis; draw them one by one")
+    lines = []
+    for k, link in enumerate(links):
+        values = _coordinate(motion, link, order)
+        lines.append(Line(motion.inputs, values, f"link {link}", TRACE_COLOURS[k % 4], _STYLES[k % 4]))
+    return _over_input(motion, lines, order, unit if sliding.pop() else "rad", events)
+
+
+def _outputs(motion: Motion) -> list[int]:
+    """Undriven links jointed to the frame; sliding ones only if no link turns."""
+    mechanism = motion.mechanism
+    frame = mechanism.frame
+    driven = {d.link for d in mechanism.drivers} | {d.base for d in mechanism.drivers}
+    near = sorted({a + b - frame for a, b, _ in mechanism.graph.joints if frame in (a, b)} - driven)
+    near = near or [link for link in range(mechanism.graph.links) if link != frame]
+    turning = [link for link in near if not _slides(motion, link)]
+    return turning or near
+
+
+def _slides(motion: Motion, link: int) -> bool:
+    mechanism = motion.mechanism
+    if not 0 <= link < mechanism.graph.links:
+        raise GeometryError(f"link {link} does not exist; the links are 0..{mechanism.graph.links - 1}")
+    return any(
+        isinstance(joint, Prismatic) and {joint.a, joint.b} == {link, mechanism.frame} for joint in mechanism.joints
+    )
+
+
+def _coordinate(motion: Motion, link: int, order: int) -> Array:
+    """Angle of a link, or displacement along its guide on the frame, or a derivative."""
+    array = (motion.poses, motion.velocities, motion.accelerations)[order]
+    mechanism = motion.mechanism
+    if not _slides(motion, link):
+        return array[:, link, 2]
+    joint = mechanism.joint(link, mechanism.frame)
+    assert isinstance(joint, Prismatic)
+    on_frame = joint.a == mechanism.frame
+    angle = joint.angle_a if on_frame else joint.angle_b  # the link does not turn: its own angle is constant
+    moved = motion.point(link, joint.at_b if on_frame else joint.at_a)
+    values = (moved.position, moved.velocity, moved.acceleration)[order]
+    origin = np.array(joint.at_a if on_frame else joint.at_b) if order == 0 else np.zeros(2)
+    along = (values - origin) @ np.array([math.cos(angle), math.sin(angle)])
+    return np.asarray(along if on_frame else -along)
+
+
+def _over_input(motion: Motion, lines: list[Line], order: int, unit: str, events: bool) -> Chart:
+    name, per, in_pi = _axis(motion)
+    below = ("", f"/{per}", f"/{per}²")[order]
+    return Chart(
+        lines, name, f"{_WORDS[order]} [{unit}{below}]", marks=event_marks(motion) if events else (), in_pi=in_pi
+    )
+
+
+def _axis(motion: Motion) -> tuple[str, str, bool]:
+    """Label of the input axis, unit of the input, and whether to mark it in quarters of a turn."""
+    drivers = motion.mechanism.drivers
+    sliding = bool(drivers) and isinstance(motion.mechanism.joint(*drivers[0].pair), Prismatic)
+    reached = motion.inputs[motion.assembled]
+    wide = reached.size > 0 and float(np.ptp(reached)) >= 0.75 * math.pi
+    return ("driver displacement [length]", "length", False) if sliding else ("driver angle [rad]", "rad", wide)
+
+
+def event_marks(motion: Motion) -> list[Mark]:
+    """Upright lines at the events within the inputs; those that end the motion stand out."""
+    low, high = float(motion.inputs.min()), float(motion.inputs.max())
+    marks = []
+    for event in motion.events:
+        colour, style = _ENDS if event.ends_motion else _PASSES
+        if low <= event.input <= high:
+            label = f"{event.kind}: ends here" if event.ends_motion else event.kind
+            marks.append(Mark(event.input, label, colour, style))
+    return marks
+
+
+def transmission_chart(motion: Motion, least: float | None = None) -> Chart:
+    """Transmission angle of every dyad over the input.
+
+    Parameters
+    ----------
+    motion : Motion
+    least : float, optional
+        A bound to be drawn, radians.
+
+    Raises
+    ------
+    GeometryError
+        If no group of the mechanism has a transmission angle (no dyads with two modes).
+    """
+    angles = motion.transmission_angle()
+    if not angles:
+        raise GeometryError("no dyad with two assembly modes, so no transmission angle; draw the margins instead")
+    links = {step.group: ", ".join(map(str, step.links)) for step in motion.steps}
+    lines = [
+        Line(motion.inputs, values, f"links {links[group]}", TRACE_COLOURS[k % 4], _STYLES[k % 4])
+        for k, (group, values) in enumerate(angles.items())
+    ]
+    name, _, in_pi = _axis(motion)
+    bound = [] if least is None else [Line((), least, "bound", "jam", "--")]
+    return Chart(lines, name, "transmission angle [rad]", marks=event_marks(motion), levels=bound, in_pi=in_pi)
+
+
+def margin_chart(motion: Motion) -> Chart:
+    """Margin of every group over the input: 0 where two assembly modes meet.
+
+    Dyads: the square of the sine of the angle at the joint that closes them; larger groups: the determinant of the
+    reduced system, over its largest value.
+    """
+    name, _, in_pi = _axis(motion)
+    lines = []
+    for k, step in enumerate(step for step in motion.steps if step.group >= 0):
+        values = motion.margins[:, step.group]
+        if step.iterative and np.isfinite(values).any():
+            values = values / np.nanmax(np.abs(values))
+        label = f"links {', '.join(map(str, step.links))}"
+        lines.append(Line(motion.inputs, values, label, TRACE_COLOURS[k % 4], _STYLES[k % 4]))
+    if not lines:
+        raise GeometryError("the mechanism has drivers only, no group: there is no margin to draw")
+    zero = [Line((), 0.0, "", "jam", "-")]
+    return Chart(lines, name, "margin [1]", marks=event_marks(motion), levels=zero, in_pi=in_pi)
