@@ -9,11 +9,19 @@ from importlib import import_module
 from typing import Any
 
 _PUBLIC: dict[str, str] = {
+    "AssemblyCertificate": "assembly_modes",
+    "AssemblyCertificateBatch": "modes_batch",
+    "AssemblyVerdict": "assembly_modes",
     "FullTurnCertificate": "full_turn",
+    "ModeEnclosure": "assembly_modes",
     "MotionCertificate": "poses",
     "TurnVerdict": "full_turn",
     "Verdict": "poses",
     "certify": "poses",
+    "certify_assembly_modes": "assembly_modes",
+    "certify_assembly_modes_batch": "modes_batch",
+    "certify_direct": "assembly_modes",
+    "certify_direct_batch": "modes_batch",
     "certify_full_turn": "full_turn",
 }
 
