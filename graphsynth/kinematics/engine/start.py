@@ -11,6 +11,7 @@ from graphsynth.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program
+from graphsynth.kinematics.engine.triads import conditions, triad_modes
 
 __all__ = ["group_modes", "initial", "sign_table"]
 
@@ -76,8 +77,8 @@ def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array 
 def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     """All assembly modes found of the group of step ``k``, core poses (modes, core links, 3), sorted by angle.
 
-    Three distances between one core link and placed links: the explicit sextic, all modes.  Otherwise Newton from
-    many starts (estimated: modes may be missing).
+    One kept link held by three distances: the explicit sextic; by distances, lines and directions: the eliminant of
+    :mod:`.triads`; all modes in both cases.  Otherwise Newton from many starts (modes may be missing).
     """
     program = tracker.program
     row0, count = program.step_table[k, 1:3]
@@ -85,6 +86,9 @@ def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     step = program.steps[k]
     if len(step.core) == 1 and (kinds == codes.DIST).all():
         return _platform_modes(program, trace, k)
+    held = conditions(program, k, trace.X[0])
+    if held is not None:
+        return triad_modes(held, program.Lc)[:, None, :]
     return _searched_modes(tracker, trace, k)
 
 
