@@ -15,7 +15,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["LegSolution", "LegStatus", "PlatformLegs", "solve_leg"]
+__all__ = ["LegSolution", "LegStatus", "PlatformLegs", "length_constants", "solve_leg"]
 
 Array = NDArray[np.float64]
 
@@ -166,6 +166,18 @@ def sensitivity(S: ArrayLike, l2: ArrayLike) -> Array:
         return np.where(S > 0.0, 2.0 * np.asarray(l2) / S, math.inf)
 
 
+def length_constants(l1: Array, l2: Array) -> Array:
+    """Constants of a leg for the kernels, shape (..., 8).
+
+    The pairs ``l1^2 - l2^2``, ``(l1 + l2)^2``, ``(l1 - l2)^2`` (value, rounding error), then ``l1 + l2``, ``|l1 - l2|``.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        (s, sl), (d, dl) = _two_sum(l1, l2), _two_sum(l1, -l2)
+        (p, e), (q, f), (r, g) = _two_product(s, d), _two_product(s, s), _two_product(d, d)
+        parts = p, e + (s * dl + sl * d), q, f + 2.0 * s * sl, r, g + 2.0 * d * dl, s, np.abs(d)
+    return np.ascontiguousarray(np.stack(parts, axis=-1))
+
+
 class PlatformLegs:
     """Three legs of a platform, solved in bulk by compiled code.
 
@@ -181,14 +193,10 @@ class PlatformLegs:
     """
 
     def __init__(self, D: Sequence[complex], b: Sequence[complex], l1: Sequence[float], l2: Sequence[float]) -> None:
-        from graphsynth.kinematics.kernels.leg import lengths
-
         self._D, self._b = np.array(D, dtype=np.complex128), np.array(b, dtype=np.complex128)
         self._l1, self._l2 = np.array(l1, dtype=np.float64), np.array(l2, dtype=np.float64)
         self._flat = self._D.view(np.float64).reshape(3, 2), self._b.view(np.float64).reshape(3, 2)
-        self._constants = np.empty((3, 8))
-        for k in range(3):
-            lengths(self._l1[k], self._l2[k], self._constants[k])
+        self._constants = length_constants(self._l1, self._l2)
 
     def solve(self, pose: Array, sigma: Array, modes: int) -> tuple[Array, NDArray[np.int8]]:
         """Angles (n, modes, 3) and status (n, 3) of poses (n, 3).

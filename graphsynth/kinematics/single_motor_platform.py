@@ -6,7 +6,7 @@ Default dimensions: MOCK-RECT (millimetres), all rational in the frame of a leg.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,9 +18,10 @@ from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite, finite_array, positive, sign
 from graphsynth.kinematics.drive import DriveTurn, FourBarDrive
 from graphsynth.kinematics.gears import GearTrain
-from graphsynth.kinematics.motion import BranchLabel, Event, Motion
+from graphsynth.kinematics.leg import length_constants
+from graphsynth.kinematics.motion import BranchLabel, Event, Monodromy, Motion, Sweep, TurnBatch
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.tracking import Tracked, correct, track
+from graphsynth.kinematics.tracking import BranchEnd, Tracked, track
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -31,8 +32,8 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _METHOD = "continuation with step control, compared with all assembly modes; estimated, not certified"
-_CLOSED = 1e-9
-_TURNS = 6
+_CLOSED = 1e-9  # scaled distance
+_SAME = 1e-6  # scaled distance below which two poses are the same mode
 
 _BARRIERS = {
     "lock": ("drive lock", "drive {0} locks: coupler and rocker in line; the crank cannot pass"),
@@ -179,29 +180,205 @@ class SingleMotorPlatform:
         GeometryError
             If the drives cannot be assembled there, the home pose does not close, or the branch ends on the way.
         """
-        offset = np.array(self.frame_angle) + np.array(self.delta)
+        tracked = self._follow(np.array([finite("psi", psi)]), None, np.inf, accelerations=False)
+        return np.asarray(tracked.pose[0, 0])
 
-        def grown(scale: float) -> tuple[Array, Array]:
-            pairs = [drive.growth(psi, scale) for drive in self.drives]
-            return np.array([p for p, _ in pairs]) + offset, np.array([rate for _, rate in pairs])
+    @cached_property
+    def _machine(self) -> Array:
+        """Row per leg of what the kernel needs; see ``kernels.turn``."""
+        turn = _directions((self.frame_angle[0] + self.delta[0], self.frame_angle[1] + self.delta[1],
+                            self.frame_angle[2] + self.delta[2]))  # fmt: skip
+        constants, P = length_constants(np.array(self.rocker), np.array(self.coupler)), self.platform
+        rows = []
+        for k, drive in enumerate(self.drives):
+            w, D, b = drive.axis - drive.pivot, P.D[k], P.b[k]
+            bell = (turn[k].real, turn[k].imag, self.frame_angle[k] + self.delta[k])
+            rows.append([w.real, w.imag, drive.crank, drive.phase, drive.rocker, drive.tau, *constants[k, :6], *bell,
+                         D.real, D.imag, P.l1[k], b.real, b.imag, P.l2[k]])  # fmt: skip
+        return np.array(rows)
 
-        theta, _ = grown(0.0)
-        if not np.isfinite(theta).all():
-            raise GeometryError("a drive cannot be assembled at zero crank length; check |OD|, coupler and rocker")
-        found = correct(self.platform, np.array(self.home), theta, self.Lc)
-        if found is None or found.first > 0.1:
+    def _follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
+        """Track the home branch, or the one of ``start``; raise `GeometryError` if there is no such branch."""
+        guess = np.array(self.home) if start is None else finite_array("start", start).reshape(3)
+        tracked = track(
+            self._machine[None], psi, np.array([stop]), guess[None], self.Lc,
+            grown=start is None, accelerations=accelerations,
+        )  # fmt: skip
+        self._require_start(BranchEnd(int(tracked.status[0])), float(psi[0]), float(tracked.end[0, 0]))
+        return tracked
+
+    def _require_start(self, status: BranchEnd, psi: float, scale: float) -> None:
+        if status is BranchEnd.NO_HOME:
+            reach = np.abs(np.array(self.axis) - np.array(self.pivot))
+            sides = np.array(self.rocker), np.array(self.coupler)
+            if bool(np.any((reach > sides[0] + sides[1]) | (reach < np.abs(sides[0] - sides[1])))):
+                raise GeometryError("a drive cannot be assembled at zero crank length; check |OD|, coupler and rocker")
             raise GeometryError(f"home = {self.home} is not close to an assembled pose; give a pose near the home pose")
-        tracked = track(self.platform, grown, found.pose, np.linspace(0.0, 1.0, 5), self.Lc)
-        if tracked.failed_at is not None:
+        if status is BranchEnd.HOME_ENDS:
             raise GeometryError(
-                f"the home branch ends at {tracked.failed_at:.6g} of the crank lengths {self.crank} at psi = {psi}; "
-                "use shorter cranks"
+                f"the home branch ends at {scale:.6g} of the crank lengths {self.crank} at psi = {psi}; use shorter cranks"
             )
-        return np.asarray(tracked.pose[-1])
+        if status is BranchEnd.NO_START:
+            raise GeometryError(f"start is not close to an assembled pose at psi = {psi}; take one of all_poses(psi)")
 
-    def _input(self, psi: float) -> tuple[Array, Array]:
-        state = self.drive(psi)
-        return state.theta, state.theta1
+    def sweep(self, psi: ArrayLike, start: ArrayLike | None = None, *, accelerations: bool = False) -> Sweep:
+        """Follow one branch through increasing wheel angles, fast: no comparison with the other modes, no events inside.
+
+        Parameters
+        ----------
+        psi : array_like, shape (n,)
+            Increasing wheel angles, radians; any number of turns.
+        start : array_like, shape (3,), optional
+            A pose close to the branch at the first angle; the home branch if omitted.
+        accelerations : bool
+            Also second derivatives with respect to psi.
+
+        Returns
+        -------
+        Sweep
+            Estimated, not certified.  Rows beyond the end of the branch are NaN; ``reason`` says why it ended.
+
+        Raises
+        ------
+        GeometryError
+            Angles that do not increase, a start that is no assembled pose, a home branch that ends before psi[0].
+
+        Examples
+        --------
+        >>> sweep = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).sweep([0.0, 0.5, 1.0])
+        >>> sweep.complete, sweep.pose[0].round(6).tolist()
+        (True, [0.672631, -5.007799, 0.053385])
+        """
+        angles = _increasing(np.asarray(psi, dtype=np.float64))
+        barrier = self._barrier(float(angles[0]), float(angles[-1]))
+        tracked = self._follow(angles, start, np.inf if barrier is None else barrier.psi, accelerations=accelerations)
+        status = BranchEnd(int(tracked.status[0]))
+        reason = {BranchEnd.SINGULAR: _SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
+        return Sweep(
+            psi=angles, pose=tracked.pose[0], velocity=tracked.velocity[0], theta=tracked.theta[0],
+            theta_velocity=tracked.theta1[0], determinant=tracked.determinant[0],
+            acceleration=tracked.acceleration[0] if accelerations else None,
+            theta_acceleration=tracked.theta2[0] if accelerations else None,
+            reached=int(tracked.reached[0]), complete=status is BranchEnd.COMPLETE,
+            end=(float(tracked.end[0, 0]), *map(float, tracked.end[0, 1:])), reason=reason.get(status, ""),
+        )  # fmt: skip
+
+    def full_turn_batch(
+        self,
+        crank: ArrayLike,
+        phase: ArrayLike | None = None,
+        coupler: ArrayLike | None = None,
+        samples: int | ArrayLike = 361,
+        *,
+        accelerations: bool = False,
+    ) -> TurnBatch:
+        """Home branches of many dimension sets over one turn; everything not given is that of this mechanism.
+
+        Parameters
+        ----------
+        crank, phase, coupler : array_like, shape (N, 3)
+            Crank lengths, keying phases (radians) and coupler lengths of N sets.
+        samples : int or array_like
+            Number of wheel angles over [0, 2 pi], or increasing angles (radians).
+        accelerations : bool
+            Also second derivatives with respect to psi.
+
+        Returns
+        -------
+        TurnBatch
+            Estimated, not certified.  A set whose turn cannot be completed has NaN from there on, with status and place.
+
+        Raises
+        ------
+        GeometryError
+            Numbers that are not finite, lengths that are not positive, shapes that do not fit.
+
+        Examples
+        --------
+        >>> batch = SingleMotorPlatform().full_turn_batch([[10, 5, 0], [31, 31, 31]], samples=9)
+        >>> [BranchEnd(status).name for status in batch.status.tolist()]
+        ['COMPLETE', 'DRIVE_ENDS']
+        """
+        psi = _increasing(samples)
+        l_B, psi0, l_BC = self._sets(crank, phase, coupler)
+        machines = np.repeat(self._machine[None], len(l_B), axis=0)
+        machines[:, :, 2], machines[:, :, 3] = l_B, psi0 - np.array(self.frame_angle)
+        if coupler is not None:
+            machines[:, :, 6:12] = length_constants(np.broadcast_to(np.array(self.rocker), l_BC.shape), l_BC)[..., :6]
+        stops = self._stops(l_B, psi0, l_BC, psi)
+        guess = np.repeat(np.array(self.home)[None], len(l_B), axis=0)
+        tracked = track(machines, psi, stops, guess, self.Lc, grown=True, accelerations=accelerations)
+        return TurnBatch(
+            psi=psi, pose=tracked.pose, velocity=tracked.velocity, theta=tracked.theta, theta_velocity=tracked.theta1,
+            determinant=tracked.determinant, acceleration=tracked.acceleration if accelerations else None,
+            theta_acceleration=tracked.theta2 if accelerations else None, status=tracked.status.astype(np.int8),
+            reached=tracked.reached, end=tracked.end,
+            closure_error=np.asarray(self._distance(tracked.pose[:, -1], tracked.pose[:, 0])),
+        )  # fmt: skip
+
+    def _sets(self, crank: ArrayLike, phase: ArrayLike | None, coupler: ArrayLike | None) -> tuple[Array, Array, Array]:
+        l_B = np.atleast_2d(finite_array("crank", crank))
+        given = {"crank": l_B}
+        for name, values in (("phase", phase), ("coupler", coupler)):
+            given[name] = np.atleast_2d(finite_array(name, getattr(self, name) if values is None else values))
+        for name, array in given.items():
+            if array.ndim != 2 or array.shape[1] != 3 or len(array) not in (1, len(l_B)):
+                raise GeometryError(f"{name} has shape {array.shape}; give ({len(l_B)}, 3), three per dimension set")
+            least = float(array.min())
+            if name != "phase" and (least < 0.0 or (name == "coupler" and least == 0.0)):
+                raise GeometryError(f"{name} = {least} must be {'positive' if name == 'coupler' else 'zero or more'}")
+        first, second, third = (np.broadcast_to(array, l_B.shape) for array in given.values())
+        return first, second, third
+
+    def _stops(self, l_B: Array, psi0: Array, l_BC: Array, psi: Array) -> Array:
+        """First wheel angle that each set cannot pass: infinite where all its cranks turn fully."""
+        distance, l_CD = np.abs(np.array(self.axis) - np.array(self.pivot)), np.array(self.rocker)
+        slack = 1e-12 * (l_CD + l_BC + l_B)
+        free = (distance + l_B < l_CD + l_BC - slack) & (np.abs(distance - l_B) > np.abs(l_CD - l_BC) + slack)
+        stops = np.full(len(l_B), np.inf)
+        for i in np.flatnonzero(~free.all(axis=1)):  # decided exactly, one by one
+            one = replace(self, crank=tuple(l_B[i]), phase=tuple(psi0[i]), coupler=tuple(l_BC[i]))
+            barrier = one._barrier(float(psi[0]), float(psi[-1]))
+            stops[i] = np.inf if barrier is None else barrier.psi
+        return stops
+
+    def monodromy(self, samples: int | ArrayLike = 361) -> Monodromy:
+        """Follow all assembly modes over one turn and say which mode becomes which.
+
+        Returns
+        -------
+        Monodromy
+            Estimated, not certified.  A mode whose branch ends has the number -1 and a reason.
+
+        Examples
+        --------
+        >>> SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).monodromy().permutation
+        (0, 1)
+        """
+        psi = _increasing(samples)
+        modes = self.all_poses(float(psi[0]))
+        barrier = self._barrier(float(psi[0]), float(psi[-1]))
+        stop = np.inf if barrier is None else barrier.psi
+        tracked = track(
+            np.repeat(self._machine[None], len(modes), axis=0), psi, np.full(len(modes), stop), modes, self.Lc,
+            grown=False, accelerations=False,
+        )  # fmt: skip
+        permutation, reasons = [], []
+        for i in range(len(modes)):
+            status, reason, target = BranchEnd(int(tracked.status[i])), "", -1
+            if status is BranchEnd.COMPLETE:
+                distance = self._distance(modes, tracked.pose[i, -1])
+                nearest = int(np.argmin(distance))
+                target = nearest if distance[nearest] <= _SAME else -1
+                reason = "" if target >= 0 else "the pose at the end is none of the modes at the start"
+            elif status is BranchEnd.DRIVE_ENDS and barrier is not None:
+                reason = barrier.statement
+            else:
+                reason = _SINGULAR
+            permutation.append(target)
+            reasons.append(reason)
+        ends = tuple(math.nan if target >= 0 else float(at) for target, at in zip(permutation, tracked.end[:, 0]))
+        return Monodromy(modes, tuple(permutation), ends, tuple(reasons))
 
     def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> Motion:
         """Follow one branch over a turn of the wheels, with events and a closure test.
@@ -221,37 +398,35 @@ class SingleMotorPlatform:
         """
         begin = perf_counter()
         psi = _increasing(samples)
-        first = self.home_pose(float(psi[0])) if start is None else self._given(start, float(psi[0]))
         barrier = self._barrier(float(psi[0]), float(psi[-1]))
-        passable = psi if barrier is None else psi[psi < barrier.psi]
-        tracked = track(self.platform, self._input, first, passable, self.Lc)
-        state = self.drive(tracked.parameter)
-        theta = np.unwrap(state.theta, axis=0)
-        pose = tracked.pose
-        velocity, acceleration = self.platform.accelerations(pose, theta, state.theta1, state.theta2)
-        JX, leg = self.platform.jacobians(pose, theta)
+        tracked = self._follow(psi, start, np.inf if barrier is None else barrier.psi, accelerations=True)
+        reached = int(tracked.reached[0])
+        pose, theta, determinant = (
+            tracked.pose[0, :reached],
+            tracked.theta[0, :reached],
+            tracked.determinant[0, :reached],
+        )
+        _, leg = self.platform.jacobians(pose, theta)
         gap, rank, mismatch = self._compare(pose, theta)
-        complete = tracked.failed_at is None and barrier is None
-        error, period = self._closure(psi, pose, complete)
-        events = self._events(tracked, barrier, leg) + mismatch_events(tracked.parameter, mismatch)
-        determinant = np.linalg.det(JX)
+        complete = int(tracked.status[0]) == BranchEnd.COMPLETE
+        monodromy, error, period = None, math.nan, 0
+        if complete and math.isclose(psi[-1] - psi[0], math.tau, rel_tol=1e-12):
+            monodromy, error = self.monodromy(psi), float(self._distance(pose[-1], pose[0]))
+            nearest = int(np.argmin(self._distance(monodromy.modes, pose[0])))
+            period = monodromy.periods[nearest]
+        events = self._events(psi, tracked, barrier, leg) + mismatch_events(psi, mismatch)
         sigma = (int(np.sign(leg[0, 0])), int(np.sign(leg[0, 1])), int(np.sign(leg[0, 2])))
         scale = max(*self.platform.l1, *self.platform.l2) ** 2
         return Motion(
-            psi=tracked.parameter, pose=pose, velocity=velocity, acceleration=acceleration, theta=theta,
-            determinant=determinant, leg=leg, drive=state.h_phi, gap=gap,
+            psi=psi[:reached], pose=pose, velocity=tracked.velocity[0, :reached],
+            acceleration=tracked.acceleration[0, :reached], theta=theta,
+            determinant=determinant, leg=leg, drive=self.drive(psi[:reached]).h_phi, gap=gap,
             residual=float(np.abs(self.platform.closure(pose, theta)).max()) / scale,
             complete=complete and not mismatch.any(), closed=period > 0, closure_error=error, period=period,
             events=tuple(sorted(events, key=lambda event: (event.psi, event.ends_motion))),
             label=BranchLabel(self.tau, sigma, int(np.sign(determinant[0])), rank, 0),
-            Lc=self.Lc, method=_METHOD, seconds=perf_counter() - begin,
+            Lc=self.Lc, method=_METHOD, seconds=perf_counter() - begin, monodromy=monodromy,
         )  # fmt: skip
-
-    def _given(self, start: ArrayLike, psi: float) -> Array:
-        found = correct(self.platform, finite_array("start", start).reshape(3), self.drive(psi).theta, self.Lc)
-        if found is None or found.first > 0.1:
-            raise GeometryError(f"start is not close to an assembled pose at psi = {psi}; take one of all_poses(psi)")
-        return found.pose
 
     def all_poses(self, psi: float) -> Array:
         """All assembly modes for the drive branches of this mechanism at ``psi``, shape (m, 3)."""
@@ -260,17 +435,12 @@ class SingleMotorPlatform:
     def _compare(self, pose: Array, theta: Array) -> tuple[Array, int, NDArray[np.bool_]]:
         """Distance to the nearest other mode, rank of alpha at the start, and samples where no mode matches."""
         batch = self.platform.direct_batch(theta)
-        gap, mismatch, rank = np.full(len(pose), np.inf), np.zeros(len(pose), dtype=bool), 0
-        for index in range(len(pose)):
-            modes = batch.poses[batch.problem == index]
-            if batch.near_double_root[index]:
-                modes = self.platform.direct(theta[index]).poses
-            distance = np.sort(self._distance(modes, pose[index]))
-            mismatch[index] = distance.size == 0 or distance[0] > 1e-6
-            gap[index] = distance[1] if distance.size > 1 else np.inf
-            if index == 0 and distance.size:
-                rank = int(np.argmin(self._distance(modes, pose[0])))
-        return gap, rank, mismatch
+        distance = np.full((len(pose), max(6, int(batch.counts.max()))), np.inf)
+        place = np.arange(len(batch.problem)) - np.repeat(np.cumsum(batch.counts) - batch.counts, batch.counts)
+        distance[batch.problem, place] = self._distance(batch.poses, pose[batch.problem])
+        rank = int(np.argmin(distance[0]))
+        distance.sort(axis=1)
+        return distance[:, 1], rank, distance[:, 0] > _SAME
 
     def _distance(self, poses: Array, pose: Array) -> Array:
         """``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2) / Lc`` with the angle taken on the circle."""
@@ -278,25 +448,11 @@ class SingleMotorPlatform:
         turn = np.angle(np.exp(1j * d[..., 2]))
         return np.asarray(np.sqrt((d[..., 0] ** 2 + d[..., 1] ** 2) / self.Lc**2 + turn**2))
 
-    def _closure(self, psi: Array, pose: Array, complete: bool) -> tuple[float, int]:
-        """Distance after one turn and the number of turns until closure (0 if it does not close)."""
-        if not complete or not math.isclose(psi[-1] - psi[0], math.tau, rel_tol=1e-12):
-            return math.nan, 0
-        error = float(self._distance(pose[-1], pose[0]))
-        last, turns = pose[-1], 1
-        while self._distance(last, pose[0]) > _CLOSED and turns < _TURNS:
-            again = track(self.platform, self._input, last, psi, self.Lc)
-            if again.failed_at is not None:
-                return error, 0
-            last, turns = again.pose[-1], turns + 1
-        return error, turns if self._distance(last, pose[0]) <= _CLOSED else 0
-
-    def _events(self, tracked: Tracked, barrier: Event | None, leg: Array) -> list[Event]:
+    def _events(self, psi: Array, tracked: Tracked, barrier: Event | None, leg: Array) -> list[Event]:
         events: list[Event] = []
-        psi, end = tracked.parameter, float(tracked.parameter[-1])
-        if tracked.failed_at is not None:
-            end = tracked.failed_at
-            x, y, alpha = (float(value) for value in tracked.last)
+        end, status = float(psi[-1]), BranchEnd(int(tracked.status[0]))
+        if status is BranchEnd.SINGULAR:
+            end, x, y, alpha = (float(value) for value in tracked.end[0])
             events.append(Event("platform singular", end, 0, True, _SINGULAR, (x, y, alpha)))
         elif barrier is not None:
             end = barrier.psi
@@ -309,9 +465,20 @@ class SingleMotorPlatform:
                     events.append(Event("rocker dead point", at, number, False, text))
         for index, k in zip(*np.nonzero(np.sign(leg[1:]) != np.sign(leg[:-1]))):
             text = f"leg {k + 1} passes its boundary: the working mode changes"
-            at = _crossing(psi[index : index + 2], leg[index : index + 2, k])
+            at = self._crossing(psi[index : index + 2], tracked.pose[0, index], int(k))
             events.append(Event("leg boundary", at, int(k) + 1, False, text))
         return events
+
+    def _crossing(self, psi: Array, pose: Array, leg: int) -> float:
+        """Wheel angle at which ``JT`` of a leg vanishes between two samples, by refinement of the sampling."""
+        low, high = float(psi[0]), float(psi[1])
+        for _ in range(4):
+            fine = self._follow(np.linspace(low, high, 33), pose, np.inf, accelerations=False)
+            values = self.platform.jacobians(fine.pose[0], fine.theta[0])[1][:, leg]
+            change = int(np.argmax(np.sign(values[1:]) != np.sign(values[:-1])))
+            low, high = low + (high - low) * change / 32.0, low + (high - low) * (change + 1) / 32.0
+            pose = fine.pose[0, change]
+        return low + (high - low) * float(values[change] / (values[change] - values[change + 1]))
 
     def _barrier(self, start: float, stop: float) -> Event | None:
         """First drive lock or change point in (start, stop]: no continuation may step over it."""
@@ -340,11 +507,6 @@ def mismatch_events(psi: Array, mismatch: NDArray[np.bool_]) -> list[Event]:
     """One event for every sample at which the tracked pose is not among the computed assembly modes."""
     text = "the tracked pose is not one of the computed assembly modes"
     return [Event("mode mismatch", float(psi[k]), 0, False, text) for k in np.flatnonzero(mismatch)]
-
-
-def _crossing(psi: Array, value: Array) -> float:
-    """Zero of the chord between two samples (estimated)."""
-    return float(psi[0] - value[0] * (psi[1] - psi[0]) / (value[1] - value[0]))
 
 
 def _increasing(samples: int | ArrayLike) -> Array:

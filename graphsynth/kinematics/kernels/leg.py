@@ -24,7 +24,7 @@ TANGENT = 0.41421356237309503  # tan(pi / 8)
 
 @intrinsic
 def fma(typingctx, a, b, c):
-    """``a b + c`` with one rounding."""
+    """Return ``a b + c`` with one rounding."""
     signature = types.float64(types.float64, types.float64, types.float64)
 
     def codegen(context, builder, signature, args):
@@ -68,16 +68,8 @@ def angle_of(y, x):
 
 
 @njit(cache=True, error_model="numpy")
-def two_sum(a, b):
-    """Rounded sum and its rounding error."""
-    s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
-
-
-@njit(cache=True, error_model="numpy")
 def cross_sum(a, b, c, d):
-    """``a b + c d``, both products and their sum compensated."""
+    """Return ``a b + c d``, both products and their sum compensated."""
     p = a * b
     q = c * d
     s = p + q
@@ -106,22 +98,8 @@ def add_pair(a, al, b, bl):
 
 
 @njit(cache=True, error_model="numpy")
-def lengths(l1, l2, out):
-    """Pairs ``l1^2 - l2^2``, ``(l1 + l2)^2``, ``(l1 - l2)^2`` and ``l1 + l2``, ``|l1 - l2|`` into ``out[0:8]``."""
-    s, sl = two_sum(l1, l2)
-    d, dl = two_sum(l1, -l2)
-    p = s * d
-    out[0], out[1] = p, fma(s, d, -p) + (s * dl + sl * d)
-    p = s * s
-    out[2], out[3] = p, fma(s, s, -p) + 2.0 * s * sl
-    p = d * d
-    out[4], out[5] = p, fma(d, d, -p) + 2.0 * d * dl
-    out[6], out[7] = s, abs(d)
-
-
-@njit(cache=True, error_model="numpy")
 def solve(u, v, c0, c1, c2, c3, c4, c5):
-    """Squared distance, C, P1, P2 of a leg that ends at (u, v); the constants are those of `lengths`."""
+    """Squared distance, C, P1, P2 of a leg that ends at (u, v); the constants are the first six of `length_constants`."""
     r, rl = square(u, v)
     C = add_pair(r, rl, c0, c1)
     P1 = add_pair(c2, c3, -r, -rl)
@@ -167,14 +145,13 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
                 v[i] = pose[start + i, 1] + (cs[i] * by + sn[i] * bx) - dy
                 sg[i] = sigma[(start + i) * step, k]
             reach(u, v, k, m, consts, r, C, P1, P2, mark)
-            for i in range(m):
-                s = math.sqrt(P1[i] * P2[i])
-                a, c = sg[i] * u[i], sg[i] * v[i]
-                plus[i] = angle_of(cross_sum(v[i], C[i], a, s), cross_sum(u[i], C[i], -c, s))
-            if modes > 1:
+            for side in range(2 if modes > 1 else 1):
+                chosen = minus if side == 1 else plus
                 for i in range(m):
                     s = math.sqrt(P1[i] * P2[i])
-                    minus[i] = angle_of(cross_sum(v[i], C[i], -u[i], s), cross_sum(u[i], C[i], v[i], s))
+                    turn = -1.0 if side == 1 else sg[i]
+                    a, c = turn * u[i], turn * v[i]
+                    chosen[i] = angle_of(cross_sum(v[i], C[i], a, s), cross_sum(u[i], C[i], -c, s))
             for i in range(m):
                 status[start + i, k] = np.int8(mark[i])
                 hard += 1 if mark[i] == 9.0 else 0

@@ -248,10 +248,6 @@ def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
             if kind[j] == 0:
                 continue
             low = -math.pi + 2.0 * HALF * j
-            if kind[j] == 1 and count < 6:
-                roots[count] = bracketed(g, low, low + 2.0 * HALF, value[j], value[j + 1])
-                count += 1
-                continue
             count, work, stuck = search(
                 g, low, low + 2.0 * HALF, value[j], value[j + 1], eta, third, stack, roots, count, work
             )
