@@ -22,8 +22,8 @@ def dimensioned(problem: Problem, x: Array) -> Mechanism | None:
     """Return the mechanism of a vector, or None if it has no pose at the first input.
 
     Every moving link's frame has its origin in the link's first joint and its x axis towards the second.  The fixed
-    frame is that of the target's coordinates; without such, its origin is the driven joint and its x axis points to the
-    next joint of the frame.  The law of a turning driver begins at the angle of the crank, so that inputs begin at 0.
+    frame is that of the target's coordinates; without such, its origin is the driven joint and another joint of the
+    frame lies on its x axis.  The law of a turning driver begins at the angle of the crank, so that inputs begin at 0.
     """
     outcome = problem.evaluate(x[None])
     frames = outcome.frames0[0]
@@ -58,12 +58,15 @@ def _world(frames: Array, link: int, local: Array) -> complex:
 
 
 def _placement(problem: Problem, frames: Array, table: Array) -> tuple[complex, complex]:
-    """Origin in the driven joint, x axis to the other fixed joint; a line goal has a crank of length 1."""
+    """Origin in the driven joint, the other fixed joint on the x axis, upright; a line goal has a crank of length 1."""
     graph = problem.design.graph
     z = [_world(frames, graph.joints[k].a, table[k, 0:2]) for k in problem.design.fixed]
     if len(z) < 2 or z[1] == z[0]:
         return 1.0 + 0j, 0j
     s = abs(z[1] - z[0]) / (z[1] - z[0])
+    upright = problem.sketch[list(problem.design.fixed)]
+    if problem.fit is None and upright[1, 0] < upright[0, 0]:
+        s = -s  # as in the sketch, with the frame below
     if problem.fit is not None and isinstance(problem.goals.target, LineGoal):
         s = s / float(problem.crank(table[None, :, 0:2])[0])
     return s, -s * z[0]

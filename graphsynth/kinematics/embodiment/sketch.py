@@ -29,6 +29,10 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
 _STEPS = 60
+#: Springs of polygons over those of bars: plates are to be nearly regular.
+_STIFF = 3.0
+#: Trials of a step, each with the offending vertices moved less.
+_RETRIES = 4
 #: Least area of a triangle of the drawing, as a share of the square of the mean side.
 _FLAT = 0.04
 
@@ -139,7 +143,7 @@ def _best_outer(
         if (graph.frame is not None and shared < 2) or len(outer) < longest - 1:
             continue
         places = _draw(graph, outer, loops[:k] + loops[k + 1 :], polygons)
-        room = (_room(places), -float(k))
+        room = (_room(places, polygons), -float(k))
         if best is None or room > best[0]:
             best = room, JointLayout(graph, places, polygons, True)
     if best is None:  # the frame is on short loops only
@@ -149,10 +153,14 @@ def _best_outer(
     return best
 
 
-def _room(places: Array) -> float:
-    """Smallest distance of two joints over the size of the picture."""
+def _room(places: Array, polygons: tuple[tuple[int, ...], ...]) -> float:
+    """Smallest distance of two joints, or height of a plate, over the size of the picture."""
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
-    return float(apart[np.triu_indices(len(places), 1)].min() / apart.max())
+    least = apart[np.triu_indices(len(places), 1)].min()
+    corners = np.array([c for p in polygons if len(p) > 2 for c in _corners(p)], dtype=np.intp).reshape(-1, 3)
+    longest = apart[corners, np.roll(corners, 1, axis=1)].max(axis=1)
+    heights = np.abs(_areas(places, corners)) / longest
+    return float(min(least, heights.min(initial=np.inf)) / apart.max())
 
 
 def _draw(
@@ -164,7 +172,9 @@ def _draw(
     places = _tutte(count + len(inner), np.array(sides + spokes), outer)
     triangles = [(count + h, a, b) for h, loop in enumerate(inner) for a, b in zip(loop, [*loop[1:], loop[0]])]
     corners = [c for around in (outer, *(p for p in polygons if len(p) > 2)) for c in _corners(around)]
-    places = _even_out(places, np.array(sides), count, np.array(triangles + corners))
+    stiff = {pair for p in polygons if len(p) > 2 for pair in _sides((p,))}
+    stiffness = np.array([_STIFF if side in stiff else 1.0 for side in sides])
+    places = _even_out(places, (np.array(sides), stiffness), count, np.array(triangles + corners))
     return _upright(graph, places[:count], outer)
 
 
@@ -198,19 +208,24 @@ def _areas(places: Array, triangles: IntArray) -> Array:
     return np.asarray((q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0]))
 
 
-def _even_out(places: Array, sides: IntArray, joints: int, triangles: IntArray) -> Array:
+def _even_out(places: Array, springs: tuple[IntArray, Array], joints: int, triangles: IntArray) -> Array:
     """Springs along the sides, repulsion between all joints; faces keep their orientation."""
+    sides, _ = springs
     mean = float(np.hypot(*(places[sides[:, 0]] - places[sides[:, 1]]).T).mean())
     places = places / mean
     sense = np.sign(_areas(places, triangles))
     floor = np.minimum(np.abs(_areas(places, triangles)), _FLAT)
     step = 0.15
     for _ in range(_STEPS):
-        move = _force(places, sides, joints)
+        move = _force(places, springs, joints)
         size = float(np.hypot(*move.T).max())
-        trial = places + move * min(step, 0.2 / max(size, 1e-9))
-        if (_areas(trial, triangles) * sense >= floor).all():
-            places, step = trial, min(0.3, step * 1.2)
+        move *= min(step, 0.2 / max(size, 1e-9))
+        for _ in range(_RETRIES):
+            bad = _areas(places + move, triangles) * sense < floor
+            if not bad.any():
+                places, step = places + move, min(0.3, step * 1.2)
+                break
+            move[np.unique(triangles[bad])] *= 0.3
         else:
             step *= 0.5
         if step < 1e-3:
@@ -218,7 +233,8 @@ def _even_out(places: Array, sides: IntArray, joints: int, triangles: IntArray) 
     return places
 
 
-def _force(places: Array, sides: IntArray, joints: int) -> Array:
+def _force(places: Array, springs: tuple[IntArray, Array], joints: int) -> Array:
+    sides, stiffness = springs
     gap = places[:, None] - places[None]
     square = (gap**2).sum(axis=2) + np.eye(len(places))
     weight = 0.35 / square**2
@@ -227,7 +243,7 @@ def _force(places: Array, sides: IntArray, joints: int) -> Array:
     move = (gap * weight[:, :, None]).sum(axis=1)
     d = places[sides[:, 1]] - places[sides[:, 0]]
     length = np.hypot(*d.T)
-    pull = d * (1.0 - 1.0 / np.maximum(length, 1e-9))[:, None]
+    pull = d * (stiffness * (1.0 - 1.0 / np.maximum(length, 1e-9)))[:, None]
     np.add.at(move, sides[:, 0], pull)
     np.add.at(move, sides[:, 1], -pull)
     return np.asarray(move)
@@ -238,7 +254,7 @@ def _upright(graph: MechanismGraph, places: Array, outer: list[int]) -> Array:
     places = places - places.mean(axis=0)
     own = [k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)]
     z = places[:, 0] + 1j * places[:, 1]
-    pairs = [(p, q) for p, q in zip(outer, [*outer[1:], outer[0]]) if p in own and q in own]
+    pairs = [(p, q) for p, q in zip(outer, [*outer[1:], *outer[:1]]) if p in own and q in own]
     if pairs:
         direction = z[pairs[0][1]] - z[pairs[0][0]]
         z = z * np.conj(direction) / abs(direction)
@@ -280,7 +296,7 @@ def _by_forces(graph: MechanismGraph) -> JointLayout:
     # symmetric graphs leave joints in one place: part them by a fixed small shift
     places += 0.1 * np.column_stack([np.cos(2.4 * np.arange(count)), np.sin(2.4 * np.arange(count))])
     for k in range(4 * _STEPS):
-        move = _force(places, pairs, count)
+        move = _force(places, (pairs, np.ones(len(pairs))), count)
         size = float(np.hypot(*move.T).max())
         places = places + move * min(0.15, 0.2 * (1.0 - k / (4 * _STEPS)) / max(size, 1e-9))
     places = _upright(graph, places, [])
