@@ -1,8 +1,8 @@
 """Direct problem of the planar platform: every pose for given anchors and leg lengths (3-RPR).
 
 The compiled solver (``kernels.modes``) isolates the real roots of the sextic with bounds on derivatives and polishes
-every pose on the closure equations.  What it cannot decide in double precision it flags; `escalation` then works with 50
-digits.
+every pose on the closure equations.  What it cannot decide in double precision it flags; `escalation` then works with
+50 digits.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def _closure(d: Complex, lengths: Array) -> Array:
 def _rows(name: str, values: ArrayLike, dtype: type) -> NDArray[Any]:
     """Finite array (n, 3) as the kernels need it: contiguous and writeable."""
     try:
-        array = np.atleast_2d(np.asarray(values, dtype=dtype))
+        array: NDArray[Any] = np.atleast_2d(np.asarray(values, dtype=dtype))
     except (TypeError, ValueError) as error:
         raise GeometryError(f"{name} is not an array of numbers: {error}") from error
     if array.ndim != 2 or array.shape[1] != 3:

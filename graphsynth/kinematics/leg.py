@@ -169,7 +169,7 @@ def sensitivity(S: ArrayLike, l2: ArrayLike) -> Array:
 def length_constants(l1: Array, l2: Array) -> Array:
     """Constants of a leg for the kernels, shape (..., 8).
 
-    The pairs ``l1^2 - l2^2``, ``(l1 + l2)^2``, ``(l1 - l2)^2`` (value, rounding error), then ``l1 + l2``, ``|l1 - l2|``.
+    The pairs ``l1^2 - l2^2``, ``(l1 + l2)^2``, ``(l1 - l2)^2`` (value, rounding error), ``l1 + l2``, ``|l1 - l2|``.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         (s, sl), (d, dl) = _two_sum(l1, l2), _two_sum(l1, -l2)
@@ -181,8 +181,8 @@ def length_constants(l1: Array, l2: Array) -> Array:
 class PlatformLegs:
     """Three legs of a platform, solved in bulk by compiled code.
 
-    The compiled evaluation keeps every sum as a pair of numbers; the few legs within about 1e-15 of their boundary, free
-    legs and extreme magnitudes are solved again by `solve_leg`, so that both give the same status.
+    The compiled evaluation keeps every sum as a pair of numbers; the few legs within about 1e-15 of their boundary,
+    free legs and extreme magnitudes are solved again by `solve_leg`, so that both give the same status.
 
     Parameters
     ----------

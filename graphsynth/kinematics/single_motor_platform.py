@@ -6,7 +6,7 @@ Default dimensions: MOCK-RECT (millimetres), all rational in the frame of a leg.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,10 +18,18 @@ from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite, finite_array, positive, sign
 from graphsynth.kinematics.drive import DriveTurn, FourBarDrive
 from graphsynth.kinematics.gears import GearTrain
-from graphsynth.kinematics.leg import length_constants
 from graphsynth.kinematics.motion import BranchLabel, Event, Monodromy, Motion, Sweep, TurnBatch
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.tracking import BranchEnd, Tracked, track
+from graphsynth.kinematics.tracking import (
+    SAME,
+    SINGULAR,
+    BranchEnd,
+    Tracked,
+    machine_rows,
+    monodromy,
+    track,
+    turn_batch,
+)
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -32,8 +40,6 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _METHOD = "continuation with step control, compared with all assembly modes; estimated, not certified"
-_CLOSED = 1e-9  # scaled distance
-_SAME = 1e-6  # scaled distance below which two poses are the same mode
 
 _BARRIERS = {
     "lock": ("drive lock", "drive {0} locks: coupler and rocker in line; the crank cannot pass"),
@@ -42,7 +48,6 @@ _BARRIERS = {
         "drive {0} reaches a change point: the branches tau = +1 and tau = -1 meet and both continue; choose one",
     ),
 }
-_SINGULAR = "det JX = 0: two assembly modes merge at this pose; the branch ends here"
 
 #: Figure 3 of the source: 0 frame, 1 pinion, 2-4 wheels, 5-7 couplers, 8-10 rockers, 11-13 links, 14 platform
 _TURNING = "0-1 0-2 0-3 0-4 2-5 3-6 4-7 5-8 6-9 7-10 0-8 0-9 0-10 8-11 9-12 10-13 11-14 12-14 13-14"
@@ -185,17 +190,11 @@ class SingleMotorPlatform:
 
     @cached_property
     def _machine(self) -> Array:
-        """Row per leg of what the kernel needs; see ``kernels.turn``."""
-        turn = _directions((self.frame_angle[0] + self.delta[0], self.frame_angle[1] + self.delta[1],
-                            self.frame_angle[2] + self.delta[2]))  # fmt: skip
-        constants, P = length_constants(np.array(self.rocker), np.array(self.coupler)), self.platform
-        rows = []
-        for k, drive in enumerate(self.drives):
-            w, D, b = drive.axis - drive.pivot, P.D[k], P.b[k]
-            bell = (turn[k].real, turn[k].imag, self.frame_angle[k] + self.delta[k])
-            rows.append([w.real, w.imag, drive.crank, drive.phase, drive.rocker, drive.tau, *constants[k, :6], *bell,
-                         D.real, D.imag, P.l1[k], b.real, b.imag, P.l2[k]])  # fmt: skip
-        return np.array(rows)
+        return machine_rows(self, _directions((
+            self.frame_angle[0] + self.delta[0],
+            self.frame_angle[1] + self.delta[1],
+            self.frame_angle[2] + self.delta[2],
+        )))  # fmt: skip
 
     def _follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
         """Track the home branch, or the one of ``start``; raise `GeometryError` if there is no such branch."""
@@ -216,13 +215,14 @@ class SingleMotorPlatform:
             raise GeometryError(f"home = {self.home} is not close to an assembled pose; give a pose near the home pose")
         if status is BranchEnd.HOME_ENDS:
             raise GeometryError(
-                f"the home branch ends at {scale:.6g} of the crank lengths {self.crank} at psi = {psi}; use shorter cranks"
+                f"the home branch ends at {scale:.6g} of the crank lengths {self.crank} at psi = {psi}; "
+                "use shorter cranks"
             )
         if status is BranchEnd.NO_START:
             raise GeometryError(f"start is not close to an assembled pose at psi = {psi}; take one of all_poses(psi)")
 
     def sweep(self, psi: ArrayLike, start: ArrayLike | None = None, *, accelerations: bool = False) -> Sweep:
-        """Follow one branch through increasing wheel angles, fast: no comparison with the other modes, no events inside.
+        """Follow one branch through increasing wheel angles, fast: without events or comparison with other modes.
 
         Parameters
         ----------
@@ -253,7 +253,7 @@ class SingleMotorPlatform:
         barrier = self._barrier(float(angles[0]), float(angles[-1]))
         tracked = self._follow(angles, start, np.inf if barrier is None else barrier.psi, accelerations=accelerations)
         status = BranchEnd(int(tracked.status[0]))
-        reason = {BranchEnd.SINGULAR: _SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
+        reason = {BranchEnd.SINGULAR: SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
         return Sweep(
             psi=angles, pose=tracked.pose[0], velocity=tracked.velocity[0], theta=tracked.theta[0],
             theta_velocity=tracked.theta1[0], determinant=tracked.determinant[0],
@@ -286,7 +286,7 @@ class SingleMotorPlatform:
         Returns
         -------
         TurnBatch
-            Estimated, not certified.  A set whose turn cannot be completed has NaN from there on, with status and place.
+            Estimated, not certified.  A set whose turn cannot be completed has NaN from there on, status and place.
 
         Raises
         ------
@@ -299,48 +299,7 @@ class SingleMotorPlatform:
         >>> [BranchEnd(status).name for status in batch.status.tolist()]
         ['COMPLETE', 'DRIVE_ENDS']
         """
-        psi = _increasing(samples)
-        l_B, psi0, l_BC = self._sets(crank, phase, coupler)
-        machines = np.repeat(self._machine[None], len(l_B), axis=0)
-        machines[:, :, 2], machines[:, :, 3] = l_B, psi0 - np.array(self.frame_angle)
-        if coupler is not None:
-            machines[:, :, 6:12] = length_constants(np.broadcast_to(np.array(self.rocker), l_BC.shape), l_BC)[..., :6]
-        stops = self._stops(l_B, psi0, l_BC, psi)
-        guess = np.repeat(np.array(self.home)[None], len(l_B), axis=0)
-        tracked = track(machines, psi, stops, guess, self.Lc, grown=True, accelerations=accelerations)
-        return TurnBatch(
-            psi=psi, pose=tracked.pose, velocity=tracked.velocity, theta=tracked.theta, theta_velocity=tracked.theta1,
-            determinant=tracked.determinant, acceleration=tracked.acceleration if accelerations else None,
-            theta_acceleration=tracked.theta2 if accelerations else None, status=tracked.status.astype(np.int8),
-            reached=tracked.reached, end=tracked.end,
-            closure_error=np.asarray(self._distance(tracked.pose[:, -1], tracked.pose[:, 0])),
-        )  # fmt: skip
-
-    def _sets(self, crank: ArrayLike, phase: ArrayLike | None, coupler: ArrayLike | None) -> tuple[Array, Array, Array]:
-        l_B = np.atleast_2d(finite_array("crank", crank))
-        given = {"crank": l_B}
-        for name, values in (("phase", phase), ("coupler", coupler)):
-            given[name] = np.atleast_2d(finite_array(name, getattr(self, name) if values is None else values))
-        for name, array in given.items():
-            if array.ndim != 2 or array.shape[1] != 3 or len(array) not in (1, len(l_B)):
-                raise GeometryError(f"{name} has shape {array.shape}; give ({len(l_B)}, 3), three per dimension set")
-            least = float(array.min())
-            if name != "phase" and (least < 0.0 or (name == "coupler" and least == 0.0)):
-                raise GeometryError(f"{name} = {least} must be {'positive' if name == 'coupler' else 'zero or more'}")
-        first, second, third = (np.broadcast_to(array, l_B.shape) for array in given.values())
-        return first, second, third
-
-    def _stops(self, l_B: Array, psi0: Array, l_BC: Array, psi: Array) -> Array:
-        """First wheel angle that each set cannot pass: infinite where all its cranks turn fully."""
-        distance, l_CD = np.abs(np.array(self.axis) - np.array(self.pivot)), np.array(self.rocker)
-        slack = 1e-12 * (l_CD + l_BC + l_B)
-        free = (distance + l_B < l_CD + l_BC - slack) & (np.abs(distance - l_B) > np.abs(l_CD - l_BC) + slack)
-        stops = np.full(len(l_B), np.inf)
-        for i in np.flatnonzero(~free.all(axis=1)):  # decided exactly, one by one
-            one = replace(self, crank=tuple(l_B[i]), phase=tuple(psi0[i]), coupler=tuple(l_BC[i]))
-            barrier = one._barrier(float(psi[0]), float(psi[-1]))
-            stops[i] = np.inf if barrier is None else barrier.psi
-        return stops
+        return turn_batch(self, crank, phase, coupler, _increasing(samples), accelerations=accelerations)
 
     def monodromy(self, samples: int | ArrayLike = 361) -> Monodromy:
         """Follow all assembly modes over one turn and say which mode becomes which.
@@ -355,30 +314,7 @@ class SingleMotorPlatform:
         >>> SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).monodromy().permutation
         (0, 1)
         """
-        psi = _increasing(samples)
-        modes = self.all_poses(float(psi[0]))
-        barrier = self._barrier(float(psi[0]), float(psi[-1]))
-        stop = np.inf if barrier is None else barrier.psi
-        tracked = track(
-            np.repeat(self._machine[None], len(modes), axis=0), psi, np.full(len(modes), stop), modes, self.Lc,
-            grown=False, accelerations=False,
-        )  # fmt: skip
-        permutation, reasons = [], []
-        for i in range(len(modes)):
-            status, reason, target = BranchEnd(int(tracked.status[i])), "", -1
-            if status is BranchEnd.COMPLETE:
-                distance = self._distance(modes, tracked.pose[i, -1])
-                nearest = int(np.argmin(distance))
-                target = nearest if distance[nearest] <= _SAME else -1
-                reason = "" if target >= 0 else "the pose at the end is none of the modes at the start"
-            elif status is BranchEnd.DRIVE_ENDS and barrier is not None:
-                reason = barrier.statement
-            else:
-                reason = _SINGULAR
-            permutation.append(target)
-            reasons.append(reason)
-        ends = tuple(math.nan if target >= 0 else float(at) for target, at in zip(permutation, tracked.end[:, 0]))
-        return Monodromy(modes, tuple(permutation), ends, tuple(reasons))
+        return monodromy(self, _increasing(samples))
 
     def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> Motion:
         """Follow one branch over a turn of the wheels, with events and a closure test.
@@ -440,7 +376,7 @@ class SingleMotorPlatform:
         distance[batch.problem, place] = self._distance(batch.poses, pose[batch.problem])
         rank = int(np.argmin(distance[0]))
         distance.sort(axis=1)
-        return distance[:, 1], rank, distance[:, 0] > _SAME
+        return distance[:, 1], rank, distance[:, 0] > SAME
 
     def _distance(self, poses: Array, pose: Array) -> Array:
         """``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2) / Lc`` with the angle taken on the circle."""
@@ -453,7 +389,7 @@ class SingleMotorPlatform:
         end, status = float(psi[-1]), BranchEnd(int(tracked.status[0]))
         if status is BranchEnd.SINGULAR:
             end, x, y, alpha = (float(value) for value in tracked.end[0])
-            events.append(Event("platform singular", end, 0, True, _SINGULAR, (x, y, alpha)))
+            events.append(Event("platform singular", end, 0, True, SINGULAR, (x, y, alpha)))
         elif barrier is not None:
             end = barrier.psi
             events.append(barrier)

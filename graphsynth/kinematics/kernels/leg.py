@@ -99,7 +99,7 @@ def add_pair(a, al, b, bl):
 
 @njit(cache=True, error_model="numpy")
 def solve(u, v, c0, c1, c2, c3, c4, c5):
-    """Squared distance, C, P1, P2 of a leg that ends at (u, v); the constants are the first six of `length_constants`."""
+    """Squared distance, C, P1, P2 of a leg that ends at (u, v); constants: the first six of `length_constants`."""
     r, rl = square(u, v)
     C = add_pair(r, rl, c0, c1)
     P1 = add_pair(c2, c3, -r, -rl)

@@ -1,8 +1,8 @@
 """All assembly modes of a 3-RPR platform: sampled real roots of the sextic with a guarantee, poses, polish, checks.
 
-Specification parallel_platform, sections 5.1 to 5.4.  ``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` is sampled at the
-ends and middles of 32 intervals; on each, ``|G''| <= |G''(middle)| + (half width) max|G'''|`` decides between no root,
-exactly one, and bisection.
+Specification parallel_platform, sections 5.1 to 5.4.  ``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` is sampled at
+the ends and middles of 32 intervals; on each, ``|G''| <= |G''(middle)| + (half width) max|G'''|`` decides between no
+root, exactly one, and bisection.
 """
 
 import math
@@ -37,6 +37,7 @@ def elbows(theta, D, l1, out):
 
 @njit(cache=True, error_model="numpy")
 def norm2(z):
+    """Squared absolute value."""
     return z.real * z.real + z.imag * z.imag
 
 
@@ -125,7 +126,7 @@ def bracketed(g, low, high, at_low, at_high):
 
 @njit(cache=True, error_model="numpy")
 def search(g, low, high, at_low, at_high, eta, third, stack, roots, count, work):
-    """Bisect an undecided interval, left parts first; returns the number of roots, the work and whether it got stuck."""
+    """Bisect an undecided interval, left parts first: number of roots, work, and whether it got stuck."""
     stuck = False
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = low, high, at_low, at_high
     depth = 1

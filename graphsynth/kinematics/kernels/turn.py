@@ -4,9 +4,9 @@ Specification parallel_platform, sections 4.2, 7.2 and 7.5.  A step is accepted 
 converges fast, and if ``det JX`` keeps its sign and half its size; otherwise it is cut.  A step that becomes too small
 ends the branch: there is no jump.
 
-A machine is one array (3, 21), a row per leg: axis minus pivot of the drive (x, y), crank, phase, rocker, tau, the six
-constants of `length_constants`, the fixed turn of the bell-crank (cos, sin, angle), pivot (x, y), arm l1, platform vertex
-(x, y), link l2.
+A machine is one array (3, 21), a row per leg: axis minus pivot of the drive (x, y), crank, phase, rocker, tau, six
+constants of `length_constants`, the fixed turn of the bell-crank (cos, sin, angle), pivot (x, y), arm l1, platform
+vertex (x, y), link l2.
 """
 
 import math
@@ -23,7 +23,7 @@ BLOCK = 128
 
 ROUND = 1.5 * 2.0**52  # added and taken away: rounds to the nearest whole number
 
-# state: pose x, y, cos, sin, running angle; velocity; det; parameter; the previous pose (x, y, angle), velocity, parameter
+# state: pose x, y, cos, sin, running angle; velocity; det; parameter; previous pose (x, y, angle), velocity, parameter
 X, Y, C, S, A, VX, VY, VA, DET, AT, OX, OY, OA, OVX, OVY, OVA, OAT, OLD = range(18)
 
 
@@ -69,7 +69,7 @@ def drives(p, k, m, cs, sn, c, t, rate, rate2, theta):
 
 @njit(cache=True, error_model="numpy")
 def drive_at(p, scaled, psi, parameter, e):
-    """Ends and velocities of the three rocker arms at one wheel angle, or at one scale of the cranks, into e (3, 5)."""
+    """Put the three rocker arms at one wheel angle, or at one scale of the cranks, into e (3, 5)."""
     for k in range(3):
         angle = (psi if scaled else parameter) + p[k, 3]
         ax, ay = p[k, 2] * math.cos(angle), p[k, 2] * math.sin(angle)
@@ -257,8 +257,9 @@ def turns(
     """Branches of many machines over the same increasing wheel angles.
 
     ``guess`` is a pose near the branch at psi[0], or with ``grown`` at zero crank length, from where the cranks then
-    grow.  Angles from ``stops`` on are not entered.  Rows beyond ``reached`` are left alone; ``end`` (N, 4) is the parameter (a scale of the
-    cranks for HOME_ENDS) and the pose where the branch ended.  ``theta2`` and ``acceleration`` are (N, n, 3), or (N, 0, 3) if not wanted.
+    grow.  Angles from ``stops`` on are not entered.  Rows beyond ``reached`` are left alone.  ``end`` (N, 4) is the
+    parameter (a scale of the cranks for HOME_ENDS) and the pose where the branch ended.  ``theta2`` and
+    ``acceleration`` are (N, n, 3), or (N, 0, 3) if not wanted.
     """
     n, second = psi.size, theta2.shape[1] > 0
     q, e, buffers = np.empty(18), np.empty((3, 5)), np.empty((6, 3, BLOCK))
