@@ -64,7 +64,16 @@ def save_gif(
     passes = max(len(shown.poses) - 1, 1)
     duration = max(20, round(seconds / passes * 100.0) * 10)
     first, *rest = [pictures[k] for k in shown.order]
-    first.save(Path(path), save_all=True, append_images=rest, duration=duration, loop=0, optimize=True, disposal=1)
+    first.save(
+        Path(path),
+        format="GIF",
+        save_all=True,
+        append_images=rest,
+        duration=duration,
+        loop=0,
+        optimize=True,
+        disposal=1,
+    )
     return 1 + len(rest)
 
 

@@ -74,10 +74,13 @@ def ladder(stages: int) -> Mechanism:
         at += 3.0
         pairs += [(rocker, coupler), (coupler, after), (0, after)]
         joints += [
-            Revolute(rocker, coupler, pin), Revolute(coupler, after, (3.0, 0.0), (2.2, 0.0)), Revolute(0, after, (at, 0.0))
+            Revolute(rocker, coupler, pin), Revolute(coupler, after, (3.0, 0.0), (2.2, 0.0)),
+            Revolute(0, after, (at, 0.0)),
         ]  # fmt: skip
         rocker, pin = after, (0.8, -0.6)
-    return Mechanism(MechanismGraph(rocker + 1, pairs, frame=0), joints, [Driver(0, 1)], {"Q": (rocker - 1, (1.0, 1.0))})
+    return Mechanism(
+        MechanismGraph(rocker + 1, pairs, frame=0), joints, [Driver(0, 1)], {"Q": (rocker - 1, (1.0, 1.0))}
+    )
 
 
 MOTIONS = {

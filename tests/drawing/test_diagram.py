@@ -100,7 +100,9 @@ def test_pitch_circles_touch_and_keep_their_size(motions: dict[str, Any]) -> Non
         gear = next(j for j in motion.mechanism.joints if isinstance(j, Gear))
         radii = {gear.a: gear.radius_a, gear.b: gear.radius_b}
         wheels = [
-            s for s in sketch.shapes if isinstance(s, Circle) and s.part.startswith("gear") and s.radius == radii[s.link]
+            s
+            for s in sketch.shapes
+            if isinstance(s, Circle) and s.part.startswith("gear") and s.radius == radii[s.link]
         ]
         assert len(wheels) == 2 and all(wheel.style.dash for wheel in wheels)
         apart = abs(place(wheels[0].link, wheels[0].centre) - place(wheels[1].link, wheels[1].centre))
@@ -254,7 +256,16 @@ def test_palette_has_the_same_names_for_light_and_dark_pages() -> None:
 
     for theme in (LIGHT, DARK):  # WCAG contrast: 4.5 for letters, 3 for lines
         paper = luminance(theme["paper"])
-        for name, least in (("ink", 7), ("note", 4.5), ("link", 7), ("a", 3), ("b", 3), ("c", 3), ("d", 3), ("soft", 3)):
+        for name, least in (
+            ("ink", 7),
+            ("note", 4.5),
+            ("link", 7),
+            ("a", 3),
+            ("b", 3),
+            ("c", 3),
+            ("d", 3),
+            ("soft", 3),
+        ):
             one, two = sorted((luminance(theme[name]), paper), reverse=True)
             assert (one + 0.05) / (two + 0.05) >= least, (name, theme[name])
 

@@ -1,0 +1,287 @@
+"""Animations: the right poses, nothing from outside, small, and a player that works."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from graphsynth.drawing.animation import animated_svg, animation_html
+from graphsynth.drawing.diagram import mechanism_sketch
+from graphsynth.drawing.frames import frames_of, with_trace_points
+from graphsynth.drawing.gif import save_gif
+from graphsynth.drawing.reach import motion_over_reach
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics import simulate
+from graphsynth.mechanism.joints import PinSlot, Revolute
+
+from .conftest import TURN, cylinder, four_bar
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+def data_of(page: str) -> dict[str, Any]:
+    found = re.search(r'<script id="data" type="application/json">(.*?)</script>', page, re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+class Tags(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.seen: list[tuple[str, dict[str, str | None]]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append((tag, dict(attrs)))
+        if tag not in ("meta", "input", "br"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_page_is_well_formed_and_needs_nothing_else(motion: Any) -> None:
+    page = animation_html(motion, frames=30)
+    tags = Tags()
+    tags.feed(page)
+    assert tags.open == []
+    assert not {"link", "img", "iframe", "object", "embed"} & {tag for tag, _ in tags.seen}
+    assert not any("src" in given or "href" in given for _, given in tags.seen)
+    assert set(re.findall(r"https?://[^\s\"'<]+", page)) == {"http://www.w3.org/2000/svg"}
+    assert "@import" not in page and "url(" not in page
+    ET.fromstring(re.search(r"<svg.*?</svg>", page, re.DOTALL)[0])  # type: ignore[index]
+
+
+def test_poses_in_the_file_are_those_of_the_motion(motion: Any) -> None:
+    """Both links of a joint, carried by the numbers of the file, put it where the display transform does."""
+    page = animation_html(motion, frames=40, width=540, height=440)
+    frames, data = frames_of(motion, 40), data_of(page)
+    sketch = mechanism_sketch(motion.mechanism, frames.poses, width=540, height=440)
+    assert data["count"] == len(frames.poses)
+    local = {}
+    for group in re.finditer(r'<g data-k="(\d+)" data-layer="joint"[^>]*>(.*?)</g>', page, re.DOTALL):
+        for circle in re.finditer(r'<circle cx="(\S+)" cy="(\S+)"[^>]*data-part="joint ([\d-]+)"', group[2]):
+            local[circle[3]] = int(group[1]), float(circle[1]), float(circle[2])
+    checked = 0
+    for joint in motion.mechanism.joints:
+        if not isinstance(joint, Revolute | PinSlot):
+            continue
+        link, x, y = local[f"{joint.a}-{joint.b}"]
+        for i in range(data["count"]):
+            X, Y, turn = np.array(data["poses"][link][3 * i : 3 * i + 3]) / [10, 10, 100]
+            c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+            pose = frames.poses[i, joint.b]
+            world = complex(pose[0], pose[1]) + np.exp(1j * pose[2]) * complex(*joint.at_b)
+            assert (X + c * x - s * y, Y + s * x + c * y) == pytest.approx(sketch.xy(world), abs=0.15)
+            checked += 1
+    assert checked >= data["count"]
+
+
+def test_ten_links_at_120_frames_stay_small(motions: dict[str, Any]) -> None:
+    motion = motions["ladder"]
+    assert motion.mechanism.graph.links == 10 and motion.completed
+    assert len(animation_html(motion, frames=120).encode()) < 200_000
+    assert len(animated_svg(motion, frames=120).encode()) < 300_000
+
+
+def test_a_closed_turn_goes_round_and_a_part_goes_to_and_fro_with_the_reason(motions: dict[str, Any]) -> None:
+    closed, stops = motions["lambda"], motions["stops"]
+    assert data_of(animation_html(closed))["loop"] is True
+    page = animation_html(stops)
+    assert data_of(page)["loop"] is False
+    words = html.unescape(re.search(r'<p class="stop">(.*?)</p>', page)[1])  # type: ignore[index]
+    assert "to and fro over the part that is reached" in words and "stretched or folded" in words
+    assert stops.reason[1:] in words
+    frames = frames_of(stops, 20)
+    assert np.isfinite(frames.poses).all() and not frames.loops
+    assert frames.coordinates[-1, 0] < stops.stopped_at
+    n = len(frames.poses)
+    assert frames.order == [*range(n), *range(n - 2, 0, -1)]
+    assert frames_of(closed, 20).order == list(range(20))
+
+
+def test_text_is_escaped(motions: dict[str, Any]) -> None:
+    evil = "</script><script>alert(1)</script>@SVG@ & <b>"
+    page = animation_html(motions["lambda"], title=evil, note=evil)
+    assert "<script>alert" not in page
+    assert page.count("<svg") == 1
+    assert html.escape(evil) in page
+
+
+def test_a_point_named_like_markup_does_not_leave_the_data() -> None:
+    motion = simulate(four_bar(2, 1, 2.5, 2.5, points={"</script><i>": (2, (1.0, 1.0))}), TURN, modes={0: 1})
+    page = animation_html(motion)
+    assert data_of(page)["points"][0]["name"] == "</script><i>" and page.count("</script>") == 2
+
+
+def test_bounds_are_told(motions: dict[str, Any]) -> None:
+    with pytest.raises(GeometryError, match="frames = 1 must be from 2 to 2000"):
+        animation_html(motions["lambda"], frames=1)
+    for seconds in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(GeometryError, match="must be positive and finite"):
+            animated_svg(motions["lambda"], seconds=seconds)
+    apart = simulate(four_bar(5, 1, 1, 1), TURN)
+    with pytest.raises(GeometryError, match="nothing of the motion is assembled"):
+        animation_html(apart)
+
+
+def test_driver_values_are_degrees_or_lengths(motions: dict[str, Any]) -> None:
+    (turning,) = data_of(animation_html(motions["lambda"], frames=4))["drivers"]
+    assert turning == {"name": "driver 0-1", "angle": True, "values": [0.0, 90.0, 180.0, 270.0, 360.0]}
+    (sliding,) = data_of(animation_html(motions["cylinder"], frames=4))["drivers"]
+    assert sliding["angle"] is False and sliding["values"][0] == 1.2 and sliding["values"][-1] == 3.4
+
+
+def test_same_motion_same_bytes(motions: dict[str, Any], tmp_path: Path) -> None:
+    motion = motions["yoke"]
+    assert animation_html(motion) == animation_html(motion) and animated_svg(motion) == animated_svg(motion)
+    for name in "ab":
+        save_gif(motion, tmp_path / name, frames=6)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+# --- SVG and GIF
+
+
+def test_svg_moves_every_link_and_stands_still_on_request(motion: Any) -> None:
+    text = animated_svg(motion, frames=12)
+    ET.fromstring(text)
+    moving = set(range(motion.mechanism.graph.links)) - {motion.mechanism.frame}
+    for link in moving:
+        assert f"@keyframes k{link}{{0%" in text and f'class="k{link}"' in text
+    assert f"@keyframes k{motion.mechanism.frame}{{" not in text
+    assert "prefers-reduced-motion:reduce" in text
+    assert ("infinite normal" in text) == motion.closure.closed
+
+
+def test_gif_has_the_frames_and_the_time(motions: dict[str, Any], tmp_path: Path) -> None:
+    from PIL import Image
+
+    path = tmp_path / "turn.gif"
+    assert save_gif(motions["lambda"], path, frames=24, seconds=2.4) == 24
+    with Image.open(path) as picture:
+        assert picture.n_frames == 24 and picture.info["duration"] == 100 and picture.info["loop"] == 0
+        first = np.asarray(picture.convert("RGB")).astype(int)
+        picture.seek(12)
+        changed = (np.abs(np.asarray(picture.convert("RGB")).astype(int) - first).sum(axis=2) > 60).mean()
+    assert 0.002 < changed < 0.2  # the links have moved, the paper has not
+    assert (first.reshape(-1, 3).mean(axis=0) > 240).all()
+    assert path.stat().st_size < 120_000
+
+
+def test_gif_of_a_part_goes_to_and_fro(motions: dict[str, Any], tmp_path: Path) -> None:
+    from PIL import Image
+
+    path = tmp_path / "part.gif"
+    n = len(frames_of(motions["stops"], 10).poses)
+    assert save_gif(motions["stops"], path, frames=10, title="stops") == 2 * n - 2
+    with Image.open(path) as picture:
+        assert picture.n_frames == 2 * n - 2
+
+
+# --- which motion is shown
+
+
+def test_reach_of_a_rocking_driver_is_shown_from_end_to_end() -> None:
+    """Lengths 2, 1, 1, 1 turn between the limit angles -+ arccos(1/4)."""
+    motion = motion_over_reach(four_bar(2, 1, 1, 1))
+    limit = math.acos(0.25)
+    step = math.tau / 360
+    assert not motion.completed and "at the other end" in motion.reason
+    assert -limit < motion.inputs[0] < -limit + step and limit - step < motion.inputs[-1] < limit
+    assert (np.diff(motion.inputs) > 0).all() and motion.assembled.all()
+    assert np.abs(np.diff(motion.poses, axis=0)).max() < 0.5 and motion.residual < 1e-12
+
+
+def test_reach_is_the_turn_where_there_is_one_and_starts_where_it_can_be_assembled() -> None:
+    assert motion_over_reach(four_bar(2, 1, 2.5, 2.5)).closure.closed
+    # D = |A - C| must be at least l3 + ... : not assembled at u = 0 for 1, 2, 3.5, 0.9 (|A - C| = 1 < 2.6)
+    late = motion_over_reach(four_bar(1, 2, 3.5, 0.9))
+    assert late.assembled.all() and late.inputs[0] > 0.0
+    with pytest.raises(GeometryError, match="cannot be assembled at any of 24 inputs"):
+        motion_over_reach(four_bar(9, 1, 1, 1))
+
+
+def test_reach_of_a_sliding_driver_needs_a_pose() -> None:
+    with pytest.raises(GeometryError, match="sliding driver has no turn"):
+        motion_over_reach(cylinder())
+    pose = simulate(cylinder(), [2.0]).poses[0]
+    motion = motion_over_reach(replace(cylinder(), pose=tuple(map(tuple, pose.tolist()))))
+    assert motion.inputs.min() < 1.9 and motion.inputs.max() > 2.1 and motion.assembled.all()
+    at_2 = np.argmin(np.abs(motion.inputs - 2.0))
+    np.testing.assert_allclose(motion.poses[at_2], pose, atol=1e-9)
+
+
+def test_a_point_is_traced_even_if_none_has_a_name(motions: dict[str, Any]) -> None:
+    plain = simulate(four_bar(2, 1, 2.5, 2.5), TURN, modes={0: 1})
+    traced = with_trace_points(plain)
+    assert traced.mechanism.points == {"P": (2, (1.25, 0.0))}
+    assert with_trace_points(motions["lambda"]) is motions["lambda"]
+
+
+# --- the player in a browser
+
+PROBE = """
+<script>
+const log = {}, $$ = q => document.querySelector(q), where = k => $$(`[data-k="${k}"]`).getAttribute("transform");
+log.start = where(1); log.autoplay = $$("#play").textContent;
+const slider = $$("#time");
+slider.value = 30; slider.dispatchEvent(new Event("input"));
+log.slid = where(1); log.words = $$("#value").textContent; log.button = $$("#play").textContent;
+log.trail = document.querySelector("[data-trail]").getAttribute("d").split("L").length;
+const key = k => document.dispatchEvent(new KeyboardEvent("keydown", {key: k, bubbles: true, cancelable: true}));
+key("ArrowRight"); log.right = +slider.value; key("ArrowLeft"); key("ArrowLeft"); log.left = +slider.value;
+key(" "); log.space = $$("#play").textContent; key(" "); log.again = $$("#play").textContent;
+$$("#trace").checked = false; $$("#trace").dispatchEvent(new Event("change"));
+log.hidden = document.querySelector("[data-trail]").getAttribute("d");
+const held = $$(".grip"), m = $$("svg.gs").getScreenCTM(), c = D.grip.centre;
+held.setPointerCapture = () => {}; held.hasPointerCapture = () => true;
+const at = (x, y) => ({clientX: m.a * x + m.e, clientY: m.d * y + m.f, pointerId: 1, bubbles: true});
+held.dispatchEvent(new PointerEvent("pointerdown", at(c[0], c[1] - 50))); log.dragged = +slider.value;
+held.dispatchEvent(new PointerEvent("pointermove", at(c[0] - 70, c[1]))); log.further = +slider.value;
+const out = document.createElement("pre"); out.id = "log"; out.textContent = JSON.stringify(log);
+document.body.append(out);
+</script></body>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium here")
+def test_the_player_moves_the_links(motions: dict[str, Any], tmp_path: Path) -> None:
+    motion = motions["lambda"]
+    page = animation_html(motion, frames=120)
+    (tmp_path / "page.html").write_text(page.replace("</body>", PROBE), "utf-8")
+    command = [
+        str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+        "--disable-background-networking", "--disable-component-update", "--disable-sync",
+        f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", (tmp_path / "page.html").as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    found = re.search(r'<pre id="log">(.*?)</pre>', done.stdout)
+    assert found, done.stderr[-2000:]
+    log = json.loads(html.unescape(found[1]))
+    assert log["autoplay"] == "Pause" and log["button"] == "Play" and log["words"] == "driver 0-1: 90.0°"
+    # the crank at 90 degrees: its middle is half a crank above the pivot, turned by -90 in the page's sense
+    x, y, turn = map(float, re.findall(r"-?[\d.]+", log["slid"]))
+    frames = frames_of(motion, 120)
+    sketch = mechanism_sketch(motion.mechanism, frames.poses, width=540, height=440)
+    assert (x, y) == pytest.approx(sketch.xy(0.5j), abs=0.06) and turn == pytest.approx(-90, abs=0.006)
+    assert log["start"] != log["slid"]
+    assert log["trail"] == 32  # frames 0..30 and the present place
+    assert (log["right"], log["left"]) == (31, 29)
+    assert (log["space"], log["again"]) == ("Pause", "Play")
+    assert log["hidden"] == ""
+    assert (log["dragged"], log["further"]) == (30, 60)
