@@ -188,6 +188,9 @@ def loci_picture(
         _arcs(axes, work, 1.3)
         for curve in loci.of_mode(sigma):
             axes.plot(curve.points.real, curve.points.imag, color=_SINGULAR, lw=1.4, zorder=4)
+        for own, p in loci.points:
+            if own == sigma:
+                axes.plot([p.real], [p.imag], ".", color=_SINGULAR, zorder=4)
         _frame(axes, work)
         axes.set_title(f"working mode {_signs(sigma)}", fontsize=9)
     for axes in grid[-1]:

@@ -16,7 +16,14 @@ from graphsynth.kinematics.platform.field import characteristic_length, determin
 from graphsynth.kinematics.platform.tracing import CurveEquations, Traced, trace
 from graphsynth.kinematics.platform.workspace import Arc, constant_orientation_workspace
 
-__all__ = ["SingularCurve", "SingularLoci", "singular_loci", "type_one_circles", "type_two_curves"]
+__all__ = [
+    "SingularCurve",
+    "SingularLoci",
+    "isolated_singular_points",
+    "singular_loci",
+    "type_one_circles",
+    "type_two_curves",
+]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -62,11 +69,25 @@ class SingularCurve:
 
 @dataclass(frozen=True, eq=False)
 class SingularLoci:
-    """Loci at one orientation: type-I circles (the same for all working modes), type-II curves (estimated)."""
+    """Loci at one orientation.
+
+    Attributes
+    ----------
+    alpha : float
+    circles : tuple of BoundaryCircle
+        Type I, the same for all working modes; exact.
+    curves : tuple of SingularCurve
+        Type II; estimated, see `type_two_curves`.
+    points : tuple of (sigma, complex)
+        Isolated points of type II, where a loop has shrunk to a point; see `isolated_singular_points`.
+    nodes : int
+        Of the grid.
+    """
 
     alpha: float
     circles: tuple[BoundaryCircle, ...]
     curves: tuple[SingularCurve, ...]
+    points: tuple[tuple[tuple[int, int, int], complex], ...]
     nodes: int
 
     def of_mode(self, sigma: tuple[int, ...]) -> tuple[SingularCurve, ...]:
@@ -88,8 +109,10 @@ def singular_loci(platform: ParallelPlatform, alpha: float, *, nodes: int = 120)
     >>> len(loci.circles), all(curve.residual < 1e-12 for curve in loci.curves)
     (6, True)
     """
-    curves = [curve for mode in WORKING_MODES for curve in type_two_curves(platform, alpha, tuple(mode), nodes=nodes)]
-    return SingularLoci(float(alpha), type_one_circles(platform, alpha), tuple(curves), nodes)
+    modes = [working_mode([int(s) for s in mode]) for mode in WORKING_MODES]
+    curves = [curve for mode in modes for curve in type_two_curves(platform, alpha, mode, nodes=nodes)]
+    points = [(mode, p) for mode in modes for p in isolated_singular_points(platform, alpha, mode, nodes=nodes)]
+    return SingularLoci(float(alpha), type_one_circles(platform, alpha), tuple(curves), tuple(points), nodes)
 
 
 def type_two_curves(
@@ -149,6 +172,53 @@ def type_two_curves(
             parts.append(trace(equations, found[0], mode, -along))
         curves.append(_curve(mode, 0, parts, equations, unit))
     return tuple(curves)
+
+
+def isolated_singular_points(
+    platform: ParallelPlatform, alpha: float, sigma: tuple[int, ...], *, nodes: int = 120
+) -> tuple[complex, ...]:
+    """Positions where ``det JX`` touches zero without changing its sign: loops shrunk to a point.
+
+    Local minima of ``|det JX|`` on the grid are refined on smaller grids; kept if the value is below 1e-10 of the
+    product of the rows of JX (estimated; such points exist at single orientations only).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> points = isolated_singular_points(ParallelPlatform.mock(), 2.0 * np.arctan(3.0 / 7.0), (-1, -1, -1))
+    >>> len(points), abs(points[0]) < 1e-3
+    (1, True)
+    """
+    mode, alpha = working_mode(sigma), finite("alpha", alpha)
+    x, y = pose_grid(platform, alpha, nodes)
+    step = max(float(x[1] - x[0]), float(y[1] - y[0]))
+
+    def value(p: Complex) -> Array:
+        X = np.stack([p.real, p.imag, np.full(p.shape, alpha)], axis=-1)
+        JX, _ = platform.jacobians(X, platform.inverse(X, mode).theta)
+        return np.asarray(determinant(JX) / np.linalg.norm(JX, axis=-1).prod(axis=-1))
+
+    g = value(x[:, None] + 1j * y[None, :])
+    inner, size = g[1:-1, 1:-1], np.abs(g)
+    least = np.isfinite(inner) & (np.abs(inner) < 0.05)
+    for i in range(3):
+        for j in range(3):
+            other = (slice(i, i + nodes - 2), slice(j, j + nodes - 2))
+            least &= (size[other] >= np.abs(inner)) & (g[other] * inner > 0.0)
+    rows, columns = np.nonzero(least)
+    if not rows.size:
+        return ()
+    centre, sign = x[rows + 1] + 1j * y[columns + 1], np.sign(inner[rows, columns])
+    local = (np.arange(-3, 4)[:, None] + 1j * np.arange(-3, 4)[None, :]).ravel() / 3.0
+    first, values = centre, np.abs(inner[rows, columns])
+    for _ in range(40):  # the best node of a 7 x 7 grid about each candidate, then a smaller grid
+        around = centre[:, None] + step * local
+        size = np.nan_to_num(sign[:, None] * value(around), nan=1.0)
+        best = np.argmin(size, axis=1)
+        centre, values = around[np.arange(len(best)), best], size[np.arange(len(best)), best]
+        step *= 0.6
+    keep = (np.abs(values) <= 1e-10) & (np.abs(centre - first) <= 3.0 * float(x[1] - x[0] + y[1] - y[0]))
+    return tuple(complex(p) for p in centre[keep])
 
 
 def _curve(
