@@ -237,7 +237,7 @@ def test_verification_refuses_bounds_not_kept() -> None:
 
 
 def test_verification_refuses_a_narrow_gap_between_samples() -> None:
-    """Crank and frame a hair longer than coupler and rocker: a gap of 0.2 degrees about the input pi, between samples."""
+    """Crank and frame a hair longer than coupler and rocker: a gap of 0.2 degrees about pi, between samples."""
     samples = 0.004 + np.linspace(0.0, math.tau, 721)
     assert np.abs(samples - math.pi).min() > 2.0 * math.sqrt(3e-6)
     mechanism = four_bar(2.0, 1.0, 1.6, 1.4 - 1e-6, offset=0.004)
@@ -279,7 +279,7 @@ def test_bad_questions() -> None:
         embody(CYCLE.without_frame(), driver=1)
     with pytest.raises(GraphError, match="mobility 0"):
         embody(MechanismGraph(3, [(0, 1), (1, 2), (0, 2)], frame=0))
-    with pytest.raises(GraphError, match="not a joint|no joint|joint"):
+    with pytest.raises(GraphError, match="joint"):
         embody(CYCLE, driver=2)
     with pytest.raises(GeometryError, match="no such joint"):
         embody(CYCLE, joints={(0, 2): "P"})

@@ -134,14 +134,14 @@ def test_function_is_recovered(known: dict[str, np.ndarray]) -> None:
 
 
 def test_path_without_times_is_passed_in_order(known: dict[str, np.ndarray]) -> None:
-    target = PathGoal(tuple((p.real, p.imag) for p in known["z"][:6]), tolerance=0.02)
+    target = PathGoal(tuple((p.real, p.imag) for p in known["z"][:6]), tolerance=1e-3)
     found = embody(CYCLE, Goals(min_transmission_angle=LEAST, target=target), driver=1, tries=2)
     assert found.accepted and found.mechanism is not None and found.figures is not None
     motion = simulate(found.mechanism, np.linspace(0.0, math.tau, 3601))
     z = motion.point("P").position @ np.array([1.0, 1j])
     size = np.abs(known["z"][:6] - known["z"][:6].mean()).max()
-    assert in_order(z, known["z"][:6]) / size <= 0.02
-    assert found.figures.goal_error <= 0.02
+    assert in_order(z, known["z"][:6]) / size <= 1e-3
+    assert found.figures.goal_error <= 1e-3
 
 
 @pytest.mark.slow

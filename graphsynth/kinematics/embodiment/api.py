@@ -171,7 +171,10 @@ class _Run:
         late = perf_counter() > self.deadline
         if self.goals.target is None or late:
             self.judge(problem, found)
-        self.ended = late or (self.goals.target is None and self.best is not None and self.best[1].accepted)
+        if self.goals.target is None:
+            self.ended = late or (self.best is not None and self.best[1].accepted)
+        else:
+            self.ended = late or found.cost <= EXACT
 
     def go_on(self) -> None:
         """Continue the most promising searches to their end."""

@@ -33,14 +33,14 @@ _SPARE = 1.002
 
 
 class Outcome(NamedTuple):
-    """Candidates evaluated: cost, merit of the bounds (1 or more: kept), error of the target, and what was moved.
+    """Candidates evaluated: cost, merit of the bounds (1 or more: kept), errors of the target, and what was moved.
 
     ``frames0`` holds (x, y, cos, sin) of every link at the first input; ``placed`` the placement by the target.
     """
 
     cost: Array
     merit: Array
-    error: Array
+    errors: Complex
     dimensions: Array
     frames0: Array
     placed: Placed | None
@@ -181,16 +181,17 @@ class Problem:
         with np.errstate(invalid="ignore"):
             least = np.where(complete, _least(sines, self.goals.full_turn), 0.0)
         ratio = self._ratio(places)
-        error, placed = np.zeros(len(X)), None
+        errors, placed = np.zeros((len(X), 1), dtype=np.complex128), None
         if self.fit is not None:
-            error, placed, arms = self._error(motion.frames, motion.velocities, extras, places, complete)
+            errors, placed, arms = self._error(motion.frames, motion.velocities, extras, places, complete)
             ratio = np.maximum(ratio, arms / self._shortest(places))
+        error = np.abs(errors).max(axis=1)
         goal = max(_SPARE * math.sin(self.goals.min_transmission_angle), 1e-3)
         merit = np.minimum(least / goal, self.goals.max_length_ratio / ratio)
         cost = -merit if self.fit is None else np.where(merit >= 1.0, error, OUTSIDE - merit)
         reached = motion.reached / len(self.inputs)
         cost = np.where(complete, cost, INCOMPLETE - 10.0 * reached)
-        return Outcome(cost, np.where(complete, merit, 0.0), error, dimensions, motion.frames[:, 0], placed)
+        return Outcome(cost, np.where(complete, merit, 0.0), errors, dimensions, motion.frames[:, 0], placed)
 
     def _closed(self, frames: Array) -> NDArray[np.bool_]:
         if not self.goals.full_turn:
@@ -230,8 +231,8 @@ class Problem:
 
     def _error(
         self, frames: Array, velocities: Array, extras: Array, places: Array, complete: NDArray[np.bool_]
-    ) -> tuple[Array, Placed, Array]:
-        """Largest error of the target, its placement, and the longest arm of the tracing point."""
+    ) -> tuple[Complex, Placed, Array]:
+        """Errors of the target, its placement, and the longest arm of the tracing point."""
         assert self.fit is not None
         own = frames[:, :, self.link]
         origin, along = self._bar(places)
@@ -257,7 +258,7 @@ class Problem:
             point = placed.q / placed.s
         joints = self.design.joints_of(self.link)
         arms = np.abs(places[:, joints, 0] + 1j * places[:, joints, 1] - point[:, None]).max(axis=1)
-        return errors.max(axis=1), placed, np.nan_to_num(arms, nan=1e12, posinf=1e12)
+        return errors, placed, np.nan_to_num(arms, nan=1e12, posinf=1e12)
 
 
 def _least(sines: Array, periodic: bool) -> Array:

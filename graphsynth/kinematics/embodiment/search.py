@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 _ENOUGH = 1.5
 #: Error of a target below which nothing is gained.
 EXACT = 1e-9
+_DIFFERENCE = 1e-6
+#: Penalty of a motion that is not complete, in the least squares of a target.
+_WALL = 1e3
 
 
 class HistoryRow(NamedTuple):
@@ -82,13 +85,49 @@ def search(
     def content(x: Array, convergence: float) -> bool:
         return perf_counter() > deadline or history[-1].cost <= (EXACT if aimed else -_ENOUGH)
 
-    generations = 60 if not aimed else 120 if before is None else 1000
+    generations = (
+        60 if not aimed else 120 if before is None else 400 if problem.fit is not None and problem.fit.warped else 1000
+    )
     generations //= 3 if problem.iterative else 1
     found = differential_evolution(
         cost, problem.bounds(), init=population, vectorized=True, updating="deferred", polish=False,
-        maxiter=generations, tol=1e-10, atol=1e-12, seed=random, callback=content,
+        maxiter=generations, tol=1e-7, atol=1e-12, seed=random, callback=content,
     )  # fmt: skip
-    return Search(found.x, float(found.fun), tuple(history), start, np.asarray(found.population))
+    best, value, population = found.x, float(found.fun), np.asarray(found.population)
+    if problem.fit is not None and problem.fit.smooth and EXACT < value < OUTSIDE:
+        polished = _polish(problem, best)
+        better = float(problem.evaluate(polished[None]).cost[0])
+        if better < value:
+            best, value, population[0] = polished, better, polished
+            history.append(HistoryRow(attempt, len(history), problem.evaluations, value))
+    return Search(best, value, tuple(history), start, population)
+
+
+def _polish(problem: Problem, x: Array) -> Array:
+    """Least squares of the errors from x, bounds as penalties; derivatives by differences, all in one batch."""
+    from scipy.optimize import least_squares
+
+    def residuals(X: Array) -> Array:
+        found = problem.evaluate(X)
+        broken = np.maximum(0.0, 1.0 - found.merit) * np.where(found.cost < 0.5 * INCOMPLETE, 1.0, _WALL)
+        return np.concatenate([found.errors.real, found.errors.imag, broken[:, None]], axis=1)
+
+    def derivatives(x: Array) -> Array:
+        step = _DIFFERENCE * np.eye(len(x))
+        both = residuals(np.concatenate([x + step, x - step]))
+        return np.asarray((both[: len(x)] - both[len(x) :]).T / (2.0 * _DIFFERENCE))
+
+    found = least_squares(
+        lambda x: residuals(x[None])[0],
+        x,
+        jac=derivatives,
+        x_scale=1.0,
+        xtol=1e-14,
+        ftol=1e-15,
+        gtol=1e-15,
+        max_nfev=80,
+    )
+    return np.asarray(found.x)
 
 
 def verdict(cost: float) -> str:

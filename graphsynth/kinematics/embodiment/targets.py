@@ -69,11 +69,13 @@ class Fit:
     ranges: Array = np.zeros((0, 2))
     #: Whether the target speaks of absolute coordinates.
     placed = False
+    #: Whether the errors vanish smoothly at a perfect candidate, so that least squares help.
+    smooth = True
     #: Whether the target reads the motion at other inputs by set.
     warped = False
 
-    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Array, Placed]:
-        """Errors (sets, m) in the unit of the tolerance, and the placement."""
+    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
+        """Errors (sets, m) whose largest size is in the unit of the tolerance, and the placement."""
         raise NotImplementedError
 
 
@@ -105,7 +107,7 @@ class PathFit(Fit):
         part = self.share - low
         return np.asarray(knots[:, low] * (1.0 - part) + knots[:, low + 1] * part)
 
-    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Array, Placed]:
+    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
         """Distance of every point over the size of the set, and angles."""
         z, w = sampled.z, sampled.w
         B = np.stack([z, w, np.ones_like(z)], axis=2)
@@ -113,10 +115,10 @@ class PathFit(Fit):
         N = BH @ B
         N = N + 1e-13 * np.trace(N, axis1=1, axis2=2).real[:, None, None] * np.eye(3)
         c: Complex = np.linalg.solve(N, BH @ np.broadcast_to(self.goal, z.shape)[:, :, None]).astype(np.complex128)
-        found = np.abs((B @ c)[:, :, 0] - self.goal) / self.size
+        found = ((B @ c)[:, :, 0] - self.goal) / self.size
         if self.turn is not None:
             turned = sampled.angle - sampled.angle[:, :1] - self.turn
-            found = np.concatenate([found, np.abs(turned - turned.mean(axis=1, keepdims=True))], axis=1)
+            found = np.concatenate([found, turned - turned.mean(axis=1, keepdims=True)], axis=1)
         return found, Placed(c[:, 0, 0], c[:, 1, 0], c[:, 2, 0])
 
 
@@ -126,24 +128,26 @@ class FunctionFit(Fit):
     def __init__(self, target: FunctionGoal) -> None:
         self.inputs, self.outputs = np.array(target.inputs), np.array(target.outputs)
 
-    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Array, Placed]:
+    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
         """Differences of angles with the best zero of the scale."""
         e = sampled.angle - self.outputs
         e = e - 0.5 * (e.max(axis=1, keepdims=True) + e.min(axis=1, keepdims=True))
         one = np.ones(len(e), dtype=np.complex128)
-        return np.abs(e), Placed(one, 0.0 * one, 0.0 * one)
+        return e.astype(np.complex128), Placed(one, 0.0 * one, 0.0 * one)
 
 
 class LineFit(Fit):
     """A straight stroke: its two ends are set exactly the wanted length apart, the strip is measured."""
 
+    smooth = False
+
     def __init__(self, target: LineGoal) -> None:
         self.target = target
-        self.inputs = np.linspace(0.0, target.span, 97)
+        self.inputs = np.linspace(0.0, target.span, 65)
         tilt = [-3.0 * target.tolerance, 3.0 * target.tolerance]
         self.ranges = np.array([tilt] if target.on_bar else [tilt, [-np.pi, np.pi]])
 
-    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Array, Placed]:
+    def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
         """Width of the strip over its length, shape (sets, 1)."""
         z, w = sampled.z, sampled.w
         dz, dw = z[:, -1] - z[:, 0], w[:, -1] - w[:, 0]
@@ -157,7 +161,7 @@ class LineFit(Fit):
         y = (np.conj(along)[:, None] * M).imag
         width = (y.max(axis=1) - y.min(axis=1)) / length
         one = np.ones(len(z), dtype=np.complex128)
-        return (width + far)[:, None], Placed(one, q, 0.0 * one)
+        return (width + far)[:, None].astype(np.complex128), Placed(one, q, 0.0 * one)
 
 
 def _on_bar(dz: Complex, dw: Complex, length: Array) -> tuple[Complex, Array]:

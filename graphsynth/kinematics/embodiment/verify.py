@@ -190,12 +190,15 @@ def strip_width(z: NDArray[np.complex128]) -> float:
 def in_order(z: NDArray[np.complex128], goal: NDArray[np.complex128]) -> float:
     """Smallest bound e such that the curve passes the goals in order, each within e.
 
-    On the samples of the curve; like the discrete Frechet distance (Eiter and Mannila, 1994).
+    The curve is the polyline through the samples; like the discrete Frechet distance (Eiter and Mannila, 1994).
 
-    >>> in_order(np.array([0j, 1, 2, 3]), np.array([0j, 2.25, 3]))
+    >>> in_order(np.array([0j, 1, 2, 3]), np.array([0j, 2.25 + 0.25j, 3]))
     0.25
     """
-    apart = np.abs(z[None] - goal[:, None])
+    sides = np.diff(z)
+    size = np.maximum(np.abs(sides) ** 2, 1e-300)
+    part = np.clip(((goal[:, None] - z[None, :-1]) * np.conj(sides)).real / size, 0.0, 1.0)
+    apart = np.abs(z[None, :-1] + part * sides - goal[:, None])
     best = np.minimum.accumulate(apart[0])
     for row in apart[1:]:
         best = np.minimum.accumulate(np.maximum(best, row))
