@@ -43,7 +43,7 @@ class Body:
 
     link: int
     points: list[complex] = field(default_factory=list)
-    joints: int = 0
+    joints: int = 0  # different places of joints
     guides: list[Guide] = field(default_factory=list)
     wheels: list[tuple[complex, float, Gear]] = field(default_factory=list)
 
@@ -81,8 +81,6 @@ def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
     found = [Body(link) for link in range(mechanism.graph.links)]
     for joint in mechanism.joints:
         a, b = found[joint.a], found[joint.b]
-        a.joints += 1
-        b.joints += 1
         at_a, at_b = complex(*joint.at_a), complex(*joint.at_b)
         if isinstance(joint, Prismatic | PinSlot):
             t = complex(np.exp(1j * joint.angle_a))
@@ -95,6 +93,8 @@ def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
         if isinstance(joint, Gear):
             a.wheels.append((at_a, joint.radius_a, joint))
             b.wheels.append((at_b, joint.radius_b, joint))
+    for body in found:  # a wheel on its pivot counts once
+        body.joints = len(_apart(body.points, reserve / 9.0)) + len(body.guides)
     for point in mechanism.points.values():
         found[point.link].points.append(complex(*point.at))
     return found
@@ -138,17 +138,22 @@ def hull(points: list[complex]) -> list[complex]:
 
 def outline(points: list[complex], merge: float) -> list[complex]:
     """Hull of points after those closer than ``merge`` to an earlier one are left out; two ends if nearly in line."""
-    kept: list[complex] = []
-    for point in points:
-        if all(abs(point - other) > merge for other in kept):
-            kept.append(point)
-    corners = hull(kept)
+    corners = hull(_apart(points, merge))
     if len(corners) < 3:
         return corners
     far, p, q = max(((abs(p - q), p, q) for p in corners for q in corners), key=lambda found: found[0])
     t = (q - p) / far
     width = [((z - p) * t.conjugate()).imag for z in corners]
     return corners if max(width) - min(width) > merge else [p, q]
+
+
+def _apart(points: list[complex], merge: float) -> list[complex]:
+    """Leave out points closer than ``merge`` to an earlier one."""
+    kept: list[complex] = []
+    for point in points:
+        if all(abs(point - other) > merge for other in kept):
+            kept.append(point)
+    return kept
 
 
 def thickness(corners: list[complex]) -> float:

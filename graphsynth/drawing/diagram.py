@@ -7,21 +7,27 @@ drawn in a second colour.
 
 from __future__ import annotations
 
-import cmath
-import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.drawing.bodies import Body, Guide, bodies, bounds, outline, rounded, thickness, world
+from graphsynth.drawing.bodies import bodies, bounds
 from graphsynth.drawing.lettering import place_letters
-from graphsynth.drawing.palette import TRACE_COLOURS
 from graphsynth.drawing.sketch import Sketch
+from graphsynth.drawing.symbols import (
+    BLOCK,
+    Plan,
+    draw_arrow,
+    draw_joints,
+    draw_link,
+    draw_points,
+    draw_slider,
+    draw_traces,
+)
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.joints import PinSlot, Prismatic
+from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -30,38 +36,7 @@ __all__ = ["draw_mechanism", "mechanism_sketch", "mechanism_svg"]
 
 Array = NDArray[np.float64]
 
-_BLOCK = 13.0  # half length of a slider's block, pixels
-_HALF = 8.0  # its half width
-_SLOT = 6.5  # half width of a slot
 _MARGIN = 40.0
-_THIN = 12.0  # plates thinner than this are drawn with room around their joints
-_ROUND = 9.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """What the parts of a diagram share."""
-
-    mechanism: Mechanism
-    poses: Array
-    sketch: Sketch
-    bodies: list[Body]
-    grounded: bool
-
-    @property
-    def px(self) -> float:
-        """One symbol pixel in the units of the mechanism."""
-        return self.sketch.pixel * self.sketch.symbol
-
-    def fixed(self, link: int) -> bool:
-        """Whether a link is drawn as ground."""
-        return self.grounded and link == self.mechanism.frame
-
-    def colour(self, link: int) -> str:
-        """Ink of a link: driven links stand out."""
-        frame = self.mechanism.frame
-        driven = any(d.link == link or (d.base == link != frame and d.link == frame) for d in self.mechanism.drivers)
-        return "b" if driven and self.grounded else "link"
 
 
 def mechanism_sketch(
@@ -111,20 +86,20 @@ def mechanism_sketch(
     spare = max(0.0, least / scale - size.real) / 2
     lower, upper = lower - spare, upper + spare
     sketch = Sketch(lower, upper, (upper - lower).real * scale + 2 * _MARGIN, _MARGIN, title or _title(mechanism))
-    reserve = (_BLOCK + 5.0) / scale
-    plan = _Plan(mechanism, array, sketch, bodies(mechanism, array, reserve), grounded)
+    reserve = (BLOCK + 5.0) / scale
+    plan = Plan(mechanism, array, sketch, bodies(mechanism, array, reserve), grounded)
     if traces and len(array) > 1:
-        _traces(plan)
+        draw_traces(plan)
     for body in plan.bodies:
-        _link(plan, body)
+        draw_link(plan, body)
     for joint in mechanism.joints:
         if isinstance(joint, Prismatic | PinSlot):
-            _slider(plan, joint)
-    grounds = _joints(plan)
+            draw_slider(plan, joint)
+    grounds = draw_joints(plan)
     if grounded:
         for driver in mechanism.drivers:
-            _arrow(plan, driver, grounds)
-    _points(plan)
+            draw_arrow(plan, driver, grounds)
+    draw_points(plan)
     place_letters(sketch, mechanism, array, plan.bodies, grounds, numbers, grounded)
     sketch.on()
     return sketch
@@ -144,190 +119,6 @@ def _checked(mechanism: Mechanism, poses: ArrayLike) -> Array:
     if not np.isfinite(array).all():
         raise GeometryError("a pose that is not finite cannot be drawn; give an assembled one")
     return array
-
-
-def _traces(plan: _Plan) -> None:
-    for k, (name, (link, at)) in enumerate(plan.mechanism.points.items()):
-        path = world(plan.poses, link, complex(*at))
-        if abs(path - path[0]).max() > plan.px:
-            plan.sketch.on(layer="trace", part=f"path {name}")
-            plan.sketch.trace(path.tolist(), TRACE_COLOURS[k % len(TRACE_COLOURS)], 2.0)
-
-
-def _link(plan: _Plan, body: Body) -> None:
-    """Pitch circles, guides, and the bar or plate that joins what is attached."""
-    sketch, link = plan.sketch, body.link
-    for centre, radius, gear in body.wheels:
-        part = f"gear {gear.a}-{gear.b} of {link}"
-        sketch.on(link, "pitch", part)
-        sketch.circle(centre, radius, "link" if plan.fixed(link) else "soft")
-        if gear.internal and radius == max(gear.radius_a, gear.radius_b):
-            sketch.circle(centre, radius + 7.0 * plan.px, "soft", dash=())
-        if not plan.fixed(link):  # a spoke shows the turn
-            rim = radius * cmath.exp(0.5j)
-            sketch.line((centre + 0.8 * rim, centre + rim), "soft", 2.2)
-        sketch.on(link, "joint", f"centre {part}")
-        for d in (4.0 * plan.px, 4j * plan.px):
-            sketch.line((centre - d, centre + d), "link", 1.2)
-        if plan.fixed(link):
-            _hatched_rim(plan, centre, radius)
-    for guide in body.guides:
-        if isinstance(guide.joint, Prismatic) and not plan.fixed(link):
-            sketch.on(link, "bar", f"guide {guide.joint.a}-{guide.joint.b}")
-            sketch.bar(guide.start, guide.stop, plan.colour(link), 4.0)
-    if plan.fixed(link):
-        return
-    corners = outline(body.vertices(), 2.0 * plan.px)
-    if len(corners) > 1 and body.joints > 2 and thickness(corners) < _THIN * plan.px:
-        # a bar would look like several links that meet at a joint
-        sketch.on(link, "plate", f"link {link}")
-        sketch.plate(rounded(corners, _ROUND * plan.px), plan.colour(link), 2.0, 0.8)
-    elif len(corners) > 2:
-        sketch.on(link, "plate", f"link {link}")
-        sketch.plate(corners, plan.colour(link), 2.6, 0.8)
-    elif len(corners) == 2:
-        sketch.on(link, "bar", f"link {link}")
-        sketch.bar(corners[0], corners[1], plan.colour(link), 4.0)
-
-
-def _hatched_rim(plan: _Plan, centre: complex, radius: float) -> None:
-    """Mark a wheel that does not turn: hatching inside the lower part of its rim."""
-    plan.sketch.on(plan.mechanism.frame, "ground", "ground of a wheel")
-    for k in range(7):
-        rim = centre + radius * cmath.exp(1j * math.radians(-120 + 10 * k))
-        plan.sketch.line((rim, rim + (0.6 + 1j) * 7.0 * plan.px), "link", 1.4)
-
-
-def _rectangle(middle: complex, t: complex, half: float, across: float) -> list[complex]:
-    return [middle + t * (x * half + 1j * y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-
-
-def _slider(plan: _Plan, joint: Prismatic | PinSlot) -> None:
-    """Draw a block on its guide, or a slot; ground where the frame is one of the two."""
-    sketch, px = plan.sketch, plan.px
-    guide = next(g for g in plan.bodies[joint.a].guides if g.joint is joint)
-    name = f"{joint.a}-{joint.b}"
-    if isinstance(joint, PinSlot):
-        sketch.on(joint.a, "block", f"slot {name}")
-        sketch.outline(_stadium(guide, _SLOT * px), plan.colour(joint.a), 1.8)
-        if plan.fixed(joint.a):
-            _guide_ground(plan, guide, _SLOT + 1.0)
-        return
-    turn = joint.angle_b if isinstance(joint, Prismatic) else 0.0
-    t = cmath.exp(1j * turn)
-    sketch.on(joint.b, "block", f"block {name}")
-    middle = complex(*joint.at_b)
-    sketch.outline(_rectangle(middle, t, _BLOCK * px, _HALF * px), plan.colour(joint.b))
-    if plan.fixed(joint.a):
-        _guide_ground(plan, guide, _HALF + 1.5)
-    elif plan.fixed(joint.b):
-        sketch.on(joint.b, "ground", f"ground {name}")
-        down = _downward(t)
-        foot = middle + down * (_HALF + 1.0) * px
-        sketch.hatch(foot - t * _BLOCK * px, foot + t * _BLOCK * px, down * px, 4)
-
-
-def _downward(t: complex) -> complex:
-    """Return the normal of a direction that points down (to the right of an upright direction)."""
-    normal = -1j * t
-    return normal if normal.imag < -1e-9 or (abs(normal.imag) <= 1e-9 and normal.real > 0) else -normal
-
-
-def _guide_ground(plan: _Plan, guide: Guide, aside: float) -> None:
-    down = _downward(guide.direction)
-    shift = down * aside * plan.px
-    strokes = max(4, round(abs(guide.stop - guide.start) / (9.0 * plan.px)))
-    plan.sketch.on(guide.joint.a, "ground", f"ground {guide.joint.a}-{guide.joint.b}")
-    plan.sketch.hatch(guide.start + shift, guide.stop + shift, down * plan.px, strokes)
-
-
-def _stadium(guide: Guide, half: float) -> list[complex]:
-    """Outline of a slot with round ends."""
-    ends = [(guide.stop, -0.5), (guide.start, 0.5)]
-    return [
-        end + half * guide.direction * cmath.exp(1j * math.pi * (first + k / 8))
-        for end, first in ends
-        for k in range(9)
-    ]
-
-
-def _joints(plan: _Plan) -> list[tuple[complex, complex]]:
-    """Draw every turning pair and pin once; return where ground stands and which way it points."""
-    sketch, grounds = plan.sketch, []
-    for joint in plan.mechanism.joints:
-        name = f"{joint.a}-{joint.b}"
-        if isinstance(joint, Revolute):
-            at = complex(*joint.at_a)
-            links = (joint.a, joint.b)
-            if any(map(plan.fixed, links)):
-                own, other = (joint.a, joint.b) if plan.fixed(joint.a) else (joint.b, joint.a)
-                at = complex(*(joint.at_a if own == joint.a else joint.at_b))
-                down = _ground_direction(plan, at, other)
-                grounds.append((at, down))
-                sketch.on(own, "ground", f"ground {name}")
-                sketch.ground(at, direction=down, joint=False)
-                sketch.on(own, "joint", f"joint {name}")
-            else:
-                sketch.on(joint.a, "joint", f"joint {name}")
-            sketch.joint(at)
-        elif isinstance(joint, PinSlot):
-            pin = complex(*joint.at_b)
-            if plan.fixed(joint.b):
-                sketch.on(joint.b, "ground", f"ground {name}")
-                sketch.ground(pin, joint=False)
-                grounds.append((pin, -1j))
-            sketch.on(joint.b, "joint", f"joint {name}")
-            sketch.joint(pin, 4.0)
-    return grounds
-
-
-def _ground_direction(plan: _Plan, at: complex, link: int) -> complex:
-    """Down, unless the link jointed there lies that way most of the time: then aside or up."""
-    own = plan.bodies[link].vertices()
-    ways = np.concatenate([world(plan.poses, link, p) for p in own]) - at if own else np.zeros(0, np.complex128)
-    ways = ways[abs(ways) > 2.0 * plan.px]
-    if ways.size == 0:
-        return -1j
-    units = ways / abs(ways)
-
-    def cost(d: complex) -> float:
-        return float(np.maximum((units * d.conjugate()).real, 0.0).mean()) + {-1j: 0.0, 1j: 0.25}.get(d, 0.3)
-
-    return min((-1j, 1j, -1 + 0j, 1 + 0j), key=cost)
-
-
-def _arrow(plan: _Plan, driver: Driver, grounds: list[tuple[complex, complex]]) -> None:
-    """Sense of a driver: an arc around a turning pair, a straight arrow beside a slider."""
-    joint = plan.mechanism.joint(*driver.pair)
-    rate = np.asarray(driver.law(np.array([0.0, 1.0]))[1], dtype=np.float64)
-    sense = -1.0 if np.isfinite(rate[0]) and rate[0] < 0.0 else 1.0
-    sketch, px = plan.sketch, plan.px
-    part = f"driver {driver.base}-{driver.link}"
-    if isinstance(joint, Revolute):
-        at = complex(*(joint.at_a if joint.a == driver.base else joint.at_b))
-        down = next((d for p, d in grounds if p == at and driver.base == plan.mechanism.frame), -1j)
-        sketch.on(driver.base, "mark", part)
-        arc = [at + 19.0 * px * -down * cmath.exp(1j * sense * math.radians(-80 + 10 * k)) for k in range(17)]
-        sketch.trace(arc, "b", 2.4)
-        _head(plan, arc[-1], (arc[-1] - at) * 1j * sense)
-    elif isinstance(joint, Prismatic):
-        sense = sense if driver.base == joint.a else -sense
-        t = cmath.exp(1j * joint.angle_b) * sense
-        foot = complex(*joint.at_b) - _downward(t) * 15.0 * px - t * 12.0 * px
-        sketch.on(joint.b, "mark", part)
-        sketch.trace([foot, foot + t * 24.0 * px], "b", 2.4)
-        _head(plan, foot + t * 24.0 * px, t)
-
-
-def _head(plan: _Plan, tip: complex, along: complex) -> None:
-    t = along / abs(along) * 9.0 * plan.px
-    plan.sketch.line((tip - t + 0.6j * t, tip + 0.25 * t, tip - t - 0.6j * t), "b", 2.4)
-
-
-def _points(plan: _Plan) -> None:
-    for k, (name, (link, at)) in enumerate(plan.mechanism.points.items()):
-        plan.sketch.on(link, "mark", f"point {name}")
-        plan.sketch.dot(complex(*at), TRACE_COLOURS[k % len(TRACE_COLOURS)], 4.2)
 
 
 def _pose_of(what: Mechanism | Motion, pose: ArrayLike | int | None) -> tuple[Mechanism, Array, Array]:

@@ -67,6 +67,8 @@ def place_letters(
         if not (grounded and body.link == mechanism.frame):
             room.add(body.link, _along(outline(body.vertices(), 2.0 * px), 14.0 * px), body.link)
         room.add(body.link, body.points)
+        for guide in body.guides:
+            room.add(body.link, _along([guide.start, guide.stop], 14.0 * px), body.link)
     frame = mechanism.frame
     for at, down in grounds:
         room.add(frame, [at + down * r * px for r in (8.0, 16.0, 23.0)])
@@ -114,4 +116,4 @@ def _beside(body: Body, px: float) -> list[complex]:
         sides = (1, -1) if thin else (1,)  # corners run anticlockwise: the outside of a plate comes first
         return [p + (q - p) * s + side * aside for s in (0.5, 0.36, 0.64, 0.22, 0.78) for side in sides]
     at = corners[0] if corners else 0j
-    return [at + 19.0 * px * d for d in (1j, -1j, 1, -1, 1 + 1j, -1 + 1j)]
+    return [at + 24.0 * px * d for d in (0.8j, -0.8j, 1, -1, 0.8 + 0.8j, -0.8 + 0.8j)]
