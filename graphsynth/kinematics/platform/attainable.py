@@ -118,18 +118,42 @@ def attainable(mechanism: SingleMotorPlatform, direction: ArrayLike) -> Attainab
     )
 
 
-def lengths_only_design(mechanism: SingleMotorPlatform, wanted: ArrayLike, *, samples: int = 96) -> Design:
+def lengths_only_design(
+    mechanism: SingleMotorPlatform, wanted: ArrayLike, *, free_phase: bool = True, samples: int = 96
+) -> Design:
     """Least-squares crank lengths for a wanted first harmonic with the given phases, verified over the whole turn.
 
-    Negative lengths become positive ones with the phase turned by 180 degrees.  ``Design.error`` tells how far the
-    result is from what was asked; `attainable` tells why.
+    Parameters
+    ----------
+    mechanism : SingleMotorPlatform
+        Its phases are kept (modulo 180 degrees: a negative length is keyed the other way round).
+    wanted : array_like of complex, shape (3,)
+    free_phase : bool, optional
+        The motion may begin at any wheel angle: ``wanted`` is multiplied by the best ``exp(i chi)``, and
+        ``Design.wanted`` is that product.
+    samples : int, optional
+
+    Returns
+    -------
+    Design
+        ``error`` tells how far the result is from what was asked; `attainable` tells why.
+
+    Examples
+    --------
+    >>> from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
+    >>> legs = SingleMotorPlatform(phase=SingleMotorPlatform().frame_angle)
+    >>> lengths_only_design(legs, [2.0, 1.0, 0.0]).error < 1e-3
+    True
     """
     target = _wanted(wanted)
     theory = small_crank(mechanism)
     scale = np.array([1.0, 1.0, mechanism.Lc])
-    G, right = _gains(mechanism), target * scale
-    stacked, both = np.concatenate([G.real, G.imag]), np.concatenate([right.real, right.imag])
-    lengths = np.linalg.lstsq(stacked, both, rcond=1e-12)[0]
+    G = _gains(mechanism)
+    stacked = np.concatenate([G.real, G.imag])
+    if free_phase:
+        target = target * _best_phase(stacked, target * scale)
+    right = target * scale
+    lengths = np.linalg.lstsq(stacked, np.concatenate([right.real, right.imag]), rcond=1e-12)[0]
     phase = np.array(mechanism.phase) + np.where(lengths < 0.0, np.pi, 0.0)
     size = np.abs(lengths)
     designed = replace(
@@ -138,3 +162,14 @@ def lengths_only_design(mechanism: SingleMotorPlatform, wanted: ArrayLike, *, sa
         phase=(float(phase[0]), float(phase[1]), float(phase[2])),
     )
     return assess_design(designed, target, theory.home, samples=samples)
+
+
+def _best_phase(stacked: Array, wanted: Complex) -> complex:
+    """Return the unit factor of ``wanted`` whose product is nearest to the span of the columns."""
+    left, values, _ = np.linalg.svd(stacked, full_matrices=False)
+    basis = left[:, values > 1e-12 * values[0]]
+    pair = np.column_stack([np.concatenate([w.real, w.imag]) for w in (wanted, 1j * wanted)])
+    cosine, sine = np.linalg.svd(basis.T @ pair)[2][0]
+    if cosine < 0.0:
+        cosine, sine = -cosine, -sine
+    return complex(cosine, sine)

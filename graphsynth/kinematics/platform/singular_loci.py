@@ -212,7 +212,7 @@ def isolated_singular_points(
     local = (np.arange(-3, 4)[:, None] + 1j * np.arange(-3, 4)[None, :]).ravel() / 3.0
     first, values = centre, np.abs(inner[rows, columns])
     for _ in range(40):  # the best node of a 7 x 7 grid about each candidate, then a smaller grid
-        around = centre[:, None] + step * local
+        around = np.asarray(centre[:, None] + step * local, dtype=np.complex128)
         size = np.nan_to_num(sign[:, None] * value(around), nan=1.0)
         best = np.argmin(size, axis=1)
         centre, values = around[np.arange(len(best)), best], size[np.arange(len(best)), best]
