@@ -100,13 +100,14 @@ def _palette() -> Any:
     from matplotlib.colors import to_rgb
     from PIL import Image
 
-    inks = dict.fromkeys(LIGHT[name] for name in ("link", "soft", "note", "a", "b", "c", "d", "fill"))
+    inks = dict.fromkeys(LIGHT[name] for name in ("link", "soft", "note", "a", "b", "c", "d"))
     pairs = [(ink, LIGHT["paper"]) for ink in inks] + [(LIGHT["link"], LIGHT["fill"])]
     colours = dict.fromkeys(
         tuple(round(255 * (p * k + q * (6 - k)) / 6) for p, q in zip(to_rgb(ink), to_rgb(ground)))
         for ink, ground in pairs
         for k in range(7)
     )
+    # Pillow looks colours up in boxes of eight: nothing may lie as close to the paper as the edge of a plate
     image = Image.new("P", (1, 1))
     image.putpalette([value for colour in colours for value in colour])
     return image
