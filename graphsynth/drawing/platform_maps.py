@@ -27,6 +27,7 @@ __all__ = ["harmonics_picture", "loci_picture", "map_picture", "workspace_pictur
 #: One colour for each leg, readable in grey and by colour-blind readers (Okabe and Ito 2008).
 _LEGS = ("#0072B2", "#D55E00", "#009E73")
 _SINGULAR = "#AA0044"
+_TINTS = ("#F6DCC8", "#D3E4F2")  # det JX < 0, > 0
 _STYLES = {"outer": "-", "inner": (0, (5, 2)), "lower limit": (0, (1, 1)), "upper limit": (0, (3, 1, 1, 1))}
 #: name of a map -> title, colour map, unit
 _MAPS = {
@@ -166,39 +167,24 @@ def loci_picture(
     -------
     matplotlib.figure.Figure
     """
-    from matplotlib.colors import ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     from graphsynth.kinematics.parallel_platform import WORKING_MODES
-    from graphsynth.kinematics.platform.maps import platform_map
+    from graphsynth.kinematics.platform.field import working_mode
     from graphsynth.kinematics.platform.workspace import constant_orientation_workspace
 
     work = constant_orientation_workspace(platform, loci.alpha)
-    tints = ListedColormap(["#F6DCC8", "#D3E4F2"])
     figure = _figure(size)
     grid = figure.subplots(2, 4, sharex=True, sharey=True)
     for axes, mode in zip(grid.ravel(), WORKING_MODES):
-        sigma = tuple(int(s) for s in mode)
-        if not work.empty:
-            field = platform_map(platform, loci.alpha, sigma, nodes=240)
-            sign = np.sign(field.quality.determinant).T
-            axes.pcolormesh(field.x, field.y, np.where(sign == 0, np.nan, sign), cmap=tints, vmin=-1, vmax=1, zorder=0)
-            axes.collections[-1].set_rasterized(True)
-        _arcs(axes, work, 1.3)
-        for curve in loci.of_mode(sigma):
-            axes.plot(curve.points.real, curve.points.imag, color=_SINGULAR, lw=1.4, zorder=4)
-        for own, p in loci.points:
-            if own == sigma:
-                axes.plot([p.real], [p.imag], ".", color=_SINGULAR, zorder=4)
-        _frame(axes, work)
-        axes.set_title(f"working mode {_signs(sigma)}", fontsize=9)
+        _panel(axes, platform, loci, work, working_mode([int(s) for s in mode]))
     for axes in grid[-1]:
         axes.set_xlabel(_axis("x", unit), fontsize=9)
     for axes in grid[:, 0]:
         axes.set_ylabel(_axis("y", unit), fontsize=9)
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    handles += [Line2D([], [], color=_SINGULAR, lw=1.4), Patch(color="#D3E4F2"), Patch(color="#F6DCC8")]
+    handles += [Line2D([], [], color=_SINGULAR, lw=1.4), Patch(color=_TINTS[1]), Patch(color=_TINTS[0])]
     labels += ["type II, det JX = 0", "det JX > 0", "det JX < 0"]
     figure.legend(
         handles,
@@ -210,6 +196,30 @@ def loci_picture(
     )
     figure.suptitle(f"Singular loci at α = {math.degrees(loci.alpha):.4g}°; arcs: type I", fontsize=11)
     return figure
+
+
+def _panel(
+    axes: Any, platform: ParallelPlatform, loci: SingularLoci, work: Workspace, sigma: tuple[int, int, int]
+) -> None:
+    """Draw one working mode: sign of ``det JX``, boundary, curves."""
+    from matplotlib.colors import ListedColormap
+
+    from graphsynth.kinematics.platform.maps import platform_map
+
+    if not work.empty:
+        field = platform_map(platform, loci.alpha, sigma, nodes=240)
+        sign = np.sign(field.quality.determinant).T
+        shown = np.where(sign == 0, np.nan, sign)
+        tints = ListedColormap(list(_TINTS))
+        axes.pcolormesh(field.x, field.y, shown, cmap=tints, vmin=-1, vmax=1, zorder=0, rasterized=True)
+    _arcs(axes, work, 1.3)
+    for curve in loci.of_mode(sigma):
+        axes.plot(curve.points.real, curve.points.imag, color=_SINGULAR, lw=1.4, zorder=4)
+    for own, p in loci.points:
+        if own == sigma:
+            axes.plot([p.real], [p.imag], ".", color=_SINGULAR, zorder=4)
+    _frame(axes, work)
+    axes.set_title(f"working mode {_signs(sigma)}", fontsize=9)
 
 
 def map_picture(

@@ -100,13 +100,11 @@ def aspects(
     from scipy.ndimage import label
 
     sigma = working_mode(sigma)
-    count = nodes if nodes is not None else (200 if alpha is not None else 64)
+    count = nodes or (200 if alpha is not None else 64)
     if count < 4 or angles < 4:
         raise GeometryError(f"nodes = {count}, angles = {angles}: the grid needs 4 nodes or more along each axis")
-    if alpha is None:
-        turn = np.arange(angles) * (math.tau / angles) - math.pi
-    else:
-        turn = np.array([finite("alpha", alpha)])
+    every = np.arange(angles) * (math.tau / angles) - math.pi
+    turn = every if alpha is None else np.array([finite("alpha", alpha)])
     x, y = pose_grid(platform, None if alpha is None else float(turn[0]), count)
     X = np.stack(np.broadcast_arrays(x[:, None, None], y[None, :, None], turn), axis=-1)
     theta = platform.inverse(X, sigma).theta

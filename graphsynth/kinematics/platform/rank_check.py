@@ -126,32 +126,37 @@ def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLik
     poses = link_poses(platform, psi, start)
     if not np.isfinite(poses).all():
         raise GeometryError(f"a drive is not assembled at psi = {psi}; choose an angle inside its reach")
-    turn = np.exp(1j * np.array(platform.frame_angle))
-    z1, z2 = platform.gears.z1, platform.gears.z2
     joints: list[JointGeometry] = [Revolute(0, 1)]
     for k in range(3):
-        wheel, coupler, rocker, link = 2 + k, 5 + k, 8 + k, 11 + k
-        O = complex(platform.axis[k] * turn[k])
-        if O == 0:
-            raise GeometryError(f"wheel {k + 1} lies on the axis of the pinion; give an axis that is not 0")
-        small, large = abs(O) * z1 / (z1 + z2), abs(O) * z2 / (z1 + z2)
-        toothed = -(1.0 + small / large) * math.atan2(O.imag, O.real)
-        crank = platform.crank[k] * complex(np.exp(1j * platform.phase[k]))
-        arm = platform.l1[k] * complex(np.exp(1j * platform.delta[k]))
-        joints += [
-            Revolute(0, wheel, _pair(O)),
-            Revolute(wheel, coupler, _pair(crank)),
-            Revolute(coupler, rocker, (platform.coupler[k], 0.0), (platform.rocker[k], 0.0)),
-            Revolute(0, rocker, _pair(platform.platform.D[k])),
-            Revolute(rocker, link, _pair(arm)),
-            Revolute(link, 14, (platform.l2[k], 0.0), _pair(platform.platform.b[k])),
-            Gear(1, wheel, radius_a=small, radius_b=large, offset=toothed),
-        ]
+        joints += _leg(platform, k)
     driver = Driver(0, 1, Linear(1.0 / platform.gears.ratio))
     return Mechanism(
         platform.graph(), tuple(joints), (driver,), {"P": TracePoint(14, (0.0, 0.0))},
         tuple((float(x), float(y), float(a)) for x, y, a in poses),
     )  # fmt: skip
+
+
+def _leg(platform: SingleMotorPlatform, k: int) -> list[JointGeometry]:
+    """Joints of wheel, coupler, rocker and intermediate link k (from 0)."""
+    turn = complex(np.exp(1j * platform.frame_angle[k]))
+    z1, z2 = platform.gears.z1, platform.gears.z2
+    wheel, coupler, rocker, link = 2 + k, 5 + k, 8 + k, 11 + k
+    O = complex(platform.axis[k] * turn)
+    if O == 0:
+        raise GeometryError(f"wheel {k + 1} lies on the axis of the pinion; give an axis that is not 0")
+    small, large = abs(O) * z1 / (z1 + z2), abs(O) * z2 / (z1 + z2)
+    toothed = -(1.0 + small / large) * math.atan2(O.imag, O.real)
+    crank = platform.crank[k] * complex(np.exp(1j * platform.phase[k]))
+    arm = platform.l1[k] * complex(np.exp(1j * platform.delta[k]))
+    return [
+        Revolute(0, wheel, _pair(O)),
+        Revolute(wheel, coupler, _pair(crank)),
+        Revolute(coupler, rocker, (platform.coupler[k], 0.0), (platform.rocker[k], 0.0)),
+        Revolute(0, rocker, _pair(platform.platform.D[k])),
+        Revolute(rocker, link, _pair(arm)),
+        Revolute(link, 14, (platform.l2[k], 0.0), _pair(platform.platform.b[k])),
+        Gear(1, wheel, radius_a=small, radius_b=large, offset=toothed),
+    ]
 
 
 def _pair(z: complex) -> tuple[float, float]:

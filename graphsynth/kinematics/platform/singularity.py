@@ -138,9 +138,7 @@ def singularity(
     sines = np.where(arms > 0.0, JT / np.where(arms > 0.0, arms, 1.0), 0.0)
     legs = tuple(k + 1 for k in range(3) if abs(sines[k]) <= tolerance)
     lost = np.array([0.5 * JX[k - 1] for k in legs]).reshape(-1, 3)
-    kind = {(False, False): "regular", (True, False): "I", (False, True): "II", (True, True): "III"}[
-        bool(legs), bool(free.any())
-    ]
+    kind = ("regular", "I", "II", "III")[bool(legs) + 2 * bool(free.any())]
     return Singularity(
         kind, legs, uncontrolled, _centre(X, uncontrolled), stress, lost, float(np.linalg.det(JX)), float(values[-1]),
         float(values[-1]) / largest, (float(sines[0]), float(sines[1]), float(sines[2])), length, tolerance,
