@@ -31,6 +31,7 @@ _PUBLIC: dict[str, str] = {
     "Prismatic": "graphsynth.mechanism.joints",
     "PinSlot": "graphsynth.mechanism.joints",
     "Gear": "graphsynth.mechanism.joints",
+    "Cam": "graphsynth.mechanism.joints",
     "simulate": "graphsynth.kinematics.simulation",
     "simulate_batch": "graphsynth.kinematics.simulation",
     "LambdaLinkage": "graphsynth.kinematics.lambda_linkage",

@@ -1,50 +1,113 @@
-"""Keeping the cache of compiled kernels honest.
+"""Compiling kernels, and keeping the compiled ones honest.
 
-numba keeps a compiled function as long as its own source file is unchanged, but the function also contains constants
-and functions of other kernel modules.  After an update of one of those, a kept function would be silently wrong.  So
-every kernel package calls ``drop_stale_kernels`` before its functions are loaded: when any of its kernel sources, or
-of those it builds on, has changed since the last time, all of them are given a new modification time.  numba then
-compiles them anew on first use, wherever it keeps its cache.
+numba keeps the machine code of a function as long as the function's own source file is unchanged, but that code also
+contains functions and constants of other modules.  After a change of one of those, a kept function would be silently
+wrong.  `kernel` therefore adds to the key under which numba keeps a function a digest of every graphsynth module that
+the function's module imports, directly or through others.  It works wherever numba keeps its files, and for sources
+that cannot be written.
 """
 
 from __future__ import annotations
 
+import re
+import sys
+from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
-__all__ = ["drop_stale_kernels"]
+__all__ = ["kernel", "source_digest"]
 
-_STAMP = "kernels.sha256"
+_IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+([^#\n]+))?", re.MULTILINE)
+_ROOT = Path(__file__).parent.parent
 
 
-@cache
-def drop_stale_kernels(*places: Path) -> bool:
-    """Make numba forget the compiled kernels of ``places`` if any source there has changed; return whether it had.
+def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """Compile a function with numba on first use and keep the machine code on disk.
 
     Parameters
     ----------
-    places : Path
-        Kernel modules, or folders of them; the first is the caller's own, the others those it builds on.
+    function : callable
+        A function of a kernel module.  Division by zero gives infinity or NaN, as in C (``error_model="numpy"``).
+    **options
+        Further options of ``numba.njit``, for example ``inline="always"``.
 
-    Notes
-    -----
-    Sources that cannot be touched are left alone: an installation that is never edited needs no such care.
+    Returns
+    -------
+    numba dispatcher
     """
+    if function is None:
+        return lambda target: kernel(target, **options)
+    from numba import njit
+
+    compiled = njit(cache=True, **{"error_model": "numpy", **options})(function)
+    compiled._cache = _cache_class()(function, source_digest(Path(function.__code__.co_filename)))
+    return compiled
+
+
+@cache
+def _cache_class() -> Any:
+    from numba.core.caching import FunctionCache
+
+    class SourceCache(FunctionCache):
+        """Functions kept under a key that tells all sources that went into them."""
+
+        def __init__(self, function: Callable[..., Any], digest: str) -> None:
+            super().__init__(function)
+            self._digest = digest
+
+        def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+            return (*super()._index_key(sig, codegen), self._digest)
+
+    return SourceCache
+
+
+@cache
+def source_digest(module: Path, root: Path = _ROOT) -> str:
+    """Digest of a source file and of all modules of the package that it imports, directly or through others.
+
+    Parameters
+    ----------
+    module : Path
+        The source file.
+    root : Path, optional
+        Folder that holds the package.
+    """
+    found: dict[Path, bytes] = {}
+    waiting = [module]
+    while waiting:
+        path = waiting.pop()
+        if path in found:
+            continue
+        found[path] = path.read_bytes()
+        waiting += _imported(found[path].decode(), root)
+    digest = sha256(sys.version.encode())
+    for path in sorted(found, key=str):
+        digest.update(path.name.encode() + b"\0" + found[path] + b"\0")
+    return digest.hexdigest()
+
+
+def _imported(source: str, root: Path) -> list[Path]:
+    """Source files of the package that a module names in its import lines."""
+    paths = []
+    for name, parts in _IMPORT.findall(source):
+        base = root.joinpath(*name.split("."))
+        names = re.findall(r"\w+", parts)
+        candidates = [base.with_suffix(".py"), base / "__init__.py", *(base / f"{part}.py" for part in names)]
+        paths += [path for path in candidates if path.is_file() and path != Path(__file__)]
+    return paths
+
+
+def drop_stale_kernels(*places: Path) -> bool:
+    """Forget kernels compiled without `kernel` when a source has changed."""
     sources = [source for place in places for source in ([place] if place.is_file() else sorted(place.glob("*.py")))]
-    digest = sha256()
-    for source in sources:
-        digest.update(source.name.encode() + b"\0" + source.read_bytes())
-    own = places[0].parent if places[0].is_file() else places[0]
-    stamp = own / "__pycache__" / _STAMP
-    try:
-        if stamp.is_file() and stamp.read_text() == digest.hexdigest():
-            return False
-        for source in sources:
-            if source.parent == own or source == places[0]:
-                source.touch()
-        stamp.parent.mkdir(exist_ok=True)
-        stamp.write_text(digest.hexdigest())
-    except OSError:
+    digest = sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+    stamp = places[0] / "__pycache__" / "kernels.sha256"
+    if not places[0].is_dir() or (stamp.is_file() and stamp.read_text() == digest):
         return False
+    for index in stamp.parent.glob("*.nbi"):
+        index.unlink(missing_ok=True)
+    stamp.parent.mkdir(exist_ok=True)
+    stamp.write_text(digest)
     return True

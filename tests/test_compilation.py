@@ -1,52 +1,81 @@
-"""Compiled kernels are forgotten when any kernel source changes."""
+"""Compiled kernels are made anew when any source that went into them has changed, and only then."""
 
 from __future__ import annotations
 
-import os
+import subprocess
+import sys
 from pathlib import Path
 
-from graphsynth.compilation import drop_stale_kernels
+from graphsynth.compilation import source_digest
 
-LONG_AGO = 1_000_000_000
-drop = drop_stale_kernels.__wrapped__
+BELOW = "from graphsynth.compilation import kernel\n\n@kernel\ndef below(x):\n    return x + {}\n"
+ABOVE = """
+from graphsynth.compilation import kernel
+from graphsynth_probe.below import below
 
-
-def _sources(folder: Path) -> tuple[Path, Path, Path]:
-    own, base = folder / "room" / "kernels", folder / "base" / "kernels.py"
-    own.mkdir(parents=True)
-    base.parent.mkdir()
-    (own / "one.py").write_text("A = 1\n")
-    (own / "two.py").write_text("from one import A\n")
-    base.write_text("C = 3\n")
-    for source in (own / "one.py", own / "two.py", base):
-        os.utime(source, (LONG_AGO, LONG_AGO))
-    return own, own / "two.py", base
-
-
-def test_every_own_source_is_touched_when_one_changes(tmp_path: Path) -> None:
-    own, two, base = _sources(tmp_path)
-    assert drop(own, base)
-    assert two.stat().st_mtime > LONG_AGO
-    assert base.stat().st_mtime == LONG_AGO
-    os.utime(two, (LONG_AGO, LONG_AGO))
-    assert not drop(own, base)
-    assert two.stat().st_mtime == LONG_AGO
-    (own / "one.py").write_text("A = 2\n")
-    assert drop(own, base)
-    assert two.stat().st_mtime > LONG_AGO
+@kernel
+def above(x):
+    return 2.0 * below(x)
+"""
+RUN = """
+import sys
+sys.path.insert(0, {folder!r})
+import graphsynth.compilation as c
+from pathlib import Path
+c._IMPORT = c.re.compile(c._IMPORT.pattern.replace("graphsynth", "graphsynth(?:_probe)?"), c.re.MULTILINE)
+c.source_digest.__wrapped__.__defaults__ = (Path({folder!r}),)
+from graphsynth_probe.above import above
+print(above(1.0), sum(above.stats.cache_hits.values()), sum(above.stats.cache_misses.values()))
+"""
 
 
-def test_a_change_below_counts(tmp_path: Path) -> None:
-    own, two, base = _sources(tmp_path)
-    drop(own, base)
-    os.utime(two, (LONG_AGO, LONG_AGO))
-    base.write_text("C = 4\n")
-    assert drop(own, base)
-    assert two.stat().st_mtime > LONG_AGO
+def probe(folder: Path) -> tuple[float, int, int]:
+    """Run the probe package in a process of its own: value, cache hits, cache misses."""
+    text = subprocess.run(
+        [sys.executable, "-c", RUN.format(folder=str(folder))], capture_output=True, text=True, check=True
+    ).stdout.split()
+    return float(text[0]), int(text[1]), int(text[2])
 
 
-def test_a_single_module(tmp_path: Path) -> None:
-    _, _, base = _sources(tmp_path)
-    assert drop(base)
-    assert base.stat().st_mtime > LONG_AGO
-    assert not drop(base)
+def test_a_change_in_another_module_is_noticed(tmp_path: Path) -> None:
+    package = tmp_path / "graphsynth_probe"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "above.py").write_text(ABOVE)
+    (package / "below.py").write_text(BELOW.format("1.0"))
+    assert probe(tmp_path) == (4.0, 0, 1)
+    assert probe(tmp_path) == (4.0, 1, 0)
+    (package / "below.py").write_text(BELOW.format("5.0"))
+    assert probe(tmp_path) == (12.0, 0, 1)
+    (package / "below.py").write_text(BELOW.format("1.0"))
+    assert probe(tmp_path) == (4.0, 1, 0)
+
+
+def written(folder: Path, texts: dict[str, str]) -> Path:
+    for name, text in texts.items():
+        path = folder / "graphsynth" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return folder
+
+
+def test_digest_follows_imports(tmp_path: Path) -> None:
+    texts = {
+        "room/kernels/one": "from graphsynth.room.kernels.two import f\n",
+        "room/kernels/two": "from graphsynth.room import codes\n",
+        "room/codes": "A = 1\n",
+        "other": "B = 1\n",
+    }
+    first = written(tmp_path / "a", texts)
+    start = Path("graphsynth/room/kernels/one.py")
+    digest = source_digest(first / start, first)
+    for name, changed in (("room/codes", True), ("room/kernels/two", True), ("other", False)):
+        other = written(tmp_path / name.replace("/", "-"), {**texts, name: texts[name] + "# new\n"})
+        assert (source_digest(other / start, other) != digest) == changed
+
+
+def test_every_kernel_module_depends_on_what_it_imports() -> None:
+    import graphsynth.synthesis.kernels.listing as listing
+    import graphsynth.synthesis.kernels.variables as variables
+
+    assert source_digest(Path(listing.__file__)) != source_digest(Path(variables.__file__))

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.mechanism.joints import Gear, JointGeometry, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 
 __all__ = ["jacobian", "residual"]
 
@@ -46,6 +46,8 @@ def residual(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
             rows += [d.real, d.imag]
         elif isinstance(joint, Gear):
             rows.append(_gear(joint, pose, d))
+        elif isinstance(joint, Cam):
+            rows.append(np.abs(d) - _pitch(joint, pose, d)[0])
         else:
             direction = np.exp(1j * (pose[..., joint.a, 2] + joint.angle_a))
             rows.append((np.conj(direction) * d).imag)
@@ -64,6 +66,16 @@ def _gear(joint: Gear, pose: Array, d: Complex) -> Array:
     # phi is known modulo a turn only, which moves the value by multiples of tau (radius_a + sign radius_b)
     period = (2.0 * np.pi) * abs(joint.radius_a + sign * joint.radius_b)
     return np.asarray(value - period * np.round(value / period))
+
+
+def _pitch(joint: Cam, pose: Array, d: Complex) -> tuple[Array, Array]:
+    """Radius of the pitch curve in the direction of d, and its derivative by the direction."""
+    psi = np.angle(d) - pose[..., joint.a, 2] - joint.angle_a
+    value, first = np.full(psi.shape, joint.radius), np.zeros(psi.shape)
+    for k, (c, s) in enumerate(joint.harmonics, 1):
+        value += c * np.cos(k * psi) + s * np.sin(k * psi)
+        first += k * (s * np.cos(k * psi) - c * np.sin(k * psi))
+    return value, first
 
 
 def jacobian(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
@@ -96,6 +108,14 @@ def jacobian(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
                 J[..., row, column + 2] = -total * weight * (np.conj(normal) * 1j * arm).real
             J[..., row, a + 2] += joint.radius_a
             J[..., row, b + 2] += sign * joint.radius_b
+            row += 1
+        elif isinstance(joint, Cam):
+            first = _pitch(joint, pose, d)[1]
+            normal = d / np.abs(d) - first * 1j * d / np.abs(d) ** 2  # gradient by the position of Q
+            for column, weight, arm in ((a, -1.0, arm_a), (b, 1.0, arm_b)):
+                J[..., row, column], J[..., row, column + 1] = weight * normal.real, weight * normal.imag
+                J[..., row, column + 2] = weight * (np.conj(normal) * 1j * arm).real
+            J[..., row, a + 2] += first
             row += 1
         else:
             t = np.exp(1j * (pose[..., joint.a, 2] + joint.angle_a))

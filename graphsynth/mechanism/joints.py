@@ -6,13 +6,14 @@ Complex notation below: link k carries the point p to ``r_k + exp(i theta_k) p``
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.checks import Point, finite, link_number, nonzero, point
 
-__all__ = ["COLUMNS", "Gear", "JointGeometry", "PinSlot", "Prismatic", "Revolute"]
+__all__ = ["COLUMNS", "Cam", "Gear", "JointGeometry", "PinSlot", "Prismatic", "Revolute"]
 
 #: Numbers of a joint in one row: point on a, direction on a, point on b, direction on b, radii, sign, offset.
 COLUMNS = ("ax", "ay", "a_angle", "bx", "by", "b_angle", "radius_a", "radius_b", "sign", "offset")
@@ -143,7 +144,54 @@ class Gear(_Pair):
         return (*self.at_a, 0.0, *self.at_b, 0.0, self.radius_a, self.radius_b, sign, self.offset)
 
 
-JointGeometry = Revolute | Prismatic | PinSlot | Gear
+@dataclass(frozen=True)
+class Cam(_Pair):
+    """Disk cam on link a with a roller (or knife edge) on link b (one equation).
+
+    The centre ``at_b`` of the roller stays on the pitch curve round ``at_a``, given in polar form by
+    ``rho(psi) = radius + sum over k >= 1 of c_k cos(k psi) + s_k sin(k psi)`` with psi counted from the direction
+    ``angle_a`` of link a; ``harmonics`` holds the pairs (c_k, s_k).  The radius must be positive everywhere (checked at
+    64 angles for each harmonic).  Contact is kept from both sides, as in a groove.
+    """
+
+    at_a: Point = (0.0, 0.0)
+    at_b: Point = (0.0, 0.0)
+    angle_a: float = 0.0
+    radius: float = 1.0
+    harmonics: tuple[Point, ...] = ()
+
+    mobility: ClassVar[int] = 2
+    kind: ClassVar[str] = "cam"
+
+    def __post_init__(self) -> None:
+        self._check(("at_a", "at_b"), ("angle_a",))
+        name = f"of cam {self.a}-{self.b}"
+        object.__setattr__(self, "radius", nonzero(f"radius {name}", self.radius))
+        pairs = tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(self.harmonics, 1))
+        object.__setattr__(self, "harmonics", pairs)
+        count = 64 * (len(pairs) + 1)
+        least = min(self.pitch_radius(2.0 * math.pi * k / count)[0] for k in range(count))
+        if least <= 0.0:
+            raise GeometryError(
+                f"the pitch curve {name} has the radius {least:.6g} somewhere; make it positive everywhere"
+            )
+
+    def pitch_radius(self, psi: float) -> tuple[float, float, float]:
+        """Radius of the pitch curve at ``psi`` (radians from ``angle_a``) and its first two derivatives."""
+        value, first, second = self.radius, 0.0, 0.0
+        for k, (c, s) in enumerate(self.harmonics, 1):
+            cosine, sine = math.cos(k * psi), math.sin(k * psi)
+            value += c * cosine + s * sine
+            first += k * (s * cosine - c * sine)
+            second -= k * k * (c * cosine + s * sine)
+        return value, first, second
+
+    def row(self) -> tuple[float, ...]:
+        """Numbers in the order of `COLUMNS` (the mean radius as the first; harmonics are the joint's own)."""
+        return (*self.at_a, self.angle_a, *self.at_b, 0.0, self.radius, 0.0, 0.0, 0.0)
+
+
+JointGeometry = Revolute | Prismatic | PinSlot | Gear | Cam
 
 #: Class by kind, for readers.
-KINDS: dict[str, Any] = {joint.kind: joint for joint in (Revolute, Prismatic, PinSlot, Gear)}
+KINDS: dict[str, Any] = {joint.kind: joint for joint in (Revolute, Prismatic, PinSlot, Gear, Cam)}

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.checks import Point, finite, link_number, point
-from graphsynth.mechanism.joints import COLUMNS, Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Law, Linear
 from graphsynth.structure.graph import MechanismGraph
 
@@ -69,7 +69,7 @@ class Mechanism:
     ----------
     graph : MechanismGraph
         A graph with a frame, space 3.
-    joints : iterable of Revolute, Prismatic, PinSlot or Gear
+    joints : iterable of Revolute, Prismatic, PinSlot, Gear or Cam
         One for every joint of the graph, in any order; kept in the order of ``graph.joints``.
     drivers : iterable of Driver
         Driven joints, R or P.
@@ -227,8 +227,8 @@ def _ordered(graph: MechanismGraph, joints: tuple[JointGeometry, ...]) -> tuple[
         raise GeometryError(f"space = {graph.space}: only planar mechanisms (space 3) have joint geometry here")
     by_pair: dict[tuple[int, int], JointGeometry] = {}
     for joint in joints:
-        if not isinstance(joint, Revolute | Prismatic | PinSlot | Gear):
-            raise GeometryError(f"{joint!r} is not a joint; use Revolute, Prismatic, PinSlot or Gear")
+        if not isinstance(joint, Revolute | Prismatic | PinSlot | Gear | Cam):
+            raise GeometryError(f"{joint!r} is not a joint; use Revolute, Prismatic, PinSlot, Gear or Cam")
         if joint.pair in by_pair:
             raise GeometryError(f"joint {joint.pair[0]}-{joint.pair[1]} has two geometries; remove one")
         by_pair[joint.pair] = joint

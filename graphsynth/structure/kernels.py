@@ -5,17 +5,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
-from graphsynth.compilation import drop_stale_kernels
+from graphsynth.compilation import kernel
 
 __all__ = ["canon", "canon_packed", "canon_workspace", "lowest_bit", "popcount"]
-
-drop_stale_kernels(Path(__file__))
 
 ZERO = np.uint64(0)
 ONE = np.uint64(1)
@@ -50,7 +46,7 @@ def lowest_bit(typingctx, x):
     return types.uint64(types.uint64), codegen
 
 
-@njit(cache=True)
+@kernel
 def canon_workspace(n, layers):
     """Return ``(lab, form, gens, index, orbits, wi, wu)``, the output and scratch arrays of ``canon``."""
     return (
@@ -64,13 +60,13 @@ def canon_workspace(n, layers):
     )
 
 
-@njit(cache=True)
+@kernel
 def _mix(state, value):
     state = (state ^ value) * MIX
     return state ^ (state >> HALF)
 
 
-@njit(cache=True)
+@kernel
 def _cell_end(starts, place, n):
     if place + 1 >= n:
         return n
@@ -80,7 +76,7 @@ def _cell_end(starts, place, n):
     return place + 1 + np.int64(lowest_bit(rest))
 
 
-@njit(cache=True)
+@kernel
 def _find(parent, vertex):
     while parent[vertex] != vertex:
         parent[vertex] = parent[parent[vertex]]
@@ -88,7 +84,7 @@ def _find(parent, vertex):
     return vertex
 
 
-@njit(cache=True)
+@kernel
 def _merge(n, parent, permutation):
     joined = False
     for vertex in range(n):
@@ -100,7 +96,7 @@ def _merge(n, parent, permutation):
     return joined
 
 
-@njit(cache=True)
+@kernel
 def _refine(n, layers, masks, lab, keys, starts, active):
     """Refine to an equitable partition; return (cell starts, trace)."""
     state = ZERO
@@ -166,7 +162,7 @@ def _refine(n, layers, masks, lab, keys, starts, active):
     return starts, trace
 
 
-@njit(cache=True)
+@kernel
 def _permuted(n, layers, masks, lab, position, wu, row):
     """Write the adjacency in the order ``lab`` to rows ``row..`` of ``wu``."""
     for i in range(n):
@@ -181,7 +177,7 @@ def _permuted(n, layers, masks, lab, position, wu, row):
             wu[row + c, i] = line
 
 
-@njit(cache=True)
+@kernel
 def _compare(n, layers, a, row_a, b, row_b):
     for c in range(layers):
         for i in range(n):
@@ -192,7 +188,7 @@ def _compare(n, layers, a, row_a, b, row_b):
     return 0
 
 
-@njit(cache=True)
+@kernel
 def _next(n, level, on_path, left, path, parent, orbits, gens, merging, others):
     """Return the next vertex of the target cell to try, or -1, and what is left of the cell."""
     if on_path:
@@ -218,7 +214,7 @@ def _next(n, level, on_path, left, path, parent, orbits, gens, merging, others):
     return -1, left
 
 
-@njit(cache=True)
+@kernel
 def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
     """Label a coloured graph canonically; the arrays after ``colours`` come from ``canon_workspace(n, layers)``.
 
@@ -407,7 +403,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
     return merging
 
 
-@njit(cache=True)
+@kernel
 def canon_packed(links, packed, colours):
     """Label one graph of at most 64 links given by joints ``a, b, mobility``; return (lab, generators, index, orbits).
 

@@ -10,6 +10,7 @@ ANGLE = 4  #: theta_b - theta_a = h
 GEAR = 5  #: radius_a (theta_a - phi) + sign radius_b (theta_b - phi - h) = 0
 DRIVE_ANGLE = 6  #: theta_b - theta_a = sign q
 DRIVE_SLIDE = 7  #: t . (Q - P) = sign q
+CAM = 8  #: |Q - P| = pitch radius in the direction of Q - P, seen from link a
 
 # Links eliminated from a group: placed after it, from the two links they join.
 E_RR, E_RP, E_PP = 0, 1, 2
@@ -27,6 +28,8 @@ TWO_MODES = (R_DIST, R_LINE_PIN, R_LINE_SLOT, P_DIST)
 # Row parameters (columns of a float table).
 PAX, PAY, PBX, PBY, TX, TY, H, RA, RB, SIGN, SLOT, INVERSE = range(12)
 ROW_WIDTH = 12
+#: Of a CAM row: mean radius in H, direction in RA; then its harmonics, two columns each.
+CAM_WIDTH = ROW_WIDTH
 #: Parameters of an eliminated link: a's point, e's point there, b's point, e's point there, directions, angle.
 ELIM_WIDTH = 13
 #: Parameters of a driver step: known point, direction in the known link, placed link's point, sign, angle.

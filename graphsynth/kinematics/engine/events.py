@@ -24,6 +24,8 @@ _NEAR = 0.2
 _CLOSE = 1e-8
 #: A smallest margin below this is a change point: the modes meet to rounding.
 _TOUCH = 1e-13
+#: A speed whose least value is below this part of the largest is examined for a dwell.
+_SLOW = 1e-2
 
 
 def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
@@ -216,7 +218,7 @@ def _flat(value: Callable[[float], float], at: float, width: float) -> float:
 
 
 def dead_centres(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
-    """Return where the coordinate of an undriven joint on the frame reverses (order 2: its rate changes sign)."""
+    """Where the coordinate of an undriven joint on the frame reverses, and where it stands still without reversing."""
     mechanism = tracker.program.mechanism
     driven = {driver.pair for driver in mechanism.drivers}
     found: list[MotionEvent] = []
@@ -233,10 +235,9 @@ def dead_centres(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
         else:
             continue
         values = np.array([rate(trace, k) for k in range(trace.done)])
-        for k in np.flatnonzero(values[1:] * values[:-1] < 0.0):
-            event = _reversal(tracker, trace, int(k), rate, group, link)
-            if event is not None:
-                found.append(event)
+        events = [_reversal(tracker, trace, *ends, rate, group, link) for ends in _sign_changes(values)]
+        events += [_dwell(tracker, trace, k, rate, group, link) for k in _near_stops(values)]
+        found += [event for event in events if event is not None]
     return found
 
 
@@ -258,20 +259,66 @@ def _along(link: int, at: tuple[float, float], angle: float) -> Rate:
     return rate
 
 
-def _reversal(tracker: Tracker, trace: Trace, k: int, rate: Rate, group: int, link: int) -> MotionEvent | None:
-    from scipy.optimize import brentq
+def _sign_changes(values: Array) -> list[tuple[int, int]]:
+    """Find samples next to each other, zeros left out, whose signs differ."""
+    kept = np.flatnonzero(values != 0.0)
+    turns = np.flatnonzero(values[kept[1:]] * values[kept[:-1]] < 0.0)
+    return [(int(kept[k]), int(kept[k + 1])) for k in turns]
 
-    low, high = float(trace.u[k]), float(trace.u[k + 1])
 
+def _near_stops(values: Array) -> list[int]:
+    """Inner samples of least speed, small against the largest, with neighbours of their own sign."""
+    if values.size < 3 or not np.isfinite(values).all():
+        return []
+    size = np.abs(values)
+    low = (size[1:-1] <= size[:-2]) & (size[1:-1] < size[2:]) & (size[1:-1] < _SLOW * size.max())
+    return [int(k) + 1 for k in np.flatnonzero(low & (values[:-2] * values[2:] > 0.0))]
+
+
+def _rate_from(tracker: Tracker, trace: Trace, k: int, rate: Rate) -> Callable[[float], float]:
     def at(u: float) -> float:
         pair, stop = tracker.reach(trace, k, u)
         return rate(pair, 1) if stop is None else math.nan
 
+    return at
+
+
+def _reversal(
+    tracker: Tracker, trace: Trace, k: int, after: int, rate: Rate, group: int, link: int
+) -> MotionEvent | None:
+    from scipy.optimize import brentq
+
+    low, high = float(trace.u[k]), float(trace.u[after])
+    at = _rate_from(tracker, trace, k, rate)
     ends = at(low), at(high)
     if not ends[0] * ends[1] < 0.0:
         return None
     where = float(brentq(at, low, high, xtol=1e-14, rtol=1e-15))
     if not math.isfinite(at(where)) or abs(at(where)) > max(abs(ends[0]), abs(ends[1])):
         return None  # a pole, not a zero
+    order = _order(at, where, (high - low) / 8.0)
     text = f"link {link} reverses on the frame at the input {where:.12g}"
-    return MotionEvent("dead centre", where, group, (link,), 2, 1e-13, False, text)
+    uncertainty = 1e-13 if order == 2 else 1e-15 ** (1.0 / (order - 1))
+    return MotionEvent("dead centre", where, group, (link,), order, uncertainty, False, text)
+
+
+def _order(at: Callable[[float], float], where: float, h: float) -> int:
+    """First derivative of the coordinate that does not vanish at a reversal: even; 2 unless the rate is flat there."""
+    near, far = abs(at(where + h)), abs(at(where + 2.0 * h))
+    if not (near > 0.0 and math.isfinite(far)):
+        return 2
+    return 2 + 2 * max(0, round((math.log2(far / near) - 1.0) / 2.0))
+
+
+def _dwell(tracker: Tracker, trace: Trace, k: int, rate: Rate, group: int, link: int) -> MotionEvent | None:
+    from scipy.optimize import minimize_scalar
+
+    at = _rate_from(tracker, trace, k - 1, rate)
+    low, high = sorted((float(trace.u[k - 1]), float(trace.u[k + 1])))
+    best = minimize_scalar(lambda u: abs(at(u)), bounds=(low, high), method="bounded", options={"xatol": 1e-10})
+    where = _flat(at, float(best.x), 0.25 * (high - low))
+    ends = abs(rate(trace, k - 1)), abs(rate(trace, k + 1))
+    if not abs(at(where)) <= 1e-9 * max(ends):
+        return None
+    text = f"link {link} stands still on the frame at the input {where:.12g} and goes on in the same sense"
+    return MotionEvent("dwell", where, group, (link,), 3, 1e-9, False, text)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError, GraphError
 from graphsynth.kinematics.engine import codes
-from graphsynth.mechanism.joints import Gear, JointGeometry, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import characteristic_length
 from graphsynth.structure.assur import Decomposition, decompose
@@ -231,6 +231,9 @@ class _Compiler:
         if isinstance(joint, Gear):
             base[codes.RA], base[codes.RB], base[codes.SIGN], base[codes.H] = size[6:10]
             return [Row(codes.GEAR, a, b, base)]
+        if isinstance(joint, Cam):
+            base[codes.RA], base[codes.H] = size[2], size[6]
+            return [Row(codes.CAM, a, b, [*base, *(part for pair in joint.harmonics for part in pair)])]
         if isinstance(joint, Revolute):
             found = [Row(codes.RX, a, b, list(base)), Row(codes.RY, a, b, list(base))]
         else:
@@ -281,7 +284,8 @@ class _Compiler:
         return joint.b, on_b, on_a, size[5], size[2]
 
     def _floats(self, rows: list[list[Number]], width: int) -> Array:
-        """Return a parameter table, shape (sets, rows, width)."""
+        """Return a parameter table, shape (sets, rows, width); cams make it wider."""
+        width = max([width, *map(len, rows)])
         table = np.zeros((self.sets, len(rows), width))
         for k, parameters in enumerate(rows):
             for column, value in enumerate(parameters):

@@ -8,8 +8,8 @@ merged into one state with a count; as soon as no critical set needs anything, t
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.synthesis.kernels.automorphisms import automorphisms
 from graphsynth.synthesis.kernels.layout import (
     BYTE,
@@ -196,7 +196,7 @@ def degree_of(k, mult, v):
     return total
 
 
-@njit(cache=True)
+@kernel
 def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, out):
     """Count the orbits of labellings of the contracted graphs ``mults[start:stop]``; one number each in ``out``.
 

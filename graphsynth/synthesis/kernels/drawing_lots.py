@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.synthesis.kernels.automorphisms import automorphisms
 from graphsynth.synthesis.kernels.counting import (
     FRAME_NONE,
@@ -51,7 +51,7 @@ from graphsynth.synthesis.kernels.variables import (
 )
 
 
-@njit(cache=True)
+@kernel
 def fixed_table(k, mult, frame_modes, frame_degree, tables, work, out):
     """Write a row (mode, frame, automorphism, automorphisms that keep the frame, labellings fixed) for each pair.
 
@@ -89,7 +89,7 @@ def fixed_table(k, mult, frame_modes, frame_degree, tables, work, out):
     return n
 
 
-@njit(cache=True)
+@kernel
 def open_fixed(k, mult, mode, frame, member, tables, work):
     """Lay out the labellings fixed by one automorphism; return (variables, classes, sets, ways without sparsity)."""
     automorphisms(k, mult, work.perms)
@@ -121,7 +121,7 @@ def _nth_label(j, g, rank, tables, work):
     return np.int64(-1)
 
 
-@njit(cache=True)
+@kernel
 def decode_fixed(count, m, sets, number, tables, work, row):
     """Write labelling ``number`` of those laid out by ``open_fixed``; return whether it is admissible."""
     start_needs(sets, work)

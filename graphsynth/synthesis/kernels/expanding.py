@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from graphsynth.compilation import kernel
 from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
 from graphsynth.synthesis.kernels.layout import inner
 from graphsynth.synthesis.kernels.listing import HEADER
@@ -135,7 +135,7 @@ def _arrange(k, mult, row, spelling, ends, matrix, order, level):
     return links, frame
 
 
-@njit(cache=True)
+@kernel
 def expand_packed(k, total, mults, rows, count, spelling, out):
     """Write the joints of rows (of ``total`` links) as byte triples (a, b, mobility), a < b, sorted.
 
@@ -177,7 +177,7 @@ def _put_number(out, at, n):
     return at + 1
 
 
-@njit(cache=True)
+@kernel
 def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
     """Write rows (of ``total`` links) as lines of the text form; return (bytes, lines).
 

@@ -13,8 +13,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from graphsynth.compilation import kernel
 
 MAX_VERTICES = 18
 MAX_CLASSES = 48
@@ -51,12 +52,12 @@ SUM, SLOT, STAMP = range(3)
 
 def inner(function: Any) -> Any:
     """Compile a kernel that only other kernels call (without the wrappers for Python)."""
-    return njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    return kernel(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def glue(function: Any) -> Any:
     """Compile a short kernel into the kernels that call it."""
-    return njit(cache=True, inline="always")(function)
+    return kernel(function, inline="always")
 
 
 class Tables(NamedTuple):

@@ -9,8 +9,8 @@ labellings fixed by a *witness*: an automorphism of order p of the contracted gr
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.synthesis.kernels.automorphisms import automorphisms
 from graphsynth.synthesis.kernels.counting import (
     FRAME_NONE,
@@ -355,7 +355,7 @@ def _search(k, symmetry, tables, work, rows, n):
     return n
 
 
-@njit(cache=True)
+@kernel
 def rewind(start, part, parts, work):
     """Put the stream before contracted graph number ``start``; keep one part of ``parts`` of its search prefixes."""
     for i in range(work.state.shape[0]):
@@ -366,7 +366,7 @@ def rewind(start, part, parts, work):
     work.state[PARTS] = parts
 
 
-@njit(cache=True)
+@kernel
 def list_rows(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work, rows):
     """Fill ``rows`` with the next labellings of the contracted graphs up to number ``stop``.
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.structure.kernels import canon, canon_workspace
 
 _ONE = np.uint64(1)
 
 
-@njit(cache=True)
+@kernel
 def _canonical_code(n, layers, mult, masks, colours, lab, form, gens, index, orbits, wi, wu, out):
     """Write the upper triangle of the canonically relabelled multiplicity matrix."""
     for c in range(layers):
@@ -28,7 +28,7 @@ def _canonical_code(n, layers, mult, masks, colours, lab, form, gens, index, orb
             at += 1
 
 
-@njit(cache=True)
+@kernel
 def split_all(k, mults, start, joined, layers, codes):
     """Split the vertices of ``mults[start:]`` into two vertices joined by ``joined`` parallel edges.
 

@@ -5,14 +5,8 @@ where gears need it), the velocity (x', y', theta') and the acceleration.  Over 
 arrays with the sample as last axis.
 """
 
-from pathlib import Path
-
-from graphsynth.compilation import drop_stale_kernels
-
-drop_stale_kernels(Path(__file__).parent, Path(__file__).parents[1] / "codes.py")
-
-from graphsynth.kinematics.engine.kernels.loops import rrr  # noqa: E402
-from graphsynth.kinematics.engine.kernels.newton import newton  # noqa: E402
-from graphsynth.kinematics.engine.kernels.running import run  # noqa: E402
+from graphsynth.kinematics.engine.kernels.loops import rrr
+from graphsynth.kinematics.engine.kernels.newton import newton
+from graphsynth.kinematics.engine.kernels.running import run
 
 __all__ = ["newton", "rrr", "run"]

@@ -1,9 +1,9 @@
 """Small dense linear systems."""
 
-from numba import njit
+from graphsynth.compilation import kernel
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def factor(J, n, pivots):
     """LU in place with row pivoting; returns the determinant (0 if a pivot vanishes)."""
     det = 1.0
@@ -30,7 +30,7 @@ def factor(J, n, pivots):
     return det
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def back(J, n, pivots, y):
     """Solve with the factors of `factor`, in place."""
     for k in range(n):
@@ -45,7 +45,7 @@ def back(J, n, pivots, y):
         y[k] /= J[k, k]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def solve3(Q, a, b, c):
     """Cramer's rule for the first three columns of Q; returns determinant and solution."""
     m0 = Q[1, 1] * Q[2, 2] - Q[1, 2] * Q[2, 1]

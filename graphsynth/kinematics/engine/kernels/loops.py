@@ -6,12 +6,11 @@ instructions.  ``X[link]`` has the rows x, y, cos theta, sin theta; ``V`` and ``
 
 import math
 
-from numba import njit
-
+from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import DRIVE_R, PAX, PAY, PBX, PBY, H
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def dyad_ends(rows, rp, r0, own):
     """Of an RRR dyad: links and points of A and B, the kept link's point at A and its arm to C, the other length."""
     if rows[r0, 1] == own:
@@ -26,7 +25,7 @@ def dyad_ends(rows, rp, r0, own):
     return la, ax, ay, lb, bx, by, hx, hy, ex - hx, ey - hy, rp[k, H]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def carried(L, ax, ay, px, py, i0, i1):
     """Path of a point of a placed link."""
     x, y, c, s = L[0], L[1], L[2], L[3]
@@ -35,7 +34,7 @@ def carried(L, ax, ay, px, py, i0, i1):
         py[i] = y[i] + s[i] * ax + c[i] * ay
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def carried_rates(L, V, W, ax, ay, vx, vy, wx, wy, i0, i1):
     """Velocity and acceleration of a point of a placed link."""
     c, s, o, al = L[2], L[3], V[2], W[2]
@@ -46,7 +45,7 @@ def carried_rates(L, V, W, ax, ay, vx, vy, wx, wy, i0, i1):
         wx[i], wy[i] = w0[i] - al[i] * uy - o[i] * o[i] * ux, w1[i] + al[i] * ux - o[i] * o[i] * uy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pinned(L, px, py, hx, hy, i0, i1):
     """Place an oriented link so that its point (hx, hy) follows a path."""
     x, y, c, s = L[0], L[1], L[2], L[3]
@@ -55,7 +54,7 @@ def pinned(L, px, py, hx, hy, i0, i1):
         y[i] = py[i] - (s[i] * hx + c[i] * hy)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pinned_rates(L, V, W, vx, vy, wx, wy, hx, hy, i0, i1):
     """Rates of a link whose point (hx, hy) follows a path and whose angle has the rates V[2], W[2]."""
     c, s, o, al = L[2], L[3], V[2], W[2]
@@ -66,7 +65,7 @@ def pinned_rates(L, V, W, vx, vy, wx, wy, hx, hy, i0, i1):
         w0[i], w1[i] = wx[i] + al[i] * fy + o[i] * o[i] * fx, wy[i] - al[i] * fx + o[i] * o[i] * fy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def apex(px, py, qx, qy, gx, gy, l2, sign, M, c, s, i0, i1):
     """Direction of the link with the arm (gx, gy) from P to the third joint C; ``M`` is sin^2 of the angle at C.
 
@@ -89,7 +88,7 @@ def apex(px, py, qx, qy, gx, gy, l2, sign, M, c, s, i0, i1):
         c[i], s[i] = re * f, im * f
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def apex_rates(px, py, qx, qy, gx, gy, T, c, s, o, al, i0, i1):
     """Rates of the angle of that link; T has the velocities and accelerations of P (rows 4..7) and Q (8..11)."""
     vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
@@ -104,7 +103,7 @@ def apex_rates(px, py, qx, qy, gx, gy, T, c, s, o, al, i0, i1):
         o[i], al[i] = w, -(rx * rx + ry * ry + ex * tx + ey * ty) * inverse
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def towards(px, py, qx, qy, gx, gy, c, s, i0, i1):
     """Direction of a link whose vector (gx, gy) points from P to Q."""
     for i in range(i0, i1):
@@ -114,7 +113,7 @@ def towards(px, py, qx, qy, gx, gy, c, s, i0, i1):
         c[i], s[i] = re * f, im * f
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def towards_rates(px, py, qx, qy, T, o, al, i0, i1):
     """Rates of the angle of the way from P to Q, of constant length; T as for `apex_rates`."""
     vx, vy, wx, wy, ux, uy, zx, zy = T[4], T[5], T[6], T[7], T[8], T[9], T[10], T[11]
@@ -125,7 +124,7 @@ def towards_rates(px, py, qx, qy, T, o, al, i0, i1):
         al[i] = (dx * (zy[i] - wy[i]) - dy * (zx[i] - wx[i])) * f
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def turned(L, ca, sa, cq, sq, sign, c, s, i0, i1):
     """Direction of a link turned against link L by a fixed angle and by sign q, both given as cosine and sine."""
     cb, sb = L[2], L[3]
@@ -134,7 +133,7 @@ def turned(L, ca, sa, cq, sq, sign, c, s, i0, i1):
         c[i], s[i] = cb[i] * c1 - sb[i] * s1, sb[i] * c1 + cb[i] * s1
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def slid(L, q, px, py, tx, ty, qx, qy, i0, i1):
     """Path of a point that moves by q from (px, py) along (tx, ty), both given in link L."""
     x, y, c, s = L[0], L[1], L[2], L[3]
@@ -143,7 +142,7 @@ def slid(L, q, px, py, tx, ty, qx, qy, i0, i1):
         qx[i], qy[i] = x[i] + c[i] * ux - s[i] * uy, y[i] + s[i] * ux + c[i] * uy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def slid_rates(L, V, W, Q, px, py, tx, ty, T, i0, i1):
     """Velocity and acceleration of that point; Q holds q, q', q''."""
     for i in range(i0, i1):
@@ -155,7 +154,7 @@ def slid_rates(L, V, W, Q, px, py, tx, ty, T, i0, i1):
         T[7, i] = W[1, i] + al * ux - o * o * uy + q2 * gy + 2.0 * o * q1 * gx
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def drive_loop(d, p, r, q, X, TH, V, W, T, i0, i1, derivs, angles):
     """Place a driven link from the link it is driven on; T is room for twelve rows."""
     base, link, k = d[r, 1], d[r, 2], d[r, 3]
@@ -185,7 +184,7 @@ def drive_loop(d, p, r, q, X, TH, V, W, T, i0, i1, derivs, angles):
         pinned_rates(L, V[link], W[link], T[4], T[5], T[6], T[7], p[r, 4], p[r, 5], i0, i1)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rrr_loop(rows, rp, r0, own, sign, X, V, W, M, T, i0, i1, derivs):
     """Place the kept link of an RRR dyad; T is room for twelve rows."""
     la, ax, ay, lb, bx, by, hx, hy, gx, gy, l2 = dyad_ends(rows, rp, r0, own)
@@ -201,7 +200,7 @@ def rrr_loop(rows, rp, r0, own, sign, X, V, W, M, T, i0, i1, derivs):
         pinned_rates(L, V[own], W[own], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def bar_loop(e, a, b, p, r, X, V, W, T, i0, i1, derivs):
     """Place a link with two turning pairs between placed links a and b; T is room for twelve rows."""
     L = X[e]
@@ -217,7 +216,7 @@ def bar_loop(e, a, b, p, r, X, V, W, T, i0, i1, derivs):
         pinned_rates(L, V[e], W[e], T[4], T[5], T[6], T[7], hx, hy, i0, i1)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def first_bad(M, i0, i1):
     """First sample whose margin is negative or not a number, and its code; (i1, 0) if there is none."""
     bad = 0
@@ -229,7 +228,7 @@ def first_bad(M, i0, i1):
     return i1, 0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rrr(A, B, l1, l2, sign, C, margin):
     """Third joints of RRR dyads; lengths of one entry are shared by all."""
     s1, s2 = min(1, l1.shape[0] - 1), min(1, l2.shape[0] - 1)

@@ -2,14 +2,13 @@
 
 import math
 
-from numba import njit
-
+from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, INVERSE, PAX, PAY, PBX, PBY, SIGN, SLOT, H
 from graphsynth.kinematics.engine.kernels.linear import back, factor, solve3
 from graphsynth.kinematics.engine.kernels.rows import gamma, row, world
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, moving):
     """Jacobian by the core links, residuals, or (moving) the right-hand side of the velocities; returns prod |row|."""
     norms = 1.0
@@ -41,7 +40,7 @@ def assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, moving):
     return norms
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def newton(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots, Lc, out):
     """Newton from x; out = (first correction, last correction, rate); returns 0 if it converged."""
     last = 0.0
@@ -80,7 +79,7 @@ def newton(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots, Lc, ou
     return 3
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rates(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots):
     """Velocities and accelerations of the core links; returns the determinant over the product of row lengths."""
     norms = assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, True)
@@ -113,7 +112,7 @@ def rates(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots):
     return det / norms
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@kernel(inline="always")
 def predict(core, c0, nc, x, h, Lc):
     """Move the core links to second order; returns how far, scaled."""
     travel = 0.0
@@ -130,7 +129,7 @@ def predict(core, c0, nc, x, h, Lc):
     return math.sqrt(travel) / Lc
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def anchors(rows, rp, r0, own, x, P):
     """Of three distances to one link: far points with velocity and acceleration, near points (local), lengths."""
     for r in range(3):
@@ -147,7 +146,7 @@ def anchors(rows, rp, r0, own, x, P):
         P[r, 8], P[r, 9] = rp[k, H], rp[k, INVERSE]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def platform_rows(P, x, own, Q):
     """Rows of three distances: Q[r] = (unit vector from the far point, its moment, residual, near arm)."""
     X, Y, c, s = x[own, 0], x[own, 1], x[own, 2], x[own, 3]
@@ -160,7 +159,7 @@ def platform_rows(P, x, own, Q):
         Q[r, 4], Q[r, 5] = ux, uy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def platform(P, x, own, Q, Lc, out, m, s):
     """Newton and rates of a link held by three distances (class III triad); returns the code of `newton`."""
     last = 0.0

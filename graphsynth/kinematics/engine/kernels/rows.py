@@ -2,10 +2,11 @@
 
 import math
 
-from numba import njit
-
+from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     ANGLE,
+    CAM,
+    CAM_WIDTH,
     DIST,
     DRIVE_ANGLE,
     DRIVE_SLIDE,
@@ -29,21 +30,36 @@ from graphsynth.kinematics.engine.codes import (
 TAU = 2.0 * math.pi
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def world(x, link, px, py):
     """World point of a local one."""
     c, s = x[link, 2], x[link, 3]
     return x[link, 0] + c * px - s * py, x[link, 1] + s * px + c * py
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def follow_angle(link, x, near):
     """Unwrapped angle of a link, nearest to ``near``."""
     raw = math.atan2(x[link, 3], x[link, 2])
     x[link, 4] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
+def pitch(p, k, psi):
+    """Pitch radius of a cam and its first two derivatives by psi."""
+    value, first, second = p[k, H], 0.0, 0.0
+    c1, s1 = math.cos(psi), math.sin(psi)
+    c, s, order = c1, s1, 1.0
+    for column in range(CAM_WIDTH, p.shape[1] - 1, 2):
+        even, odd = p[k, column] * c + p[k, column + 1] * s, p[k, column + 1] * c - p[k, column] * s
+        value += even
+        first += order * odd
+        second -= order * order * even
+        c, s, order = c * c1 - s * s1, s * c1 + c * s1, order + 1.0
+    return value, first, second
+
+
+@kernel
 def row(kind, p, k, a, b, x, phi, q, g):
     """Value of one constraint row; its gradient by (x, y, theta) of a and of b goes to g[0:6]."""
     ca, sa, cb, sb = x[a, 2], x[a, 3], x[b, 2], x[b, 3]
@@ -82,6 +98,14 @@ def row(kind, p, k, a, b, x, phi, q, g):
         ch, sh = math.cos(h), math.sin(h)
         re, im = cb * ca + sb * sa, sb * ca - cb * sa
         return math.atan2(im * ch - re * sh, re * ch + im * sh)
+    if kind == CAM:
+        square = dx * dx + dy * dy
+        far = math.sqrt(square)
+        rho, first, _ = pitch(p, k, math.atan2(dy, dx) - math.atan2(sa, ca) - p[k, RA])
+        ex, ey = dx / far + first * dy / square, dy / far - first * dx / square
+        g[0], g[1], g[2] = -ex, -ey, first - (ux * ey - uy * ex)
+        g[3], g[4], g[5] = ex, ey, wx * ey - wy * ex
+        return far - rho
     # gear: angles relative to the line of centres
     total = p[k, RA] + p[k, SIGN] * p[k, RB]
     square = dx * dx + dy * dy
@@ -96,7 +120,7 @@ def row(kind, p, k, a, b, x, phi, q, g):
     return scale * (p[k, RA] * (x[a, 4] - here) + p[k, SIGN] * p[k, RB] * (x[b, 4] - here - p[k, H]))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def gamma(kind, p, k, a, b, x, q):
     """Second-order part of a row: its second derivative along the velocities, accelerations being zero."""
     if kind == ANGLE:
@@ -123,5 +147,12 @@ def gamma(kind, p, k, a, b, x, q):
         return (-oa * oa * (tx * dx + ty * dy) + 2.0 * oa * (tx * ey - ty * ex) + tx * cx + ty * cy
                 - p[k, SIGN] * q[int(p[k, SLOT]), 2])  # fmt: skip
     square = dx * dx + dy * dy
+    if kind == CAM:
+        _, first, second = pitch(p, k, math.atan2(dy, dx) - math.atan2(sa, ca) - p[k, RA])
+        far, along, across = math.sqrt(square), dx * ex + dy * ey, dx * ey - dy * ex
+        rate = across / square - oa
+        curved = (dx * cy - dy * cx) / square - 2.0 * along * across / (square * square)
+        return ((ex * ex + ey * ey + dx * cx + dy * cy) / far - along * along / (square * far)
+                - second * rate * rate - first * curved)  # fmt: skip
     turn = (dx * cy - dy * cx) / square - 2.0 * (dx * ex + dy * ey) * (dx * ey - dy * ex) / (square * square)
     return -(p[k, RA] + p[k, SIGN] * p[k, RB]) / (p[k, RA] + p[k, RB]) * turn

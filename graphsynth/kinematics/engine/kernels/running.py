@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     BAD_INPUT,
     E_RR,
@@ -26,7 +26,7 @@ from graphsynth.kinematics.engine.kernels.rows import TAU, follow_angle, world
 from graphsynth.kinematics.engine.kernels.single import closed_form, pivot_rates, place_eliminated
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def load(link, i, x, X, TH, V, W, derivs):
     """Copy one link's state at sample i to its row of x."""
     for c in range(4):
@@ -37,7 +37,7 @@ def load(link, i, x, X, TH, V, W, derivs):
             x[link, 5 + c], x[link, 8 + c] = V[link, c, i], W[link, c, i]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def store(link, i, x, X, TH, V, W, derivs):
     """Copy a row of x to the link's state at sample i."""
     for c in range(4):
@@ -48,7 +48,7 @@ def store(link, i, x, X, TH, V, W, derivs):
             V[link, c, i], W[link, c, i] = x[link, 5 + c], x[link, 8 + c]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def unwrap(link, u, X, TH, V, i0, i1, derivs):
     """Angle of a link placed by a loop, without jumps."""
     for i in range(i0, i1):
@@ -59,7 +59,7 @@ def unwrap(link, u, X, TH, V, i0, i1, derivs):
         TH[link, i] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, i0, i1, derivs):
     """Place the eliminated links with two turning pairs, those that are wanted."""
     for k in range(e0, e0 + ne):
@@ -70,7 +70,7 @@ def bars(elim, e0, ne, ep, wanted, need, u, X, TH, V, W, T, i0, i1, derivs):
                 unwrap(e, u, X, TH, V, i0, i1, derivs)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def carry_centres(rows, rp, r0, nr, i, x, phi, PHI):
     """Follow the direction of the line of centres of every gear pair of a step."""
     for k in range(r0, r0 + nr):
@@ -83,7 +83,7 @@ def carry_centres(rows, rp, r0, nr, i, x, phi, PHI):
             PHI[slot, i] = phi[slot]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h, warm, need, M, s, J, f, g, G, pivots,
           out, P, Q, Lc, derivs):  # fmt: skip
     """Place the kept links of one group at one sample; returns why it failed, or 0."""
@@ -126,7 +126,7 @@ def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h
     return 0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def seat(poses, X, TH, PHI):
     """Put the poses (x, y, theta) of all links into the first sample."""
     for k in range(poses.shape[0]):
@@ -135,7 +135,7 @@ def seat(poses, X, TH, PHI):
     PHI[:, 0] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def deliver(source, rows, done, target):
     """Copy the rows asked for, not a number beyond the samples reached."""
     for r in range(rows.shape[0]):
@@ -145,7 +145,7 @@ def deliver(source, rows, done, target):
             target[r, c, count:] = math.nan
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, modes, poses, X, TH, V, W, PHI, M, kept,
         groups, OX, OV, OW, OM, done, why, first, Lc, derivs):  # fmt: skip
     """Run a program for every dimension set over the samples first..n-1.

@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     E_RP,
     P_DIST,
@@ -26,7 +25,7 @@ from graphsynth.kinematics.engine.codes import (
 from graphsynth.kinematics.engine.kernels.rows import TAU, gamma, row, world
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def turn_to(x, link, lx, ly, wx, wy):
     """Orient a link so that its local vector (lx, ly) points along (wx, wy)."""
     re, im = lx * wx + ly * wy, lx * wy - ly * wx
@@ -34,14 +33,14 @@ def turn_to(x, link, lx, ly, wx, wy):
     x[link, 2], x[link, 3] = re / size, im / size
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pin_to(x, link, lx, ly, wx, wy):
     """Move an oriented link so that its local point lies at (wx, wy)."""
     c, s = x[link, 2], x[link, 3]
     x[link, 0], x[link, 1] = wx - (c * lx - s * ly), wy - (s * lx + c * ly)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def orient(rows, rp, k, x, own):
     """Orient link ``own`` by the ANGLE row k."""
     a, b, h = rows[k, 1], rows[k, 2], rp[k, H]
@@ -51,7 +50,7 @@ def orient(rows, rp, k, x, own):
     x[own, 4] = x[other, 4] + sign * h
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def line_of(rows, rp, k, x, own):
     """For an oriented link ``own`` in a LINE row: direction t and the value kappa of n . r_own."""
     a, b = rows[k, 1], rows[k, 2]
@@ -66,7 +65,7 @@ def line_of(rows, rp, k, x, own):
     return tx, ty, -ty * (px - ox) + tx * (py - oy) - rp[k, H]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
     """Place the one core link of a group; returns its margin, negative where it cannot be assembled."""
     if code in (P_DIST, P_LINE):  # a sliding pair orients the link: rows LINE, ANGLE, then DIST or LINE
@@ -157,7 +156,7 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
     return margin
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def place_eliminated(kind, e, a, b, p, r, x, derivs):
     """Place an eliminated link that slides on at least one of its two neighbours, with velocity and acceleration."""
     ax, ay = world(x, a, p[r, 0], p[r, 1])
@@ -208,7 +207,7 @@ def place_eliminated(kind, e, a, b, p, r, x, derivs):
     x[e, 8], x[e, 9], x[e, 10] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det, l
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pivot_rates(rows, rp, r0, own, x, phi, q, g):
     """Rates of a link that turns about a point of a placed link: one unknown, from the third row."""
     if rows[r0, 1] == own:
