@@ -12,6 +12,7 @@ _PUBLIC: dict[str, str] = {
     "AssemblyCertificate": "assembly_modes",
     "AssemblyCertificateBatch": "modes_batch",
     "AssemblyVerdict": "assembly_modes",
+    "CrankCertificate": "four_bar",
     "FullTurnCertificate": "full_turn",
     "ModeEnclosure": "assembly_modes",
     "MotionCertificate": "poses",
@@ -22,7 +23,10 @@ _PUBLIC: dict[str, str] = {
     "certify_assembly_modes_batch": "modes_batch",
     "certify_direct": "assembly_modes",
     "certify_direct_batch": "modes_batch",
+    "certify_four_bar": "four_bar",
     "certify_full_turn": "full_turn",
+    "certify_inverted_slider_crank": "four_bar",
+    "certify_slider_crank": "four_bar",
 }
 
 __all__ = sorted(_PUBLIC)

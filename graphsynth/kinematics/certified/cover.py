@@ -78,6 +78,7 @@ def _join(a: Balls, b: Balls) -> Balls:
     return Balls(np.concatenate([a.mid, b.mid]), np.concatenate([a.rad, b.rad]))
 
 
+@np.errstate(all="ignore")  # what overflows or is undefined is not proved
 def prove_nodes(system: System, u: Balls, guess: Array) -> Nodes:
     """Newton from the guesses, then the proof, with the widest box of uniqueness that passes."""
     x, V = correct(system, guess, u.mid)
@@ -87,6 +88,7 @@ def prove_nodes(system: System, u: Balls, guess: Array) -> Nodes:
     return Nodes(u, x, V, proof, turns, directions)
 
 
+@np.errstate(all="ignore")
 def cover(system: System, nodes: Nodes, budget: Budget, begin: float | None = None) -> Cover:
     """Cover all intervals between consecutive nodes."""
     begin = perf_counter() if begin is None else begin
@@ -104,11 +106,13 @@ def cover(system: System, nodes: Nodes, budget: Budget, begin: float | None = No
             found.exhausted = True
             break
         found.tested += left.size
-        boxes, proof, linked = _try(system, nodes, left, right)
+        boxes, proof, linked, parted = _try(system, nodes, left, right)
         ok = proof.proved & linked
+        _give_up(found, nodes, left[parted], right[parted], owner[parted])
         found.boxes.append((boxes.take(ok), proof.tight[ok]))
         found.owners.append(owner[ok])
-        left, right, owner, boxes = left[~ok], right[~ok], owner[~ok], boxes.take(~ok)
+        rest = ~ok & ~parted
+        left, right, owner, boxes = left[rest], right[rest], owner[rest], boxes.take(rest)
         a, b = nodes.u.mid[left], nodes.u.mid[right]
         narrow = np.abs(b - a) <= 1e-13 * np.maximum(np.abs(a), np.abs(b)) + 1e-300
         _give_up(found, nodes, left[narrow], right[narrow], owner[narrow])
@@ -116,7 +120,7 @@ def cover(system: System, nodes: Nodes, budget: Budget, begin: float | None = No
         if left.size == 0:
             return found
         middle = len(nodes.x) + np.arange(left.size)
-        nodes = nodes.join(prove_nodes(system, exact(boxes.u.mid), boxes.x))
+        nodes = nodes.join(prove_nodes(system, exact(boxes.u.mid), _middle(system, nodes, left, right, boxes)))
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
         owner = np.concatenate([owner, owner])
     _give_up(found, nodes, left, right, owner)
@@ -130,34 +134,52 @@ def _give_up(
     found.undecided += [(float(nodes.u.mid[a]), float(nodes.u.mid[b])) for a, b in zip(left, right)]
 
 
-def _try(system: System, nodes: Nodes, left: NDArray[np.intp], right: NDArray[np.intp]) -> tuple[Boxes, Proof, Mask]:
-    """Predict, prove and link one moving box per interval."""
+def _try(
+    system: System, nodes: Nodes, left: NDArray[np.intp], right: NDArray[np.intp]
+) -> tuple[Boxes, Proof, Mask, Mask]:
+    """Predict, prove and link one moving box per interval.
+
+    Also returned: where the branch through one end is proved to miss the other end, so that no subdivision can help.
+    """
     a, b = nodes.take(left), nodes.take(right)
     middle = 0.5 * (a.u.mid + b.u.mid)
     reach = [np.abs(node.u.mid - middle) * UP + node.u.rad for node in (a, b)]
     u = Balls(middle, np.maximum(*reach) * UP + TINY)
     h = (b.u.mid - a.u.mid)[:, None]
     guess = 0.5 * (a.x + b.x) + 0.125 * h * (a.V - b.V)  # cubic through both nodes
-    x, V = correct(system, guess, middle, steps=2)
-    lost = np.isnan(x).any(axis=1) | ~np.isfinite(x + V).all(axis=1)
-    lost = np.asarray(lost, dtype=np.bool_)
+    x, V = correct(system, guess, middle, steps=4)
+    lost = np.asarray(~np.isfinite(x + V).all(axis=1), dtype=np.bool_)
     x, V = np.where(lost[:, None], guess, x), np.where(lost[:, None], 0.0, V)
     boxes = Boxes(u, x, V)
     proof = prove(system, boxes)
     turns, directions = system.branch(boxes.hull(proof.radius), middle)
-    linked = ~lost
+    met, missed = [], []
     for node in (a, b):
-        linked = linked & _inside(boxes, proof.radius, node)
-        linked = linked & (turns == node.turns).all(axis=1)
-        linked = linked & _same_direction(directions, node.directions)
-    return boxes, proof, linked
+        with np.errstate(all="ignore"):
+            gap = exact(node.x) - boxes.at(node.u)
+            inside = (((gap.size + node.proof.tight) * UP) < proof.radius).all(axis=1)
+            outside = (gap.least > (proof.radius + node.proof.tight) * UP).any(axis=1)
+        same = (turns == node.turns).all(axis=1) & _same_direction(directions, node.directions)
+        met.append(np.asarray(inside & same, dtype=np.bool_))
+        missed.append(np.asarray(outside | (turns != node.turns).any(axis=1), dtype=np.bool_))
+    parted = proof.proved & ((met[0] & missed[1]) | (met[1] & missed[0]))
+    return boxes, proof, met[0] & met[1], parted
 
 
-def _inside(boxes: Boxes, radius: Array, node: Nodes) -> Mask:
-    """Whether the node's solution lies in the moving box at the node's input."""
-    with np.errstate(all="ignore"):
-        gap = exact(node.x) - boxes.at(node.u)
-        return np.asarray((((gap.size + node.proof.tight) * UP) < radius).all(axis=1))
+def _middle(system: System, nodes: Nodes, left: NDArray[np.intp], right: NDArray[np.intp], boxes: Boxes) -> Array:
+    """Guess for the poses at the new nodes: the boxes' centres, or what follows from the left end if that is nearer.
+
+    Newton's method from half-way between two branches may end anywhere, for instance on a copy whole turns away.
+    """
+    a, b, best = nodes.x[left], nodes.x[right], boxes.x
+    step = (boxes.u.mid - nodes.u.mid[left])[:, None]
+    other, _ = correct(system, a + nodes.V[left] * step, boxes.u.mid, steps=4)
+
+    def detour(x: Array) -> Array:
+        away = (np.abs(x - a) + np.abs(x - b)) / system.weights
+        return np.asarray(np.nan_to_num(away.max(axis=1), nan=np.inf))
+
+    return np.where((detour(other) < detour(best) - 1e-9)[:, None], other, best)
 
 
 def _same_direction(own: Balls, other: Balls) -> Mask:

@@ -183,6 +183,7 @@ def _nodes(system: PlatformSystem, psi: Array, guess: Array, complete: bool) -> 
     return prove_nodes(system, u, guess)
 
 
+@np.errstate(all="ignore")
 def _conclude(
     system: PlatformSystem, nodes: Nodes, found: Cover, drives: tuple[str, str, str], stopped: str, begin: float
 ) -> FullTurnCertificate:
@@ -263,7 +264,7 @@ def _sign(value: Balls) -> Array:
 def _working_mode(
     system: PlatformSystem, cover: tuple[Boxes, Array]
 ) -> tuple[bool | None, tuple[tuple[int, float, float, bool], ...]]:
-    """Decide by enclosures of P1 and P2 whether a leg passes its boundary; halve the slices that do not decide."""
+    """Decide by enclosures of P1, P2 and JT whether a leg passes its boundary; halve the slices that do not decide."""
     boxes, tight = cover
     slices = np.column_stack([boxes.u.mid - boxes.u.rad, boxes.u.mid + boxes.u.rad])
     own = np.arange(len(slices))
@@ -276,7 +277,8 @@ def _working_mode(
         part = boxes.take(own)
         centre = part.at(u)
         b = system.bounds(centre.wider(tight[own]), u)
-        good = (b.P1.mid > b.P1.rad * UP) & (b.P2.mid > b.P2.rad * UP)
+        # JT^2 = P1 P2 on the closure: either form may decide
+        good = (b.JT.least > 0.0) | ((b.P1.mid > b.P1.rad * UP) & (b.P2.mid > b.P2.rad * UP))
         done = good.all(axis=1) | (depth == _SPLIT)
         kept, clear = np.concatenate([kept, slices[done]]), np.concatenate([clear, good[done]])
         signs = np.concatenate([signs, np.where(good, np.sign(b.JT.mid) * (b.JT.least > 0.0), 0.0)[done]])
@@ -306,7 +308,7 @@ def _arcs(
                 stop += 1
             before = next((s for s in signs[:k, leg][::-1] if s), 0.0)
             after = next((s for s in signs[stop + 1 :, leg] if s), 0.0)
-            found.append((leg + 1, float(slices[k, 0]), float(slices[stop, 1]), before * after < 0.0))
+            found.append((leg + 1, float(slices[k, 0]), float(slices[stop, 1]), bool(before * after < 0.0)))
             k = stop + 1
     if not found:
         return True, ()

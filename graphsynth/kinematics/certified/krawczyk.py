@@ -113,14 +113,18 @@ def _inverse(J: Array) -> Array:
     return np.asarray(np.where(np.isfinite(Y).all(axis=(1, 2), keepdims=True), Y, 0.0))
 
 
-def correct(system: System, x: Array, u: Array, steps: int = 4) -> tuple[Array, Array]:
-    """Newton steps in floating point; returns the points and their velocities ``dx/du`` (NaN where it fails)."""
+def correct(system: System, x: Array, u: Array, steps: int = 40) -> tuple[Array, Array]:
+    """Newton steps in floating point until all converge; points and velocities ``dx/du`` (NaN where it fails)."""
     with np.errstate(all="ignore"):
         for _ in range(steps):
             units = system.units(x, u, checked=False)
             f = system.residual(exact(x), exact(u), units)
             J, _ = system.derivatives(exact(x), exact(u), units)
-            x = x - _apply(_inverse(J.mid), f.mid)
+            step = _apply(_inverse(J.mid), f.mid)
+            x = x - step
+            size = np.abs(step / system.weights).max(axis=1, initial=0.0)
+            if not (size > 1e-14 * (1.0 + np.abs(x / system.weights).max(axis=1, initial=0.0))).any():
+                break
         J, fu = system.derivatives(exact(x), exact(u), system.units(x, u, checked=False))
         return x, -_apply(_inverse(J.mid), fu.mid)
 
