@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic
 from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["Body", "Guide", "bodies", "bounds", "hull", "outline", "rounded", "thickness", "world"]
@@ -39,13 +39,14 @@ class Guide:
 
 @dataclass(slots=True)
 class Body:
-    """One link: where other links or named points are attached, its guides, and the pitch circles it carries."""
+    """One link: where other links or named points are attached, its guides, pitch circles and cams."""
 
     link: int
     points: list[complex] = field(default_factory=list)
     joints: int = 0  # different places of joints
     guides: list[Guide] = field(default_factory=list)
     wheels: list[tuple[complex, float, Gear]] = field(default_factory=list)
+    cams: list[tuple[Cam, list[complex]]] = field(default_factory=list)
 
     def vertices(self) -> list[complex]:
         """Attachment points, and for each guide its point nearest to them."""
@@ -93,6 +94,8 @@ def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
         if isinstance(joint, Gear):
             a.wheels.append((at_a, joint.radius_a, joint))
             b.wheels.append((at_b, joint.radius_b, joint))
+        if isinstance(joint, Cam):
+            a.cams.append((joint, _pitch_curve(joint)))
     for body in found:  # a wheel on its pivot counts once
         body.joints = len(_apart(body.points, reserve / 9.0)) + len(body.guides)
     for point in mechanism.points.values():
@@ -100,12 +103,19 @@ def bodies(mechanism: Mechanism, poses: Array, reserve: float) -> list[Body]:
     return found
 
 
+def _pitch_curve(cam: Cam) -> list[complex]:
+    """Points of the pitch curve in the frame of the cam's link."""
+    steps = [math.tau * k / 180 for k in range(180)]
+    return [complex(*cam.at_a) + cmath.rect(cam.pitch_radius(psi)[0], cam.angle_a + psi) for psi in steps]
+
+
 def bounds(mechanism: Mechanism, poses: Array) -> tuple[complex, complex]:
     """Corners of the smallest box around everything that is drawn, over all poses; never without width or height."""
     every = []
     for body in bodies(mechanism, poses, 0.0):
         ends = [end for guide in body.guides for end in (guide.start, guide.stop)]
-        every += [world(poses, body.link, point) for point in (*body.points, *ends)]
+        rims = [point for _, curve in body.cams for point in curve[::6]]
+        every += [world(poses, body.link, point) for point in (*body.points, *ends, *rims)]
         every += [
             world(poses, body.link, centre) + radius * d for centre, radius, _ in body.wheels for d in (1j, -1j, 1, -1)
         ]

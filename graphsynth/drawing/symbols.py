@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from graphsynth.drawing.bodies import Body, Guide, outline, rounded, thickness, world
 from graphsynth.drawing.palette import TRACE_COLOURS
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 
 __all__ = ["BLOCK", "Plan", "draw_arrow", "draw_joints", "draw_link", "draw_points", "draw_slider", "draw_traces"]
@@ -81,6 +81,9 @@ def draw_link(plan: Plan, body: Body) -> None:
             sketch.line((centre - d, centre + d), "link", 1.2)
         if plan.fixed(link):
             _hatched_rim(plan, centre, radius)
+    for cam, curve in body.cams:
+        sketch.on(link, "pitch", f"cam {cam.a}-{cam.b}")
+        sketch.plate(curve, plan.colour(link), 2.0, 0.8)
     for guide in body.guides:
         if isinstance(guide.joint, Prismatic) and not plan.fixed(link):
             sketch.on(link, "bar", f"guide {guide.joint.a}-{guide.joint.b}")
@@ -188,6 +191,10 @@ def draw_joints(plan: Plan) -> list[tuple[complex, complex]]:
                 grounds.append((pin, -1j))
             sketch.on(joint.b, "joint", f"joint {name}")
             sketch.joint(pin, 4.0)
+        elif isinstance(joint, Cam):
+            sketch.on(joint.b, "joint", f"roller {name}")
+            sketch.joint(complex(*joint.at_b), 6.5)
+            sketch.dot(complex(*joint.at_b), "link", 1.8)
     return grounds
 
 

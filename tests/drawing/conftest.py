@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from graphsynth.kinematics import simulate
-from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
@@ -58,6 +58,15 @@ def planet() -> Mechanism:
     return Mechanism(graph, joints, [Driver(0, 1)], {"K": (2, (1.0, 0.0))})
 
 
+def cam() -> Mechanism:
+    """A disk cam lifts a roller on a slider."""
+    graph = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)
+    up = math.pi / 2
+    profile = Cam(1, 2, radius=1.5, harmonics=((0.4, 0.0), (0.2, 0.1)))
+    joints = [Revolute(0, 1), Prismatic(0, 2, angle_a=up, angle_b=up), profile]
+    return Mechanism(graph, joints, [Driver(0, 1)], {"F": (2, (0.0, 1.2))})
+
+
 def cylinder() -> Mechanism:
     """A boom moved by a cylinder: the driven sliding pair moves itself."""
     graph = MechanismGraph(4, [(0, 1), (0, 2), (1, 3), (2, 3)], frame=0)
@@ -91,6 +100,7 @@ MOTIONS = {
     "yoke": lambda: simulate(yoke(), TURN),
     "geared": lambda: simulate(geared(), TURN),
     "planet": lambda: simulate(planet(), TURN),
+    "cam": lambda: simulate(cam(), TURN, start=[(0, 0, 0), (0, 0, 0), (0, 1.7, 0)]),
     "cylinder": lambda: simulate(cylinder(), np.linspace(1.2, 3.4, 45)),
     "ladder": lambda: simulate(ladder(4), np.linspace(0.0, math.tau, 361), modes=dict.fromkeys(range(4), 1)),
 }

@@ -181,6 +181,7 @@ def test_gif_has_the_frames_and_the_time(motions: dict[str, Any], tmp_path: Path
         changed = (np.abs(np.asarray(picture.convert("RGB")).astype(int) - first).sum(axis=2) > 60).mean()
     assert 0.002 < changed < 0.2  # the links have moved, the paper has not
     assert (first.reshape(-1, 3).mean(axis=0) > 240).all()
+    assert (first.reshape(-1, 3) == 255).all(axis=1).mean() > 0.9  # the paper is white
     assert path.stat().st_size < 120_000
 
 

@@ -20,7 +20,7 @@ from graphsynth.drawing.diagram import draw_mechanism, mechanism_sketch, mechani
 from graphsynth.drawing.palette import DARK, LIGHT
 from graphsynth.drawing.shapes import Circle, Path, Text, placement
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -54,6 +54,8 @@ def test_every_joint_is_drawn_once(motion: Any) -> None:
             assert counted[f"block {name}"] == 1
         if isinstance(joint, PinSlot):
             assert counted[f"slot {name}"] == 1
+        if isinstance(joint, Cam):
+            assert counted[f"cam {name}"] == 1 and counted[f"roller {name}"] == 2  # a circle and its centre
         if isinstance(joint, Gear):
             # a circle and, unless the wheel is fixed, a spoke; a ring has a second circle
             assert counted[f"gear {name} of {joint.a}"] >= 1 and counted[f"gear {name} of {joint.b}"] >= 2
@@ -73,7 +75,7 @@ def test_joints_are_where_the_display_transform_puts_them(motion: Any) -> None:
     sketch = mechanism_sketch(motion.mechanism, reached(motion))
     svg = sketch.svg(pose.tolist())
     for joint in motion.mechanism.joints:
-        if isinstance(joint, Gear | Prismatic):
+        if isinstance(joint, Gear | Prismatic | Cam):
             continue
         x, y = sketch.xy(carried(pose[joint.b], joint.at_b))
         circle = found(svg, f"joint {joint.a}-{joint.b}")
@@ -107,6 +109,25 @@ def test_pitch_circles_touch_and_keep_their_size(motions: dict[str, Any]) -> Non
         assert len(wheels) == 2 and all(wheel.style.dash for wheel in wheels)
         apart = abs(place(wheels[0].link, wheels[0].centre) - place(wheels[1].link, wheels[1].centre))
         assert apart == pytest.approx(gear.radius_a - gear.radius_b if gear.internal else gear.radius_a + gear.radius_b)
+
+
+def test_roller_stays_on_the_cam(motions: dict[str, Any]) -> None:
+    """Over the turn the roller's centre lies on the curve that is drawn, to the chord error of two degrees."""
+    motion = motions["cam"]
+    sketch = mechanism_sketch(motion.mechanism, motion.poses)
+    curve = next(s for s in sketch.shapes if s.part == "cam 1-2")
+    roller = next(s for s in sketch.shapes if s.part == "roller 1-2")
+    assert isinstance(curve, Path) and isinstance(roller, Circle)
+    for pose in motion.poses[::7]:
+        place = placement(pose.tolist())
+        centre = place(2, roller.centre)
+        ring = [place(1, z) for z in curve.runs[0]]
+        near = min(
+            abs(((centre - p) / (q - p)).imag * abs(q - p))
+            for p, q in zip(ring, [*ring[1:], ring[0]])
+            if -1e-9 <= ((centre - p) / (q - p)).real <= 1 + 1e-9
+        )
+        assert near < 5e-4
 
 
 def test_blocks_stay_on_their_guides(motions: dict[str, Any]) -> None:
