@@ -131,20 +131,16 @@ def embody(
     >>> found.accepted, found.motion.completed, found.motion.closure.closed
     (True, True, True)
     """
-    begin = perf_counter()
-    wanted = Goals() if goals is None else goals
+    begin, wanted = perf_counter(), Goals() if goals is None else goals
     _check(graph, wanted, seed, tries, seconds)
     order = choices(graph, driver)
     run = _Run(wanted, seed, begin, seconds)
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
-        design = Design(inversion, drivers, _kinds(graph, inversion, joints))
-        run.start(design, attempt, attempt // len(order))
+        run.start(Design(inversion, drivers, _kinds(graph, inversion, joints)), attempt, attempt // len(order))
         if run.ended:
             break
-    if wanted.target is not None:
-        run.go_on()
-    return run.result(attempt + 1)
+    return run.result()
 
 
 class _Run:
@@ -196,11 +192,15 @@ class _Run:
         if self.best is None or rank < self.best[0]:
             self.best = rank, result
 
-    def result(self, tries: int) -> Embodiment:
-        """Return the best with the totals of the run."""
+    def result(self) -> Embodiment:
+        """Finish the searches for a target; return the best with the totals of the run."""
+        if self.goals.target is not None:
+            self.go_on()
         assert self.best is not None
         evaluations = sum(problem.evaluations for _, problem, _ in self.found)
-        return _with_totals(self.best[1], self.reasons, evaluations, perf_counter() - self.begin, self.history, tries)
+        return _with_totals(
+            self.best[1], self.reasons, evaluations, perf_counter() - self.begin, self.history, len(self.found)
+        )
 
 
 def _check(graph: MechanismGraph, goals: Goals, seed: int, tries: int, seconds: float) -> None:

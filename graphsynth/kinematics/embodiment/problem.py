@@ -238,7 +238,7 @@ class Problem:
         origin, along = self._bar(places)
         w = own[..., 2] + 1j * own[..., 3]
         z, w = own[..., 0] + 1j * own[..., 1] + w * origin[:, None], w * along[:, None]
-        angle = np.unwrap(np.nan_to_num(np.angle(w)), axis=1)
+        angle = np.unwrap(np.nan_to_num(np.angle(w)), axis=1) if self.fit.angular else np.zeros(w.shape)
         if isinstance(self.fit, PathFit) and self.fit.warped:
             times = self.fit.times(extras, self.goals.span)
             v = velocities[:, :, self.link]

@@ -10,7 +10,7 @@ Methods Appl. Mech. Eng. 186, 311-338 (complete motions before bounds, bounds be
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import NamedTuple
 
@@ -28,6 +28,8 @@ _ENOUGH = 1.5
 #: Error of a target below which nothing is gained.
 EXACT = 1e-9
 _DIFFERENCE = 1e-6
+#: Spread of the second population about the best of the first, where least squares do not help.
+_AROUND = 0.01
 #: Penalty of a motion that is not complete, in the least squares of a target.
 _WALL = 1e3
 
@@ -59,22 +61,62 @@ def search(
 
     With a target the first search is short: it tells the promising starts, which are then continued.
     """
+    begun = _begin(problem, random) if before is None else before
+    history = [HistoryRow(attempt, 0, problem.evaluations, begun.cost)]
+    start = begun.start if before is None else (0, 0, 0)
+    if problem.unknowns.size == 0:
+        return replace(begun, history=tuple(history), start=start)
+    best, value, population = _evolve(
+        problem, begun.population, _generations(problem, before), history, deadline, random
+    )
+    smooth = problem.fit is None or problem.fit.smooth
+    if not smooth and before is not None:
+        box = problem.bounds()
+        around = np.clip(best + random.normal(0.0, _AROUND, population.shape), box[:, 0], box[:, 1])
+        around[0] = best
+        best, value, population = _evolve(
+            problem, around, _generations(problem, before) // 2, history, deadline, random
+        )
+    if problem.fit is not None and smooth and EXACT < value < OUTSIDE:
+        polished = _polish(problem, best)
+        better = float(problem.evaluate(polished[None]).cost[0])
+        if better < value:
+            best, value, population[0] = polished, better, polished
+            history.append(HistoryRow(attempt, len(history), problem.evaluations, value))
+    return Search(best, value, tuple(history), start, population)
+
+
+def _begin(problem: Problem, random: np.random.Generator) -> Search:
+    """Make many candidates and keep the best as the first population."""
+    aimed, size = problem.fit is not None, problem.unknowns.size
+    width = min(120, 15 * size) if aimed else min(60, 6 * size)
+    first = problem.population(max(1, (20 if aimed else 4) * width), random)
+    outcome = problem.evaluate(first)
+    order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
+    start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
+    return Search(first[order[0]], float(outcome.cost[order[0]]), (), start, first[order])
+
+
+def _generations(problem: Problem, before: Search | None) -> int:
+    """Return the largest number of generations: fewer where a motion costs more."""
+    if problem.fit is None:
+        count = 60
+    elif before is None:
+        count = 120
+    else:
+        count = 400 if problem.fit.warped else 600
+    return count // 3 if problem.iterative else count
+
+
+def _evolve(
+    problem: Problem, population: Array, generations: int, history: list[HistoryRow], deadline: float,
+    random: np.random.Generator,
+) -> tuple[Array, float, Array]:  # fmt: skip
+    """Differential evolution; returns the best, its cost and the last population."""
     from scipy.optimize import differential_evolution
 
-    aimed = problem.fit is not None
-    size = problem.unknowns.size
-    width = min(120, 15 * size) if aimed else min(60, 6 * size)
-    if before is None:
-        first = problem.population((20 if aimed else 4) * width, random)
-        outcome = problem.evaluate(first)
-        order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
-        start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
-        least, population = float(outcome.cost[order[0]]), first[order]
-    else:
-        start, least, population = (0, 0, 0), before.cost, before.population
-    history = [HistoryRow(attempt, 0, problem.evaluations, least)]
-    if size == 0:
-        return Search(population[0], least, tuple(history), start, population)
+    enough = -_ENOUGH if problem.fit is None else EXACT
+    attempt = history[0].attempt
 
     def cost(X: Array) -> Array:
         found = problem.evaluate(np.atleast_2d(X.T)).cost
@@ -83,24 +125,13 @@ def search(
         return found
 
     def content(x: Array, convergence: float) -> bool:
-        return perf_counter() > deadline or history[-1].cost <= (EXACT if aimed else -_ENOUGH)
+        return perf_counter() > deadline or history[-1].cost <= enough
 
-    generations = (
-        60 if not aimed else 120 if before is None else 400 if problem.fit is not None and problem.fit.warped else 1000
-    )
-    generations //= 3 if problem.iterative else 1
     found = differential_evolution(
         cost, problem.bounds(), init=population, vectorized=True, updating="deferred", polish=False,
         maxiter=generations, tol=1e-7, atol=1e-12, seed=random, callback=content,
     )  # fmt: skip
-    best, value, population = found.x, float(found.fun), np.asarray(found.population)
-    if problem.fit is not None and problem.fit.smooth and EXACT < value < OUTSIDE:
-        polished = _polish(problem, best)
-        better = float(problem.evaluate(polished[None]).cost[0])
-        if better < value:
-            best, value, population[0] = polished, better, polished
-            history.append(HistoryRow(attempt, len(history), problem.evaluations, value))
-    return Search(best, value, tuple(history), start, population)
+    return found.x, float(found.fun), np.asarray(found.population)
 
 
 def _polish(problem: Problem, x: Array) -> Array:

@@ -69,6 +69,8 @@ class Fit:
     ranges: Array = np.zeros((0, 2))
     #: Whether the target speaks of absolute coordinates.
     placed = False
+    #: Whether continuous angles are needed.
+    angular = True
     #: Whether the errors vanish smoothly at a perfect candidate, so that least squares help.
     smooth = True
     #: Whether the target reads the motion at other inputs by set.
@@ -90,6 +92,7 @@ class PathFit(Fit):
         self.turn = rows[:, 2] - rows[0, 2] if isinstance(target, PosesGoal) else None
         self.size = float(np.abs(self.goal - self.goal.mean()).max()) or 1.0
         self.warped = target.inputs is None
+        self.angular = self.warped or self.turn is not None
         if target.inputs is not None:
             self.inputs = np.array(target.inputs)
             return
@@ -139,11 +142,11 @@ class FunctionFit(Fit):
 class LineFit(Fit):
     """A straight stroke: its two ends are set exactly the wanted length apart, the strip is measured."""
 
-    smooth = False
+    smooth = angular = False
 
     def __init__(self, target: LineGoal) -> None:
         self.target = target
-        self.inputs = np.linspace(0.0, target.span, 65)
+        self.inputs = np.linspace(0.0, target.span, 49)
         tilt = [-3.0 * target.tolerance, 3.0 * target.tolerance]
         self.ranges = np.array([tilt] if target.on_bar else [tilt, [-np.pi, np.pi]])
 
@@ -159,9 +162,17 @@ class LineFit(Fit):
         M = z + q[:, None] * w
         along = (M[:, -1] - M[:, 0]) / length * np.exp(1j * extras[:, 0])
         y = (np.conj(along)[:, None] * M).imag
-        width = (y.max(axis=1) - y.min(axis=1)) / length
+        width = (_peak(y) + _peak(-y)) / length
         one = np.ones(len(z), dtype=np.complex128)
         return (width + far)[:, None].astype(np.complex128), Placed(one, q, 0.0 * one)
+
+
+def _peak(y: Array) -> Array:
+    """Largest value by row of equidistant samples, with the parabola through every local maximum and its neighbours."""
+    y0, y1, y2 = y[:, :-2], y[:, 1:-1], y[:, 2:]
+    bend = np.minimum(y0 - 2.0 * y1 + y2, -1e-300)
+    rise = np.where((y1 >= y0) & (y1 >= y2), -((y0 - y2) ** 2) / (8.0 * bend), 0.0)
+    return np.asarray(np.maximum(y.max(axis=1), (y1 + rise).max(axis=1)))
 
 
 def _on_bar(dz: Complex, dw: Complex, length: Array) -> tuple[Complex, Array]:
