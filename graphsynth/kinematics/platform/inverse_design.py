@@ -53,7 +53,8 @@ class Design:
         ``wanted`` is not real up to one phase.
     iterations : int
     amplitude_reached : float
-        Fraction of the wanted amplitude that was reached: 1 if accepted; NaN if not searched for.
+        Fraction of the wanted amplitude that was reached: 1 if accepted; NaN if not searched for.  The mechanism is
+        then the one with that amplitude.
     motion : Motion or None
         The verification over the whole turn, compared with all assembly modes.
     """
@@ -166,8 +167,8 @@ def refine_design(
     -------
     Design
         Every sweep of the iteration keeps the branch label, and the result is verified over the whole turn.  Otherwise
-        ``accepted`` is False with the reason, and ``amplitude_reached`` is the largest fraction of the wanted amplitude
-        for which the refinement succeeds (found by bisection, estimated to 1 %).
+        ``accepted`` is False with the reason, ``amplitude_reached`` is the largest fraction of the wanted amplitude
+        that is reached by growing the amplitude from zero (steps down to 0.5 %), and ``mechanism`` the design there.
 
     Notes
     -----
@@ -187,27 +188,57 @@ def refine_design(
     found, reason, count = _refine(mechanism, theory, target, couplers, samples, tolerance)
     if found is not None:
         return assess_design(found.mechanism, target, theory.home, samples=samples, iterations=count)
-    low, high = 0.0, 1.0
-    best: SingleMotorPlatform | None = None
-    while high - low > 0.01:
-        middle = 0.5 * (low + high)
-        part, _, _ = _refine(mechanism, theory, middle * target, couplers, samples, tolerance)
-        low, high = (middle, high) if part is not None else (low, middle)
-        best = part.mechanism if part is not None else best
+    best, reached, reason_there = _grow(mechanism, theory, target, couplers, samples, tolerance)
+    if best is not None and reached == 1.0:
+        return assess_design(best.mechanism, target, theory.home, samples=samples, iterations=count)
     nothing = np.full(3, np.nan)
-    rejected = best if best is not None else _linear(mechanism, theory, target)
+    rejected = best.mechanism if best is not None else _linear(mechanism, theory, target)
     return Design(
-        rejected, False, reason, target, nothing + 0j, nothing, math.nan, math.nan, math.nan, math.nan, count, low, None
+        rejected,
+        False,
+        reason_there or reason,
+        target,
+        nothing + 0j,
+        nothing,
+        math.nan,
+        math.nan,
+        math.nan,
+        math.nan,
+        count,
+        reached,
+        None,
     )
 
 
-def _refine(
+def _grow(
     mechanism: SingleMotorPlatform, theory: SmallCrank, target: Complex, couplers: bool, samples: int, tolerance: float
-) -> tuple[Sweep | None, str, int]:
-    """Newton iteration; the sweep of the solution, or None with the reason."""
+) -> tuple[Sweep | None, float, str]:
+    """Follow the design from small amplitudes; the last one, its fraction of the amplitude, and what stops it."""
+    best: Sweep | None = None
+    reached, step, reason = 0.0, 0.5, ""
+    while step > 0.005 and reached < 1.0:
+        share = min(1.0, reached + step)
+        start = None
+        if best is not None:
+            own = best.mechanism
+            crank = np.array(own.crank) * np.exp(1j * np.array(own.phase))
+            start = warm_sweep(_with(own, np.asarray(crank * (share / reached))), best)
+        found, why, _ = _refine(mechanism, theory, share * target, couplers, samples, tolerance, start)
+        if found is None:
+            step, reason = 0.5 * step, why
+        else:
+            best, reached = found, share
+    return best, reached, reason
+
+
+def _refine(
+    mechanism: SingleMotorPlatform, theory: SmallCrank, target: Complex, couplers: bool, samples: int,
+    tolerance: float, start: Sweep | None = None,
+) -> tuple[Sweep | None, str, int]:  # fmt: skip
+    """Newton iteration from ``start`` or the linear design; the sweep of the solution, or None with the reason."""
     weight = np.array([1.0, 1.0, mechanism.Lc])
     size = float(np.linalg.norm(weight * target))
-    sweep = cold_sweep(_linear(mechanism, theory, target), samples)
+    sweep = start if start is not None else cold_sweep(_linear(mechanism, theory, target), samples)
     if sweep.reason:
         return None, sweep.reason, 0
     unknowns, last = (9 if couplers else 6), math.inf

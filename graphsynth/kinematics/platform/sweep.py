@@ -92,13 +92,21 @@ def warm_sweep(mechanism: SingleMotorPlatform, near: Sweep) -> Sweep:
         if size <= 1e-14 or (size <= 1e-11 and size >= 0.25 * last):
             break
         if size > 0.5 or (size >= last and size > 1e-11):
-            return _failed(mechanism, "the poses of the turn were not found from the neighbouring design")
+            return _followed(mechanism, near)
     JX, JT = platform.jacobians(pose, theta)
     if bool((np.sign(JT) != np.array(near.sigma)).any()):
         return _failed(mechanism, "a leg passes its boundary: the working mode changes during the turn")
     if bool((determinant(JX) * near.sign <= 0.0).any()):
         return _failed(mechanism, "det JX changes its sign: the platform is singular during the turn")
     return Sweep(mechanism, near.psi, pose, theta, state.h_phi, near.sigma, near.sign, "")
+
+
+def _followed(mechanism: SingleMotorPlatform, near: Sweep) -> Sweep:
+    """Follow the turn from home where Newton from the neighbouring poses fails; the label must be the neighbour's."""
+    found = cold_sweep(mechanism, len(near.psi))
+    if not found.reason and (found.sigma, found.sign) != (near.sigma, near.sign):
+        return _failed(mechanism, "the home branch has another label than that of the neighbouring design")
+    return found
 
 
 def pose_derivatives(sweep: Sweep) -> Array:

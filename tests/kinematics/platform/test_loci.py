@@ -69,6 +69,21 @@ def test_every_end_joins_two_working_modes(loci: tuple[ParallelPlatform, Singula
         assert [i for i in range(3) if modes[0][i] != modes[1][i]] == [leg - 1]
 
 
+@pytest.mark.parametrize("seed", [11, *[pytest.param(seed, marks=pytest.mark.slow) for seed in range(12, 30)]])
+def test_ends_pair_up_on_random_platforms(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    D, b = rng.normal(size=3) + 1j * rng.normal(size=3), 0.4 * (rng.normal(size=3) + 1j * rng.normal(size=3))
+    platform = ParallelPlatform(tuple(D), tuple(b), rng.uniform(0.6, 1.8, 3), rng.uniform(0.6, 1.8, 3))  # type: ignore[arg-type]
+    found = singular_loci(platform, rng.uniform(-3, 3), nodes=50)
+    ends: list[tuple[int, complex, tuple[int, ...]]] = []
+    for curve in found.curves:
+        assert curve.complete and curve.residual < 1e-12
+        ends += [(leg, complex(p), curve.sigma) for leg, p in zip(curve.ends, curve.points[[0, -1]])]
+    for leg, p, sigma in ends:
+        partners = [other for k, q, other in ends if k == leg and abs(p - q) < 1e-6 and other != sigma]
+        assert len(partners) == 1 and [i for i in range(3) if partners[0][i] != sigma[i]] == [leg - 1]
+
+
 def test_ends_lie_on_circles_of_type_one(loci: tuple[ParallelPlatform, SingularLoci]) -> None:
     _, found = loci
     for curve in found.curves:
