@@ -19,6 +19,7 @@ from graphsynth.kinematics.certified import certify, certify_four_bar
 from graphsynth.kinematics.certified.balls import Balls, exact
 from graphsynth.kinematics.certified.equations import MechanismSystem
 from graphsynth.kinematics.engine.result import Motion
+from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear, Polynomial, Table
@@ -173,6 +174,35 @@ def test_close_to_a_change_point_the_gap_is_really_open() -> None:
         assert certify_four_bar(*lengths).full_turn
         proof = certify(simulate(four_bar(*lengths), TURN))
         assert proof.certified and proof.closed
+
+
+def gear_platform(source: SingleMotorPlatform) -> Mechanism:
+    """The single-motor platform for the general engine: 15 links, 19 turning pairs, 3 gear pairs."""
+    turn = np.exp(1j * np.array(source.frame_angle))
+    joints: list[Revolute | Gear] = [Revolute(0, 1)]
+    for k in range(3):
+        wheel, coupler, rocker, link = 2 + k, 5 + k, 8 + k, 11 + k
+        O, D, b = (z[k] * turn[k] for z in (source.axis, source.pivot, source.vertex))
+        crank, bell = source.crank[k] * np.exp(1j * source.phase[k]), source.l1[k] * np.exp(1j * source.delta[k])
+        joints += [
+            Revolute(0, wheel, (O.real, O.imag)), Revolute(wheel, coupler, (crank.real, crank.imag)),
+            Revolute(coupler, rocker, (source.coupler[k], 0.0), (source.rocker[k], 0.0)),
+            Revolute(0, rocker, (D.real, D.imag)), Revolute(rocker, link, (bell.real, bell.imag)),
+            Revolute(link, 14, (source.l2[k], 0.0), (b.real, b.imag)),
+            Gear(1, wheel, radius_a=15.0, radius_b=30.0, offset=-1.5 * float(np.angle(O))),
+        ]  # fmt: skip
+    return Mechanism(source.graph(), joints, [Driver(0, 1, Linear(-2.0))])
+
+
+def test_fifteen_links_with_gears_close_after_a_turn_of_the_wheels() -> None:
+    source = SingleMotorPlatform(crank=(10.0, 5.0, 1.0), phase=(0.0, 0.5, 1.0))
+    start = np.zeros((15, 3))
+    start[14] = source.home_pose(0.0)
+    motion = simulate(gear_platform(source), np.linspace(0.0, math.tau, 91), modes={3: -1, 4: -1, 5: -1}, start=start)
+    proof = certify(motion)
+    assert motion.completed and proof.certified and proof.closed and proof.position_radius.max() < 1e-10
+    half = certify(simulate(motion.mechanism, motion.inputs[:46], modes={3: -1, 4: -1, 5: -1}, start=start))
+    assert half.certified and not half.closed
 
 
 # --- nothing false

@@ -145,9 +145,8 @@ class MechanismSystem:
 
     def branch(self, x: Balls, u: Array) -> tuple[NDArray[np.int64], Balls]:
         """Return turns of sliding pairs and drivers in order, and directions of lines of centres of gears."""
-        # the turns are a function of the midpoints alone; the cosines do not matter for them
-        units = self.units(x.mid, u, checked=False)
-        centre, place = _Place(self, exact(x.mid), units), _Place(self, x, units.wider(1e-15))
+        units = self.units(x.mid, u)
+        centre, place = _Place(self, exact(x.mid), units), _Place(self, x, units)
         turns, directions = [], []
         for joint in self.mechanism.joints:
             if isinstance(joint, Prismatic):

@@ -92,7 +92,7 @@ def certify_four_bar(ground: Any, crank: Any, coupler: Any, rocker: Any) -> Cran
     ('crank-rocker', 'change point')
     >>> limited = certify_four_bar(2, 1.5, 1, 1)
     >>> [round(limit.low, 9) for limit in limited.limits], limited.limits[0].place
-    ([0.650588359], 'stretched')
+    ([1.186399552], 'stretched')
     """
     need_flint()
     g, a, b, c = (

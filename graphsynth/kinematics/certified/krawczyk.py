@@ -7,7 +7,7 @@ For a system ``f(x, u) = 0`` with as many equations as unknowns, an interval U o
 
 with any matrix Y satisfies: if K(u) lies in the interior of ``c(u) + B`` for every u in U, then for every u in U there
 is exactly one solution in ``c(u) + B``, it lies in K(u), and the Jacobian is regular everywhere in the box (Krawczyk
-1969; Neumaier 1990, theorem 5.1.8).  ``f`` along the moving centre is bounded by its value at mid U and its derivative
+1969; Neumaier 1990, section 5.1).  ``f`` along the moving centre is bounded by its value at mid U and its derivative
 by u over U, so the bound is of second order in the width of U.
 """
 
@@ -149,7 +149,7 @@ def _prove(system: System, boxes: Boxes, radii: tuple[float, ...]) -> Proof:
         gamma = 4.0 * (boxes.x.shape[1] + 2) * U
         # change of f along the moving centre: (J V + f_u) times the half width of U
         along = np.abs(_apply(J.mid, boxes.V) + fu.mid) + gamma * (_apply(np.abs(J.mid), np.abs(boxes.V)))
-        along = (along + _apply(J.rad, np.abs(boxes.V)) + fu.rad + gamma * np.abs(fu.mid)) * UP + TINY
+        along = (along + _apply(J.rad, np.abs(boxes.V)) + fu.rad + gamma * np.abs(fu.mid)) * (1.0 + gamma) * UP + TINY
         spread = (f.rad + along * boxes.u.rad[:, None]) * UP + TINY
         absolute = np.abs(Y)
         first = np.abs(_apply(Y, f.mid)) + gamma * _apply(absolute, np.abs(f.mid)) + _apply(absolute, spread)

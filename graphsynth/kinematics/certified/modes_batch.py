@@ -252,7 +252,8 @@ def _decide(A: Balls, b: NDArray[np.complex128], l2: Array) -> tuple[Index, Arra
     scaled = Balls(A.mid / unit_length, A.rad / unit_length * UP + TINY)  # a power of two: exact
     vertices, legs = exact(b / unit_length), exact(l2 / unit_length)
     s = _coefficients(scaled, vertices, legs)
-    decided = np.ones(len(l2), dtype=bool)
+    # beyond these sizes products of lengths leave the range of doubles
+    decided = np.asarray((power > 2.0**-150) & (power < 2.0**150))
     problem, low, width = _isolate(s, decided)
     alpha = _refine(s.take(problem), low, width)
     x, y, determinant = _poses(s.take(problem), scaled[problem], vertices[problem], alpha)

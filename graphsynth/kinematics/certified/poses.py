@@ -144,7 +144,7 @@ def certify(
     count = int(np.argmin(np.append(motion.assembled, False)))
     asked = asked[asked < count]
     samples = motion.poses[asked][:, system.moving].reshape(len(asked), system.size)
-    turns = _full_turn(motion) if between else None
+    turns = _full_turn(motion) if between and len(asked) == len(motion.inputs) else None
     u, end = _inputs(motion.inputs[asked], turns)
     nodes = prove_nodes(system, u, samples)
     position, angle, room = _radii(system, nodes, samples)
@@ -152,7 +152,7 @@ def certify(
     found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
     if between and len(asked) > 1 and all(enclosed(driver.law) for driver in motion.mechanism.drivers):
         found = cover(system, nodes, Budget(max_boxes, seconds), begin)
-    closed = turns is not None and len(asked) == len(motion.inputs) and end
+    closed = turns is not None and end
     closed = closed and bool(found.covered.all()) and _closes(system, nodes, turns)
     return _certificate(motion, between, asked, (position, angle, room), proved, found, closed, turns, begin)
 
