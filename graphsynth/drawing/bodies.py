@@ -132,12 +132,11 @@ def hull(points: list[complex]) -> list[complex]:
     ordered = sorted(set(points), key=lambda z: (z.real, z.imag))
     if len(ordered) < 3:
         return ordered
-    size = max(abs(z - ordered[0]) for z in ordered)
 
     def chain(sequence: list[complex]) -> list[complex]:
         kept: list[complex] = []
         for z in sequence:
-            while len(kept) > 1 and ((kept[-1] - kept[-2]).conjugate() * (z - kept[-2])).imag <= 1e-9 * size * size:
+            while len(kept) > 1 and ((kept[-1] - kept[-2]).conjugate() * (z - kept[-2])).imag <= 0.0:
                 kept.pop()
             kept.append(z)
         return kept
@@ -180,8 +179,9 @@ def rounded(corners: list[complex], radius: float) -> list[complex]:
     found = []
     for k, corner in enumerate(corners):
         into, out = corner - corners[k - 1], corners[(k + 1) % count] - corner
-        first = cmath.phase(-1j * into)
-        turn = cmath.phase(out / into) % math.tau
+        first = math.atan2(-into.real, into.imag)  # outwards: cmath.phase fails on subnormal numbers
+        turn = (math.atan2(out.imag, out.real) - math.atan2(into.imag, into.real)) % math.tau
+        turn = 0.0 if turn > 1.5 * math.pi else turn  # a corner that is straight to rounding
         steps = max(2, math.ceil(turn / 0.35))
         found += [corner + cmath.rect(radius, first + turn * j / steps) for j in range(steps + 1)]
     return found

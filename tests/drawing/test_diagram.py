@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from graphsynth.drawing.bodies import hull, outline, rounded, thickness
@@ -294,6 +294,7 @@ def test_palette_has_the_same_names_for_light_and_dark_pages() -> None:
 POINTS = st.lists(st.complex_numbers(max_magnitude=1e3, allow_nan=False, allow_infinity=False), min_size=1, max_size=9)
 
 
+@example([1 + 0j, 7.8e-146 + 0j, 1j, 7.8e-146 + 2j])  # in line but for an underflow
 @given(POINTS)
 def test_hull_holds_every_point_and_turns_left(points: list[complex]) -> None:
     corners = hull(points)
