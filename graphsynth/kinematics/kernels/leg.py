@@ -19,6 +19,8 @@ LARGEST, SMALLEST = 1e60, 1e-60  # of the squared lengths: their fourth powers n
 
 QUARTER = 0.7853981633974483  # pi / 4 and its rounding error
 QUARTER_LOW = 3.061616997868383e-17
+HALF_PI, HALF_PI_LOW, TWO_OVER_PI = 1.5707963267948966, 6.123233995736766e-17, 0.6366197723675814
+ROUND = 1.5 * 2.0**52  # added and taken away: rounds to the nearest whole number
 TANGENT = 0.41421356237309503  # tan(pi / 8)
 
 
@@ -65,6 +67,41 @@ def angle_of(y, x):
     r = -r if x < 0.0 else r
     a = fma(k, QUARTER, fma(k, QUARTER_LOW, r))
     return -a if y < 0.0 else a
+
+
+@njit(cache=True, error_model="numpy")
+def direction(a):
+    """Cosine and sine without branches, for |a| < 1e5; error below 1 ulp (polynomials of fdlibm, Sun 1993)."""
+    n = (a * TWO_OVER_PI + ROUND) - ROUND
+    r = fma(-n, HALF_PI_LOW, fma(-n, HALF_PI, a))
+    z = r * r
+    s = fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08)
+    s = fma(z, fma(z, s, 2.75573137070700676789e-06), -1.98412698298579493134e-04)
+    s = fma(z, fma(z, s, 8.33333333332248946124e-03), -1.66666666666666324348e-01)
+    s = fma(r, z * s, r)
+    c = fma(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09)
+    c = fma(z, fma(z, c, -2.75573143513906633035e-07), 2.48015872894767294178e-05)
+    c = fma(z, fma(z, c, -1.38888888888741095749e-03), 4.16666666666666019037e-02)
+    h = 0.5 * z
+    w = 1.0 - h
+    c = w + (((1.0 - w) - h) + z * (z * c))
+    quarter = n - 4.0 * ((n * 0.25 - 0.375 + ROUND) - ROUND)  # 0, 1, 2 or 3
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    x, y = (s if odd else c), (c if odd else s)
+    x = -x if (quarter == 1.0) | (quarter == 2.0) else x
+    return x, (-y if quarter > 1.5 else y)
+
+
+@njit(cache=True, error_model="numpy")
+def directions(a, m, c, s):
+    """Cosines and sines of m angles."""
+    far = False
+    for i in range(m):
+        c[i], s[i] = direction(a[i])
+        far |= not abs(a[i]) < 1e5
+    if far:
+        for i in range(m):
+            c[i], s[i] = math.cos(a[i]), math.sin(a[i])
 
 
 @njit(cache=True, error_model="numpy")
@@ -136,8 +173,7 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
     hard = 0
     for start in range(0, n, BLOCK):
         m = min(BLOCK, n - start)
-        for i in range(m):
-            cs[i], sn[i] = math.cos(pose[start + i, 2]), math.sin(pose[start + i, 2])
+        directions(pose[start : start + m, 2], m, cs, sn)
         for k in range(3):
             bx, by, dx, dy = b[k, 0], b[k, 1], D[k, 0], D[k, 1]
             for i in range(m):

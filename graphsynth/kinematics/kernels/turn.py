@@ -14,14 +14,18 @@ import math
 import numpy as np
 from numba import njit
 
-from graphsynth.kinematics.kernels.leg import angle_of, cross_sum, fma, solve
+from graphsynth.kinematics.kernels.leg import ROUND, angle_of, cross_sum, directions, fma, solve
 
 COMPLETE, NO_HOME, HOME_ENDS, DRIVE_ENDS, SINGULAR, NO_START = 0, 1, 2, 3, 4, 5
 SMALLEST = 1e-11  # step over the whole range
 TAU = 2.0 * math.pi
 BLOCK = 128
+# rows of the work array of a block: five per leg (arm cos, sin, theta', theta'', theta), then these
+LEG = 5 * BLOCK
+COS, SIN, PX, PY, PA, SPEED, PUSH = (row * BLOCK for row in (15, 16, 17, 18, 19, 20, 24))
+QUICK = 1e-7  # scaled correction after which one more pass, in bulk, is enough
+FINAL = 1e-13  # scaled correction of that pass above which the block is done again, step by step
 
-ROUND = 1.5 * 2.0**52  # added and taken away: rounds to the nearest whole number
 
 # state: pose x, y, cos, sin, running angle; velocity; det; parameter; previous pose (x, y, angle), velocity, parameter
 X, Y, C, S, A, VX, VY, VA, DET, AT, OX, OY, OA, OVX, OVY, OVA, OAT, OLD = range(18)
@@ -52,19 +56,19 @@ def rocker2(c, t, rate, lx, ly, half, arm1x, arm1y, arm2x, arm2y, length):
 
 
 @njit(cache=True, error_model="numpy")
-def drives(p, k, m, cs, sn, c, t, rate, rate2, theta):
-    """Drive k at m wheel angles: direction of the rocker arm, theta', theta'' and theta into block arrays."""
+def drives(p, k, m, c, s, out):
+    """Drive k at m wheel angles with cosines c and sines s: the five rows of a leg into ``out``."""
     ex, ey, crank, length, tau = p[k, 0], p[k, 1], p[k, 2], p[k, 4], p[k, 5]
     c0, c1, c2, c3, c4, c5 = p[k, 6], p[k, 7], p[k, 8], p[k, 9], p[k, 10], p[k, 11]
     cd, sd, offset = p[k, 12], p[k, 13], p[k, 14]
     cp, sp = math.cos(p[k, 3]), math.sin(p[k, 3])
     for i in range(m):
-        ax, ay = crank * (cs[i] * cp - sn[i] * sp), crank * (cs[i] * sp + sn[i] * cp)
+        cs, sn = c[i], s[i]
+        ax, ay = crank * (cs * cp - sn * sp), crank * (cs * sp + sn * cp)
         y, x, cf, tf, r, lx, ly, half = rocker(ex + ax, ey + ay, -ay, ax, length, tau, c0, c1, c2, c3, c4, c5)
-        rate[k, i] = r
-        rate2[k, i] = rocker2(cf, tf, r, lx, ly, half, -ay, ax, -ax, -ay, length)
-        c[k, i], t[k, i] = cf * cd - tf * sd, cf * sd + tf * cd
-        theta[k, i] = angle_of(y, x) + offset
+        out[i], out[BLOCK + i], out[2 * BLOCK + i] = cf * cd - tf * sd, cf * sd + tf * cd, r
+        out[3 * BLOCK + i] = rocker2(cf, tf, r, lx, ly, half, -ay, ax, -ax, -ay, length)
+        out[4 * BLOCK + i] = angle_of(y, x) + offset
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,10 +115,11 @@ def predict(q, goal):
 
 
 @njit(cache=True, error_model="numpy")
-def advance(p, e, goal, q, Lc, check):
+def advance(p, e, goal, q, Lc, check, quick):
     """Move the state q to the parameter ``goal`` with rocker arms e; False, and q unchanged, if not trustworthy.
 
-    With ``check`` False the pose of q is only a guess: the rules on the step do not apply.
+    With ``check`` False the pose of q is only a guess: the rules on the step do not apply.  With ``quick`` one pass is
+    enough after a good prediction; `finish` then makes the second and judges it.
     """
     weight = 1.0 / (Lc * Lc)
     x, y, turn = q[X], q[Y], 0.0
@@ -161,7 +166,7 @@ def advance(p, e, goal, q, Lc, check):
         elif it == 1 and first > 1e-13:
             rate = size / first
         # the matrix of this pass serves the velocity: it must belong to the final pose
-        if size <= 1e-14 or settled:
+        if size <= 1e-14 or settled or (quick and it == 0 and size <= QUICK):
             accurate = True
             break
         if it > 0:
@@ -194,45 +199,64 @@ def advance(p, e, goal, q, Lc, check):
 
 
 @njit(cache=True, error_model="numpy")
-def push(x, y, cz, sz, vx, vy, va, dx, dy, l1, bx, by, c, t, r1, r2):
-    """Half a row of JX and half the right-hand side of the accelerations for one leg."""
+def leg_row(x, y, cz, sz, dx, dy, l1, bx, by, l2, c, t):
+    """Half a row of JX, half the closure, the rocker vector and the platform arm of one leg."""
     zx, zy = cz * bx - sz * by, cz * by + sz * bx
     rx, ry = l1 * c, l1 * t
-    lx, ly = x + zx - dx - rx, y + zy - dy - ry
-    sx, sy = vx - zy * va + ry * r1, vy + zx * va - rx * r1
-    ax, ay = -ry * r2 - rx * r1 * r1 + zx * va * va, rx * r2 - ry * r1 * r1 + zy * va * va
-    return lx, ly, zx * ly - zy * lx, lx * ax + ly * ay - (sx * sx + sy * sy)
+    lx, ly = x + zx - (dx + rx), y + zy - (dy + ry)
+    return lx, ly, zx * ly - zy * lx, 0.5 * (fma(lx, lx, -(l2 * l2)) + ly * ly), rx, ry, zx, zy
 
 
 @njit(cache=True, error_model="numpy")
-def bend(p, start, m, c, t, rate, rate2, cs, sn, pose, velocity, theta2, acceleration):
-    """Second derivatives of m samples (section 4.2)."""
-    d1x, d1y, l1, b1x, b1y = p[0, 15], p[0, 16], p[0, 17], p[0, 18], p[0, 19]
-    d2x, d2y, l2, b2x, b2y = p[1, 15], p[1, 16], p[1, 17], p[1, 18], p[1, 19]
-    d3x, d3y, l3, b3x, b3y = p[2, 15], p[2, 16], p[2, 17], p[2, 18], p[2, 19]
+def push(lx, ly, rx, ry, zx, zy, vx, vy, va, r1, r2):
+    """Half the right-hand side of the accelerations for one leg (section 4.2)."""
+    sx, sy = vx - zy * va + ry * r1, vy + zx * va - rx * r1
+    ax, ay = -ry * r2 - rx * r1 * r1 + zx * va * va, rx * r2 - ry * r1 * r1 + zy * va * va
+    return lx * ax + ly * ay - (sx * sx + sy * sy)
+
+
+@njit(cache=True, error_model="numpy")
+def finish(p, m, weight, w):
+    """Last Newton step and all derivatives of m samples in w; how many corrections were too large.
+
+    The running angle only tells the number of turns.
+    """
+    d1x, d1y, q1, b1x, b1y, l1 = p[0, 15], p[0, 16], p[0, 17], p[0, 18], p[0, 19], p[0, 20]
+    d2x, d2y, q2, b2x, b2y, l2 = p[1, 15], p[1, 16], p[1, 17], p[1, 18], p[1, 19], p[1, 20]
+    d3x, d3y, q3, b3x, b3y, l3 = p[2, 15], p[2, 16], p[2, 17], p[2, 18], p[2, 19], p[2, 20]
+    bad = 0
     for i in range(m):
-        j = start + i
-        x, y, cz, sz = pose[j, 0], pose[j, 1], cs[i], sn[i]
-        vx, vy, va = velocity[j, 0], velocity[j, 1], velocity[j, 2]
-        dx1, dy1, m1, g1 = push(
-            x, y, cz, sz, vx, vy, va, d1x, d1y, l1, b1x, b1y, c[0, i], t[0, i], rate[0, i], rate2[0, i]
+        x, y, cz, sz = w[PX + i], w[PY + i], w[COS + i], w[SIN + i]
+        a1, a2, a3 = w[2 * BLOCK + i], w[LEG + 2 * BLOCK + i], w[2 * LEG + 2 * BLOCK + i]
+        dx1, dy1, m1, f1, r1x, r1y, z1x, z1y = leg_row(
+            x, y, cz, sz, d1x, d1y, q1, b1x, b1y, l1, w[i], w[BLOCK + i]
         )  # fmt: skip
-        dx2, dy2, m2, g2 = push(
-            x, y, cz, sz, vx, vy, va, d2x, d2y, l2, b2x, b2y, c[1, i], t[1, i], rate[1, i], rate2[1, i]
+        dx2, dy2, m2, f2, r2x, r2y, z2x, z2y = leg_row(
+            x, y, cz, sz, d2x, d2y, q2, b2x, b2y, l2, w[LEG + i], w[LEG + BLOCK + i]
         )  # fmt: skip
-        dx3, dy3, m3, g3 = push(
-            x, y, cz, sz, vx, vy, va, d3x, d3y, l3, b3x, b3y, c[2, i], t[2, i], rate[2, i], rate2[2, i]
+        dx3, dy3, m3, f3, r3x, r3y, z3x, z3y = leg_row(
+            x, y, cz, sz, d3x, d3y, q3, b3x, b3y, l3, w[2 * LEG + i], w[2 * LEG + BLOCK + i]
         )  # fmt: skip
         k1, k2, k3 = dx2 * dy3 - dx3 * dy2, dx3 * dy1 - dx1 * dy3, dx1 * dy2 - dx2 * dy1
-        inv = 1.0 / (m1 * k1 + m2 * k2 + m3 * k3)
-        acceleration[j, 0] = (
-            g1 * (dy2 * m3 - dy3 * m2) + g2 * (dy3 * m1 - dy1 * m3) + g3 * (dy1 * m2 - dy2 * m1)
-        ) * inv
-        acceleration[j, 1] = (
-            g1 * (dx3 * m2 - dx2 * m3) + g2 * (dx1 * m3 - dx3 * m1) + g3 * (dx2 * m1 - dx1 * m2)
-        ) * inv
-        acceleration[j, 2] = (g1 * k1 + g2 * k2 + g3 * k3) * inv
-        theta2[j, 0], theta2[j, 1], theta2[j, 2] = rate2[0, i], rate2[1, i], rate2[2, i]
+        u1, u2, u3 = dy2 * m3 - dy3 * m2, dy3 * m1 - dy1 * m3, dy1 * m2 - dy2 * m1
+        v1, v2, v3 = dx3 * m2 - dx2 * m3, dx1 * m3 - dx3 * m1, dx2 * m1 - dx1 * m2
+        whole = m1 * k1 + m2 * k2 + m3 * k3
+        inv = 1.0 / whole
+        px, py = (f1 * u1 + f2 * u2 + f3 * u3) * inv, (f1 * v1 + f2 * v2 + f3 * v3) * inv
+        pa = (f1 * k1 + f2 * k2 + f3 * k3) * inv
+        bad += 0 if (px * px + py * py) * weight + pa * pa <= FINAL * FINAL else 1
+        w[PX + i], w[PY + i], w[PA + i] = x - px, y - py, near(angle_of(sz, cz), w[PA + i]) - pa
+        g1, g2, g3 = (r1x * dy1 - r1y * dx1) * a1, (r2x * dy2 - r2y * dx2) * a2, (r3x * dy3 - r3y * dx3) * a3
+        vx, vy = (g1 * u1 + g2 * u2 + g3 * u3) * inv, (g1 * v1 + g2 * v2 + g3 * v3) * inv
+        va = (g1 * k1 + g2 * k2 + g3 * k3) * inv
+        w[SPEED + i], w[SPEED + BLOCK + i], w[SPEED + 2 * BLOCK + i], w[SPEED + 3 * BLOCK + i] = vx, vy, va, 8.0 * whole
+        g1 = push(dx1, dy1, r1x, r1y, z1x, z1y, vx, vy, va, a1, w[3 * BLOCK + i])
+        g2 = push(dx2, dy2, r2x, r2y, z2x, z2y, vx, vy, va, a2, w[LEG + 3 * BLOCK + i])
+        g3 = push(dx3, dy3, r3x, r3y, z3x, z3y, vx, vy, va, a3, w[2 * LEG + 3 * BLOCK + i])
+        w[PUSH + i] = (g1 * u1 + g2 * u2 + g3 * u3) * inv
+        w[PUSH + BLOCK + i] = (g1 * v1 + g2 * v2 + g3 * v3) * inv
+        w[PUSH + 2 * BLOCK + i] = (g1 * k1 + g2 * k2 + g3 * k3) * inv
+    return bad
 
 
 @njit(cache=True, error_model="numpy")
@@ -262,9 +286,7 @@ def turns(
     ``acceleration`` are (N, n, 3), or (N, 0, 3) if not wanted.
     """
     n, second = psi.size, theta2.shape[1] > 0
-    q, e, buffers = np.empty(18), np.empty((3, 5)), np.empty((6, 3, BLOCK))
-    cs, sn = buffers[0, 0], buffers[0, 1]
-    c, t, rate, rate2, angle = buffers[1], buffers[2], buffers[3], buffers[4], buffers[5]
+    q, saved, e, w = np.empty(18), np.empty(18), np.empty((3, 5)), np.empty(27 * BLOCK)
     for i in range(machines.shape[0]):
         p, state, done = machines[i], COMPLETE, 0
         q[VX], q[VY], q[VA], q[DET] = 0.0, 0.0, 0.0, 0.0
@@ -282,54 +304,70 @@ def turns(
             for start in range(0, count, BLOCK):
                 m = min(BLOCK, count - start)
                 if not growing:
-                    for s in range(m):
-                        cs[s], sn[s] = math.cos(psi[start + s]), math.sin(psi[start + s])
+                    directions(psi[start : start + m], m, w[COS:SIN], w[SIN:PX])
                     for k in range(3):
-                        drives(p, k, m, cs, sn, c, t, rate, rate2, angle)
-                for slot in range(m):
-                    j = start + slot
-                    target = 1.0 * j if growing else psi[j]
-                    if not growing and not target < stops[i]:
-                        state = DRIVE_ENDS
+                        drives(p, k, m, w[COS:SIN], w[SIN:PX], w[k * LEG : (k + 1) * LEG])
+                for k in range(18):
+                    saved[k] = q[k]
+                for attempt in range(2):
+                    for slot in range(m):
+                        j = start + slot
+                        target = 1.0 * j if growing else psi[j]
+                        if not growing and not target < stops[i]:
+                            state = DRIVE_ENDS
+                            break
+                        if j == 0:
+                            q[AT], q[OLD] = target, 0.0
+                        step, sampled, arrived = target - q[AT], not growing, False
+                        while not arrived:
+                            whole = step >= target - q[AT]
+                            goal = target if whole else q[AT] + step
+                            if sampled:
+                                for k in range(3):
+                                    at = k * LEG + slot
+                                    arm(p, k, w[at], w[at + BLOCK], w[at + 2 * BLOCK], e)
+                            else:
+                                drive_at(p, growing, psi[0], goal, e)
+                            if advance(p, e, goal, q, Lc, j > 0, sampled and attempt == 0):
+                                arrived = whole
+                                step = min(2.0 * step, total / 8.0)
+                            else:
+                                step = 0.5 * (goal - q[AT])
+                                if j == 0 or step < SMALLEST * total:
+                                    break
+                            sampled = False
+                        if not arrived:
+                            state = (
+                                (NO_HOME if j == 0 else HOME_ENDS) if growing else (NO_START if j == 0 else SINGULAR)
+                            )
+                            break
+                        if growing:
+                            continue
+                        done = j + 1
+                        w[PX + slot], w[PY + slot], w[PA + slot] = q[X], q[Y], q[A]
+                        w[COS + slot], w[SIN + slot] = q[C], q[S]
+                    if growing or done <= start:
                         break
-                    if j == 0:
-                        q[AT], q[OLD] = target, 0.0
-                    step, sampled, arrived = target - q[AT], not growing, False
-                    while not arrived:
-                        whole = step >= target - q[AT]
-                        goal = target if whole else q[AT] + step
-                        if sampled:
+                    bad = finish(p, done - start, 1.0 / (Lc * Lc), w)
+                    if bad == 0 or attempt == 1:
+                        break
+                    state, done = COMPLETE, start  # once more, every step to the end
+                    for k in range(18):
+                        q[k] = saved[k]
+                if not growing:
+                    for j in range(start, done):
+                        s = j - start
+                        for k in range(3):
+                            pose[i, j, k], velocity[i, j, k] = w[PX + k * BLOCK + s], w[SPEED + k * BLOCK + s]
+                            at = k * LEG + s
+                            raw = w[at + 4 * BLOCK]
+                            theta[i, j, k] = raw if j == 0 else near(raw, theta[i, j - 1, k])
+                            theta1[i, j, k] = w[at + 2 * BLOCK]
+                        det[i, j] = w[SPEED + 3 * BLOCK + s]
+                        if second:
                             for k in range(3):
-                                arm(p, k, c[k, slot], t[k, slot], rate[k, slot], e)
-                        else:
-                            drive_at(p, growing, psi[0], goal, e)
-                        if advance(p, e, goal, q, Lc, j > 0):
-                            arrived = whole
-                            step = min(2.0 * step, total / 8.0)
-                        else:
-                            step = 0.5 * (goal - q[AT])
-                            if j == 0 or step < SMALLEST * total:
-                                break
-                        sampled = False
-                    if not arrived:
-                        state = (NO_HOME if j == 0 else HOME_ENDS) if growing else (NO_START if j == 0 else SINGULAR)
-                        break
-                    if growing:
-                        continue
-                    done = j + 1
-                    raw = angle_of(q[S], q[C])
-                    pose[i, j, 0], pose[i, j, 1], pose[i, j, 2] = q[X], q[Y], near(raw, q[A])
-                    velocity[i, j, 0], velocity[i, j, 1], velocity[i, j, 2], det[i, j] = q[VX], q[VY], q[VA], q[DET]
-                    cs[slot], sn[slot] = q[C], q[S]
-                    for k in range(3):
-                        raw = angle[k, slot]
-                        theta[i, j, k] = raw if j == 0 else near(raw, theta[i, j - 1, k])
-                        theta1[i, j, k] = rate[k, slot]
-                if second and done > start and not growing:
-                    bend(
-                        p, start, done - start, c, t, rate, rate2, cs, sn,
-                        pose[i], velocity[i], theta2[i], acceleration[i],
-                    )  # fmt: skip
+                                acceleration[i, j, k] = w[PUSH + k * BLOCK + s]
+                                theta2[i, j, k] = w[k * LEG + 3 * BLOCK + s]
                 if state != COMPLETE:
                     break
             if state != COMPLETE:
