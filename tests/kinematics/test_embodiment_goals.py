@@ -193,6 +193,8 @@ def test_target_that_is_missed_is_refused(known: dict[str, np.ndarray]) -> None:
         (lambda: PosesGoal(((0, 0), (1, 1), (2, 0)), (0.0, 1.0, 2.0)), "entries"),
         (lambda: FunctionGoal((0.0, 3.0, 9.0), (0.0, 1.0, 2.0)), "more than one turn"),
         (lambda: FunctionGoal((0.0, 1.0), (0.0, 1.0)), "outputs has 2 entries"),
+        (lambda: Goals(span=1.0, target=LineGoal(4.0)), "needs a range of 3.14159"),
+        (lambda: Goals(span=1.0, target=FunctionGoal((0, 1, 2), (0, 1, 2))), "needs a range of 2"),
     ],
 )
 def test_bad_targets(make: object, message: str) -> None:

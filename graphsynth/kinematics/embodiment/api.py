@@ -114,8 +114,7 @@ def embody(
     Returns
     -------
     Embodiment
-        Accepted only after `simulate` has completed the range on a grid of half a degree or finer with events on
-        (estimated: floating point).
+        Accepted only after `simulate` completed the range in steps of at most half a degree (estimated).
 
     Raises
     ------
@@ -165,9 +164,8 @@ class _Run:
         self.found.append((found, problem, attempt))
         self.history += found.history
         late = perf_counter() > self.deadline
-        if self.goals.target is None or late:
-            self.judge(problem, found)
         if self.goals.target is None:
+            self.judge(problem, found)
             self.ended = late or (self.best is not None and self.best[1].accepted)
         else:
             self.ended = late or found.cost <= EXACT

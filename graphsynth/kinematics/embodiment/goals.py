@@ -226,6 +226,15 @@ class Goals:
             raise GeometryError(
                 f"target = {self.target!r} is no goal; use LineGoal, PathGoal, PosesGoal or FunctionGoal"
             )
+        needed = 0.0
+        if isinstance(self.target, LineGoal):
+            needed = self.target.span
+        elif self.target is not None and self.target.inputs is not None:
+            needed = self.target.inputs[-1]
+        if needed > self.span + 1e-9:
+            raise GeometryError(
+                f"the target needs a range of {needed:.6g}, but span = {self.span:.6g}; give a larger span"
+            )
 
     @property
     def full_turn(self) -> bool:
