@@ -1,0 +1,35 @@
+"""Rigorous intervals: arithmetic with outward rounding, proofs of roots, certified pavings.
+
+Names are resolved on first use.  Importing the package checks that the processor rounds to nearest and keeps
+subnormal numbers; every public solve checks it again.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from graphsynth.intervals.guard import check_rounding
+
+_PUBLIC: dict[str, str] = {
+    "Decoration": "interval",
+    "Interval": "interval",
+    "Dual": "dual",
+    "Image": "proving",
+    "KrawczykResult": "proving",
+    "Status": "status",
+    "image": "proving",
+    "krawczyk": "proving",
+}
+
+__all__ = ["check_rounding", *sorted(_PUBLIC)]
+
+
+def __getattr__(name: str) -> Any:
+    module = _PUBLIC.get(name)
+    if module is None:
+        raise AttributeError(f"module 'graphsynth.intervals' has no attribute {name!r}")
+    return getattr(import_module(f"graphsynth.intervals.{module}"), name)
+
+
+check_rounding()

@@ -1,0 +1,149 @@
+"""Interval operations on arrays of bounds, the numpy form: bounds in, bounds out, any equal shapes.
+
+Empty is ``(inf, -inf)``.  The compiled form (``kernels/arithmetic.py``) gives the same results to the bit; it is used
+for large arrays, this one where loading compiled code would take longer than the work.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals import rounding
+from graphsynth.intervals.rounding import down, up
+
+__all__ = ["absolute", "add", "divide", "multiply", "power", "root", "square", "subtract"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Bounds = tuple[Array, Array]
+
+
+def _masked(lo: Array, hi: Array, void: Mask) -> Bounds:
+    return np.where(void, np.inf, lo), np.where(void, -np.inf, hi)
+
+
+def add(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Sum."""
+    s, below, _ = rounding.add(al, bl)
+    t, _, above = rounding.add(ah, bh)
+    return _masked(down(s, below), up(t, above), (al > ah) | (bl > bh))
+
+
+def subtract(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Difference."""
+    s, below, _ = rounding.add(al, -bh)
+    t, _, above = rounding.add(ah, -bl)
+    return _masked(down(s, below), up(t, above), (al > ah) | (bl > bh))
+
+
+def _extremes(values: list[tuple[Array, Array]], low: float, high: float, safe: Mask) -> Bounds:
+    """Bounds of four nearest values with the signs of their errors; ``low <= |value| <= high`` where trusted."""
+    lo = np.minimum(np.minimum(values[0][0], values[1][0]), np.minimum(values[2][0], values[3][0]))
+    hi = np.maximum(np.maximum(values[0][0], values[1][0]), np.maximum(values[2][0], values[3][0]))
+    below, above = safe.copy(), safe.copy()
+    for value, error in values:
+        below &= (value > lo) | (error >= 0.0)
+        above &= (value < hi) | (error <= 0.0)
+    below &= (np.abs(lo) >= low) & (np.abs(lo) <= high)
+    above &= (np.abs(hi) >= low) & (np.abs(hi) <= high)
+    return down(lo, below), up(hi, above)
+
+
+def multiply(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Product, with ``0 * inf = 0``."""
+    limit = rounding.FACTOR_MAX
+    safe = (-al <= limit) & (ah <= limit) & (-bl <= limit) & (bh <= limit)
+    products = [rounding.multiply(a, b) for a in (al, ah) for b in (bl, bh)]
+    lo, hi = _extremes(products, rounding.PRODUCT_MIN, np.inf, safe)
+    zero = ((al == 0.0) & (ah == 0.0)) | ((bl == 0.0) & (bh == 0.0))
+    lo = np.where((lo < 0.0) & (zero | ((al >= 0.0) & (bl >= 0.0)) | ((ah <= 0.0) & (bh <= 0.0))), 0.0, lo)
+    hi = np.where((hi > 0.0) & (zero | ((al >= 0.0) & (bh <= 0.0)) | ((ah <= 0.0) & (bl >= 0.0))), 0.0, hi)
+    return _masked(lo, hi, (al > ah) | (bl > bh))
+
+
+def divide(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Quotients by the nonzero part of the divisor."""
+    touched = (bl <= 0.0) & (bh >= 0.0)
+    if not touched.any():
+        return _divide_nonzero(al, ah, bl, bh)
+    # a divisor [0, h] or [l, 0] is replaced by its far end; the near end gives an infinity in the direction of the sign
+    far = np.where(bl == 0.0, bh, bl)
+    safe = np.where(touched, np.where(far == 0.0, 1.0, far), bl), np.where(touched, np.where(far == 0.0, 1.0, far), bh)
+    lo, hi = _divide_nonzero(al, ah, *safe)
+    positive, negative = (al >= 0.0), (ah <= 0.0)
+    upward = (positive & (bl == 0.0)) | (negative & (bh == 0.0))
+    lo = np.where(touched, np.where(upward & (lo > 0.0), lo, np.where(upward, 0.0, -np.inf)), lo)
+    hi = np.where(touched, np.where(upward, np.inf, np.where(hi < 0.0, hi, 0.0)), hi)
+    across = touched & (((bl < 0.0) & (bh > 0.0)) | ((al < 0.0) & (ah > 0.0)))
+    lo, hi = np.where(across, -np.inf, lo), np.where(across, np.inf, hi)
+    nothing = touched & (al == 0.0) & (ah == 0.0)
+    lo, hi = np.where(nothing, 0.0, lo), np.where(nothing, 0.0, hi)
+    return _masked(lo, hi, (al > ah) | (bl > bh) | ((bl == 0.0) & (bh == 0.0)))
+
+
+def _divide_nonzero(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    inner, outer = np.where(bl > 0.0, bl, -bh), np.where(bl > 0.0, bh, -bl)
+    safe = (inner >= rounding.DIVISOR_MIN) & (outer <= rounding.FACTOR_MAX)
+    quotients = [rounding.divide(a, b) for a in (al, ah) for b in (bl, bh)]
+    lo, hi = _extremes(quotients, rounding.QUOTIENT_MIN, rounding.QUOTIENT_MAX, safe)
+    zero = (al == 0.0) & (ah == 0.0)
+    lo = np.where((lo < 0.0) & (zero | ((al >= 0.0) & (bl > 0.0)) | ((ah <= 0.0) & (bh < 0.0))), 0.0, lo)
+    hi = np.where((hi > 0.0) & (zero | ((al >= 0.0) & (bh < 0.0)) | ((ah <= 0.0) & (bl > 0.0))), 0.0, hi)
+    return _masked(lo, hi, (al > ah) | (bl > bh))
+
+
+def _one_product(a: Array, b: Array) -> Bounds:
+    """Lower and upper bound of the product of two numbers that are not negative."""
+    p, e = rounding.multiply(a, b)
+    zero = (a == 0.0) | (b == 0.0)
+    safe = (p >= rounding.PRODUCT_MIN) & (a <= rounding.FACTOR_MAX) & (b <= rounding.FACTOR_MAX)
+    return np.maximum(down(p, zero | (safe & (e >= 0.0))), 0.0), up(p, zero | (safe & (e <= 0.0)))
+
+
+def absolute(al: Array, ah: Array) -> Bounds:
+    """Absolute value."""
+    return _masked(np.maximum(np.maximum(al, -ah), 0.0), np.maximum(-al, ah), al > ah)
+
+
+def square(al: Array, ah: Array) -> Bounds:
+    """Square, not the product with itself."""
+    low, high = absolute(al, ah)
+    return _masked(_one_product(low, low)[0], _one_product(high, high)[1], al > ah)
+
+
+def root(al: Array, ah: Array) -> Bounds:
+    """Square roots of the part at or above 0."""
+    low, high = np.maximum(al, 0.0), np.maximum(ah, 0.0)
+    s, below, _ = rounding.square_root(low)
+    t, _, above = rounding.square_root(high)
+    return _masked(down(s, below), up(t, above), (al > ah) | (ah < 0.0))
+
+
+def _power_bounds(x: Array, n: int, side: int) -> Array:
+    """Lower (side 0) or upper (side 1) bound of ``x**n`` for ``x >= 0``, ``n >= 1``, by repeated squaring."""
+    result, factor = np.ones_like(x), x
+    while True:
+        if n & 1:
+            result = _one_product(result, factor)[side]
+        n >>= 1
+        if n == 0:
+            return result
+        factor = _one_product(factor, factor)[side]
+
+
+def power(al: Array, ah: Array, n: int) -> Bounds:
+    """Integer power; a negative exponent is the quotient of 1 by the positive one."""
+    void = al > ah
+    if n == 0:
+        return _masked(np.ones_like(al), np.ones_like(ah), void)
+    m = abs(n)
+    if m % 2:
+        lo = np.where(al >= 0.0, _power_bounds(np.abs(al), m, 0), -_power_bounds(np.abs(al), m, 1))
+        hi = np.where(ah >= 0.0, _power_bounds(np.abs(ah), m, 1), -_power_bounds(np.abs(ah), m, 0))
+    else:
+        low, high = absolute(al, ah)
+        lo, hi = _power_bounds(low, m, 0), _power_bounds(high, m, 1)
+    if n < 0:
+        lo, hi = divide(np.ones_like(lo), np.ones_like(hi), lo, hi)
+    return _masked(lo, hi, void)

@@ -1,0 +1,473 @@
+"""`Interval`: arrays of closed intervals with outward rounding.
+
+An `Interval` holds two float64 arrays ``lo`` and ``hi`` of one shape.  Every operation returns bounds that hold all
+exact results for all points of the arguments; rounding errors are included.  Empty is ``(inf, -inf)``; unbounded ends
+are infinite; NaN is refused on input and never made.
+
+Decorations record what an operation had to do: a clipped argument, a discontinuity, an input that was a float.  They
+are carried through every further operation, so the last result tells whether a certificate may rest on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import IntFlag
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import SpecError
+from graphsynth.intervals import operations
+from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, decimal_outward, read_bounds, read_points
+
+__all__ = ["Decoration", "Interval"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Flags = NDArray[np.uint8]
+
+
+class Decoration(IntFlag):
+    """What happened on the way to an interval; 0 says: defined and continuous throughout, exact input."""
+
+    NONE = 0
+    CLIPPED = 1  # an operation was undefined on part of its argument, which was left out
+    DISCONTINUOUS = 2  # an operation was not continuous on its argument (atan2 across its cut, tan across a pole)
+    FLOAT_INPUT = 4  # a plain float came in: whatever rounding made it is not included
+
+
+def _both(*flags: Flags) -> Flags:
+    result = flags[0]
+    for flag in flags[1:]:
+        if flag is not result:
+            result = np.asarray(np.bitwise_or(result, flag))
+    return result
+
+
+class Interval:
+    """Array of closed intervals; immutable in use, arithmetic by operators with outward rounding.
+
+    Parameters
+    ----------
+    value : number, str, Fraction, Decimal, Interval, or nested sequence or array of these
+        One argument: points (or text with bounds, ``"[0.1, 0.2]"``, ``"17.5 +- 0.005"``).  Text, integers, fractions
+        and decimals are enclosed exactly; floats are taken as they are and marked `Decoration.FLOAT_INPUT`.
+    upper : the same, optional
+        With two arguments ``value`` gives the lower and ``upper`` the upper bounds, rounded outward.  Floats are then
+        meant as bounds and not marked; ``-inf`` and ``inf`` are allowed.
+
+    Attributes
+    ----------
+    lo, hi : ndarray of float64
+        Bounds, read-only; empty is ``(inf, -inf)``.
+    flags : ndarray of uint8
+        Decorations, of the shape of ``lo`` or a scalar for all.
+
+    Raises
+    ------
+    SpecError
+        For NaN, reversed bounds, shapes that do not fit.
+    FormatError
+        For text or objects that are no numbers.
+
+    Notes
+    -----
+    Guarantee: certified.  + - * / and the square root give the tightest bounds for ordinary magnitudes, at most one
+    step more elsewhere; elementary functions at most one or two steps more.  Source: specification section 11; Rump,
+    Zimmermann, Boldo, Melquiond (2009); proofs in ``docs/explanation/intervals.md``.
+
+    Examples
+    --------
+    >>> x = Interval("0.1")
+    >>> x.contains(0.1), (x + x + x).contains("0.3")
+    (True, True)
+    >>> Interval(1, 2) / Interval(3, 4)
+    Interval([0.25, 0.66666666666666675])
+    """
+
+    __slots__ = ("flags", "hi", "lo")
+    __array_ufunc__ = None  # numpy arrays leave mixed operations to this class
+    __hash__ = None  # type: ignore[assignment]
+
+    lo: Array
+    hi: Array
+    flags: Flags
+
+    def __init__(self, value: Any, upper: Any = None) -> None:
+        if upper is None:
+            lo, hi, flags = (value.lo, value.hi, value.flags) if isinstance(value, Interval) else read_points(value)
+        else:
+            lo, hi = read_bounds(value, upper)
+            flags = NO_FLAGS
+        _fill(self, lo, hi, flags)
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise AttributeError(f"an Interval does not change; {name} cannot be set")
+
+    # -- other ways to make one ------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_bounds(cls, lo: ArrayLike, hi: ArrayLike) -> Interval:
+        """Make intervals from float bounds; ``(inf, -inf)`` is the empty one.
+
+        Examples
+        --------
+        >>> Interval.from_bounds([0.0, 1.0], [1.0, float("inf")]).width.tolist()
+        [1.0, inf]
+        """
+        return cls(np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64))
+
+    @classmethod
+    def midrad(cls, mid: Any, rad: Any) -> Interval:
+        """Enclose ``mid - rad`` to ``mid + rad``; both exact text or numbers, or floats taken as they are.
+
+        Examples
+        --------
+        >>> Interval.midrad("17.5", "0.005")
+        Interval([17.494999999999997, 17.505000000000003])
+        """
+        centre, radius = cls(mid), cls(rad)
+        if bool((radius.lo < 0.0).any()):
+            raise SpecError(f"radius {rad!r} is negative; give a radius of at least 0")
+        low, high = centre - radius, centre + radius
+        return _make(low.lo, high.hi, low.flags)
+
+    @classmethod
+    def empty(cls, shape: int | tuple[int, ...] = ()) -> Interval:
+        """Empty intervals."""
+        return _make(np.full(shape, np.inf), np.full(shape, -np.inf))
+
+    @classmethod
+    def entire(cls, shape: int | tuple[int, ...] = ()) -> Interval:
+        """Intervals over the whole line."""
+        return _make(np.full(shape, -np.inf), np.full(shape, np.inf))
+
+    @classmethod
+    def zeros(cls, shape: int | tuple[int, ...] = ()) -> Interval:
+        """Point intervals at 0."""
+        return _make(np.zeros(shape), np.zeros(shape))
+
+    @classmethod
+    def stack(cls, parts: Iterable[Interval], axis: int = 0) -> Interval:
+        """Join intervals of one shape along a new axis."""
+        items = np.broadcast_arrays  # broadcast first: constants may be scalars
+        parts = list(parts)
+        lo, hi = items(*[p.lo for p in parts]), items(*[p.hi for p in parts])
+        flags = NO_FLAGS
+        if any(p.flags is not NO_FLAGS for p in parts):
+            flags = np.stack([np.broadcast_to(p.flags, low.shape) for p, low in zip(parts, lo)], axis)
+        return _make(np.stack(lo, axis), np.stack(hi, axis), flags)
+
+    # -- shape -----------------------------------------------------------------------------------------------------
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the array of intervals."""
+        return self.lo.shape
+
+    @property
+    def size(self) -> int:
+        """Number of intervals."""
+        return self.lo.size
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return self.lo.ndim
+
+    def __len__(self) -> int:
+        return len(self.lo)
+
+    def __getitem__(self, key: Any) -> Interval:
+        return _make(np.asarray(self.lo[key]), np.asarray(self.hi[key]), self._flags_at(key))
+
+    def _flags_at(self, key: Any) -> Flags:
+        return self.flags if self.flags.ndim == 0 else np.asarray(self.flags[key])
+
+    def __iter__(self) -> Any:
+        return (self[k] for k in range(len(self)))
+
+    def reshape(self, *shape: int) -> Interval:
+        """Return the same intervals in another shape."""
+        flags = self.flags if self.flags.ndim == 0 else self.flags.reshape(*shape)
+        return _make(self.lo.reshape(*shape), self.hi.reshape(*shape), flags)
+
+    def sum(self, axis: int | None = None) -> Interval:
+        """Sum along an axis (all axes for None), added in order, so independent of threads."""
+        if axis is None:
+            return self.reshape(-1).sum(0)
+        moved = [np.moveaxis(a, axis, 0) for a in (self.lo, self.hi)]
+        total = Interval.zeros(moved[0].shape[1:])
+        for lo, hi in zip(*moved):
+            total = total + _make(lo, hi)
+        flags = self.flags if self.flags.ndim == 0 else np.asarray(np.bitwise_or.reduce(self.flags, axis=axis))
+        return _make(total.lo, total.hi, flags)
+
+    def dot(self, other: Any) -> Interval:
+        """Sum of products over the last axis of both.
+
+        Examples
+        --------
+        >>> Interval([1, 2]).dot(Interval(["0.5", "0.25"]))
+        Interval([1, 1])
+        """
+        product: Interval = self * other
+        return product.sum(-1)
+
+    # -- measures --------------------------------------------------------------------------------------------------
+
+    @property
+    def is_empty(self) -> Mask:
+        """Where empty."""
+        return np.asarray(self.lo > self.hi)
+
+    @property
+    def is_bounded(self) -> Mask:
+        """Where not empty and both ends are finite."""
+        return np.asarray(np.isfinite(self.lo) & np.isfinite(self.hi))
+
+    @property
+    def width(self) -> Array:
+        """Upper bound of ``hi - lo``; NaN for empty."""
+        with np.errstate(all="ignore"):
+            return np.where(self.is_empty, np.nan, operations.binary("subtract", self.hi, self.hi, self.lo, self.lo)[1])
+
+    @property
+    def mid(self) -> Array:
+        """Midpoint rounded, always inside; 0 for the whole line, the largest number for a half line, NaN for empty."""
+        big = float(np.finfo(np.float64).max)
+        with np.errstate(all="ignore"):
+            lo, hi = np.maximum(self.lo, -big), np.minimum(self.hi, big)
+            middle = np.where(lo == -hi, 0.0, 0.5 * lo + 0.5 * hi)
+            middle = np.where(self.is_empty, np.nan, np.minimum(np.maximum(middle, self.lo), self.hi))
+        return np.asarray(middle)
+
+    @property
+    def rad(self) -> Array:
+        """Smallest float with ``[mid - rad, mid + rad]`` around the interval, rounded up; NaN for empty."""
+        mid = self.mid
+        with np.errstate(all="ignore"):
+            above = operations.binary("subtract", self.hi, self.hi, mid, mid)[1]
+            below = operations.binary("subtract", mid, mid, self.lo, self.lo)[1]
+        return np.where(self.is_empty, np.nan, np.maximum(above, below))
+
+    @property
+    def mag(self) -> Array:
+        """Largest absolute value; NaN for empty."""
+        return np.where(self.is_empty, np.nan, np.maximum(np.abs(self.lo), np.abs(self.hi)))
+
+    @property
+    def mig(self) -> Array:
+        """Smallest absolute value; NaN for empty."""
+        return np.where(self.is_empty, np.nan, np.maximum(np.maximum(self.lo, -self.hi), 0.0))
+
+    @property
+    def guaranteed(self) -> Mask:
+        """Where every operation was defined and continuous on its whole argument: a certificate may rest on it."""
+        return np.asarray((self.flags & 3) == 0)
+
+    @property
+    def exact_input(self) -> Mask:
+        """Where no plain float came in."""
+        return np.asarray((self.flags & 4) == 0)
+
+    # -- comparisons: certain for all points, or possible for some ---------------------------------------------------
+
+    def certainly_less(self, other: Any) -> Mask:
+        """Whether every point lies below every point of the other; true for an empty one."""
+        other = interval(other)
+        return np.asarray((self.hi < other.lo) | self.is_empty | other.is_empty)
+
+    def certainly_less_equal(self, other: Any) -> Mask:
+        """Whether no point lies above a point of the other; true for an empty one."""
+        other = interval(other)
+        return np.asarray((self.hi <= other.lo) | self.is_empty | other.is_empty)
+
+    def possibly_less(self, other: Any) -> Mask:
+        """Whether some point lies below some point of the other."""
+        other = interval(other)
+        return np.asarray((self.lo < other.hi) & ~self.is_empty & ~other.is_empty)
+
+    def possibly_equal(self, other: Any) -> Mask:
+        """Whether they have a point in common."""
+        return ~self.intersect(other).is_empty
+
+    def contains(self, point: Any) -> Any:
+        """Whether a number lies inside, exactly decided; text and fractions for one interval, floats for arrays.
+
+        Examples
+        --------
+        >>> Interval("1/30").contains("1/30")
+        True
+        """
+        if isinstance(point, np.ndarray):
+            return np.asarray((self.lo <= point) & (point <= self.hi))
+        from fractions import Fraction
+
+        value = point if isinstance(point, float) else Fraction(point)
+        lo, hi = self.lo, self.hi
+        if self.ndim == 0:
+            return bool(float(lo) <= value <= float(hi))
+        inside = [a <= value <= b for a, b in zip(lo.ravel().tolist(), hi.ravel().tolist())]
+        return np.array(inside, dtype=np.bool_).reshape(self.shape)
+
+    def subset(self, other: Any) -> Mask:
+        """Whether inside the other; the empty one always is."""
+        other = interval(other)
+        return np.asarray(self.is_empty | ((other.lo <= self.lo) & (self.hi <= other.hi)))
+
+    def interior(self, other: Any) -> Mask:
+        """Whether inside the interior of the other, in the topology of the line."""
+        other = interval(other)
+        left = (other.lo < self.lo) | ((other.lo == -np.inf) & (self.lo == -np.inf))
+        right = (self.hi < other.hi) | ((other.hi == np.inf) & (self.hi == np.inf))
+        return np.asarray(self.is_empty | (left & right))
+
+    def disjoint(self, other: Any) -> Mask:
+        """Whether without a common point."""
+        return self.intersect(other).is_empty
+
+    def equal(self, other: Any) -> Mask:
+        """Whether the bounds are the same."""
+        other = interval(other)
+        return np.asarray((self.lo == other.lo) & (self.hi == other.hi))
+
+    # -- sets ------------------------------------------------------------------------------------------------------
+
+    def intersect(self, other: Any) -> Interval:
+        """Return the common part."""
+        other = interval(other)
+        lo, hi = np.maximum(self.lo, other.lo), np.minimum(self.hi, other.hi)
+        void = lo > hi
+        return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), _both(self.flags, other.flags))
+
+    def hull(self, other: Any) -> Interval:
+        """Return the smallest interval around both."""
+        other = interval(other)
+        return _make(np.minimum(self.lo, other.lo), np.maximum(self.hi, other.hi), _both(self.flags, other.flags))
+
+    def inflate(self, relative: float = 0.1, absolute: float = 0.0) -> Interval:
+        """Widen both ends by ``relative`` times the radius plus ``absolute``, and at least one step."""
+        grow = Interval.from_bounds(0.0, 1.0) * relative * self.rad + absolute + 5e-324
+        return _make((self - grow).lo, (self + grow).hi, self.flags)
+
+    def bisect(self) -> tuple[Interval, Interval]:
+        """Cut at the midpoint; both halves hold it."""
+        return _make(self.lo, self.mid, self.flags), _make(self.mid, self.hi, self.flags)
+
+    # -- arithmetic ------------------------------------------------------------------------------------------------
+
+    def _binary(self, name: str, other: Any, reverse: bool = False) -> Interval:
+        try:
+            other = interval(other)
+        except TypeError:
+            return NotImplemented  # type: ignore[no-any-return]
+        a, b = (other, self) if reverse else (self, other)
+        flags = _both(a.flags, b.flags)
+        if name == "divide":
+            flags = _clipped(flags, (b.lo <= 0.0) & (b.hi >= 0.0))
+        return _make(*operations.binary(name, a.lo, a.hi, b.lo, b.hi), flags)
+
+    def __add__(self, other: Any) -> Interval:
+        return self._binary("add", other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Interval:
+        return self._binary("subtract", other)
+
+    def __rsub__(self, other: Any) -> Interval:
+        return self._binary("subtract", other, reverse=True)
+
+    def __mul__(self, other: Any) -> Interval:
+        return self._binary("multiply", other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Interval:
+        return self._binary("divide", other)
+
+    def __rtruediv__(self, other: Any) -> Interval:
+        return self._binary("divide", other, reverse=True)
+
+    def __neg__(self) -> Interval:
+        return _make(-self.hi, -self.lo, self.flags)
+
+    def __pos__(self) -> Interval:
+        return self
+
+    def __abs__(self) -> Interval:
+        return _make(*operations.unary("absolute", self.lo, self.hi), self.flags)
+
+    def __pow__(self, exponent: int) -> Interval:
+        if not isinstance(exponent, int | np.integer):
+            raise SpecError(f"exponent {exponent!r} is not an integer; use exp(b * log(a)) for other powers")
+        if exponent == 2:
+            return self.sqr()
+        flags = _clipped(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if exponent < 0 else self.flags
+        return _make(*operations.power(self.lo, self.hi, int(exponent)), flags)
+
+    def sqr(self) -> Interval:
+        """Square: never negative, and tighter than ``x * x``."""
+        return _make(*operations.unary("square", self.lo, self.hi), self.flags)
+
+    def sqrt(self) -> Interval:
+        """Square root; a negative part of the argument is clipped and recorded."""
+        return _make(*operations.unary("root", self.lo, self.hi), _clipped(self.flags, self.lo < 0.0))
+
+    def __eq__(self, other: object) -> Any:
+        raise TypeError("intervals have no ==; use equal, certainly_less, possibly_equal or subset")
+
+    def __bool__(self) -> bool:
+        raise TypeError("an Interval is neither true nor false; use is_empty, contains or a comparison")
+
+    def __repr__(self) -> str:
+        if self.ndim == 0:
+            return f"Interval({_one(float(self.lo), float(self.hi))})"
+        if self.size <= 12 and self.ndim == 1:
+            return f"Interval([{', '.join(_one(a, b) for a, b in zip(self.lo.tolist(), self.hi.tolist()))}])"
+        return f"<Interval array of shape {self.shape}, mid about {self.mid.ravel()[:3].tolist()}...>"
+
+
+def _one(lo: float, hi: float) -> str:
+    return "empty" if lo > hi else f"[{decimal_outward(lo, -1)}, {decimal_outward(hi, 1)}]"
+
+
+def _clipped(flags: Flags, where: Mask) -> Flags:
+    """Mark the places where an argument was clipped."""
+    if not where.any():
+        return flags
+    return np.asarray(np.bitwise_or(flags, np.where(where, CLIPPED, np.uint8(0))))
+
+
+def _fill(target: Interval, lo: Array, hi: Array, flags: Flags) -> None:
+    lo, hi = np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64)
+    lo.flags.writeable = False
+    hi.flags.writeable = False
+    object.__setattr__(target, "lo", lo)
+    object.__setattr__(target, "hi", hi)
+    object.__setattr__(target, "flags", flags)
+
+
+def _make(lo: ArrayLike, hi: ArrayLike, flags: Flags = NO_FLAGS) -> Interval:
+    """Make an interval from bounds known to be right; views of others' arrays are not frozen."""
+    result = Interval.__new__(Interval)
+    low, high = np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64)
+    _fill(result, low.view(), high.view(), flags)
+    return result
+
+
+def interval(value: Any) -> Interval:
+    """Return an `Interval` as it is; take anything else as points.
+
+    Raises
+    ------
+    TypeError
+        For a type that brings its own arithmetic, so that Python asks it instead.
+    """
+    if isinstance(value, Interval):
+        return value
+    if hasattr(value, "__interval_priority__"):
+        raise TypeError
+    return Interval(value)

@@ -1,0 +1,251 @@
+"""Interval operations on scalar bounds: four floats in, two out; empty is ``(inf, -inf)``."""
+
+from numba import njit
+
+from graphsynth.intervals.kernels.rounding import (
+    DIVISOR_MIN,
+    ETA,
+    FACTOR_MAX,
+    INF,
+    NAN,
+    PHI,
+    PRODUCT_MIN,
+    QUOTIENT_MAX,
+    QUOTIENT_MIN,
+    add_down,
+    add_up,
+    divide_both,
+    down,
+    fma,
+    multiply_both,
+    root_down,
+    root_up,
+    up,
+)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def add(al, ah, bl, bh):
+    """Sum."""
+    void = (al > ah) | (bl > bh)
+    lo, hi = add_down(al, bl), add_up(ah, bh)
+    return INF if void else lo, -INF if void else hi
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def subtract(al, ah, bl, bh):
+    """Difference."""
+    void = (al > ah) | (bl > bh)
+    lo, hi = add_down(al, -bh), add_up(ah, -bl)
+    return INF if void else lo, -INF if void else hi
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def multiply_plain(al, ah, bl, bh):
+    """Product of intervals of ordinary size; the lower bound is NaN where `multiply_any` must be asked."""
+    p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
+    e1, e2, e3, e4 = fma(al, bl, -p1), fma(al, bh, -p2), fma(ah, bl, -p3), fma(ah, bh, -p4)
+    l1 = p1 if p1 < p2 else p2
+    l2 = p3 if p3 < p4 else p4
+    u1 = p1 if p1 > p2 else p2
+    u2 = p3 if p3 > p4 else p4
+    lo = l1 if l1 < l2 else l2
+    hi = u1 if u1 > u2 else u2
+    below = (
+        ((p1 > lo) | (e1 >= 0.0)) & ((p2 > lo) | (e2 >= 0.0)) & ((p3 > lo) | (e3 >= 0.0)) & ((p4 > lo) | (e4 >= 0.0))
+    )
+    above = (
+        ((p1 < hi) | (e1 <= 0.0)) & ((p2 < hi) | (e2 <= 0.0)) & ((p3 < hi) | (e3 <= 0.0)) & ((p4 < hi) | (e4 <= 0.0))
+    )
+    safe = (al >= -FACTOR_MAX) & (ah <= FACTOR_MAX) & (bl >= -FACTOR_MAX) & (bh <= FACTOR_MAX) & (al <= ah) & (bl <= bh)
+    safe = safe & (abs(lo) >= PRODUCT_MIN) & (abs(hi) >= PRODUCT_MIN)
+    lo = lo if below else lo - (PHI * abs(lo) + ETA)
+    hi = hi if above else hi + (PHI * abs(hi) + ETA)
+    return lo if safe else NAN, hi
+
+
+@njit(cache=True, error_model="numpy")
+def multiply_any(al, ah, bl, bh):
+    """Product of any intervals."""
+    p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
+    e1, e2, e3, e4 = fma(al, bl, -p1), fma(al, bh, -p2), fma(ah, bl, -p3), fma(ah, bh, -p4)
+    p1 = 0.0 if p1 != p1 else p1
+    p2 = 0.0 if p2 != p2 else p2
+    p3 = 0.0 if p3 != p3 else p3
+    p4 = 0.0 if p4 != p4 else p4
+    l1 = p1 if p1 < p2 else p2
+    l2 = p3 if p3 < p4 else p4
+    u1 = p1 if p1 > p2 else p2
+    u2 = p3 if p3 > p4 else p4
+    lo = l1 if l1 < l2 else l2
+    hi = u1 if u1 > u2 else u2
+    below = (
+        ((p1 > lo) | (e1 >= 0.0)) & ((p2 > lo) | (e2 >= 0.0)) & ((p3 > lo) | (e3 >= 0.0)) & ((p4 > lo) | (e4 >= 0.0))
+    )
+    above = (
+        ((p1 < hi) | (e1 <= 0.0)) & ((p2 < hi) | (e2 <= 0.0)) & ((p3 < hi) | (e3 <= 0.0)) & ((p4 < hi) | (e4 <= 0.0))
+    )
+    safe = (-al <= FACTOR_MAX) & (ah <= FACTOR_MAX) & (-bl <= FACTOR_MAX) & (bh <= FACTOR_MAX)
+    lo = down(lo, safe & below & (abs(lo) >= PRODUCT_MIN))
+    hi = up(hi, safe & above & (abs(hi) >= PRODUCT_MIN))
+    zero = ((al == 0.0) & (ah == 0.0)) | ((bl == 0.0) & (bh == 0.0))
+    lo = 0.0 if (lo < 0.0) & (zero | ((al >= 0.0) & (bl >= 0.0)) | ((ah <= 0.0) & (bh <= 0.0))) else lo
+    hi = 0.0 if (hi > 0.0) & (zero | ((al >= 0.0) & (bh <= 0.0)) | ((ah <= 0.0) & (bl >= 0.0))) else hi
+    void = (al > ah) | (bl > bh)
+    return INF if void else lo, -INF if void else hi
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def multiply(al, ah, bl, bh):
+    """Product."""
+    lo, hi = multiply_plain(al, ah, bl, bh)
+    if lo != lo:
+        return multiply_any(al, ah, bl, bh)
+    return lo, hi
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def scale(a, bl, bh):
+    """Float times interval."""
+    l1, u1 = multiply_both(a, bl)
+    l2, u2 = multiply_both(a, bh)
+    void = bl > bh
+    return INF if void else (l1 if l1 < l2 else l2), -INF if void else (u1 if u1 > u2 else u2)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def divide_nonzero(al, ah, bl, bh):
+    """Quotient by a divisor without 0; without branches."""
+    q1, q2, q3, q4 = al / bl, al / bh, ah / bl, ah / bh
+    r1, r2, r3, r4 = fma(-q1, bl, al), fma(-q2, bh, al), fma(-q3, bl, ah), fma(-q4, bh, ah)
+    sign = 1.0 if bl > 0.0 else -1.0
+    r1, r2, r3, r4 = r1 * sign, r2 * sign, r3 * sign, r4 * sign
+    q1 = 0.0 if q1 != q1 else q1
+    q2 = 0.0 if q2 != q2 else q2
+    q3 = 0.0 if q3 != q3 else q3
+    q4 = 0.0 if q4 != q4 else q4
+    l1 = q1 if q1 < q2 else q2
+    l2 = q3 if q3 < q4 else q4
+    u1 = q1 if q1 > q2 else q2
+    u2 = q3 if q3 > q4 else q4
+    lo = l1 if l1 < l2 else l2
+    hi = u1 if u1 > u2 else u2
+    below = (
+        ((q1 > lo) | (r1 >= 0.0)) & ((q2 > lo) | (r2 >= 0.0)) & ((q3 > lo) | (r3 >= 0.0)) & ((q4 > lo) | (r4 >= 0.0))
+    )
+    above = (
+        ((q1 < hi) | (r1 <= 0.0)) & ((q2 < hi) | (r2 <= 0.0)) & ((q3 < hi) | (r3 <= 0.0)) & ((q4 < hi) | (r4 <= 0.0))
+    )
+    inner = bl if bl > 0.0 else -bh
+    outer = bh if bl > 0.0 else -bl
+    safe = (inner >= DIVISOR_MIN) & (outer <= FACTOR_MAX)
+    lo = down(lo, safe & below & (abs(lo) >= QUOTIENT_MIN) & (abs(lo) <= QUOTIENT_MAX))
+    hi = up(hi, safe & above & (abs(hi) >= QUOTIENT_MIN) & (abs(hi) <= QUOTIENT_MAX))
+    zero = (al == 0.0) & (ah == 0.0)
+    lo = 0.0 if (lo < 0.0) & (zero | ((al >= 0.0) & (bl > 0.0)) | ((ah <= 0.0) & (bh < 0.0))) else lo
+    hi = 0.0 if (hi > 0.0) & (zero | ((al >= 0.0) & (bh < 0.0)) | ((ah <= 0.0) & (bl > 0.0))) else hi
+    void = (al > ah) | (bl > bh)
+    return INF if void else lo, -INF if void else hi
+
+
+@njit(cache=True, error_model="numpy")
+def divide_zero(al, ah, bl, bh):
+    """Quotients by the nonzero part of a divisor that contains 0."""
+    if al > ah or (bl == 0.0 and bh == 0.0):
+        return INF, -INF
+    if al == 0.0 and ah == 0.0:
+        return 0.0, 0.0
+    if bl < 0.0 < bh or al < 0.0 < ah:
+        return -INF, INF
+    if bl == 0.0:
+        if al >= 0.0:
+            return max(divide_both(al, bh)[0], 0.0), INF
+        return -INF, min(divide_both(ah, bh)[1], 0.0)
+    if al >= 0.0:
+        return -INF, min(divide_both(al, bl)[1], 0.0)
+    return max(divide_both(ah, bl)[0], 0.0), INF
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def divide(al, ah, bl, bh):
+    """Quotients by the nonzero part of the divisor."""
+    if bl <= 0.0 <= bh:
+        return divide_zero(al, ah, bl, bh)
+    return divide_nonzero(al, ah, bl, bh)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def square(al, ah):
+    """Square."""
+    void = al > ah
+    mig = al if al > 0.0 else (-ah if ah < 0.0 else 0.0)
+    mag = -al if -al > ah else ah
+    lo = multiply_both(mig, mig)[0]
+    hi = multiply_both(mag, mag)[1]
+    lo = 0.0 if lo < 0.0 else lo
+    return INF if void else lo, -INF if void else hi
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def root(al, ah):
+    """Square roots of the part at or above 0."""
+    if al > ah or ah < 0.0:
+        return INF, -INF
+    return root_down(al) if al > 0.0 else 0.0, root_up(ah)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def absolute(al, ah):
+    """Absolute value."""
+    if al > ah:
+        return INF, -INF
+    return al if al > 0.0 else (-ah if ah < 0.0 else 0.0), max(-al, ah)
+
+
+@njit(cache=True, error_model="numpy")
+def power_down(x, n):
+    """Lower bound of ``x**n`` for ``x >= 0``, ``n >= 1``."""
+    result, factor = 1.0, x
+    while True:
+        if n & 1:
+            result = max(multiply_both(result, factor)[0], 0.0)
+        n >>= 1
+        if n == 0:
+            return result
+        factor = max(multiply_both(factor, factor)[0], 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def power_up(x, n):
+    """Upper bound of ``x**n`` for ``x >= 0``, ``n >= 1``."""
+    result, factor = 1.0, x
+    while True:
+        if n & 1:
+            result = multiply_both(result, factor)[1]
+        n >>= 1
+        if n == 0:
+            return result
+        factor = multiply_both(factor, factor)[1]
+
+
+@njit(cache=True, error_model="numpy")
+def power(al, ah, n):
+    """Integer power; a negative exponent is the quotient of 1 by the positive one."""
+    if al > ah:
+        return INF, -INF
+    if n == 0:
+        return 1.0, 1.0
+    m = abs(n)
+    if m & 1:
+        lo = power_down(al, m) if al >= 0.0 else -power_up(-al, m)
+        hi = power_up(ah, m) if ah >= 0.0 else -power_down(-ah, m)
+    else:
+        l, h = absolute(al, ah)
+        lo, hi = power_down(l, m), power_up(h, m)
+    return (lo, hi) if n > 0 else divide(1.0, 1.0, lo, hi)
+
+
+__all__ = [
+    "absolute", "add", "divide", "down", "multiply", "power", "power_down", "power_up", "root", "scale", "square",
+    "subtract", "up",
+]  # fmt: skip

@@ -1,0 +1,60 @@
+"""Loops of the interval operations over flat arrays; bounds in, bounds out."""
+
+from numba import njit
+
+from graphsynth.intervals.kernels import arithmetic
+
+
+@njit(cache=True, error_model="numpy")
+def add(al, ah, bl, bh, lo, hi):
+    """Add flat arrays."""
+    for i in range(lo.size):
+        lo[i], hi[i] = arithmetic.add(al[i], ah[i], bl[i], bh[i])
+
+
+@njit(cache=True, error_model="numpy")
+def subtract(al, ah, bl, bh, lo, hi):
+    """Differences of flat arrays."""
+    for i in range(lo.size):
+        lo[i], hi[i] = arithmetic.subtract(al[i], ah[i], bl[i], bh[i])
+
+
+@njit(cache=True, error_model="numpy")
+def multiply(al, ah, bl, bh, lo, hi):
+    """Products of flat arrays."""
+    for i in range(lo.size):
+        lo[i], hi[i] = arithmetic.multiply_plain(al[i], ah[i], bl[i], bh[i])
+    for i in range(lo.size):  # the rare cases afterwards, so that the loop above uses vector instructions
+        if lo[i] != lo[i]:
+            lo[i], hi[i] = arithmetic.multiply_any(al[i], ah[i], bl[i], bh[i])
+
+
+@njit(cache=True, error_model="numpy")
+def divide(al, ah, bl, bh, lo, hi):
+    """Quotients of flat arrays."""
+    for i in range(lo.size):
+        lo[i], hi[i] = arithmetic.divide_nonzero(al[i], ah[i], bl[i], bh[i])
+    for i in range(lo.size):  # the rare cases afterwards, so that the loop above uses vector instructions
+        if bl[i] <= 0.0 <= bh[i]:
+            lo[i], hi[i] = arithmetic.divide_zero(al[i], ah[i], bl[i], bh[i])
+
+
+@njit(cache=True, error_model="numpy")
+def square(al, ah, lo, hi):
+    """Squares of a flat array."""
+    for i in range(lo.size):
+        lo[i], hi[i] = arithmetic.square(al[i], ah[i])
+
+
+@njit(cache=True, error_model="numpy")
+def root(al, ah, lo, hi):
+    """Square roots of a flat array."""
+    for i in range(lo.size):
+        lo[i], hi[i] = arithmetic.root(al[i], ah[i])
+
+
+@njit(cache=True, error_model="numpy")
+def power(al, ah, n, lo, hi):
+    """Integer powers of a flat array."""
+    for i in range(lo.size):
+        lo[i], hi[i] = arithmetic.power(al[i], ah[i], n)

@@ -1,0 +1,349 @@
+"""Krawczyk's test for systems of equations, with interval parameters and automatic derivatives.
+
+For a system ``F(x, p) = 0`` on a box X, with z in X, L an enclosure of the Jacobian over X and all p, and a real
+matrix Y near the inverse of mid L,
+
+    K(X) = z - Y F(z, [p]) + (I - Y L) (X - z).
+
+What follows from K(X) is listed in `Status`; nothing follows from a mere overlap.  Sources: Krawczyk (1969), Moore
+(1977), Neumaier (1990); specification, section 6.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import SpecError
+from graphsynth.intervals.dual import jacobian_of, values_of, variables
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.interval import Interval, _make, interval
+from graphsynth.intervals.status import Status
+
+__all__ = ["Image", "KrawczykResult", "System", "image", "krawczyk"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+#: ``f(x)`` or ``f(x, p)``: sequences of unknowns and parameters in, a sequence of as many equations as unknowns out.
+System = Callable[..., Sequence[Any]]
+
+_ROUNDS = 12
+_GAIN = 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Krawczyk images of N boxes with n unknowns, and what they prove.
+
+    Attributes
+    ----------
+    status : ndarray of int8, shape (N,)
+        `Status` of every box.
+    box : Interval, shape (N, n)
+        The intersection of box and image: every solution of the box lies in it.
+    image : Interval, shape (N, n)
+        K(X).
+    factor : ndarray, shape (N, n, n)
+        Upper bounds of ``|I - Y L|``.
+    guaranteed : ndarray of bool, shape (N,)
+        Whether the equations are defined and continuous on the whole box.
+    singular : ndarray of bool, shape (N,)
+        Whether the midpoint of L had no usable inverse; the box must then be cut.
+    """
+
+    status: NDArray[np.int8]
+    box: Interval
+    image: Interval
+    factor: Array
+    guaranteed: Mask
+    singular: Mask
+
+
+@dataclass(frozen=True, eq=False)
+class KrawczykResult:
+    """Outcome of `krawczyk` for one box.
+
+    Attributes
+    ----------
+    status : Status
+        What is proved about the box that was given (rounding included: certified).
+    box : Interval, shape (n,)
+        Every solution in the given box lies here, for all parameter values; empty for ``EMPTY``.
+    domain : Interval, shape (n,)
+        For ``UNIQUE`` the largest tested box around it in which the solution is the only one.
+    image : Interval, shape (n,)
+        Last Krawczyk image.
+    spectral_radius : float
+        Estimate of ``rho(|I - Y L|)`` on the last box; the textbook condition ``< 1`` is necessary for success but
+        not sufficient (specification, section 6.6).
+    contraction : float
+        Largest ratio of the radii of the image and of the box it came from; below 1 where the test succeeds.
+    rounds : int
+        Boxes tested.
+    reason : str
+        One sentence.
+    """
+
+    status: Status
+    box: Interval
+    domain: Interval
+    image: Interval
+    spectral_radius: float
+    contraction: float
+    rounds: int
+    reason: str
+
+
+def _inverse(matrices: Array) -> tuple[Array, Mask]:
+    """Return inverses (identity where there is none) and where there is none."""
+    n = matrices.shape[-1]
+    fine: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    guarded = np.where(fine[:, None, None], matrices, np.eye(n))
+    try:
+        inverse = np.linalg.inv(guarded)
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(guarded, np.nan)
+        for k, matrix in enumerate(guarded):
+            with suppress(np.linalg.LinAlgError):
+                inverse[k] = np.linalg.inv(matrix)
+    fine = np.asarray(fine & np.isfinite(inverse).all(axis=(1, 2)))
+    return np.where(fine[:, None, None], inverse, np.eye(n)), ~fine
+
+
+def evaluate(f: System, x: Sequence[Any], parameters: Interval | None) -> Sequence[Any]:
+    """Return the equations at ``x``; parameters of shape (m,) or (N, m)."""
+    if parameters is None:
+        results = f(x)
+    else:
+        results = f(x, [parameters[..., j] for j in range(parameters.shape[-1])])
+    if len(results) != len(x):
+        raise SpecError(
+            f"the system returns {len(results)} equations for {len(x)} unknowns; Krawczyk's test needs as many"
+        )
+    return results
+
+
+def matvec(matrix: Interval, vector: Interval) -> Interval:
+    """Product of matrices (N, n, n) and vectors (N, n)."""
+    return (matrix * vector.reshape(*vector.shape[:-1], 1, vector.shape[-1])).sum(-1)
+
+
+def matmul(a: Interval, b: Interval) -> Interval:
+    """Product of matrices (N, n, n)."""
+    total = a[..., :, 0:1] * b[..., 0:1, :]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., :, k : k + 1] * b[..., k : k + 1, :]
+    return total
+
+
+def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Image:
+    """Apply Krawczyk's test once to boxes of shape (N, n).
+
+    Parameters
+    ----------
+    f : callable
+        ``f(x)`` or ``f(x, p)``, written with operators and the functions of `graphsynth.intervals`.
+    boxes : Interval, shape (N, n)
+    parameters : Interval, shape (m,) or (N, m), optional
+
+    Returns
+    -------
+    Image
+        Certified; the semantics of `Status`.
+
+    Examples
+    --------
+    >>> boxes = Interval([["[1, 2]"], ["[3, 4]"]])
+    >>> [Status(s).name for s in image(lambda x: [x[0] ** 2 - 2], boxes).status]
+    ['UNIQUE', 'EMPTY']
+    """
+    count, n = boxes.shape
+    shape = (count,)
+    with np.errstate(all="ignore"):
+        duals = evaluate(f, variables(boxes), parameters)
+        over, slopes = values_of(duals, shape), jacobian_of(duals, n, shape)
+        z = boxes.mid
+        z = np.where(np.isfinite(z), z, 0.0)
+        centre = _make(z, z)
+        at = values_of(evaluate(f, [centre[:, i] for i in range(n)], parameters), shape)
+        Y, singular = _inverse(slopes.mid)
+        exact = _make(Y, Y)
+        rest = _make(np.eye(n), np.eye(n)) - matmul(exact, slopes)
+        K = centre - matvec(exact, at) + matvec(rest, boxes - centre)
+    void: Mask = np.asarray(boxes.is_empty.any(axis=1))
+    smooth = _all_guaranteed(over, 1) & _all_guaranteed(slopes, 2) & _all_guaranteed(at, 1)
+    smooth = np.asarray(smooth & boxes.is_bounded.all(axis=1) & ~singular)
+    K = _where(smooth, K, Interval.entire(K.shape))
+    meet = _where(~void, boxes.intersect(K), Interval.empty(K.shape))
+    none = (~over.contains(np.zeros(over.shape))).any(axis=1) | meet.is_empty.any(axis=1) | void
+    inside = smooth & K.interior(boxes).all(axis=1)
+    within = smooth & K.subset(boxes).all(axis=1) & _regular(Y, slopes)
+    status = np.where(
+        none, Status.EMPTY, np.where(inside, Status.UNIQUE, np.where(within, Status.EXISTS, Status.UNDECIDED))
+    )
+    box = _where(~none, meet, Interval.empty(K.shape))
+    return Image(status.astype(np.int8), box, K, np.where(rest.is_empty, np.inf, rest.mag), smooth, singular)
+
+
+def _regular(Y: Array, slopes: Interval) -> Mask:
+    """Whether ``|I - Y mid L| < 1`` in the maximum norm is proved, so that Y is nonsingular."""
+    n = Y.shape[-1]
+    mid = slopes.mid
+    with np.errstate(all="ignore"):
+        rest = _make(np.eye(n), np.eye(n)) - matmul(_make(Y, Y), _make(mid, mid))
+        norm = _make(np.zeros_like(rest.mag), rest.mag).sum(-1).hi.max(axis=-1)
+    return np.asarray(norm < 1.0)
+
+
+def _all_guaranteed(a: Interval, axes: int) -> Mask:
+    """Whether all entries of each box rest on operations defined, continuous, and not empty."""
+    last = tuple(range(-axes, 0))
+    return np.asarray(np.broadcast_to(a.guaranteed, a.shape).all(axis=last) & ~a.is_empty.any(axis=last))
+
+
+def _where(mask: Mask, a: Interval, b: Interval) -> Interval:
+    pick = mask.reshape(mask.shape + (1,) * (a.ndim - mask.ndim))
+    return _make(np.where(pick, a.lo, b.lo), np.where(pick, a.hi, b.hi))
+
+
+def spectral_radius(factor: Array) -> float:
+    """Estimate of the spectral radius of a nonnegative matrix; infinity if an entry is not finite."""
+    if not np.isfinite(factor).all():
+        return float("inf")
+    return float(np.abs(np.linalg.eigvals(factor)).max(initial=0.0))
+
+
+def krawczyk(
+    f: System, box: Any, parameters: Any = None, *, rounds: int = _ROUNDS, inflate: bool = True
+) -> KrawczykResult:
+    """Decide whether a box holds a solution of ``f = 0``, with proof.
+
+    Parameters
+    ----------
+    f : callable
+        ``f(x)`` or ``f(x, p)``: n unknowns (and m parameters) in, n equations out, written with operators and the
+        functions of `graphsynth.intervals` (``sin``, ``sqrt``, ...).  Derivatives are automatic.
+    box : Interval or anything `Interval` takes, shape (n,)
+        Start box; bounded.
+    parameters : Interval or anything it takes, shape (m,), optional
+        Interval parameters; the status holds for every value in them.
+    rounds : int
+        Limit on contractions, and again on inflations.
+    inflate : bool
+        Test enlarged boxes too (epsilon-inflation): needed for solutions near a face.
+
+    Returns
+    -------
+    KrawczykResult
+        Certified.
+
+    Raises
+    ------
+    SpecError
+        For a box that is empty, unbounded or not a vector, and for a number of equations that differs from n.
+    GraphsynthError
+        If the processor's rounding has been changed.
+
+    Notes
+    -----
+    Source: specification, sections 6.4 to 6.6.  UNIQUE from an enlarged box is given only if its image lies inside the
+    given box: all solutions of the given box lie in the enlarged one, which has exactly one, in the image.
+
+    Examples
+    --------
+    >>> circle_and_parabola = lambda x: [x[0] ** 2 + x[1] ** 2 - 1, x[0] - x[1] ** 2]
+    >>> result = krawczyk(circle_and_parabola, ["[0.5, 0.7]", "[0.7, 0.9]"])
+    >>> result.status.name, bool(result.box.width.max() < 1e-14)
+    ('UNIQUE', True)
+    """
+    check_rounding()
+    start = _start(box)
+    parameters = None if parameters is None else interval(parameters)
+    X, best, tested = start, None, 0
+    for _ in range(rounds):
+        step = image(f, X.reshape(1, -1), parameters)
+        tested += 1
+        if step.status[0] == Status.EMPTY:
+            return _report(Status.EMPTY, step, X, tested, "no solution: the equations or the image exclude the box")
+        best, width = _stronger(best, step, X), X.width
+        X = step.box[0]
+        if not (X.width < _GAIN * width).any():
+            break
+    if best is not None:
+        status, domain = best
+        wording = "exactly one solution" if status is Status.UNIQUE else "at least one solution"
+        return _report(status, step, X, tested, f"{wording}: the image lies in a box tested", domain)
+    if inflate and bool(step.guaranteed[0]):
+        found = _inflated(f, X, start, parameters, rounds)
+        if found is not None:
+            status, image_step, domain, reason, extra = found
+            return _report(status, image_step, X, tested + extra, reason, domain, start)
+    reason = "the image is not inside the box: the box is too wide, or a solution is multiple or near a face"
+    if step.singular[0]:
+        reason = "the midpoint of the Jacobian is singular: cut the box"
+    elif not step.guaranteed[0]:
+        reason = "the equations or their derivatives are undefined, unbounded or discontinuous somewhere in the box"
+    return _report(Status.UNDECIDED, step, X, tested, reason)
+
+
+def _start(box: Any) -> Interval:
+    start = interval(box)
+    if start.ndim != 1 or start.size == 0:
+        raise SpecError(f"the box has shape {start.shape}; give one interval per unknown, shape (n,)")
+    if not start.is_bounded.all():
+        raise SpecError(f"the box {start!r} is empty or unbounded; give finite bounds")
+    return start
+
+
+def _stronger(best: tuple[Status, Interval] | None, step: Image, X: Interval) -> tuple[Status, Interval] | None:
+    """Keep the first proof of uniqueness (its box is the largest), else the first of existence."""
+    status = Status(int(step.status[0]))
+    if status is Status.UNIQUE and (best is None or best[0] is not Status.UNIQUE):
+        return status, X
+    if status is Status.EXISTS and best is None:
+        return status, X
+    return best
+
+
+def _inflated(
+    f: System, X: Interval, start: Interval, parameters: Interval | None, rounds: int
+) -> tuple[Status, Image, Interval, str, int] | None:
+    """Test boxes enlarged around X; X holds every solution of the start box."""
+    trial = X
+    for k in range(rounds):
+        trial = trial.inflate(0.1, 1e-300)
+        step = image(f, trial.reshape(1, -1), parameters)
+        K = step.image[0]
+        if step.status[0] == Status.EMPTY:
+            return Status.EMPTY, step, trial, "no solution: the image excludes an enlarged box", k + 1
+        if step.status[0] == Status.UNIQUE:
+            if K.subset(start).all():
+                return Status.UNIQUE, step, trial, "exactly one solution: the image lies inside an enlarged box", k + 1
+            if K.disjoint(start).any():
+                return Status.EMPTY, step, trial, "no solution: the only one near lies outside the box", k + 1
+            reason = "exactly one solution in an enlarged box, but it may lie outside the given one: see domain, image"
+            return Status.UNDECIDED, step, trial, reason, k + 1
+        if not step.guaranteed[0]:
+            return None
+        trial = K.hull(X) if (K.width < 4.0 * trial.width).all() else trial
+    return None
+
+
+def _report(
+    status: Status, step: Image, X: Interval, rounds: int, reason: str,
+    domain: Interval | None = None, start: Interval | None = None,
+) -> KrawczykResult:  # fmt: skip
+    K = step.image[0]
+    domain = X if domain is None else domain
+    box = Interval.empty(X.shape) if status is Status.EMPTY else step.box[0]
+    if start is not None and status is not Status.EMPTY:
+        box = box.intersect(start) if status is Status.UNIQUE else X
+    with np.errstate(all="ignore"):
+        factor = (step.factor[0] @ domain.rad) / domain.rad
+    contraction = float(np.max(factor)) if np.isfinite(factor).all() else float("inf")
+    return KrawczykResult(status, box, domain, K, spectral_radius(step.factor[0]), contraction, rounds, reason)

@@ -1,0 +1,205 @@
+"""Exact input: numbers and decimal text as rational numbers, and rational numbers as the nearest bounds outside."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import FormatError, SpecError
+
+__all__ = [
+    "CLIPPED", "DISCONTINUOUS", "FLOAT_INPUT", "NO_FLAGS", "decimal_outward", "enclose", "lower_bound", "read_bounds",
+    "read_one", "read_points", "upper_bound",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.uint8]
+CLIPPED: Final = np.uint8(1)
+DISCONTINUOUS: Final = np.uint8(2)
+FLOAT_INPUT: Final = np.uint8(4)
+NO_FLAGS: Flags = np.zeros((), dtype=np.uint8)
+_FLOAT: Flags = np.asarray(FLOAT_INPUT)
+
+_PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
+_SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")
+_LONGEST = 10_000
+
+
+def lower_bound(value: Fraction) -> float:
+    """Return the largest double not above ``value``.
+
+    Examples
+    --------
+    >>> lower_bound(Fraction(1, 10)) < Fraction(1, 10) < upper_bound(Fraction(1, 10))
+    True
+    """
+    try:
+        nearest = float(value)
+    except OverflowError:
+        return float(np.finfo(np.float64).max) if value > 0 else -math.inf
+    return nearest if Fraction(nearest) <= value else math.nextafter(nearest, -math.inf)
+
+
+def upper_bound(value: Fraction) -> float:
+    """Return the smallest double not below ``value``."""
+    return -lower_bound(-value)
+
+
+def enclose(value: Fraction) -> tuple[float, float]:
+    """Return the tightest bounds of a rational number."""
+    return lower_bound(value), upper_bound(value)
+
+
+def _fraction(text: str) -> Fraction:
+    if len(text) > _LONGEST:
+        raise FormatError(f"a number of {len(text)} characters; at most {_LONGEST} are read: shorten it")
+    exponent = re.search(r"[eE]([+-]?\d+)\s*$", text)
+    if exponent and abs(int(exponent[1])) > _LONGEST:
+        raise FormatError(
+            f"{text.strip()[:60]!r} has an exponent beyond +-{_LONGEST}: bring it into the range of doubles"
+        )
+    try:
+        return Fraction(text.strip())
+    except (ValueError, ZeroDivisionError):
+        raise FormatError(
+            f"{text[:60]!r} is not a number; write a decimal such as 0.03, a fraction such as 1/30, "
+            "a pair [0.1, 0.2] or a spread 17.5 +- 0.005"
+        ) from None
+
+
+def _text(text: str) -> tuple[float, float]:
+    word = text.strip().lower()
+    if word in ("[empty]", "empty"):
+        return math.inf, -math.inf
+    if word in ("[entire]", "entire"):
+        return -math.inf, math.inf
+    pair = _PAIR.fullmatch(text)
+    if pair:
+        lo = -math.inf if pair[1].lower() in ("-inf", "-infinity") else _fraction(pair[1])
+        hi = math.inf if pair[2].lower() in ("inf", "+inf", "infinity") else _fraction(pair[2])
+        if lo > hi:
+            raise SpecError(f"{text.strip()!r} has its lower bound above its upper bound; exchange them")
+        low = lo if isinstance(lo, float) else lower_bound(lo)
+        return low, hi if isinstance(hi, float) else upper_bound(hi)
+    spread = _SPREAD.fullmatch(text)
+    if spread:
+        mid, rad = _fraction(spread[1]), _fraction(spread[2])
+        if rad < 0:
+            raise SpecError(f"{text.strip()!r} has a negative radius; give a radius of at least 0")
+        return lower_bound(mid - rad), upper_bound(mid + rad)
+    return enclose(_fraction(text))
+
+
+def read_one(value: Any) -> tuple[float, float, bool]:
+    """Return bounds of one number or text, and whether they are guaranteed (False for a float).
+
+    Raises
+    ------
+    FormatError
+        For text that is no number, or an object of another kind.
+    SpecError
+        For NaN, infinities, and bounds in the wrong order.
+
+    Examples
+    --------
+    >>> read_one("0.5"), read_one(0.5)
+    ((0.5, 0.5, True), (0.5, 0.5, False))
+    """
+    if isinstance(value, bool | np.bool_):
+        raise FormatError(f"{value!r} is a truth value, not a number; give a number or text")
+    if isinstance(value, str):
+        return *_text(value), True
+    if isinstance(value, float | np.floating):
+        number = float(value)
+        if not math.isfinite(number):
+            raise SpecError(f"{number} is not a point; give a finite number, or bounds that may be infinite")
+        return number, number, False
+    if isinstance(value, Decimal) and not value.is_finite():
+        raise SpecError(f"{value} is not a point; give a finite number, or bounds that may be infinite")
+    if isinstance(value, int | np.integer | Fraction | Decimal):
+        if isinstance(value, Decimal) and abs(value.adjusted()) > _LONGEST:
+            raise FormatError(f"{value} has an exponent beyond +-{_LONGEST}: bring it into the range of doubles")
+        return *enclose(Fraction(int(value) if isinstance(value, np.integer) else value)), True
+    raise FormatError(f"{type(value).__name__} is not a number; give a number, a Fraction, a Decimal or text")
+
+
+def decimal_outward(x: float, side: int, digits: int = 17) -> str:
+    """Write a bound as a decimal that is not inside it: not above a lower bound (side -1), not below an upper (+1).
+
+    Examples
+    --------
+    >>> decimal_outward(0.1, -1), decimal_outward(0.1, 1)
+    ('0.1', '0.10000000000000001')
+    """
+    if math.isinf(x) or x == 0.0:
+        return "0" if x == 0.0 else repr(x)
+    exact, short = Fraction(x), repr(x)
+    if Fraction(short) == exact or (Fraction(short) < exact) == (side < 0):
+        return short.removesuffix(".0")
+    from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+
+    context = Context(prec=digits, rounding=ROUND_FLOOR if side < 0 else ROUND_CEILING, Emin=-9999, Emax=9999)
+    return str(context.create_decimal(Decimal(x)))
+
+
+def read_points(value: Any) -> tuple[Array, Array, Flags]:
+    """Read numbers, text or nested sequences of them: bounds and decorations."""
+    if not isinstance(value, np.ndarray) and hasattr(value, "flags"):  # an Interval inside a list
+        return value.lo, value.hi, value.flags
+    if isinstance(value, np.ndarray | np.generic) and value.dtype.kind == "f":
+        array = np.array(value, dtype=np.float64)
+        _finite(array)
+        return array, array.copy(), _FLOAT
+    if isinstance(value, np.ndarray | list | tuple):
+        nested = [read_points(item) for item in value]
+        if not nested:
+            return np.zeros(0), np.zeros(0), NO_FLAGS
+        if len({part[0].shape for part in nested}) > 1:
+            raise SpecError("the rows of intervals have different lengths; give a full array")
+        flags = NO_FLAGS
+        if any(part[2].any() for part in nested):
+            flags = np.stack([np.broadcast_to(part[2], part[0].shape) for part in nested])
+        return np.stack([part[0] for part in nested]), np.stack([part[1] for part in nested]), flags
+    lo, hi, guaranteed = read_one(value)
+    flag = NO_FLAGS if guaranteed else _FLOAT
+    return np.asarray(lo), np.asarray(hi), flag
+
+
+def _finite(array: Array) -> None:
+    if not np.isfinite(array).all():
+        bad = array[~np.isfinite(array)].ravel()[0]
+        raise SpecError(f"{bad} is not a point; give finite numbers, or bounds that may be infinite")
+
+
+def _bound(value: Any, side: int) -> Array:
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        return np.array(value, dtype=np.float64)
+    if isinstance(value, float | np.floating):
+        return np.asarray(float(value))
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return np.array([_bound(item, side) for item in value], dtype=np.float64)
+    lo, hi, _ = read_points(value)
+    return hi if side else lo
+
+
+def read_bounds(lower: Any, upper: Any) -> tuple[Array, Array]:
+    """Read lower and upper bounds, rounded outward; refuse NaN and bounds in the wrong order."""
+    lo, hi = _bound(lower, 0), _bound(upper, 1)
+    try:
+        lo, hi = (np.array(a) for a in np.broadcast_arrays(lo, hi))
+    except ValueError:
+        raise SpecError(f"bounds of shapes {lo.shape} and {hi.shape} do not fit; give equal shapes") from None
+    if np.isnan(lo).any() or np.isnan(hi).any():
+        raise SpecError("a bound is NaN, which is no number; give numbers, -inf or inf")
+    wrong = ((lo > hi) & ~((lo == np.inf) & (hi == -np.inf))) | ((lo == hi) & np.isinf(lo))
+    if wrong.any():
+        a, b = lo[wrong].ravel()[0], hi[wrong].ravel()[0]
+        raise SpecError(f"lower bound {a} and upper bound {b} hold no number; give lower <= upper")
+    return lo, hi
