@@ -170,8 +170,20 @@ def type_two_curves(
         parts = [trace(equations, found[0], mode, along)]
         if parts[0].end != 0:
             parts.append(trace(equations, found[0], mode, -along))
-        curves.append(_curve(mode, 0, parts, equations, unit))
+        curve = _curve(mode, 0, parts, equations, unit)
+        if not _repeated(curves, curve, unit):
+            curves.append(curve)
     return tuple(curves)
+
+
+def _repeated(curves: list[SingularCurve], new: SingularCurve, unit: float) -> bool:
+    """Whether a curve is already there: an end belongs to one curve of a mode, a loop is compared by its points."""
+    path = np.column_stack([new.points.real / unit, new.points.imag / unit, new.theta])
+    if new.ends:
+        return any(_known(curves, state, unit, ends_only=True) for state in path[[0, -1]])
+    loops = [curve for curve in curves if curve.closed and abs(len(curve.points) - len(path)) < 0.2 * len(path) + 10]
+    sample = path[:: max(1, len(path) // 12)]
+    return sum(_known(loops, state, unit) for state in sample) > 0.7 * len(sample)
 
 
 def isolated_singular_points(
