@@ -94,7 +94,7 @@ def singularity_distance(
     Raises
     ------
     GeometryError
-        A pose out of reach.
+        A pose out of reach, or a leg with a link of length zero.
 
     Notes
     -----
@@ -112,6 +112,8 @@ def singularity_distance(
     X = finite_array("pose", pose).reshape(3)
     theta = platform.inverse(X, mode).theta
     for leg in range(3):
+        if min(platform.l1[leg], platform.l2[leg]) == 0.0:
+            raise GeometryError(f"leg {leg + 1} has a link of length zero, so every pose is singular; give l1, l2 > 0")
         if not math.isfinite(theta[leg]):
             raise GeometryError(f"leg {leg + 1} does not reach the pose {X.tolist()}; choose a pose in the workspace")
     JX, JT = platform.jacobians(X, theta)

@@ -260,3 +260,5 @@ def test_distance_against_random_poses(pose: tuple[float, float, float], sigma: 
 def test_pose_out_of_reach_is_refused() -> None:
     with pytest.raises(GeometryError, match="leg 1"):
         singularity_distance(G1, [9.0, 9.0, 0.0], (1, 1, 1))
+    with pytest.raises(GeometryError, match="leg 2 has a link of length zero"):
+        singularity_distance(ParallelPlatform(G1.D, G1.b, G1.l1, (1.1, 0.0, 1.05)), [1.2, 0.9, 0.0], (1, 1, 1))
