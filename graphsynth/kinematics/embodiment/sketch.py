@@ -26,9 +26,12 @@ if TYPE_CHECKING:
 __all__ = ["JointLayout", "layout"]
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Polygons = tuple[tuple[int, ...], ...]
 IntArray = NDArray[np.intp]
 
-_STEPS = 60
+#: Steps of forces: for the comparison of outer faces, and for the picture.
+_ROUGH, _STEPS = 20, 60
 #: Springs of polygons over those of bars: plates are to be nearly regular.
 _STIFF = 3.0
 #: Trials of a step, each with the offending vertices moved less.
@@ -90,34 +93,32 @@ def layout(graph: MechanismGraph) -> JointLayout:
     """
     if not graph.joints or not graph.is_connected:
         raise GraphError("a sketch needs a connected graph with at least one joint")
-    best: tuple[tuple[float, float], JointLayout] | None = None
-    for faces, polygons in _embeddings(graph):
-        if len(faces) > 2:
-            best = _best_outer(graph, faces, polygons)
-        else:
-            places = _circle(graph, faces[0])
-            best = ((1.0, 1.0), JointLayout(graph, places, polygons, True))
-    return _by_forces(graph) if best is None else best[1]
+    found = _embedding(graph)
+    if found is None:
+        return _by_forces(graph)
+    loops, polygons = found
+    places = _circle(graph, loops[0]) if len(loops) == 2 else _best_outer(graph, loops, polygons)
+    return JointLayout(graph, places, polygons, True)
 
 
 # --- planar embedding
 
 
-def _embeddings(graph: MechanismGraph) -> list[tuple[list[list[int]], tuple[tuple[int, ...], ...]]]:
-    """Loops as cycles of joints and outlines of the links; nothing if the graph has no such embedding."""
+def _embedding(graph: MechanismGraph) -> tuple[list[list[int]], Polygons] | None:
+    """Loops as cycles of joints and outlines of the links; None if the graph has no such embedding."""
     import networkx as nx
 
     if min(graph.degrees) < 2 or graph.cut_links or graph.cut_joints:
-        return []
+        return None
     plain = nx.Graph([(a, b) for a, b, _ in graph.joints])
     planar, embedding = nx.check_planarity(plain)
     if not planar:
-        return []
+        return None
     index = {pair: k for k, joint in enumerate(graph.joints) for pair in ((joint.a, joint.b), (joint.b, joint.a))}
     outlines = tuple(
         tuple(index[link, other] for other in embedding.neighbors_cw_order(link)) for link in range(graph.links)
     )
-    return [(_loops(embedding, index), outlines)]
+    return _loops(embedding, index), outlines
 
 
 def _loops(embedding: Any, index: dict[tuple[int, int], int]) -> list[list[int]]:
@@ -131,54 +132,94 @@ def _loops(embedding: Any, index: dict[tuple[int, int], int]) -> list[list[int]]
     return found
 
 
-def _best_outer(
-    graph: MechanismGraph, loops: list[list[int]], polygons: tuple[tuple[int, ...], ...]
-) -> tuple[tuple[float, float], JointLayout]:
+def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygons) -> Array:
     """Draw with the outer face that gives the roomiest picture; with the frame outside if there is one."""
     frame_joints = {k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)}
-    best: tuple[tuple[float, float], JointLayout] | None = None
-    longest = max(len(loop) for loop in loops)
-    for k, outer in enumerate(loops):
-        shared = len(frame_joints & set(outer))
-        if (graph.frame is not None and shared < 2) or len(outer) < longest - 1:
-            continue
-        places = _draw(graph, outer, loops[:k] + loops[k + 1 :], polygons)
-        room = (_room(places, polygons), -float(k))
-        if best is None or room > best[0]:
-            best = room, JointLayout(graph, places, polygons, True)
-    if best is None:  # the frame is on short loops only
-        outer = max((loop for loop in loops if len(frame_joints & set(loop)) >= 2), key=len)
-        others = [loop for loop in loops if loop is not outer]
-        best = (0.0, 0.0), JointLayout(graph, _draw(graph, outer, others, polygons), polygons, True)
-    return best
+    allowed = [k for k, loop in enumerate(loops) if graph.frame is None or len(frame_joints & set(loop)) >= 2]
+    longest = max(len(loops[k]) for k in allowed)
+    drawings = [_Drawing(graph, loops, k, polygons) for k in allowed if len(loops[k]) >= longest - 1]
+    for drawing in drawings:
+        drawing.even_out(_ROUGH)
+    best = max(drawings, key=_Drawing.room)  # the first of equals
+    best.even_out(_STEPS)
+    return _upright(graph, best.z[: len(graph.joints)], best.outer)
 
 
-def _room(places: Array, polygons: tuple[tuple[int, ...], ...]) -> float:
-    """Smallest distance of two joints, or height of a plate, over the size of the picture."""
-    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
-    least = apart[np.triu_indices(len(places), 1)].min()
-    corners = np.array([c for p in polygons if len(p) > 2 for c in _corners(p)], dtype=np.intp).reshape(-1, 3)
-    longest = apart[corners, np.roll(corners, 1, axis=1)].max(axis=1)
-    heights = np.abs(_areas(places, corners)) / longest
-    return float(min(least, heights.min(initial=np.inf)) / apart.max())
+class _Drawing:
+    """A drawing under way: joints, then the hubs of the inner loops, as complex numbers."""
+
+    def __init__(self, graph: MechanismGraph, loops: list[list[int]], outer: int, polygons: Polygons) -> None:
+        count, self.outer = len(graph.joints), loops[outer]
+        inner = loops[:outer] + loops[outer + 1 :]
+        sides = _sides(polygons)
+        spokes = [(count + hub, joint) for hub, loop in enumerate(inner) for joint in loop]
+        triangles = [(count + h, a, b) for h, loop in enumerate(inner) for a, b in zip(loop, [*loop[1:], loop[0]])]
+        self.plates = [corner for p in polygons if len(p) > 2 for corner in _corners(p)]
+        self.triangles = np.array(triangles + self.plates + _corners(self.outer), dtype=np.intp)
+        stiff = {pair for p in polygons if len(p) > 2 for pair in _sides((p,))}
+        self.springs = _Springs(
+            np.array(sides), [_STIFF if side in stiff else 1.0 for side in sides], count, len(inner)
+        )
+        z = _tutte(count + len(inner), np.array(sides + spokes), self.outer)
+        self.z = z / float(np.abs(self.springs.stretch(z)).mean())
+        areas = _areas(self.z, self.triangles)
+        self.sense, self.floor = np.sign(areas), np.minimum(np.abs(areas), _FLAT)
+        self.joints = count
+
+    def even_out(self, steps: int) -> None:
+        """Let springs and repulsion act; faces keep their orientation."""
+        step = 0.15
+        for _ in range(steps):
+            move = self.springs.force(self.z)
+            move *= min(step, 0.2 / max(float(np.abs(move).max()), 1e-9))
+            for _ in range(_RETRIES):
+                bad = _areas(self.z + move, self.triangles) * self.sense < self.floor
+                if not bad.any():
+                    self.z, step = self.z + move, min(0.3, step * 1.2)
+                    break
+                move[self.triangles[bad].ravel()] *= 0.3
+            else:
+                step *= 0.5
+            if step < 1e-3:
+                break
+
+    def room(self) -> float:
+        """Smallest distance of two joints, or height of a plate, over the size of the picture."""
+        z = self.z[: self.joints]
+        apart = np.abs(z[:, None] - z)
+        least = apart[np.triu_indices(len(z), 1)].min()
+        corners = np.array(self.plates, dtype=np.intp).reshape(-1, 3)
+        longest = apart[corners, np.roll(corners, 1, axis=1)].max(axis=1, initial=1e-300)
+        heights = np.abs(_areas(z, corners)) / longest
+        return float(min(least, heights.min(initial=np.inf)) / apart.max())
 
 
-def _draw(
-    graph: MechanismGraph, outer: list[int], inner: list[list[int]], polygons: tuple[tuple[int, ...], ...]
-) -> Array:
-    count = len(graph.joints)
-    sides = _sides(polygons)
-    spokes = [(count + hub, joint) for hub, loop in enumerate(inner) for joint in loop]
-    places = _tutte(count + len(inner), np.array(sides + spokes), outer)
-    triangles = [(count + h, a, b) for h, loop in enumerate(inner) for a, b in zip(loop, [*loop[1:], loop[0]])]
-    corners = [c for around in (outer, *(p for p in polygons if len(p) > 2)) for c in _corners(around)]
-    stiff = {pair for p in polygons if len(p) > 2 for pair in _sides((p,))}
-    stiffness = np.array([_STIFF if side in stiff else 1.0 for side in sides])
-    places = _even_out(places, (np.array(sides), stiffness), count, np.array(triangles + corners))
-    return _upright(graph, places[:count], outer)
+class _Springs:
+    """Springs of rest length 1 along sides, and repulsion between all vertices (hubs repel weakly)."""
+
+    def __init__(self, sides: IntArray, stiffness: list[float], joints: int, hubs: int) -> None:
+        count = joints + hubs
+        self.first, self.second, self.stiffness = sides[:, 0], sides[:, 1], np.array(stiffness)
+        self.incidence = np.zeros((count, len(sides)))
+        self.incidence[self.first, np.arange(len(sides))] = 1.0
+        self.incidence[self.second, np.arange(len(sides))] = -1.0
+        weight = np.where(np.arange(count) < joints, 1.0, 0.2)
+        self.weight, self.eye = 0.35 * np.outer(weight, weight), np.eye(count)
+
+    def stretch(self, z: Complex) -> Complex:
+        """Vectors along the sides."""
+        return np.asarray(z[self.second] - z[self.first])
+
+    def force(self, z: Complex) -> Complex:
+        """Force on every vertex."""
+        gap = z[:, None] - z
+        square = gap.real**2 + gap.imag**2 + self.eye
+        d = self.stretch(z)
+        pull = d * (self.stiffness * (1.0 - 1.0 / np.maximum(np.abs(d), 1e-9)))
+        return np.asarray((gap * (self.weight / square**2)).sum(axis=1) + self.incidence @ pull)
 
 
-def _sides(polygons: tuple[tuple[int, ...], ...]) -> list[tuple[int, int]]:
+def _sides(polygons: Polygons) -> list[tuple[int, int]]:
     """Neighbouring joints on the outline of every link, each pair once."""
     pairs = [pair for p in polygons if len(p) > 1 for pair in zip(p, (*p[1:], p[0]))]
     return sorted({(min(pair), max(pair)) for pair in pairs})
@@ -188,72 +229,30 @@ def _corners(around: Any) -> list[tuple[int, int, int]]:
     return [(around[k - 2], around[k - 1], around[k]) for k in range(len(around))]
 
 
-def _tutte(count: int, edges: IntArray, outer: list[int]) -> Array:
+def _tutte(count: int, edges: IntArray, outer: list[int]) -> Complex:
     """Barycentric drawing: outer face on a regular polygon, every other vertex at the mean of its neighbours."""
     A = np.zeros((count, count))
     np.add.at(A, (edges[:, 0], edges[:, 1]), 1.0)
     A = np.minimum(A + A.T, 1.0)
-    places = np.zeros((count, 2))
-    angle = math.tau * np.arange(len(outer)) / len(outer)
-    places[outer] = np.column_stack([np.cos(angle), np.sin(angle)])
+    z = np.zeros(count, dtype=np.complex128)
+    z[outer] = np.exp(1j * math.tau * np.arange(len(outer)) / len(outer))
     free = np.setdiff1d(np.arange(count), outer)
     if free.size:
         L = np.diag(A.sum(axis=1)) - A
-        places[free] = np.linalg.solve(L[free][:, free], -L[free][:, outer] @ places[outer])
-    return places
+        z[free] = np.linalg.solve(L[free][:, free], -L[free][:, outer] @ z[outer])
+    return z
 
 
-def _areas(places: Array, triangles: IntArray) -> Array:
-    p, q, r = (places[triangles[:, k]] for k in range(3))
-    return np.asarray((q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0]))
+def _areas(z: Complex, triangles: IntArray) -> Array:
+    """Twice the signed areas of triangles."""
+    p, q, r = z[triangles[:, 0]], z[triangles[:, 1]], z[triangles[:, 2]]
+    return np.asarray((np.conj(q - p) * (r - p)).imag)
 
 
-def _even_out(places: Array, springs: tuple[IntArray, Array], joints: int, triangles: IntArray) -> Array:
-    """Springs along the sides, repulsion between all joints; faces keep their orientation."""
-    sides, _ = springs
-    mean = float(np.hypot(*(places[sides[:, 0]] - places[sides[:, 1]]).T).mean())
-    places = places / mean
-    sense = np.sign(_areas(places, triangles))
-    floor = np.minimum(np.abs(_areas(places, triangles)), _FLAT)
-    step = 0.15
-    for _ in range(_STEPS):
-        move = _force(places, springs, joints)
-        size = float(np.hypot(*move.T).max())
-        move *= min(step, 0.2 / max(size, 1e-9))
-        for _ in range(_RETRIES):
-            bad = _areas(places + move, triangles) * sense < floor
-            if not bad.any():
-                places, step = places + move, min(0.3, step * 1.2)
-                break
-            move[np.unique(triangles[bad])] *= 0.3
-        else:
-            step *= 0.5
-        if step < 1e-3:
-            break
-    return places
-
-
-def _force(places: Array, springs: tuple[IntArray, Array], joints: int) -> Array:
-    sides, stiffness = springs
-    gap = places[:, None] - places[None]
-    square = (gap**2).sum(axis=2) + np.eye(len(places))
-    weight = 0.35 / square**2
-    weight[joints:] *= 0.2
-    weight[:, joints:] *= 0.2
-    move = (gap * weight[:, :, None]).sum(axis=1)
-    d = places[sides[:, 1]] - places[sides[:, 0]]
-    length = np.hypot(*d.T)
-    pull = d * (stiffness * (1.0 - 1.0 / np.maximum(length, 1e-9)))[:, None]
-    np.add.at(move, sides[:, 0], pull)
-    np.add.at(move, sides[:, 1], -pull)
-    return np.asarray(move)
-
-
-def _upright(graph: MechanismGraph, places: Array, outer: list[int]) -> Array:
-    """Turn the frame to the bottom, a side of it on the outer face horizontal; mean side 1, centre at the origin."""
-    places = places - places.mean(axis=0)
+def _upright(graph: MechanismGraph, z: Complex, outer: list[int]) -> Array:
+    """Turn the frame to the bottom, a side of it on the outer face horizontal; centre at the origin."""
+    z = z - z.mean()
     own = [k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)]
-    z = places[:, 0] + 1j * places[:, 1]
     pairs = [(p, q) for p, q in zip(outer, [*outer[1:], *outer[:1]]) if p in own and q in own]
     if pairs:
         direction = z[pairs[0][1]] - z[pairs[0][0]]
@@ -272,11 +271,9 @@ def _upright(graph: MechanismGraph, places: Array, outer: list[int]) -> Array:
 
 def _circle(graph: MechanismGraph, loop: list[int]) -> Array:
     """Draw a single loop: a regular polygon of sides 1."""
-    count = len(graph.joints)
-    angle = math.tau * np.arange(len(loop)) / len(loop)
-    places = np.zeros((count, 2))
-    places[loop] = np.column_stack([np.cos(angle), np.sin(angle)]) / (2.0 * math.sin(math.pi / len(loop)))
-    return _upright(graph, places, loop)
+    z = np.zeros(len(graph.joints), dtype=np.complex128)
+    z[loop] = np.exp(1j * math.tau * np.arange(len(loop)) / len(loop)) / (2.0 * math.sin(math.pi / len(loop)))
+    return _upright(graph, z, loop)
 
 
 def _by_forces(graph: MechanismGraph) -> JointLayout:
@@ -290,16 +287,16 @@ def _by_forces(graph: MechanismGraph) -> JointLayout:
     A = np.zeros((count, count))
     A[pairs[:, 0], pairs[:, 1]] = A[pairs[:, 1], pairs[:, 0]] = 1.0
     _, vectors = np.linalg.eigh(np.diag(A.sum(axis=1)) - A)
-    places = np.zeros((count, 2))
-    width = min(2, count - 1)
-    places[:, :width] = vectors[:, 1 : 1 + width] * math.sqrt(count)
+    z = np.zeros(count, dtype=np.complex128)
+    if count > 2:
+        z = (vectors[:, 1] + 1j * vectors[:, 2]) * math.sqrt(count)
     # symmetric graphs leave joints in one place: part them by a fixed small shift
-    places += 0.1 * np.column_stack([np.cos(2.4 * np.arange(count)), np.sin(2.4 * np.arange(count))])
+    z = z + 0.1 * np.exp(2.4j * np.arange(count))
+    springs = _Springs(pairs, [1.0] * len(pairs), count, 0)
     for k in range(4 * _STEPS):
-        move = _force(places, (pairs, np.ones(len(pairs))), count)
-        size = float(np.hypot(*move.T).max())
-        places = places + move * min(0.15, 0.2 * (1.0 - k / (4 * _STEPS)) / max(size, 1e-9))
-    places = _upright(graph, places, [])
+        move = springs.force(z)
+        z = z + move * min(0.15, 0.2 * (1.0 - k / (4 * _STEPS)) / max(float(np.abs(move).max()), 1e-9))
+    places = _upright(graph, z, [])
     polygons = tuple(_around(places, joints) for joints in own)
     return JointLayout(graph, places, polygons, False)
 
