@@ -21,6 +21,7 @@ import flint
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.certified import (
+    AssemblyCertificate,
     AssemblyVerdict,
     ModeEnclosure,
     certify_assembly_modes,
@@ -28,6 +29,7 @@ from graphsynth.kinematics.certified import (
     certify_direct,
     certify_direct_batch,
 )
+from graphsynth.kinematics.certified.exact_modes import exact_roots
 from graphsynth.kinematics.certified.extra import precision
 from graphsynth.kinematics.certified.numbers import ball, complex_ball, gaussian, rational
 from graphsynth.kinematics.certified.sextic_balls import sextic_balls
@@ -229,8 +231,60 @@ def test_self_motion_is_recognised_exactly() -> None:
     triangle = [(0, 0), (4, 0), (1, 3)]
     turned = [(Fraction(3, 5) * x - Fraction(4, 5) * y, Fraction(4, 5) * x + Fraction(3, 5) * y) for x, y in triangle]
     assert certify_assembly_modes(turned, triangle, [2, 2, 2]).verdict is AssemblyVerdict.SELF_MOTION
+    # with unequal legs nothing is left at that orientation
     unequal = certify_assembly_modes(turned, triangle, [2, 2, Fraction(21, 10)])
-    assert not unequal.certified and "Delta" in unequal.reason
+    assert unequal.certified and all(not mode.alpha.contains(math.atan2(4, 3)) for mode in unequal.modes)
+
+
+def closed(proof: AssemblyCertificate, anchors: list[Any], vertices: list[Any], lengths: list[Any]) -> bool:
+    """Whether every enclosure satisfies the closure equations: their balls hold zero and are small."""
+    with precision(200):
+        for mode in proof.modes:
+            s, c = mode.alpha.sin_cos()
+            for anchor, vertex, length in zip(anchors, vertices, lengths):
+                d = flint.acb(mode.x, mode.y) + flint.acb(c, s) * complex_ball(gaussian("b", vertex))
+                d -= complex_ball(gaussian("A", anchor))
+                f = d.real * d.real + d.imag * d.imag - ball(rational("l", length)) ** 2
+                if not (f.contains(0) and abs(f) < 1e-6):
+                    return False
+    return True
+
+
+def test_two_modes_of_equal_orientation_are_kept_apart() -> None:
+    """Delta = 0 at alpha = 0, where e = (-6, -3) and Q = (3, +4) or (3, -4): legs 5, 5, 4 (section 5.3)."""
+    anchors, vertices, lengths = [(0, 0), (12, 0), (6, 0)], [(0, 0), (6, 0), (3, 0)], [5, 5, 4]
+    proof = certify_assembly_modes(anchors, vertices, lengths)
+    assert proof.certified and proof.method == "exact polynomial" and closed(proof, anchors, vertices, lengths)
+    level = sorted((mode for mode in proof.modes if mode.alpha.contains(0)), key=lambda mode: float(mode.y))
+    assert [(round(float(m.x), 12), round(float(m.y), 12)) for m in level] == [(3.0, -4.0), (3.0, 4.0)]
+    # a third leg that is a little longer contradicts the line: nothing is left there
+    other = certify_assembly_modes(anchors, vertices, [5, 5, "4.000001"])
+    assert not any(mode.alpha.contains(0) for mode in other.modes)
+
+
+COORDINATE = st.integers(-4, 4)
+POINTS = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=3, max_size=3)
+
+
+@given(POINTS, POINTS, st.lists(st.integers(1, 6), min_size=3, max_size=3))
+@settings(max_examples=150, deadline=None)
+def test_small_integers_are_decided_the_same_in_two_ways(
+    anchors: list[tuple[int, int]], vertices: list[tuple[int, int]], lengths: list[int]
+) -> None:
+    """Degenerate data of every kind: subdivision against exact polynomials, and the closure equations."""
+    proof = certify_assembly_modes(anchors, vertices, lengths, max_bits=128)
+    assert proof.certified or proof.reason
+    assert closed(proof, anchors, vertices, lengths)
+    if proof.certified:
+        weights = [(1 if m.determinant > 0 else -1) for m in proof.modes if m.multiplicity == 1]
+        if len(weights) == len(proof.modes):
+            assert sum(weights) == 0
+    if proof.method == "subdivision" and proof.certified:
+        A, b = [gaussian("A", v) for v in anchors], [gaussian("b", v) for v in vertices]
+        with precision(128):
+            roots = exact_roots(A, b, [Fraction(v) for v in lengths])
+        assert roots is not None and len(roots) == len(proof)
+        assert all(root.multiplicity == 1 for root in roots)
 
 
 def test_exact_input_forms_agree() -> None:

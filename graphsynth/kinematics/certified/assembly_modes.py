@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
 from time import perf_counter
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics.certified.exact_modes import exact_roots, self_motion
+from graphsynth.kinematics.certified.exact_modes import exact_roots, parallel_positions, self_motion
 from graphsynth.kinematics.certified.extra import need_flint, precision
 from graphsynth.kinematics.certified.numbers import Gaussian, ball, complex_ball, gaussian, rational
 from graphsynth.kinematics.certified.sextic_balls import SexticBalls, isolate, mirror_count, refine, sextic_balls
@@ -44,7 +44,7 @@ class ModeEnclosure:
         Balls of python-flint that contain the exact pose and its ``det JX``; alpha up to whole turns, its midpoint in
         (-pi, pi].
     multiplicity : int
-        Of the root alpha; 1 means a regular mode, whose ``det JX`` is not zero.
+        1 for a regular mode, whose ``det JX`` is not zero; else that of the root alpha.
     """
 
     x: Any
@@ -261,7 +261,7 @@ def _subdivide(problem: _Problem, bits: int) -> tuple[list[ModeEnclosure] | None
         return None, found.reason
     modes = []
     for low, high in found.roots:
-        mode = _pose(s, A, b, refine(s, low, high, bits), 1)
+        mode = _pose(s, A, b, refine(s, low, high, bits))
         if mode is None:
             return None, "Delta may vanish at a mode: its position is not determined by its orientation alone"
         if mode.determinant.contains(0):
@@ -272,43 +272,56 @@ def _subdivide(problem: _Problem, bits: int) -> tuple[list[ModeEnclosure] | None
     return sorted(modes, key=lambda mode: float(mode.alpha)), ""
 
 
-def _pose(s: SexticBalls, A: list[Any], b: list[Any], alpha: Any, multiplicity: int) -> ModeEnclosure | None:
+def _pose(s: SexticBalls, A: list[Any], b: list[Any], alpha: Any) -> ModeEnclosure | None:
     """Pose of a root; None if Delta may be zero."""
     flint = need_flint()
     sine, cosine = alpha.sin_cos()
-    z = flint.acb(cosine, sine)
-    back = flint.acb(cosine, -sine)
+    z, back = flint.acb(cosine, sine), flint.acb(cosine, -sine)
     n2, n1, n0, nm = s.n
     Delta = s.d[0] + s.d[1] * z - flint.acb(s.d[1].real, -s.d[1].imag) * back
     if Delta.contains(0):
         return None
     N = (n2 * z + n1) * z + n0 + nm * back
-    p = A[0] + N / Delta - z * b[0]
+    return _enclosure(A, b, A[0] + N / Delta - z * b[0], z, alpha)
+
+
+def _enclosure(A: list[Any], b: list[Any], p: Any, z: Any, alpha: Any) -> ModeEnclosure:
+    """Mode at the position p and the orientation z, with ``det JX``."""
+    flint = need_flint()
     rows = []
     for k in range(3):
         arm = z * b[k]
         d = p + arm - A[k]
         rows.append([2 * d.real, 2 * d.imag, 2 * (arm.real * d.imag - arm.imag * d.real)])
     turned = alpha - 2 * flint.arb.pi() if alpha.mid() > flint.arb.pi() else alpha
-    return ModeEnclosure(p.real, p.imag, turned, flint.arb_mat(rows).det(), multiplicity)
+    return ModeEnclosure(p.real, p.imag, turned, flint.arb_mat(rows).det())
 
 
 def _decide_exactly(problem: _Problem, reason: str) -> tuple[list[ModeEnclosure] | None, str]:
-    roots = exact_roots(problem.anchors, problem.vertices, problem.lengths)
+    """All modes of rational data with their multiplicities; None and a reason where a position is not determined."""
+    data = problem.anchors, problem.vertices, problem.lengths
+    roots = exact_roots(*data)
     if roots is None:
         return None, "every orientation solves the elimination equation: a self-motion, or a degenerate platform"
     A, b, lengths = problem.balls()
     s = sextic_balls(A, b, lengths)
-    modes = []
-    for alpha, multiplicity in roots:
-        mode = _pose(s, A, b, alpha, multiplicity)
-        if mode is None:
-            where = float(alpha)
-            return None, (
-                f"Delta may vanish at the mode alpha = {where:.15g}, so its position follows from a circle and a line; "
-                f"{reason}"
+    modes: list[ModeEnclosure] = []
+    for root in roots:
+        mode = _pose(s, A, b, root.alpha)
+        if mode is not None:
+            modes.append(replace(mode, multiplicity=root.multiplicity))
+            continue
+        positions = None if root.z is None else parallel_positions(*data, root.z)
+        if positions is None:
+            where = float(root.alpha)
+            return (
+                None,
+                f"Delta may vanish at the root alpha = {where:.15g}, so the position is not determined; {reason}",
             )
-        modes.append(mode)
+        for p in positions:
+            mode = _enclosure(A, b, p, complex_ball(root.z), root.alpha)
+            regular = not mode.determinant.contains(0)
+            modes.append(replace(mode, multiplicity=1 if regular else root.multiplicity))
     return modes, ""
 
 

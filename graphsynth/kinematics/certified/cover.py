@@ -120,7 +120,7 @@ def cover(system: System, nodes: Nodes, budget: Budget, begin: float | None = No
         if left.size == 0:
             return found
         middle = len(nodes.x) + np.arange(left.size)
-        nodes = nodes.join(prove_nodes(system, exact(boxes.u.mid), _middle(system, nodes, left, right, boxes)))
+        nodes = nodes.join(prove_nodes(system, exact(boxes.u.mid), boxes.x))
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
         owner = np.concatenate([owner, owner])
     _give_up(found, nodes, left, right, owner)
@@ -145,11 +145,7 @@ def _try(
     middle = 0.5 * (a.u.mid + b.u.mid)
     reach = [np.abs(node.u.mid - middle) * UP + node.u.rad for node in (a, b)]
     u = Balls(middle, np.maximum(*reach) * UP + TINY)
-    h = (b.u.mid - a.u.mid)[:, None]
-    guess = 0.5 * (a.x + b.x) + 0.125 * h * (a.V - b.V)  # cubic through both nodes
-    x, V = correct(system, guess, middle, steps=4)
-    lost = np.asarray(~np.isfinite(x + V).all(axis=1), dtype=np.bool_)
-    x, V = np.where(lost[:, None], guess, x), np.where(lost[:, None], 0.0, V)
+    x, V = _centres(system, a, b, middle)
     boxes = Boxes(u, x, V)
     proof = prove(system, boxes)
     turns, directions = system.branch(boxes.hull(proof.radius), middle)
@@ -166,20 +162,30 @@ def _try(
     return boxes, proof, met[0] & met[1], parted
 
 
-def _middle(system: System, nodes: Nodes, left: NDArray[np.intp], right: NDArray[np.intp], boxes: Boxes) -> Array:
-    """Guess for the poses at the new nodes: the boxes' centres, or what follows from the left end if that is nearer.
+def _centres(system: System, a: Nodes, b: Nodes, middle: Array) -> tuple[Array, Array]:
+    """Poses and velocities half-way between nodes: from both ends, or from the left one where that strays less.
 
     Newton's method from half-way between two branches may end anywhere, for instance on a copy whole turns away.
     """
-    a, b, best = nodes.x[left], nodes.x[right], boxes.x
-    step = (boxes.u.mid - nodes.u.mid[left])[:, None]
-    other, _ = correct(system, a + nodes.V[left] * step, boxes.u.mid, steps=4)
+    h = (b.u.mid - a.u.mid)[:, None]
+    guess = 0.5 * (a.x + b.x) + 0.125 * h * (a.V - b.V)  # cubic through both nodes
+    x, V = correct(system, guess, middle, steps=4)
+    direct = (np.abs(a.x - b.x) / system.weights).max(axis=1)
 
-    def detour(x: Array) -> Array:
-        away = (np.abs(x - a) + np.abs(x - b)) / system.weights
+    def detour(point: Array) -> Array:
+        away = (np.abs(point - a.x) + np.abs(point - b.x)) / system.weights
         return np.asarray(np.nan_to_num(away.max(axis=1), nan=np.inf))
 
-    return np.where((detour(other) < detour(best) - 1e-9)[:, None], other, best)
+    astray = np.flatnonzero(detour(x) > 1.5 * direct + 1e-9)
+    if astray.size:
+        x2, V2 = correct(system, (a.x + 0.5 * h * a.V)[astray], middle[astray], steps=4)
+        best = x.copy()
+        best[astray] = x2
+        better = astray[(detour(best) < detour(x))[astray]]
+        keep = np.isin(astray, better)
+        x[better], V[better] = x2[keep], V2[keep]
+    lost = np.asarray(~np.isfinite(x + V).all(axis=1), dtype=np.bool_)[:, None]
+    return np.where(lost, guess, x), np.where(lost, 0.0, V)
 
 
 def _same_direction(own: Balls, other: Balls) -> Mask:

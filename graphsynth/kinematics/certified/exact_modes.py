@@ -4,23 +4,31 @@ from __future__ import annotations
 
 from fractions import Fraction
 from math import lcm
-from typing import Any
+from typing import Any, NamedTuple
 
 from graphsynth.kinematics.certified.extra import need_flint
-from graphsynth.kinematics.certified.numbers import Gaussian
+from graphsynth.kinematics.certified.numbers import Gaussian, ball, complex_ball
 from graphsynth.kinematics.certified.sextic_balls import sextic_balls
 
-__all__ = ["exact_roots", "self_motion"]
+__all__ = ["ExactRoot", "exact_roots", "parallel_positions", "self_motion"]
 
 _ZERO = Gaussian(Fraction(0), Fraction(0))
 
 
-def exact_roots(A: list[Gaussian], b: list[Gaussian], lengths: list[Fraction]) -> list[tuple[Any, int]] | None:
-    """All real roots alpha of G as balls with their multiplicities; None if G vanishes identically.
+class ExactRoot(NamedTuple):
+    """A real root alpha of G as a ball, its multiplicity, and ``exp(i alpha)`` where tan(alpha / 2) is rational."""
+
+    alpha: Any
+    multiplicity: int
+    z: Gaussian | None
+
+
+def exact_roots(A: list[Gaussian], b: list[Gaussian], lengths: list[Fraction]) -> list[ExactRoot] | None:
+    """All real roots of G with their multiplicities; None if G vanishes identically.
 
     With ``t = tan(alpha / 2)``, ``R(t) = (1 + t^2)^3 G`` is a real polynomial of degree at most six; its real roots are
-    the modes; the drop of its degree is the multiplicity of alpha = pi.  Multiplicities come from greatest common
-    divisors over the rationals, and flint proves which roots are real.
+    the modes, and the drop of its degree is the multiplicity of alpha = pi.  Multiplicities come from the factors over
+    the rationals, and flint proves which roots are real.
     """
     flint = need_flint()
     coefficients = _half_angle(A, b, lengths)
@@ -28,11 +36,46 @@ def exact_roots(A: list[Gaussian], b: list[Gaussian], lengths: list[Fraction]) -
         return None
     common = lcm(*(c.denominator for c in coefficients))
     poly = flint.fmpz_poly([int(c * common) for c in coefficients])
-    found = [(2 * root.real.atan(), int(m)) for root, m in poly.complex_roots() if root.imag.is_zero()]
+    found = []
+    for factor, multiplicity in poly.factor()[1]:
+        if factor.degree() == 1:
+            t = Fraction(-int(factor[0]), int(factor[1]))
+            z = Gaussian((1 - t * t) / (1 + t * t), 2 * t / (1 + t * t))
+            found.append(ExactRoot(2 * ball(t).atan(), int(multiplicity), z))
+            continue
+        for root, _ in factor.complex_roots():
+            if root.imag.is_zero():
+                found.append(ExactRoot(2 * root.real.atan(), int(multiplicity), None))
     missing = 6 - poly.degree()
     if missing:
-        found.append((flint.arb.pi(), missing))
-    return sorted(found, key=lambda pair: float(pair[0]))
+        found.append(ExactRoot(flint.arb.pi(), missing, Gaussian(Fraction(-1), Fraction(0))))
+    return sorted(found, key=lambda root: float(root.alpha))
+
+
+def parallel_positions(A: list[Gaussian], b: list[Gaussian], lengths: list[Fraction], z: Gaussian) -> list[Any] | None:
+    """Positions p of the platform at an orientation z where Delta vanishes, as balls; None if it does not vanish.
+
+    The two linear equations ``dot(e_k, Q) = w_k / 2`` then describe one line, which meets the circle ``|Q| = l2_1`` at
+    most twice, or contradict each other; both are decided exactly (specification parallel_platform, section 5.3).
+    """
+    e = [z * (b[k] - b[0]) - (A[k] - A[0]) for k in (1, 2)]
+    if (e[0].conj * e[1]).imag != 0:
+        return None
+    L = lengths[0] ** 2
+    sizes = [(v * v.conj).real for v in e]
+    w = [lengths[k] ** 2 - L - sizes[k - 1] for k in (1, 2)]
+    k = 0 if sizes[0] > 0 else 1
+    if sizes[k] == 0:
+        return []  # equal legs would be a self-motion, which is recognised before
+    factor = (e[k].conj * e[1 - k]).real / sizes[k]
+    rest = (L - w[k] ** 2 / (4 * sizes[k])) / sizes[k]
+    if w[1 - k] != factor * w[k] or rest < 0:
+        return []
+    flint = need_flint()
+    across = ball(rest).sqrt()
+    origin = complex_ball(A[0]) - complex_ball(z) * complex_ball(b[0])
+    sides = (across, -across) if rest > 0 else (flint.arb(0),)
+    return [origin + complex_ball(e[k]) * flint.acb(ball(w[k] / (2 * sizes[k])), side) for side in sides]
 
 
 def _half_angle(A: list[Gaussian], b: list[Gaussian], lengths: list[Fraction]) -> list[Fraction]:
