@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
@@ -14,10 +15,20 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite, positive, sign
 from graphsynth.kinematics.leg import solve_leg
+from graphsynth.kinematics.motion import Event
 
-__all__ = ["DriveMotion", "DriveTurn", "FourBarDrive"]
+__all__ = ["DriveMotion", "DriveTurn", "FourBarDrive", "first_barrier"]
 
 Array = NDArray[np.float64]
+
+
+_BARRIERS = {
+    "lock": ("drive lock", "drive {0} locks: coupler and rocker in line; the crank cannot pass"),
+    "change point": (
+        "change point",
+        "drive {0} reaches a change point: the branches tau = +1 and tau = -1 meet and both continue; choose one",
+    ),
+}
 
 
 class DriveMotion(NamedTuple):
@@ -201,3 +212,15 @@ def _order(square: Fraction, bound: Fraction) -> int:
 
 def _dot(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:
     return np.asarray((np.conj(a) * b).real)
+
+
+def first_barrier(drives: Sequence[FourBarDrive], start: float, stop: float) -> Event | None:
+    """First drive lock or change point in (start, stop]: no continuation may step over it."""
+    found: list[Event] = []
+    for number, drive in enumerate(drives, start=1):
+        for angle, kind in drive.barriers():
+            at = start + (angle - start) % math.tau
+            if start < at <= stop:
+                name, text = _BARRIERS[kind]
+                found.append(Event(name, at, number, True, text.format(number)))
+    return min(found, key=lambda event: event.psi, default=None)

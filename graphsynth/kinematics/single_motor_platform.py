@@ -16,15 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite, finite_array, positive, sign
-from graphsynth.kinematics.drive import DriveTurn, FourBarDrive
+from graphsynth.kinematics.drive import DriveTurn, FourBarDrive, first_barrier
 from graphsynth.kinematics.gears import GearTrain
 from graphsynth.kinematics.motion import BranchLabel, Event, Monodromy, Motion, Sweep, TurnBatch
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.tracking import (
-    SAME,
     SINGULAR,
     BranchEnd,
     Tracked,
+    compare,
+    distance,
     machine_rows,
     monodromy,
     track,
@@ -40,14 +41,6 @@ Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _METHOD = "continuation with step control, compared with all assembly modes; estimated, not certified"
-
-_BARRIERS = {
-    "lock": ("drive lock", "drive {0} locks: coupler and rocker in line; the crank cannot pass"),
-    "change point": (
-        "change point",
-        "drive {0} reaches a change point: the branches tau = +1 and tau = -1 meet and both continue; choose one",
-    ),
-}
 
 #: Figure 3 of the source: 0 frame, 1 pinion, 2-4 wheels, 5-7 couplers, 8-10 rockers, 11-13 links, 14 platform
 _TURNING = "0-1 0-2 0-3 0-4 2-5 3-6 4-7 5-8 6-9 7-10 0-8 0-9 0-10 8-11 9-12 10-13 11-14 12-14 13-14"
@@ -250,7 +243,7 @@ class SingleMotorPlatform:
         (True, [0.672631, -5.007799, 0.053385])
         """
         angles = _increasing(np.asarray(psi, dtype=np.float64))
-        barrier = self._barrier(float(angles[0]), float(angles[-1]))
+        barrier = first_barrier(self.drives, float(angles[0]), float(angles[-1]))
         tracked = self._follow(angles, start, np.inf if barrier is None else barrier.psi, accelerations=accelerations)
         status = BranchEnd(int(tracked.status[0]))
         reason = {BranchEnd.SINGULAR: SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
@@ -334,7 +327,7 @@ class SingleMotorPlatform:
         """
         begin = perf_counter()
         psi = _increasing(samples)
-        barrier = self._barrier(float(psi[0]), float(psi[-1]))
+        barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
         tracked = self._follow(psi, start, np.inf if barrier is None else barrier.psi, accelerations=True)
         reached = int(tracked.reached[0])
         pose, theta, determinant = (
@@ -343,12 +336,12 @@ class SingleMotorPlatform:
             tracked.determinant[0, :reached],
         )
         _, leg = self.platform.jacobians(pose, theta)
-        gap, rank, mismatch = self._compare(pose, theta)
+        gap, rank, mismatch = compare(self.platform, pose, theta, self.Lc)
         complete = int(tracked.status[0]) == BranchEnd.COMPLETE
         monodromy, error, period = None, math.nan, 0
         if complete and math.isclose(psi[-1] - psi[0], math.tau, rel_tol=1e-12):
-            monodromy, error = self.monodromy(psi), float(self._distance(pose[-1], pose[0]))
-            nearest = int(np.argmin(self._distance(monodromy.modes, pose[0])))
+            monodromy, error = self.monodromy(psi), float(distance(pose[-1], pose[0], self.Lc))
+            nearest = int(np.argmin(distance(monodromy.modes, pose[0], self.Lc)))
             period = monodromy.periods[nearest]
         events = self._events(psi, tracked, barrier, leg) + mismatch_events(psi, mismatch)
         sigma = (int(np.sign(leg[0, 0])), int(np.sign(leg[0, 1])), int(np.sign(leg[0, 2])))
@@ -367,22 +360,6 @@ class SingleMotorPlatform:
     def all_poses(self, psi: float) -> Array:
         """All assembly modes for the drive branches of this mechanism at ``psi``, shape (m, 3)."""
         return self.platform.direct(self.drive(psi).theta).poses
-
-    def _compare(self, pose: Array, theta: Array) -> tuple[Array, int, NDArray[np.bool_]]:
-        """Distance to the nearest other mode, rank of alpha at the start, and samples where no mode matches."""
-        batch = self.platform.direct_batch(theta)
-        distance = np.full((len(pose), max(6, int(batch.counts.max()))), np.inf)
-        place = np.arange(len(batch.problem)) - np.repeat(np.cumsum(batch.counts) - batch.counts, batch.counts)
-        distance[batch.problem, place] = self._distance(batch.poses, pose[batch.problem])
-        rank = int(np.argmin(distance[0]))
-        distance.sort(axis=1)
-        return distance[:, 1], rank, distance[:, 0] > SAME
-
-    def _distance(self, poses: Array, pose: Array) -> Array:
-        """``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2) / Lc`` with the angle taken on the circle."""
-        d = poses - pose
-        turn = np.angle(np.exp(1j * d[..., 2]))
-        return np.asarray(np.sqrt((d[..., 0] ** 2 + d[..., 1] ** 2) / self.Lc**2 + turn**2))
 
     def _events(self, psi: Array, tracked: Tracked, barrier: Event | None, leg: Array) -> list[Event]:
         events: list[Event] = []
@@ -415,17 +392,6 @@ class SingleMotorPlatform:
             low, high = low + (high - low) * change / 32.0, low + (high - low) * (change + 1) / 32.0
             pose = fine.pose[0, change]
         return low + (high - low) * float(values[change] / (values[change] - values[change + 1]))
-
-    def _barrier(self, start: float, stop: float) -> Event | None:
-        """First drive lock or change point in (start, stop]: no continuation may step over it."""
-        found: list[Event] = []
-        for number, drive in enumerate(self.drives, start=1):
-            for angle, kind in drive.barriers():
-                at = start + (angle - start) % math.tau
-                if start < at <= stop:
-                    name, text = _BARRIERS[kind]
-                    found.append(Event(name, at, number, True, text.format(number)))
-        return min(found, key=lambda event: event.psi, default=None)
 
     def graph(self) -> MechanismGraph:
         """Structural graph of the source's Figure 3: 15 links, 19 turning pairs, 3 gear pairs, link 0 the frame."""

@@ -16,13 +16,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics.drive import first_barrier
 from graphsynth.kinematics.leg import length_constants
 from graphsynth.kinematics.motion import Monodromy, TurnBatch
 
 if TYPE_CHECKING:
+    from graphsynth.kinematics.parallel_platform import ParallelPlatform
     from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["SAME", "SINGULAR", "BranchEnd", "Tracked", "machine_rows", "monodromy", "track", "turn_batch"]
+__all__ = [
+    "SAME",
+    "SINGULAR",
+    "BranchEnd",
+    "Tracked",
+    "compare",
+    "distance",
+    "machine_rows",
+    "monodromy",
+    "track",
+    "turn_batch",
+]
 
 Array = NDArray[np.float64]
 
@@ -120,7 +133,7 @@ def turn_batch(
         determinant=tracked.determinant, acceleration=tracked.acceleration if accelerations else None,
         theta_acceleration=tracked.theta2 if accelerations else None, status=tracked.status.astype(np.int8),
         reached=tracked.reached, end=tracked.end,
-        closure_error=np.asarray(mechanism._distance(tracked.pose[:, -1], tracked.pose[:, 0])),
+        closure_error=np.asarray(distance(tracked.pose[:, -1], tracked.pose[:, 0], mechanism.Lc)),
     )  # fmt: skip
 
 
@@ -149,7 +162,7 @@ def _stops(mechanism: SingleMotorPlatform, l_B: Array, psi0: Array, l_BC: Array,
     stops = np.full(len(l_B), np.inf)
     for i in np.flatnonzero(~free.all(axis=1)):  # decided exactly, one by one
         one = replace(mechanism, crank=tuple(l_B[i]), phase=tuple(psi0[i]), coupler=tuple(l_BC[i]))
-        barrier = one._barrier(float(psi[0]), float(psi[-1]))
+        barrier = first_barrier(one.drives, float(psi[0]), float(psi[-1]))
         stops[i] = np.inf if barrier is None else barrier.psi
     return stops
 
@@ -157,7 +170,7 @@ def _stops(mechanism: SingleMotorPlatform, l_B: Array, psi0: Array, l_BC: Array,
 def monodromy(mechanism: SingleMotorPlatform, psi: Array) -> Monodromy:
     """See `SingleMotorPlatform.monodromy`."""
     modes = mechanism.all_poses(float(psi[0]))
-    barrier = mechanism._barrier(float(psi[0]), float(psi[-1]))
+    barrier = first_barrier(mechanism.drives, float(psi[0]), float(psi[-1]))
     stop = np.inf if barrier is None else barrier.psi
     tracked = track(
         np.repeat(mechanism._machine[None], len(modes), axis=0), psi, np.full(len(modes), stop), modes, mechanism.Lc,
@@ -167,9 +180,9 @@ def monodromy(mechanism: SingleMotorPlatform, psi: Array) -> Monodromy:
     for i in range(len(modes)):
         status, reason, target = BranchEnd(int(tracked.status[i])), "", -1
         if status is BranchEnd.COMPLETE:
-            distance = mechanism._distance(modes, tracked.pose[i, -1])
-            nearest = int(np.argmin(distance))
-            target = nearest if distance[nearest] <= SAME else -1
+            apart = distance(modes, tracked.pose[i, -1], mechanism.Lc)
+            nearest = int(np.argmin(apart))
+            target = nearest if apart[nearest] <= SAME else -1
             reason = "" if target >= 0 else "the pose at the end is none of the modes at the start"
         elif status is BranchEnd.DRIVE_ENDS and barrier is not None:
             reason = barrier.statement
@@ -179,3 +192,21 @@ def monodromy(mechanism: SingleMotorPlatform, psi: Array) -> Monodromy:
         reasons.append(reason)
     ends = tuple(math.nan if target >= 0 else float(at) for target, at in zip(permutation, tracked.end[:, 0]))
     return Monodromy(modes, tuple(permutation), ends, tuple(reasons))
+
+
+def distance(poses: Array, pose: Array, Lc: float) -> Array:
+    """``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2) / Lc`` with the angle taken on the circle."""
+    d = poses - pose
+    turn = np.angle(np.exp(1j * d[..., 2]))
+    return np.asarray(np.sqrt((d[..., 0] ** 2 + d[..., 1] ** 2) / Lc**2 + turn**2))
+
+
+def compare(platform: ParallelPlatform, pose: Array, theta: Array, Lc: float) -> tuple[Array, int, NDArray[np.bool_]]:
+    """Distance to the nearest other mode, rank of alpha at the start, and samples where no mode matches."""
+    batch = platform.direct_batch(theta)
+    apart = np.full((len(pose), max(6, int(batch.counts.max()))), np.inf)
+    place = np.arange(len(batch.problem)) - np.repeat(np.cumsum(batch.counts) - batch.counts, batch.counts)
+    apart[batch.problem, place] = distance(batch.poses, pose[batch.problem], Lc)
+    rank = int(np.argmin(apart[0]))
+    apart.sort(axis=1)
+    return apart[:, 1], rank, apart[:, 0] > SAME
