@@ -34,6 +34,8 @@ IntArray = NDArray[np.intp]
 _ROUGH, _STEPS = 20, 60
 #: Springs of polygons over those of bars: plates are to be nearly regular.
 _STIFF = 3.0
+#: Height of a plate's corner over the line of its neighbours below which it is pushed out, in mean sides.
+_HEIGHT = 0.6
 #: Trials of a step, each with the offending vertices moved less.
 _RETRIES = 4
 #: Least area of a triangle of the drawing, as a share of the square of the mean side.
@@ -165,12 +167,16 @@ class _Drawing:
         areas = _areas(self.z, self.triangles)
         self.sense, self.floor = np.sign(areas), np.minimum(np.abs(areas), _FLAT)
         self.joints = count
+        self.corners = np.array(self.plates, dtype=np.intp).reshape(-1, 3)
+        self.turned = np.sign(_areas(self.z, self.corners))
 
     def even_out(self, steps: int) -> None:
         """Let springs and repulsion act; faces keep their orientation."""
         step = 0.15
         for _ in range(steps):
             move = self.springs.force(self.z)
+            if self.plates:
+                self._raise_corners(move)
             move *= min(step, 0.2 / max(float(np.abs(move).max()), 1e-9))
             for _ in range(_RETRIES):
                 bad = _areas(self.z + move, self.triangles) * self.sense < self.floor
@@ -183,14 +189,24 @@ class _Drawing:
             if step < 1e-3:
                 break
 
+    def _raise_corners(self, move: Complex) -> None:
+        """Push corners of flat plates out: springs alone leave them nearly on a line."""
+        a, b, c = self.corners.T
+        side = self.z[c] - self.z[a]
+        length = np.maximum(np.abs(side), 1e-9)
+        heights = _areas(self.z, self.corners) * self.turned / length
+        push = -2.0 * np.maximum(0.0, _HEIGHT - heights) * self.turned * 1j * side / length
+        np.add.at(move, b, push)
+        np.add.at(move, a, -0.5 * push)
+        np.add.at(move, c, -0.5 * push)
+
     def room(self) -> float:
         """Smallest distance of two joints, or height of a plate, over the size of the picture."""
         z = self.z[: self.joints]
         apart = np.abs(z[:, None] - z)
         least = apart[np.triu_indices(len(z), 1)].min()
-        corners = np.array(self.plates, dtype=np.intp).reshape(-1, 3)
-        longest = apart[corners, np.roll(corners, 1, axis=1)].max(axis=1, initial=1e-300)
-        heights = np.abs(_areas(z, corners)) / longest
+        longest = apart[self.corners, np.roll(self.corners, 1, axis=1)].max(axis=1, initial=1e-300)
+        heights = np.abs(_areas(z, self.corners)) / longest
         return float(min(least, heights.min(initial=np.inf)) / apart.max())
 
 
