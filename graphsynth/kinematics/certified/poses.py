@@ -135,6 +135,10 @@ def certify(
     >>> proof.certified, proof.closed, bool(proof.position_radius.max() < 1e-12)
     (True, True, True)
     """
+    return _certify(motion, between, Budget(max_boxes, seconds))
+
+
+def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate:
     begin = perf_counter()
     need_flint()
     check_rounding()
@@ -151,7 +155,7 @@ def certify(
     proved = np.isfinite(room)
     found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
     if between and len(asked) > 1 and all(enclosed(driver.law) for driver in motion.mechanism.drivers):
-        found = cover(system, nodes, Budget(max_boxes, seconds), begin)
+        found = cover(system, nodes, budget, begin)
     closed = turns is not None and end
     closed = closed and bool(found.covered.all()) and _closes(system, nodes, turns)
     return _certificate(motion, between, asked, (position, angle, room), proved, found, closed, turns, begin)
