@@ -281,6 +281,15 @@ def test_an_incomplete_motion_is_not_certified_but_its_reached_part_is_proved() 
     assert np.isnan(proof.position_radius[reached:]).all()
 
 
+def test_a_hole_in_the_samples_is_not_bridged() -> None:
+    motion = simulate(four_bar(4.0, 1.0, 3.0, 3.5), TURN)
+    poses = motion.poses.copy()
+    poses[50] = np.nan
+    proof = certify(replace(motion, poses=poses))
+    assert not proof.certified and not proof.closed
+    assert proof.intervals.tolist() == [True] * 49 + [False] * 71
+
+
 def test_the_budget_is_kept_and_said() -> None:
     proof = certify(simulate(watt(), np.linspace(0.0, math.tau, 4)), max_boxes=5)
     assert not proof.certified and "limit of work" in proof.reason and proof.boxes <= 5

@@ -143,10 +143,8 @@ def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate
     need_flint()
     check_rounding()
     system = MechanismSystem(motion.mechanism)
-    asked = np.flatnonzero(motion.assembled & np.isfinite(motion.poses).all(axis=(1, 2)))
-    # the assembled samples up to the first gap: a branch has no holes
-    count = int(np.argmin(np.append(motion.assembled, False)))
-    asked = asked[asked < count]
+    reached = motion.assembled & np.isfinite(motion.poses).all(axis=(1, 2))
+    asked = np.arange(int(np.argmin(np.append(reached, False))))  # up to the first gap: a branch has no holes
     samples = motion.poses[asked][:, system.moving].reshape(len(asked), system.size)
     turns = _full_turn(motion) if between and len(asked) == len(motion.inputs) else None
     u, end = _inputs(motion.inputs[asked], turns)
