@@ -13,6 +13,7 @@ from mpmath import mp
 from graphsynth import Cam, Driver, Mechanism, MechanismGraph, Prismatic, Revolute
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate, simulate_batch
+from graphsynth.kinematics.platform.rank_check import loop_closure
 from graphsynth.mechanism.constraints import jacobian, residual
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 361)
@@ -126,6 +127,24 @@ def test_batch_scales_the_mean_radius() -> None:
     np.testing.assert_allclose(
         batch.point(2, (0.0, 0.0))[1, :, 1] - batch.point(2, (0.0, 0.0))[0, :, 1], 0.2, atol=1e-13
     )
+
+
+def test_loop_closure_of_a_cam() -> None:
+    """The loop matrix of the velocities has one freedom, with the ratio of speeds that the motion shows."""
+    motion = simulate(oscillating(), [0.8, 0.9])
+    found = loop_closure(motion.mechanism, motion.poses[0])
+    assert found.mobility == 1
+    speeds = dict(zip(found.columns, found.motions[0]))
+    ratio = speeds["R 0-2"] / speeds["R 0-1"]
+    np.testing.assert_allclose(ratio, motion.velocities[0, 2, 2], atol=1e-12)
+
+
+def test_no_certificate_for_cams() -> None:
+    pytest.importorskip("flint")
+    from graphsynth.kinematics.certified import certify
+
+    with pytest.raises(GeometryError, match="cam"):
+        certify(simulate(oscillating(), TURN))
 
 
 def test_mobility_and_files() -> None:

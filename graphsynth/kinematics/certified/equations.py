@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.certified.balls import Balls, exact, stack, tau_times, unit
 from graphsynth.kinematics.certified.laws import law_rate, law_value
-from graphsynth.mechanism.joints import Gear, JointGeometry, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.mechanism.rank import characteristic_length
 
@@ -62,10 +62,14 @@ class MechanismSystem:
     Raises
     ------
     GeometryError
-        If equations and unknowns differ in number: the certificate is for mechanisms with one driver per freedom.
+        If equations and unknowns differ in number: the certificate is for mechanisms with one driver per freedom; or
+        if there is a cam.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
+        cam = next((joint for joint in mechanism.joints if isinstance(joint, Cam)), None)
+        if cam is not None:
+            raise GeometryError(f"joint {cam.a}-{cam.b} is a cam: there are no certificates for cams, only estimates")
         self.mechanism = mechanism
         self.frame = mechanism.frame
         self.moving = [link for link in range(mechanism.graph.links) if link != self.frame]

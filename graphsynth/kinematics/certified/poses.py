@@ -116,7 +116,7 @@ def certify(
     GraphsynthError
         If python-flint (extra ``certified``) is not installed.
     GeometryError
-        If the drivers do not fit the mobility.
+        If the drivers do not fit the mobility, or there is a cam.
 
     Notes
     -----

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite, finite_array
-from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
@@ -239,10 +239,13 @@ def _twists(joint: JointGeometry, X: Array, Lc: float) -> list[tuple[str, Array]
         outer = joint.radius_a + (-joint.radius_b if joint.internal else joint.radius_b)
         pitch = P + between * (joint.radius_a / outer)
         return [("roll", about(pitch)), ("slide", along(between / abs(between)))]
+    if isinstance(joint, Cam):
+        radial = (Q - P) / abs(Q - P)
+        rho, slope, _ = joint.pitch_radius(float(np.angle(radial)) - X[joint.a, 2] - joint.angle_a)
+        return [("turn", about(Q)), ("slide", along(radial * complex(slope, rho) / abs(complex(slope, rho))))]
     line = complex(np.exp(1j * (X[joint.a, 2] + joint.angle_a)))
     if isinstance(joint, Prismatic):
         return [("P", along(line))]
-    assert isinstance(joint, PinSlot)
     return [("turn", about(Q)), ("slide", along(line))]
 
 
