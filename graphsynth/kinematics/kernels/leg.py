@@ -93,15 +93,15 @@ def direction(a):
 
 
 @njit(cache=True, error_model="numpy")
-def directions(a, m, c, s):
-    """Cosines and sines of m angles."""
+def directions(a, start, m, c, s):
+    """Cosines and sines of the m angles from ``a[start]``."""
     far = False
     for i in range(m):
-        c[i], s[i] = direction(a[i])
-        far |= not abs(a[i]) < 1e5
+        c[i], s[i] = direction(a[start + i])
+        far |= not abs(a[start + i]) < 1e5
     if far:
         for i in range(m):
-            c[i], s[i] = math.cos(a[i]), math.sin(a[i])
+            c[i], s[i] = math.cos(a[start + i]), math.sin(a[start + i])
 
 
 @njit(cache=True, error_model="numpy")
@@ -173,7 +173,9 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
     hard = 0
     for start in range(0, n, BLOCK):
         m = min(BLOCK, n - start)
-        directions(pose[start : start + m, 2], m, cs, sn)
+        for i in range(m):
+            sg[i] = pose[start + i, 2]
+        directions(sg, 0, m, cs, sn)
         for k in range(3):
             bx, by, dx, dy = b[k, 0], b[k, 1], D[k, 0], D[k, 1]
             for i in range(m):

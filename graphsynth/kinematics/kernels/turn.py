@@ -20,9 +20,10 @@ COMPLETE, NO_HOME, HOME_ENDS, DRIVE_ENDS, SINGULAR, NO_START = 0, 1, 2, 3, 4, 5
 SMALLEST = 1e-11  # step over the whole range
 TAU = 2.0 * math.pi
 BLOCK = 128
-# rows of the work array of a block: five per leg (arm cos, sin, theta', theta'', theta), then these
+# rows of a leg in a block: arm cos, sin, theta', theta'', theta; then those of the platform: pose, velocity and
+# determinant, acceleration
 LEG = 5 * BLOCK
-COS, SIN, PX, PY, PA, SPEED, PUSH = (row * BLOCK for row in (15, 16, 17, 18, 19, 20, 24))
+PX, PY, PA, SPEED, PUSH = (row * BLOCK for row in (0, 1, 2, 3, 7))
 QUICK = 1e-7  # scaled correction after which one more pass, in bulk, is enough
 FINAL = 1e-13  # scaled correction of that pass above which the block is done again, step by step
 
@@ -216,8 +217,8 @@ def push(lx, ly, rx, ry, zx, zy, vx, vy, va, r1, r2):
 
 
 @njit(cache=True, error_model="numpy")
-def finish(p, m, weight, w):
-    """Last Newton step and all derivatives of m samples in w; how many corrections were too large.
+def finish(p, m, weight, cs, sn, e1, e2, e3, w):
+    """Last Newton step and derivatives of m samples, leg rows e, platform rows w; how many corrections were too large.
 
     The running angle only tells the number of turns.
     """
@@ -226,16 +227,16 @@ def finish(p, m, weight, w):
     d3x, d3y, q3, b3x, b3y, l3 = p[2, 15], p[2, 16], p[2, 17], p[2, 18], p[2, 19], p[2, 20]
     bad = 0
     for i in range(m):
-        x, y, cz, sz = w[PX + i], w[PY + i], w[COS + i], w[SIN + i]
-        a1, a2, a3 = w[2 * BLOCK + i], w[LEG + 2 * BLOCK + i], w[2 * LEG + 2 * BLOCK + i]
+        x, y, cz, sz = w[PX + i], w[PY + i], cs[i], sn[i]
+        a1, a2, a3 = e1[2 * BLOCK + i], e2[2 * BLOCK + i], e3[2 * BLOCK + i]
         dx1, dy1, m1, f1, r1x, r1y, z1x, z1y = leg_row(
-            x, y, cz, sz, d1x, d1y, q1, b1x, b1y, l1, w[i], w[BLOCK + i]
+            x, y, cz, sz, d1x, d1y, q1, b1x, b1y, l1, e1[i], e1[BLOCK + i]
         )  # fmt: skip
         dx2, dy2, m2, f2, r2x, r2y, z2x, z2y = leg_row(
-            x, y, cz, sz, d2x, d2y, q2, b2x, b2y, l2, w[LEG + i], w[LEG + BLOCK + i]
+            x, y, cz, sz, d2x, d2y, q2, b2x, b2y, l2, e2[i], e2[BLOCK + i]
         )  # fmt: skip
         dx3, dy3, m3, f3, r3x, r3y, z3x, z3y = leg_row(
-            x, y, cz, sz, d3x, d3y, q3, b3x, b3y, l3, w[2 * LEG + i], w[2 * LEG + BLOCK + i]
+            x, y, cz, sz, d3x, d3y, q3, b3x, b3y, l3, e3[i], e3[BLOCK + i]
         )  # fmt: skip
         k1, k2, k3 = dx2 * dy3 - dx3 * dy2, dx3 * dy1 - dx1 * dy3, dx1 * dy2 - dx2 * dy1
         u1, u2, u3 = dy2 * m3 - dy3 * m2, dy3 * m1 - dy1 * m3, dy1 * m2 - dy2 * m1
@@ -250,9 +251,9 @@ def finish(p, m, weight, w):
         vx, vy = (g1 * u1 + g2 * u2 + g3 * u3) * inv, (g1 * v1 + g2 * v2 + g3 * v3) * inv
         va = (g1 * k1 + g2 * k2 + g3 * k3) * inv
         w[SPEED + i], w[SPEED + BLOCK + i], w[SPEED + 2 * BLOCK + i], w[SPEED + 3 * BLOCK + i] = vx, vy, va, 8.0 * whole
-        g1 = push(dx1, dy1, r1x, r1y, z1x, z1y, vx, vy, va, a1, w[3 * BLOCK + i])
-        g2 = push(dx2, dy2, r2x, r2y, z2x, z2y, vx, vy, va, a2, w[LEG + 3 * BLOCK + i])
-        g3 = push(dx3, dy3, r3x, r3y, z3x, z3y, vx, vy, va, a3, w[2 * LEG + 3 * BLOCK + i])
+        g1 = push(dx1, dy1, r1x, r1y, z1x, z1y, vx, vy, va, a1, e1[3 * BLOCK + i])
+        g2 = push(dx2, dy2, r2x, r2y, z2x, z2y, vx, vy, va, a2, e2[3 * BLOCK + i])
+        g3 = push(dx3, dy3, r3x, r3y, z3x, z3y, vx, vy, va, a3, e3[3 * BLOCK + i])
         w[PUSH + i] = (g1 * u1 + g2 * u2 + g3 * u3) * inv
         w[PUSH + BLOCK + i] = (g1 * v1 + g2 * v2 + g3 * v3) * inv
         w[PUSH + 2 * BLOCK + i] = (g1 * k1 + g2 * k2 + g3 * k3) * inv
@@ -286,7 +287,8 @@ def turns(
     ``acceleration`` are (N, n, 3), or (N, 0, 3) if not wanted.
     """
     n, second = psi.size, theta2.shape[1] > 0
-    q, saved, e, w = np.empty(18), np.empty(18), np.empty((3, 5)), np.empty(27 * BLOCK)
+    q, saved, e, w = np.empty(18), np.empty(18), np.empty((3, 5)), np.empty(10 * BLOCK)
+    cs, sn, legs = np.empty(BLOCK), np.empty(BLOCK), (np.empty(LEG), np.empty(LEG), np.empty(LEG))
     for i in range(machines.shape[0]):
         p, state, done = machines[i], COMPLETE, 0
         q[VX], q[VY], q[VA], q[DET] = 0.0, 0.0, 0.0, 0.0
@@ -304,9 +306,9 @@ def turns(
             for start in range(0, count, BLOCK):
                 m = min(BLOCK, count - start)
                 if not growing:
-                    directions(psi[start : start + m], m, w[COS:SIN], w[SIN:PX])
+                    directions(psi, start, m, cs, sn)
                     for k in range(3):
-                        drives(p, k, m, w[COS:SIN], w[SIN:PX], w[k * LEG : (k + 1) * LEG])
+                        drives(p, k, m, cs, sn, legs[k])
                 for k in range(18):
                     saved[k] = q[k]
                 for attempt in range(2):
@@ -324,8 +326,7 @@ def turns(
                             goal = target if whole else q[AT] + step
                             if sampled:
                                 for k in range(3):
-                                    at = k * LEG + slot
-                                    arm(p, k, w[at], w[at + BLOCK], w[at + 2 * BLOCK], e)
+                                    arm(p, k, legs[k][slot], legs[k][BLOCK + slot], legs[k][2 * BLOCK + slot], e)
                             else:
                                 drive_at(p, growing, psi[0], goal, e)
                             if advance(p, e, goal, q, Lc, j > 0, sampled and attempt == 0):
@@ -345,10 +346,10 @@ def turns(
                             continue
                         done = j + 1
                         w[PX + slot], w[PY + slot], w[PA + slot] = q[X], q[Y], q[A]
-                        w[COS + slot], w[SIN + slot] = q[C], q[S]
+                        cs[slot], sn[slot] = q[C], q[S]
                     if growing or done <= start:
                         break
-                    bad = finish(p, done - start, 1.0 / (Lc * Lc), w)
+                    bad = finish(p, done - start, 1.0 / (Lc * Lc), cs, sn, legs[0], legs[1], legs[2], w)
                     if bad == 0 or attempt == 1:
                         break
                     state, done = COMPLETE, start  # once more, every step to the end
@@ -359,15 +360,14 @@ def turns(
                         s = j - start
                         for k in range(3):
                             pose[i, j, k], velocity[i, j, k] = w[PX + k * BLOCK + s], w[SPEED + k * BLOCK + s]
-                            at = k * LEG + s
-                            raw = w[at + 4 * BLOCK]
+                            raw = legs[k][4 * BLOCK + s]
                             theta[i, j, k] = raw if j == 0 else near(raw, theta[i, j - 1, k])
-                            theta1[i, j, k] = w[at + 2 * BLOCK]
+                            theta1[i, j, k] = legs[k][2 * BLOCK + s]
                         det[i, j] = w[SPEED + 3 * BLOCK + s]
                         if second:
                             for k in range(3):
                                 acceleration[i, j, k] = w[PUSH + k * BLOCK + s]
-                                theta2[i, j, k] = w[k * LEG + 3 * BLOCK + s]
+                                theta2[i, j, k] = legs[k][3 * BLOCK + s]
                 if state != COMPLETE:
                     break
             if state != COMPLETE:
