@@ -175,7 +175,7 @@ def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
         m = min(BLOCK, n - start)
         for i in range(m):
             sg[i] = pose[start + i, 2]
-        directions(sg, 0, m, cs, sn)
+        directions(sg, start - start, m, cs, sn)
         for k in range(3):
             bx, by, dx, dy = b[k, 0], b[k, 1], D[k, 0], D[k, 1]
             for i in range(m):
