@@ -146,7 +146,7 @@ class LineFit(Fit):
 
     def __init__(self, target: LineGoal) -> None:
         self.target = target
-        self.inputs = np.linspace(0.0, target.span, 49)
+        self.inputs = np.linspace(0.0, target.span, 73)
         tilt = [-3.0 * target.tolerance, 3.0 * target.tolerance]
         self.ranges = np.array([tilt] if target.on_bar else [tilt, [-np.pi, np.pi]])
 
