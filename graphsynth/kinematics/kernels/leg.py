@@ -9,8 +9,10 @@ exact evaluation of `graphsynth.kinematics.leg.solve_leg`.
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from graphsynth.compilation import kernel
 
 BLOCK = 256
 HARD = 9  # status of an entry that needs the exact evaluation
@@ -35,7 +37,7 @@ def fma(typingctx, a, b, c):
     return signature, codegen
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def angle_of(y, x):
     """``atan2(y, x)`` in (-pi, pi] without branches; error below 0.75 ulp of pi and 2 ulp of a small result.
 
@@ -69,7 +71,7 @@ def angle_of(y, x):
     return -a if y < 0.0 else a
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def direction(a):
     """Cosine and sine without branches, for |a| < 1e5; error below 1 ulp (polynomials of fdlibm, Sun 1993)."""
     n = (a * TWO_OVER_PI + ROUND) - ROUND
@@ -92,7 +94,7 @@ def direction(a):
     return x, (-y if quarter > 1.5 else y)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def directions(a, start, m, c, s):
     """Cosines and sines of the m angles from ``a[start]``."""
     far = False
@@ -104,7 +106,7 @@ def directions(a, start, m, c, s):
             c[i], s[i] = math.cos(a[start + i]), math.sin(a[start + i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def cross_sum(a, b, c, d):
     """Return ``a b + c d``, both products and their sum compensated."""
     p = a * b
@@ -115,7 +117,7 @@ def cross_sum(a, b, c, d):
     return s + (rest + (fma(a, b, -p) + fma(c, d, -q)))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def square(u, v):
     """``u^2 + v^2`` as a pair."""
     p = u * u
@@ -126,7 +128,7 @@ def square(u, v):
     return s, low
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def add_pair(a, al, b, bl):
     """Sum of two pairs, rounded."""
     s = a + b
@@ -134,7 +136,7 @@ def add_pair(a, al, b, bl):
     return s + ((a - (s - t)) + (b - t) + (al + bl))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def solve(u, v, c0, c1, c2, c3, c4, c5):
     """Squared distance, C, P1, P2 of a leg that ends at (u, v); constants: the first six of `length_constants`."""
     r, rl = square(u, v)
@@ -144,7 +146,7 @@ def solve(u, v, c0, c1, c2, c3, c4, c5):
     return r, C, P1, P2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reach(u, v, k, n, c, r, C, P1, P2, mark):
     """Legs that end at u, v (n entries): squared distances, C, P1, P2 and their marks (0 reachable, 2, 3, HARD)."""
     c0, c1, c2, c3, c4, c5 = c[k, 0], c[k, 1], c[k, 2], c[k, 3], c[k, 4], c[k, 5]
@@ -157,7 +159,7 @@ def reach(u, v, k, n, c, r, C, P1, P2, mark):
         mark[i] = out if clear else 9.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def inverse(pose, D, b, consts, sigma, theta, status, S, deficit):
     """Legs of poses (n, 3): angles, status and, where wanted, S and deficit; returns the number of legs marked HARD.
 

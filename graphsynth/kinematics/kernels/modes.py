@@ -8,8 +8,8 @@ root, exactly one, and bisection.
 import math
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.kinematics.kernels.leg import fma
 
 NEAR_DOUBLE, INCONSISTENT, DEGENERATE = 1, 2, 4  # bits of a flag
@@ -25,7 +25,7 @@ _MIDDLES = _ENDS + HALF
 TABLE = np.array([f(k * angles) for angles in (_ENDS, _MIDDLES) for k in (1, 2, 3) for f in (np.cos, np.sin)])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def elbows(theta, D, l1, out):
     """Anchors ``D_k + l1_k exp(i theta_k)``, complex (n, 3)."""
     for i in range(theta.shape[0]):
@@ -35,13 +35,13 @@ def elbows(theta, D, l1, out):
             )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def norm2(z):
     """Squared absolute value."""
     return z.real * z.real + z.imag * z.imag
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def coefficients(a2, a3, b2, b3, l1, l2, l3, g, q):
     """Real and imaginary parts of g0, g1, g2, g3 into g[0:7] and n2, n1, n0, nm, d0, de (complex) into q[0:6]."""
     L = l1 * l1
@@ -62,7 +62,7 @@ def coefficients(a2, a3, b2, b3, l1, l2, l3, g, q):
     q[0], q[1], q[2], q[3], q[4], q[5] = n2, n1, n0, nm, complex(0.0, d0), de
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def jet(g, c, s):
     """G, G' and G'' at the angle with cosine c and sine s."""
     c2, s2 = c * c - s * s, 2.0 * c * s
@@ -72,7 +72,7 @@ def jet(g, c, s):
     return g[0] + 2.0 * (r1 + r2 + r3), -2.0 * (i1 + 2.0 * i2 + 3.0 * i3), -2.0 * (r1 + 4.0 * r2 + 9.0 * r3)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sample(g, eta, third, value, kind):
     """Values of G at the nodes; kind of each interval: 0 no root, 1 exactly one, 2 undecided."""
     T = TABLE
@@ -99,7 +99,7 @@ def sample(g, eta, third, value, kind):
         kind[j] = 0 if (empty | (steep & same)) else (1 if steep else 2)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def bracketed(g, low, high, at_low, at_high):
     """Root between low and high: Newton from the chord, kept inside the bracket; |error| about 1e-12."""
     alpha = low + (high - low) * (at_low / (at_low - at_high))
@@ -124,7 +124,7 @@ def bracketed(g, low, high, at_low, at_high):
     return alpha
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def search(g, low, high, at_low, at_high, eta, third, stack, roots, count, work):
     """Bisect an undecided interval, left parts first: number of roots, work, and whether it got stuck."""
     stuck = False
@@ -161,7 +161,7 @@ def search(g, low, high, at_low, at_high, eta, third, stack, roots, count, work)
     return count, work, stuck
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def polish(a, b, l, x, y, alpha, out):
     """Newton on the three closures from a pose near a solution; pose, det JX into out[0:4]; whether it is accurate."""
     ax2, ay2, ax3, ay3 = a[0].real, a[0].imag, a[1].real, a[1].imag
@@ -198,7 +198,7 @@ def polish(a, b, l, x, y, alpha, out):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def modes(anchors, vertices, legs, problem, pose, determinant, counts, flags):
     """All assembly modes of n problems: anchors (n, 3), vertices and legs (1, 3) or (n, 3); returns how many modes.
 

@@ -12,8 +12,8 @@ vertex (x, y), link l2.
 import math
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.kinematics.kernels.leg import ROUND, angle_of, cross_sum, directions, fma, solve
 
 COMPLETE, NO_HOME, HOME_ENDS, DRIVE_ENDS, SINGULAR, NO_START = 0, 1, 2, 3, 4, 5
@@ -32,7 +32,7 @@ FINAL = 1e-13  # scaled correction of that pass above which the block is done ag
 X, Y, C, S, A, VX, VY, VA, DET, AT, OX, OY, OA, OVX, OVY, OVA, OAT, OLD = range(18)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rocker(u, v, arm1x, arm1y, length, tau, c0, c1, c2, c3, c4, c5):
     """Rocker of a drive whose crank pin is at (u, v) from the pivot: y, x of phi, cos, sin, phi', link and moment.
 
@@ -48,7 +48,7 @@ def rocker(u, v, arm1x, arm1y, length, tau, c0, c1, c2, c3, c4, c5):
     return y, x, c, t, (lx * arm1x + ly * arm1y) / half, lx, ly, half
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rocker2(c, t, rate, lx, ly, half, arm1x, arm1y, arm2x, arm2y, length):
     """``phi''`` of the drive from the results of `rocker`."""
     sx, sy = -length * t * rate - arm1x, length * c * rate - arm1y
@@ -56,7 +56,7 @@ def rocker2(c, t, rate, lx, ly, half, arm1x, arm1y, arm2x, arm2y, length):
     return (lx * ax + ly * ay - (sx * sx + sy * sy)) / half
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def drives(p, k, m, c, s, out):
     """Drive k at m wheel angles with cosines c and sines s: the five rows of a leg into ``out``."""
     ex, ey, crank, length, tau = p[k, 0], p[k, 1], p[k, 2], p[k, 4], p[k, 5]
@@ -72,7 +72,7 @@ def drives(p, k, m, c, s, out):
         out[4 * BLOCK + i] = angle_of(y, x) + offset
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def drive_at(p, scaled, psi, parameter, e):
     """Put the three rocker arms at one wheel angle, or at one scale of the cranks, into e (3, 5)."""
     for k in range(3):
@@ -87,20 +87,20 @@ def drive_at(p, scaled, psi, parameter, e):
         arm(p, k, c * p[k, 12] - t * p[k, 13], c * p[k, 13] + t * p[k, 12], rate, e)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def near(angle, other):
     """``angle`` shifted by whole turns to be nearest to ``other``."""
     return angle + TAU * (((other - angle) * (1.0 / TAU) + ROUND) - ROUND)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def arm(p, k, c, t, rate, e):
     """Elbow A_k, rocker vector and rate of a rocker arm with direction (c, t) into e[k]."""
     rx, ry = p[k, 17] * c, p[k, 17] * t
     e[k, 0], e[k, 1], e[k, 2], e[k, 3], e[k, 4] = p[k, 15] + rx, p[k, 16] + ry, rx, ry, rate
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict(q, goal):
     """Pose at ``goal``: cubic through the last two poses and velocities, or the tangent where there is one only."""
     h = goal - q[AT]
@@ -115,7 +115,7 @@ def predict(q, goal):
     return x, y, h00 * (q[OA] - q[A]) + h10 * q[OVA] + h11 * q[VA]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def advance(p, e, goal, q, Lc, check, quick):
     """Move the state q to the parameter ``goal`` with rocker arms e; False, and q unchanged, if not trustworthy.
 
@@ -199,7 +199,7 @@ def advance(p, e, goal, q, Lc, check, quick):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def leg_row(x, y, cz, sz, dx, dy, l1, bx, by, l2, c, t):
     """Half a row of JX, half the closure, the rocker vector and the platform arm of one leg."""
     zx, zy = cz * bx - sz * by, cz * by + sz * bx
@@ -208,7 +208,7 @@ def leg_row(x, y, cz, sz, dx, dy, l1, bx, by, l2, c, t):
     return lx, ly, zx * ly - zy * lx, 0.5 * (fma(lx, lx, -(l2 * l2)) + ly * ly), rx, ry, zx, zy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def push(lx, ly, rx, ry, zx, zy, vx, vy, va, r1, r2):
     """Half the right-hand side of the accelerations for one leg (section 4.2)."""
     sx, sy = vx - zy * va + ry * r1, vy + zx * va - rx * r1
@@ -216,7 +216,7 @@ def push(lx, ly, rx, ry, zx, zy, vx, vy, va, r1, r2):
     return lx * ax + ly * ay - (sx * sx + sy * sy)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def finish(p, m, weight, cs, sn, e1, e2, e3, w):
     """Last Newton step and derivatives of m samples, leg rows e, platform rows w; how many corrections were too large.
 
@@ -260,7 +260,7 @@ def finish(p, m, weight, cs, sn, e1, e2, e3, w):
     return bad
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def turns(
     machines,
     psi,
