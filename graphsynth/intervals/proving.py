@@ -54,6 +54,8 @@ class Image:
         Whether the equations are defined and continuous on the whole box.
     singular : ndarray of bool, shape (N,)
         Whether the midpoint of L had no usable inverse; the box must then be cut.
+    exact_input : bool
+        False if a plain float came into the equations or parameters: what rounding did to it is not included.
     """
 
     status: NDArray[np.int8]
@@ -62,6 +64,7 @@ class Image:
     factor: Array
     guaranteed: Mask
     singular: Mask
+    exact_input: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +90,9 @@ class KrawczykResult:
         Boxes tested.
     reason : str
         One sentence.
+    exact_input : bool
+        False if a plain float came in as a constant or parameter: the proof is for that float, not for the decimal
+        it was written as.
     """
 
     status: Status
@@ -97,6 +103,7 @@ class KrawczykResult:
     contraction: float
     rounds: int
     reason: str
+    exact_input: bool
 
 
 def _inverse(matrices: Array) -> tuple[Array, Mask]:
@@ -172,22 +179,23 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
         centre = _make(z, z)
         at = values_of(evaluate(f, [centre[:, i] for i in range(n)], parameters), shape)
         Y, singular = _inverse(slopes.mid)
-        exact = _make(Y, Y)
-        rest = _make(np.eye(n), np.eye(n)) - matmul(exact, slopes)
-        K = centre - matvec(exact, at) + matvec(rest, boxes - centre)
+        real = _make(Y, Y)
+        rest = _make(np.eye(n), np.eye(n)) - matmul(real, slopes)
+        K = centre - matvec(real, at) + matvec(rest, boxes - centre)
     void: Mask = np.asarray(boxes.is_empty.any(axis=1))
     smooth = _all_guaranteed(over, 1) & _all_guaranteed(slopes, 2) & _all_guaranteed(at, 1)
     smooth = np.asarray(smooth & boxes.is_bounded.all(axis=1) & ~singular)
     K = _where(smooth, K, Interval.entire(K.shape))
     meet = _where(~void, boxes.intersect(K), Interval.empty(K.shape))
     none = (~over.contains(np.zeros(over.shape))).any(axis=1) | meet.is_empty.any(axis=1) | void
+    exact = bool(over.exact_input.all() and slopes.exact_input.all())
     inside = smooth & K.interior(boxes).all(axis=1)
     within = smooth & K.subset(boxes).all(axis=1) & _regular(Y, slopes)
     status = np.where(
         none, Status.EMPTY, np.where(inside, Status.UNIQUE, np.where(within, Status.EXISTS, Status.UNDECIDED))
     )
     box = _where(~none, meet, Interval.empty(K.shape))
-    return Image(status.astype(np.int8), box, K, np.where(rest.is_empty, np.inf, rest.mag), smooth, singular)
+    return Image(status.astype(np.int8), box, K, np.where(rest.is_empty, np.inf, rest.mag), smooth, singular, exact)
 
 
 def _regular(Y: Array, slopes: Interval) -> Mask:
@@ -346,4 +354,5 @@ def _report(
     with np.errstate(all="ignore"):
         factor = (step.factor[0] @ domain.rad) / domain.rad
     contraction = float(np.max(factor)) if np.isfinite(factor).all() else float("inf")
-    return KrawczykResult(status, box, domain, K, spectral_radius(step.factor[0]), contraction, rounds, reason)
+    radius = spectral_radius(step.factor[0])
+    return KrawczykResult(status, box, domain, K, radius, contraction, rounds, reason, step.exact_input)

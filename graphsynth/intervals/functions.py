@@ -1,0 +1,227 @@
+"""Functions for formulas written once: of numbers, intervals and duals.
+
+Elementary functions are computed by this package's own kernels with proved error bounds; no function of the C library
+or of numpy is trusted with a bound (``docs/explanation/intervals.md``).  Accuracy: for point arguments the bounds are
+mostly neighbouring doubles, at worst three apart.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals.dual import Dual
+from graphsynth.intervals.interval import Interval, _clipped, _make, interval
+from graphsynth.intervals.reading import DISCONTINUOUS
+
+__all__ = [
+    "acos", "asin", "atan", "atan2", "cos", "divide_extended", "exp", "hypot", "log", "maximum", "minimum", "pi", "sin",
+    "sqr", "sqrt", "tan",
+]  # fmt: skip
+
+Array = NDArray[np.float64]
+
+
+def _apply(name: str, *arguments: Interval) -> Interval:
+    """Run a compiled loop over broadcast arguments; decorations of all are joined."""
+    from graphsynth.intervals.kernels import elementary
+
+    bounds = np.broadcast_arrays(*[side for a in arguments for side in (a.lo, a.hi)])
+    flat = [np.ascontiguousarray(b).reshape(-1) for b in bounds]
+    lo, hi = np.empty(flat[0].size), np.empty(flat[0].size)
+    getattr(elementary, name)(*flat, lo, hi)
+    flags = arguments[0].flags
+    for a in arguments[1:]:
+        flags = np.asarray(np.bitwise_or(flags, a.flags))
+    return _make(lo.reshape(bounds[0].shape), hi.reshape(bounds[0].shape), flags)
+
+
+def _mark(x: Interval, where: NDArray[np.bool_]) -> Interval:
+    if not where.any():
+        return x
+    return _make(x.lo, x.hi, np.asarray(np.bitwise_or(x.flags, np.where(where, DISCONTINUOUS, np.uint8(0)))))
+
+
+def _mark_clipped(x: Interval, where: NDArray[np.bool_]) -> Interval:
+    return _make(x.lo, x.hi, _clipped(x.flags, where))
+
+
+def sqr(x: Any) -> Any:
+    """Square.
+
+    Examples
+    --------
+    >>> sqr(Interval(-1, 2))
+    Interval([0, 4])
+    """
+    return x.sqr() if isinstance(x, Dual) else interval(x).sqr()
+
+
+def sqrt(x: Any) -> Any:
+    """Square root; a negative part is clipped and recorded (`Decoration.CLIPPED`)."""
+    return x.sqrt() if isinstance(x, Dual) else interval(x).sqrt()
+
+
+def sin(x: Any) -> Any:
+    """Sine.
+
+    Examples
+    --------
+    >>> sin(Interval(0, 4)).hi.item()
+    1.0
+    """
+    if isinstance(x, Dual):
+        return x.chain(sin(x.value), cos(x.value))
+    return _apply("sin", interval(x))
+
+
+def cos(x: Any) -> Any:
+    """Cosine."""
+    if isinstance(x, Dual):
+        return x.chain(cos(x.value), -sin(x.value))
+    return _apply("cos", interval(x))
+
+
+def tan(x: Any) -> Any:
+    """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`)."""
+    if isinstance(x, Dual):
+        value = tan(x.value)
+        return x.chain(value, value.sqr() + 1)
+    result = _apply("tan", interval(x))
+    return _mark(result, ~result.is_bounded & ~result.is_empty)
+
+
+def atan(x: Any) -> Any:
+    """Inverse tangent."""
+    if isinstance(x, Dual):
+        return x.chain(atan(x.value), 1 / (x.value.sqr() + 1))
+    return _apply("atan", interval(x))
+
+
+def asin(x: Any) -> Any:
+    """Inverse sine; a part outside [-1, 1] is clipped and recorded."""
+    if isinstance(x, Dual):
+        return x.chain(asin(x.value), 1 / sqrt((1 - x.value) * (1 + x.value)))
+    x = interval(x)
+    return _mark_clipped(_apply("asin", x), (x.lo < -1.0) | (x.hi > 1.0))
+
+
+def acos(x: Any) -> Any:
+    """Inverse cosine; a part outside [-1, 1] is clipped and recorded."""
+    if isinstance(x, Dual):
+        return x.chain(acos(x.value), -1 / sqrt((1 - x.value) * (1 + x.value)))
+    x = interval(x)
+    return _mark_clipped(_apply("acos", x), (x.lo < -1.0) | (x.hi > 1.0))
+
+
+def exp(x: Any) -> Any:
+    """Exponential."""
+    if isinstance(x, Dual):
+        value = exp(x.value)
+        return x.chain(value, value)
+    return _apply("exp", interval(x))
+
+
+def log(x: Any) -> Any:
+    """Natural logarithm; a part at or below 0 is clipped and recorded."""
+    if isinstance(x, Dual):
+        return x.chain(log(x.value), 1 / x.value)
+    x = interval(x)
+    return _mark_clipped(_apply("log", x), x.lo <= 0.0)
+
+
+def atan2(y: Any, x: Any) -> Any:
+    """Angle of the points (x, y) in (-pi, pi]; ``[-pi, pi]`` across the cut, recorded; clipped at the origin.
+
+    Examples
+    --------
+    >>> atan2(Interval(1), Interval(1)).contains(0.7853981633974483)
+    True
+    """
+    if isinstance(x, Dual) or isinstance(y, Dual):
+        x, y = _dual(x, y), _dual(y, x)
+        square = x.value.sqr() + y.value.sqr()
+        return Dual(atan2(y.value, x.value), (x.value / square) * y.grad - (y.value / square) * x.grad)
+    y, x = interval(y), interval(x)
+    result = _mark(_apply("atan2", y, x), (y.lo < 0.0) & (y.hi >= 0.0) & (x.lo < 0.0))
+    return _mark_clipped(result, (y.lo <= 0.0) & (y.hi >= 0.0) & (x.lo <= 0.0) & (x.hi >= 0.0))
+
+
+def hypot(x: Any, y: Any) -> Any:
+    """Distance from the origin, without overflow on the way."""
+    if isinstance(x, Dual) or isinstance(y, Dual):
+        x, y = _dual(x, y), _dual(y, x)
+        value = hypot(x.value, y.value)
+        return Dual(value, (x.value / value) * x.grad + (y.value / value) * y.grad)
+    return _apply("hypot", interval(x), interval(y))
+
+
+def _dual(x: Any, like: Any) -> Dual:
+    return x if isinstance(x, Dual) else Dual(interval(x), like.grad * 0)
+
+
+def minimum(x: Any, y: Any) -> Any:
+    """Smaller of two; the derivative holds both where either may be the smaller."""
+    if isinstance(x, Dual) or isinstance(y, Dual):
+        x, y = _dual(x, y), _dual(y, x)
+        return _selected(minimum(x.value, y.value), x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo)
+    x, y = interval(x), interval(y)
+    return _combined(x, y, np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi))
+
+
+def maximum(x: Any, y: Any) -> Any:
+    """Larger of two; the derivative holds both where either may be the larger."""
+    if isinstance(x, Dual) or isinstance(y, Dual):
+        x, y = _dual(x, y), _dual(y, x)
+        return _selected(maximum(x.value, y.value), x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi)
+    x, y = interval(x), interval(y)
+    return _combined(x, y, np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi))
+
+
+def _combined(x: Interval, y: Interval, lo: Array, hi: Array) -> Interval:
+    void = x.is_empty | y.is_empty
+    return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), np.asarray(np.bitwise_or(x.flags, y.flags)))
+
+
+def _selected(value: Interval, x: Dual, y: Dual, first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Dual:
+    both = x.grad.hull(y.grad)
+    lo = np.where(first, x.grad.lo, np.where(second, y.grad.lo, both.lo))
+    hi = np.where(first, x.grad.hi, np.where(second, y.grad.hi, both.hi))
+    return Dual(value, _make(lo, hi, both.flags))
+
+
+def pi() -> Interval:
+    """Return the interval of two neighbouring doubles around pi.
+
+    Examples
+    --------
+    >>> pi()
+    Interval([3.141592653589793, 3.1415926535897936])
+    """
+    from graphsynth.intervals.constants import PI
+
+    return _make(*PI)
+
+
+def divide_extended(a: Any, b: Any) -> tuple[Interval, Interval]:
+    """Quotient as the union of two intervals, the second empty unless 0 lies inside the divisor.
+
+    ``{x : x b = a for some a, b}`` without the case 0 b = 0: for a divisor with 0 inside and a numerator without it,
+    the quotient is two half lines, needed by Gauss-Seidel steps.
+
+    Examples
+    --------
+    >>> divide_extended(Interval(1), Interval(-2, 4))
+    (Interval([-inf, -0.5]), Interval([0.25, inf]))
+    """
+    a, b = interval(a), interval(b)
+    split = (b.lo < 0.0) & (b.hi > 0.0) & ((a.lo > 0.0) | (a.hi < 0.0))
+    whole = a / b
+    left = a / _make(np.where(split, b.lo, 1.0), np.where(split, 0.0, 1.0))
+    right = a / _make(np.where(split, 0.0, 1.0), np.where(split, b.hi, 1.0))
+    low = np.where(left.lo == -np.inf, left.hi, right.hi)
+    high = np.where(left.hi == np.inf, left.lo, right.lo)
+    first = _make(np.where(split, -np.inf, whole.lo), np.where(split, low, whole.hi), whole.flags)
+    return first, _make(np.where(split, high, np.inf), np.where(split, np.inf, -np.inf), whole.flags)

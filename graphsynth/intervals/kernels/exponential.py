@@ -1,0 +1,139 @@
+"""Exponential, logarithm and hypotenuse with certified bounds; proofs in ``docs/explanation/intervals.md``."""
+
+from fractions import Fraction
+from math import factorial, frexp, ldexp
+
+import numpy as np
+from numba import njit
+
+from graphsynth.intervals import constants
+from graphsynth.intervals.kernels import double_double as dd
+from graphsynth.intervals.kernels.rounding import (
+    ETA,
+    INF,
+    MAX,
+    add_down,
+    add_up,
+    multiply_both,
+    root_down,
+    root_up,
+)
+
+_LOG2 = Fraction(constants.log2_fixed(300), 2**300)
+_TOP = float(Fraction(int(_LOG2 * 2**40), 2**40))  # 40 bits: its products with exponents are exact
+_MID, _LOW = constants.split(_LOG2 - Fraction(_TOP))
+_LOG2_H, _LOG2_L = constants.split(_LOG2)
+_EXP = np.array([constants.split(Fraction(1, factorial(k))) for k in range(21)])
+_ODD = np.array([constants.split(Fraction(2, 2 * k + 1)) for k in range(20)])
+_EXP_EXACT, _LOG_EXACT = 10, 7
+RELATIVE = 2.0**-66
+
+
+@njit(cache=True, error_model="numpy")
+def exp_at(x):
+    """Bounds of the exponential; infinities allowed."""
+    if x == 0.0:
+        return 1.0, 1.0
+    if x > 709.8:
+        return MAX, INF
+    if x < -745.2:
+        return 0.0, ETA
+    k = np.floor(x * 1.4426950408889634 + 0.5)
+    h, l = dd.two_sum(x, -k * _TOP)
+    mh, ml = dd.multiply_double(_MID, _LOW, k)
+    h, l = dd.add(h, l, -mh, -ml)
+    tail = 0.0
+    for j in range(20, _EXP_EXACT - 1, -1):
+        tail = tail * h + _EXP[j, 0]
+    ph, pl = tail, 0.0
+    for j in range(_EXP_EXACT - 1, -1, -1):
+        ph, pl = dd.multiply(ph, pl, h, l)
+        ph, pl = dd.add(ph, pl, _EXP[j, 0], _EXP[j, 1])
+    lo, hi = dd.bounds(ph, pl, ph * RELATIVE)
+    n = int(k)
+    half = n // 2
+    a, b = ldexp(1.0, half), ldexp(1.0, n - half)
+    if n > -1000:
+        lo, hi = lo * a * b, hi * a * b  # exact, or an overflow
+    else:
+        lo, hi = multiply_both(lo * a, b)[0], multiply_both(hi * a, b)[1]
+    return max(min(lo, MAX), 0.0), hi
+
+
+@njit(cache=True, error_model="numpy")
+def log_at(x):
+    """Bounds of the logarithm of ``x >= 0``; infinities allowed."""
+    if x == 0.0:
+        return -INF, -INF
+    if x == INF:
+        return MAX, INF
+    if x == 1.0:
+        return 0.0, 0.0
+    m, e = frexp(x)
+    if m < 0.7071067811865476:
+        m, e = 2.0 * m, e - 1
+    ah, al = dd.two_sum(m, 1.0)
+    h, l = dd.divide(m - 1.0, 0.0, ah, al)
+    sh, sl = dd.multiply(h, l, h, l)
+    tail = 0.0
+    for j in range(19, _LOG_EXACT - 1, -1):
+        tail = tail * sh + _ODD[j, 0]
+    ph, pl = tail, 0.0
+    for j in range(_LOG_EXACT - 1, -1, -1):
+        ph, pl = dd.multiply(ph, pl, sh, sl)
+        ph, pl = dd.add(ph, pl, _ODD[j, 0], _ODD[j, 1])
+    h, l = dd.multiply(ph, pl, h, l)
+    if e != 0:
+        lh, ll = dd.multiply_double(_LOG2_H, _LOG2_L, float(e))
+        h, l = dd.add(lh, ll, h, l)
+    return dd.bounds(h, l, abs(h) * RELATIVE)
+
+
+@njit(cache=True, error_model="numpy")
+def exp(al, ah):
+    """Range of the exponential."""
+    if al > ah:
+        return INF, -INF
+    return 0.0 if al == -INF else exp_at(al)[0], INF if ah == INF else exp_at(ah)[1]
+
+
+@njit(cache=True, error_model="numpy")
+def log(al, ah):
+    """Range of the logarithm of the part above 0."""
+    if al > ah or ah <= 0.0:
+        return INF, -INF
+    return log_at(max(al, 0.0))[0], log_at(ah)[1]
+
+
+@njit(cache=True, error_model="numpy")
+def hypot(al, ah, bl, bh):
+    """Range of ``sqrt(x^2 + y^2)``."""
+    if al > ah or bl > bh:
+        return INF, -INF
+    x1 = al if al > 0.0 else (-ah if ah < 0.0 else 0.0)
+    y1 = bl if bl > 0.0 else (-bh if bh < 0.0 else 0.0)
+    return _hypot_at(x1, y1)[0], _hypot_at(max(-al, ah), max(-bl, bh))[1]
+
+
+@njit(cache=True, error_model="numpy")
+def _hypot_at(x, y):
+    """Bounds for ``x, y >= 0``."""
+    if x == 0.0 or y == 0.0:
+        return x + y, x + y
+    big, small = max(x, y), min(x, y)
+    if big == INF:
+        return MAX, INF
+    scale = 1.0
+    if big > 2.0**480:
+        scale = 2.0**-600
+    elif big < 2.0**-400:
+        scale = 2.0**600
+    a = big * scale
+    b = small * scale
+    if b < 2.0**-450 and b < a * 2.0**-50:  # hypot - big < small^2 / (2 big), less than a step
+        return big, add_up(big, ETA)
+    lo = root_down(add_down(multiply_both(a, a)[0], multiply_both(b, b)[0]))
+    hi = root_up(add_up(multiply_both(a, a)[1], multiply_both(b, b)[1]))
+    if scale == 1.0:
+        return max(lo, big), hi
+    return max(multiply_both(lo, 1.0 / scale)[0], big), multiply_both(hi, 1.0 / scale)[1]

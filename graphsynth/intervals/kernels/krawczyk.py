@@ -1,0 +1,117 @@
+"""Krawczyk's test compiled, for systems that are themselves compiled.
+
+A system is an ``njit`` function
+
+    system(xl, xh, pl, ph, fl, fh, jl, jh, derivatives) -> bool
+
+that writes enclosures of the equations into ``fl, fh`` (n,) and, if ``derivatives``, of the Jacobian into ``jl, jh``
+(n, n), for unknowns ``xl, xh`` (n,) and parameters ``pl, ph`` (m,); it returns whether everything was defined and
+continuous.  It is written with the scalar functions of this package (``arithmetic.add`` and so on).
+"""
+
+import numpy as np
+from numba import njit
+
+from graphsynth.intervals.kernels import arithmetic as ia
+
+EMPTY, UNIQUE, EXISTS, UNDECIDED = 0, 1, 2, 3
+
+
+@njit(cache=True, error_model="numpy")
+def invert(a, y):
+    """Inverse of ``a`` (destroyed) into ``y``; False if there is none."""
+    n = a.shape[0]
+    if n == 1:
+        y[0, 0] = 1.0 / a[0, 0]
+        return np.isfinite(y[0, 0])
+    if n == 2:
+        d = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
+        y[0, 0], y[0, 1], y[1, 0], y[1, 1] = a[1, 1] / d, -a[0, 1] / d, -a[1, 0] / d, a[0, 0] / d
+        return np.isfinite(y[0, 0]) and np.isfinite(y[0, 1]) and np.isfinite(y[1, 0]) and np.isfinite(y[1, 1])
+    for i in range(n):
+        for j in range(n):
+            y[i, j] = 1.0 if i == j else 0.0
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if not abs(a[pivot, k]) > 0.0:
+            return False
+        for j in range(n):
+            a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+            y[k, j], y[pivot, j] = y[pivot, j], y[k, j]
+        inverse = 1.0 / a[k, k]
+        for j in range(n):
+            a[k, j] *= inverse
+            y[k, j] *= inverse
+        for i in range(n):
+            if i != k:
+                factor = a[i, k]
+                for j in range(n):
+                    a[i, j] -= factor * a[k, j]
+                    y[i, j] -= factor * y[k, j]
+    return np.isfinite(y.sum())
+
+
+@njit(error_model="numpy")
+def krawczyk_boxes(system, lo, hi, pl, ph, out_lo, out_hi, status):
+    """Test boxes (N, n) once with common parameters (m,): status and intersection with the image."""
+    n = lo.shape[1]
+    fl, fh, z = np.empty(n), np.empty(n), np.empty(n)
+    jl, jh = np.empty((n, n)), np.empty((n, n))
+    mid, y = np.empty((n, n)), np.empty((n, n))
+    for b in range(lo.shape[0]):
+        xl, xh, kl, kh = lo[b], hi[b], out_lo[b], out_hi[b]
+        smooth = system(xl, xh, pl, ph, fl, fh, jl, jh, True)
+        found = UNDECIDED
+        for i in range(n):
+            kl[i], kh[i] = xl[i], xh[i]
+            z[i] = 0.5 * (xl[i] + xh[i])
+            if not (fl[i] <= 0.0 <= fh[i]) or not xl[i] <= xh[i]:
+                found = EMPTY
+            smooth = smooth and np.isfinite(z[i])
+            for j in range(n):
+                mid[i, j] = 0.5 * (jl[i, j] + jh[i, j])
+        if found != EMPTY and smooth and invert(mid, y):
+            smooth = system(z, z, pl, ph, fl, fh, jl, jh, False)
+            if smooth:
+                found = _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh)
+        if found == EMPTY:
+            kl[:], kh[:] = np.inf, -np.inf
+        status[b] = found
+
+
+@njit(cache=True, error_model="numpy")
+def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
+    """Return the status from the image; the intersection replaces ``kl, kh``."""
+    n = z.size
+    inside, within, norm = True, True, 0.0
+    for i in range(n):
+        al, ah = z[i], z[i]
+        rl, rh = 0.0, 0.0
+        row = 0.0
+        for j in range(n):
+            pl, ph = ia.scale(y[i, j], fl[j], fh[j])
+            al, ah = ia.subtract(al, ah, pl, ph)
+            ml, mh = ia.scale(-y[i, 0], jl[0, j], jh[0, j])
+            for k in range(1, n):
+                pl, ph = ia.scale(-y[i, k], jl[k, j], jh[k, j])
+                ml, mh = ia.add(ml, mh, pl, ph)
+            if i == j:
+                ml, mh = ia.add(ml, mh, 1.0, 1.0)
+            row += max(-ml, mh)
+            dl, dh = ia.subtract(xl[j], xh[j], z[j], z[j])
+            pl, ph = ia.multiply(ml, mh, dl, dh)
+            rl, rh = ia.add(rl, rh, pl, ph)
+        al, ah = ia.add(al, ah, rl, rh)
+        norm = max(norm, row)
+        inside = inside and xl[i] < al and ah < xh[i]
+        within = within and xl[i] <= al and ah <= xh[i]
+        if al > xh[i] or ah < xl[i]:
+            return EMPTY
+        kl[i], kh[i] = max(xl[i], al), min(xh[i], ah)
+    if inside:
+        return UNIQUE
+    # the sum is done to nearest; the margin covers its rounding, so Y is nonsingular
+    return EXISTS if within and norm < 1.0 - 1e-9 else UNDECIDED

@@ -1,0 +1,341 @@
+"""Pavings: all solutions of a system in a box, by branch and prune over many boxes at once.
+
+Breadth first: a batch of boxes from the front of the queue is tested by Krawczyk's operator, contracted, kept or cut.
+The search is an iterator; it can be stopped, saved as plain arrays, loaded and resumed, and gives the same boxes
+however it is interrupted.  Nothing is lost: at any time the kept and the waiting boxes hold every solution of the
+start box.  Source: specification, section 6.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import FormatError, SpecError
+from graphsynth.intervals.boxes import Paving, Progress
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.interval import Interval, _make, interval
+from graphsynth.intervals.proving import Image, System, image
+from graphsynth.intervals.status import Status
+
+__all__ = ["Search", "pave"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_FORMAT = 1
+_GAIN = 0.9
+_CONTRACTIONS = 4
+_POLISH = 8
+_ARRAYS = ("waiting_lo", "waiting_hi", "lo", "hi", "domain_lo", "domain_hi", "status", "inner")
+
+
+class Search:
+    """Branch and prune as an iterator over batches.
+
+    Parameters
+    ----------
+    f : callable
+        As for `krawczyk`.
+    box : Interval or anything it takes, shape (n,)
+        Start box, bounded.
+    parameters : Interval or anything it takes, shape (m,), optional
+    tolerance : float
+        Boxes with all widths below ``tolerance * scale`` are not cut further.
+    scale : sequence of float, optional
+        Natural size of each unknown; the widths of the start box for None.
+    max_boxes, max_seconds : int, float
+        Budget of the whole search, resumed parts included.  A batch is never cut short, so that an interrupted search
+        gives the same boxes; the budget may be exceeded by one batch.
+    inner : sequence of int, optional
+        As many parameters as equations by which boxes are proved inner: for every point of the box there are values
+        of these parameters that make it a solution.
+    batch : int
+        Boxes tested at once; part of the definition of the result.
+    progress : callable, optional
+        Called with a `Progress` after every batch.
+
+    Raises
+    ------
+    SpecError
+        For a box that is empty, unbounded or no vector, budgets and tolerances that are not positive.
+
+    Examples
+    --------
+    >>> search = Search(lambda x: [x[0] ** 2 - 2], ["[-4, 4]"], tolerance=1e-9)
+    >>> for state in search:
+    ...     pass
+    >>> found = search.paving()
+    >>> [Status(s).name for s in found.status], found.finished
+    (['UNIQUE', 'UNIQUE'], True)
+    """
+
+    def __init__(
+        self, f: System, box: Any, parameters: Any = None, *, tolerance: float = 1e-6,
+        scale: Sequence[float] | None = None, max_boxes: int = 100_000, max_seconds: float = 60.0,
+        inner: Sequence[int] | None = None, batch: int = 2048, progress: Callable[[Progress], None] | None = None,
+    ) -> None:  # fmt: skip
+        check_rounding()
+        start = interval(box)
+        if start.ndim != 1 or start.size == 0 or not start.is_bounded.all():
+            raise SpecError(f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)")
+        for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
+            if not value > 0:
+                raise SpecError(f"{name} = {value} must be positive")
+        self.f, self.start, self.progress = f, start, progress
+        self.parameters = None if parameters is None else interval(parameters)
+        self.tolerance, self.max_boxes, self.max_seconds, self.batch = tolerance, max_boxes, max_seconds, batch
+        size = np.asarray(start.width if scale is None else scale, dtype=np.float64)
+        if size.shape != start.shape or not np.isfinite(size).all() or (size < 0.0).any():
+            raise SpecError(f"scale {scale!r} must hold {start.size} positive numbers")
+        self.scale = np.where(size > 0.0, size, 1.0)
+        self.inner_by = None if inner is None else list(inner)
+        if self.inner_by is not None and (self.parameters is None or len(self.inner_by) != start.size):
+            raise SpecError(f"inner = {inner!r} must name as many parameters as there are equations, {start.size}")
+        n = start.size
+        none = np.zeros((0, n))
+        self._state: dict[str, NDArray[Any]] = dict.fromkeys(_ARRAYS[2:6], none)
+        self._state |= {"waiting_lo": start.lo[None].copy(), "waiting_hi": start.hi[None].copy()}
+        self._state |= {"status": np.zeros(0, dtype=np.int8), "inner": np.zeros(0, dtype=np.bool_)}
+        self.tested, self.seconds = 0, 0.0
+
+    @property
+    def finished(self) -> bool:
+        """Whether no box waits."""
+        return len(self._state["waiting_lo"]) == 0
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether a budget is used up."""
+        return self.tested >= self.max_boxes or self.seconds >= self.max_seconds
+
+    def __iter__(self) -> Iterator[Progress]:
+        check_rounding()
+        while not self.finished and not self.exhausted:
+            begin = perf_counter()
+            self._advance()
+            self.seconds += perf_counter() - begin
+            state = Progress(self.tested, len(self._state["waiting_lo"]), len(self._state["lo"]), self.seconds)
+            if self.progress is not None:
+                self.progress(state)
+            yield state
+
+    def paving(self) -> Paving:
+        """Return what is known now; waiting boxes are UNDECIDED."""
+        s = self._state
+        count = len(s["waiting_lo"])
+        lo, hi = np.concatenate([s["lo"], s["waiting_lo"]]), np.concatenate([s["hi"], s["waiting_hi"]])
+        dlo, dhi = (np.concatenate([s[f"domain_{e}"], s[f"waiting_{e}"]]) for e in ("lo", "hi"))
+        status = np.concatenate([s["status"], np.full(count, Status.UNDECIDED, dtype=np.int8)])
+        inner = np.concatenate([s["inner"], np.zeros(count, dtype=np.bool_)])
+        return Paving(_make(lo, hi), status, _make(dlo, dhi), inner, count == 0, self.tested, self.seconds)
+
+    def save(self, path: str | Path) -> None:
+        """Write the state to an ``.npz`` file of plain arrays."""
+        meta = np.array([_FORMAT, self.tested, self.batch], dtype=np.int64)
+        numbers = np.array([self.seconds, self.tolerance])
+        with Path(path).open("wb") as file:
+            np.savez(
+                file, meta=meta, numbers=numbers, start_lo=self.start.lo, start_hi=self.start.hi, scale=self.scale,
+                **{key: self._state[key] for key in _ARRAYS},  # type: ignore[arg-type]
+            )  # fmt: skip
+
+    def load(self, path: str | Path) -> Search:
+        """Go on from a saved state of the same search; returns the search itself.
+
+        Raises
+        ------
+        FormatError
+            For a file that is not a saved state, or that belongs to another box, tolerance or batch.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                data = {key: file[key] for key in file.files}
+            meta, numbers = data["meta"], data["numbers"]
+            state = {key: data[key] for key in _ARRAYS}
+            same = (
+                int(meta[0]) == _FORMAT and int(meta[2]) == self.batch and float(numbers[1]) == self.tolerance
+                and np.array_equal(data["start_lo"], self.start.lo) and np.array_equal(data["start_hi"], self.start.hi)
+                and np.array_equal(data["scale"], self.scale)
+            )  # fmt: skip
+            rows = {len(state[key]) for key in _ARRAYS[2:]}
+            sound = len(rows) == 1 and all(state[key].shape[1:] == self.start.shape for key in _ARRAYS[:6])
+            sound = sound and not any(np.isnan(state[key]).any() for key in _ARRAYS[:6])
+        except Exception as error:
+            raise FormatError(
+                f"not a saved search ({type(error).__name__}); give a file written by save", str(path)
+            ) from error
+        if not same or not sound:
+            raise FormatError("saved by a search of another box, scale, tolerance or batch; start it anew", str(path))
+        self._state, self.tested, self.seconds = state, int(meta[1]), float(numbers[0])
+        return self
+
+    # -- one batch ---------------------------------------------------------------------------------------------------
+
+    def _advance(self) -> None:
+        s = self._state
+        count = self.batch
+        X = _make(s["waiting_lo"][:count], s["waiting_hi"][:count])
+        s["waiting_lo"], s["waiting_hi"] = s["waiting_lo"][count:], s["waiting_hi"][count:]
+        X, domain, status, last = self._contract(X)
+        alive = status != Status.EMPTY
+        X, domain, status, last = X[alive], domain[alive], status[alive], last[alive]
+        proved = status != Status.UNDECIDED
+        self._keep(X[proved], domain[proved], status[proved], np.zeros(int(proved.sum()), dtype=np.bool_))
+        X, last = X[~proved], last[~proved]
+        X = X[~self._prove_beyond(X, last)]
+        if self.inner_by is not None and len(X):
+            inside = self._inner(X)
+            self._keep(X[inside], X[inside], np.full(int(inside.sum()), Status.UNDECIDED, dtype=np.int8), None)
+            X = X[~inside]
+        sides = X.width / self.scale
+        widest = sides.argmax(axis=1) if len(X) else np.zeros(0, dtype=np.int64)
+        row = np.arange(len(X))
+        middle = X.mid[row, widest]
+        small = sides.max(axis=1, initial=0.0) <= self.tolerance
+        small |= (middle <= X.lo[row, widest]) | (middle >= X.hi[row, widest])
+        done = np.full(int(small.sum()), Status.UNDECIDED, dtype=np.int8)
+        self._keep(X[small], X[small], done, np.zeros(len(done), dtype=np.bool_))
+        self._cut(X[~small], widest[~small], middle[~small])
+        self._absorb()
+
+    def _contract(self, X: Interval) -> tuple[Interval, Interval, NDArray[np.int8], Array]:
+        """Repeat the test on each box while it gains; the domain is the box of the first proof."""
+        lo, hi = X.lo.copy(), X.hi.copy()
+        dlo, dhi = lo.copy(), hi.copy()
+        status = np.full(len(lo), Status.UNDECIDED, dtype=np.int8)
+        norm = np.full(len(lo), np.inf)
+        active = np.arange(len(lo))
+        for turn in range(_CONTRACTIONS + _POLISH):
+            if active.size == 0:
+                break
+            boxes = _make(lo[active], hi[active])
+            step = image(self.f, boxes, self.parameters)
+            self.tested += active.size
+            norm[active] = step.factor.sum(axis=2).max(axis=1)
+            better = (status[active] == Status.UNDECIDED) & (step.status != Status.UNDECIDED)
+            better |= (status[active] == Status.EXISTS) & (step.status == Status.UNIQUE)
+            first = active[better]
+            dlo[first], dhi[first] = lo[first], hi[first]
+            status[first] = step.status[better]
+            empty = step.status == Status.EMPTY
+            status[active[empty]] = Status.EMPTY
+            gain = (step.box.width < _GAIN * boxes.width).any(axis=1) & ~empty
+            lo[active], hi[active] = step.box.lo, step.box.hi
+            if turn >= _CONTRACTIONS:
+                gain &= status[active] != Status.UNDECIDED
+            active = active[gain]
+        return _make(lo, hi), _make(dlo, dhi), status, norm
+
+    def _prove_beyond(self, X: Interval, norm: Array) -> Mask:
+        """Epsilon-inflation: prove solutions near faces in enlarged boxes; returns the boxes that are settled."""
+        settled = np.zeros(len(norm), dtype=np.bool_)
+        near = np.flatnonzero(norm < 0.5)
+        if near.size == 0:
+            return settled
+        trial = X[near].inflate(0.25, 1e-300)
+        grow = 0.05 * trial.width.max(axis=1, keepdims=True) if len(near) else 0.0
+        trial = _make(trial.lo - grow, trial.hi + grow)
+        step: Image = image(self.f, trial, self.parameters)
+        self.tested += near.size
+        good = step.status == Status.UNIQUE
+        settled[near[step.status == Status.EMPTY]] = True
+        outside = step.image.disjoint(self.start).any(axis=1)
+        settled[near[good & outside]] = True  # the only solution near lies outside the start box
+        keep = good & step.image.subset(self.start).all(axis=1)
+        settled[near[keep]] = True
+        if keep.any():
+            box, domain = step.box[keep], trial[keep]
+            for _ in range(_POLISH):
+                box = image(self.f, box.inflate(0.01, 1e-300), self.parameters).box.intersect(box)
+                self.tested += len(box)
+            self._keep(box, domain, step.status[keep], np.zeros(int(keep.sum()), dtype=np.bool_))
+        return settled
+
+    def _inner(self, X: Interval) -> Mask:
+        """Whether for every point of a box there are values of the chosen parameters that make it a solution."""
+        assert self.parameters is not None
+        assert self.inner_by is not None
+        chosen, n, parameters = self.inner_by, self.start.size, self.parameters
+        m = parameters.shape[-1]
+        middle = parameters.mid
+
+        def flipped(q: Sequence[Any], x: Sequence[Any]) -> Sequence[Any]:
+            values: list[Any] = [_make(middle[j], middle[j]) for j in range(m)]
+            for index, value in zip(chosen, q):
+                values[index] = value
+            return self.f(x[:n], values)
+
+        wanted = parameters[np.array(chosen)]
+        shape = (len(X.lo), len(chosen))
+        boxes = _make(np.broadcast_to(wanted.lo, shape), np.broadcast_to(wanted.hi, shape))
+        status = image(flipped, boxes, X).status
+        return np.asarray((status == Status.UNIQUE) | (status == Status.EXISTS))
+
+    def _keep(self, box: Interval, domain: Interval, status: NDArray[np.int8], inner: Mask | None) -> None:
+        s = self._state
+        inner = np.ones(len(status), dtype=np.bool_) if inner is None else inner
+        s["lo"], s["hi"] = np.concatenate([s["lo"], box.lo]), np.concatenate([s["hi"], box.hi])
+        s["domain_lo"] = np.concatenate([s["domain_lo"], domain.lo])
+        s["domain_hi"] = np.concatenate([s["domain_hi"], domain.hi])
+        s["status"], s["inner"] = np.concatenate([s["status"], status]), np.concatenate([s["inner"], inner])
+
+    def _cut(self, X: Interval, widest: NDArray[np.intp], middle: Array) -> None:
+        """Halve boxes; halves stay neighbours, at the back of the queue."""
+        row = np.arange(len(widest))
+        lo, hi = np.repeat(X.lo, 2, axis=0), np.repeat(X.hi, 2, axis=0)
+        hi[2 * row, widest] = middle
+        lo[2 * row + 1, widest] = middle
+        s = self._state
+        s["waiting_lo"] = np.concatenate([s["waiting_lo"], lo])
+        s["waiting_hi"] = np.concatenate([s["waiting_hi"], hi])
+
+    def _absorb(self) -> None:
+        """Drop what a proved box already stands for: a box inside its domain, or the same solution found twice."""
+        s = self._state
+        dropped = np.zeros(len(s["lo"]), dtype=np.bool_)
+        gone = np.zeros(len(s["waiting_lo"]), dtype=np.bool_)
+        for k in np.flatnonzero(s["status"] == Status.UNIQUE):
+            if dropped[k]:
+                continue
+            dlo, dhi = s["domain_lo"][k], s["domain_hi"][k]
+            inside = (s["lo"] >= dlo).all(axis=1) & (s["hi"] <= dhi).all(axis=1)
+            inside[k] = False
+            dropped |= inside
+            gone |= (s["waiting_lo"] >= dlo).all(axis=1) & (s["waiting_hi"] <= dhi).all(axis=1)
+        if gone.any():
+            s["waiting_lo"], s["waiting_hi"] = s["waiting_lo"][~gone], s["waiting_hi"][~gone]
+        if dropped.any():
+            for key in _ARRAYS[2:]:
+                s[key] = s[key][~dropped]
+
+
+def pave(f: System, box: Any, parameters: Any = None, **options: Any) -> Paving:
+    """Find all solutions of ``f = 0`` in a box: run a `Search` to its end or its budget.
+
+    Parameters
+    ----------
+    f, box, parameters : as for `krawczyk`
+    **options
+        As for `Search`: tolerance, scale, max_boxes, max_seconds, inner, batch, progress.
+
+    Returns
+    -------
+    Paving
+        Certified; ``finished`` is False if a budget ended the search.
+
+    Examples
+    --------
+    >>> found = pave(lambda x: [x[0] ** 2 + x[1] ** 2 - 1, x[0] - x[1] ** 2], ["[-2, 2]", "[-2, 2]"])
+    >>> len(found.status), found.verdict.name
+    (2, 'EXISTS')
+    """
+    search = Search(f, box, parameters, **options)
+    for _ in search:
+        pass
+    return search.paving()
