@@ -17,7 +17,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-__all__ = ["kernel", "source_digest"]
+__all__ = ["announce", "kernel", "source_digest"]
 
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+([^#\n]+))?", re.MULTILINE)
 _ROOT = Path(__file__).parent.parent
@@ -46,6 +46,15 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     return compiled
 
 
+#: At most one function, called before the first kernel that has to be compiled.
+_listeners: list[Callable[[], None]] = []
+
+
+def announce(listener: Callable[[], None]) -> None:
+    """Call ``listener`` once, before the first kernel of this process that is not kept on disk is compiled."""
+    _listeners[:] = [listener]
+
+
 @cache
 def _cache_class() -> Any:
     from numba.core.caching import FunctionCache
@@ -59,6 +68,12 @@ def _cache_class() -> Any:
 
         def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
             return (*super()._index_key(sig, codegen), self._digest)
+
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            found = super().load_overload(sig, target_context)
+            if found is None and _listeners:
+                _listeners.pop()()
+            return found
 
     return SourceCache
 

@@ -25,16 +25,19 @@ from pathlib import Path
 c._IMPORT = c.re.compile(c._IMPORT.pattern.replace("graphsynth", "graphsynth(?:_probe)?"), c.re.MULTILINE)
 c.source_digest.__wrapped__.__defaults__ = (Path({folder!r}),)
 from graphsynth_probe.above import above
+c.announce(lambda: sys.stderr.write("compiling\\n"))
 print(above(1.0), sum(above.stats.cache_hits.values()), sum(above.stats.cache_misses.values()))
 """
 
 
 def probe(folder: Path) -> tuple[float, int, int]:
-    """Run the probe package in a process of its own: value, cache hits, cache misses."""
-    text = subprocess.run(
+    """Run the probe package in a process of its own: value, cache hits, cache misses; compiling is announced once."""
+    done = subprocess.run(
         [sys.executable, "-c", RUN.format(folder=str(folder))], capture_output=True, text=True, check=True
-    ).stdout.split()
-    return float(text[0]), int(text[1]), int(text[2])
+    )
+    value, hits, misses = done.stdout.split()
+    assert done.stderr.count("compiling") == (1 if int(misses) else 0)
+    return float(value), int(hits), int(misses)
 
 
 def test_a_change_in_another_module_is_noticed(tmp_path: Path) -> None:

@@ -7,14 +7,13 @@ import time
 
 from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
-from graphsynth.cli.workers import announce_compilation, workers_for
+from graphsynth.cli.workers import workers_for
 
 __all__ = ["run"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the count; the number stands alone on the last line."""
-    announce_compilation("counting.count_block")
     from graphsynth.synthesis.parallel import processes
     from graphsynth.synthesis.writing import count_with_checkpoint
 

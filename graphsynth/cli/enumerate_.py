@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
-from graphsynth.cli.workers import announce_compilation, workers_for
+from graphsynth.cli.workers import workers_for
 from graphsynth.errors import SpecError, TooLargeError
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ def run(options: argparse.Namespace) -> int:
         raise SpecError("--json needs -o FILE.jsonl here: the graphs go to the file, a summary to standard output")
     if options.output is None and (options.resume or options.force):
         raise SpecError("--resume and --force need -o FILE")
-    announce_compilation("listing.list_rows")
     from graphsynth.synthesis.parallel import processes
 
     begin = time.perf_counter()

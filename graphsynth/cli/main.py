@@ -13,7 +13,9 @@ from pathlib import Path
 from types import FrameType
 
 import graphsynth
+from graphsynth.cli.console import note
 from graphsynth.cli.question import add_question
+from graphsynth.compilation import announce
 from graphsynth.errors import GraphsynthError
 
 __all__ = ["main"]
@@ -28,6 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: done; 2: bad input, told in one sentence on standard error; 130: interrupted.
     """
     options = _parser().parse_args(arguments)
+    announce(lambda: note("compiling kernels (first use only, some seconds) ..."))
     interrupted = _note_interrupts()
     try:
         # each verb lives in a module of its own, imported when it is used

@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 
 from graphsynth.cli import console
-from graphsynth.cli.workers import announce_compilation
 
 __all__ = ["run"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Run a scene and print its summary."""
-    announce_compilation("listing.list_rows")
     from graphsynth.scenes.report import print_summary
     from graphsynth.scenes.runner import run as run_scene
 
