@@ -59,7 +59,7 @@ def announce(listener: Callable[[], None]) -> None:
 def _cache_class() -> Any:
     from numba.core.caching import FunctionCache
 
-    class SourceCache(FunctionCache):
+    class SourceCache(FunctionCache):  # type: ignore[misc]  # numba has no types
         """Functions kept under a key that tells all sources that went into them."""
 
         def __init__(self, function: Callable[..., Any], digest: str) -> None:
