@@ -445,6 +445,8 @@ def _fill(target: Interval, lo: Array, hi: Array, flags: Flags) -> None:
     lo, hi = np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64)
     lo.flags.writeable = False
     hi.flags.writeable = False
+    if flags.ndim and flags.shape != lo.shape:
+        flags = np.broadcast_to(flags, lo.shape)
     object.__setattr__(target, "lo", lo)
     object.__setattr__(target, "hi", hi)
     object.__setattr__(target, "flags", flags)

@@ -50,6 +50,8 @@ def exp_at(x):
         ph, pl = dd.multiply(ph, pl, h, l)
         ph, pl = dd.add(ph, pl, _EXP[j, 0], _EXP[j, 1])
     lo, hi = dd.bounds(ph, pl, ph * RELATIVE)
+    if k == 0.0:
+        lo, hi = (max(lo, 1.0), hi) if x > 0.0 else (lo, min(hi, 1.0))
     n = int(k)
     half = n // 2
     a, b = ldexp(1.0, half), ldexp(1.0, n - half)

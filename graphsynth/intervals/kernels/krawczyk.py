@@ -6,15 +6,22 @@ A system is an ``njit`` function
 
 that writes enclosures of the equations into ``fl, fh`` (n,) and, if ``derivatives``, of the Jacobian into ``jl, jh``
 (n, n), for unknowns ``xl, xh`` (n,) and parameters ``pl, ph`` (m,); it returns whether everything was defined and
-continuous.  It is written with the scalar functions of this package (``arithmetic.add`` and so on).
+continuous.  It is written with the scalar functions of this package (``arithmetic.add`` and so on) and decorated with
+``@system``, which fixes its types: the test is then compiled once for all systems and calls them by their address.
 """
 
 import numpy as np
-from numba import njit
+from numba import boolean, float64, int8, njit, types, void
 
 from graphsynth.intervals.kernels import arithmetic as ia
 
 EMPTY, UNIQUE, EXISTS, UNDECIDED = 0, 1, 2, 3
+
+_VECTOR, _MATRIX = float64[::1], float64[:, ::1]
+SYSTEM = boolean(*[_VECTOR] * 6, _MATRIX, _MATRIX, boolean)
+#: Decorator for compiled systems.
+system = njit(SYSTEM, error_model="numpy")
+_TEST = void(types.FunctionType(SYSTEM), _MATRIX, _MATRIX, _VECTOR, _VECTOR, _MATRIX, _MATRIX, int8[::1])
 
 
 @njit(cache=True, error_model="numpy")
@@ -54,34 +61,6 @@ def invert(a, y):
     return np.isfinite(y.sum())
 
 
-@njit(error_model="numpy")
-def krawczyk_boxes(system, lo, hi, pl, ph, out_lo, out_hi, status):
-    """Test boxes (N, n) once with common parameters (m,): status and intersection with the image."""
-    n = lo.shape[1]
-    fl, fh, z = np.empty(n), np.empty(n), np.empty(n)
-    jl, jh = np.empty((n, n)), np.empty((n, n))
-    mid, y = np.empty((n, n)), np.empty((n, n))
-    for b in range(lo.shape[0]):
-        xl, xh, kl, kh = lo[b], hi[b], out_lo[b], out_hi[b]
-        smooth = system(xl, xh, pl, ph, fl, fh, jl, jh, True)
-        found = UNDECIDED
-        for i in range(n):
-            kl[i], kh[i] = xl[i], xh[i]
-            z[i] = 0.5 * (xl[i] + xh[i])
-            if not (fl[i] <= 0.0 <= fh[i]) or not xl[i] <= xh[i]:
-                found = EMPTY
-            smooth = smooth and np.isfinite(z[i])
-            for j in range(n):
-                mid[i, j] = 0.5 * (jl[i, j] + jh[i, j])
-        if found != EMPTY and smooth and invert(mid, y):
-            smooth = system(z, z, pl, ph, fl, fh, jl, jh, False)
-            if smooth:
-                found = _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh)
-        if found == EMPTY:
-            kl[:], kh[:] = np.inf, -np.inf
-        status[b] = found
-
-
 @njit(cache=True, error_model="numpy")
 def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
     """Return the status from the image; the intersection replaces ``kl, kh``."""
@@ -115,3 +94,31 @@ def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
         return UNIQUE
     # the sum is done to nearest; the margin covers its rounding, so Y is nonsingular
     return EXISTS if within and norm < 1.0 - 1e-9 else UNDECIDED
+
+
+@njit(_TEST, cache=True, error_model="numpy")
+def krawczyk_boxes(equations, lo, hi, pl, ph, out_lo, out_hi, status):
+    """Test boxes (N, n) once with common parameters (m,): status and intersection with the image."""
+    n = lo.shape[1]
+    fl, fh, z = np.empty(n), np.empty(n), np.empty(n)
+    jl, jh = np.empty((n, n)), np.empty((n, n))
+    mid, y = np.empty((n, n)), np.empty((n, n))
+    for b in range(lo.shape[0]):
+        xl, xh, kl, kh = lo[b], hi[b], out_lo[b], out_hi[b]
+        smooth = equations(xl, xh, pl, ph, fl, fh, jl, jh, True)
+        found = UNDECIDED
+        for i in range(n):
+            kl[i], kh[i] = xl[i], xh[i]
+            z[i] = 0.5 * (xl[i] + xh[i])
+            if not (fl[i] <= 0.0 <= fh[i]) or not xl[i] <= xh[i]:
+                found = EMPTY
+            smooth = smooth and np.isfinite(z[i])
+            for j in range(n):
+                mid[i, j] = 0.5 * (jl[i, j] + jh[i, j])
+        if found != EMPTY and smooth and invert(mid, y):
+            smooth = equations(z, z, pl, ph, fl, fh, jl, jh, False)
+            if smooth:
+                found = _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh)
+        if found == EMPTY:
+            kl[:], kh[:] = np.inf, -np.inf
+        status[b] = found

@@ -1,7 +1,7 @@
 """Sine, cosine and tangent: certified bounds at points and over intervals.
 
-Arguments beyond pi/4 are reduced by exact integer arithmetic with 1344 bits of 2/pi (Payne and Hanek 1983), the rest
-is a Taylor polynomial in double-double arithmetic.  Every bound on an error is proved in ``docs/explanation/intervals.md``.
+Arguments beyond pi/4 are reduced by exact integer arithmetic with 1344 bits of 2/pi (Payne and Hanek 1983); the rest
+is a Taylor polynomial in double-double arithmetic.  Every error bound is proved in ``docs/explanation/intervals.md``.
 """
 
 from fractions import Fraction

@@ -1,0 +1,155 @@
+"""The guard, and that compiled code does exactly what is written: no contraction, no reassociation."""
+
+import json
+import platform
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+from graphsynth.errors import GraphsynthError
+from graphsynth.intervals import check_rounding
+from graphsynth.intervals.guard import rounding_faults
+
+ON_GLIBC = platform.libc_ver()[0] == "glibc" and platform.machine() == "x86_64"
+needs_control_word = pytest.mark.skipif(not ON_GLIBC, reason="sets the control word of x86-64 through glibc")
+
+
+def run(code):
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_all_is_well_here():
+    assert rounding_faults() == []
+    check_rounding()
+
+
+UPWARD = "ctypes.CDLL('libm.so.6').fesetround(0x800)"
+# the environment of x86-64 holds the SSE control word at byte 28; bit 15 flushes results, bit 6 flushes operands
+FLUSH = """
+    library = ctypes.CDLL('libm.so.6')
+    state = (ctypes.c_uint32 * 8)()
+    library.fegetenv(state)
+    state[7] |= {bits}
+    library.fesetenv(state)
+"""
+
+
+@needs_control_word
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (UPWARD, "nearest"),
+        (UPWARD.replace("0x800", "0x400"), "nearest"),
+        (UPWARD.replace("0x800", "0xc00"), "nearest"),
+        (FLUSH.format(bits="0x8040"), "subnormal"),
+        (FLUSH.format(bits="0x8000"), "subnormal"),
+        (FLUSH.format(bits="0x40"), "subnormal"),
+    ],
+    ids=["upward", "downward", "to-zero", "both", "results", "operands"],
+)
+def test_a_changed_mode_is_refused_at_import_and_at_each_solve(change, word):
+    change = textwrap.dedent(change).strip()
+    code = f"""
+import ctypes, sys
+import numpy as np
+from graphsynth.errors import GraphsynthError
+from graphsynth.intervals import Interval, krawczyk, pave, solve_linear, gauss_seidel, Search
+box = Interval([1], [2])
+A = Interval([[2]])
+search = Search(lambda x: [x[0] * x[0] - 2], box)
+{change}
+f = lambda x: [x[0] * x[0] - 2]
+calls = [
+    lambda: krawczyk(f, box), lambda: pave(f, box), lambda: solve_linear(A, box), lambda: gauss_seidel(A, box, box),
+    lambda: next(iter(search)),
+]
+for call in calls:
+    try:
+        call()
+    except GraphsynthError as error:
+        assert {word!r} in str(error), error
+    else:
+        raise SystemExit("not refused")
+for name in [n for n in sys.modules if n.startswith("graphsynth.intervals")]:
+    del sys.modules[name]
+try:
+    import graphsynth.intervals
+except GraphsynthError as error:
+    print("refused")
+"""
+    assert run(code).strip().endswith("refused")
+
+
+def test_the_message_names_the_remedy(monkeypatch):
+    from graphsynth.intervals import guard
+
+    monkeypatch.setattr(guard, "_RIGHT", -guard._RIGHT)
+    with pytest.raises(GraphsynthError, match="process of its own"):
+        guard.check_rounding()
+
+
+CASES = """
+    import json, random, struct, sys
+    import numpy as np
+    sys.path.insert(0, {folder!r})
+    from interval_samples import bounds
+    {patch}
+    from graphsynth.intervals.kernels import arithmetic, trigonometry, inverse, exponential
+    np.seterr(all="ignore")
+    rng = np.random.default_rng(8)
+    count = 400
+    a, b = np.array(bounds(rng, count)), np.array(bounds(rng, count))
+    near = np.array([rng.uniform(-40, 40, 60), np.zeros(60)])
+    near[1] = near[0] + rng.uniform(0, 3, 60)
+    unit = np.sort(rng.uniform(-1, 1, (2, 60)), axis=0)
+    out = []
+    def note(pair):
+        out.append([struct.pack("<d", float(x) + 0.0).hex() for x in pair])
+    for i in range(count):
+        four = [float(v) for v in (a[0, i], a[1, i], b[0, i], b[1, i])]
+        for f in (arithmetic.add, arithmetic.subtract, arithmetic.multiply, arithmetic.divide, exponential.hypot,
+                  inverse.atan2):
+            note(f(*four))
+        for f in (arithmetic.square, arithmetic.root, trigonometry.sin, trigonometry.cos, trigonometry.tan,
+                  inverse.atan, exponential.exp, exponential.log):
+            note(f(*four[:2]))
+        note(arithmetic.power(*four[:2], 5))
+        note(arithmetic.scale(four[1] if np.isfinite(four[1]) else 2.0, *four[2:]))
+    for i in range(60):
+        for f in (trigonometry.sin, trigonometry.cos, trigonometry.tan, exponential.exp, inverse.atan):
+            note(f(float(near[0, i]), float(near[1, i])))
+        for f in (inverse.asin, inverse.acos):
+            note(f(float(unit[0, i]), float(unit[1, i])))
+    print(json.dumps(out))
+"""
+PATCH = """
+    import os
+    os.environ["NUMBA_DISABLE_JIT"] = "1"
+    from fractions import Fraction
+    from math import isfinite
+    import graphsynth.intervals.kernels.rounding as rounding
+    def fma(a, b, c):
+        if not (isfinite(a) and isfinite(b) and isfinite(c)):
+            return float(np.float64(a) * np.float64(b) + np.float64(c))
+        exact = Fraction(a) * Fraction(b) + Fraction(c)
+        try:
+            return float(exact)
+        except OverflowError:
+            return float("inf") if exact > 0 else -float("inf")
+    rounding.fma = fma
+"""
+
+
+def test_compiled_code_equals_the_uncompiled_source_to_the_bit():
+    """The interpreter neither contracts nor reorders; so neither has the compiler, on any path of any kernel."""
+    from pathlib import Path
+
+    folder = str(Path(__file__).parent)
+    interpreted = json.loads(run(textwrap.dedent(CASES).format(folder=folder, patch=textwrap.dedent(PATCH).strip())))
+    compiled = json.loads(run(textwrap.dedent(CASES).format(folder=folder, patch="")))
+    assert len(compiled) > 6000
+    assert interpreted == compiled
