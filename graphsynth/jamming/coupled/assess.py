@@ -1,0 +1,211 @@
+"""Assess any mechanism whose joints share the misalignment: least tilt, prices, verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.jamming.bearing import Bearing, Condition
+from graphsynth.jamming.coupled.closure import ROLL, ROUND, Layout, joint_places, lay_out, shifts
+from graphsynth.jamming.coupled.limits import Limits, Misalignment, complete
+from graphsynth.jamming.coupled.program import PoseSolution, solve_poses
+from graphsynth.jamming.coupled.report import CoupledReport, CoupledVerdict, Loosen
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["Problem", "assess_coupled", "problem"]
+
+Array = NDArray[np.float64]
+Bearings = Bearing | Limits | Mapping[tuple[int, int], Bearing | Limits]
+
+#: Differences from 1 below this are a matter of rounding.
+_TOUCH = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A mechanism with limits and misalignments; what the solvers and the certificates start from."""
+
+    mechanism: Mechanism
+    limits: tuple[Limits, ...]
+    misalignments: tuple[Misalignment, ...]
+    layout: Layout
+
+    @property
+    def names(self) -> tuple[tuple[tuple[int, int], str], ...]:
+        """Joint and kind of every limit on tilt."""
+        kinds = ["tilt" if axis == ROUND else "roll" if axis == ROLL else "pitch" for axis in self.layout.block_axis]
+        return tuple((self.pairs[place], kind) for place, kind in zip(self.layout.block_joint, kinds))
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Links of every joint of the layout."""
+        return tuple(self.mechanism.joints[k].pair for k in self.layout.joints)
+
+    def solve(self, poses: Array, mode: str = "tilt", turned: float = 0.0) -> PoseSolution:
+        """Solve at poses (N, links, 3); all misalignments turned by ``turned`` radians."""
+        r, e, base = joint_places(self.mechanism, self.layout.joints, poses)
+        return solve_poses(self.layout, r, e, shifts(self.layout, base, turned), "scale" if mode == "scale" else "tilt")
+
+
+def problem(
+    mechanism: Mechanism, bearings: Bearings, tilts: Misalignment | Iterable[Misalignment], condition: Condition = "A"
+) -> Problem:
+    """Put a mechanism, limits and misalignments together; see `assess_coupled` for the arguments.
+
+    Raises
+    ------
+    GeometryError
+        A joint without limits, limits that do not fit a joint, a misalignment of a joint that does not exist.
+    """
+    chosen = (tilts,) if isinstance(tilts, Misalignment) else tuple(tilts)
+    by_pair: dict[tuple[int, int], Misalignment] = {}
+    for tilt in chosen:
+        pair = (min(tilt.base, tilt.link), max(tilt.base, tilt.link))
+        mechanism.joint(*pair)  # raises if there is none
+        if pair in by_pair:
+            raise GeometryError(f"joint {pair[0]}-{pair[1]} has two misalignments; give their sum")
+        by_pair[pair] = tilt
+    limits = complete(mechanism.joints, bearings, by_pair, condition)
+    return Problem(mechanism, limits, chosen, lay_out(mechanism, limits, chosen))
+
+
+def assess_coupled(
+    motion: Motion,
+    bearings: Bearings,
+    tilts: Misalignment | Iterable[Misalignment],
+    *,
+    condition: Condition = "A",
+) -> CoupledReport:
+    """Assess whether all joints together can take up misaligned axes at every pose of a motion (model L1).
+
+    Parameters
+    ----------
+    motion : Motion
+        Of `graphsynth.simulate`; any planar mechanism.
+    bearings : Bearing, JointLimits, SlideLimits, or mapping of (link, link) to one of these
+        Limits of every joint; one value for all, or by joint.  Gear, cam and slot contacts that are not named guide
+        nothing out of the plane.
+    tilts : Misalignment or several
+        Which axes are tilted; a rigid one (a motor shaft) takes no clearance of its own.
+    condition : {"A", "B", "general"}
+        Contact condition of every `Bearing`.
+
+    Returns
+    -------
+    CoupledReport
+        Estimated at the samples, with primal and dual values and their gap.
+
+    Raises
+    ------
+    GeometryError
+        For limits or misalignments that do not fit the mechanism.
+
+    Notes
+    -----
+    Specification lambda_and_jamming, section 9.  The program stays convex with any number of misaligned axes, because
+    each only shifts the relative tilt of its own joint by a constant.
+
+    Examples
+    --------
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> linkage = Mechanism(graph, [
+    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+    ...     Revolute(0, 3, (2.0, 0.0)),
+    ... ], [Driver(0, 1)])
+    >>> motion = simulate(linkage, np.radians([0.0, 90.0, 180.0]))
+    >>> report = assess_coupled(motion, Bearing(), Misalignment(0, 1, 0.012))
+    >>> report.verdict.name, [round(float(f), 4) for f in report.factor]
+    ('FREE_ESTIMATED', [0.9694, 0.9894, 0.7915])
+    """
+    begin = perf_counter()
+    given = problem(motion.mechanism, bearings, tilts, condition)
+    keep = np.flatnonzero(motion.assembled)
+    poses = motion.poses[keep]
+    tilt, scale = given.solve(poses), given.solve(poses, "scale")
+    return _report(given, motion, keep, (tilt, scale), begin)
+
+
+def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:
+    full = np.full((count, *values.shape[1:]), np.nan)
+    full[keep] = values
+    return full
+
+
+def _report(
+    given: Problem, motion: Motion, keep: NDArray[np.intp], found: tuple[PoseSolution, PoseSolution], begin: float
+) -> CoupledReport:
+    tilt, scale = found
+    layout, count = given.layout, len(motion.inputs)
+    with np.errstate(all="ignore"):
+        gap = np.where(tilt.upper > tilt.lower, (tilt.upper - tilt.lower) / tilt.upper, 0.0)
+        allowed = np.where(scale.lower > 0.0, 1.0 / scale.lower, math.inf)
+        lean = np.hypot(tilt.tau[..., 0], tilt.tau[..., 1])
+        used = np.where(layout.limit > 0.0, lean / (tilt.lower[:, None] * layout.limit), 0.0)
+        slip = np.where(np.isfinite(layout.play) & (layout.play > 0.0), np.abs(tilt.zeta) / layout.play, 0.0)
+    used = np.where(tilt.lower[:, None] > 0.0, used, 0.0)
+    verdict, reason = _verdict(scale.lower, motion, keep)
+    worst = int(np.argmax(tilt.lower)) if keep.size else -1
+    tight = int(np.argmin(allowed)) if keep.size else -1
+    inputs = motion.inputs[keep]
+    return CoupledReport(
+        verdict=verdict,
+        reason=reason,
+        inputs=motion.inputs,
+        factor=_spread(tilt.lower, keep, count),
+        gap=_spread(gap, keep, count),
+        allowed_scale=_spread(allowed, keep, count),
+        consumption=_spread(used, keep, count),
+        play_used=_spread(slip, keep, count),
+        price=_spread(tilt.moment, keep, count),
+        play_price=_spread(tilt.force, keep, count),
+        names=given.names,
+        joints=given.pairs,
+        worst_input=float(inputs[worst]) if keep.size else math.nan,
+        worst_factor=float(tilt.lower[worst]) if keep.size else math.nan,
+        smallest_scale=float(allowed[tight]) if keep.size else math.nan,
+        smallest_scale_input=float(inputs[tight]) if keep.size else math.nan,
+        loosen=_loosen(given, scale, tight) if keep.size else (),
+        limits=given.limits,
+        misalignments=given.misalignments,
+        notes=_notes(given, motion, keep),
+        seconds=perf_counter() - begin,
+    )
+
+
+def _verdict(value: Array, motion: Motion, keep: NDArray[np.intp]) -> tuple[CoupledVerdict, str]:
+    if keep.size == 0:
+        return CoupledVerdict.CANNOT_ASSEMBLE, f"no sample is assembled: {motion.reason}"
+    jammed = value > 1.0 + _TOUCH
+    if jammed.any():
+        return CoupledVerdict.JAMMED_ESTIMATED, f"jams at {int(jammed.sum())} of {keep.size} samples (estimated)"
+    if (value >= 1.0 - _TOUCH).any():
+        return CoupledVerdict.TOUCHING_ESTIMATED, "no clearance is left at one sample or more (estimated)"
+    if not motion.completed:
+        return CoupledVerdict.FREE_ESTIMATED, f"free at {keep.size} samples; the motion ends: {motion.reason}"
+    return CoupledVerdict.FREE_ESTIMATED, f"free at all {keep.size} samples (estimated)"
+
+
+def _loosen(given: Problem, scale: PoseSolution, at: int) -> tuple[Loosen, ...]:
+    rows = [Loosen(pair, what, float(scale.moment[at, k])) for k, (pair, what) in enumerate(given.names)]
+    rows += [Loosen(pair, "play", float(scale.force[at, k])) for k, pair in enumerate(given.pairs)]
+    return tuple(sorted((row for row in rows if row.gain > 1e-9), key=lambda row: -row.gain))
+
+
+def _notes(given: Problem, motion: Motion, keep: NDArray[np.intp]) -> tuple[str, ...]:
+    notes = []
+    if given.layout.loops == 0:
+        notes.append("no closed loop of guided joints: nothing can jam")
+    if keep.size < len(motion.inputs):
+        notes.append(f"{len(motion.inputs) - keep.size} samples are not assembled: {motion.reason}")
+    return tuple(notes)

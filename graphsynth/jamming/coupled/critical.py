@@ -1,0 +1,55 @@
+"""Certified range of the critical tilt of a bearing over a box of its dimensions."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from graphsynth.errors import GeometryError
+from graphsynth.intervals import Interval
+from graphsynth.jamming.bearing import Bearing
+
+__all__ = ["critical_range"]
+
+
+def critical_range(
+    bearing: Bearing, condition: str, tolerances: tuple[float, float, float], nominal: float
+) -> tuple[float, float]:
+    """Enclose the critical tilt for ``Rb``, ``Hb``, ``clearance`` within the tolerances (mm), from two corners."""
+    radius, height, clearance = (
+        _around(name, value, tolerance)
+        for name, value, tolerance in zip(
+            ("Rb", "Hb", "clearance"), (bearing.Rb, bearing.Hb, bearing.clearance), tolerances
+        )
+    )
+    sense = 1 if condition == "A" else -1
+    least = _tilt(radius[::sense][0], height[1], clearance[0], condition)
+    most = _tilt(radius[::sense][1], height[0], clearance[1], condition)
+    low, high = float(least.lo), float(most.hi)
+    return min(low, nominal), max(high, nominal)
+
+
+def _around(name: str, value: float, tolerance: float) -> tuple[Fraction, Fraction]:
+    low, high = Fraction(value) - Fraction(tolerance), Fraction(value) + Fraction(tolerance)
+    if low < 0 or (name == "Rb" and low == 0):
+        raise GeometryError(f"{name} = {value} mm with tolerance {tolerance} mm reaches {float(low)}; reduce it")
+    return low, high
+
+
+def _tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> Interval:
+    """``2 arctan(c / (h + w))`` of section 4.7; infinite where there is no critical tilt (exact decision)."""
+    h = H / 2
+    room = h * h - c * (2 * R + c) if condition == "A" else h * h + c * (2 * R + c)
+    if condition == "A" and (room <= 0 or h == 0):
+        return Interval.from_bounds(math.inf, math.inf)
+    divisor = Interval(h) + Interval(room).sqrt()
+    if c == 0:
+        return Interval(0)
+    q = Interval(c) / divisor
+    cube = q * q * q
+    # alternating series with falling terms for q <= 1: q - q^3/3 <= arctan q <= q - q^3/3 + q^5/5
+    if float(q.hi) <= 1e-3:
+        return 2 * (q - cube / 3 + Interval.from_bounds(0.0, 1.0) * (cube * q * q) / 5)
+    from graphsynth.intervals import atan
+
+    return 2 * atan(q)
