@@ -15,18 +15,17 @@ from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.kinematics.engine.events import dead_centres, ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
+from graphsynth.kinematics.engine.inputs import coordinates, fine_grid, full_turn, monotonic
+from graphsynth.kinematics.engine.pivots import pivot_passes, refined
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
 from graphsynth.kinematics.engine.start import initial, sign_table
-from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["BatchMotion", "Motion", "simulate", "simulate_batch"]
 
 Array = NDArray[np.float64]
 
-#: Largest step of a turning driver on the internal grid, radians: events between samples are looked for on it.
-_FINE = math.tau / 360.0
 _TURNS = 12
 _CLOSED = 1e-9
 
@@ -83,7 +82,7 @@ def simulate(
     (True, True, True)
     """
     begin = perf_counter()
-    u = _monotonic(inputs)
+    u = monotonic(inputs)
     program = compile_program(mechanism)
     given = start if start is not None else mechanism.pose
     guess = None if given is None else _poses(given, mechanism)
@@ -91,25 +90,15 @@ def simulate(
     tracker = Tracker(program, signs)
     if guess is not None:
         _signs_from(tracker, float(u[0]), guess, modes or {})
-    grid, where = _grid(mechanism, u)
+    grid, where = fine_grid(mechanism, u)
     seed, code, step = initial(tracker, float(u[0]), modes or {}, guess)
     if code == codes.DONE:
-        trace = tracker.follow(grid, seed)
+        trace, where = refined(tracker, tracker.follow(grid, seed), where)
     else:
         trace = tracker.blank(grid)
         trace.stop = Stop(code, step, float(u[0]), 0.0)
     found = _events(tracker, trace, events)
     return _motion(tracker, trace, where, found, begin)
-
-
-def _monotonic(inputs: ArrayLike) -> Array:
-    u = finite_array("inputs", inputs)
-    if u.ndim != 1 or u.size == 0:
-        raise GeometryError(f"inputs have shape {u.shape}; give one list of one or more inputs")
-    steps = np.diff(u)
-    if not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise GeometryError("inputs must increase or decrease strictly; sort them and remove duplicates")
-    return u
 
 
 def _poses(start: ArrayLike, mechanism: Mechanism) -> Array:
@@ -141,33 +130,13 @@ def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, i
         tracker.modes[k] = 1.0 if errors[0] <= errors[1] else -1.0
 
 
-def _grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return inputs with extra samples where a turning driver would step too far, and where the given ones are."""
-    if u.size < 2:
-        return u, np.zeros(u.size, dtype=np.intp)
-    parts = np.ones(u.size - 1, dtype=np.intp)
-    span = abs(float(u[-1] - u[0]))
-    for driver in mechanism.drivers:
-        q = driver.law(u)[0]
-        if isinstance(mechanism.joint(*driver.pair), Prismatic):
-            size = np.abs(np.diff(u)) * (200.0 / span)
-        else:
-            size = np.abs(np.diff(q)) / _FINE
-        parts = np.maximum(parts, np.ceil(np.nan_to_num(size, nan=1.0) - 1e-9).astype(np.intp))
-    where = np.concatenate([[0], np.cumsum(parts)]).astype(np.intp)
-    if (parts == 1).all():
-        return u, where
-    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(u[:-1], u[1:], parts)]
-    return np.concatenate([*pieces, u[-1:]]), where
-
-
 def _events(tracker: Tracker, trace: Trace, wanted: bool) -> list[MotionEvent]:
     """Events in order; shortens the trace where a branch ends between samples."""
     found: list[MotionEvent] = []
     if trace.stop is not None:
         found.append(ending(tracker, trace))
     sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
-    for touch in touches(tracker, trace) if trace.done > 0 else []:
+    for touch in _touched(tracker, trace, sense):
         if touch.ends_motion:
             found = [event for event in found if not event.ends_motion] + [touch]
             trace.done = int(np.sum(sense * trace.u < sense * touch.input))
@@ -176,6 +145,17 @@ def _events(tracker: Tracker, trace: Trace, wanted: bool) -> list[MotionEvent]:
     if wanted:
         found += dead_centres(tracker, trace)
     return sorted(found, key=lambda event: sense * event.input)
+
+
+def _touched(tracker: Tracker, trace: Trace, sense: float) -> list[MotionEvent]:
+    """Touches and passages of pivots up to the first that ends the motion."""
+    if trace.done == 0:
+        return []
+    found = touches(tracker, trace) + pivot_passes(tracker, trace)
+    first = min((event for event in found if event.ends_motion), key=lambda event: sense * event.input, default=None)
+    if first is None:
+        return found
+    return [e for e in found if not e.ends_motion and sense * e.input < sense * first.input] + [first]
 
 
 def _motion(tracker: Tracker, trace: Trace, where: NDArray[np.intp], events: list[MotionEvent], begin: float) -> Motion:
@@ -223,24 +203,9 @@ def _arrays(tracker: Tracker, trace: Trace) -> tuple[Array, Array, Array, Array,
     return poses, velocities, accelerations, margins, modes
 
 
-def _full_turn(mechanism: Mechanism, u: Array) -> bool:
-    """Whether every driver returns to its place over the inputs, at least one of them after full turns."""
-    if u.size < 2 or not mechanism.drivers:
-        return False
-    ends = np.array([u[0], u[-1]])
-    moved = False
-    for driver in mechanism.drivers:
-        q, rate, _ = driver.law(ends)
-        turns = 0.0 if isinstance(mechanism.joint(*driver.pair), Prismatic) else round((q[1] - q[0]) / math.tau)
-        if abs(q[1] - q[0] - turns * math.tau) > 1e-9 or abs(rate[1] - rate[0]) > 1e-9 * max(1.0, abs(rate[0])):
-            return False
-        moved = moved or turns != 0 or abs(q[1] - q[0]) <= 1e-9
-    return moved
-
-
 def _closure(tracker: Tracker, trace: Trace, completed: bool, events: list[MotionEvent]) -> Closure:
     mechanism = tracker.program.mechanism
-    if not completed or not _full_turn(mechanism, trace.u):
+    if not completed or not full_turn(mechanism, trace.u):
         text = "not tested: the motion is incomplete" if not completed else "not tested: the inputs are no full turn"
         return Closure(False, False, math.nan, 0, (), text)
     first, last = trace.X[0], trace.X[-1]
@@ -277,21 +242,16 @@ def _period(tracker: Tracker, trace: Trace) -> int:
     """
     mechanism = tracker.program.mechanism
     span = float(trace.u[-1] - trace.u[0])
-    q = [driver.law(np.array([trace.u[0], trace.u[-1], trace.u[-1] + span])) for driver in mechanism.drivers]
+    q = [coordinates(driver, np.array([trace.u[0], trace.u[-1], trace.u[-1] + span])) for driver in mechanism.drivers]
     if not all(np.isfinite(part[0]).all() and abs(part[0][2] - 2 * part[0][1] + part[0][0]) < 1e-9 for part in q):
         return 0
     u, current = trace.u, trace
     for turn in range(2, _TURNS + 1):
         u = u + span
-        pose = np.column_stack([current.X[-1, :, :2], _angles(tracker, current)])
+        pose = np.column_stack([current.X[-1, :, :2], current.angles(tracker.program, -1)])
         current = tracker.follow(u, pose, current.PHI[-1])
         if current.stop is not None:
             return 0
         if _apart(tracker, trace.X[0], current.X[-1])[0] <= _CLOSED:
             return turn
     return 0
-
-
-def _angles(tracker: Tracker, trace: Trace) -> Array:
-    angle = np.arctan2(trace.X[-1, :, 3], trace.X[-1, :, 2])
-    return np.where(tracker.program.need_angle, trace.TH[-1], angle)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from typing import Any
 
 from graphsynth.errors import GeometryError
@@ -48,6 +49,10 @@ def point(name: str, value: Any) -> Point:
 
 def link_number(name: str, value: Any) -> int:
     """Return a link number as an int; raise `GeometryError` for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+    try:
+        number = -1 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        number = -1
+    if number < 0:
         raise GeometryError(f"{name} = {value!r} is not a link; give its number, 0 or more")
-    return value
+    return number

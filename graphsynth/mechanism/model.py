@@ -50,8 +50,8 @@ class Driver:
     law: Law = field(default_factory=Linear)
 
     def __post_init__(self) -> None:
-        link_number("base of a driver", self.base)
-        link_number("link of a driver", self.link)
+        object.__setattr__(self, "base", link_number("base of a driver", self.base))
+        object.__setattr__(self, "link", link_number("link of a driver", self.link))
         if not callable(self.law):
             raise GeometryError(f"law = {self.law!r} of driver {self.base}-{self.link} is not callable; give a law")
 
@@ -138,7 +138,7 @@ class Mechanism:
             link, at = value
         except (TypeError, ValueError) as error:
             raise GeometryError(f"point {name} = {value!r} is not (link, (x, y))") from error
-        link_number(f"link of point {name}", link)
+        link = link_number(f"link of point {name}", link)
         if link >= self.graph.links:
             raise GeometryError(f"point {name} is on link {link}, but the links are 0..{self.graph.links - 1}")
         return TracePoint(link, point(f"point {name}", at))

@@ -13,6 +13,7 @@ from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, workspace
+from graphsynth.kinematics.engine.inputs import monotonic
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, sign_table
 
@@ -154,10 +155,7 @@ def simulate_batch(
     >>> simulate_batch(base, np.linspace(0.0, 6.28, 91), sets).completed.tolist()
     [True, True, False]
     """
-    u = finite_array("inputs", inputs)
-    steps = np.diff(u)
-    if u.ndim != 1 or u.size == 0 or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise GeometryError("inputs must be one list that increases or decreases strictly")
+    u = monotonic(inputs)
     sizes = np.ascontiguousarray(finite_array("dimensions", dimensions))
     if sizes.ndim != 3 or sizes.shape[1:] != mechanism.dimensions.shape:
         raise GeometryError(

@@ -24,6 +24,8 @@ _NEAR = 0.2
 _CLOSE = 1e-8
 #: A smallest margin below this is a change point: the modes meet to rounding.
 _TOUCH = 1e-13
+#: Margin of a dyad whose two outer points, or whose pin and pivot, coincide exactly.
+_COINCIDE = -5e-324
 #: A speed whose least value is below this part of the largest is examined for a dwell.
 _SLOW = 1e-2
 
@@ -34,15 +36,33 @@ def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
     stop = trace.stop
     step = tracker.program.steps[stop.step]
     if stop.code == codes.BAD_INPUT:
-        text = f"the driver of link {step.links[0]} has no value at the input {stop.at:.12g}"
-        return MotionEvent("input", stop.at, -1, step.links, 0, 0.0, True, text)
+        at, uncertainty = _without_value(tracker, trace)
+        text = f"the driver of link {step.links[0]} has no value from the input {at:.12g} on"
+        return MotionEvent("input", at, -1, step.links, 0, uncertainty, True, text)
     if trace.done == 0:
-        text = f"group {step.group} ({step.kind}, links {_list(step.links)}) cannot be assembled at the first input"
+        name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
+        text = f"{name} cannot be assembled at the first input"
+        if trace.M[0, stop.step] == _COINCIDE:
+            text = f"two points of {name} coincide at the first input, so that its place is not determined there"
         return MotionEvent("not assembled", stop.at, step.group, step.links, 0, 0.0, True, text)
     if stop.code == codes.UNREACHABLE:
         return _limit(tracker, trace, float(trace.u[trace.done]))
     beyond = _limit_beyond(tracker, trace, stop)
     return _singular(tracker, stop) if beyond is None else _limit(tracker, trace, beyond)
+
+
+def _without_value(tracker: Tracker, trace: Trace) -> tuple[float, float]:
+    """First input at which a driver has no value, by halving the last step, and the uncertainty."""
+    bad = float(trace.u[trace.done])
+    if trace.done == 0:
+        return bad, 0.0
+    good = float(trace.u[trace.done - 1])
+    while (middle := 0.5 * (good + bad)) not in (good, bad):
+        if np.isfinite(tracker.values(np.array([middle]))[:, :3]).all():
+            good = middle
+        else:
+            bad = middle
+    return bad, abs(bad - good)
 
 
 def _limit_beyond(tracker: Tracker, trace: Trace, stop: Stop) -> float | None:
@@ -86,6 +106,12 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     if other is not None:  # groups that hang on the limit cannot be followed to its last bits
         good, bad = _closed_limit(tracker, source, at, step_index, unreachable)
     step = tracker.program.steps[step_index]
+    if step.has_two_modes and tracker.near(source, at, bad)[0].M[1, step_index] == _COINCIDE:
+        text = (
+            f"two points of group {step.group} ({step.kind}, links {_list(step.links)}) coincide at the input "
+            f"{bad:.12g}: its place is not determined there, so the branch after it is a choice"
+        )
+        return MotionEvent("change point", bad, step.group, step.links, 2, abs(bad - good), True, text)
     if step.has_two_modes:
         text = (
             f"group {step.group} ({step.kind}, links {_list(step.links)}) is stretched or folded at the input "
@@ -120,14 +146,12 @@ def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:
         (u0, d0), (u1, d1) = points[-3], points[-1]
         if d0 * d0 > d1 * d1 > 0.0:
             at = u1 + d1 * d1 * (u1 - u0) / (d0 * d0 - d1 * d1)
-            power = math.log(abs(d0 / d1)) / math.log(abs((at - u0) / (at - u1)))
-            check = _power(points, at)
-            if abs(check - 0.5) < 0.1:
+            power = _power(points, at)
+            if abs(power - 0.5) < 0.1:
                 text = (
                     f"{where} is singular at the input {at:.12g}: two assembly modes merge and the branch ends "
-                    f"(the determinant goes to zero like the power {check:.2f} of the distance)"
+                    f"(the determinant goes to zero like the power {power:.2f} of the distance)"
                 )
-                del power
                 return MotionEvent("fold", at, step.group, step.links, 2, abs(at - u1), True, text)
     text = f"{where} becomes singular near the input {stop.at:.12g}: modes meet and the branch after it is ambiguous"
     return MotionEvent("singular", stop.at, step.group, step.links, 0, stop.uncertainty, True, text)
@@ -153,13 +177,9 @@ def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
         low = np.flatnonzero((middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])) + 1
         events = (_touch(tracker, trace, int(k), s) for k in low)
         found += [event for event in events if event is not None]
-        found += [_at_end(trace, k, step) for k in sorted({0, len(M) - 1}) if len(M) and M[k] <= _TOUCH]
-    sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
-    ends = [event for event in found if event.ends_motion]
-    if not ends:
-        return found
-    first = min(ends, key=lambda event: sense * event.input)
-    return [e for e in found if not e.ends_motion and sense * e.input < sense * first.input] + [first]
+        ends = {0, len(M) - 1} if trace.stop is None else {0}  # the stop has an event of its own
+        found += [_at_end(trace, k, step) for k in sorted(ends) if len(M) and M[k] <= _TOUCH]
+    return found
 
 
 def _at_end(trace: Trace, k: int, step: Step) -> MotionEvent:
@@ -182,9 +202,9 @@ def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None
     name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
     if least < -_TOUCH:
         start = float(trace.u[k - 1])
-        at = float(brentq(margin, start, at, xtol=1e-15, rtol=1e-15))
+        at = float(brentq(margin, start, at, xtol=1e-15 * min(1.0, high - low), rtol=1e-15))
         text = f"{name} is stretched or folded at the input {at:.12g}: it cannot be assembled on a stretch beyond"
-        return MotionEvent("fold", at, step.group, step.links, 2, 1e-14, True, text)
+        return MotionEvent("fold", at, step.group, step.links, 2, 1e-14 * max(1.0, abs(at)), True, text)
     if not least <= _CLOSE:
         return None
     at = _flat(margin, at, 0.25 * (high - low))
@@ -293,12 +313,15 @@ def _reversal(
     ends = at(low), at(high)
     if not ends[0] * ends[1] < 0.0:
         return None
-    where = float(brentq(at, low, high, xtol=1e-14, rtol=1e-15))
+    try:
+        where = float(brentq(at, low, high, xtol=1e-14 * min(1.0, abs(high - low)), rtol=1e-15))
+    except ValueError:  # NaN inside: the branch cannot be followed there, and that has an event of its own
+        return None
     if not math.isfinite(at(where)) or abs(at(where)) > max(abs(ends[0]), abs(ends[1])):
         return None  # a pole, not a zero
     order = _order(at, where, (high - low) / 8.0)
     text = f"link {link} reverses on the frame at the input {where:.12g}"
-    uncertainty = 1e-13 if order == 2 else 1e-15 ** (1.0 / (order - 1))
+    uncertainty = (1e-13 if order == 2 else 1e-15 ** (1.0 / (order - 1))) * max(1.0, abs(where))
     return MotionEvent("dead centre", where, group, (link,), order, uncertainty, False, text)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.kinematics.engine.program import Program
 
 __all__ = ["Delivery", "Stop", "Trace", "Tracker", "run_program", "workspace"]
@@ -58,6 +59,10 @@ class Trace:
         """State at sample k."""
         return self.X[k], self.TH[k], self.V[k], self.W[k], self.PHI[k], self.M[k]
 
+    def angles(self, program: Program, k: int) -> Array:
+        """Angle of every link at sample k: with its turns where gears count them."""
+        return np.where(program.need_angle, self.TH[k], np.arctan2(self.X[k, :, 3], self.X[k, :, 2]))
+
 
 class Tracker:
     """Runs a program; everything about one mechanism on one choice of assembly modes."""
@@ -71,7 +76,7 @@ class Tracker:
         drivers = self.program.mechanism.drivers
         q = np.zeros((max(1, len(drivers)), 5, len(u)))
         for k, driver in enumerate(drivers):
-            for order, part in enumerate(driver.law(u)):
+            for order, part in enumerate(coordinates(driver, u)):
                 q[k, order] = part
         with np.errstate(invalid="ignore"):  # a law without a value is found by the kernel
             q[:, 3], q[:, 4] = np.cos(q[:, 0]), np.sin(q[:, 0])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import link_number, point
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Prismatic
 
@@ -171,13 +172,18 @@ class Motion:
             else:
                 held[:, k, 3 * driver.link + 2], held[:, k, 3 * driver.base + 2] = 1.0, -1.0
         moving = [3 * k + c for k in range(links) if k != mechanism.frame for c in range(3)]
-        matrix = np.concatenate([J, held], axis=1)[:, :, moving]
+        size = np.array([self.Lc if angular else 1.0 for angular in _angular_rows(mechanism)])  # every row in lengths
+        matrix = np.concatenate([J, held], axis=1)[:, :, moving] * size[:, None]
         matrix = matrix * np.tile([1.0, 1.0, 1.0 / self.Lc], links)[moving]
         return np.asarray(np.linalg.svd(matrix, compute_uv=False)[:, -1])
 
     @cached_property
     def singularity_distance(self) -> Array:
-        """Smallest singular value of the scaled constraint matrix at every sample; 0 at a singular pose."""
+        """Smallest singular value of the constraint matrix with the drivers held, at every sample; shape (n,).
+
+        Rows and unknowns are in units of ``Lc`` and radians, so the size of the mechanism does not matter; 0 at a
+        singular pose, NaN where the branch does not reach.
+        """
         found = np.full(len(self.inputs), np.nan)
         if self.assembled.any():
             found[self.assembled] = self._smallest_singular_value(self.assembled)
@@ -191,13 +197,10 @@ class Motion:
                 raise GeometryError(f"point {name_or_link!r} is not defined; the mechanism has {known}")
             link, at = self.mechanism.points[name_or_link]
         else:
-            link = name_or_link
-            if not 0 <= link < self.mechanism.graph.links:
+            link = link_number("link of the point", name_or_link)
+            if link >= self.mechanism.graph.links:
                 raise GeometryError(f"link {link} does not exist; the links are 0..{self.mechanism.graph.links - 1}")
-            values = np.asarray((0.0, 0.0) if local is None else local, dtype=np.float64)
-            if values.shape != (2,) or not np.isfinite(values).all():
-                raise GeometryError(f"local = {local!r} is not a point; give two finite numbers")
-            at = (float(values[0]), float(values[1]))
+            at = point("local", (0.0, 0.0) if local is None else local)
         pose, v, w = self.poses[:, link], self.velocities[:, link], self.accelerations[:, link]
         arm = np.exp(1j * pose[:, 2]) * complex(*at)
         P = pose[:, 0] + 1j * pose[:, 1] + arm
@@ -239,3 +242,11 @@ class Motion:
             columns[f"margin_{group}"] = self.margins[:, group]
         columns["residual"], columns["error"] = self.residuals, self.errors
         return pd.DataFrame(columns)
+
+
+def _angular_rows(mechanism: Mechanism) -> list[bool]:
+    """Of the rows of `_smallest_singular_value`, those that are angles: second rows of P joints, turning drivers."""
+    rows: list[bool] = []
+    for joint in mechanism.joints:
+        rows += [False, isinstance(joint, Prismatic)] if joint.mobility == 1 else [False]
+    return rows + [not isinstance(mechanism.joint(*driver.pair), Prismatic) for driver in mechanism.drivers]

@@ -29,12 +29,14 @@ def sign_table(program: Program, modes: Mapping[int, int]) -> Array:
         If a group does not exist, has one mode only, or the mode is not +1 or -1 (a rank for larger groups).
     """
     signs = np.ones(len(program.steps))
+    if not isinstance(modes, Mapping):
+        raise GeometryError(f"modes = {modes!r} is not a mapping; give the mode by group, as in {{0: 1}}")
     by_group = {step.group: k for k, step in enumerate(program.steps) if step.group >= 0}
     for group, mode in modes.items():
         if group not in by_group:
             raise GeometryError(f"modes names group {group}, but the groups are 0..{len(by_group) - 1}")
         step = program.steps[by_group[group]]
-        if isinstance(mode, bool) or not isinstance(mode, int):
+        if isinstance(mode, bool | np.bool_) or not isinstance(mode, int | np.integer):
             raise GeometryError(f"mode {mode!r} of group {group} is not an integer")
         if step.has_two_modes and mode not in (1, -1):
             raise GeometryError(f"mode {mode} of group {group} ({step.kind}) must be +1 or -1")

@@ -1,0 +1,142 @@
+"""Inputs of a motion: their check, the coordinates of the drivers, the internal grid, full turns."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
+from graphsynth.mechanism.joints import Prismatic
+from graphsynth.mechanism.laws import LAWS
+
+if TYPE_CHECKING:
+    from graphsynth.mechanism.model import Driver, Mechanism
+
+__all__ = ["coordinates", "fine_grid", "full_turn", "monotonic"]
+
+Array = NDArray[np.float64]
+
+#: Largest step of a turning driver on the internal grid, radians: events between samples are looked for on it.
+_FINE = math.tau / 360.0
+#: Parts of the whole range for a sliding driver.
+_PARTS = 200.0
+#: Most poses of links on the internal grid: about 2 GB of state.
+_MOST = 2e7
+
+
+def monotonic(inputs: ArrayLike) -> Array:
+    """Return the inputs as an array; `GeometryError` unless they are finite and increase or decrease strictly."""
+    u = finite_array("inputs", inputs)
+    if u.ndim != 1 or u.size == 0:
+        raise GeometryError(f"inputs have shape {u.shape}; give one list of one or more inputs")
+    steps = np.diff(u)
+    if not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise GeometryError("inputs must increase or decrease strictly; sort them and remove duplicates")
+    return u
+
+
+def coordinates(driver: Driver, u: Array) -> tuple[Array, Array, Array]:
+    """Coordinate of a driver and its two derivatives, NaN where the law has no finite value.
+
+    Raises
+    ------
+    GeometryError
+        If the law does not return three arrays of the shape of its input.
+    """
+    found = driver.law(u)
+    name = f"the law of driver {driver.base}-{driver.link}"
+    if not isinstance(found, tuple | list) or len(found) != 3:
+        what = f"{len(found)} of them" if isinstance(found, tuple | list) else f"one {type(found).__name__}"
+        raise GeometryError(f"{name} must return three arrays, (q, dq/du, d2q/du2), not {what}")
+    parts = [np.asarray(part, dtype=np.float64) for part in found]
+    for part in parts:
+        if part.shape != u.shape:
+            raise GeometryError(f"{name} returned the shape {part.shape} for inputs of shape {u.shape}; return as many")
+    finite = np.isfinite(parts[0]) & np.isfinite(parts[1]) & np.isfinite(parts[2])
+    if not finite.all():
+        parts = [np.where(finite, part, np.nan) for part in parts]
+    return parts[0], parts[1], parts[2]
+
+
+def fine_grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return inputs with extra samples where a turning driver would step too far, and where the given ones are.
+
+    Raises
+    ------
+    GeometryError
+        If the range needs more samples than memory has room for, or the user's own law jumps.
+    """
+    if u.size < 2:
+        return u, np.zeros(u.size, dtype=np.intp)
+    parts = np.ones(u.size - 1)
+    steps = np.abs(np.diff(u))
+    for driver in mechanism.drivers:
+        if isinstance(mechanism.joint(*driver.pair), Prismatic):
+            size = steps * (_PARTS / abs(float(u[-1] - u[0])))
+        else:
+            size = _travel(coordinates(driver, u), steps) / _FINE
+        parts = np.maximum(parts, np.ceil(np.nan_to_num(size, nan=1.0) - 1e-9))
+    if parts.sum() * mechanism.graph.links > _MOST:
+        raise GeometryError(
+            f"the inputs from {u[0]:.6g} to {u[-1]:.6g} need {parts.sum():.3g} samples in between, more than the limit "
+            f"of {_MOST / mechanism.graph.links:.3g} for {mechanism.graph.links} links; give a shorter range"
+        )
+    counts = parts.astype(np.intp)
+    where = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(u[:-1], u[1:], counts)]
+    grid = u if (counts == 1).all() else np.concatenate([*pieces, u[-1:]])
+    for driver in mechanism.drivers:
+        _check_jumps(driver, grid)
+    return grid, where
+
+
+def _travel(q: tuple[Array, Array, Array], steps: Array) -> Array:
+    """Travel between neighbours by values, rates and accelerations: a law that oscillates between them is seen."""
+    value, rate, second = q
+    by_rate = steps * np.maximum(np.abs(rate[1:]), np.abs(rate[:-1]))
+    by_second = 0.5 * steps**2 * np.maximum(np.abs(second[1:]), np.abs(second[:-1]))
+    return np.maximum(np.abs(np.diff(value)), np.maximum(by_rate, by_second))
+
+
+def _check_jumps(driver: Driver, u: Array) -> None:
+    """Compare the changes of the user's own law with its derivative (the laws of the package are smooth)."""
+    if type(driver.law) in LAWS.values():
+        return
+    value, rate, _ = coordinates(driver, u)
+    steps = np.diff(u)
+    change, expected = np.diff(value), 0.5 * steps * (rate[1:] + rate[:-1])
+    size = np.maximum(np.abs(change), np.abs(steps) * np.maximum(np.abs(rate[1:]), np.abs(rate[:-1])))
+    allowed = 0.1 * size + 1e-13 * np.abs(value[1:])
+    bad = np.flatnonzero(np.abs(change - expected) > allowed)
+    if bad.size:
+        k = int(bad[0])
+        raise GeometryError(
+            f"the law of driver {driver.base}-{driver.link} changes by {change[k]:.6g} between the inputs {u[k]:.9g} "
+            f"and {u[k + 1]:.9g}, but its derivative gives {expected[k]:.6g}: it jumps, its derivative is wrong, or "
+            "the inputs are too coarse for it; correct the law or give finer inputs"
+        )
+
+
+def full_turn(mechanism: Mechanism, u: Array) -> bool:
+    """Whether every driver returns to its place over the inputs, at least one of them after full turns."""
+    if u.size < 2 or not mechanism.drivers:
+        return False
+    ends = np.array([u[0], u[-1]])
+    moved = False
+    for driver in mechanism.drivers:
+        q, rate, _ = coordinates(driver, ends)
+        sliding = isinstance(mechanism.joint(*driver.pair), Prismatic)
+        change = float(q[1] - q[0])
+        if not math.isfinite(change):
+            return False
+        turns = 0 if sliding else round(change / math.tau)
+        # rounding of the driver's own coordinate is no missing turn
+        slack = max(1e-9 * (float(np.abs(q).max()) if sliding else 1.0), 4.0 * np.spacing(float(np.abs(q).max())))
+        if abs(change - turns * math.tau) > slack or abs(rate[1] - rate[0]) > 1e-9 * max(1.0, abs(rate[0])):
+            return False
+        moved = moved or turns != 0 or abs(change) <= slack
+    return moved

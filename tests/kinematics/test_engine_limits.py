@@ -1,0 +1,203 @@
+"""Where the engine must stop, refuse or speak up: pins on pivots, change points at samples, laws, sizes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics import simulate
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.laws import Harmonic, Linear, Table
+from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.structure.graph import MechanismGraph
+
+TURN = np.linspace(0.0, math.tau, 73)
+CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+FIVE = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4)], frame=0)
+
+
+def four_bar(crank: float, coupler: float, rocker: float, frame: float, law: object = None) -> Mechanism:
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (crank, 0.0)), Revolute(2, 3, (coupler, 0.0), (rocker, 0.0)),
+        Revolute(0, 3, (frame, 0.0)),
+    ]  # fmt: skip
+    return Mechanism(CYCLE, joints, [Driver(0, 1) if law is None else Driver(0, 1, law)])  # type: ignore[arg-type]
+
+
+def slotted(crank: float, apart: float, with_block: bool) -> Mechanism:
+    """Crank whose pin turns a slotted arm on a pivot below its own: Whitworth's quick return if crank > apart."""
+    if not with_block:
+        graph = MechanismGraph(3, [(0, 1), (1, 2, 2), (0, 2)], frame=0)
+        joints = [Revolute(0, 1), PinSlot(2, 1, at_b=(crank, 0.0)), Revolute(0, 2, (0.0, -apart))]
+    else:
+        graph = MechanismGraph(4, [(0, 1), (1, 3), (2, 3), (0, 2)], frame=0)
+        joints = [Revolute(0, 1), Revolute(1, 3, (crank, 0.0)), Prismatic(2, 3), Revolute(0, 2, (0.0, -apart))]
+    return Mechanism(graph, joints, [Driver(0, 1)])
+
+
+# --- a pin that passes the pivot of its slotted link
+
+
+@pytest.mark.parametrize("with_block", [True, False])
+@pytest.mark.parametrize("mode", [1, -1])
+@pytest.mark.parametrize("inputs", [TURN, TURN + 0.01, -TURN, TURN[::-1]])
+def test_pin_on_the_pivot_ends_the_motion(with_block: bool, mode: int, inputs: np.ndarray) -> None:
+    motion = simulate(slotted(2.0, 2.0, with_block), inputs, modes={0: mode})
+    assert not motion.completed
+    assert math.remainder(motion.stopped_at - 1.5 * math.pi, math.tau) == pytest.approx(0.0, abs=1e-9)
+    assert motion.events[-1].kind == "change point"
+    # up to there the arm turns at half the speed of the crank
+    turned = np.diff(motion.poses[motion.assembled, 2, 2]) / np.diff(inputs[motion.assembled])
+    assert turned == pytest.approx(0.5, abs=1e-9)
+    assert motion.errors[motion.assembled].max() < 1e-12
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-7, -1e-7])
+def test_pin_close_to_the_pivot_goes_on(gap: float) -> None:
+    motion = simulate(slotted(2.0, 2.0 - gap, with_block=True), TURN + 0.01)
+    assert motion.completed
+    # longer crank: the arm turns fully; shorter: it comes back
+    turns = (motion.poses[-1, 2, 2] - motion.poses[0, 2, 2]) / math.tau
+    assert turns == pytest.approx(1.0 if gap > 0.0 else 0.0, abs=1e-9)
+
+
+def test_kite_at_its_coincidence_is_not_called_impossible() -> None:
+    motion = simulate(four_bar(1.0, 2.0, 2.0, 1.0), TURN)
+    assert "coincide" in motion.reason
+
+
+# --- change points and folds on samples
+
+
+@pytest.mark.parametrize("mode", [1, -1])
+@pytest.mark.parametrize("samples", [13, 37, 73, 361])
+def test_change_point_on_the_last_sample_is_an_event(mode: int, samples: int) -> None:
+    motion = simulate(four_bar(1.0, 3.0, 2.0, 2.0), np.linspace(0.0, math.tau, samples), modes={0: mode})
+    ends = [event.input for event in motion.events if event.kind in ("change point", "fold")]
+    assert ends[0] == pytest.approx(0.0, abs=1e-9)
+    assert ends[-1] == pytest.approx(math.tau, abs=1e-6)
+    assert not motion.closure.closed
+
+
+def test_fold_on_a_sample_is_no_change_point() -> None:
+    joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), Prismatic(0, 3, (0.0, 2.5))]
+    motion = simulate(Mechanism(CYCLE, joints, [Driver(0, 1)]), TURN)
+    assert motion.stopped_at == pytest.approx(math.pi + math.asin(0.5), abs=1e-12)
+    assert [event.kind for event in motion.events if event.group == 0 and event.kind != "dead centre"] == ["fold"]
+
+
+# --- laws
+
+
+def broken(value: object) -> Mechanism:
+    return four_bar(1.0, 3.0, 3.5, 4.0, law=lambda u: value(u))  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (lambda u: (np.where(u > 3.0, 1.0, 0.0), 0.0 * u, 0.0 * u), "it jumps"),
+        (lambda u: (u, 0.0 * u, 0.0 * u), "derivative"),
+        (lambda u: u, "three arrays"),
+        (lambda u: (u, 0.0 * u), "three arrays"),
+        (lambda u: (u, np.ones(1), 0.0 * u), "shape"),
+    ],
+)
+def test_laws_that_are_none_are_refused(law: object, words: str) -> None:
+    with pytest.raises(GeometryError, match=words):
+        simulate(broken(law), TURN)
+
+
+@pytest.mark.parametrize("beyond", [np.inf, -np.inf, np.nan])
+def test_law_without_a_value_ends_the_motion_where_it_does(beyond: float) -> None:
+    law = lambda u: (np.where(u > 3.0, beyond, u), np.ones_like(u), np.zeros_like(u))  # noqa: E731
+    motion = simulate(broken(law), TURN)
+    assert motion.events[-1].kind == "input"
+    assert motion.stopped_at == pytest.approx(3.0, abs=1e-12)
+
+
+def test_table_ends_at_its_last_input() -> None:
+    motion = simulate(four_bar(1.0, 3.0, 3.5, 4.0, law=Table((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.5, 1.0))), TURN)
+    assert motion.stopped_at == pytest.approx(3.0, abs=1e-12)
+
+
+def test_own_law_that_is_smooth_is_taken() -> None:
+    law = lambda u: (np.sin(u), np.cos(u), -np.sin(u))  # noqa: E731
+    own = simulate(broken(law), TURN)
+    same = simulate(four_bar(1.0, 3.0, 3.5, 4.0, law=Harmonic()), TURN)
+    np.testing.assert_array_equal(own.poses, same.poses)
+
+
+def test_oscillation_between_samples_is_seen() -> None:
+    """72 periods between 73 samples: the coordinate is 0 at every sample, and the crank swings by 3 rad between."""
+    law = Harmonic(amplitude=3.0, order=72.0)
+    motion = simulate(four_bar(3.0, 3.0, 3.5, 4.0, law=law), TURN)  # a rocker: its crank cannot turn that far
+    assert not motion.completed
+    assert motion.stopped_at < 0.1
+
+
+# --- sizes, units, numbers
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_error_estimates_do_not_depend_on_the_unit(scale: float) -> None:
+    motion = simulate(four_bar(scale, 3.0 * scale, 3.5 * scale, 4.0 * scale), TURN)
+    unit = simulate(four_bar(1.0, 3.0, 3.5, 4.0), TURN)
+    assert motion.singularity_distance == pytest.approx(unit.singularity_distance, rel=1e-9)
+    assert motion.errors.max() < 1e-14
+
+
+@pytest.mark.parametrize("scale", [1e-150, 1e150])
+def test_lengths_whose_products_are_no_numbers_are_refused(scale: float) -> None:
+    with pytest.raises(GeometryError, match="change the unit"):
+        simulate(four_bar(scale, 3.0 * scale, 3.5 * scale, 4.0 * scale), TURN)
+
+
+def test_a_range_beyond_memory_is_refused() -> None:
+    with pytest.raises(GeometryError, match="shorter range"):
+        simulate(four_bar(1.0, 3.0, 3.5, 4.0), [0.0, 1e9])
+
+
+@pytest.mark.parametrize("rate", [1e-9, 1e9])
+def test_dead_centres_are_as_sharp_in_any_unit_of_the_input(rate: float) -> None:
+    """Crank and coupler in line: cos(angle) from the triangle (c -+ a, d, rocker)."""
+    motion = simulate(four_bar(1.0, 3.0, 3.5, 4.0, law=Linear(rate=rate)), TURN / rate)
+    stretched = math.acos((4.0**2 + 4.0**2 - 3.5**2) / (2.0 * 4.0 * 4.0))
+    folded = math.pi + math.acos((2.0**2 + 4.0**2 - 3.5**2) / (2.0 * 2.0 * 4.0))
+    found = [event.input * rate for event in motion.events if event.kind == "dead centre"]
+    assert found == pytest.approx([stretched, folded], abs=1e-12)
+
+
+def test_numpy_integers_are_integers() -> None:
+    i = np.int64
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [
+        Revolute(i(0), i(1)), Revolute(i(1), i(2), (1.0, 0.0)), Revolute(i(2), i(3), (3.0, 0.0), (3.5, 0.0)),
+        Revolute(i(0), i(3), (4.0, 0.0)),
+    ]  # fmt: skip
+    mechanism = Mechanism(graph, joints, [Driver(i(0), i(1))], points={"M": (i(2), (5.0, 0.0))})
+    motion = simulate(mechanism, TURN, modes={i(0): i(-1)})
+    assert motion.completed
+    assert Mechanism.from_json(mechanism.to_json()) == mechanism
+
+
+def test_modes_must_be_a_mapping() -> None:
+    with pytest.raises(GeometryError, match="mapping"):
+        simulate(four_bar(1.0, 3.0, 3.5, 4.0), TURN, modes=[1])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("link", [1.5, True, -1, 9, None])
+def test_unknown_links_of_points_are_refused(link: object) -> None:
+    motion = simulate(four_bar(1.0, 3.0, 3.5, 4.0), TURN[:2])
+    with pytest.raises(GeometryError):
+        motion.point(link)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("local", ["a", (1.0,), (1.0, math.nan), 3.0, "ab"])
+def test_points_that_are_none_are_refused(local: object) -> None:
+    motion = simulate(four_bar(1.0, 3.0, 3.5, 4.0), TURN[:2])
+    with pytest.raises(GeometryError):
+        motion.point(1, local)  # type: ignore[arg-type]
