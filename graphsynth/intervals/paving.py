@@ -20,7 +20,7 @@ from graphsynth.errors import FormatError, SpecError
 from graphsynth.intervals.boxes import Paving, Progress
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
-from graphsynth.intervals.proving import Image, System, image
+from graphsynth.intervals.proving import System, image
 from graphsynth.intervals.status import Status
 
 __all__ = ["Search", "pave"]
@@ -32,6 +32,7 @@ _FORMAT = 1
 _GAIN = 0.9
 _CONTRACTIONS = 4
 _POLISH = 8
+_INFLATIONS = 4
 _ARRAYS = ("waiting_lo", "waiting_hi", "lo", "hi", "domain_lo", "domain_hi", "status", "inner")
 
 
@@ -54,7 +55,8 @@ class Search:
         gives the same boxes; the budget may be exceeded by one batch.
     inner : sequence of int, optional
         As many parameters as equations by which boxes are proved inner: for every point of the box there are values
-        of these parameters that make it a solution.
+        of these parameters that make it a solution.  The search then paves the solution set: boxes are cut down to
+        the tolerance even where a wide box is proved to hold exactly one solution for every parameter value.
     batch : int
         Boxes tested at once; part of the definition of the result.
     progress : callable, optional
@@ -185,14 +187,21 @@ class Search:
         X, domain, status, last = self._contract(X)
         alive = status != Status.EMPTY
         X, domain, status, last = X[alive], domain[alive], status[alive], last[alive]
-        proved = status != Status.UNDECIDED
-        self._keep(X[proved], domain[proved], status[proved], np.zeros(int(proved.sum()), dtype=np.bool_))
-        X, last = X[~proved], last[~proved]
-        X = X[~self._prove_beyond(X, last)]
-        if self.inner_by is not None and len(X):
+        if self.inner_by is None:
+            proved = status != Status.UNDECIDED
+            self._keep(X[proved], domain[proved], status[proved], np.zeros(int(proved.sum()), dtype=np.bool_))
+            X, last = X[~proved], last[~proved]
+            X = X[~self._prove_beyond(X, last)]
+        elif len(X):  # a set is wanted, not the hull of a proof: go on cutting
             inside = self._inner(X)
             self._keep(X[inside], X[inside], np.full(int(inside.sum()), Status.UNDECIDED, dtype=np.int8), None)
             X = X[~inside]
+        self._cut_or_keep(X)
+        if self.inner_by is None:
+            self._absorb()
+
+    def _cut_or_keep(self, X: Interval) -> None:
+        """Keep boxes at the limit of the resolution as undecided, cut the others."""
         sides = X.width / self.scale
         widest = sides.argmax(axis=1) if len(X) else np.zeros(0, dtype=np.int64)
         row = np.arange(len(X))
@@ -202,7 +211,6 @@ class Search:
         done = np.full(int(small.sum()), Status.UNDECIDED, dtype=np.int8)
         self._keep(X[small], X[small], done, np.zeros(len(done), dtype=np.bool_))
         self._cut(X[~small], widest[~small], middle[~small])
-        self._absorb()
 
     def _contract(self, X: Interval) -> tuple[Interval, Interval, NDArray[np.int8], Array]:
         """Repeat the test on each box while it gains; the domain is the box of the first proof."""
@@ -236,26 +244,31 @@ class Search:
         """Epsilon-inflation: prove solutions near faces in enlarged boxes; returns the boxes that are settled."""
         settled = np.zeros(len(norm), dtype=np.bool_)
         near = np.flatnonzero(norm < 0.5)
-        if near.size == 0:
-            return settled
-        trial = X[near].inflate(0.25, 1e-300)
-        grow = 0.05 * trial.width.max(axis=1, keepdims=True) if len(near) else 0.0
-        trial = _make(trial.lo - grow, trial.hi + grow)
-        step: Image = image(self.f, trial, self.parameters)
-        self.tested += near.size
-        good = step.status == Status.UNIQUE
-        settled[near[step.status == Status.EMPTY]] = True
-        outside = step.image.disjoint(self.start).any(axis=1)
-        settled[near[good & outside]] = True  # the only solution near lies outside the start box
-        keep = good & step.image.subset(self.start).all(axis=1)
-        settled[near[keep]] = True
-        if keep.any():
-            box, domain = step.box[keep], trial[keep]
-            for _ in range(_POLISH):
-                box = image(self.f, box.inflate(0.01, 1e-300), self.parameters).box.intersect(box)
-                self.tested += len(box)
-            self._keep(box, domain, step.status[keep], np.zeros(int(keep.sum()), dtype=np.bool_))
+        trial = X[near]
+        for _ in range(_INFLATIONS):
+            if near.size == 0:
+                break
+            trial = trial.inflate(0.25, 1e-300)
+            grow = _make(-0.05, 0.05) * trial.width.max(axis=1, keepdims=True)
+            trial = trial + grow
+            step = image(self.f, trial, self.parameters)
+            self.tested += near.size
+            good = step.status == Status.UNIQUE
+            # a unique solution that certainly lies outside the start box leaves none in the box itself
+            outside = good & step.image.disjoint(self.start).any(axis=1)
+            keep = good & step.image.subset(self.start).all(axis=1)
+            settled[near[(step.status == Status.EMPTY) | outside | keep]] = True
+            if keep.any():
+                self._keep_polished(step.box[keep], trial[keep], step.status[keep])
+            again = (step.status == Status.UNDECIDED) & (step.image.width < 4.0 * trial.width).all(axis=1)
+            near, trial = near[again], trial[again].hull(step.image[again])
         return settled
+
+    def _keep_polished(self, box: Interval, domain: Interval, status: NDArray[np.int8]) -> None:
+        for _ in range(_POLISH):
+            box = image(self.f, box.inflate(0.01, 1e-300), self.parameters).box.intersect(box)
+            self.tested += len(box)
+        self._keep(box, domain, status, np.zeros(len(status), dtype=np.bool_))
 
     def _inner(self, X: Interval) -> Mask:
         """Whether for every point of a box there are values of the chosen parameters that make it a solution."""
