@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 
-__all__ = ["choice", "finite", "finite_array", "positive", "sign", "unit_vector"]
+__all__ = [
+    "choice", "finite", "finite_array", "positive", "sign", "three", "three_points", "triple", "triples", "unit_vector",
+]  # fmt: skip
 
 
 def finite(name: str, value: Any) -> float:
@@ -72,4 +74,45 @@ def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         raise GeometryError(f"{name} holds {array.flat[bad[0]]} at flat position {bad[0]}; give finite numbers only")
+    return array
+
+
+def three(name: str, values: Any) -> tuple[Any, Any, Any]:
+    """Return three entries, one per leg; raise `GeometryError` for another number of them or none."""
+    try:
+        found = tuple(values)
+    except TypeError as error:
+        raise GeometryError(f"{name} = {values!r} is not a sequence; give three entries, one per leg") from error
+    if len(found) != 3:
+        raise GeometryError(f"{name} has {len(found)} entries; give three, one per leg")
+    return found
+
+
+def three_points(name: str, values: Any) -> tuple[complex, complex, complex]:
+    """Return three points as complex numbers; raise `GeometryError` for anything else, naming the leg."""
+    points = []
+    for leg, value in enumerate(three(name, values), start=1):
+        try:
+            found = complex(value) if not isinstance(value, str | bytes) else complex(math.nan)
+        except (TypeError, ValueError, OverflowError):
+            found = complex(math.nan)
+        if not (math.isfinite(found.real) and math.isfinite(found.imag)):
+            raise GeometryError(f"{name} of leg {leg} is {value!r}; give a finite point x + 1j * y")
+        points.append(found)
+    return points[0], points[1], points[2]
+
+
+def triple(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return three finite numbers, shape (3,); raise `GeometryError` for anything else."""
+    array = finite_array(name, values)
+    if array.shape != (3,):
+        raise GeometryError(f"{name} has shape {array.shape}; give three numbers")
+    return array
+
+
+def triples(name: str, values: ArrayLike, *, nan: bool = False) -> NDArray[np.float64]:
+    """Return finite numbers (or any, if ``nan``) of shape (..., 3); raise `GeometryError` for anything else."""
+    array = np.asarray(values, dtype=np.float64) if nan else finite_array(name, values)
+    if array.shape[-1:] != (3,):
+        raise GeometryError(f"{name} has shape {array.shape}; its last axis must hold three numbers")
     return array

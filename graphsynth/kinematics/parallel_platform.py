@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array, positive
+from graphsynth.kinematics._checks import positive, three, three_points, triple, triples
+from graphsynth.kinematics._plane import cross, directions
 from graphsynth.kinematics.assembly_modes import AssemblyModeBatch, AssemblyModes, assembly_modes, assembly_modes_batch
 from graphsynth.kinematics.leg import LegStatus, PlatformLegs, sensitivity
 
@@ -75,19 +76,9 @@ class InverseSolution:
         return np.asarray((self.status <= LegStatus.BOUNDARY).all(axis=-1))
 
 
-def _points(name: str, values: Any) -> tuple[complex, complex, complex]:
-    array = np.asarray(values, dtype=np.complex128)
-    if array.shape != (3,):
-        raise GeometryError(f"{name} has shape {array.shape}; give three complex numbers, one per leg")
-    for leg, value in enumerate(array, start=1):
-        if not np.isfinite(value):
-            raise GeometryError(f"{name} of leg {leg} is {value}; give a finite point")
-    return (complex(array[0]), complex(array[1]), complex(array[2]))
-
-
 def _lengths(name: str, values: Any) -> tuple[float, float, float]:
-    array = np.broadcast_to(np.asarray(values, dtype=np.float64), (3,))
-    first, second, third = (positive(f"{name} of leg {leg}", value, zero=True) for leg, value in enumerate(array, 1))
+    given = (values,) * 3 if np.ndim(values) == 0 else three(name, values)
+    first, second, third = (positive(f"{name} of leg {leg}", value, zero=True) for leg, value in enumerate(given, 1))
     return (first, second, third)
 
 
@@ -127,8 +118,8 @@ class ParallelPlatform:
     l2: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "D", _points("D", self.D))
-        object.__setattr__(self, "b", _points("b", self.b))
+        object.__setattr__(self, "D", three_points("D", self.D))
+        object.__setattr__(self, "b", three_points("b", self.b))
         object.__setattr__(self, "l1", _lengths("l1", self.l1))
         object.__setattr__(self, "l2", _lengths("l2", self.l2))
 
@@ -146,17 +137,17 @@ class ParallelPlatform:
     @classmethod
     def mock(cls) -> ParallelPlatform:
         """Return the symmetric mock-up MOCK-RECT (sections 2.5 and 8.2; millimetres)."""
-        turn = leg_directions()
+        turn = directions((-5 * math.pi / 6, -math.pi / 6, math.pi / 2))
         return cls(tuple((105 + 45j) * turn), tuple(45 * turn), (45.0,) * 3, (60.0,) * 3)
 
     def vertices(self, pose: ArrayLike) -> Complex:
         """Platform vertices F_k in the fixed frame, shape (..., 3), for poses (..., 3)."""
-        X = finite_array("pose", pose)
+        X = triples("pose", pose)
         return np.asarray(_complex(X)[..., None] + np.exp(1j * X[..., 2:3]) * np.array(self.b))
 
     def elbows(self, theta: ArrayLike) -> Complex:
-        """Joints A_k between rocker and intermediate link, shape (..., 3), for rocker angles (..., 3)."""
-        theta = np.asarray(theta, dtype=np.float64)
+        """Joints A_k between rocker and intermediate link, (..., 3), for rocker angles (..., 3); NaN stays NaN."""
+        theta = triples("theta", theta, nan=True)
         return np.asarray(np.array(self.D) + np.array(self.l1) * np.exp(1j * theta))
 
     def inverse(self, pose: ArrayLike, sigma: ArrayLike | None = None) -> InverseSolution:
@@ -170,7 +161,7 @@ class ParallelPlatform:
         GeometryError
             A pose that is not finite, or a sigma that is not made of +1 and -1.
         """
-        X = finite_array("pose", pose)
+        X = triples("pose", pose)
         rows = np.ascontiguousarray(X.reshape(-1, 3))
         if sigma is None:
             theta, status = self._legs.solve(rows, WORKING_MODES.astype(np.float64), 8)
@@ -200,12 +191,12 @@ class ParallelPlatform:
         JT : ndarray, shape (..., 3)
             Diagonal of ``df/dtheta``; on the closure ``JT_k = sigma_k S_k``.
         """
-        X = finite_array("pose", pose)
+        X = triples("pose", pose)
         d = self.vertices(X) - self.elbows(theta)
         arm = np.exp(1j * X[..., 2:3]) * np.array(self.b)
         rocker = np.array(self.l1) * np.exp(1j * np.asarray(theta, dtype=np.float64))
-        JX = 2.0 * np.stack([d.real, d.imag, _cross(arm, d)], axis=-1)
-        return JX, np.asarray(-2.0 * _cross(rocker, d))
+        JX = 2.0 * np.stack([d.real, d.imag, cross(arm, d)], axis=-1)
+        return JX, np.asarray(-2.0 * cross(rocker, d))
 
     def determinant(self, pose: ArrayLike, theta: ArrayLike) -> Array:
         """``det JX``, shape (...), unit length^4; zero at a type-II singularity."""
@@ -238,7 +229,7 @@ class ParallelPlatform:
         self, pose: ArrayLike, theta: ArrayLike, rate: ArrayLike, rate2: ArrayLike
     ) -> tuple[Array, Array]:
         """X' and X'' for given theta' and theta'' with respect to any parameter (section 4.2), shapes (..., 3)."""
-        X = finite_array("pose", pose)
+        X = triples("pose", pose)
         t1, t2 = np.asarray(rate, dtype=np.float64), np.asarray(rate2, dtype=np.float64)
         JX, JT = self.jacobians(X, theta)
         first = np.asarray(np.linalg.solve(JX, -(JT * t1)[..., None])[..., 0], dtype=np.float64)
@@ -261,7 +252,7 @@ class ParallelPlatform:
 
         An empty list is a valid answer.  Near a type-II singularity the computation continues at 50 digits and says so.
         """
-        theta = finite_array("theta", theta).reshape(3)
+        theta = triple("theta", theta)
         return assembly_modes(
             self.elbows(theta), np.array(self.b), np.array(self.l2), arms=(self.D, self.l1, tuple(theta))
         )
@@ -273,7 +264,7 @@ class ParallelPlatform:
         """
         from graphsynth.kinematics.kernels.modes import elbows
 
-        angles = np.require(np.atleast_2d(finite_array("theta", theta)), requirements=["C", "W"])
+        angles = np.require(np.atleast_2d(triples("theta", theta)), requirements=["C", "W"])
         anchors = np.empty(angles.shape, dtype=np.complex128)
         elbows(angles, np.array(self.D), np.array(self.l1), anchors)
         arms = (np.array(self.D), np.array(self.l1), angles)
@@ -288,15 +279,5 @@ class ParallelPlatform:
         return np.asarray(np.linalg.cond(JX / np.array([1.0, 1.0, positive("Lc", Lc)])))
 
 
-def leg_directions() -> Complex:
-    """``exp(i beta_k)`` for beta = -150, -30, 90 degrees, correctly rounded."""
-    half, root = 0.5, 0.5 * math.sqrt(3.0)
-    return np.array([complex(-root, -half), complex(root, -half), 1j])
-
-
 def _complex(X: Array) -> Complex:
     return np.asarray(X[..., 0] + 1j * X[..., 1])
-
-
-def _cross(a: Complex, b: Complex) -> Array:
-    return np.asarray(a.real * b.imag - a.imag * b.real)

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array, positive, sign
+from graphsynth.kinematics._checks import finite, finite_array, positive, sign, three, three_points, triple
+from graphsynth.kinematics._plane import directions
 from graphsynth.kinematics.drive import DriveTurn, FourBarDrive, first_barrier
 from graphsynth.kinematics.gears import GearTrain
-from graphsynth.kinematics.motion import BranchLabel, Event, Monodromy, Motion, Sweep, TurnBatch
+from graphsynth.kinematics.motion import BranchLabel, Monodromy, Motion, Sweep, TurnBatch
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.tracking import (
     SINGULAR,
@@ -31,6 +32,7 @@ from graphsynth.kinematics.tracking import (
     track,
     turn_batch,
 )
+from graphsynth.kinematics.turn_events import events, wheel_angles
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -127,16 +129,16 @@ class SingleMotorPlatform:
             "tau": sign,
         }
         for name, rule in rules.items():
-            values = tuple(getattr(self, name))
-            if len(values) != 3:
-                raise GeometryError(f"{name} has {len(values)} entries; give three, one per leg")
+            values = three(name, getattr(self, name))
             object.__setattr__(self, name, tuple(rule(f"{name} of leg {k}", v) for k, v in enumerate(values, 1)))
+        for name in ("axis", "pivot", "vertex"):
+            object.__setattr__(self, name, three_points(name, getattr(self, name)))
         _ = self.platform, self.drives  # their own checks
 
     @cached_property
     def platform(self) -> ParallelPlatform:
         """The three-leg platform in the fixed frame."""
-        turn = _directions(self.frame_angle)
+        turn = directions(self.frame_angle)
         D, b = np.array(self.pivot) * turn, np.array(self.vertex) * turn
         return ParallelPlatform((D[0], D[1], D[2]), (b[0], b[1], b[2]), self.l1, self.l2)
 
@@ -178,20 +180,26 @@ class SingleMotorPlatform:
         GeometryError
             If the drives cannot be assembled there, the home pose does not close, or the branch ends on the way.
         """
-        tracked = self._follow(np.array([finite("psi", psi)]), None, np.inf, accelerations=False)
+        tracked = self.follow(np.array([finite("psi", psi)]), None, np.inf, accelerations=False)
         return np.asarray(tracked.pose[0, 0])
 
     @cached_property
     def _machine(self) -> Array:
-        return machine_rows(self, _directions((
+        return machine_rows(self, directions((
             self.frame_angle[0] + self.delta[0],
             self.frame_angle[1] + self.delta[1],
             self.frame_angle[2] + self.delta[2],
         )))  # fmt: skip
 
-    def _follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
-        """Track the home branch, or the one of ``start``; raise `GeometryError` if there is no such branch."""
-        guess = np.array(self.home) if start is None else finite_array("start", start).reshape(3)
+    def follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
+        """Track the home branch, or the one of ``start``, through wheel angles psi (n,) up to ``stop`` (radians).
+
+        Raises
+        ------
+        GeometryError
+            If there is no such branch at the first angle.
+        """
+        guess = np.array(self.home) if start is None else triple("start", start)
         tracked = track(
             self._machine[None], psi, np.array([stop]), guess[None], self.Lc,
             grown=start is None, accelerations=accelerations,
@@ -242,9 +250,9 @@ class SingleMotorPlatform:
         >>> sweep.complete, sweep.pose[0].round(6).tolist()
         (True, [0.672631, -5.007799, 0.053385])
         """
-        angles = _increasing(np.asarray(psi, dtype=np.float64))
+        angles = wheel_angles(finite_array("psi", psi))
         barrier = first_barrier(self.drives, float(angles[0]), float(angles[-1]))
-        tracked = self._follow(angles, start, np.inf if barrier is None else barrier.psi, accelerations=accelerations)
+        tracked = self.follow(angles, start, np.inf if barrier is None else barrier.psi, accelerations=accelerations)
         status = BranchEnd(int(tracked.status[0]))
         reason = {BranchEnd.SINGULAR: SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
         return Sweep(
@@ -292,7 +300,7 @@ class SingleMotorPlatform:
         >>> [BranchEnd(status).name for status in batch.status.tolist()]
         ['COMPLETE', 'DRIVE_ENDS']
         """
-        return turn_batch(self, crank, phase, coupler, _increasing(samples), accelerations=accelerations)
+        return turn_batch(self, crank, phase, coupler, wheel_angles(samples), accelerations=accelerations)
 
     def monodromy(self, samples: int | ArrayLike = 361) -> Monodromy:
         """Follow all assembly modes over one turn and say which mode becomes which.
@@ -307,7 +315,7 @@ class SingleMotorPlatform:
         >>> SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).monodromy().permutation
         (0, 1)
         """
-        return monodromy(self, _increasing(samples))
+        return monodromy(self, wheel_angles(samples))
 
     def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> Motion:
         """Follow one branch over a turn of the wheels, with events and a closure test.
@@ -326,9 +334,9 @@ class SingleMotorPlatform:
             event says so; the pose is compared with all assembly modes at every sample.
         """
         begin = perf_counter()
-        psi = _increasing(samples)
+        psi = wheel_angles(samples)
         barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
-        tracked = self._follow(psi, start, np.inf if barrier is None else barrier.psi, accelerations=True)
+        tracked = self.follow(psi, start, np.inf if barrier is None else barrier.psi, accelerations=True)
         reached = int(tracked.reached[0])
         pose, theta, determinant = (
             tracked.pose[0, :reached],
@@ -343,7 +351,6 @@ class SingleMotorPlatform:
             monodromy, error = self.monodromy(psi), float(distance(pose[-1], pose[0], self.Lc))
             nearest = int(np.argmin(distance(monodromy.modes, pose[0], self.Lc)))
             period = monodromy.periods[nearest]
-        events = self._events(psi, tracked, barrier, leg) + mismatch_events(psi, mismatch)
         sigma = (int(np.sign(leg[0, 0])), int(np.sign(leg[0, 1])), int(np.sign(leg[0, 2])))
         scale = max(*self.platform.l1, *self.platform.l2) ** 2
         return Motion(
@@ -352,7 +359,7 @@ class SingleMotorPlatform:
             determinant=determinant, leg=leg, drive=self.drive(psi[:reached]).h_phi, gap=gap,
             residual=float(np.abs(self.platform.closure(pose, theta)).max()) / scale,
             complete=complete and not mismatch.any(), closed=period > 0, closure_error=error, period=period,
-            events=tuple(sorted(events, key=lambda event: (event.psi, event.ends_motion))),
+            events=tuple(events(self, psi, tracked, barrier, leg, mismatch)),
             label=BranchLabel(self.tau, sigma, int(np.sign(determinant[0])), rank, 0),
             Lc=self.Lc, method=_METHOD, seconds=perf_counter() - begin, monodromy=monodromy,
         )  # fmt: skip
@@ -360,38 +367,6 @@ class SingleMotorPlatform:
     def all_poses(self, psi: float) -> Array:
         """All assembly modes for the drive branches of this mechanism at ``psi``, shape (m, 3)."""
         return self.platform.direct(self.drive(psi).theta).poses
-
-    def _events(self, psi: Array, tracked: Tracked, barrier: Event | None, leg: Array) -> list[Event]:
-        events: list[Event] = []
-        end, status = float(psi[-1]), BranchEnd(int(tracked.status[0]))
-        if status is BranchEnd.SINGULAR:
-            end, x, y, alpha = (float(value) for value in tracked.end[0])
-            events.append(Event("platform singular", end, 0, True, SINGULAR, (x, y, alpha)))
-        elif barrier is not None:
-            end = barrier.psi
-            events.append(barrier)
-        for number, drive in enumerate(self.drives, start=1):
-            for angle in drive.dead_points():
-                at = float(psi[0]) + (angle - float(psi[0])) % math.tau
-                if at <= end:
-                    text = f"crank and coupler {number} in line: the rocker reverses"
-                    events.append(Event("rocker dead point", at, number, False, text))
-        for index, k in zip(*np.nonzero(np.sign(leg[1:]) != np.sign(leg[:-1]))):
-            text = f"leg {k + 1} passes its boundary: the working mode changes"
-            at = self._crossing(psi[index : index + 2], tracked.pose[0, index], int(k))
-            events.append(Event("leg boundary", at, int(k) + 1, False, text))
-        return events
-
-    def _crossing(self, psi: Array, pose: Array, leg: int) -> float:
-        """Wheel angle at which ``JT`` of a leg vanishes between two samples, by refinement of the sampling."""
-        low, high = float(psi[0]), float(psi[1])
-        for _ in range(4):
-            fine = self._follow(np.linspace(low, high, 33), pose, np.inf, accelerations=False)
-            values = self.platform.jacobians(fine.pose[0], fine.theta[0])[1][:, leg]
-            change = int(np.argmax(np.sign(values[1:]) != np.sign(values[:-1])))
-            low, high = low + (high - low) * change / 32.0, low + (high - low) * (change + 1) / 32.0
-            pose = fine.pose[0, change]
-        return low + (high - low) * float(values[change] / (values[change] - values[change + 1]))
 
     def graph(self) -> MechanismGraph:
         """Structural graph of the source's Figure 3: 15 links, 19 turning pairs, 3 gear pairs, link 0 the frame."""
@@ -403,37 +378,3 @@ class SingleMotorPlatform:
             for pair in text.split()
         ]
         return MechanismGraph(15, [(a, b, f) for a, b, f in joints], frame=0)
-
-
-def mismatch_events(psi: Array, mismatch: NDArray[np.bool_]) -> list[Event]:
-    """One event for every sample at which the tracked pose is not among the computed assembly modes."""
-    text = "the tracked pose is not one of the computed assembly modes"
-    return [Event("mode mismatch", float(psi[k]), 0, False, text) for k in np.flatnonzero(mismatch)]
-
-
-def _increasing(samples: int | ArrayLike) -> Array:
-    if isinstance(samples, int | np.integer):
-        if samples < 2:
-            raise GeometryError(f"samples = {samples} is too few for a turn; give 2 or more, or an array of angles")
-        return np.linspace(0.0, math.tau, int(samples))
-    psi = finite_array("samples", samples).ravel()
-    if psi.size < 2 or bool(np.any(np.diff(psi) <= 0.0)):
-        raise GeometryError("samples must hold two or more increasing wheel angles")
-    return psi
-
-
-def _directions(angles: Triple) -> NDArray[np.complex128]:
-    """``exp(i beta)`` with multiples of 30 degrees rounded correctly."""
-    twelfths = [round(angle * 6.0 / math.pi) for angle in angles]
-    table = [0.0, 0.5, 0.5 * math.sqrt(3.0), 1.0, 0.5 * math.sqrt(3.0), 0.5]
-
-    def sine(k: int) -> float:
-        k %= 12
-        return table[k] if k < 6 else -table[k - 6]
-
-    return np.array(
-        [
-            complex(sine(k + 3), sine(k)) if abs(angle - k * math.pi / 6.0) < 1e-15 else np.exp(1j * angle)
-            for k, angle in zip(twelfths, angles)
-        ]
-    )

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate
+from graphsynth.kinematics._plane import directions
 from graphsynth.kinematics.assembly_modes import assembly_modes
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform, _directions
+from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -332,7 +333,7 @@ def test_six_bars_start_at_their_pose_and_keep_their_lengths(name: str, seed: in
 
 def platform(source: SingleMotorPlatform) -> Mechanism:
     """The same mechanism for the general engine: 15 links, pinion of half the wheels' radius."""
-    turn = _directions(source.frame_angle)
+    turn = directions(source.frame_angle)
     joints: list[Revolute | Gear] = [Revolute(0, 1)]
     for k in range(3):
         wheel, coupler, rocker, link = 2 + k, 5 + k, 8 + k, 11 + k

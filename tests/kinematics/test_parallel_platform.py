@@ -430,3 +430,35 @@ def test_bad_platform(change, text):
         G1.inverse([math.nan, 0, 0])
     with pytest.raises(GeometryError, match="sigma"):
         G1.inverse(POSE, sigma=(1, 0, 1))
+
+
+# --- bad input: one sentence, whatever it is
+
+
+@pytest.mark.parametrize(
+    "points", ["abc", (1, 2), 5, (0, 1, "x"), (0, 1, (1.0, 2.0)), (0, 1, np.nan), None, (0, 1, np.inf)]
+)
+@pytest.mark.parametrize("name", ["D", "b"])
+def test_points_that_are_none_are_refused(points: object, name: str) -> None:
+    good = {"D": (0, 2.5 + 0.2j, 1.1 + 2.3j), "b": (-0.4 - 0.25j, 0.45 - 0.3j, 0.05 + 0.5j), "l1": 1.0, "l2": 1.0}
+    with pytest.raises(GeometryError, match=name):
+        ParallelPlatform(**{**good, name: points})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("lengths", ["abc", (1.0, 2.0), (1.0, -1.0, 2.0), None, (1.0, 1.0, np.nan), 1j])
+def test_lengths_that_are_none_are_refused(lengths: object) -> None:
+    with pytest.raises(GeometryError, match="l1"):
+        ParallelPlatform((0, 2.5 + 0.2j, 1.1 + 2.3j), (-0.4j, 0.45, 0.5j), lengths, 1.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("wrong", [[0.0, 0.0], [0.0] * 4, 0.0, [[0.0, 0.0]], []])
+def test_shapes_that_do_not_fit_are_refused(wrong: object) -> None:
+    platform = ParallelPlatform.g1()
+    for call in (platform.inverse, platform.vertices, platform.direct, platform.direct_batch):
+        with pytest.raises(GeometryError, match="shape"):
+            call(wrong)  # type: ignore[operator]
+    for other in (platform.jacobians, platform.closure, platform.determinant, platform.velocity_matrix):
+        with pytest.raises(GeometryError, match="shape"):
+            other(wrong, [0.0, 0.0, 0.0])
+        with pytest.raises(GeometryError, match="shape"):
+            other([0.0, 0.0, 0.0], wrong)

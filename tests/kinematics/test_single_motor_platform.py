@@ -244,3 +244,31 @@ def test_graph_is_figure_three():
     assert len(graph.joints) == 22
     assert graph.mobility == 1
     assert [len(level) for level in graph.levels] == [1, 7, 6, 1]
+
+
+@pytest.mark.parametrize("wrong", [10, None, "abc", (1.0, 2.0), (1.0, 2.0, "x")])
+@pytest.mark.parametrize(
+    "name", ["crank", "phase", "coupler", "rocker", "pivot", "axis", "vertex", "l1", "delta", "home"]
+)
+def test_parameters_that_are_none_are_refused(wrong: object, name: str) -> None:
+    if name == "l1" and wrong == 10:
+        pytest.skip("one length for all legs is allowed")
+    with pytest.raises(GeometryError, match=name):
+        SingleMotorPlatform(**{name: wrong})  # type: ignore[arg-type]
+
+
+def test_starts_that_are_none_are_refused() -> None:
+    for start in ([0.0, 0.0], "x", [0.0, 0.0, math.nan]):
+        with pytest.raises(GeometryError, match="start"):
+            SingleMotorPlatform().full_turn(start=start)  # type: ignore[arg-type]
+    for psi in ("x", [0.0, math.nan], [[0.0, "y"]]):
+        with pytest.raises(GeometryError, match="psi"):
+            SingleMotorPlatform().sweep(psi)  # type: ignore[arg-type]
+
+
+def test_dead_points_of_every_turn_are_events() -> None:
+    """Crank and coupler are in line twice a turn, drive by drive: 3 x 2 x 3 in three turns."""
+    motion = SingleMotorPlatform().full_turn(np.linspace(0.1, 0.1 + 3.0 * math.tau, 361))
+    at = [event.psi for event in motion.events if event.kind == "rocker dead point"]
+    assert len(at) == 18
+    assert np.allclose(np.array(at[6:]) - np.array(at[:-6]), math.tau)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite
+from graphsynth.kinematics._plane import cross
 
 __all__ = ["SingularConic", "singular_conic"]
 
@@ -76,7 +77,7 @@ def singular_conic(anchors: ArrayLike, vertices: ArrayLike, alpha: float) -> Sin
     t2 = _moment(arm[1], g[1]) - t1
     t3 = _moment(arm[2], g[2]) - t1
     quadratic = _product(t3, _turned(u2, g[0])) - _product(t2, _turned(u3, g[0]))
-    quadratic[3:] += _cross(u2, u3) * t1
+    quadratic[3:] += cross(u2, u3) * t1
     c = tuple(float(8.0 * value) for value in quadratic)
     discriminant = c[1] ** 2 - 4.0 * c[0] * c[2]
     size = float(max(np.abs(g - g[0]).max(), np.abs(arm).max(), 1e-300))
@@ -94,18 +95,14 @@ def _kind(c: tuple[float, ...], discriminant: float, size: float) -> str:
     return "ellipse" if discriminant < 0.0 else "hyperbola"
 
 
-def _cross(a: complex, b: complex) -> float:
-    return a.real * b.imag - a.imag * b.real
-
-
 def _moment(arm: complex, g: complex) -> NDArray[np.float64]:
     """``cross(arm, p - g)`` as coefficients of (x, y, 1)."""
-    return np.array([-arm.imag, arm.real, -_cross(arm, g)])
+    return np.array([-arm.imag, arm.real, -cross(arm, g)])
 
 
 def _turned(u: complex, g: complex) -> NDArray[np.float64]:
     """``cross(p - g, u)`` as coefficients of (x, y, 1)."""
-    return np.array([u.imag, -u.real, -_cross(g, u)])
+    return np.array([u.imag, -u.real, -cross(g, u)])
 
 
 def _product(s: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array, positive
+from graphsynth.kinematics._checks import positive, triple
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.field import characteristic_length, determinant, scaled_rows, working_mode
 from graphsynth.kinematics.platform.tracing import CurveEquations
@@ -109,7 +109,7 @@ def singularity_distance(
     """
     mode = working_mode(sigma)
     length = characteristic_length(platform) if Lc is None else positive("Lc", Lc)
-    X = finite_array("pose", pose).reshape(3)
+    X = triple("pose", pose)
     theta = platform.inverse(X, mode).theta
     for leg in range(3):
         if min(platform.l1[leg], platform.l2[leg]) == 0.0:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array
+from graphsynth.kinematics._checks import finite, finite_array, triple
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def link_poses(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> Ar
     Links: 0 frame, 1 pinion, 2-4 wheels, 5-7 couplers, 8-10 rockers (bell-cranks), 11-13 intermediate links, 14
     platform.
     """
-    X = finite_array("pose", pose).reshape(3)
+    X = triple("pose", pose)
     state = platform.drive(finite("psi", psi))
     turn = np.exp(1j * np.array(platform.frame_angle))
     O, D = np.array(platform.axis) * turn, np.array(platform.platform.D)
@@ -122,7 +122,7 @@ def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLik
     from graphsynth.mechanism.laws import Linear
     from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
 
-    start = platform.home_pose(psi) if pose is None else finite_array("pose", pose).reshape(3)
+    start = platform.home_pose(psi) if pose is None else triple("pose", pose)
     poses = link_poses(platform, psi, start)
     if not np.isfinite(poses).all():
         raise GeometryError(f"a drive is not assembled at psi = {psi}; choose an angle inside its reach")

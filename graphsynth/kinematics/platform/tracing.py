@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.kinematics._plane import cross
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
 __all__ = ["CurveEquations", "Traced", "trace"]
@@ -48,7 +49,7 @@ class CurveEquations:
     def reach(self, v: Array) -> Array:
         """``JT_k``: its sign is the working mode."""
         rocker, d = self.legs(v)
-        return np.array([-2.0 * _cross(e, x) for e, x in zip(rocker, d)])
+        return np.array([-2.0 * cross(e, x) for e, x in zip(rocker, d)])
 
     def reach_gradient(self, v: Array, k: int) -> Array:
         """Gradient of ``JT_k``."""
@@ -61,18 +62,18 @@ class CurveEquations:
     def evaluate(self, v: Array) -> tuple[Array, Array]:
         """Four residuals and their Jacobian (4, 5)."""
         rocker, d = self.legs(v)
-        rows = [(x.real, x.imag, _cross(a, x)) for a, x in zip(self.arm, d)]
+        rows = [(x.real, x.imag, cross(a, x)) for a, x in zip(self.arm, d)]
         cofactor = [_cross3(rows[(k + 1) % 3], rows[(k + 2) % 3]) for k in range(3)]
         f, J = np.empty(4), np.zeros((4, 5))
         for k in range(3):
             x, e, c, a = d[k], rocker[k], cofactor[k], self.arm[k]
             length = abs(x)
             f[k] = (length - self.l2[k]) * (length + self.l2[k])
-            J[k, 0], J[k, 1], J[k, 2 + k] = 2.0 * x.real, 2.0 * x.imag, -2.0 * _cross(e, x)
+            J[k, 0], J[k, 1], J[k, 2 + k] = 2.0 * x.real, 2.0 * x.imag, -2.0 * cross(e, x)
             move = -1j * e
             J[3, 0] += c[0] - c[2] * a.imag
             J[3, 1] += c[1] + c[2] * a.real
-            J[3, 2 + k] = c[0] * move.real + c[1] * move.imag + c[2] * _cross(a, move)
+            J[3, 2 + k] = c[0] * move.real + c[1] * move.imag + c[2] * cross(a, move)
         f[3] = rows[0][0] * cofactor[0][0] + rows[0][1] * cofactor[0][1] + rows[0][2] * cofactor[0][2]
         return f, J
 
@@ -160,10 +161,6 @@ def _tangent(J: Array, along: Array) -> Array:
     """Return the unit null vector of the Jacobian with a positive component along ``along``."""
     t = np.linalg.svd(J)[2][-1]
     return np.asarray(-t if float(t @ along) < 0.0 else t)
-
-
-def _cross(a: complex, b: complex) -> float:
-    return a.real * b.imag - a.imag * b.real
 
 
 def _cross3(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
