@@ -1,0 +1,20 @@
+"""Circle and ellipse with tolerances: the interval problem of the source, solved exactly and by Krawczyk's method."""
+
+from __future__ import annotations
+
+from graphsynth.jamming.circle_ellipse.boxes import CrossingBoxes, krawczyk_boxes
+from graphsynth.jamming.circle_ellipse.hull import CrossingHull, exact_hull, mirrored
+from graphsynth.jamming.circle_ellipse.problem import CircleEllipse, circle_ellipse, surrogate_problem
+from graphsynth.jamming.circle_ellipse.reasons import Reason
+
+__all__ = [
+    "CircleEllipse",
+    "CrossingBoxes",
+    "CrossingHull",
+    "Reason",
+    "circle_ellipse",
+    "exact_hull",
+    "krawczyk_boxes",
+    "mirrored",
+    "surrogate_problem",
+]

@@ -1,0 +1,194 @@
+"""Circle and ellipse by Krawczyk's method in (x, y) with bisection, as in the source, but with sound statuses.
+
+Specification, sections 6.4 and 6.5: an empty image proves that there is no crossing, an image in the interior of its
+box that there is exactly one, and an overlap proves nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import SpecError
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.interval import Interval
+from graphsynth.intervals.reading import lower_bound, upper_bound
+from graphsynth.intervals.status import Status
+from graphsynth.jamming.circle_ellipse.criterion import spectral_radius
+from graphsynth.jamming.circle_ellipse.exact import root_bounds
+from graphsynth.jamming.circle_ellipse.hull import mirrored
+from graphsynth.jamming.circle_ellipse.problem import CircleEllipse
+from graphsynth.jamming.circle_ellipse.reasons import Reason
+
+__all__ = ["CrossingBoxes", "krawczyk_boxes", "krawczyk_data"]
+
+Array = NDArray[np.float64]
+
+#: Boxes treated between two looks at the clock.
+_BATCH = 4096
+_MOST_PROVED = 16
+
+
+@dataclass(frozen=True, eq=False)
+class CrossingBoxes:
+    """Outcome of `krawczyk_boxes`, for the first quadrant.
+
+    Attributes
+    ----------
+    status : Status
+        ``EMPTY``: no crossing; ``UNIQUE``: exactly one in the quadrant, for every choice of the parameters; ``EXISTS``:
+        at least one for every choice, but boxes are left that may hold more; ``UNDECIDED``: see ``reasons``.
+    reasons : tuple of Reason
+    proved : Interval, shape (P, 2)
+        Enclosures of crossings that exist and are unique in the matching row of ``domains``.
+    domains : Interval, shape (P, 2)
+    inner : Interval, shape (M, 2)
+        Boxes of which every point is a solution for some choice of the parameters.
+    boundary : Interval, shape (N, 2)
+        Boxes about which nothing is proved: the layer around a thick solution set, and boxes not treated.
+    finished : bool
+        False if a limit ended the search; all boxes together hold every solution all the same.
+    tested, seconds : int, float
+        Work done.
+    spectral_radius : float
+        ``rho(|I - Y L|)`` on ``outer``, an estimate.
+    """
+
+    problem: CircleEllipse
+    status: Status
+    reasons: tuple[Reason, ...]
+    proved: Interval
+    domains: Interval
+    inner: Interval
+    boundary: Interval
+    finished: bool
+    tested: int
+    seconds: float
+    spectral_radius: float
+
+    @property
+    def boxes(self) -> Interval:
+        """All boxes, shape (K, 2): every solution lies in one of them."""
+        return _joined(self.proved, self.inner, self.boundary)
+
+    @property
+    def outer(self) -> Interval:
+        """Hull of all boxes, shape (2,)."""
+        return _hull_of(self.boxes)
+
+    @property
+    def inside(self) -> Interval:
+        """Hull of the inner boxes, shape (2,): part of the solution set; empty if there are none."""
+        return _hull_of(self.inner)
+
+    @property
+    def four(self) -> Interval:
+        """Hulls of the crossings in all quadrants, copies on an axis merged; see `mirrored`."""
+        return mirrored(self.outer)
+
+
+def _joined(*parts: Interval) -> Interval:
+    return Interval.from_bounds(np.concatenate([p.lo for p in parts]), np.concatenate([p.hi for p in parts]))
+
+
+def _hull_of(boxes: Interval) -> Interval:
+    if len(boxes) == 0:
+        return Interval.empty(2)
+    return Interval.from_bounds(boxes.lo.min(axis=0), boxes.hi.max(axis=0))
+
+
+def krawczyk_data(problem: CircleEllipse) -> Array:
+    """Bounds of the two right-hand sides and of 1/a^2 and 1/b^2, rounded outward."""
+    pairs = [problem.circle_bounds, problem.level_bounds]
+    ends = [(p.lo, p.hi) for p in pairs] + [(1 / r.hi**2, 1 / r.lo**2) for r in (problem.a, problem.b)]
+    return np.array([bound for lo, hi in ends for bound in (lower_bound(lo), upper_bound(hi))])
+
+
+def krawczyk_boxes(
+    problem: CircleEllipse, *, tolerance: float = 1e-6, max_boxes: int = 20_000, max_seconds: float = 60.0
+) -> CrossingBoxes:
+    """Solve the problem by bisection and Krawczyk's test in (x, y).
+
+    Parameters
+    ----------
+    problem : CircleEllipse
+    tolerance : float
+        Boxes with both sides below ``tolerance`` times the side of the start box are not cut further.
+    max_boxes : int
+        Limit on the boxes tested; waiting boxes are then reported as boundary.
+    max_seconds : float
+        Limit on the run time, looked at every few thousand boxes.
+
+    Returns
+    -------
+    CrossingBoxes
+        Certified, whatever the limit.
+
+    Raises
+    ------
+    SpecError
+        For limits that are not positive.
+    GraphsynthError
+        If the processor's rounding has been changed.
+
+    Examples
+    --------
+    >>> from graphsynth.jamming.circle_ellipse import circle_ellipse
+    >>> found = krawczyk_boxes(circle_ellipse(5, 6, 4, eps="1e-9"))
+    >>> found.status.name, len(found.four), found.finished
+    ('UNIQUE', 4, True)
+    """
+    check_rounding()
+    for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
+        if not value > 0:
+            raise SpecError(f"{name} = {value} must be positive; give a number above 0")
+    from graphsynth.jamming.circle_ellipse import kernels
+
+    begin = perf_counter()
+    side = upper_bound(root_bounds(max(problem.circle_bounds.hi, Fraction(0))).hi)
+    queue, state = np.empty((2 * max_boxes + 2, 4)), np.zeros(5, dtype=np.int64)
+    queue[0], state[kernels.TAIL] = (0.0, side, 0.0, side), 1
+    kept, inner = np.empty((max_boxes + 1, 4)), np.zeros(max_boxes + 1, dtype=np.bool_)
+    proved, data = np.empty((_MOST_PROVED, 8)), krawczyk_data(problem)
+    seconds = 0.0
+    while state[kernels.HEAD] < state[kernels.TAIL] and state[kernels.TESTED] < max_boxes and seconds < max_seconds:
+        limit = min(int(state[kernels.TESTED]) + _BATCH, max_boxes)
+        kernels.search(queue, state, kept, inner, proved, data, tolerance * side, limit)
+        seconds = perf_counter() - begin
+    head, tail, tested, found, count = state.tolist()
+    rest = np.concatenate([kept[:count][~inner[:count]], queue[head:tail]])
+    parts = (proved[:found, 4:], proved[:found, :4], kept[:count][inner[:count]], rest)
+    return _outcome(problem, parts, head == tail, tested, seconds, tested >= max_boxes)
+
+
+def _intervals(rows: Array) -> Interval:
+    return Interval.from_bounds(rows[:, ::2], rows[:, 1::2])
+
+
+def _outcome(
+    problem: CircleEllipse, parts: tuple[Any, ...], finished: bool, tested: int, seconds: float, full: bool
+) -> CrossingBoxes:
+    """Drop boxes that a proved crossing stands for, and say what is known."""
+    enclosures, domains, inner, rest = parts
+    for domain in domains:
+        for_it = (rest[:, ::2] >= domain[::2]).all(axis=1) & (rest[:, 1::2] <= domain[1::2]).all(axis=1)
+        rest = rest[~for_it]
+    left = len(rest) + len(inner) > 0
+    if len(domains):
+        status = Status.EXISTS if left or len(domains) > 1 else Status.UNIQUE
+    else:
+        status = Status.UNDECIDED if left else Status.EMPTY
+    reasons = [Reason.CROSSING] if status is Status.UNIQUE else []
+    if status is Status.EMPTY:
+        outside = problem.circle_bounds.lo > problem.a.lo**2
+        reasons.append(Reason.CIRCLE_OUTSIDE if outside else Reason.CIRCLE_INSIDE)
+    elif left:
+        reasons.append(Reason.RESOLUTION if finished else Reason.BOXES if full else Reason.SECONDS)
+    found, unique, within, layer = (_intervals(rows) for rows in (enclosures, domains, inner, rest))
+    rho = spectral_radius(problem, _hull_of(_joined(found, within, layer)))
+    return CrossingBoxes(problem, status, tuple(reasons), found, unique, within, layer, finished, tested, seconds, rho)
