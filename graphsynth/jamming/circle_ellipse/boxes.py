@@ -55,8 +55,6 @@ class CrossingBoxes:
         False if a limit ended the search; all boxes together hold every solution all the same.
     tested, seconds : int, float
         Work done.
-    spectral_radius : float
-        ``rho(|I - Y L|)`` on ``outer``, an estimate.
     """
 
     problem: CircleEllipse
@@ -69,7 +67,11 @@ class CrossingBoxes:
     finished: bool
     tested: int
     seconds: float
-    spectral_radius: float
+
+    @property
+    def spectral_radius(self) -> float:
+        """``rho(|I - Y L|)`` on ``outer``, an estimate."""
+        return spectral_radius(self.problem, self.outer)
 
     @property
     def boxes(self) -> Interval:
@@ -190,5 +192,4 @@ def _outcome(
     elif left:
         reasons.append(Reason.RESOLUTION if finished else Reason.BOXES if full else Reason.SECONDS)
     found, unique, within, layer = (_intervals(rows) for rows in (enclosures, domains, inner, rest))
-    rho = spectral_radius(problem, _hull_of(_joined(found, within, layer)))
-    return CrossingBoxes(problem, status, tuple(reasons), found, unique, within, layer, finished, tested, seconds, rho)
+    return CrossingBoxes(problem, status, tuple(reasons), found, unique, within, layer, finished, tested, seconds)

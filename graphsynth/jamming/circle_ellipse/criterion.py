@@ -28,7 +28,7 @@ def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
     >>> from graphsynth.jamming.circle_ellipse import circle_ellipse
     >>> box = Interval.from_bounds([4.0, 2.9], [4.1, 3.0])
     >>> round(spectral_radius(circle_ellipse(5, 6, 4), box), 4)
-    0.0292
+    0.0733
     """
     if box.is_empty.any():
         return 0.0
