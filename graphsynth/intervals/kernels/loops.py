@@ -22,11 +22,15 @@ def subtract(al, ah, bl, bh, lo, hi):
 @njit(cache=True, error_model="numpy")
 def multiply(al, ah, bl, bh, lo, hi):
     """Products of flat arrays."""
+    rare = 0
     for i in range(lo.size):
-        lo[i], hi[i] = arithmetic.multiply_plain(al[i], ah[i], bl[i], bh[i])
-    for i in range(lo.size):  # the rare cases afterwards, so that the loop above uses vector instructions
-        if lo[i] != lo[i]:
-            lo[i], hi[i] = arithmetic.multiply_any(al[i], ah[i], bl[i], bh[i])
+        low, high = arithmetic.multiply_plain(al[i], ah[i], bl[i], bh[i])
+        lo[i], hi[i] = low, high
+        rare += 1 if low != low else 0
+    if rare > 0:  # afterwards, so that the loop above uses vector instructions
+        for i in range(lo.size):
+            if lo[i] != lo[i]:
+                lo[i], hi[i] = arithmetic.multiply_any(al[i], ah[i], bl[i], bh[i])
 
 
 @njit(cache=True, error_model="numpy")
