@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.cli.show import check_place, read_graph
+from graphsynth.errors import FormatError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.structure.graph import MechanismGraph
 
 __all__ = ["run"]
 
@@ -33,15 +35,17 @@ class _Found:
 
 def run(options: argparse.Namespace) -> int:
     """Embody and animate one candidate, or animate a dimensioned mechanism."""
+    from graphsynth.drawing.frames import check_frames
+
     suffix = options.output.suffix.lower()
-    if suffix not in _SUFFIXES:
-        raise GraphsynthError(f"{options.output} must end in {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}")
-    if options.save and options.save.suffix.lower() not in (".toml", ".json"):
-        raise GraphsynthError(f"{options.save} must end in .toml or .json")
+    check_place(options.output, _SUFFIXES)
+    if options.save:
+        check_place(options.save, (".toml", ".json"))
+    count = options.frames if options.frames is not None else _FRAMES[suffix]
+    check_frames(count)
     place = Path(options.mechanism)
     dimensioned = len(options.mechanism) < 1000 and place.suffix.lower() in (".toml", ".json") and place.is_file()
     found = _from_file(place, options) if dimensioned else _from_graph(options)
-    count = options.frames if options.frames is not None else _FRAMES[suffix]
     _write(found, options.output, suffix, count)
     if options.save:
         text = found.motion.mechanism
@@ -66,7 +70,10 @@ def _from_file(place: Path, options: argparse.Namespace) -> _Found:
     if options.driver:
         raise SpecError("--driver belongs to a graph: a dimensioned mechanism names its drivers in its file")
     text = place.read_bytes()
-    mechanism = Mechanism.from_toml(text) if place.suffix.lower() == ".toml" else Mechanism.from_json(text)
+    try:
+        mechanism = Mechanism.from_toml(text) if place.suffix.lower() == ".toml" else Mechanism.from_json(text)
+    except FormatError as error:
+        raise FormatError(str(error), str(place)) from None
     if options.range is not None:
         motion = simulate(mechanism, np.linspace(options.range[0], options.range[1], 361))
     else:
@@ -79,14 +86,12 @@ def _from_file(place: Path, options: argparse.Namespace) -> _Found:
 
 def _from_graph(options: argparse.Namespace) -> _Found:
     """Find dimensions for a graph; the best found is shown even where nothing was accepted."""
-    from graphsynth.cli.show import read_graph
     from graphsynth.kinematics.embodiment import embody
 
     if options.range is not None:
         raise SpecError("--range belongs to a dimensioned mechanism: dimensions of a graph are sought for a full turn")
     graph = read_graph(options.mechanism, options.line)
-    driver = options.driver[0] if options.driver and len(options.driver) == 1 else options.driver
-    found = embody(graph, seed=options.seed, driver=driver)
+    found = embody(graph, seed=options.seed, driver=_on_frame(graph, options.driver))
     if found.motion is None or found.mechanism is None:
         raise GraphsynthError(f"{found.statement}; try another --seed or --driver")
     facts: dict[str, Any] = {
@@ -104,6 +109,21 @@ def _from_graph(options: argparse.Namespace) -> _Found:
             "length_ratio": _number(found.figures.length_ratio),
         }
     return _Found(found.motion, graph.to_text(), found.statement, facts)
+
+
+def _on_frame(graph: MechanismGraph, links: list[int] | None) -> list[tuple[int, int]] | None:
+    """Driven joints between the links given and the frame."""
+    if not links:
+        return None
+    if graph.frame is None:
+        raise SpecError("--driver needs a mechanism: choose a frame first (text form '... f0')")
+    for link in links:
+        if link not in graph.levels[1]:
+            listed = ", ".join(map(str, graph.levels[1]))
+            raise SpecError(f"--driver {link}: the link is not jointed to the frame; choose from {listed}")
+        if links.count(link) > 1:
+            raise SpecError(f"--driver {link} is given twice; name every driven link once")
+    return [(graph.frame, link) for link in links]
 
 
 def _write(found: _Found, path: Path, suffix: str, frames: int) -> None:

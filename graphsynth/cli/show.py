@@ -7,17 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
-from graphsynth.errors import FormatError, GraphError, SpecError
+from graphsynth.errors import FormatError, GraphError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["read_graph", "run"]
+__all__ = ["check_place", "read_graph", "run"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
     graph = read_graph(options.graph, options.line)
+    if options.output:
+        check_place(options.output, (".svg", ".png", ".pdf"))
     facts = _facts(graph, options.driver)
     if options.json:
         console.put_json(facts)
@@ -32,6 +34,16 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def check_place(path: Path, suffixes: tuple[str, ...]) -> None:
+    """Refuse a file that cannot be written before any work is done."""
+    if path.suffix.lower() not in suffixes:
+        raise GraphsynthError(f"{path} must end in {', '.join(suffixes[:-1])} or {suffixes[-1]}")
+    if not path.parent.is_dir():
+        raise GraphsynthError(f"{path}: the folder {path.parent} does not exist; make it first")
+    if path.is_dir():
+        raise GraphsynthError(f"{path} is a folder; name a file")
+
+
 def read_graph(text: str, line: int = 1) -> MechanismGraph:
     """Read a canonical key, a text form, or line ``line`` of a file of either (or of JSON lines)."""
     from graphsynth.structure.graph import MechanismGraph
@@ -44,7 +56,12 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
         return _one(lines[line - 1].strip(), f"{text} line {line}")
     if text.startswith("1") and " " not in text:
         return MechanismGraph.from_key(text)
-    return _one(text, "")
+    try:
+        return _one(text, "")
+    except FormatError as error:
+        if set(text) & {"/", "."}:  # never part of a key or a text form
+            raise FormatError("there is no such file, nor is this a key or the text form of a graph", text) from None
+        raise error
 
 
 def _one(text: str, place: str) -> MechanismGraph:
@@ -61,7 +78,9 @@ def _one(text: str, place: str) -> MechanismGraph:
         return MechanismGraph.from_key(text) if text.startswith("1") else MechanismGraph.from_text(text)
     except FormatError as error:
         raise FormatError(str(error), place) from None
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except KeyError as error:
+        raise FormatError(f"the JSON record of a graph needs the key {error}", place) from None
+    except (ValueError, TypeError, AttributeError) as error:
         raise FormatError(f"not a JSON record of a graph ({error})", place) from None
 
 
@@ -97,9 +116,14 @@ def _groups(graph: MechanismGraph, driver: int | None) -> list[str]:
 
     if graph.mobility != 1 and driver is None:
         return [f"{graph.mobility} drivers needed: not listed"]
-    drivers = [driver] if driver is not None else list(graph.levels[1])
+    if driver is not None:
+        if driver not in graph.levels[1]:
+            raise GraphError(f"driver {driver} is not jointed to the frame; choose one of {_set(graph.levels[1])}")
+        if graph.mobility == 1:
+            return [f"driver {driver}: {decompose(graph, [driver])}"]
+        return [f"driver {driver}: one of {graph.mobility} drivers needed, groups not listed"]
     lines = []
-    for link in drivers:
+    for link in graph.levels[1]:
         try:
             lines.append(f"driver {link}: {decompose(graph, [link])}")
         except GraphError as error:

@@ -17,7 +17,7 @@ from graphsynth.mechanism.model import Mechanism, TracePoint
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["Frames", "frames_of", "with_trace_points"]
+__all__ = ["Frames", "check_frames", "frames_of", "with_trace_points"]
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,12 @@ class Frames:
         return list(range(n - 1)) if self.loops else [*range(n), *range(n - 2, 0, -1)]
 
 
+def check_frames(count: int) -> None:
+    """Raise `GeometryError` unless so many frames can be shown."""
+    if not 2 <= count <= FRAMES_MAX:
+        raise GeometryError(f"frames = {count} must be from 2 to {FRAMES_MAX}; choose another number")
+
+
 def frames_of(motion: Motion, count: int = 120) -> Frames:
     """Choose about ``count`` frames of the part of a motion that is reached.
 
@@ -75,8 +81,7 @@ def frames_of(motion: Motion, count: int = 120) -> Frames:
     GeometryError
         If ``count`` is out of 2..2000, or nothing of the motion is assembled.
     """
-    if not 2 <= count <= FRAMES_MAX:
-        raise GeometryError(f"frames = {count} must be from 2 to {FRAMES_MAX}; choose another number")
+    check_frames(count)
     reached = np.flatnonzero(~np.isfinite(motion.poses).all(axis=(1, 2)))
     last = int(reached[0]) if reached.size else len(motion.inputs)
     if last == 0:

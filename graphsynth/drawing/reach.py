@@ -58,7 +58,7 @@ def motion_over_reach(mechanism: Mechanism, samples: int = 361) -> Motion:
     span = (characteristic_length(mechanism) if sliding else math.tau) / abs(rate)
     steps = np.linspace(0.0, span, samples)
     begin = _begin(mechanism)
-    starts = [begin] if mechanism.pose is not None else [begin + math.tau * k / _STARTS for k in range(_STARTS)]
+    starts = [begin] if mechanism.pose is not None else [begin + span * k / _STARTS for k in range(_STARTS)]
     for start in starts:
         forward = simulate(mechanism, start + steps)
         if forward.assembled[0]:
@@ -84,7 +84,8 @@ def _begin(mechanism: Mechanism) -> float:
             complex(*pose[k, :2]) + np.exp(1j * pose[k, 2]) * complex(*at)
             for k, at in ((joint.a, joint.at_a), (joint.b, joint.at_b))
         )
-        q = float(((Q - P) * np.exp(-1j * (pose[joint.a, 2] + joint.angle_a))).real)
+        sign = 1.0 if driver.base == joint.a else -1.0
+        q = sign * float(((Q - P) * np.exp(-1j * (pose[joint.a, 2] + joint.angle_a))).real)
     else:
         q = float(pose[driver.link, 2] - pose[driver.base, 2])
     return (q - law.offset) / law.rate

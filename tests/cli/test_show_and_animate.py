@@ -77,6 +77,33 @@ def test_show_refuses_another_suffix(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "must end in .svg, .png or .pdf" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["missing.g6"], "missing.g6: there is no such file"),
+        (["./nothing"], "there is no such file"),
+        (["."], "there is no such file"),
+        (["Cl f0", "--driver", "9"], "driver 9 is not jointed to the frame"),
+        (["Cl f0", "--driver", "2"], "driver 2 is not jointed to the frame"),
+        (["Cl f0", "--driver", "-1"], "not jointed to the frame"),
+        (["Cl f0", "-o", "no/x.svg"], "the folder no does not exist"),
+        (["Cl f0", "-o", "x.bmp"], "must end in"),
+        (["Cl f0", "-o", "folder.svg"], "is a folder"),
+        (["a.jsonl"], "needs the key 'joints'"),
+    ],
+)
+def test_show_tells_bad_input_in_one_sentence(
+    words: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Status 2, one sentence, and nothing on standard output that looks like a result."""
+    monkeypatch.chdir(tmp_path)
+    Path("a.jsonl").write_text('{"links": 4}')
+    Path("folder.svg").mkdir()
+    assert main(["show", *words]) == 2
+    said = capsys.readouterr()
+    assert message in said.err and said.err.count("\n") == 1 and said.out == ""
+
+
 # --- animate
 
 
@@ -130,7 +157,20 @@ def test_animate_a_part_of_a_turn_says_why(tmp_path: Path, capsys: pytest.Captur
         (["Cl f0", "-o", "x.mp4"], "must end in .html, .gif or .svg"),
         (["Cl f0", "-o", "x.html", "--save", "m.txt"], "must end in .toml or .json"),
         (["Cl f0", "-o", "x.html", "--frames", "1"], "frames = 1 must be from 2 to 2000"),
-        (["Cl f0", "-o", "x.html", "--driver", "2"], "2"),
+        (
+            ["Cl f0", "-o", "x.html", "--driver", "2"],
+            "--driver 2: the link is not jointed to the frame",
+        ),
+        (["Cl f0", "-o", "x.html", "--driver", "9"], "choose from 1, 3"),
+        (["Cl f0", "-o", "x.html", "--driver", "0"], "choose from 1, 3"),
+        (["Cl f0", "-o", "x.html", "--driver", "1", "--driver", "1"], "given twice"),
+        (["Cl f0", "-o", "x.html", "--driver", "1", "--driver", "3"], "2"),
+        (["Cl", "-o", "x.html", "--driver", "1"], "choose a frame first"),
+        (["Cl f0", "-o", "no/x.html"], "the folder no does not exist"),
+        (["Cl f0", "-o", "x.html", "--save", "no/m.toml"], "the folder no does not exist"),
+        (["missing.toml", "-o", "x.html"], "missing.toml: there is no such file"),
+        (["no/such/file", "-o", "x.html"], "no/such/file: there is no such file"),
+        (["bad.toml", "-o", "x.html"], "bad.toml"),
         (["Cl f0", "-o", "x.html", "--seed", "-1"], "seed = -1"),
         (["Cl f0", "-o", "x.html", "--range", "0", "1"], "--range belongs to a dimensioned mechanism"),
         (["bad.toml", "-o", "x.html"], "not TOML"),

@@ -24,7 +24,10 @@ from graphsynth.drawing.gif import save_gif
 from graphsynth.drawing.reach import motion_over_reach
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate
-from graphsynth.mechanism.joints import PinSlot, Revolute
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.laws import Linear
+from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.structure.graph import MechanismGraph
 
 from .conftest import TURN, cylinder, four_bar
 
@@ -286,3 +289,32 @@ def test_the_player_moves_the_links(motions: dict[str, Any], tmp_path: Path) -> 
     assert (log["space"], log["again"]) == ("Pause", "Play")
     assert log["hidden"] == ""
     assert (log["dragged"], log["further"]) == (30, 60)
+
+
+@pytest.mark.parametrize(("base", "link", "sense"), [(0, 3, 1.0), (3, 0, -1.0)])
+def test_reach_of_a_slider_begins_at_its_pose_whichever_way_the_driver_is_named(
+    base: int, link: int, sense: float
+) -> None:
+    """Crank 1, rod 3: the slider runs from 2 to 4."""
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), Prismatic(0, 3)]
+    angle = math.asin(1.0 / 3.0)
+    pose = [(0, 0, 0), (0, 0, math.pi / 2), (0, 1, -angle), (3.0 * math.cos(angle), 0, 0)]
+    motion = motion_over_reach(Mechanism(graph, joints, [Driver(base, link)], pose=pose))
+    assert sorted(sense * motion.inputs[[0, -1]]) == pytest.approx([2.0, 4.0], abs=0.02)
+    np.testing.assert_allclose(motion.poses[:, 3, 0], sense * motion.inputs, atol=1e-12)
+
+
+def test_reach_is_looked_for_over_one_turn_of_the_driver_whatever_its_law() -> None:
+    """A rocker that is assembled only around pi; a hundred turns of the driver for one of the input."""
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [
+        Revolute(0, 1),
+        Revolute(1, 2, (2.0, 0.0)),
+        Revolute(2, 3, (1.0, 0.0), (1.0, 0.0)),
+        Revolute(0, 3, (-3.0, 0)),
+    ]
+    motion = motion_over_reach(Mechanism(graph, joints, [Driver(0, 1, Linear(rate=100.0))]))
+    ends = np.sort(motion.inputs[[0, -1]]) * 100.0
+    limit = math.acos((4.0 + 9.0 - 4.0) / 12.0)  # |AB| = 2 between the crank's end and the pivot at -3
+    assert ends == pytest.approx([math.pi - limit, math.pi + limit], abs=0.02)

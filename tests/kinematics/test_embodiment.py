@@ -346,3 +346,9 @@ def test_bar_formula_of_a_triad_against_lengthened_bars() -> None:
     assert any(form.bars for form in group_forms(mechanism, motion.steps))
     angle = smallest_transmission(motion)
     assert math.sin(angle) == pytest.approx(min(sines), rel=1e-7)
+
+
+@pytest.mark.parametrize("driver", [1.5, "x", True, (1, 1), (0, 2, 3), [(0, 1, 2)], [None], 9, -1, (0, 9)])
+def test_drivers_that_are_none_are_refused(driver: object) -> None:
+    with pytest.raises(GraphError):
+        embody(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), driver=driver)  # type: ignore[arg-type]

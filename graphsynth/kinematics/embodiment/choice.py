@@ -62,15 +62,27 @@ def _mobility(graph: MechanismGraph, a: int, b: int) -> int:
     return next(joint.mobility for joint in graph.joints if (joint.a, joint.b) == (min(a, b), max(a, b)))
 
 
+def _is_link(value: Any) -> bool:
+    return hasattr(value, "__index__") and not isinstance(value, bool)
+
+
 def _given(graph: MechanismGraph, driver: Drivers) -> tuple[MechanismGraph, tuple[tuple[int, int], ...]]:
     if graph.frame is None:
         raise GraphError("a driver is given but no frame; choose one with graph.with_frame(link)")
-    listed: list[Any] = [driver] if isinstance(driver, int) else list(driver)
-    if len(listed) == 2 and graph.mobility == 1 and all(isinstance(k, int) for k in listed):
+    try:
+        listed: list[Any] = [driver] if _is_link(driver) else list(driver)  # type: ignore[arg-type]
+    except TypeError as error:
+        raise GraphError(f"driver = {driver!r} is neither a link nor (base, link)") from error
+    if len(listed) == 2 and graph.mobility == 1 and all(map(_is_link, listed)):
         listed = [tuple(listed)]  # one driver (base, link)
     pairs = []
     for item in listed:
-        base, link = (graph.frame, item) if isinstance(item, int) else (int(item[0]), int(item[1]))
+        pair = (graph.frame, item) if _is_link(item) else item
+        if not isinstance(pair, tuple | list) or len(pair) != 2 or not all(map(_is_link, pair)):
+            raise GraphError(f"driver = {item!r} is neither a link nor (base, link)")
+        base, link = int(pair[0]), int(pair[1])
+        if base == link:
+            raise GraphError(f"driver {base}-{link}: a link cannot be driven against itself; name two jointed links")
         pairs.append((base, link))
     fault = find_fault(graph, pairs)
     if fault is not None:
