@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import SpecError
 from graphsynth.intervals import operations
+from graphsynth.intervals.measures import Measures
 from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, decimal_outward, read_bounds, read_points
 
 __all__ = ["Decoration", "Interval"]
@@ -45,7 +46,7 @@ def _both(*flags: Flags) -> Flags:
     return result
 
 
-class Interval:
+class Interval(Measures):
     """Array of closed intervals; immutable in use, arithmetic by operators with outward rounding.
 
     Parameters
@@ -89,10 +90,6 @@ class Interval:
     __slots__ = ("flags", "hi", "lo")
     __array_ufunc__ = None  # numpy arrays leave mixed operations to this class
     __hash__ = None  # type: ignore[assignment]
-
-    lo: Array
-    hi: Array
-    flags: Flags
 
     def __init__(self, value: Any, upper: Any = None) -> None:
         if upper is None:
@@ -151,9 +148,8 @@ class Interval:
     @classmethod
     def stack(cls, parts: Iterable[Interval], axis: int = 0) -> Interval:
         """Join intervals of one shape along a new axis."""
-        items = np.broadcast_arrays  # broadcast first: constants may be scalars
         parts = list(parts)
-        lo, hi = items(*[p.lo for p in parts]), items(*[p.hi for p in parts])
+        lo, hi = np.broadcast_arrays(*[p.lo for p in parts]), np.broadcast_arrays(*[p.hi for p in parts])
         flags = NO_FLAGS
         if any(p.flags is not NO_FLAGS for p in parts):
             flags = np.stack([np.broadcast_to(p.flags, low.shape) for p, low in zip(parts, lo)], axis)
@@ -214,63 +210,6 @@ class Interval:
         """
         product: Interval = self * other
         return product.sum(-1)
-
-    # -- measures --------------------------------------------------------------------------------------------------
-
-    @property
-    def is_empty(self) -> Mask:
-        """Where empty."""
-        return np.asarray(self.lo > self.hi)
-
-    @property
-    def is_bounded(self) -> Mask:
-        """Where not empty and both ends are finite."""
-        return np.asarray(np.isfinite(self.lo) & np.isfinite(self.hi))
-
-    @property
-    def width(self) -> Array:
-        """Upper bound of ``hi - lo``; NaN for empty."""
-        with np.errstate(all="ignore"):
-            return np.where(self.is_empty, np.nan, operations.binary("subtract", self.hi, self.hi, self.lo, self.lo)[1])
-
-    @property
-    def mid(self) -> Array:
-        """Midpoint rounded, always inside; 0 for the whole line, the largest number for a half line, NaN for empty."""
-        big = float(np.finfo(np.float64).max)
-        with np.errstate(all="ignore"):
-            lo, hi = np.maximum(self.lo, -big), np.minimum(self.hi, big)
-            middle = np.where(lo == -hi, 0.0, 0.5 * lo + 0.5 * hi)
-            middle = np.where(self.is_empty, np.nan, np.minimum(np.maximum(middle, self.lo), self.hi))
-        return np.asarray(middle)
-
-    @property
-    def rad(self) -> Array:
-        """Smallest float with ``[mid - rad, mid + rad]`` around the interval, rounded up; NaN for empty."""
-        mid = self.mid
-        with np.errstate(all="ignore"):
-            above = operations.binary("subtract", self.hi, self.hi, mid, mid)[1]
-            below = operations.binary("subtract", mid, mid, self.lo, self.lo)[1]
-        return np.where(self.is_empty, np.nan, np.maximum(above, below))
-
-    @property
-    def mag(self) -> Array:
-        """Largest absolute value; NaN for empty."""
-        return np.where(self.is_empty, np.nan, np.maximum(np.abs(self.lo), np.abs(self.hi)))
-
-    @property
-    def mig(self) -> Array:
-        """Smallest absolute value; NaN for empty."""
-        return np.where(self.is_empty, np.nan, np.maximum(np.maximum(self.lo, -self.hi), 0.0))
-
-    @property
-    def guaranteed(self) -> Mask:
-        """Where every operation was defined and continuous on its whole argument: a certificate may rest on it."""
-        return np.asarray((self.flags & 3) == 0)
-
-    @property
-    def exact_input(self) -> Mask:
-        """Where no plain float came in."""
-        return np.asarray((self.flags & 4) == 0)
 
     # -- comparisons: certain for all points, or possible for some ---------------------------------------------------
 
@@ -349,7 +288,9 @@ class Interval:
 
     def inflate(self, relative: float = 0.1, absolute: float = 0.0) -> Interval:
         """Widen both ends by ``relative`` times the radius plus ``absolute``, and at least one step."""
-        grow = Interval.from_bounds(0.0, 1.0) * relative * self.rad + absolute + 5e-324
+        radius = self.rad
+        radius = np.where(np.isfinite(radius), radius, 0.0)  # an infinite end stays where it is, the empty set too
+        grow = _make(0.0, relative) * _make(radius, radius) + _make(absolute, absolute) + _make(5e-324, 5e-324)
         return _make((self - grow).lo, (self + grow).hi, self.flags)
 
     def bisect(self) -> tuple[Interval, Interval]:

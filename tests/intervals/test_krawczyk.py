@@ -157,19 +157,8 @@ def test_equations_and_unknowns_must_match():
 # -- no false certificate ------------------------------------------------------------------------------------------
 
 
-def true_count(roots, lo, hi):
-    return sum(lo <= r <= hi for r in roots)
-
-
-@settings(max_examples=150, deadline=None)
-@given(
-    st.lists(st.integers(-64, 64), min_size=1, max_size=4), st.integers(-1, 1), st.integers(-1100, 1100),
-    st.integers(1, 900), st.integers(0, 52),
-)  # fmt: skip
-def test_status_against_exactly_known_roots(numerators, shift, start, width, depth):
-    """Products of (x - r), with single, double and close roots, on boxes with roots at and near their faces."""
-    roots = [Fraction(k, 16) for k in numerators]
-    roots[-1] = roots[-1] + Fraction(shift, 2**depth)
+def status_is_true(roots, start, width):
+    """Check the status of a product of (x - r) on a box against the exact roots; return it."""
     box = Interval(Fraction(start, 256), Fraction(start + width, 256))
 
     def f(x):
@@ -179,16 +168,44 @@ def test_status_against_exactly_known_roots(numerators, shift, start, width, dep
         return [product]
 
     result = krawczyk(f, box.reshape(1))
-    distinct = set(roots)
-    inside = true_count(distinct, Fraction(float(box.lo)), Fraction(float(box.hi)))
+    inside = [r for r in set(roots) if float(box.lo) <= r <= float(box.hi)]
     if result.status is Status.EMPTY:
-        assert inside == 0
+        assert inside == []
     elif result.status is Status.UNIQUE:
-        assert inside == 1
+        assert len(inside) == 1
     elif result.status is Status.EXISTS:
-        assert inside >= 1
-    kept = [r for r in distinct if float(box.lo) <= r <= float(box.hi)]
-    assert all(result.box[0].contains(r) for r in kept)
+        assert inside
+    assert all(result.box[0].contains(r) for r in inside)
+    return result.status
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(st.integers(-64, 64), min_size=1, max_size=4), st.integers(-1, 1), st.integers(-1100, 1100),
+    st.integers(1, 900), st.integers(0, 52),
+)  # fmt: skip
+def test_status_against_exactly_known_roots(numerators, shift, start, width, depth):
+    """Single, double and close roots, on boxes with roots at and near their faces."""
+    roots = [Fraction(k, 16) for k in numerators]
+    roots[-1] = roots[-1] + Fraction(shift, 2**depth)
+    status_is_true(roots, start, width)
+
+
+@pytest.mark.slow
+def test_ten_thousand_certificates():
+    rng = np.random.default_rng(17)
+    seen = dict.fromkeys(Status, 0)
+    for _ in range(10_000):
+        roots = [Fraction(int(k), 16) for k in rng.integers(-64, 65, rng.integers(1, 5))]
+        roots[-1] += Fraction(int(rng.integers(-1, 2)), 2 ** int(rng.integers(0, 53)))
+        start = int(rng.integers(-1100, 1100))
+        if rng.random() < 0.5:  # near a root, so that certificates are common
+            start = int(256 * roots[0]) - int(rng.integers(0, 30))
+        seen[
+            status_is_true(roots, start, int(rng.integers(1, 40) if rng.random() < 0.7 else rng.integers(1, 900)))
+        ] += 1
+    assert seen[Status.UNIQUE] > 2000
+    assert seen[Status.EMPTY] > 1000
 
 
 @pytest.mark.parametrize("gap", [0.0, 2.0**-52, 2.0**-40, 1e-9, -1e-9, -(2.0**-52)])

@@ -71,6 +71,29 @@ def test_subdivided_krawczyk_encloses_the_hulls_of_the_specification(row):
         assert float(box.width[i]) <= float(hi - lo) * 1.2 + 1e-9
 
 
+def test_different_tolerances_of_the_specification():
+    x, y = exact_hull(Interval("17.5"), Interval("1e-3"), Interval("17.53"), Interval(B_90), Interval("1e-6"))
+    for got, lo, hi in (
+        (x, "13.10850140189148743244032", "13.12131152758367451247872"),
+        (y, "11.57938615800076761795533", "11.59379967899259973598900"),
+    ):
+        assert got.contains(Fraction(lo))
+        assert got.contains(Fraction(hi))
+        assert float(got.width) - float(Fraction(hi) - Fraction(lo)) < 1e-9
+
+
+def test_tangent_curves_are_undecided_and_enclosed():
+    """R1 = a: a double point on the axis y = 0; R1 above a: nothing (section 12)."""
+    p = Interval([Fraction("17.53") ** 2, 1, "17.53", B_90])
+    found = pave(circle_and_ellipse, ["[0, 18]", "[0, 18]"], p, tolerance=1e-4)
+    assert found.finished
+    assert found.verdict is Status.UNDECIDED
+    assert found.outer.contains(np.array([17.53, 0.0])).all()
+    assert float(found.outer.lo[0]) > 17.4
+    apart = Interval(["307.6", 1, "17.53", B_90])
+    assert pave(circle_and_ellipse, ["[0, 18]", "[0, 18]"], apart).verdict is Status.EMPTY
+
+
 def test_where_the_textbook_method_cannot_certify():
     """Section 6.6: rho is 0.67 at eps = 1e-5, above 1/4; an honest 'undecided'."""
     result = krawczyk(circle_and_ellipse, ["[13.08, 13.15]", "[11.55, 11.62]"], deck("1e-5", "1e-5"))
