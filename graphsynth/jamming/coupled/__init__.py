@@ -14,8 +14,14 @@ _PUBLIC: dict[str, str] = {
     "JointLimits": "limits",
     "Misalignment": "limits",
     "SlideLimits": "limits",
+    "DirectionMap": "directions",
+    "ScaleCertificate": "scale",
+    "TurnCertificate": "turn",
     "assess_coupled": "assess",
     "bearing_limits": "limits",
+    "certify_coupled": "turn",
+    "direction_map": "directions",
+    "largest_scale": "scale",
 }
 
 __all__ = sorted(_PUBLIC)

@@ -3,80 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import replace
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.jamming.bearing import Bearing, Condition
-from graphsynth.jamming.coupled.closure import ROLL, ROUND, Layout, joint_places, lay_out, shifts
-from graphsynth.jamming.coupled.limits import Limits, Misalignment, complete
-from graphsynth.jamming.coupled.program import PoseSolution, solve_poses
+from graphsynth.jamming.bearing import Condition
+from graphsynth.jamming.coupled.limits import Misalignment
+from graphsynth.jamming.coupled.problem import Bearings, Problem, problem
+from graphsynth.jamming.coupled.program import PoseSolution
 from graphsynth.jamming.coupled.report import CoupledReport, CoupledVerdict, Loosen
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
-    from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Problem", "assess_coupled", "problem"]
+__all__ = ["assess_coupled"]
 
 Array = NDArray[np.float64]
-Bearings = Bearing | Limits | Mapping[tuple[int, int], Bearing | Limits]
 
 #: Differences from 1 below this are a matter of rounding.
 _TOUCH = 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """A mechanism with limits and misalignments; what the solvers and the certificates start from."""
-
-    mechanism: Mechanism
-    limits: tuple[Limits, ...]
-    misalignments: tuple[Misalignment, ...]
-    layout: Layout
-
-    @property
-    def names(self) -> tuple[tuple[tuple[int, int], str], ...]:
-        """Joint and kind of every limit on tilt."""
-        kinds = ["tilt" if axis == ROUND else "roll" if axis == ROLL else "pitch" for axis in self.layout.block_axis]
-        return tuple((self.pairs[place], kind) for place, kind in zip(self.layout.block_joint, kinds))
-
-    @property
-    def pairs(self) -> tuple[tuple[int, int], ...]:
-        """Links of every joint of the layout."""
-        return tuple(self.mechanism.joints[k].pair for k in self.layout.joints)
-
-    def solve(self, poses: Array, mode: str = "tilt", turned: float = 0.0) -> PoseSolution:
-        """Solve at poses (N, links, 3); all misalignments turned by ``turned`` radians."""
-        r, e, base = joint_places(self.mechanism, self.layout.joints, poses)
-        return solve_poses(self.layout, r, e, shifts(self.layout, base, turned), "scale" if mode == "scale" else "tilt")
-
-
-def problem(
-    mechanism: Mechanism, bearings: Bearings, tilts: Misalignment | Iterable[Misalignment], condition: Condition = "A"
-) -> Problem:
-    """Put a mechanism, limits and misalignments together; see `assess_coupled` for the arguments.
-
-    Raises
-    ------
-    GeometryError
-        A joint without limits, limits that do not fit a joint, a misalignment of a joint that does not exist.
-    """
-    chosen = (tilts,) if isinstance(tilts, Misalignment) else tuple(tilts)
-    by_pair: dict[tuple[int, int], Misalignment] = {}
-    for tilt in chosen:
-        pair = (min(tilt.base, tilt.link), max(tilt.base, tilt.link))
-        mechanism.joint(*pair)  # raises if there is none
-        if pair in by_pair:
-            raise GeometryError(f"joint {pair[0]}-{pair[1]} has two misalignments; give their sum")
-        by_pair[pair] = tilt
-    limits = complete(mechanism.joints, bearings, by_pair, condition)
-    return Problem(mechanism, limits, chosen, lay_out(mechanism, limits, chosen))
 
 
 def assess_coupled(
@@ -85,6 +34,9 @@ def assess_coupled(
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
+    certify: bool = False,
+    length_tolerance: float = 0.0,
+    seconds: float = 20.0,
 ) -> CoupledReport:
     """Assess whether all joints together can take up misaligned axes at every pose of a motion (model L1).
 
@@ -99,11 +51,16 @@ def assess_coupled(
         Which axes are tilted; a rigid one (a motor shaft) takes no clearance of its own.
     condition : {"A", "B", "general"}
         Contact condition of every `Bearing`.
+    certify : bool
+        Prove the verdict between the samples too (`certify_coupled`), over the tolerance boxes.
+    length_tolerance, seconds : float
+        For the proof: relative tolerance of lengths, and the time it may take.
 
     Returns
     -------
     CoupledReport
-        Estimated at the samples, with primal and dual values and their gap.
+        Estimated at the samples, with primal and dual values and their gap; with ``certify`` the verdict and the
+        reason are those of the proof.
 
     Raises
     ------
@@ -118,6 +75,7 @@ def assess_coupled(
     Examples
     --------
     >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> from graphsynth.jamming import Bearing
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     >>> linkage = Mechanism(graph, [
     ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
@@ -129,11 +87,22 @@ def assess_coupled(
     ('FREE_ESTIMATED', [0.9694, 0.9894, 0.7915])
     """
     begin = perf_counter()
+    tilts = (tilts,) if isinstance(tilts, Misalignment) else tuple(tilts)
     given = problem(motion.mechanism, bearings, tilts, condition)
     keep = np.flatnonzero(motion.assembled)
     poses = motion.poses[keep]
     tilt, scale = given.solve(poses), given.solve(poses, "scale")
-    return _report(given, motion, keep, (tilt, scale), begin)
+    report = _report(given, motion, keep, (tilt, scale), begin)
+    if not certify or keep.size < 2:
+        return report
+    from graphsynth.jamming.coupled.turn import certify_coupled
+
+    proof = certify_coupled(
+        motion, bearings, tilts, condition=condition, length_tolerance=length_tolerance, seconds=seconds
+    )
+    return replace(
+        report, verdict=proof.verdict, reason=proof.reason, certificate=proof, seconds=perf_counter() - begin
+    )
 
 
 def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:

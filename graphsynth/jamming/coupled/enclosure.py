@@ -1,0 +1,313 @@
+"""Bounds of the factor in intervals: from a system in equilibrium below, from a closed system of tilts above.
+
+Both start from floating-point numbers that need not be right.  Below: loop wrenches are in equilibrium whatever the
+positions (`graphsynth.jamming.coupled.closure`); where a joint must carry no moment or no force, the wrenches are
+corrected by an enclosed linear solve.  Above: the tilts are corrected by an enclosed linear solve until every loop
+closes, for every position in the box.  Then limits and work are evaluated with outward rounding.
+Specification, sections 9.4 and 9.5.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals import Interval, cos, sin
+from graphsynth.jamming.coupled.closure import PITCH, ROLL, ROUND, Layout, moment_rows
+from graphsynth.jamming.coupled.program import PoseSolution
+
+__all__ = ["Pieces", "factor_bounds", "shifts_enclosed"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class Pieces(NamedTuple):
+    """Positions, guide directions and misalignments in intervals, each (N, joints, 2)."""
+
+    r: Interval
+    e: Interval
+    d: Interval
+
+    @property
+    def middle(self) -> tuple[Array, Array, Array]:
+        """Midpoints."""
+        return self.r.mid, self.e.mid, self.d.mid
+
+
+def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
+    """Enclose the misalignments over their tolerance boxes; ``base`` (N, joints, 2, 2) directions of links a and b."""
+    count, joints = base.shape[:2]
+    zero = Interval.zeros((count,))
+    columns = [Interval.zeros((count, 2)) for _ in range(joints)]
+    for place, sign, tilt in layout.misalignments:
+        assert tilt.alpha_range is not None and tilt.direction_range is not None  # filled when made
+        alpha = Interval.from_bounds(*tilt.alpha_range) * sign
+        direction = Interval.from_bounds(*tilt.direction_range)
+        c, s = cos(direction) * alpha, sin(direction) * alpha
+        turn = base[:, place, 0 if sign > 0 else 1]
+        x, y = turn[:, 0], turn[:, 1]
+        columns[place] = Interval.stack([x * c - y * s + zero, x * s + y * c + zero], axis=-1)
+    return Interval.stack(columns, axis=1) if joints else Interval.zeros((count, 0, 2))
+
+
+def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
+    """Certified bounds of the factor (mode "scale") over boxes of positions, misalignments and limits.
+
+    Parameters
+    ----------
+    layout : Layout
+        Its ``limit_range`` and ``play_range`` are part of the box.
+    at : Pieces
+    found : PoseSolution
+        Of `solve_poses` with mode "scale" near the middle of the boxes; any numbers give valid bounds.
+
+    Returns
+    -------
+    lower, upper : ndarray, shape (N,)
+        For every member of the box ``lower <= T <= upper``; 0 and infinity where nothing is proved.
+    """
+    count = len(at.r)
+    if layout.loops == 0:
+        return np.zeros(count), np.zeros(count)
+    centre, length = found.units.centre, found.units.length
+    r = (at.r - Interval(centre)) / length
+    with np.errstate(all="ignore"):
+        return _lower(layout, r, at, found, length), _upper(layout, r, at, found, length)
+
+
+def _lower(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float) -> Array:
+    y, fine = _without_forbidden(layout, r, at.e, found.y)
+    wrench = _by_joint(layout, y)
+    m = (wrench[:, :, 0] - wrench[:, :, 2] * r[:, :, 1], wrench[:, :, 1] + wrench[:, :, 2] * r[:, :, 0])
+    work = Interval.zeros((len(found.y),))
+    for place, _, _ in layout.misalignments:
+        work = work + m[0][:, place] * at.d[:, place, 0] + m[1][:, place] * at.d[:, place, 1]
+    cost = Interval.zeros((len(found.y),))
+    for block, place in enumerate(layout.block_joint.tolist()):
+        limit = float(layout.limit_range[1, block])
+        if limit == 0.0 or np.isinf(layout.limit[block]):  # rigid costs nothing; without limit the moment is zero
+            continue
+        size = _size(layout.block_axis[block], (m[0][:, place], m[1][:, place]), at.e[:, place])
+        cost = cost + size * Interval.from_bounds(0.0, limit)
+    for place, play in enumerate(layout.play_range[1].tolist()):
+        if play > 0.0 and np.isfinite(layout.play[place]):
+            cost = cost + abs(wrench[:, place, 2]) * Interval.from_bounds(0.0, play) / length
+    least = work.mig
+    quotient = (Interval.from_bounds(least, least) / Interval.from_bounds(cost.hi, cost.hi)).lo
+    quotient = np.where((cost.hi == 0.0) & (least > 0.0), np.inf, quotient)
+    sound = fine & np.isfinite(least) & (least > 0.0) & ~np.isnan(quotient)
+    return np.where(sound, np.maximum(quotient, 0.0), 0.0)
+
+
+def _size(axis: float, v: tuple[Interval, Interval], e: Interval) -> Interval:
+    """Length of a vector, or its component along or across the guide, as the limit takes it."""
+    if axis == ROUND:
+        return (v[0].sqr() + v[1].sqr()).sqrt()
+    if axis == ROLL:
+        return abs(v[0] * e[:, 0] + v[1] * e[:, 1])
+    assert axis == PITCH
+    return abs(v[1] * e[:, 0] - v[0] * e[:, 1])
+
+
+def _by_joint(layout: Layout, y: Interval) -> Interval:
+    """Sum of the loop wrenches (N, 3 loops) through every joint, (N, joints, 3)."""
+    columns = []
+    for place in range(len(layout.joints)):
+        total = Interval.zeros((len(y), 3))
+        for loop, sign in enumerate(layout.incidence[:, place].tolist()):
+            if sign != 0.0:
+                part = y[:, 3 * loop : 3 * loop + 3]
+                total = total + part if sign > 0.0 else total - part
+        columns.append(total)
+    return Interval.stack(columns, axis=1)
+
+
+def _without_forbidden(layout: Layout, r: Interval, e: Interval, y: Array) -> tuple[Interval, Mask]:
+    """Correct y until joints without limit carry exactly nothing; False where that is not proved."""
+    exact = Interval.from_bounds(y, y)
+    every = np.ones(len(y), dtype=bool)
+    rows = _forbidden(layout, r, e)
+    if rows is None:
+        return exact, every
+    direction = rows.mid
+    matrix = (rows.reshape(*rows.shape[:2], 1, rows.shape[2]) * _points(direction[:, None])).sum(-1)
+    right = -(rows * _points(y[:, None])).sum(-1)
+    step, fine = _enclosed_solve(matrix, right)
+    change = (step.reshape(*step.shape, 1) * _points(direction)).sum(1)
+    return exact + change, fine
+
+
+def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
+    """Rows (N, rows, 3 loops) of moments and forces that must vanish; equal rows once."""
+    blocks = np.flatnonzero(np.isinf(layout.limit))
+    count, loops = len(r), layout.loops
+    lo, hi = [], []
+
+    def add(entries: list[list[Interval]]) -> None:
+        flat = [value + Interval.zeros((count,)) for loop in entries for value in loop]
+        row = Interval.stack(flat, axis=-1)
+        lo.append(row.lo)
+        hi.append(row.hi)
+
+    zero, one = Interval(0), Interval(1)
+    for block in blocks.tolist():
+        place = int(layout.block_joint[block])
+        x, y, signs = r[:, place, 0], r[:, place, 1], [int(s) for s in layout.incidence[:, place]]
+        plain = (one, zero, -y), (zero, one, x)
+        if layout.block_axis[block] == ROUND:
+            wanted = plain
+        else:
+            a, b = e[:, place, 0], e[:, place, 1]
+            if layout.block_axis[block] == PITCH:
+                a, b = -b, a
+            wanted = (tuple(plain[0][i] * a + plain[1][i] * b for i in range(3)),)  # type: ignore[assignment]
+        for row in wanted:
+            add([[value * s for value in row] for s in signs])
+    columns = {tuple((c * (c[np.flatnonzero(c)[0]] if c.any() else 1.0)).tolist())
+               for c in layout.incidence.T[np.isinf(layout.play)]}  # fmt: skip
+    for column in sorted(columns):
+        if any(column):
+            add([[zero, zero, Interval(int(s))] for s in column])
+    if not lo:
+        return None
+    assert loops == len(layout.incidence)
+    return Interval.from_bounds(np.stack(lo, axis=1), np.stack(hi, axis=1))
+
+
+def _points(values: Array) -> Interval:
+    return Interval.from_bounds(values, values)
+
+
+def _enclosed_solve(matrix: Interval, right: Interval) -> tuple[Interval, Mask]:
+    """Enclose the solutions of N systems (N, k, k) for all members; False where a matrix may be singular.
+
+    With C near the inverse of the midpoint, ``x - x0 = C (b - A x0) + (1 - C A)(x - x0)``; the norm of the last matrix
+    below 1 bounds ``x - x0`` and proves every A regular (Rump 1980).
+    """
+    k = matrix.shape[-1]
+    middle = np.where(np.isfinite(matrix.mid), matrix.mid, 0.0)
+    inverse = np.linalg.pinv(middle, rcond=1e-14)
+    C = _points(inverse)
+    start = (inverse @ right.mid[:, :, None])[..., 0]
+    start = np.where(np.isfinite(start), start, 0.0)
+    residual = right - (matrix * _points(start[:, None])).sum(-1)
+    first = (C * residual.reshape(len(residual), 1, k)).sum(-1).mag
+    product = (C.reshape(-1, k, k, 1) * matrix.reshape(-1, 1, k, k)).sum(2)
+    rest = _points(np.eye(k)) - product
+    rows = Interval.from_bounds(np.zeros_like(rest.mag), rest.mag).sum(-1).hi
+    norm, largest = rows.max(axis=1), first.max(axis=1)
+    fine = np.isfinite(norm) & (norm < 1.0) & np.isfinite(largest)
+    norm, largest = np.where(fine, norm, 0.0), np.where(fine, largest, 0.0)
+    bound = _points(largest) / (1 - _points(norm))
+    spread = (_points(np.where(fine[:, None], first, 0.0)) + _points(rows * fine[:, None]) * bound.reshape(-1, 1)).hi
+    around = Interval.from_bounds(-spread, spread)
+    return around + _points(start), np.asarray(fine)
+
+
+def _upper(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float) -> Array:
+    tau, zeta = np.nan_to_num(found.tau), np.nan_to_num(found.zeta)
+    tau[:, layout.limit == 0.0], zeta[:, layout.play == 0.0] = 0.0, 0.0
+    tau[:, layout.block_axis != ROUND, 1] = 0.0
+    tilts, slips = _directions(layout, r.mid, at.e.mid, found, length)
+    tau, zeta = _fill_free(layout, r.mid, at, (tau, zeta), length)
+    columns = tilts.shape[-1]
+    parts = [_closure(layout, r, at.e, _points(tilts[..., c]), _points(slips[..., c]), length) for c in range(columns)]
+    matrix = Interval.stack(parts, axis=-1)
+    off = _closure(layout, r, at.e, _points(tau), _points(zeta), length, at.d)
+    step, fine = _enclosed_solve(matrix, -off)
+    tau_all = _points(tau) + (_points(tilts) * step.reshape(len(step), 1, 1, columns)).sum(-1)
+    zeta_all = _points(zeta) + (_points(slips) * step.reshape(len(step), 1, columns)).sum(-1)
+    worst = np.zeros(len(step))
+    for block in range(len(layout.limit)):
+        least = float(layout.limit_range[0, block])
+        if layout.limit[block] == 0.0 or np.isinf(least):
+            continue
+        if layout.block_axis[block] == ROUND:
+            size = (tau_all[:, block, 0].sqr() + tau_all[:, block, 1].sqr()).sqrt()
+        else:
+            size = abs(tau_all[:, block, 0])
+        worst = np.maximum(worst, _ratio(size.hi, least))
+    for place in range(len(layout.joints)):
+        least = float(layout.play_range[0, place])
+        if layout.play[place] > 0.0 and np.isfinite(least):
+            worst = np.maximum(worst, _ratio(zeta_all[:, place].mag, least))
+    return np.where(fine & ~np.isnan(worst), worst, np.inf)
+
+
+def _ratio(size: Array, limit: float) -> Array:
+    """Upper bound of size over limit; infinite for a limit that may be zero, unless the size is zero too."""
+    if limit == 0.0:
+        return np.where(size > 0.0, np.inf, 0.0)
+    return np.asarray((_points(size) / limit).hi)
+
+
+def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length: float) -> tuple[Array, Array]:
+    """Return changes of tilts (N, blocks, 2, 3 loops) and slips (N, joints, 3 loops) that may correct the closure.
+
+    In proportion to the squares of the limits: the least change measured by what each joint has; joints without limit
+    take most.
+    """
+    loops = layout.loops
+    rows = moment_rows(layout, r, e)
+    finite = layout.limit[np.isfinite(layout.limit)].max(initial=0.0) or 1.0
+    weight = np.where(np.isinf(layout.limit), 100.0, (layout.limit / finite) ** 2)
+    tilts = rows * weight[:, None, None]
+    play = np.where(np.isinf(layout.play), 10.0 * finite * length, np.minimum(layout.play, 10.0 * finite * length))
+    share = (play / (length * finite)) ** 2
+    slips = np.zeros((len(r), len(layout.joints), 3 * loops))
+    slips[:, :, 2::3] = layout.incidence.T * (share * length)[:, None]
+    return tilts, slips
+
+
+def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array], length: float) -> tuple[Array, Array]:
+    """Give joints without limit the tilts and slips that close the loops, in floats."""
+    tau, zeta = start
+    blocks, joints = np.isinf(layout.limit), np.isinf(layout.play)
+    if not (blocks.any() or joints.any()):
+        return tau, zeta
+    count = len(r)
+    rows = moment_rows(layout, r, at.e.mid)[:, blocks].reshape(count, -1, 3 * layout.loops)
+    slips = np.zeros((count, int(joints.sum()), 3 * layout.loops))
+    slips[:, :, 2::3] = layout.incidence.T[joints]
+    off = _closure(layout, _points(r), _points(at.e.mid), _points(tau), _points(zeta), length, _points(at.d.mid)).mid
+    both = np.concatenate([rows, slips], axis=1).transpose(0, 2, 1)
+    value = -(np.linalg.pinv(both, rcond=1e-12) @ np.nan_to_num(off)[:, :, None])[..., 0]
+    n = 2 * int(blocks.sum())
+    tau[:, blocks] = value[:, :n].reshape(count, -1, 2)
+    tau[:, layout.block_axis != ROUND, 1] = 0.0
+    zeta[:, joints] = value[:, n:] * length
+    return tau, zeta
+
+
+def _closure(
+    layout: Layout, r: Interval, e: Interval, tau: Interval, zeta: Interval, length: float, d: Interval | None = None
+) -> Interval:
+    """Sum up every loop (N, 3 loops): tilts, tilts, slips over ``length``; misalignments d included if given."""
+    count, joints = len(r), len(layout.joints)
+    x, y = [Interval.zeros((count,))] * joints, [Interval.zeros((count,))] * joints
+    for block, place in enumerate(layout.block_joint.tolist()):
+        axis = layout.block_axis[block]
+        if axis == ROUND:
+            x[place], y[place] = x[place] + tau[:, block, 0], y[place] + tau[:, block, 1]
+        else:
+            own, a, b = tau[:, block, 0], e[:, place, 0], e[:, place, 1]
+            if axis == PITCH:
+                a, b = -b, a
+            x[place], y[place] = x[place] + own * a, y[place] + own * b
+    if d is not None:
+        for place, _, _ in layout.misalignments:
+            x[place], y[place] = x[place] + d[:, place, 0], y[place] + d[:, place, 1]
+    sums = []
+    for signs in layout.incidence.tolist():
+        parts = [Interval.zeros((count,))] * 3
+        for place, sign in enumerate(signs):
+            if sign == 0.0:
+                continue
+            lift = zeta[:, place] / length + (r[:, place, 0] * y[place] - r[:, place, 1] * x[place])
+            own = (x[place], y[place], lift)
+            parts = [p + v if sign > 0.0 else p - v for p, v in zip(parts, own)]
+        sums += parts
+    return Interval.stack(sums, axis=-1)

@@ -1,0 +1,147 @@
+"""Pieces of the input along a motion: their positions proved, the factor bounded over each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.intervals import Interval, check_rounding
+from graphsynth.jamming.coupled.enclosure import Pieces, factor_bounds, shifts_enclosed
+from graphsynth.jamming.coupled.positions import Positions
+from graphsynth.jamming.coupled.problem import Problem
+from graphsynth.jamming.coupled.tubes import linked, prove_tubes
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.simulation import Motion
+
+__all__ = ["PARTS", "Found", "Work", "check_range", "cut"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Pieces of the whole range at first, and parts into which one is cut.
+FIRST, PARTS = 128, 4
+
+
+class Found(NamedTuple):
+    """Pieces evaluated: inputs, bounds of the factor, whether positions are proved, and the boxes they lie in."""
+
+    lo: Array
+    hi: Array
+    lower: Array
+    upper: Array
+    proved: Mask
+    box_lo: Array
+    box_hi: Array
+
+    def take(self, rows: Mask | NDArray[np.intp]) -> Found:
+        """Return some of the pieces."""
+        return Found(
+            self.lo[rows], self.hi[rows], self.lower[rows], self.upper[rows], self.proved[rows],
+            self.box_lo[rows], self.box_hi[rows],
+        )  # fmt: skip
+
+    @staticmethod
+    def join(parts: list[Found]) -> Found:
+        """Return all pieces in the order of the input."""
+        whole = Found(*(np.concatenate(columns) for columns in zip(*parts)))
+        return whole.take(np.lexsort((whole.hi, whole.lo)))
+
+
+class Work:
+    """Evaluation of pieces of one problem along one motion."""
+
+    def __init__(self, given: Problem, motion: Motion, tolerance: float) -> None:
+        self.given, self.motion = given, motion
+        self.system = Positions(motion.mechanism, tolerance)
+        keep = np.flatnonzero(motion.assembled)
+        ends = motion.inputs[keep]
+        self.low, self.high = float(ends.min()), float(ends.max())
+        self.start = motion.poses[keep[int(np.argmin(ends))]]
+        self.evaluated = 0
+
+    def first(self) -> tuple[Array, Array]:
+        """Equal pieces of the whole range."""
+        edges = np.linspace(self.low, self.high, FIRST + 1)
+        return edges[:-1], edges[1:]
+
+    def evaluate(self, lo: Array, hi: Array) -> Found:
+        """Bounds of the factor over every piece."""
+        from graphsynth.kinematics.simulation import simulate
+
+        count, size = len(lo), self.system.size
+        self.evaluated += count
+        u = Interval.from_bounds(lo, hi)
+        order = np.argsort(u.mid, kind="stable")
+        inputs, back = np.unique(np.concatenate([[self.low], u.mid[order]]), return_inverse=True)
+        found = simulate(self.given.mechanism, inputs, start=self.start, events=False)
+        at = np.empty(count, dtype=np.intp)
+        at[order] = back[1:]
+        lower, upper = np.zeros(count), np.full(count, np.inf)
+        proved = np.zeros(count, dtype=bool)
+        box = np.full((2, count, size), np.nan)
+        keep = np.flatnonzero(found.assembled[at] & np.isfinite(found.velocities[at]).all(axis=(1, 2)))
+        if keep.size:
+            poses = found.poses[at[keep]]
+            x, rate = self.system.coordinates(poses, found.velocities[at[keep]])
+            layout = self.given.layout
+            tubes = prove_tubes(self.system, layout.joints, u[keep], x, rate, self.system.count(poses))
+            d = shifts_enclosed(layout, tubes.base)
+            low, high = factor_bounds(layout, Pieces(tubes.r, tubes.e, d), self.given.solve(poses, "scale"))
+            proved[keep] = tubes.proved
+            lower[keep], upper[keep] = np.where(tubes.proved, low, 0.0), np.where(tubes.proved, high, np.inf)
+            box[0, keep], box[1, keep] = tubes.domain.lo, tubes.domain.hi
+        return Found(lo, hi, lower, upper, proved, box[0], box[1])
+
+    def estimate(self, inputs: Array) -> Array:
+        """Factor at inputs in ascending order (estimated); 0 where there is no pose."""
+        from graphsynth.kinematics.simulation import simulate
+
+        start = [] if inputs[0] == self.low else [self.low]
+        found = simulate(self.given.mechanism, [*start, *inputs], start=self.start, events=False)
+        fine = found.assembled[len(start) :]
+        value = np.zeros(len(inputs))
+        value[fine] = self.given.solve(found.poses[len(start) :][fine], "scale").lower
+        return value
+
+    def one_branch(self, pieces: Found) -> bool:
+        """Whether the assemblies of neighbouring pieces are proved to be one at the input they share."""
+        if not pieces.proved.all():
+            return False
+        from graphsynth.kinematics.simulation import simulate
+
+        edges = pieces.lo[1:]
+        if edges.size == 0 or self.system.size == 0:
+            return True
+        inputs, back = np.unique(np.concatenate([[self.low], edges]), return_inverse=True)
+        found = simulate(self.given.mechanism, inputs, start=self.start, events=False)
+        if not found.assembled.all() or not np.isfinite(found.velocities).all():
+            return False
+        poses = found.poses[back[1:]]
+        x, rate = self.system.coordinates(poses, found.velocities[back[1:]])
+        u = Interval.from_bounds(edges, edges)
+        points = prove_tubes(self.system, (), u, x, rate, self.system.count(poses))
+        before = Interval.from_bounds(pieces.box_lo[:-1], pieces.box_hi[:-1])
+        after = Interval.from_bounds(pieces.box_lo[1:], pieces.box_hi[1:])
+        return bool(linked(points, before, after).all())
+
+
+def cut(lo: Array, hi: Array) -> tuple[Array, Array]:
+    """Cut every piece into equal parts; parts share their ends exactly."""
+    edges = lo[:, None] + (hi - lo)[:, None] * (np.arange(PARTS + 1) / PARTS)
+    edges[:, 0], edges[:, -1] = lo, hi
+    return edges[:, :-1].ravel(), edges[:, 1:].ravel()
+
+
+def check_range(motion: Motion, length_tolerance: float) -> None:
+    """Refuse a changed rounding mode, a tolerance out of bounds, and a motion without a range."""
+    check_rounding()
+    if not 0.0 <= length_tolerance < 0.5:
+        raise GeometryError(f"length_tolerance = {length_tolerance} must be a relative half width from 0 to 0.5")
+    if int(motion.assembled.sum()) < 2:
+        raise GeometryError(
+            f"the motion has {int(motion.assembled.sum())} assembled samples; a range needs two or more"
+        )
