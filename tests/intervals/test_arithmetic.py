@@ -241,3 +241,36 @@ def test_large_arrays_use_the_compiled_form_with_the_same_result():
         low, high = numpy_form.multiply(lo, hi, *np.broadcast_arrays(tenth.lo, tenth.hi, lo)[:2])
     assert (big.lo == low).all()
     assert (big.hi == high).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*BINARY, "square", "root"])
+def test_a_million_operations_against_flint(name):
+    """Random points of random intervals; the exact value, at 4400 bits, lies in the result."""
+    flint = pytest.importorskip("flint")
+    rng = np.random.default_rng(6)
+    count = 1_000_000
+    a, b = bounds(rng, count, empty=0.0), bounds(rng, count, empty=0.0)
+    x, y = (np.where(rng.random(count) < 0.5, *pair) for pair in (a, b))
+    result = np.empty(count), np.empty(count)
+    from graphsynth.intervals.kernels import loops
+
+    getattr(loops, name)(*(a + b if name in BINARY else a), *result)
+    fine = np.isfinite(x) & np.isfinite(y)
+    fine &= {"divide": y != 0.0, "root": x >= 0.0}.get(name, True)
+    exact = {
+        "add": lambda p, q: p + q, "subtract": lambda p, q: p - q, "multiply": lambda p, q: p * q,
+        "divide": lambda p, q: p / q, "square": lambda p, q: p * p, "root": lambda p, q: p.sqrt(),
+    }[name]  # fmt: skip
+    before, flint.ctx.prec = flint.ctx.prec, 4400
+    bad = []
+    try:
+        rows = zip(*(v[fine].tolist() for v in (x, y, *result)))
+        for p, q, lo, hi in rows:
+            value = exact(flint.arb(p), flint.arb(q))
+            if flint.arb(lo) > value or flint.arb(hi) < value:
+                bad.append((p, q))
+    finally:
+        flint.ctx.prec = before
+    assert fine.sum() > 400_000
+    assert bad == []

@@ -259,7 +259,7 @@ def test_many_boxes_at_once_equal_one_by_one():
 
 def test_compiled_test_agrees_with_arrays():
     from graphsynth.intervals.kernels import arithmetic as ia
-    from graphsynth.intervals.kernels.krawczyk import krawczyk_boxes, system
+    from graphsynth.intervals.kernels.krawczyk import krawczyk_boxes, krawczyk_pave, system
 
     @system
     def equations(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
@@ -294,6 +294,23 @@ def test_compiled_test_agrees_with_arrays():
     assert not (has_root & (status == Status.EMPTY)).any()
     assert (out_lo[has_root] <= root).all()
     assert (out_hi[has_root] >= root).all()
+
+    kept_lo, kept_hi, kept = np.empty((50, 2)), np.empty((50, 2)), np.empty(50, dtype=np.int8)
+    low, high, fine = np.array([-2.0, -2.1]), np.array([2.0, 2.0]), np.full(2, 1e-6)
+    count, _, complete = krawczyk_pave(equations, low, high, one, one, fine, 10_000, kept_lo, kept_hi, kept)
+    assert (count, complete) == (2, 1)
+    assert kept[:2].tolist() == [Status.UNIQUE] * 2
+    for found_lo, found_hi in zip(kept_lo[:2], kept_hi[:2]):
+        assert any((found_lo <= r + 1e-15).all() and (found_hi >= r - 1e-15).all() for r in (root, mirror))
+    for budget, room in ((4, 50), (10_000, 1)):  # an exhausted budget keeps its boxes; missing room is admitted
+        count, _, complete = krawczyk_pave(
+            equations, low, high, one, one, fine, budget, kept_lo[:room], kept_hi[:room], kept[:room]
+        )
+        assert complete == (room == 50)
+        covered = [
+            ((kept_lo[:count] <= r).all(axis=1) & (kept_hi[:count] >= r).all(axis=1)).any() for r in (root, mirror)
+        ]
+        assert all(covered) or not complete
 
 
 # -- linear systems ------------------------------------------------------------------------------------------

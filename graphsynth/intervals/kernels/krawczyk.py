@@ -11,7 +11,7 @@ continuous.  It is written with the scalar functions of this package (``arithmet
 """
 
 import numpy as np
-from numba import boolean, float64, int8, njit, types, void
+from numba import boolean, float64, int8, int64, njit, types, void
 
 from graphsynth.intervals.kernels import arithmetic as ia
 
@@ -96,29 +96,102 @@ def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
     return EXISTS if within and norm < 1.0 - 1e-9 else UNDECIDED
 
 
+@njit(cache=True, error_model="numpy")
+def _test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y):
+    """Status of one box; ``kl, kh`` becomes the intersection with the image; the rest is workspace."""
+    n = z.size
+    smooth = equations(xl, xh, pl, ph, fl, fh, jl, jh, True)
+    found = UNDECIDED
+    for i in range(n):
+        kl[i], kh[i] = xl[i], xh[i]
+        z[i] = 0.5 * (xl[i] + xh[i])
+        if not (fl[i] <= 0.0 <= fh[i]) or not xl[i] <= xh[i]:
+            found = EMPTY
+        smooth = smooth and np.isfinite(z[i])
+        for j in range(n):
+            mid[i, j] = 0.5 * (jl[i, j] + jh[i, j])
+    if found != EMPTY and smooth and invert(mid, y):
+        smooth = equations(z, z, pl, ph, fl, fh, jl, jh, False)
+        if smooth:
+            found = _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh)
+    if found == EMPTY:
+        kl[:], kh[:] = np.inf, -np.inf
+    return found
+
+
 @njit(_TEST, cache=True, error_model="numpy")
 def krawczyk_boxes(equations, lo, hi, pl, ph, out_lo, out_hi, status):
     """Test boxes (N, n) once with common parameters (m,): status and intersection with the image."""
     n = lo.shape[1]
     fl, fh, z = np.empty(n), np.empty(n), np.empty(n)
-    jl, jh = np.empty((n, n)), np.empty((n, n))
-    mid, y = np.empty((n, n)), np.empty((n, n))
+    jl, jh, mid, y = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     for b in range(lo.shape[0]):
-        xl, xh, kl, kh = lo[b], hi[b], out_lo[b], out_hi[b]
-        smooth = equations(xl, xh, pl, ph, fl, fh, jl, jh, True)
+        status[b] = _test(equations, lo[b], hi[b], pl, ph, out_lo[b], out_hi[b], fl, fh, z, jl, jh, mid, y)
+
+
+_PAVE = int64[::1](
+    types.FunctionType(SYSTEM), _VECTOR, _VECTOR, _VECTOR, _VECTOR, _VECTOR, int64, _MATRIX, _MATRIX, int8[::1]
+)
+
+
+@njit(_PAVE, cache=True, error_model="numpy")
+def krawczyk_pave(equations, lo, hi, pl, ph, tolerance, max_boxes, kept_lo, kept_hi, status):
+    """Branch and prune of one box (n,), depth first; returns kept boxes, tested boxes, and 1 if nothing was left out.
+
+    Kept are boxes with a proof, contracted, and undecided ones with all widths at most ``tolerance`` (n,).  Where the
+    budget or the room in ``kept_lo`` ends the search, the waiting boxes are kept undecided while there is room; the
+    third number is 0 if some solution may lie outside all kept boxes.  A solution on a cut stays undecided here;
+    ``graphsynth.intervals.Search`` proves it by inflation.
+    """
+    n, room, depth = lo.size, kept_lo.shape[0], 4096
+    stack_lo, stack_hi = np.empty((depth, n)), np.empty((depth, n))
+    rows = np.empty((7, n))
+    xl, xh, kl, kh, fl, fh, z = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
+    jl, jh, mid, y = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    stack_lo[0], stack_hi[0] = lo, hi
+    waiting, kept, tested, complete = 1, 0, 0, 1
+    while waiting > 0:
+        waiting -= 1
+        xl[:], xh[:] = stack_lo[waiting], stack_hi[waiting]
         found = UNDECIDED
-        for i in range(n):
-            kl[i], kh[i] = xl[i], xh[i]
-            z[i] = 0.5 * (xl[i] + xh[i])
-            if not (fl[i] <= 0.0 <= fh[i]) or not xl[i] <= xh[i]:
+        over = tested >= max_boxes
+        for _ in range(12):
+            if over:
+                break
+            result = _test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y)
+            tested += 1
+            if result == EMPTY:
                 found = EMPTY
-            smooth = smooth and np.isfinite(z[i])
-            for j in range(n):
-                mid[i, j] = 0.5 * (jl[i, j] + jh[i, j])
-        if found != EMPTY and smooth and invert(mid, y):
-            smooth = equations(z, z, pl, ph, fl, fh, jl, jh, False)
-            if smooth:
-                found = _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh)
+                break
+            if result == UNIQUE or (result == EXISTS and found == UNDECIDED):
+                found = result
+            gains = False
+            for i in range(n):
+                gains = gains or kh[i] - kl[i] < 0.9 * (xh[i] - xl[i])
+                xl[i], xh[i] = kl[i], kh[i]
+            if not gains:
+                break
         if found == EMPTY:
-            kl[:], kh[:] = np.inf, -np.inf
-        status[b] = found
+            continue
+        widest, size = 0, -1.0
+        small = True
+        for i in range(n):
+            ratio = (xh[i] - xl[i]) / tolerance[i]
+            small = small and ratio <= 1.0
+            if ratio > size:
+                widest, size = i, ratio
+        middle = 0.5 * (xl[widest] + xh[widest])
+        inside = xl[widest] < middle < xh[widest]
+        if found != UNDECIDED or small or over or not inside or waiting + 2 > depth:
+            if kept == room:
+                complete = 0
+                break
+            kept_lo[kept], kept_hi[kept], status[kept] = xl, xh, found
+            kept += 1
+            continue
+        stack_lo[waiting], stack_hi[waiting] = xl, xh
+        stack_lo[waiting + 1], stack_hi[waiting + 1] = xl, xh
+        stack_lo[waiting, widest] = middle
+        stack_hi[waiting + 1, widest] = middle
+        waiting += 2
+    return np.array([kept, tested, complete])
