@@ -1,25 +1,44 @@
-"""Bearing contact under tilt: gaps, critical tilt, jam arcs over a turn, areas, verdicts."""
+"""Bearing contact under tilt: gaps, critical tilt, jam arcs over a turn, areas, verdicts with and without proof.
+
+Names are resolved on first use.
+"""
 
 from __future__ import annotations
 
-from graphsynth.jamming.assess import JammingReport, JammingTable, assess_jamming
-from graphsynth.jamming.bearing import Bearing, CriticalTilt
-from graphsynth.jamming.inverse import Limit, largest_height, largest_misalignment, smallest_clearance
-from graphsynth.jamming.tilt_arcs import Arc, JamArcs, jam_arcs
-from graphsynth.jamming.verdict import Verdict
+from importlib import import_module
+from typing import Any
 
-__all__ = [
-    "Arc",
-    "Bearing",
-    "CriticalTilt",
-    "JamArcs",
-    "JammingReport",
-    "JammingTable",
-    "Limit",
-    "Verdict",
-    "assess_jamming",
-    "jam_arcs",
-    "largest_height",
-    "largest_misalignment",
-    "smallest_clearance",
-]
+_PUBLIC: dict[str, str] = {
+    "Arc": "tilt_arcs",
+    "ArcEnclosure": "certified_arcs",
+    "Bearing": "bearing",
+    "CertifiedArcs": "certified_arcs",
+    "CriticalTilt": "bearing",
+    "Enclosure": "certified_arcs",
+    "JamArcs": "tilt_arcs",
+    "JamCertificate": "certify",
+    "JammingReport": "assess",
+    "JammingTable": "assess",
+    "Limit": "inverse",
+    "Range": "ranges",
+    "Span": "circle_sets",
+    "ToleranceBox": "parameters",
+    "Verdict": "verdict",
+    "Witness": "certify",
+    "assess_jamming": "assess",
+    "certify_jamming": "certify",
+    "jam_arcs": "tilt_arcs",
+    "largest_height": "inverse",
+    "largest_misalignment": "inverse",
+    "smallest_clearance": "inverse",
+    "spread": "ranges",
+}
+
+__all__ = [*sorted(_PUBLIC)]
+
+
+def __getattr__(name: str) -> Any:
+    module = _PUBLIC.get(name)
+    if module is None:
+        raise AttributeError(f"module 'graphsynth.jamming' has no attribute {name!r}")
+    return getattr(import_module(f"graphsynth.jamming.{module}"), name)

@@ -4,18 +4,33 @@ from __future__ import annotations
 
 from enum import Enum
 
-__all__ = ["METHOD_CLOSED_FORM", "Verdict"]
+__all__ = ["METHOD_CERTIFIED", "METHOD_CLOSED_FORM", "Verdict"]
 
 METHOD_CLOSED_FORM = "closed form, double precision, not certified"
+METHOD_CERTIFIED = "certified: interval arithmetic with outward rounding"
 
 
 class Verdict(Enum):
-    """Verdict over a whole turn of the crank.
+    """Verdict over a whole turn of the crank and all parameters of a tolerance box.
 
-    Every member whose name ends in ESTIMATED rests on closed forms in floating point: no rounding error is included, so
-    none of them is a certificate.
+    ============================= ============================== ==================================================
+    member                        name in the specification 10.1 what is proved
+    ============================= ============================== ==================================================
+    ``CERTIFIED_FREE``            ``NO_JAM_CERTIFIED``           g < 0 for every angle and every parameter vector
+    ``CERTIFIED_JAMMED``          ``JAM_FOR_ALL``                every parameter vector jams at some crank angle
+    ``CERTIFIED_JAMMED_FOR_SOME`` ``JAM_FOR_SOME``               some parameter vector jams at some crank angle
+    ``UNDECIDED``                 ``TOUCHING``, ``UNDECIDED``    nothing; the reason says what stands in the way
+    ``CANNOT_ASSEMBLE``           (section 12)                   interference fit, or no position of the linkage
+    ============================= ============================== ==================================================
+
+    Members whose name ends in ESTIMATED rest on closed forms in floating point: no rounding error is included, so none
+    of them is a certificate.
     """
 
+    CERTIFIED_FREE = "free over the whole turn (certified)"
+    CERTIFIED_JAMMED = "jams on part of the turn, whatever the parameters (certified)"
+    CERTIFIED_JAMMED_FOR_SOME = "jams on part of the turn for some of the parameters (certified)"
+    UNDECIDED = "undecided"
     FREE_ESTIMATED = "free over the whole turn (estimated)"
     JAMMED_ESTIMATED = "jams on part of the turn (estimated)"
     TOUCHING_ESTIMATED = "touches without clearance left, within the rounding level (estimated)"
@@ -24,4 +39,14 @@ class Verdict(Enum):
     @property
     def is_free(self) -> bool:
         """True only for a verdict that says free."""
-        return self is Verdict.FREE_ESTIMATED
+        return self in (Verdict.FREE_ESTIMATED, Verdict.CERTIFIED_FREE)
+
+    @property
+    def is_jammed(self) -> bool:
+        """True for a verdict that says that something jams."""
+        return self in (Verdict.JAMMED_ESTIMATED, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME)
+
+    @property
+    def is_certified(self) -> bool:
+        """True for a verdict that is a proof."""
+        return self in (Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME)

@@ -1,0 +1,397 @@
+"""`certify_jamming`: a proved verdict on one tilted bearing over a whole turn and a whole tolerance box (model L0)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from fractions import Fraction
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.jamming.bearing import Condition
+from graphsynth.jamming.certified_arcs import CertifiedArcs, Enclosure, arcs_from, no_arcs, whole_turn
+from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from graphsynth.intervals import Interval
+
+__all__ = ["JamCertificate", "Witness", "certify_jamming"]
+
+_ANGLES = 64  # angles of the turn tried as positions of a jam
+_PIECES = 256  # pieces of the turn on which assembly is proved
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A jam that is proved: exact parameters, a crank angle, and a positive lower bound of the gap function there.
+
+    ``parameters`` are exact numbers as text, ``f`` (radians) encloses the crank angle, ``gap`` (mm) the gap function.
+    """
+
+    parameters: dict[str, str]
+    f: Enclosure
+    gap: Enclosure
+
+
+@dataclass(frozen=True, eq=False)
+class JamCertificate:
+    """What is proved about the bearing at B, for every crank angle and every parameter vector of the box.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        See the table there.
+    reason : str
+        Why nothing is proved, or what is special; empty for a plain verdict.
+    condition : str
+        Contact condition used.
+    box : ToleranceBox
+        The parameters.
+    largest_gap : Enclosure
+        Of the largest gap function over the turn and the box, mm; a negative upper end proves that all is free.
+    smallest_worst_gap : Enclosure
+        Of the smallest value over the box of the largest gap over the turn, mm; a positive lower end proves that every
+        parameter vector jams.
+    largest_tilt, critical_tilt : Enclosure
+        Range over the box of the largest tilt of a turn and of the critical tilt, radians; infinite: none.
+    arcs : CertifiedArcs
+        Jam arcs with inner and outer bounds.
+    assembles : {"always", "at some angles", "never", "not decided"}
+        What is proved about assembly, for every parameter vector.
+    witness : Witness or None
+        Evidence of a jam for ``CERTIFIED_JAMMED`` and ``CERTIFIED_JAMMED_FOR_SOME``.
+    exact_input : bool
+        False if a plain float came in; the statement then holds for that double.
+    boxes : int
+        Boxes evaluated.
+    seconds : float
+        Run time.
+    """
+
+    verdict: Verdict
+    reason: str
+    condition: str
+    box: ToleranceBox
+    largest_gap: Enclosure
+    smallest_worst_gap: Enclosure
+    largest_tilt: Enclosure
+    critical_tilt: Enclosure
+    arcs: CertifiedArcs
+    assembles: str
+    witness: Witness | None
+    exact_input: bool
+    boxes: int
+    seconds: float = field(default=0.0, compare=False)
+    method: str = METHOD_CERTIFIED
+
+    @property
+    def clearance_left(self) -> Enclosure:
+        """Range that holds the clearance left at the worst angle of the worst parameters, mm; negative is missing."""
+        return Enclosure(-self.largest_gap.hi, -self.largest_gap.lo)
+
+    @property
+    def tilt_margin(self) -> Enclosure:
+        """Critical tilt minus largest tilt for the worst and the best parameters, radians (outward)."""
+        low = math.nextafter(self.critical_tilt.lo - self.largest_tilt.hi, -math.inf)
+        return Enclosure(low, math.nextafter(self.critical_tilt.hi - self.largest_tilt.lo, math.inf))
+
+    @property
+    def statement(self) -> str:
+        """The sentence that is proved, or what is missing."""
+        return _statement(self)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values for a report or a JSON file; angles in radians, lengths in mm."""
+        arcs = self.arcs
+        return {
+            "verdict": self.verdict.name,
+            "statement": self.statement,
+            "method": self.method,
+            "condition": self.condition,
+            "parameters": self.box.describe(),
+            "exact_input": self.exact_input,
+            "largest_gap_mm": list(self.largest_gap),
+            "smallest_worst_gap_mm": list(self.smallest_worst_gap),
+            "largest_tilt": list(self.largest_tilt),
+            "critical_tilt": list(self.critical_tilt),
+            "kappa": list(arcs.kappa),
+            "arcs": [{"start": list(a.start), "stop": list(a.stop)} for a in arcs.arcs],
+            **{name: [list(span) for span in getattr(arcs, name)] for name in ("inner", "outer", "undecided", "free")},
+            "assembles": self.assembles,
+            "boxes": self.boxes,
+            "seconds": self.seconds,
+        }
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the partition of the turn as a table: kind, start and stop in radians."""
+        import pandas as pd
+
+        kinds = ("free", "inner", "undecided")
+        rows = [(kind, *span) for kind in kinds for span in getattr(self.arcs, kind)]
+        frame = pd.DataFrame(rows, columns=["kind", "start", "stop"])
+        return frame.sort_values("start", ignore_index=True)
+
+
+def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertificate:
+    """Prove whether the bearing at B jams while the crank makes a turn, for all parameters of a box.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        The linkage and the bearing; give text or fractions, not floats, if the numbers are decimals.
+    condition : {"A", "B", "general"}
+        Contact condition, see `Bearing.gap`.
+
+    Returns
+    -------
+    JamCertificate
+        Certified: every rounding error is included.  Where neither side is proved, ``UNDECIDED`` with the reason.
+
+    Raises
+    ------
+    GeometryError
+        An unknown condition, or "general" without a hole length.
+    GraphsynthError
+        If another library has changed the rounding mode of the processor.
+
+    Notes
+    -----
+    The gap is monotone in every parameter, so that its extremes over the box are values at two exact corners
+    (specification 10.2); a jam also needs a position that can be assembled, which interval kinematics proves.
+
+    Examples
+    --------
+    >>> found = certify_jamming(ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003"))
+    >>> found.verdict.name, found.largest_gap.hi < 0
+    ('CERTIFIED_FREE', True)
+    """
+    from graphsynth.intervals import check_rounding
+    from graphsynth.jamming.corners import check_condition
+
+    begin = perf_counter()
+    check_rounding()
+    check_condition(box, condition)
+    clearance = box["clearance"]
+    if clearance.upper < 0:
+        return _interference(box, condition, begin)
+    if clearance.lower < 0:
+        return _partly_interference(box, condition, begin)
+    return _Proof(box, condition, begin).result()
+
+
+class _Proof:
+    """One run: the corner values, then the weakest work that settles the verdict."""
+
+    def __init__(self, box: ToleranceBox, condition: Condition, begin: float) -> None:
+        from graphsynth.jamming import corners
+
+        self.box, self.condition, self.begin = box, condition, begin
+        self.tilt = corners.sines(box)
+        self.gaps = corners.gap_corners(box, self.tilt.sine, condition)
+        self.critical = corners.critical_sines(box, condition)
+        self.phase = corners.phase(box)
+        self.kappa = Enclosure(*corners.onset(box, self.critical, self.tilt))
+        self.boxes = 2
+        self.assembles = self._assembly(box)
+
+    def result(self) -> JamCertificate:
+        low, high = _pair(self.gaps, 0), _pair(self.gaps, 1)
+        verdict, reason, witness = Verdict.UNDECIDED, "", None
+        if self.assembles == "never":
+            verdict, reason = Verdict.CANNOT_ASSEMBLE, "no crank angle can be assembled, for any parameters"
+        elif high.hi < 0.0:
+            verdict = Verdict.CERTIFIED_FREE
+        else:
+            witness = self._jam(self.box) if low.lo > 0.0 else None
+            if witness:
+                verdict = Verdict.CERTIFIED_JAMMED
+            elif high.lo > 0.0:
+                witness = self._jam(worst_corner(self.box, self.condition))
+                verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME if witness else Verdict.UNDECIDED
+        if verdict is Verdict.UNDECIDED:
+            reason = self._why(high)
+        return self._finish(verdict, reason, witness)
+
+    def _why(self, high: Enclosure) -> str:
+        if high.lo > 0.0:
+            return "the gap closes, but no position with a jam is proved to be assembled"
+        c = self.box["clearance"]
+        if c.lower == 0:
+            if self.kappa.lo > 0.0 or float(self.tilt.sine.hi[1]) == 0.0:
+                return "touching: no clearance and no tilt, the parts touch at every angle"
+            return "touching: no clearance is left at the lower end of its range"
+        if self.condition == "A" and _touches_only(self.box):
+            return "touching: h^2 = c (2R + c) exactly, the parts can touch but never overlap"
+        width = f"[{high.lo:.3g}, {high.hi:.3g}] mm"
+        return f"the largest gap lies in {width}, which contains 0: touching at this resolution; change a tolerance"
+
+    def _assembly(self, box: ToleranceBox) -> str:
+        """Say at how much of the turn the linkage is proved to be assembled, for every parameter vector."""
+        from graphsynth.jamming.poses import pose, turn_pieces
+
+        found = pose(box, turn_pieces(_PIECES))
+        self.boxes += _PIECES
+        if found.assembled.all():
+            return "always"
+        if found.missing.all():
+            return "never"
+        return "at some angles" if found.assembled.any() else "not decided"
+
+    def _jam(self, box: ToleranceBox) -> Witness | None:
+        """Look for an angle at which every parameter vector of ``box`` is proved assembled and jammed."""
+        import numpy as np
+
+        from graphsynth.intervals import Interval, sin
+        from graphsynth.jamming import corners, poses
+
+        turn = poses.grid(_ANGLES)  # angles after the phase
+        tilt = corners.sines(box) if box is not self.box else self.tilt
+        amplitude = Interval.from_bounds(tilt.amplitude.lo[0], tilt.amplitude.hi[0])
+        sine = corners.sine_of(amplitude * abs(sin(turn)), box.rod)
+        gap = poses.corner_gap(box, sine, self.condition, 0)
+        f = corners.phase(box) + turn
+        found = poses.pose(box, f)
+        self.boxes += _ANGLES
+        proved = np.flatnonzero((gap.lo > 0.0) & found.assembled)
+        if proved.size == 0:
+            return None
+        best = int(proved[np.argmax(gap.lo[proved])])
+        angle = Enclosure(float(f.lo[best]), float(f.hi[best]))
+        return Witness(box.describe(), angle, Enclosure(float(gap.lo[best]), float(gap.hi[best])))
+
+    def _finish(self, verdict: Verdict, reason: str, witness: Witness | None) -> JamCertificate:
+        shown = Enclosure(float(self.phase.lo), float(self.phase.hi))
+        if verdict is Verdict.CERTIFIED_FREE:
+            why = "the gap stays open"
+            if self.kappa.lo == math.inf:
+                still = float(self.tilt.amplitude.hi[1]) == 0.0
+                why = "the crank pin stays in the plane: no tilt" if still else "there is no critical tilt"
+            arcs = no_arcs(self.kappa, shown, why)
+        elif self.kappa.lo == 0.0 and float(self.tilt.amplitude.hi[1]) == 0.0:
+            arcs = whole_turn(self.kappa, shown, reason, False)
+        else:
+            arcs = arcs_from(self.kappa, self.phase)
+        return JamCertificate(
+            verdict=verdict,
+            reason=reason,
+            condition=self.condition,
+            box=self.box,
+            largest_gap=_pair(self.gaps, 1),
+            smallest_worst_gap=_pair(self.gaps, 0),
+            largest_tilt=_angles(self.tilt.sine),
+            critical_tilt=_angles(self.critical),
+            arcs=arcs,
+            assembles=self.assembles,
+            witness=witness,
+            exact_input=self.box.exact_input,
+            boxes=self.boxes,
+            seconds=perf_counter() - self.begin,
+        )
+
+
+def _pair(values: Interval, corner: int) -> Enclosure:
+    return Enclosure(float(values.lo[corner]), float(values.hi[corner]))
+
+
+def _angles(sine: Interval) -> Enclosure:
+    """Range of the angles of a pair of sines; an infinite sine stands for "none"."""
+    from graphsynth.jamming.corners import arcsine
+
+    low, high = float(sine.lo[0]), float(sine.hi[1])
+    first = float(arcsine(low).lo) if low <= 1.0 else math.inf
+    return Enclosure(first, float(arcsine(high).hi) if high <= 1.0 else math.inf)
+
+
+def _touches_only(box: ToleranceBox) -> bool:
+    h, c, R = box["Hb"].upper / 2, box["clearance"].lower, box["Rb"].lower
+    return h * h == c * (2 * R + c)
+
+
+def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:
+    """Return the parameter vector of the box at which the gap is largest; the middle where it does not matter.
+
+    For condition "general" with a range of radii the radius is a candidate only: the value there is evaluated anew.
+    """
+    ends: dict[str, Fraction] = {name: (r.lower + r.upper) / 2 for name, r in box.ranges.items()}
+    for name in ("l2", "Hb", "hole_length"):
+        if name in box:
+            ends[name] = box[name].upper
+    ends["l3"], ends["clearance"] = box["l3"].lower, max(box["clearance"].lower, Fraction(0))
+    far = max(box["alpha"].lower, box["alpha"].upper, key=abs)
+    ends["alpha"] = far
+    for name in ("n1", "n2"):
+        ends[name] = max(box[name].lower, box[name].upper, key=abs)
+    low, high = box["n3"].lower, box["n3"].upper
+    ends["n3"] = Fraction(0) if low <= 0 <= high else min(low, high, key=abs)
+    if condition == "A":
+        ends["Rb"] = box["Rb"].lower
+    elif condition == "B":
+        ends["Rb"] = box["Rb"].upper
+    else:
+        ends["Rb"] = _balanced_radius(box, ends)
+    axis = (ends.pop("n1"), ends.pop("n2"), ends.pop("n3"))
+    return ToleranceBox(**ends, axis=axis, sgn=box.sgn, rod=box.rod, convention=box.convention)
+
+
+def _balanced_radius(box: ToleranceBox, ends: dict[str, Fraction]) -> Fraction:
+    """Radius at which both readings of the general pin are about equal: ``R S = hp C - hh`` (section 4.4)."""
+    linkage, _ = box.nominal()
+    sine = linkage.largest_tilt[1]
+    if sine == 0.0:
+        return box["Rb"].upper
+    wanted = float(ends["Hb"]) / 2 * math.sqrt(1.0 - sine * sine) - float(ends["hole_length"]) / 2
+    return min(max(Fraction(wanted / sine), box["Rb"].lower), box["Rb"].upper)
+
+
+def _interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
+    """Answer for a clearance that is negative throughout."""
+    from graphsynth.jamming import corners
+
+    tilt = corners.sines(box)
+    gaps = corners.gap_corners(box, tilt.sine, condition)
+    nothing = Enclosure(0.0, 0.0)
+    reason = "interference fit: the clearance is negative, the parts overlap at every tilt"
+    arcs = whole_turn(nothing, Enclosure(-math.pi, math.pi), reason, True)
+    return JamCertificate(
+        Verdict.CANNOT_ASSEMBLE, reason, condition, box, _pair(gaps, 1), _pair(gaps, 0), _angles(tilt.sine), nothing,
+        arcs, "never", None, box.exact_input, 2, perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
+    """Answer for a range of clearances from negative to positive: jams of the sound part count, freedom does not."""
+    from dataclasses import replace
+
+    from graphsynth.jamming.ranges import Range
+
+    c = box["clearance"]
+    sound = box.replace(clearance=Range(Fraction(0), c.upper, c.exact))
+    found = _Proof(sound, condition, begin).result()
+    verdict, reason = found.verdict, found.reason
+    text = "part of the range of the clearance is an interference fit, which cannot be assembled"
+    if found.verdict is Verdict.CERTIFIED_JAMMED:
+        verdict, reason = Verdict.CERTIFIED_JAMMED_FOR_SOME, text
+    elif found.verdict is not Verdict.CERTIFIED_JAMMED_FOR_SOME:
+        verdict, reason = Verdict.UNDECIDED, text
+    return replace(found, verdict=verdict, reason=reason, box=box, seconds=perf_counter() - begin)
+
+
+def _statement(found: JamCertificate) -> str:
+    who = "the bearing" if found.box.is_point else "every bearing of the tolerance box"
+    given = "" if found.exact_input else " (for the doubles given: floats came in, decimals are not guaranteed)"
+    gap = found.largest_gap
+    match found.verdict:
+        case Verdict.CERTIFIED_FREE:
+            text = f"proved: {who} is free at every crank angle; at least {-gap.hi:.6g} mm of clearance are left"
+        case Verdict.CERTIFIED_JAMMED:
+            text = f"proved: {who} jams during the turn; at least {found.smallest_worst_gap.lo:.6g} mm are missing"
+        case Verdict.CERTIFIED_JAMMED_FOR_SOME:
+            text = f"proved: a bearing of the tolerance box jams; at least {gap.lo:.6g} mm are missing there"
+        case Verdict.CANNOT_ASSEMBLE:
+            text = f"the parts cannot be assembled: {found.reason}"
+        case _:
+            text = f"undecided: {found.reason}"
+    return f"{text} (condition {found.condition}){given}"

@@ -1,0 +1,344 @@
+"""Certified verdicts and arcs: published values, exact references to 60 digits, adversarial cases."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from graphsynth.errors import GeometryError
+from graphsynth.jamming import Bearing, ToleranceBox, Verdict, certify_jamming, spread
+from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+
+DEG = mpmath.mpf
+F = Fraction
+
+
+def reference(alpha, axis, lengths, R, H, c, condition, hole=None):
+    """Largest gap, kappa and phase to 60 digits from the geometry itself (rotation matrix, distances of points)."""
+    mp = mpmath.mp.clone()
+    mp.dps = 60
+    q = [mp.mpf(x.numerator) / x.denominator for x in map(F, (alpha, *axis, *lengths, R, H, c))]
+    alpha, n1, n2, n3, l2, l3, R, H, c = q
+    norm = mp.sqrt(n1**2 + n2**2 + n3**2)
+    n1, n2, n3 = n1 / norm, n2 / norm, n3 / norm
+    s, k = mp.sin(alpha), 1 - mp.cos(alpha)
+    r31, r32 = n1 * n3 * k - n2 * s, n2 * n3 * k + n1 * s
+    S = l2 / l3 * mp.sqrt(r31**2 + r32**2)
+    C, h, Rh = mp.sqrt(1 - S**2), H / 2, R + c
+    D_A = R * C + h * S if h * C >= R * S else mp.sqrt(R**2 + h**2)
+    gaps = {"A": D_A - Rh, "B": R - (Rh * C - h * S)}
+    if hole is not None:
+        hole = mp.mpf(F(hole).numerator) / F(hole).denominator / 2
+        gaps["general"] = min(D_A, (R + hole * S) / C) - Rh
+    return gaps[condition], S, mp.atan2(-r31, r32)
+
+
+def deck(**changes):
+    return ToleranceBox(**{"alpha": "1/30", **changes})
+
+
+@pytest.mark.parametrize(
+    ("condition", "start", "stop"),
+    [("A", "27.0592203251509475645179736478", "152.940779674849052435482026352"),
+     ("B", "26.4519007718602215158671401366", "153.548099228139778484132859863")],
+)  # fmt: skip
+def test_published_arcs_lie_in_their_enclosures(condition, start, stop):
+    found = certify_jamming(deck(), condition)
+    assert found.verdict is Verdict.CERTIFIED_JAMMED and found.exact_input and found.assembles == "always"
+    with mpmath.workdps(40):
+        for half, arc in enumerate(found.arcs.arcs):
+            for text, end in ((start, arc.start), (stop, arc.stop)):
+                exact = mpmath.radians(mpmath.mpf(text) + 180 * half)
+                assert end.lo <= exact <= end.hi
+                assert end.width < 1e-14
+    (one, two), (first, last) = found.arcs.inner, found.arcs.free
+    assert one.start > found.arcs.outer[0].start and two.stop < found.arcs.outer[1].stop
+    assert first.start == found.arcs.outer[0].stop and last.start == found.arcs.outer[1].stop
+    assert found.arcs.jammed_part.width < 1e-14
+    assert list(found.to_pandas()["kind"]).count("undecided") == 4
+
+
+def test_published_tilts_gaps_and_the_statement():
+    found = certify_jamming(deck())
+    with mpmath.workdps(40):
+        for text, enclosure in [
+            ("0.0133312592085829611560698794957554253", found.largest_tilt),
+            ("0.006064396559156420060266102798724801172486", found.critical_tilt),
+            ("0.03509927307354575852847158852", found.largest_gap),
+            ("0.03509927307354575852847158852", found.smallest_worst_gap),
+        ]:
+            assert enclosure.lo <= mpmath.mpf(text) <= enclosure.hi
+            assert enclosure.width < 1e-15
+    assert found.statement.startswith("proved: the bearing jams") and "0.0350993 mm" in found.statement
+    assert found.summary()["verdict"] == "CERTIFIED_JAMMED"
+    assert found.witness is not None and found.witness.gap.lo > 0
+
+
+def table_10_3(alpha, tol):
+    return ToleranceBox(
+        l2=spread(1, 0, tol), l3=spread("2.5", 0, tol), alpha=spread(alpha, 0, tol), azimuth="[-0.05, 0.05]",
+        Rb="17.5 +- 0.005", Hb=spread(10, "0.05"), clearance="0.03 +- 0.003",
+    )  # fmt: skip
+
+
+def test_both_rows_of_the_published_tolerance_table():
+    jammed, free = certify_jamming(table_10_3("1/30", "1e-4")), certify_jamming(table_10_3("0.0130", "1e-2"))
+    assert jammed.verdict is Verdict.CERTIFIED_JAMMED
+    assert free.verdict is Verdict.CERTIFIED_FREE
+    with mpmath.workdps(40):
+        for text, enclosure in [
+            ("0.03845215250404404041426319", jammed.largest_gap),
+            ("0.03174659891642157774855620", jammed.smallest_worst_gap),
+            ("-0.0003274375372990500519939424", free.largest_gap),
+        ]:
+            assert enclosure.lo <= mpmath.mpf(text) <= enclosure.hi
+            assert enclosure.width < 3e-16
+    assert free.arcs.outer == () and free.clearance_left.lo > 0.000327
+    assert free.arcs.kappa.lo > 1 and free.tilt_margin.lo > 0
+    inner, outer = jammed.arcs.inner, jammed.arcs.outer
+    assert len(inner) == len(outer) == 2 and len(jammed.arcs.undecided) == 4
+    assert all(o.start < i.start < i.stop < o.stop for i, o in zip(inner, outer))
+
+
+rational = st.fractions(max_denominator=10**6)
+lengths = st.fractions(F(1, 2), 4, max_denominator=1000)
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.fractions(F(1, 1000), F(3, 2), max_denominator=10**5),
+    st.tuples(*[st.fractions(-1, 1, max_denominator=50)] * 3).filter(any),
+    lengths, st.fractions(4, 9, max_denominator=1000),
+    st.fractions(5, 30, max_denominator=1000), st.fractions(1, 40, max_denominator=1000),
+    st.fractions(F(1, 10**4), 1, max_denominator=10**5), st.sampled_from(["A", "B", "general"]),
+)  # fmt: skip
+def test_verdicts_and_enclosures_against_sixty_digits(alpha, axis, l2, l3, R, H, c, condition):
+    hole = H / 3
+    gap, S, phase = reference(alpha, axis, (l2, l3), R, H, c, condition, hole)
+    box = ToleranceBox(6, l2, l3, 6, alpha, axis, 0, R, H, c, hole)
+    found = certify_jamming(box, condition)
+    assert found.largest_gap.lo <= gap <= found.largest_gap.hi
+    assert found.largest_gap.width <= 1e-14 * float(R + H)
+    if abs(gap) > 1e-13:
+        assert found.verdict is (Verdict.CERTIFIED_JAMMED if gap > 0 else Verdict.CERTIFIED_FREE)
+    off = mpmath.fmod(phase - mpmath.mpf(found.arcs.phase.mid), mpmath.pi)
+    assert min(abs(off), mpmath.pi - abs(off)) < 1e-14 or S == 0
+
+
+def critical_alpha(condition="A", digits=60):
+    """Decimal text of the tilt at which the deck touches."""
+    with mpmath.workdps(digits + 10):
+        c, R, h = mpmath.mpf("0.03"), mpmath.mpf("17.5"), mpmath.mpf(5)
+        w = mpmath.sqrt(h * h - c * (2 * R + c)) if condition == "A" else mpmath.sqrt(h * h + c * (2 * R + c))
+        q = c / (h + w)
+        return mpmath.asin(mpmath.mpf("2.5") * 2 * q / (1 + q * q))
+
+
+@pytest.mark.parametrize("condition", ["A", "B"])
+def test_never_a_wrong_certificate_beside_the_touching_tilt(condition):
+    edge = critical_alpha(condition)
+    for exponent in range(6, 40):
+        for sign in (1, -1):
+            with mpmath.workdps(70):
+                text = mpmath.nstr(edge * (1 + sign * mpmath.mpf(10) ** -exponent), 60)
+            verdict = certify_jamming(ToleranceBox(alpha=text), condition).verdict
+            right = Verdict.CERTIFIED_JAMMED if sign > 0 else Verdict.CERTIFIED_FREE
+            assert verdict in (right, Verdict.UNDECIDED)
+            if exponent <= 12:
+                assert verdict is right
+
+
+def test_touching_exactly_is_never_decided():
+    # h^2 = c (2R + c): 3, 4, 5 triangle; R = 4, h = 3, Rh = 5; whatever the tilt, contact but no overlap
+    for alpha in ("1/30", "0.5", "1.5"):
+        found = certify_jamming(ToleranceBox(1, 1, 1, 1, alpha, Rb=4, Hb=6, clearance=1))
+        assert found.verdict in (Verdict.UNDECIDED, Verdict.CERTIFIED_FREE)
+        assert found.arcs.inner == ()
+    assert found.verdict is Verdict.UNDECIDED and "never overlap" in found.reason
+    wider = certify_jamming(ToleranceBox(1, 1, 1, 1, "1.5", Rb=4, Hb=6, clearance="1.000000001"))
+    tighter = certify_jamming(ToleranceBox(1, 1, 1, 1, "1.5", Rb=4, Hb=6, clearance="0.999999999"))
+    assert (wider.verdict, tighter.verdict) == (Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED)
+
+
+def test_no_clearance():
+    found = certify_jamming(deck(clearance=0))
+    assert found.verdict is Verdict.CERTIFIED_JAMMED  # a tilt exists, and any tilt jams
+    assert "touches at the two angles without" in found.arcs.reason
+    assert found.arcs.free == () and found.arcs.jammed_part.lo > 1 - 1e-14
+    still = certify_jamming(deck(alpha=0, clearance=0))
+    assert still.verdict is Verdict.UNDECIDED and "touching" in still.reason
+    assert still.arcs.inner == () and still.arcs.free == ()
+    thin = certify_jamming(deck(clearance=0, Hb=0))
+    assert thin.verdict is Verdict.UNDECIDED and thin.arcs.free == ()
+
+
+def test_interference_fit_cannot_be_assembled():
+    press = certify_jamming(deck(clearance="-0.01"))
+    assert press.verdict is Verdict.CANNOT_ASSEMBLE and "interference" in press.statement
+    mixed = certify_jamming(deck(alpha="0.001", clearance="[-0.01, 0.1]"))
+    assert mixed.verdict is Verdict.CERTIFIED_JAMMED_FOR_SOME
+    assert certify_jamming(deck(alpha=0, clearance="[-0.01, 0.1]")).verdict is Verdict.UNDECIDED
+
+
+def test_linkage_that_never_assembles():
+    found = certify_jamming(deck(l1=10, l3=2, l4=2))
+    assert (found.verdict, found.assembles) == (Verdict.CANNOT_ASSEMBLE, "never")
+
+
+def test_jam_that_cannot_be_reached_is_not_claimed():
+    # the crank of (10, 9, 2, 2) is assembled near f = 0 only, where the pin is in the plane: the jam is out of reach
+    found = certify_jamming(ToleranceBox(10, 9, 2, 2, "0.003"))
+    assert found.assembles == "at some angles"
+    assert found.verdict is Verdict.UNDECIDED and "assembled" in found.reason
+
+
+def test_zero_tilt_and_vertical_axis_are_free():
+    for box in (deck(alpha=0), deck(axis=(0, 0, 1)), deck(axis=(0, 0, 1), alpha=3)):
+        found = certify_jamming(box)
+        assert found.verdict is Verdict.CERTIFIED_FREE and "no tilt" in found.arcs.reason
+        assert found.largest_gap.hi == pytest.approx(-0.03, rel=1e-15)
+        assert found.arcs.free[0].length == math.tau
+
+
+def test_tiny_tilt_keeps_its_digits():
+    found = certify_jamming(deck(alpha="1e-8"))
+    with mpmath.workdps(40):  # 14.4
+        assert found.largest_gap.lo <= mpmath.mpf("-0.02999998000000014000000033333") <= found.largest_gap.hi
+
+
+def test_upright_tilt():
+    for condition in ("A", "B"):
+        found = certify_jamming(ToleranceBox(4, 2, 2, 5, "1.5707963267948966192", Rb=10, Hb=4), condition)
+        assert found.verdict is Verdict.CERTIFIED_JAMMED and found.largest_tilt.hi > 1.5
+
+
+@pytest.mark.parametrize("factor", ["1e-9", "1e9"])
+def test_units_do_not_matter(factor):
+    f = F(factor)
+    for alpha in ("1/30", "0.0151", "0.0152"):
+        plain = certify_jamming(deck(alpha=alpha))
+        for kind in ("lengths", "bearing"):
+            other = {"l1": 2 * f, "l2": f, "l3": F("2.5") * f, "l4": F("2.5") * f}
+            if kind == "bearing":
+                other = {"Rb": F("17.5") * f, "Hb": 10 * f, "clearance": F("0.03") * f}
+            scaled = certify_jamming(deck(alpha=alpha, **other))
+            assert scaled.verdict is plain.verdict
+            for one, two in zip(plain.arcs.arcs, scaled.arcs.arcs):
+                assert one.start.lo <= two.start.hi and two.start.lo <= one.start.hi
+                assert two.start.width < 4e-15 / math.cos(two.start.mid)  # the condition of the arcsine
+
+
+def test_a_jam_for_some_names_exact_parameters():
+    found = certify_jamming(deck(clearance="[0.03, 0.1]", l2="1 +- 0.001"))
+    assert found.verdict is Verdict.CERTIFIED_JAMMED_FOR_SOME
+    assert found.witness is not None
+    assert (found.witness.parameters["clearance"], found.witness.parameters["l2"]) == ("0.03", "1.001")
+    assert found.arcs.inner == () and "depends on the parameters" in found.arcs.reason
+    assert found.largest_gap.lo > 0 > found.smallest_worst_gap.hi
+
+
+def test_arcs_that_merge_and_phases_that_are_unknown():
+    near = certify_jamming(deck(azimuth="[-0.5, 0.5]"))  # free pieces vanish for some azimuth
+    assert near.verdict is Verdict.CERTIFIED_JAMMED
+    assert near.arcs.outer[0].length == math.tau and near.arcs.free == ()
+    assert len(near.arcs.inner) == 2
+    lost = certify_jamming(deck(axis=("[-1, 1]", "[-1, 1]", 1)))
+    assert lost.arcs.inner == () and "direction" in lost.arcs.reason
+    turned = certify_jamming(deck(azimuth="6.4"))
+    shift = [
+        (b.start.mid - a.start.mid - 6.4) % math.pi for a, b in zip(certify_jamming(deck()).arcs.arcs, turned.arcs.arcs)
+    ]
+    assert all(min(s, math.pi - s) < 1e-14 for s in shift)
+    assert all(-1e-14 <= arc.start.lo < math.tau for arc in turned.arcs.arcs)
+
+
+def test_floats_are_marked():
+    found = certify_jamming(ToleranceBox.of(LambdaLinkage(alpha=1 / 30), Bearing()))
+    assert not found.exact_input and "floats came in" in found.statement
+    assert certify_jamming(deck()).exact_input
+
+
+def test_the_deck_rod():
+    found = certify_jamming(deck(rod="deck"))
+    with mpmath.workdps(40):
+        for text, arc in zip(("27.0597585332963475926436265901", "207.0597585332963475926436265901"), found.arcs.arcs):
+            assert arc.start.lo <= mpmath.radians(mpmath.mpf(text)) <= arc.start.hi
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+def test_arcs_hold_every_member_of_a_box(data):
+    draw = data.draw
+    alpha = draw(st.fractions(F(1, 100), F(1, 5), max_denominator=1000))
+    axis = draw(st.sampled_from([(1, 0, 0), (-1, 2, 0), (2, -1, 2), (-1, F(-1, 3), F(1, 4))]))
+    tolerance = draw(st.fractions(0, F(1, 20), max_denominator=1000))
+    condition = draw(st.sampled_from(["A", "B"]))
+    values = {"l2": 1, "l3": F(5, 2), "alpha": alpha, "Rb": F(35, 2), "Hb": 10, "clearance": F(3, 100)}
+    box = ToleranceBox(
+        axis=axis, azimuth=f"0 +- {tolerance}", **{k: spread(v, 0, tolerance) for k, v in values.items()}
+    )
+    found = certify_jamming(box, condition)
+    u = {name: draw(st.fractions(0, 1, max_denominator=100)) for name in (*values, "azimuth")}
+    point = box.replace(**{name: box[name].lower + u[name] * (box[name].upper - box[name].lower) for name in u})
+    linkage, bearing = point.nominal()
+    f = np.linspace(0.0, math.tau, 721)
+    path = linkage.positions(f)
+    gap = bearing.gap(path.sin_theta, path.cos_theta, condition)
+    from graphsynth.jamming.circle_sets import contains
+
+    for angle, g in zip(f, gap):
+        if g > 1e-12:
+            assert contains(found.arcs.outer, angle + 0.0) or _near(found.arcs.outer, angle)
+        if g < -1e-12:
+            assert not any(_inside(span, angle) for span in found.arcs.inner)
+    assert found.largest_gap.hi >= gap.max() - 1e-14
+    assert (found.verdict is not Verdict.CERTIFIED_FREE) or gap.max() < 1e-14
+    assert (found.verdict is not Verdict.CERTIFIED_JAMMED) or gap.max() > -1e-5
+
+
+def _near(spans, angle, eps=1e-12):
+    return any(min((angle - end) % math.tau, (end - angle) % math.tau) < eps for span in spans for end in span)
+
+
+def _inside(span, angle, eps=1e-12):
+    return eps < (angle - span.start) % math.tau < span.stop - span.start - eps
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"clearance": "[0.1, 0.03]"}, "exchange"),
+        ({"clearance": math.nan}, "not a finite number"),
+        ({"clearance": "0,03"}, "not a finite number"),
+        ({"clearance": -20}, "leaves no hole"),
+        ({"Rb": 0}, "positive"),
+        ({"Hb": "0 +- 1"}, "zero or more"),
+        ({"l3": "1 +- 2"}, "positive"),
+        ({"axis": (0, 0, 0)}, "zero vector"),
+        ({"axis": (1, 0)}, "three components"),
+        ({"rod": "soft"}, "rod"),
+        ({"alpha": True}, "not a finite number"),
+        ({"alpha": "1e999999"}, "not a finite number"),
+        ({"alpha": "1/0"}, "not a finite number"),
+    ],
+)
+def test_bad_input_gets_a_sentence(changes, words):
+    with pytest.raises(GeometryError, match=words):
+        deck(**changes)
+
+
+def test_general_needs_a_hole_and_condition_a_name():
+    with pytest.raises(GeometryError, match="hole_length"):
+        certify_jamming(deck(), "general")
+    with pytest.raises(GeometryError, match="condition"):
+        certify_jamming(deck(), "C")
+    with pytest.raises(GeometryError, match="no parameter"):
+        deck().replace(colour=3)
+    with pytest.raises(AttributeError, match="does not change"):
+        deck().sgn = -1
