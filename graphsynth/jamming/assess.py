@@ -13,15 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.jamming.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing import Bearing, Condition
+from graphsynth.jamming.circle_sets import strictly_inside
 from graphsynth.jamming.inverse import Limit, largest_misalignment, smallest_clearance
+from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.tilt_arcs import JamArcs, jam_arcs
-from graphsynth.jamming.verdict import METHOD_CLOSED_FORM, Verdict
+from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics._turn import FullTurn
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from graphsynth.jamming.certify import JamCertificate
 
 __all__ = ["JammingReport", "JammingTable", "assess_jamming"]
 
@@ -63,13 +67,13 @@ class JammingReport:
     Attributes
     ----------
     verdict : Verdict
-        Over the whole turn; the members of this step are estimates, see ``method``.
+        Over the whole turn: that of the certificate, or an estimate if none was asked for; see ``method``.
     method : str
         How the verdict was had.
     condition : str
         Contact condition used.
     arcs : JamArcs
-        Closed-form jam arcs, radians.
+        Closed-form jam arcs of the nominal dimensions, radians (estimated; proved bounds are in the certificate).
     worst_gap, worst_angle : float
         Largest gap function over the turn (mm; negative is the clearance left) and a crank angle where it is reached.
     largest_tilt, critical_tilt : float or None
@@ -84,6 +88,8 @@ class JammingReport:
         What a reader must know: angles that cannot be assembled, special cases.
     seconds : float
         Run time.
+    certificate : JamCertificate or None
+        What is proved, with evidence: bounds of the gap, inner and outer arcs, witness.
     """
 
     linkage: LambdaLinkage
@@ -102,12 +108,29 @@ class JammingReport:
     largest_misalignment: Limit | None
     notes: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
+    certificate: JamCertificate | None = None
+
+    @property
+    def statement(self) -> str:
+        """The proved sentence, or the estimated verdict in words."""
+        return self.certificate.statement if self.certificate else self.verdict.value
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the table over the crank angles with the columns ``certainly_jams`` and ``certainly_free`` added.
+
+        Both come from the certificate and are False where nothing is proved, or without a certificate.
+        """
+        frame = self.table.to_pandas()
+        for name, kind in (("certainly_jams", "inner"), ("certainly_free", "free")):
+            spans = getattr(self.certificate.arcs, kind) if self.certificate else ()
+            frame[name] = [strictly_inside(spans, angle) for angle in self.table.f]
+        return frame
 
     def summary(self) -> dict[str, Any]:
         """Plain values (floats, strings, lists; angles in radians) for a report or a JSON file."""
         return {
             "verdict": self.verdict.name,
-            "statement": self.verdict.value,
+            "statement": self.statement,
             "method": self.method,
             "condition": self.condition,
             "arcs": [[arc.start, arc.stop] for arc in self.arcs.arcs],
@@ -122,67 +145,71 @@ class JammingReport:
             "full_turn": self.full_turn.statement,
             "notes": list(self.notes),
             "seconds": self.seconds,
+            "certificate": self.certificate.summary() if self.certificate else None,
         }
 
 
 def assess_jamming(
-    linkage: LambdaLinkage,
+    linkage: LambdaLinkage | None = None,
     bearing: Bearing | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike = 361,
+    *,
+    box: ToleranceBox | None = None,
+    certify: bool = True,
 ) -> JammingReport:
     """Assess whether the bearing at B jams while the crank makes a turn.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
-        With its tilted motor axis.
+    linkage : LambdaLinkage, optional
+        With its tilted motor axis; needed unless ``box`` is given.
     bearing : Bearing, optional
         Defaults to the bearing of the source (17.5 mm, 10 mm, 0.03 mm).
     condition : {"A", "B", "general"}
         Contact condition; "A" (short bearing in a long hole) is what the source means.
     samples : int or array_like
         Number of crank angles of the table over [0, 2 pi], or the angles themselves (radians).
+    box : ToleranceBox, optional
+        Exact dimensions with tolerances; the verdict then holds for the whole box, table and closed-form arcs for its
+        middle unless ``linkage`` and ``bearing`` say otherwise.
+    certify : bool
+        If False the verdict is an estimate from closed forms in double precision, and says so.
 
     Returns
     -------
     JammingReport
-        The verdict comes from the closed form of section 7.1, not from the samples; it is an estimate in double
-        precision and says so.
+        The verdict is certified (`certify_jamming`) by default: for the whole box, or for the doubles given, which it
+        says.  It never comes from the samples.
 
     Raises
     ------
     GeometryError
-        Bad dimensions, an unknown condition, fewer than two samples.
+        Bad dimensions, an unknown condition, fewer than two samples, neither a linkage nor a box.
 
     Examples
     --------
-    >>> report = assess_jamming(LambdaLinkage(alpha=1 / 30))
+    >>> report = assess_jamming(box=ToleranceBox(alpha="1/30", clearance="0.03 +- 0.003"))
     >>> report.verdict.name, round(report.worst_gap, 12)
-    ('JAMMED_ESTIMATED', 0.035099273074)
+    ('CERTIFIED_JAMMED', 0.035099273074)
     """
     begin = perf_counter()
-    bearing = Bearing() if bearing is None else bearing
+    linkage, bearing, box = _given(linkage, bearing, box)
     f = _angles(samples)
     table = _table(linkage, bearing, condition, f)
     arcs = jam_arcs(linkage, bearing, condition)
     turn = linkage.full_turn()
     tilt, sine = linkage.largest_tilt
-    worst_gap = float(bearing.gap(sine, math.cos(tilt), condition))
-    notes = [text for text in (arcs.reason,) if text]
-    if not turn.possible:
-        notes.append(f"{turn.statement}; the arcs hold for the assembled crank angles only")
-    if table.rim_by_quadrature.any():
-        notes.append("R S > h C at some angles: the area of the rim is a quadrature there")
+    certificate = _certificate(box, condition) if certify else None
     inverse = condition != "general" and linkage.rod == "rigid" and linkage.pin_height <= linkage.l3
     return JammingReport(
         linkage=linkage,
         bearing=bearing,
-        verdict=_verdict(bearing, arcs, turn),
-        method=METHOD_CLOSED_FORM,
+        verdict=certificate.verdict if certificate else _verdict(bearing, arcs, turn),
+        method=METHOD_CERTIFIED if certificate else METHOD_CLOSED_FORM,
         condition=condition,
         arcs=arcs,
-        worst_gap=worst_gap,
+        worst_gap=float(bearing.gap(sine, math.cos(tilt), condition)),
         worst_angle=(linkage.pin_phase + 0.5 * math.pi) % math.tau,
         largest_tilt=tilt,
         critical_tilt=bearing.critical_tilt(condition).angle,
@@ -190,9 +217,42 @@ def assess_jamming(
         table=table,
         smallest_clearance=smallest_clearance(linkage, bearing, condition) if inverse else None,
         largest_misalignment=largest_misalignment(linkage, bearing, condition) if inverse else None,
-        notes=tuple(notes),
+        notes=_notes(arcs, turn, table, certificate),
         seconds=perf_counter() - begin,
+        certificate=certificate,
     )
+
+
+def _given(
+    linkage: LambdaLinkage | None, bearing: Bearing | None, box: ToleranceBox | None
+) -> tuple[LambdaLinkage, Bearing, ToleranceBox]:
+    """Complete what was given: the box of the models, or the models in the middle of the box."""
+    if box is None:
+        if linkage is None:
+            raise GeometryError(
+                "neither a linkage nor a box is given; give LambdaLinkage(...) or box=ToleranceBox(...)"
+            )
+        bearing = Bearing() if bearing is None else bearing
+        return linkage, bearing, ToleranceBox.of(linkage, bearing)
+    middle = box.nominal()
+    return linkage or middle[0], bearing or middle[1], box
+
+
+def _certificate(box: ToleranceBox, condition: Condition) -> JamCertificate:
+    from graphsynth.jamming.certify import certify_jamming
+
+    return certify_jamming(box, condition)
+
+
+def _notes(arcs: JamArcs, turn: FullTurn, table: JammingTable, certificate: JamCertificate | None) -> tuple[str, ...]:
+    notes = [text for text in (arcs.reason,) if text]
+    if not turn.possible:
+        notes.append(f"{turn.statement}; the arcs hold for the assembled crank angles only")
+    if table.rim_by_quadrature.any():
+        notes.append("R S > h C at some angles: the area of the rim is a quadrature there")
+    if certificate and certificate.reason and certificate.reason not in notes:
+        notes.append(certificate.reason)
+    return tuple(notes)
 
 
 def _angles(samples: int | ArrayLike) -> Array:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-__all__ = ["FULL_TURN", "Span", "complement", "contains", "merge_outer", "subtract", "total_length"]
+__all__ = ["FULL_TURN", "Span", "complement", "contains", "merge_outer", "strictly_inside", "subtract", "total_length"]
 
 #: Doubles around 2 pi.
 TURN_LOW, TURN_HIGH = 6.283185307179586, 6.283185307179587
@@ -105,6 +105,20 @@ def _without(piece: Span, cut: Span) -> list[Span]:
 def contains(spans: Iterable[Span], f: float) -> bool:
     """Whether a crank angle lies in one of the spans (decided in floating point: for displays and samples)."""
     return any((f - span.start) % math.tau <= span.stop - span.start for span in spans)
+
+
+def strictly_inside(spans: Iterable[Span], f: float) -> bool:
+    """Whether a crank angle (a double in [-2 pi, 4 pi]) certainly lies in one of the spans; never true by rounding."""
+    for span in spans:
+        if _is_full(span):
+            return True
+        for turn in (-2.0, -1.0, 0.0, 1.0, 2.0):
+            low, high = sorted((turn * TURN_LOW, turn * TURN_HIGH))
+            first = math.nextafter(f + low, -math.inf) if turn else f
+            last = math.nextafter(f + high, math.inf) if turn else f
+            if span.start < first and last < span.stop:
+                return True
+    return False
 
 
 def total_length(spans: Iterable[Span]) -> float:

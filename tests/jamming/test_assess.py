@@ -161,7 +161,7 @@ def test_inverse_answers_are_on_the_edge(condition, axis):
             assess_jamming(linkage, Bearing(17.5, 10.0, clearance / factor), condition, 5),
             assess_jamming(linkage, Bearing(17.5, height * factor, 0.03), condition, 5),
         ]
-        expected = Verdict.FREE_ESTIMATED if free else Verdict.JAMMED_ESTIMATED
+        expected = Verdict.CERTIFIED_FREE if free else Verdict.CERTIFIED_JAMMED
         assert [report.verdict for report in kinds] == [expected] * 3
 
 
@@ -198,13 +198,17 @@ def test_arcs_agree_with_the_gap(alpha, axis, R, H, c, condition, f):
 
 
 def test_verdicts_of_extreme_cases():
-    assert assess_jamming(LambdaLinkage(), Bearing()).verdict is Verdict.FREE_ESTIMATED
-    assert assess_jamming(LambdaLinkage(alpha=0.5, axis=(0, 0, 1)), Bearing()).verdict is Verdict.FREE_ESTIMATED
+    assert assess_jamming(LambdaLinkage(), Bearing(), certify=False).verdict is Verdict.FREE_ESTIMATED
+    assert assess_jamming(LambdaLinkage(), Bearing()).verdict is Verdict.CERTIFIED_FREE
+    assert assess_jamming(LambdaLinkage(alpha=0.5, axis=(0, 0, 1)), Bearing()).verdict is Verdict.CERTIFIED_FREE
     zero = assess_jamming(DECK, Bearing(17.5, 10, 0.0))
-    assert zero.verdict is Verdict.JAMMED_ESTIMATED
+    assert zero.verdict is Verdict.CERTIFIED_JAMMED
+    assert assess_jamming(DECK, Bearing(17.5, 10, 0.0), certify=False).verdict is Verdict.JAMMED_ESTIMATED
     assert zero.arcs.touching == pytest.approx((0.0, math.pi))
     assert sum(arc.length for arc in zero.arcs.arcs) == pytest.approx(math.tau, rel=1e-15)
-    assert assess_jamming(LambdaLinkage(), Bearing(17.5, 10, 0.0)).verdict is Verdict.TOUCHING_ESTIMATED
+    assert assess_jamming(LambdaLinkage(), Bearing(17.5, 10, 0.0)).verdict is Verdict.UNDECIDED
+    still = assess_jamming(LambdaLinkage(), Bearing(17.5, 10, 0.0), certify=False)
+    assert still.verdict is Verdict.TOUCHING_ESTIMATED
     press = assess_jamming(DECK, Bearing(17.5, 10, -0.01))
     assert press.verdict is Verdict.CANNOT_ASSEMBLE
     assert np.all(press.table.gap > 0)
@@ -219,7 +223,9 @@ def test_touching():
     sine = bearing.critical_tilt("A").sine
     linkage = LambdaLinkage(alpha=math.asin(2.5 * sine))
     report = assess_jamming(linkage, bearing)
-    assert report.verdict is Verdict.TOUCHING_ESTIMATED
+    assert report.verdict is Verdict.UNDECIDED
+    assert any("contains 0" in note for note in report.notes)
+    assert assess_jamming(linkage, bearing, certify=False).verdict is Verdict.TOUCHING_ESTIMATED
     assert report.arcs.touching == pytest.approx((math.pi / 2, 3 * math.pi / 2))
 
 
@@ -249,8 +255,16 @@ def test_report_is_plain_data():
     assert len(frame) == 19
     summary = report.summary()
     assert summary["condition"] == "A"
-    assert "not certified" in summary["method"]
-    assert "CERTIFIED" not in summary["verdict"]
+    assert summary["method"].startswith("certified") and summary["verdict"] == "CERTIFIED_JAMMED"
+    assert "floats came in" in summary["statement"] and not summary["certificate"]["exact_input"]
+    plain = assess_jamming(DECK, samples=19, certify=False).summary()
+    assert "not certified" in plain["method"]
+    assert plain["verdict"] == "JAMMED_ESTIMATED" and plain["certificate"] is None
+    table = report.to_pandas()
+    assert table["certainly_jams"].sum() == (table["gap"] > 0).sum() == 12
+    assert table["certainly_free"].sum() == (table["gap"] < 0).sum() == 7
+    with pytest.raises(GeometryError, match="neither"):
+        assess_jamming()
     with pytest.raises(GeometryError, match="samples"):
         assess_jamming(DECK, samples=1)
     with pytest.raises(GeometryError, match="condition"):
