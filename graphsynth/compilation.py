@@ -23,13 +23,15 @@ _IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+([
 _ROOT = Path(__file__).parent.parent
 
 
-def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+def kernel(function: Callable[..., Any] | None = None, *, signature: Any = None, **options: Any) -> Any:
     """Compile a function with numba on first use and keep the machine code on disk.
 
     Parameters
     ----------
     function : callable
         A function of a kernel module.  Division by zero gives infinity or NaN, as in C (``error_model="numpy"``).
+    signature : numba signature, optional
+        Compile at once for these types and for no others.
     **options
         Further options of ``numba.njit``, for example ``inline="always"``.
 
@@ -38,11 +40,14 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     numba dispatcher
     """
     if function is None:
-        return lambda target: kernel(target, **options)
+        return lambda target: kernel(target, signature=signature, **options)
     from numba import njit
 
     compiled = njit(cache=True, **{"error_model": "numpy", **options})(function)
     compiled._cache = _cache_class()(function, source_digest(Path(function.__code__.co_filename)))
+    if signature is not None:
+        compiled.compile(signature)
+        compiled.disable_compile()
     return compiled
 
 
@@ -112,17 +117,3 @@ def _imported(source: str, root: Path) -> list[Path]:
         candidates = [base.with_suffix(".py"), base / "__init__.py", *(base / f"{part}.py" for part in names)]
         paths += [path for path in candidates if path.is_file() and path != Path(__file__)]
     return paths
-
-
-def drop_stale_kernels(*places: Path) -> bool:
-    """Forget kernels compiled without `kernel` when a source has changed."""
-    sources = [source for place in places for source in ([place] if place.is_file() else sorted(place.glob("*.py")))]
-    digest = sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
-    stamp = places[0] / "__pycache__" / "kernels.sha256"
-    if not places[0].is_dir() or (stamp.is_file() and stamp.read_text() == digest):
-        return False
-    for index in stamp.parent.glob("*.nbi"):
-        index.unlink(missing_ok=True)
-    stamp.parent.mkdir(exist_ok=True)
-    stamp.write_text(digest)
-    return True

@@ -1,7 +1,6 @@
 """Interval operations on scalar bounds: four floats in, two out; empty is ``(inf, -inf)``."""
 
-from numba import njit
-
+from graphsynth.compilation import kernel
 from graphsynth.intervals.kernels.rounding import (
     DIVISOR_MIN,
     ETA,
@@ -24,7 +23,7 @@ from graphsynth.intervals.kernels.rounding import (
 )
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def add(al, ah, bl, bh):
     """Sum."""
     void = (al > ah) | (bl > bh)
@@ -32,7 +31,7 @@ def add(al, ah, bl, bh):
     return INF if void else lo, -INF if void else hi
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def subtract(al, ah, bl, bh):
     """Difference."""
     void = (al > ah) | (bl > bh)
@@ -40,7 +39,7 @@ def subtract(al, ah, bl, bh):
     return INF if void else lo, -INF if void else hi
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def multiply_plain(al, ah, bl, bh):
     """Product of intervals of ordinary size; the lower bound is NaN where `multiply_any` must be asked."""
     p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
@@ -64,7 +63,7 @@ def multiply_plain(al, ah, bl, bh):
     return lo if safe else NAN, hi
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def multiply_any(al, ah, bl, bh):
     """Product of any intervals."""
     p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
@@ -95,7 +94,7 @@ def multiply_any(al, ah, bl, bh):
     return INF if void else lo, -INF if void else hi
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def multiply(al, ah, bl, bh):
     """Product."""
     lo, hi = multiply_plain(al, ah, bl, bh)
@@ -104,7 +103,7 @@ def multiply(al, ah, bl, bh):
     return lo, hi
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def scale(a, bl, bh):
     """Float times interval."""
     l1, u1 = multiply_both(a, bl)
@@ -113,7 +112,7 @@ def scale(a, bl, bh):
     return INF if void else (l1 if l1 < l2 else l2), -INF if void else (u1 if u1 > u2 else u2)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def divide_nonzero(al, ah, bl, bh):
     """Quotient by a divisor without 0; without branches."""
     q1, q2, q3, q4 = al / bl, al / bh, ah / bl, ah / bh
@@ -148,7 +147,7 @@ def divide_nonzero(al, ah, bl, bh):
     return INF if void else lo, -INF if void else hi
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def divide_zero(al, ah, bl, bh):
     """Quotients by the nonzero part of a divisor that contains 0."""
     if al > ah or (bl == 0.0 and bh == 0.0):
@@ -166,7 +165,7 @@ def divide_zero(al, ah, bl, bh):
     return max(divide_both(ah, bl)[0], 0.0), INF
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def divide(al, ah, bl, bh):
     """Quotients by the nonzero part of the divisor."""
     if bl <= 0.0 <= bh:
@@ -174,7 +173,7 @@ def divide(al, ah, bl, bh):
     return divide_nonzero(al, ah, bl, bh)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def square(al, ah):
     """Square."""
     void = al > ah
@@ -186,7 +185,7 @@ def square(al, ah):
     return INF if void else lo, -INF if void else hi
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def root(al, ah):
     """Square roots of the part at or above 0."""
     if al > ah or ah < 0.0:
@@ -194,7 +193,7 @@ def root(al, ah):
     return root_down(al) if al > 0.0 else 0.0, root_up(ah)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def absolute(al, ah):
     """Absolute value."""
     if al > ah:
@@ -202,7 +201,7 @@ def absolute(al, ah):
     return al if al > 0.0 else (-ah if ah < 0.0 else 0.0), max(-al, ah)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def power_down(x, n):
     """Lower bound of ``x**n`` for ``x >= 0``, ``n >= 1``."""
     result, factor = 1.0, x
@@ -215,7 +214,7 @@ def power_down(x, n):
         factor = max(multiply_both(factor, factor)[0], 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def power_up(x, n):
     """Upper bound of ``x**n`` for ``x >= 0``, ``n >= 1``."""
     result, factor = 1.0, x
@@ -228,7 +227,7 @@ def power_up(x, n):
         factor = multiply_both(factor, factor)[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def power(al, ah, n):
     """Integer power; a negative exponent is the quotient of 1 by the positive one."""
     if al > ah:

@@ -7,12 +7,11 @@ building blocks of double-word arithmetic", ACM TOMS 44 (2017): sum 3 u^2 + 13 u
 
 from math import sqrt
 
-from numba import njit
-
+from graphsynth.compilation import kernel
 from graphsynth.intervals.kernels.rounding import ETA, PHI, add_down, add_up, fma
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def two_sum(a, b):
     """Sum and error (Knuth)."""
     s = a + b
@@ -20,21 +19,21 @@ def two_sum(a, b):
     return s, (a - (s - t)) + (b - t)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def quick_two_sum(a, b):
     """Sum and error for ``|a| >= |b|`` (Dekker)."""
     s = a + b
     return s, b - (s - a)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def add_double(ah, al, b):
     """Sum with a double (algorithm 4)."""
     s, e = two_sum(ah, b)
     return quick_two_sum(s, e + al)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def add(ah, al, bh, bl):
     """Sum, accurate also under cancellation (algorithm 6)."""
     sh, sl = two_sum(ah, bh)
@@ -43,14 +42,14 @@ def add(ah, al, bh, bl):
     return quick_two_sum(vh, tl + vl)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def multiply_double(ah, al, b):
     """Product with a double (algorithm 9)."""
     p = ah * b
     return quick_two_sum(p, fma(al, b, fma(ah, b, -p)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def multiply(ah, al, bh, bl):
     """Product (algorithm 12)."""
     p = ah * bh
@@ -58,7 +57,7 @@ def multiply(ah, al, bh, bl):
     return quick_two_sum(p, e + fma(al, bh, fma(ah, bl, al * bl)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def divide(ah, al, bh, bl):
     """Quotient (algorithm 17)."""
     q = ah / bh
@@ -67,7 +66,7 @@ def divide(ah, al, bh, bl):
     return quick_two_sum(q, d / bh)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def root(ah, al):
     """Square root of a positive number (Lefevre, Louvet, Muller, Picot, Rideau 2023: 25/8 u^2)."""
     s = sqrt(ah)
@@ -75,7 +74,7 @@ def root(ah, al):
     return quick_two_sum(s, (al + r) / (s + s))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def bounds(h, l, error):
     """Doubles on both sides of every number within ``error`` of ``h + l``."""
     d = l - error

@@ -4,8 +4,8 @@ from fractions import Fraction
 from math import factorial, frexp, ldexp
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import (
@@ -29,7 +29,7 @@ _EXP_EXACT, _LOG_EXACT = 10, 7
 RELATIVE = 2.0**-66
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def exp_at(x):
     """Bounds of the exponential; infinities allowed."""
     if x == 0.0:
@@ -62,7 +62,7 @@ def exp_at(x):
     return max(min(lo, MAX), 0.0), hi
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def log_at(x):
     """Bounds of the logarithm of ``x >= 0``; infinities allowed."""
     if x == 0.0:
@@ -91,7 +91,7 @@ def log_at(x):
     return dd.bounds(h, l, abs(h) * RELATIVE)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def exp(al, ah):
     """Range of the exponential."""
     if al > ah:
@@ -99,7 +99,7 @@ def exp(al, ah):
     return 0.0 if al == -INF else exp_at(al)[0], INF if ah == INF else exp_at(ah)[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def log(al, ah):
     """Range of the logarithm of the part above 0."""
     if al > ah or ah <= 0.0:
@@ -107,7 +107,7 @@ def log(al, ah):
     return log_at(max(al, 0.0))[0], log_at(ah)[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def hypot(al, ah, bl, bh):
     """Range of ``sqrt(x^2 + y^2)``."""
     if al > ah or bl > bh:
@@ -117,7 +117,7 @@ def hypot(al, ah, bl, bh):
     return _hypot_at(x1, y1)[0], _hypot_at(max(-al, ah), max(-bl, bh))[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _hypot_at(x, y):
     """Bounds for ``x, y >= 0``."""
     if x == 0.0 or y == 0.0:

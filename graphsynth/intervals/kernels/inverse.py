@@ -7,8 +7,8 @@ others are arctangents of double-double quotients.  Proofs: ``docs/explanation/i
 from fractions import Fraction
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import INF, divide_both, down, up
@@ -22,7 +22,7 @@ RELATIVE = 2.0**-68
 _SMALL = 2.0**-27
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def atan_unit(h, l):
     """Arctangent of ``0 <= h + l <= 1 + 1/32``."""
     k = min(int(h * 16.0 + 0.5), 16)
@@ -48,7 +48,7 @@ def atan_unit(h, l):
     return h, l
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def atan_at(x):
     """Bounds of the arctangent; infinities allowed."""
     size = abs(x)
@@ -64,7 +64,7 @@ def atan_at(x):
     return (lo, hi) if x > 0.0 else (-hi, -lo)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def atan(al, ah):
     """Range of the arctangent."""
     if al > ah:
@@ -72,7 +72,7 @@ def atan(al, ah):
     return atan_at(al)[0], atan_at(ah)[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def asin_at(x):
     """Bounds of the arcsine of ``|x| <= 1``."""
     size = abs(x)
@@ -96,7 +96,7 @@ def asin_at(x):
     return (lo, hi) if x > 0.0 else (-hi, -lo)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def acos_at(x):
     """Bounds of the arccosine of ``|x| <= 1``."""
     if x == 1.0:
@@ -114,7 +114,7 @@ def acos_at(x):
     return dd.bounds(h, l, h * RELATIVE)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def asin(al, ah):
     """Range of the arcsine of the part in [-1, 1]."""
     if al > ah or al > 1.0 or ah < -1.0:
@@ -122,7 +122,7 @@ def asin(al, ah):
     return asin_at(max(al, -1.0))[0], asin_at(min(ah, 1.0))[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def acos(al, ah):
     """Range of the arccosine of the part in [-1, 1]."""
     if al > ah or al > 1.0 or ah < -1.0:
@@ -130,7 +130,7 @@ def acos(al, ah):
     return max(acos_at(min(ah, 1.0))[0], 0.0), acos_at(max(al, -1.0))[1]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def angle_at(y, x):
     """Bounds of ``atan2(y, x)`` for ``y >= 0``, not both 0; one may be infinite."""
     if y == 0.0 or abs(x) == INF:
@@ -166,7 +166,7 @@ def angle_at(y, x):
     return dd.bounds(h, l, h * RELATIVE)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _angle_above(yl, yh, xl, xh):
     """Range for ``yl >= 0``, without the origin inside; the extremes lie at corners."""
     if yl == 0.0 and xl < 0.0 < xh:  # the origin on the border: all of [0, pi]
@@ -185,7 +185,7 @@ def _angle_above(yl, yh, xl, xh):
     return low, high
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def atan2(yl, yh, xl, xh):
     """Range of the angle of the points of a box; ``[-pi, pi]`` where the cut is crossed."""
     if yl > yh or xl > xh or (yl == 0.0 and yh == 0.0 and xl == 0.0 and xh == 0.0):

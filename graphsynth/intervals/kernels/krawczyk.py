@@ -13,6 +13,7 @@ continuous.  It is written with the scalar functions of this package (``arithmet
 import numpy as np
 from numba import boolean, float64, int8, int64, njit, types, void
 
+from graphsynth.compilation import kernel
 from graphsynth.intervals.kernels import arithmetic as ia
 
 EMPTY, UNIQUE, EXISTS, UNDECIDED = 0, 1, 2, 3
@@ -24,7 +25,7 @@ system = njit(SYSTEM, error_model="numpy")
 _TEST = void(types.FunctionType(SYSTEM), _MATRIX, _MATRIX, _VECTOR, _VECTOR, _MATRIX, _MATRIX, int8[::1])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def invert(a, y):
     """Inverse of ``a`` (destroyed) into ``y``; False if there is none."""
     n = a.shape[0]
@@ -61,7 +62,7 @@ def invert(a, y):
     return np.isfinite(y.sum())
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
     """Return the status from the image; the intersection replaces ``kl, kh``."""
     n = z.size
@@ -96,7 +97,7 @@ def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
     return EXISTS if within and norm < 1.0 - 1e-9 else UNDECIDED
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y):
     """Status of one box; ``kl, kh`` becomes the intersection with the image; the rest is workspace."""
     n = z.size
@@ -119,7 +120,7 @@ def _test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y):
     return found
 
 
-@njit(_TEST, cache=True, error_model="numpy")
+@kernel(signature=_TEST)
 def krawczyk_boxes(equations, lo, hi, pl, ph, out_lo, out_hi, status):
     """Test boxes (N, n) once with common parameters (m,): status and intersection with the image."""
     n = lo.shape[1]
@@ -134,7 +135,7 @@ _PAVE = int64[::1](
 )
 
 
-@njit(_PAVE, cache=True, error_model="numpy")
+@kernel(signature=_PAVE)
 def krawczyk_pave(equations, lo, hi, pl, ph, tolerance, max_boxes, kept_lo, kept_hi, status):
     """Branch and prune of one box (n,), depth first; returns kept boxes, tested boxes, and 1 if nothing was left out.
 

@@ -1,25 +1,24 @@
 """Loops of the interval operations over flat arrays; bounds in, bounds out."""
 
-from numba import njit
-
+from graphsynth.compilation import kernel
 from graphsynth.intervals.kernels import arithmetic
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def add(al, ah, bl, bh, lo, hi):
     """Add flat arrays."""
     for i in range(lo.size):
         lo[i], hi[i] = arithmetic.add(al[i], ah[i], bl[i], bh[i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def subtract(al, ah, bl, bh, lo, hi):
     """Differences of flat arrays."""
     for i in range(lo.size):
         lo[i], hi[i] = arithmetic.subtract(al[i], ah[i], bl[i], bh[i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def multiply(al, ah, bl, bh, lo, hi):
     """Products of flat arrays."""
     rare = 0
@@ -33,7 +32,7 @@ def multiply(al, ah, bl, bh, lo, hi):
                 lo[i], hi[i] = arithmetic.multiply_any(al[i], ah[i], bl[i], bh[i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def divide(al, ah, bl, bh, lo, hi):
     """Quotients of flat arrays."""
     for i in range(lo.size):
@@ -43,21 +42,21 @@ def divide(al, ah, bl, bh, lo, hi):
             lo[i], hi[i] = arithmetic.divide_zero(al[i], ah[i], bl[i], bh[i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def square(al, ah, lo, hi):
     """Squares of a flat array."""
     for i in range(lo.size):
         lo[i], hi[i] = arithmetic.square(al[i], ah[i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def root(al, ah, lo, hi):
     """Square roots of a flat array."""
     for i in range(lo.size):
         lo[i], hi[i] = arithmetic.root(al[i], ah[i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def power(al, ah, n, lo, hi):
     """Integer powers of a flat array."""
     for i in range(lo.size):

@@ -6,8 +6,10 @@ itself must not fuse anything: no ``fastmath`` anywhere, and a test compares wit
 
 from math import sqrt
 
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from graphsynth.compilation import kernel
 
 PHI = 2.0**-53 * (1.0 + 2.0**-52)
 ETA = 2.0**-1074
@@ -32,21 +34,21 @@ def fma(typing_context, a, b, c):
     return types.float64(types.float64, types.float64, types.float64), build
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def down(x, exact):
     """Move a nearest result down one step unless it is exact enough."""
     y = x if exact else x - (PHI * abs(x) + ETA)
     return MAX if x > MAX else y
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def up(x, exact):
     """Move a nearest result up one step unless it is exact enough."""
     y = x if exact else x + (PHI * abs(x) + ETA)
     return -MAX if x < -MAX else y
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def add_down(a, b):
     """Lower bound of a sum."""
     s = a + b
@@ -55,7 +57,7 @@ def add_down(a, b):
     return down(s, (e >= 0.0) & (e <= MAX))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def add_up(a, b):
     """Upper bound of a sum."""
     s = a + b
@@ -64,7 +66,7 @@ def add_up(a, b):
     return up(s, (e <= 0.0) & (e >= -MAX))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def multiply_both(a, b):
     """Lower and upper bound of a product, with ``0 * inf = 0``."""
     p = a * b
@@ -75,7 +77,7 @@ def multiply_both(a, b):
     return down(p, zero | (safe & (e >= 0.0))), up(p, zero | (safe & (e <= 0.0)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def divide_both(a, b):
     """Lower and upper bound of a quotient, ``b`` not 0, ``inf / inf = 0``."""
     q = a / b
@@ -88,7 +90,7 @@ def divide_both(a, b):
     return down(q, zero | (safe & (r >= 0.0))), up(q, zero | (safe & (r <= 0.0)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def root_down(a):
     """Lower bound of a root."""
     s = sqrt(a)
@@ -96,7 +98,7 @@ def root_down(a):
     return down(s, (a == 0.0) | ((a >= PRODUCT_MIN) & (a <= ROOT_MAX) & (r >= 0.0)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@kernel(forceinline=True)
 def root_up(a):
     """Upper bound of a root."""
     s = sqrt(a)

@@ -8,8 +8,8 @@ from fractions import Fraction
 from math import factorial, frexp
 
 import numpy as np
-from numba import njit
 
+from graphsynth.compilation import kernel
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import INF, down, up
@@ -26,7 +26,7 @@ _MASK = np.uint64(0xFFFFFFFF)
 _32 = np.uint64(32)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def reduce(x):
     """Return ``floor(x 2/pi) mod 4`` (-1 if not certain), the nearest integer mod 4, and the rest times pi/2."""
     if x == 0.0:
@@ -73,7 +73,7 @@ def reduce(x):
     return -1 if ones else floor, nearest, rh, rl
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sine_polynomial(h, l):
     """Sine of ``|h + l| <= 0.7854``."""
     sh, sl = dd.multiply(h, l, h, l)
@@ -89,7 +89,7 @@ def sine_polynomial(h, l):
     return dd.add(h, l, ph, pl)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def cosine_polynomial(h, l):
     """Cosine of ``|h + l| <= 0.7854``."""
     sh, sl = dd.multiply(h, l, h, l)
@@ -103,7 +103,7 @@ def cosine_polynomial(h, l):
     return ph, pl
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sine_at(x, turn):
     """Bounds of ``sin(x + turn pi/2)`` for finite x, and the quadrant of the argument (-1 if not certain)."""
     if abs(x) < 0.785:
@@ -126,14 +126,14 @@ def sine_at(x, turn):
     return max(lo, -1.0), min(hi, 1.0), floor
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _steps(first, last, width):
     """Quadrant borders crossed between two quadrants; the width tells none from four."""
     n = (last - first) & 3
     return 4 if n == 0 and width > 3.0 else n
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sine_turned(al, ah, turn):
     """Range of ``sin(x + turn pi/2)``."""
     if al > ah:
@@ -155,19 +155,19 @@ def sine_turned(al, ah, turn):
     return lo, hi
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sin(al, ah):
     """Range of the sine."""
     return sine_turned(al, ah, 0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def cos(al, ah):
     """Range of the cosine."""
     return sine_turned(al, ah, 1)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def tangent_at(x):
     """Bounds of the tangent of finite x, and the quadrant."""
     if abs(x) < _SMALL:  # x < tan x < x + x^3 / 2
@@ -190,7 +190,7 @@ def tangent_at(x):
     return lo, hi, floor
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def tan(al, ah):
     """Range of the tangent; the whole line across a pole."""
     if al > ah:
