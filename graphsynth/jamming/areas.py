@@ -19,8 +19,10 @@ __all__ = ["CrescentAreas", "ellipse_circle", "ellipse_circle_stable", "lid_area
 
 Array = NDArray[np.float64]
 
-# xms(x) = x - sin x = x^3/3! - x^5/5! + ...; the term of order 19 is below 1e-17 of the first for |x| < 0.5
-_XMS = [(-1) ** k / math.factorial(2 * k + 3) for k in range(8)]
+# xms(x) = x - sin x = x^3/3! - x^5/5! + ...; the first term left out is below 1e-17 of the first for |x| < 2.  Direct
+# subtraction below 2 loses up to four units in the last place.
+_XMS_LIMIT = 2.0
+_XMS = [(-1) ** k / math.factorial(2 * k + 3) for k in range(12)]
 
 
 class CrescentAreas(NamedTuple):
@@ -35,7 +37,7 @@ def _xms(x: Array) -> Array:
     series = np.zeros_like(x)
     for coefficient in reversed(_XMS):
         series = series * square + coefficient
-    return np.asarray(np.where(np.abs(x) < 0.5, series * square * x, x - np.sin(x)))
+    return np.asarray(np.where(np.abs(x) < _XMS_LIMIT, series * square * x, x - np.sin(x)))
 
 
 def _segment(s: Array) -> Array:
@@ -103,6 +105,9 @@ def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> Cresce
     tc, te = np.arctan2(x0, y0), np.arctan2(b * x0, a * y0)
     ell = 2.0 * (-ex * _segment(sc) + a * b * _segment_difference(dl, sc + se))
     cir = 2.0 * (ex * _segment(tc) + a * b * _segment_difference(dl, tc + te))
+    # far from a circle the angles differ so much that the plain difference of the segments loses less
+    ell = np.where(2.0 * sc < se, 2.0 * (a * b * _segment(se) - R1 * R1 * _segment(sc)), ell)
+    cir = np.where(2.0 * te < tc, 2.0 * (R1 * R1 * _segment(tc) - a * b * _segment(te)), cir)
     ell = np.where(crossing, ell, np.where(pa <= 0.0, 0.0, -math.pi * ex))
     cir = np.where(crossing, cir, np.where(pa <= 0.0, math.pi * ex, 0.0))
     return CrescentAreas(ell, cir)

@@ -5,16 +5,28 @@ from __future__ import annotations
 from graphsynth.jamming.circle_ellipse.boxes import CrossingBoxes, krawczyk_boxes
 from graphsynth.jamming.circle_ellipse.hull import CrossingHull, exact_hull, mirrored
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse, circle_ellipse, surrogate_problem
+from graphsynth.jamming.circle_ellipse.readings import (
+    Reading,
+    TiltedEllipse,
+    reading_areas,
+    reading_ellipse,
+    reading_problem,
+)
 from graphsynth.jamming.circle_ellipse.reasons import Reason
 
 __all__ = [
     "CircleEllipse",
     "CrossingBoxes",
     "CrossingHull",
+    "Reading",
     "Reason",
+    "TiltedEllipse",
     "circle_ellipse",
     "exact_hull",
     "krawczyk_boxes",
     "mirrored",
+    "reading_areas",
+    "reading_ellipse",
+    "reading_problem",
     "surrogate_problem",
 ]

@@ -15,7 +15,7 @@ from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Bearing
 from graphsynth.jamming.circle_ellipse.exact import Range, exact_range, root_bounds
 
-__all__ = ["CircleEllipse", "circle_ellipse", "surrogate_problem"]
+__all__ = ["CircleEllipse", "bearing_radii", "circle_ellipse", "surrogate_problem"]
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,18 @@ def circle_ellipse(R1: Any, a: Any, b: Any, e1: Any = 0, e2: Any = 0, *, eps: An
     return CircleEllipse(**ranges)
 
 
+def bearing_radii(bearing: Bearing) -> tuple[Fraction, Fraction, Fraction]:
+    """Return R, Rh and h as the decimals that they print as.
+
+    Examples
+    --------
+    >>> bearing_radii(Bearing())[1]
+    Fraction(1753, 100)
+    """
+    R, c, height = (Fraction(repr(v)) for v in (bearing.Rb, bearing.clearance, bearing.Hb))
+    return R, R + c, height / 2
+
+
 def surrogate_problem(
     bearing: Bearing, sine: Any, e1: Any = 0, e2: Any = 0, *, eps: Any = None, bits: int = 128
 ) -> CircleEllipse:
@@ -121,8 +133,7 @@ def surrogate_problem(
     low, high = (low, high) if low >= 0 else (max(Fraction(0), low, -high), max(-low, high))
     if high > 1:
         raise GeometryError(f"sine = {float(high)} of the tilt exceeds 1; give a value in [-1, 1]")
-    R, c, h = (Fraction(repr(v)) for v in (bearing.Rb, bearing.clearance, bearing.Hb / 2))
-    Rh = R + c
+    _, Rh, h = bearing_radii(bearing)
     short = Range(
         Rh * root_bounds(1 - high * high, bits).lo - h * high, Rh * root_bounds(1 - low * low, bits).hi - h * low
     )
@@ -131,4 +142,4 @@ def surrogate_problem(
             f"sine = {float(high)}: Rh cos t - h sin t is not positive, so the surrogate ellipse does not exist; "
             "use lid_area, which is defined at any tilt"
         )
-    return circle_ellipse(R, Rh, short, e1, e2, eps=eps)
+    return circle_ellipse(bearing_radii(bearing)[0], Rh, short, e1, e2, eps=eps)
