@@ -167,7 +167,10 @@ class Cam(_Pair):
         self._check(("at_a", "at_b"), ("angle_a",))
         name = f"of cam {self.a}-{self.b}"
         object.__setattr__(self, "radius", nonzero(f"radius {name}", self.radius))
-        pairs = tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(self.harmonics, 1))
+        try:
+            pairs = tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(self.harmonics, 1))
+        except TypeError as error:
+            raise GeometryError(f"harmonics {name} = {self.harmonics!r} are no list of pairs (c_k, s_k)") from error
         object.__setattr__(self, "harmonics", pairs)
         count = 64 * (len(pairs) + 1)
         least = min(self.pitch_radius(2.0 * math.pi * k / count)[0] for k in range(count))

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.constraints import jacobian, residual
+from graphsynth.mechanism.joints import Cam, Gear
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
@@ -122,10 +123,14 @@ def mobility_report(mechanism: Mechanism, pose: ArrayLike | None = None) -> Mobi
     given = mechanism.pose if pose is None else pose
     if given is None:
         raise GeometryError("the rank belongs to a pose, and this mechanism has none; give an assembled pose")
-    pose_array = np.asarray(given, dtype=np.float64)
+    try:
+        pose_array = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"pose = {given!r} is no array of numbers; give (x, y, theta) of every link") from error
     links = mechanism.graph.links
     if pose_array.shape != (links, 3) or not np.isfinite(pose_array).all():
         raise GeometryError(f"pose must hold finite (x, y, theta) for {links} links; its shape is {pose_array.shape}")
+    _check_centres(mechanism, pose_array)
     Lc = characteristic_length(mechanism)
     violation = float(np.abs(residual(mechanism.joints, pose_array)).max(initial=0.0))
     if violation > _ASSEMBLED * Lc:
@@ -134,6 +139,21 @@ def mobility_report(mechanism: Mechanism, pose: ArrayLike | None = None) -> Mobi
             "give an assembled pose"
         )
     return _report(mechanism, pose_array, Lc, violation)
+
+
+def _check_centres(mechanism: Mechanism, pose: Array) -> None:
+    """Refuse gears and cams without a line of centres."""
+    for joint in mechanism.joints:
+        if not isinstance(joint, Gear | Cam):
+            continue
+        P, Q = (
+            complex(*pose[link, :2]) + np.exp(1j * pose[link, 2]) * complex(*at)
+            for link, at in ((joint.a, joint.at_a), (joint.b, joint.at_b))
+        )
+        if P == Q:
+            raise GeometryError(
+                f"the centres of {joint.kind} {joint.a}-{joint.b} coincide at this pose; they have no line of centres"
+            )
 
 
 def _report(mechanism: Mechanism, pose: Array, Lc: float, violation: float) -> MobilityReport:

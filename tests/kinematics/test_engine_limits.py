@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics import simulate
-from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+from graphsynth.kinematics import simulate, simulate_batch
+from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear, Table
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -201,3 +202,73 @@ def test_points_that_are_none_are_refused(local: object) -> None:
     motion = simulate(four_bar(1.0, 3.0, 3.5, 4.0), TURN[:2])
     with pytest.raises(GeometryError):
         motion.point(1, local)  # type: ignore[arg-type]
+
+
+# --- gears and cams
+
+
+def test_gears_without_a_line_of_centres_are_not_moved() -> None:
+    graph = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)
+    mechanism = Mechanism(graph, [Revolute(0, 1), Revolute(0, 2), Gear(1, 2)], [Driver(0, 1)])
+    motion = simulate(mechanism, TURN)
+    assert not motion.assembled.any() and "coincide" in motion.reason
+    with pytest.raises(GeometryError, match="line of centres"):
+        mechanism.mobility(np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("radii", [(-1.0, 2.0), (0.0, 2.0), (1.0, 0.0)])
+def test_batch_refuses_radii_that_a_gear_refuses(radii: tuple[float, float]) -> None:
+    graph = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)
+    joints = [Revolute(0, 1), Revolute(0, 2, (3.0, 0.0)), Gear(1, 2, radius_a=1.0, radius_b=2.0)]
+    mechanism = Mechanism(graph, joints, [Driver(0, 1)])
+    sets = np.repeat(mechanism.dimensions[None], 2, axis=0)
+    sets[1, 2, 6:8] = radii
+    with pytest.raises(GeometryError, match="set 1"):
+        simulate_batch(mechanism, TURN, sets)
+
+
+@pytest.mark.parametrize("keep", ["a", [9], [-1], [0.5]])
+def test_batch_refuses_links_that_do_not_exist(keep: object) -> None:
+    mechanism = four_bar(1.0, 3.0, 3.5, 4.0)
+    with pytest.raises(GeometryError, match="keep"):
+        simulate_batch(mechanism, TURN, mechanism.dimensions[None], keep=keep)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("harmonics", [5, "ab", ((1.0,),), (0.1,), (None,)])
+def test_harmonics_that_are_none_are_refused(harmonics: object) -> None:
+    with pytest.raises(GeometryError, match="harmonic"):
+        Cam(0, 1, harmonics=harmonics)  # type: ignore[arg-type]
+
+
+def test_pose_that_is_none_is_refused() -> None:
+    with pytest.raises(GeometryError, match="pose"):
+        four_bar(1.0, 3.0, 3.5, 4.0).mobility("x")  # type: ignore[arg-type]
+
+
+def test_a_limit_at_the_input_zero_is_told_as_zero() -> None:
+    graph = MechanismGraph(3, [(0, 1), (1, 2, 2), (0, 2)], frame=0)
+    mechanism = Mechanism(graph, [Prismatic(0, 1), PinSlot(2, 1), Revolute(0, 2)], [Driver(0, 1)])
+    motion = simulate(mechanism, np.linspace(-2.0, 2.0, 41))
+    assert abs(motion.stopped_at) < 1e-15 and motion.events[-1].kind == "change point"
+
+
+def test_a_search_that_found_nothing_does_not_claim_impossibility() -> None:
+    """A five-bar too short to close, driven at its middle joint: a group that is solved by search."""
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), Revolute(3, 4, (3.0, 0.0), (1.0, 0.0)),
+        Revolute(0, 4, (2.5, 0.0)),
+    ]  # fmt: skip
+    motion = simulate(Mechanism(FIVE, joints, [Driver(0, 1), Driver(2, 3, Linear(0.0, 0.5))]), [0.0])
+    assert not motion.assembled.any()
+    assert motion.steps[-1].code == codes.NEWTON
+    assert "no pose" in motion.reason
+
+
+@pytest.mark.parametrize(("bar", "words"), [(1.0, "move by itself"), (9.0, "cannot be assembled")])
+def test_parallelogram_with_three_bars(bar: float, words: str) -> None:
+    """By count a structure: with three equal bars it moves by itself, with a longer third bar it does not close."""
+    graph = MechanismGraph(5, [(0, 1), (0, 3), (0, 4), (1, 2), (2, 3), (2, 4)], frame=0)
+    bars = [Revolute(0, k, (x, 0.0)) for k, x in ((1, 0.0), (3, 2.0), (4, 1.0))]
+    tops = [Revolute(2, k, (x, 0.0), (0.0, bar if k == 4 else 1.0)) for k, x in ((1, 0.0), (3, 2.0), (4, 1.0))]
+    motion = simulate(Mechanism(graph, bars + tops), [0.0])
+    assert not motion.assembled.any() and words in motion.reason

@@ -16,6 +16,8 @@ from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, 
 from graphsynth.kinematics.engine.inputs import monotonic
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, sign_table
+from graphsynth.mechanism.checks import link_number
+from graphsynth.mechanism.joints import COLUMNS, Gear
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
@@ -140,7 +142,8 @@ def simulate_batch(
     Raises
     ------
     GeometryError
-        Shapes that do not fit, numbers that are not finite, modes that do not exist.
+        Shapes that do not fit, numbers that are not finite, lengths and radii that no mechanism can have, modes that
+        do not exist.
 
     Examples
     --------
@@ -161,6 +164,7 @@ def simulate_batch(
         raise GeometryError(
             f"dimensions have shape {sizes.shape}; give (sets, {', '.join(map(str, mechanism.dimensions.shape))})"
         )
+    _check_gears(mechanism, sizes)
     program = compile_program(mechanism, sizes)
     signs = sign_table(program, modes or {})
     poses, found = _starts(program, signs, float(u[0]), modes or {}, start)
@@ -168,11 +172,28 @@ def simulate_batch(
 
 
 def _kept(mechanism: Mechanism, keep: Sequence[int] | None) -> list[int]:
-    links = list(range(mechanism.graph.links)) if keep is None else list(keep)
+    links = range(mechanism.graph.links) if keep is None else [link_number("link in keep", link) for link in keep]
     for link in links:
-        if not 0 <= link < mechanism.graph.links:
+        if link >= mechanism.graph.links:
             raise GeometryError(f"keep names link {link}, but the links are 0..{mechanism.graph.links - 1}")
-    return links
+    return list(links)
+
+
+def _check_gears(mechanism: Mechanism, sizes: Array) -> None:
+    """Radii of gears are positive, of internal pairs different: what a single mechanism checks when it is made."""
+    for k, joint in enumerate(mechanism.joints):
+        if not isinstance(joint, Gear):
+            continue
+        radii = sizes[:, k][:, [COLUMNS.index("radius_a"), COLUMNS.index("radius_b")]]
+        bad = np.flatnonzero(~(radii > 0.0).all(axis=1) | (joint.internal & (radii[:, 0] == radii[:, 1])))
+        if bad.size:
+            a, b = radii[bad[0]].tolist()
+            raise GeometryError(
+                f"set {bad[0]} has the radii {a:.6g} and {b:.6g} at gear {joint.a}-{joint.b}; give positive radii"
+                + (" that differ" if joint.internal else "")
+            )
+        if (sizes[:, k, COLUMNS.index("sign")] != (-1.0 if joint.internal else 1.0)).any():
+            raise GeometryError(f"gear {joint.a}-{joint.b} is of another sign in a set; use a mechanism of its own")
 
 
 def _starts(

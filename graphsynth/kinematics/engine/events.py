@@ -42,6 +42,10 @@ def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
     if trace.done == 0:
         name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
         text = f"{name} cannot be assembled at the first input"
+        if step.code == codes.NEWTON:  # its modes are searched for, and some may be missed
+            text = f"no pose of {name} was found at the first input; if there is one, give a start pose close to it"
+        if stop.code == codes.SINGULAR:
+            text = f"{name} is not held at the first input: its special dimensions let it move by itself"
         if trace.M[0, stop.step] == _COINCIDE:
             text = f"two points of {name} coincide at the first input, so that its place is not determined there"
         return MotionEvent("not assembled", stop.at, step.group, step.links, 0, 0.0, True, text)
@@ -86,10 +90,7 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     assert trace.stop is not None
     source, at, good = trace, trace.done - 1, float(trace.u[trace.done - 1])
     unreachable, step_index, other = bad, trace.stop.step, None
-    while True:
-        middle = 0.5 * (good + bad)
-        if middle in (good, bad):
-            break
+    while (middle := _middle(trace, good, bad)) is not None:
         pair, stop = tracker.reach(source, at, middle)
         if stop is None:
             good = middle
@@ -123,18 +124,23 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     return MotionEvent("singular", good, step.group, step.links, 0, abs(bad - good), True, text)
 
 
+def _middle(trace: Trace, good: float, bad: float) -> float | None:
+    """Input between two others; None where no double lies between, or none that matters (beside the input 0)."""
+    middle = 0.5 * (good + bad)
+    last = abs(bad - good) <= 1e-18 * abs(float(trace.u[-1] - trace.u[0]))
+    return None if last or middle in (good, bad) else middle
+
+
 def _closed_limit(tracker: Tracker, source: Trace, at: int, step: int, bad: float) -> tuple[float, float]:
     """Bisect for the limit of one closed form alone."""
     good = float(source.u[at])
-    while True:
-        middle = 0.5 * (good + bad)
-        if middle in (good, bad):
-            return good, bad
+    while (middle := _middle(source, good, bad)) is not None:
         _, code, where = tracker.near(source, at, middle)
         if code == codes.UNREACHABLE and where == step:
             bad = middle
         else:
             good = middle
+    return good, bad
 
 
 def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:

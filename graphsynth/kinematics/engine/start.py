@@ -65,6 +65,8 @@ def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array 
         if done == 0 and where < k:
             return poses, code, where
         found = group_modes(tracker, trace, k)
+        if found is None:
+            return poses, codes.SINGULAR, k
         rank = modes.get(step.group, 0)
         if not len(found):
             return poses, codes.UNREACHABLE, k
@@ -76,11 +78,12 @@ def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array 
     return poses, codes.DONE, -1
 
 
-def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
+def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array | None:
     """All assembly modes found of the group of step ``k``, core poses (modes, core links, 3), sorted by angle.
 
     One kept link held by three distances: the explicit sextic; by distances, lines and directions: the eliminant of
-    :mod:`.triads`; all modes in both cases.  Otherwise Newton from many starts (modes may be missing).
+    :mod:`.triads`; all modes in both cases.  Otherwise Newton from many starts (modes may be missing).  None if the
+    group has a continuum of poses: special dimensions let it move by itself.
     """
     program = tracker.program
     row0, count = program.step_table[k, 1:3]
@@ -94,7 +97,7 @@ def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     return _searched_modes(tracker, trace, k)
 
 
-def _platform_modes(program: Program, trace: Trace, k: int) -> Array:
+def _platform_modes(program: Program, trace: Trace, k: int) -> Array | None:
     from graphsynth.kinematics.assembly_modes import assembly_modes
 
     own = program.steps[k].core[0]
@@ -108,7 +111,8 @@ def _platform_modes(program: Program, trace: Trace, k: int) -> Array:
         anchors.append(complex(x, y) + complex(c, s) * far)
         vertices.append(near)
         lengths.append(program.row_table[0, r, codes.H])
-    return np.asarray(assembly_modes(anchors, vertices, lengths).poses)[:, None, :]
+    found = assembly_modes(anchors, vertices, lengths)
+    return None if found.self_motion else np.asarray(found.poses)[:, None, :]
 
 
 def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:

@@ -140,10 +140,13 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
         other = b if own == a else a
         if own == a:
             ox, oy = world(x, b, rp[k, PBX], rp[k, PBY])
-            raw = math.atan2(oy - ay, ox - ax)
+            dx, dy = ox - ax, oy - ay
         else:
             ox, oy = world(x, a, rp[k, PAX], rp[k, PAY])
-            raw = math.atan2(ay - oy, ax - ox)
+            dx, dy = ax - ox, ay - oy
+        if dx == 0.0 and dy == 0.0:  # no line of centres
+            return -5e-324
+        raw = math.atan2(dy, dx)
         slot = int(rp[k, SLOT])
         here = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
         ra, rb = rp[k, RA], rp[k, SIGN] * rp[k, RB]
