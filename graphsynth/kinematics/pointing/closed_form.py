@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.kinematics._checks import finite_array, sign
 from graphsynth.kinematics.pointing.legs import scale_of, solution_order
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["crank_arrays", "poses"]
 
+Array = NDArray[np.float64]
+
 #: Codes of the kernel in terms of the legs, for each gimbal order.
 _CODES = {
     "YX": (0, PoseStatus.FOLD_X, PoseStatus.FOLD_Y, PoseStatus.LEG_X_OUT_OF_REACH, PoseStatus.LEG_Y_OUT_OF_REACH, 5),
@@ -23,7 +25,7 @@ _CODES = {
 }
 
 
-def crank_arrays(phi_x: ArrayLike, phi_y: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+def crank_arrays(phi_x: ArrayLike, phi_y: ArrayLike) -> tuple[Array, Array]:
     """Check two crank angles and broadcast them against each other."""
     x, y = np.broadcast_arrays(finite_array("phi_x", phi_x), finite_array("phi_y", phi_y))
     return x, y
@@ -53,5 +55,17 @@ def poses(mechanism: PointingMechanism, phi_x: ArrayLike, phi_y: ArrayLike, s_y:
         a, b, margin_y, margin_x = v, u, margin2, margin1
     else:
         a, b, margin_y, margin_x = u, v, margin1, margin2
-    shaped = [np.reshape(part, x.shape) for part in (a, b, status, deficit * scale, margin_y, margin_x)]
-    return Poses(x, y, *shaped, int(s_y), int(s_x), mechanism.order)
+    shape = x.shape
+    return Poses(
+        phi_x=x,
+        phi_y=y,
+        a=a.reshape(shape),
+        b=b.reshape(shape),
+        status=status.reshape(shape),
+        deficit=(deficit * scale).reshape(shape),
+        margin_y=margin_y.reshape(shape),
+        margin_x=margin_x.reshape(shape),
+        s_y=int(s_y),
+        s_x=int(s_x),
+        order=mechanism.order,
+    )

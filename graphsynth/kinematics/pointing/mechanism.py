@@ -10,6 +10,15 @@ from numpy.typing import ArrayLike
 from graphsynth.kinematics._checks import choice, positive
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from graphsynth.kinematics.pointing.charts import ChartReport
+    from graphsynth.kinematics.pointing.cranks import CrankAngles
+    from graphsynth.kinematics.pointing.modes import AssemblyModes
+    from graphsynth.kinematics.pointing.newton import LoopSolution, RootSurvey
+    from graphsynth.kinematics.pointing.passive import PassiveAngles
+    from graphsynth.kinematics.pointing.rates import Rates
     from graphsynth.kinematics.pointing.results import Poses
     from graphsynth.structure.graph import MechanismGraph
 
@@ -107,3 +116,123 @@ class PointingMechanism:
         from graphsynth.kinematics.pointing.closed_form import poses
 
         return poses(self, phi_x, phi_y, s_y, s_x)
+
+    def solve(self, phi_x: ArrayLike, phi_y: ArrayLike) -> AssemblyModes:
+        """All assembly modes at the given crank angles: up to four, none twice.
+
+        Examples
+        --------
+        >>> PointingMechanism().solve(0.2, 0.3).count
+        array(4)
+        """
+        from graphsynth.kinematics.pointing.modes import solve
+
+        return solve(self, phi_x, phi_y)
+
+    def cranks(self, a: ArrayLike, b: ArrayLike, elbow_y: int | None = None, elbow_x: int | None = None) -> CrankAngles:
+        """Crank angles that point the reflector (closed form, each leg by itself).
+
+        Parameters
+        ----------
+        a, b : array_like
+            Wanted elevation and azimuth, radians.
+        elbow_y, elbow_x : {+1, -1}, optional
+            Which of the two settings of each crank; by default those of the rest pose (-1 and +1).
+
+        Returns
+        -------
+        CrankAngles
+            With the assembly mode on which `poses` returns to the wanted pose.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> found = PointingMechanism().cranks(np.radians(10), np.radians(-5))
+        >>> np.degrees([found.phi_x, found.phi_y]).round(6).tolist()
+        [17.001794, -8.466231]
+        """
+        from graphsynth.kinematics.pointing.cranks import cranks
+
+        return cranks(self, a, b, elbow_y, elbow_x)
+
+    def passive_angles(self, poses: Poses) -> PassiveAngles:
+        """Angles of all passive joints at known poses: the twelve unknowns of the loop equations (section 2.5)."""
+        from graphsynth.kinematics.pointing.passive import passive_angles
+
+        return passive_angles(self, poses)
+
+    def solve_loops(
+        self, phi_x: ArrayLike, phi_y: ArrayLike, *, start: ArrayLike | None = None, chart: str = "corrected"
+    ) -> LoopSolution:
+        """Solve the twelve loop equations by Newton's method, without the closed form (section 2.3).
+
+        Parameters
+        ----------
+        phi_x, phi_y : array_like
+            Crank angles, radians.
+        start : array_like, shape (..., 12), optional
+            Unknowns to start from; by default the rest pose, followed to the given angles in small steps.
+        chart : {"corrected", "printed"}
+            "printed" turns the ball joint of leg Y about y, x, y as the source does, which is singular at rest.
+
+        Returns
+        -------
+        LoopSolution
+            Roots whose orientations do not agree are rejected.
+        """
+        from graphsynth.kinematics.pointing.newton import solve_loops
+
+        return solve_loops(self, phi_x, phi_y, start, chart)
+
+    def survey_roots(
+        self, phi_x: float, phi_y: float, *, starts: int = 200, seed: int = 0, chart: str = "corrected"
+    ) -> RootSurvey:
+        """Newton's method from random starts: genuine roots by assembly mode, false orientation roots counted."""
+        from graphsynth.kinematics.pointing.newton import survey_roots
+
+        return survey_roots(self, phi_x, phi_y, starts, seed, chart)
+
+    def check_chart(
+        self, phi_x: float, phi_y: float, chart: str = "corrected", *, s_y: int = 1, s_x: int = -1, scaled: bool = True
+    ) -> ChartReport:
+        """Judge the coordinates of the loop equations at a pose: rank, condition, verdict (section 2.4).
+
+        Examples
+        --------
+        >>> report = PointingMechanism().check_chart(0.0, 0.0, "printed")
+        >>> report.rank, report.verdict, report.use
+        (11, 'coordinates singular, mechanism regular', 'corrected')
+        """
+        from graphsynth.kinematics.pointing.charts import check_chart
+
+        return check_chart(self, phi_x, phi_y, chart, s_y, s_x, scaled)
+
+    def rates(
+        self,
+        phi_x: ArrayLike,
+        phi_y: ArrayLike,
+        dphi_x: ArrayLike = 0.0,
+        dphi_y: ArrayLike = 0.0,
+        ddphi_x: ArrayLike = 0.0,
+        ddphi_y: ArrayLike = 0.0,
+        *,
+        s_y: int = 1,
+        s_x: int = -1,
+    ) -> Rates:
+        """Velocity Jacobian, velocities and accelerations (section 2.6); crank rates in rad/s, rad/s^2.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> PointingMechanism().rates(np.radians(15), np.radians(15)).jacobian.round(9).tolist()
+        [[0.583946582, 0.01261739], [0.0, 0.579026781]]
+        """
+        from graphsynth.kinematics.pointing.rates import rates
+
+        return rates(self, phi_x, phi_y, (dphi_x, dphi_y), (ddphi_x, ddphi_y), s_y, s_x)
+
+    def passive_rates(self, poses: Poses, dphi_x: ArrayLike, dphi_y: ArrayLike) -> NDArray[np.float64]:
+        """Rates of the twelve unknowns for crank speeds, shape (..., 12), from the 12 x 12 Jacobian."""
+        from graphsynth.kinematics.pointing.rates import passive_rates
+
+        return passive_rates(self, poses, dphi_x, dphi_y)

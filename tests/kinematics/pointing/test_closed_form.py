@@ -129,7 +129,7 @@ def test_out_of_reach_is_named_and_never_clipped():
     assert PoseStatus(int(beyond.status)) is PoseStatus.LEG_Y_OUT_OF_REACH
     assert np.isnan(beyond.a) and np.isnan(beyond.b)
     assert "leg Y" in beyond.reasons()[0]
-    l1, l2, l3, l4, l5 = (mp.mpf(x) for x in PARALLELOGRAM)
+    l1, l2, l3 = (mp.mpf(x) for x in PARALLELOGRAM[:3])
     phi = mp.radians(70)
     sy, sz = l1 - l3 + l3 * mp.cos(phi), -l2 + l3 * mp.sin(phi)
     deficit = abs((l1**2 + sy**2 + sz**2 - l2**2) / (2 * l1)) - mp.hypot(sy, sz * mp.cos(phi))
