@@ -1,0 +1,133 @@
+"""Monte-Carlo samples and a search over corners, beside the certified bound (specification, section 10.4).
+
+Samples prove nothing about freedom.  They are here to show how far the certified bound is from what is seen: a sample
+above the bound would be a bug, a large gap would mean overestimation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import product
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.jamming.bearing import Condition
+from graphsynth.jamming.certify import certify_jamming
+from graphsynth.jamming.parameters import ToleranceBox
+
+__all__ = ["Samples", "sample_gaps"]
+
+Array = NDArray[np.float64]
+_BATCH = 100_000
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What was sampled, beside what is proved.
+
+    Attributes
+    ----------
+    count : int
+        Parameter vectors with a crank angle, uniform in the box and over the turn.
+    largest_gap : float
+        Largest gap seen, mm (estimated).
+    jamming_fraction : float
+        Part of the samples with a positive gap.
+    corner_gap : float
+        Largest gap over all corners of the box at the worst angle, mm (estimated).
+    corners : int
+        Corners tried.
+    bound : float
+        Certified upper bound of the gap, mm.
+    outside : int
+        Samples above the bound; anything but 0 is a bug.
+    seconds : float
+        Run time.
+    """
+
+    count: int
+    largest_gap: float
+    jamming_fraction: float
+    corner_gap: float
+    corners: int
+    bound: float
+    outside: int
+    seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def overestimation(self) -> float:
+        """Certified bound minus the largest gap seen, at the corners or in the samples, mm."""
+        return self.bound - max(self.largest_gap, self.corner_gap)
+
+
+def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_000, seed: int = 0) -> Samples:
+    """Draw parameter vectors and crank angles, search the corners, and compare with the certified bound.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        The tolerance box; uniform and independent in every range.
+    condition : {"A", "B", "general"}
+        Contact condition.
+    count : int
+        Number of samples.
+    seed : int
+        Seed of the generator.
+
+    Examples
+    --------
+    >>> box = ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003")
+    >>> seen = sample_gaps(box, count=2000)
+    >>> seen.outside, seen.jamming_fraction, 0 <= seen.overestimation < 1e-15
+    (0, 0.0, True)
+    """
+    begin = perf_counter()
+    bound = certify_jamming(box, condition).largest_gap.hi
+    generator = np.random.default_rng(seed)
+    best, jams, outside = -math.inf, 0, 0
+    for start in range(0, count, _BATCH):
+        size = min(_BATCH, count - start)
+        values = {name: _uniform(generator, box, name, size) for name in box.ranges}
+        gap = _gaps(box, condition, values, np.sin(generator.uniform(0.0, math.tau, size)))
+        best = max(best, float(gap.max()))
+        jams += int((gap > 0.0).sum())
+        outside += int((gap > bound).sum())
+    corner, tried = _corners(box, condition)
+    return Samples(count, best, jams / count, corner, tried, bound, outside, perf_counter() - begin)
+
+
+def _uniform(generator: np.random.Generator, box: ToleranceBox, name: str, size: int) -> Array:
+    (_, low), (high, _) = box[name].ends
+    return np.full(size, low) if low >= high else generator.uniform(low, high, size)
+
+
+def _gaps(box: ToleranceBox, condition: str, v: dict[str, Array], wave: Array) -> Array:
+    """Gap function in doubles for parameter vectors and ``sin(f - psi1)``, stable form."""
+    flat = v["n1"] ** 2 + v["n2"] ** 2
+    deficit = 2.0 * np.sin(0.5 * v["alpha"]) ** 2 * flat / (flat + v["n3"] ** 2)
+    ratio = v["l2"] / v["l3"] * np.sqrt(deficit * (2.0 - deficit)) * np.abs(wave)
+    S = np.minimum(ratio, 1.0) if box.rod == "rigid" else ratio / np.hypot(1.0, ratio)
+    C = np.sqrt((1.0 - S) * (1.0 + S))
+    R, h, c = v["Rb"], 0.5 * v["Hb"], v["clearance"]
+    if condition == "B":
+        return np.asarray(h * S - c + (R + c) * S * S / (1.0 + C))
+    saturated = (h * h - c * (2.0 * R + c)) / (np.hypot(R, h) + R + c)
+    a = np.where(h * C >= R * S, h * S - c - R * S * S / (1.0 + C), saturated)
+    if condition == "A":
+        return np.asarray(a)
+    with np.errstate(divide="ignore"):
+        return np.minimum(a, (0.5 * v["hole_length"] * S - c + (R + c) * S * S / (1.0 + C)) / C)
+
+
+def _corners(box: ToleranceBox, condition: str) -> tuple[float, int]:
+    """Largest gap over the corners of the ranges that have a width, at the worst angle."""
+    wide = [name for name in box.ranges if not box[name].is_point]
+    signs = np.array(list(product((0, 1), repeat=len(wide)))).reshape(-1, len(wide))
+    values = {name: np.full(len(signs), box[name].middle) for name in box.ranges}
+    for column, name in enumerate(wide):
+        ends = np.array([float(box[name].lower), float(box[name].upper)])
+        values[name] = ends[signs[:, column]]
+    return float(_gaps(box, condition, values, np.ones(len(signs))).max()), len(signs)
