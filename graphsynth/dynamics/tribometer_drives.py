@@ -1,0 +1,177 @@
+"""Drives of the lower platform of a tribometer: crank and rod, pure cosine, belt."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.friction import finite, positive
+from graphsynth.errors import GeometryError
+
+__all__ = ["BeltDrive", "CrankDrive", "Drive", "DriveMotion", "HarmonicDrive"]
+
+Array = NDArray[np.float64]
+
+
+class DriveMotion(NamedTuple):
+    """Displacement (m), velocity (m/s), acceleration (m/s^2) and jerk (m/s^3) of the lower platform."""
+
+    x: Array
+    v: Array
+    a: Array
+    j: Array
+
+
+class Drive:
+    """Base of the drives: ``motion(t)`` and ``period`` (infinite for a belt)."""
+
+    speed: float
+
+    @property
+    def period(self) -> float:
+        """Time of one turn of the crank, s."""
+        return math.tau / abs(self.speed)
+
+    def motion(self, t: ArrayLike) -> DriveMotion:
+        """Motion of the lower platform at the times ``t``."""
+        raise NotImplementedError
+
+    def _packed(self) -> tuple[float, float, float, float]:
+        """Return kind, radius, rod, speed: entries 10 to 13 of the kernels' data."""
+        raise NotImplementedError
+
+
+def _turning(speed: float) -> float:
+    number = finite("crank speed", speed)
+    if number == 0.0:
+        raise GeometryError("The crank speed is 0; the drive has to turn, give a speed in rad/s other than zero.")
+    return number
+
+
+@dataclass(frozen=True)
+class BeltDrive(Drive):
+    """Lower platform that moves with the constant velocity ``speed``, m/s.
+
+    Examples
+    --------
+    >>> float(BeltDrive(0.02).motion(3.0).x)
+    0.06
+    """
+
+    speed: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "speed", finite("belt speed", self.speed))
+
+    @property
+    def period(self) -> float:
+        """Infinite: a belt does not repeat."""
+        return math.inf
+
+    def motion(self, t: ArrayLike) -> DriveMotion:
+        """Motion of the lower platform at the times ``t``; exact."""
+        t = np.asarray(t, float)
+        zero = np.zeros_like(t)
+        return DriveMotion(self.speed * t, zero + self.speed, zero, zero)
+
+    def _packed(self) -> tuple[float, float, float, float]:
+        return 0.0, 1.0, 2.0, self.speed
+
+
+@dataclass(frozen=True)
+class HarmonicDrive(Drive):
+    """Lower platform at ``radius cos(speed t)``: the sine of the source's block diagram.
+
+    Parameters
+    ----------
+    radius : float
+        Amplitude, m.
+    speed : float
+        Angular speed, rad/s.
+
+    Raises
+    ------
+    SpecError, GeometryError
+        If the radius is not positive or the speed is zero.
+
+    Examples
+    --------
+    >>> float(HarmonicDrive(0.03, 2.0).motion(0.0).a)
+    -0.12
+    """
+
+    radius: float
+    speed: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", positive("radius", self.radius))
+        object.__setattr__(self, "speed", _turning(self.speed))
+
+    def motion(self, t: ArrayLike) -> DriveMotion:
+        """Motion of the lower platform at the times ``t``; exact but for rounding."""
+        w = self.speed
+        theta = w * np.asarray(t, float)
+        C, S = self.radius * np.cos(theta), self.radius * np.sin(theta)
+        return DriveMotion(C, -w * S, -w * w * C, w**3 * S)
+
+    def _packed(self) -> tuple[float, float, float, float]:
+        return 1.0, self.radius, 2.0 * self.radius, self.speed
+
+
+@dataclass(frozen=True)
+class CrankDrive(Drive):
+    """Lower platform driven by a crank and a connecting rod, ``x1 = r cos(wt) + sqrt(l^2 - r^2 sin^2(wt)) - l``.
+
+    Parameters
+    ----------
+    radius, rod : float
+        Crank radius and length of the connecting rod, m; the rod must be longer.
+    speed : float
+        Crank speed, rad/s.
+
+    Raises
+    ------
+    SpecError, GeometryError
+        If a length is not positive, the rod is not longer than the crank, or the speed is zero.
+
+    Examples
+    --------
+    >>> float(CrankDrive(0.03, 0.12, 2.0).motion(0.0).x)
+    0.03
+    """
+
+    radius: float
+    rod: float
+    speed: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", positive("crank radius", self.radius))
+        object.__setattr__(self, "rod", positive("length of the connecting rod", self.rod))
+        object.__setattr__(self, "speed", _turning(self.speed))
+        if not self.radius < self.rod:
+            raise GeometryError(
+                f"The crank radius {self.radius:g} m is not below the length of the connecting rod, {self.rod:g} m; "
+                "the crank could not turn: shorten the crank or lengthen the rod."
+            )
+
+    def motion(self, t: ArrayLike) -> DriveMotion:
+        """Motion of the lower platform at the times ``t``; closed form."""
+        r, w = self.radius, self.speed
+        theta = w * np.asarray(t, float)
+        C, S = np.cos(theta), np.sin(theta)
+        q = np.sqrt((self.rod - r * S) * (self.rod + r * S))
+        a, b = r * r * S * C / q, r * r * (C - S) * (C + S) / q
+        x = r * C - (r * S) ** 2 / (q + self.rod)
+        return DriveMotion(
+            x,
+            w * (-r * S - a),
+            w * w * (-r * C - b - a * a / q),
+            w**3 * (r * S + 4.0 * a - 3.0 * a * b / q - 3.0 * a**3 / q**2),
+        )
+
+    def _packed(self) -> tuple[float, float, float, float]:
+        return 2.0, self.radius, self.rod, self.speed
