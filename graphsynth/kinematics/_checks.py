@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 
 __all__ = [
-    "choice", "finite", "finite_array", "positive", "sign", "three", "three_points", "triple", "triples", "unit_vector",
+    "choice", "finite", "finite_array", "plane_point", "positive", "sign", "three", "three_points", "triple", "triples",
+    "unit_vector", "whole",
 ]  # fmt: skip
 
 
@@ -68,7 +70,11 @@ def unit_vector(name: str, value: Any) -> tuple[float, float, float]:
 def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return ``values`` as a float array; raise `GeometryError` if an entry is NaN or infinite."""
     try:
+        if np.iscomplexobj(values):
+            raise GeometryError(f"{name} holds complex numbers; give real ones")
         array = np.asarray(values, dtype=np.float64)
+    except GeometryError:
+        raise
     except (TypeError, ValueError) as error:
         raise GeometryError(f"{name} is not an array of real numbers: {error}") from error
     bad = np.flatnonzero(~np.isfinite(array))
@@ -90,16 +96,30 @@ def three(name: str, values: Any) -> tuple[Any, Any, Any]:
 
 def three_points(name: str, values: Any) -> tuple[complex, complex, complex]:
     """Return three points as complex numbers; raise `GeometryError` for anything else, naming the leg."""
-    points = []
-    for leg, value in enumerate(three(name, values), start=1):
-        try:
-            found = complex(value) if not isinstance(value, str | bytes) else complex(math.nan)
-        except (TypeError, ValueError, OverflowError):
-            found = complex(math.nan)
-        if not (math.isfinite(found.real) and math.isfinite(found.imag)):
-            raise GeometryError(f"{name} of leg {leg} is {value!r}; give a finite point x + 1j * y")
-        points.append(found)
-    return points[0], points[1], points[2]
+    first, second, third = (plane_point(f"{name} of leg {k}", v) for k, v in enumerate(three(name, values), start=1))
+    return first, second, third
+
+
+def plane_point(name: str, value: Any) -> complex:
+    """Return a point of the plane as a complex number; raise `GeometryError` unless it is a finite one."""
+    try:
+        found = complex(value) if not isinstance(value, str | bytes) else complex(math.nan)
+    except (TypeError, ValueError, OverflowError):
+        found = complex(math.nan)
+    if not (math.isfinite(found.real) and math.isfinite(found.imag)):
+        raise GeometryError(f"{name} is {value!r}; give a finite point x + 1j * y")
+    return found
+
+
+def whole(name: str, value: Any, least: int, most: int = 10_000_000) -> int:
+    """Return a whole number between the bounds; raise `GeometryError` for anything else."""
+    try:
+        number = operator.index(value)
+    except TypeError as error:
+        raise GeometryError(f"{name} = {value!r} is not a whole number; give one from {least} on") from error
+    if isinstance(value, bool) or not least <= number <= most:
+        raise GeometryError(f"{name} = {value!r} must be a whole number from {least} to {most}")
+    return number
 
 
 def triple(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics._checks import finite_array, plane_point, positive, three
 from graphsynth.kinematics.platform.inverse_design import Design, _wanted, assess_design
 from graphsynth.kinematics.platform.small_crank import small_crank
 
@@ -55,7 +55,10 @@ def ellipticity(phasor: ArrayLike, Lc: float) -> float:
     >>> ellipticity([1.0, 1j, 0.0], 45.0), ellipticity([1.0, 2.0, 0.0], 45.0)
     (1.0, 0.0)
     """
-    scaled = np.asarray(phasor, dtype=np.complex128) * np.array([1.0, 1.0, Lc])
+    first, second, third = (
+        plane_point(f"phasor of {n}", v) for n, v in zip(("x", "y", "alpha"), three("phasor", phasor))
+    )
+    scaled = np.array([first, second, third]) * np.array([1.0, 1.0, positive("Lc", Lc)])
     axes = np.linalg.svd(np.column_stack([scaled.real, scaled.imag]), compute_uv=False)
     return float(axes[1] / axes[0]) if axes[0] > 0.0 else 0.0
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite
+from graphsynth.kinematics._checks import finite, three_points
 from graphsynth.kinematics._plane import cross
 
 __all__ = ["SingularConic", "singular_conic"]
@@ -67,9 +66,7 @@ def singular_conic(anchors: ArrayLike, vertices: ArrayLike, alpha: float) -> Sin
     >>> singular_conic([0, 4, 2 + 3j], [0, 1, 0.5 + 0.5j], 0.3).kind
     'ellipse'
     """
-    A, b = np.asarray(anchors, dtype=np.complex128), np.asarray(vertices, dtype=np.complex128)
-    if A.shape != (3,) or b.shape != (3,) or not (np.isfinite(A).all() and np.isfinite(b).all()):
-        raise GeometryError(f"anchors {A.shape} and vertices {b.shape} must hold three finite complex numbers each")
+    A, b = np.array(three_points("anchors", anchors)), np.array(three_points("vertices", vertices))
     arm = np.exp(1j * finite("alpha", alpha)) * b
     g = A - arm
     u2, u3 = complex(g[0] - g[1]), complex(g[0] - g[2])

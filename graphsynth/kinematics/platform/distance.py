@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import positive, triple
+from graphsynth.kinematics._checks import positive, triple, whole
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.field import characteristic_length, determinant, scaled_rows, working_mode
 from graphsynth.kinematics.platform.tracing import CurveEquations
@@ -107,7 +107,7 @@ def singularity_distance(
     >>> found.nearest.kind, found.nearest.distance > 15.0
     ('I', True)
     """
-    mode = working_mode(sigma)
+    mode, rays = working_mode(sigma), whole("rays", rays, 1)
     length = characteristic_length(platform) if Lc is None else positive("Lc", Lc)
     X = triple("pose", pose)
     theta = platform.inverse(X, mode).theta

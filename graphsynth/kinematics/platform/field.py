@@ -17,8 +17,11 @@ Array = NDArray[np.float64]
 
 def working_mode(sigma: Sequence[int]) -> tuple[int, int, int]:
     """Return the working mode as a tuple; `GeometryError` unless it has three entries +1 or -1."""
-    values = tuple(sigma)
-    if len(values) != 3 or any(s not in (1, -1) for s in values):
+    try:
+        values = tuple(sigma)
+    except TypeError:
+        values = ()
+    if len(values) != 3 or any(not isinstance(s, int | float | np.number) or s not in (1, -1) for s in values):
         raise GeometryError(f"sigma = {sigma!r} must hold three entries +1 or -1, the working mode")
     return (int(values[0]), int(values[1]), int(values[2]))
 

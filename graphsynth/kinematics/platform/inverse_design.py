@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite, plane_point, three
 from graphsynth.kinematics.platform.harmonics import Harmonics, harmonics
 from graphsynth.kinematics.platform.small_crank import SmallCrank, small_crank
 from graphsynth.kinematics.platform.sweep import Sweep, cold_sweep, pose_derivatives, warm_sweep
@@ -76,20 +76,19 @@ class Design:
 
 def translation_along(amplitude: float, angle: float) -> Complex:
     """Phasor of a rectilinear translation: amplitude (length) in the direction ``angle`` (radians)."""
+    amplitude, angle = finite("amplitude", amplitude), finite("angle", angle)
     return np.array([amplitude * math.cos(angle), amplitude * math.sin(angle), 0.0], dtype=np.complex128)
 
 
 def rotation_about(amplitude: float, centre: complex = 0j) -> Complex:
     """Phasor of a rotation: amplitude (radians) about a point measured from the home position (section 10.1)."""
-    c = complex(centre)
+    c, amplitude = plane_point("centre", centre), finite("amplitude", amplitude)
     return amplitude * np.array([c.imag, -c.real, 1.0], dtype=np.complex128)
 
 
 def _wanted(value: ArrayLike) -> Complex:
-    wanted = np.asarray(value, dtype=np.complex128).reshape(-1)
-    if wanted.shape != (3,) or not np.isfinite(wanted).all():
-        raise GeometryError(f"wanted = {value!r} must hold three finite numbers: phasors of x, y and alpha")
-    return wanted
+    parts = zip(("x", "y", "alpha"), three("wanted", value))
+    return np.array([plane_point(f"phasor wanted of {name}", part) for name, part in parts])
 
 
 def _with(mechanism: SingleMotorPlatform, crank: Complex, coupler: ArrayLike | None = None) -> SingleMotorPlatform:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array, positive
+from graphsynth.kinematics._checks import finite, finite_array, positive, whole
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.field import (
     characteristic_length,
@@ -191,8 +190,7 @@ def platform_map(
     True
     """
     mode, alpha = working_mode(sigma), finite("alpha", alpha)
-    if nodes < 2 or not math.isfinite(nodes):
-        raise GeometryError(f"nodes = {nodes} is no grid; give 2 or more")
+    nodes = whole("nodes", nodes, 2, 100_000)
     x, y = pose_grid(platform, alpha, nodes)
     poses = np.stack(np.broadcast_arrays(x[:, None], y[None, :], alpha), axis=-1)
     return PlatformMap(platform, alpha, mode, x, y, quality(platform, poses, mode, Lc=Lc))

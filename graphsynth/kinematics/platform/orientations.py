@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, positive
+from graphsynth.kinematics._checks import finite, plane_point, positive
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
 __all__ = ["RegionArea", "orientations", "reachable_workspace", "total_orientation_workspace"]
@@ -63,7 +63,7 @@ def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[floa
     >>> [tuple(round(a, 6) for a in pair) for pair in orientations(ParallelPlatform.mock(), 0j)]
     [(5.522173, 7.853982)]
     """
-    p = np.array([complex(point)])
+    p = np.array([plane_point("point", point)])
     ends = _ends(platform, p)[0].ravel()
     ends = np.unique(np.mod(ends[np.isfinite(ends)], math.tau))
     if not ends.size:
@@ -104,7 +104,7 @@ def reachable_workspace(platform: ParallelPlatform, resolution: float = 2e-3) ->
 
     def test(p: Complex, extra: float) -> NDArray[np.bool_]:
         ends = _ends(platform, p, extra)
-        candidates = np.concatenate([ends.reshape(len(p), -1), np.zeros((len(p), 1))], axis=1)
+        candidates = np.concatenate([ends.reshape(len(p), 12), np.zeros((len(p), 1))], axis=1)
         allowed = _allowed(platform, p, candidates, extra)
         own = np.repeat(np.arange(3), 4)
         allowed[:, np.arange(12), own] = np.isfinite(candidates[:, :12])  # its own leg: by construction

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite
+from graphsynth.kinematics._checks import finite, whole
 from graphsynth.kinematics.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.kinematics.platform.circles import BoundaryCircle, leg_circles
 from graphsynth.kinematics.platform.field import characteristic_length, determinant, pose_grid, working_mode
@@ -147,8 +147,7 @@ def type_two_curves(
     """
     mode = working_mode(sigma)
     alpha = finite("alpha", alpha)
-    if nodes < 8:
-        raise GeometryError(f"nodes = {nodes} is too coarse to find curves; give 8 or more")
+    nodes = whole("nodes", nodes, 8, 100_000)  # fewer find no curves
     for leg, lengths in enumerate(zip(platform.l1, platform.l2), start=1):
         if min(lengths) == 0.0:
             raise GeometryError(f"leg {leg} has a link of length zero, so its working modes coincide; give l1, l2 > 0")

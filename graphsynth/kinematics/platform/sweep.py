@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import whole
 from graphsynth.kinematics.platform.field import determinant
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def _failed(mechanism: SingleMotorPlatform, reason: str) -> Sweep:
 
 def cold_sweep(mechanism: SingleMotorPlatform, samples: int) -> Sweep:
     """Follow the home branch over a turn with step control."""
+    samples = whole("samples", samples, 4, 100_000)
     reason = _drives(mechanism)
     if reason:
         return _failed(mechanism, reason)

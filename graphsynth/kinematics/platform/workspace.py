@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array
+from graphsynth.kinematics._checks import finite, finite_array, positive, three
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.circles import BoundaryCircle, Limits, leg_circles, meet
+from graphsynth.kinematics.platform.field import working_mode
 
 __all__ = ["Arc", "Contact", "Workspace", "constant_orientation_workspace"]
 
@@ -183,7 +184,7 @@ def constant_orientation_workspace(
     mode, bounds = _checked(platform, sigma, limits)
     circles = leg_circles(platform, alpha, mode, bounds)
     scale = max(max(c.radius for c in circles), max(abs(c.centre - circles[0].centre) for c in circles))
-    problem = _Problem(platform, circles, mode, bounds, tolerance * scale)
+    problem = _Problem(platform, circles, mode, bounds, positive("tolerance", tolerance, zero=True) * scale)
     thin = problem.thin()
     arcs = problem.arcs() if thin is None else problem.curve(thin)
     isolated = problem.isolated(arcs)
@@ -200,23 +201,26 @@ def constant_orientation_workspace(
 def _checked(
     platform: ParallelPlatform, sigma: Sequence[int] | None, limits: Sequence[Limits] | None
 ) -> tuple[tuple[int, ...] | None, tuple[Limits, ...]]:
-    if sigma is not None and (len(sigma) != 3 or any(s not in (1, -1) for s in sigma)):
-        raise GeometryError(f"sigma = {sigma!r} must hold three entries +1 or -1, the working mode")
-    if limits is None or all(bound is None for bound in limits):
+    mode = None if sigma is None else working_mode(sigma)
+    if limits is None:
         return None, (None, None, None)
-    if sigma is None:
+    limits = three("limits", limits)
+    if all(bound is None for bound in limits):
+        return None, (None, None, None)
+    if mode is None:
         raise GeometryError("limits of the rocker angles need a working mode; give sigma")
-    if len(limits) != 3:
-        raise GeometryError(f"limits has {len(limits)} entries; give three, one per leg (None for no limit)")
     for leg, bound in enumerate(limits, start=1):
         if bound is None:
             continue
-        low, high = finite_array(f"limits of leg {leg}", bound).ravel()
+        pair = finite_array(f"limits of leg {leg}", bound)
+        if pair.shape != (2,):
+            raise GeometryError(f"limits of leg {leg} = {bound!r} are no pair; give (low, high) or None")
+        low, high = pair
         if not low < high < low + math.tau:
             raise GeometryError(f"limits ({low}, {high}) of leg {leg} must satisfy low < high < low + 2 pi")
         if min(platform.l1[leg - 1], platform.l2[leg - 1]) == 0.0:
             raise GeometryError(f"leg {leg} has a link of length zero: its rocker angle has no limits to apply")
-    return tuple(int(s) for s in sigma), tuple(limits)
+    return mode, limits
 
 
 class _Problem:
