@@ -1,0 +1,258 @@
+"""Motors: direct current with speed control, synchronous in the rotor frame, ideal sources; their limit L -> 0.
+
+Every motor acts on the driving shaft of a `graphsynth.dynamics.trains.Train`.  SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from graphsynth.errors import SpecError
+
+__all__ = ["DCMotor", "IdealSpeed", "IdealTorque", "LinearCharacteristic", "Motor", "SynchronousMotor"]
+
+
+def number(name: str, value: float, *, least: float = -math.inf, above: bool = False, infinite: bool = False) -> float:
+    """Return a finite float not below ``least`` (or above it), or raise `SpecError` naming value, bound and remedy."""
+    try:
+        given = float(value)
+    except (TypeError, ValueError):
+        raise SpecError(f"{name} = {value!r} is not a number; give a number in SI units") from None
+    if math.isnan(given) or (math.isinf(given) and not infinite):
+        raise SpecError(f"{name} = {given} is not finite; give a finite number in SI units")
+    if given < least or (above and given == least):
+        relation = "positive" if above and least == 0.0 else f"{'above' if above else 'at least'} {least:g}"
+        raise SpecError(f"{name} = {given:g} must be {relation}; check the sign and the unit")
+    return given
+
+
+def _check(motor: object, zero_or_more: tuple[str, ...], positive: tuple[str, ...] = ()) -> None:
+    for item in fields(motor):  # type: ignore[arg-type]
+        name, value = item.name, getattr(motor, item.name)
+        if name == "pole_pairs":
+            if value != int(value) or value < 1:
+                raise SpecError(f"pole_pairs = {value!r} must be a whole number of at least 1; count pairs, not poles")
+            continue
+        low = 0.0 if name in zero_or_more or name in positive else -math.inf
+        checked = number(name, value, least=low, above=name in positive, infinite=name == "voltage_limit")
+        object.__setattr__(motor, name, checked)
+
+
+@dataclass(frozen=True)
+class LinearCharacteristic:
+    """Motor without electrical states: torque ``stall - slope * (shaft speed)``.
+
+    Parameters
+    ----------
+    stall : float
+        Torque at rest, N m.
+    slope : float, optional
+        Loss of torque per speed, N m s/rad, not negative.
+    rotor_inertia, friction : float, optional
+        Of the rotor, kg m^2 and N m s/rad, not negative.
+
+    Raises
+    ------
+    SpecError
+        A number that is not finite, or negative where it must not be.
+
+    Examples
+    --------
+    >>> LinearCharacteristic(0.4, 0.02).torque(10.0)
+    0.2
+    """
+
+    stall: float
+    slope: float = 0.0
+    rotor_inertia: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, ("slope", "rotor_inertia", "friction"))
+
+    def torque(self, speed: float) -> float:
+        """Torque at a shaft speed, N m."""
+        return self.stall - self.slope * speed
+
+
+@dataclass(frozen=True)
+class IdealTorque:
+    """Source of a constant torque (N m) at the motor shaft, whatever the speed.
+
+    Examples
+    --------
+    >>> IdealTorque(0.5).reduced().torque(100.0)
+    0.5
+    """
+
+    value: float
+    rotor_inertia: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, ("rotor_inertia", "friction"))
+
+    def reduced(self) -> LinearCharacteristic:
+        """The same as a linear characteristic."""
+        return LinearCharacteristic(self.value, 0.0, self.rotor_inertia, self.friction)
+
+
+@dataclass(frozen=True)
+class IdealSpeed:
+    """Source of a constant shaft speed (rad/s), whatever the torque: its torque follows by inverse dynamics.
+
+    Examples
+    --------
+    >>> IdealSpeed(20.0).value
+    20.0
+    """
+
+    value: float
+    rotor_inertia: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, ("rotor_inertia", "friction"))
+
+
+@dataclass(frozen=True)
+class DCMotor:
+    """Direct-current motor with independent excitation and proportional speed control.
+
+    ``L dI/dt = U - r I - c_e w_m``, ``U = K (w_d - w_m)``, at most ``voltage_limit`` in absolute value; torque ``K_m I``.
+
+    Parameters
+    ----------
+    resistance, inductance : float
+        Of the armature, ohm and H; not negative, not both zero.
+    torque_constant, emf_constant : float
+        K_m, N m/A, and c_e, V s/rad; not negative.
+    gain : float
+        K of the speed controller, V s/rad, not negative.
+    speed : float
+        Demanded motor speed w_d, rad/s.
+    voltage_limit : float, optional
+        Largest armature voltage, V; none by default, as in the source.
+    rotor_inertia, friction : float, optional
+        kg m^2 and N m s/rad at the motor shaft.
+
+    Raises
+    ------
+    SpecError
+        A number that is not finite, negative where it must not be, or both armature constants zero.
+
+    Notes
+    -----
+    Specification parallel_platform, section 11.1.
+
+    Examples
+    --------
+    >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
+    >>> motor.electrical_time, motor.reduced().stall
+    (0.2, 40.0)
+    """
+
+    resistance: float
+    inductance: float
+    torque_constant: float
+    emf_constant: float
+    gain: float
+    speed: float
+    voltage_limit: float = math.inf
+    rotor_inertia: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            ("resistance", "inductance", "torque_constant", "emf_constant", "gain", "rotor_inertia", "friction"),
+            ("voltage_limit",),
+        )
+        if self.resistance == 0.0 and self.inductance == 0.0:
+            raise SpecError("resistance and inductance are both zero: the current is unbounded; give one of them")
+
+    @property
+    def electrical_time(self) -> float:
+        """Time constant L/r, s; infinite without resistance."""
+        return self.inductance / self.resistance if self.resistance else math.inf
+
+    def reduced(self) -> LinearCharacteristic:
+        """The limit L -> 0: ``I = (K (w_d - w_m) - c_e w_m) / r``; its error is of first order in L.
+
+        Raises
+        ------
+        SpecError
+            Without resistance there is no limit; with a voltage limit the characteristic is not linear.
+        """
+        if self.resistance == 0.0:
+            raise SpecError("resistance = 0 leaves no limit for L -> 0; give a positive resistance")
+        if self.voltage_limit < math.inf:
+            raise SpecError(
+                f"voltage_limit = {self.voltage_limit:g} makes the reduced motor nonlinear; "
+                "keep a positive inductance (any size) or remove the limit"
+            )
+        factor = self.torque_constant / self.resistance
+        return LinearCharacteristic(
+            factor * self.gain * self.speed, factor * (self.gain + self.emf_constant), self.rotor_inertia, self.friction
+        )
+
+
+@dataclass(frozen=True)
+class SynchronousMotor:
+    """Permanent-magnet synchronous motor with non-salient rotor in the rotor frame, voltages prescribed.
+
+    Parameters
+    ----------
+    pole_pairs : int
+    resistance, inductance : float
+        Of the stator, ohm (positive) and H (not negative).
+    flux : float
+        Flux linkage of the magnet, V s.
+    ud, uq : float
+        Stator voltages, V (amplitudes).
+    rotor_inertia, friction : float, optional
+        kg m^2 and N m s/rad at the motor shaft.
+
+    Raises
+    ------
+    SpecError
+        A number that is not finite, or out of its bound.
+
+    Notes
+    -----
+    Specification instruments_and_dynamics, section 4.4; ``T_e = 1.5 p psi i_q``.
+
+    Examples
+    --------
+    >>> motor = SynchronousMotor(4, 2.0, 1e-3, 5e-3, 0.0, 2.1013)
+    >>> round(motor.reduced().stall, 9)
+    0.0315195
+    """
+
+    pole_pairs: int
+    resistance: float
+    inductance: float
+    flux: float
+    ud: float
+    uq: float
+    rotor_inertia: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, ("inductance", "flux", "rotor_inertia", "friction"), ("resistance",))
+
+    @property
+    def electrical_time(self) -> float:
+        """Time constant L/R, s."""
+        return self.inductance / self.resistance
+
+    def reduced(self) -> LinearCharacteristic:
+        """The limit L -> 0: ``i_q = (u_q - p w_m psi) / R``; its error is of first order in L."""
+        factor = 1.5 * self.pole_pairs * self.flux / self.resistance
+        return LinearCharacteristic(
+            factor * self.uq, factor * self.pole_pairs * self.flux, self.rotor_inertia, self.friction
+        )
+
+
+Motor = DCMotor | SynchronousMotor | LinearCharacteristic | IdealTorque

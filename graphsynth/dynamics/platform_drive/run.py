@@ -1,0 +1,478 @@
+"""Run a motor on a mechanism of one freedom: setup of the compiled integrator, checks, result with its balances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import IntEnum
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.motors import (
+    DCMotor,
+    IdealTorque,
+    LinearCharacteristic,
+    Motor,
+    SynchronousMotor,
+    number,
+)
+from graphsynth.dynamics.trains import Train
+from graphsynth.errors import SpecError
+
+__all__ = ["DriveEvent", "DriveRun", "Plant", "RunStatus", "run"]
+
+Array = NDArray[np.float64]
+_EVENTS = {2: "dead centre", 3: "stall", 4: "voltage limit", 5: "direction of power flow"}
+
+
+class RunStatus(IntEnum):
+    """How an integration ended; everything but DONE is a failure, with NaN from ``reached`` on."""
+
+    DONE = 0
+    STEP_TOO_SMALL = 1
+    TOO_MANY_STEPS = 2
+    NOT_FINITE = 3
+    TOO_MANY_EVENTS = 4
+
+
+_REASONS = {
+    RunStatus.DONE: "",
+    RunStatus.STEP_TOO_SMALL: "the step size vanished at t = {t:.6g} s: the model is singular there, or the tolerance "
+    "is below what double precision gives; relax rtol or add inertia",
+    RunStatus.TOO_MANY_STEPS: "{steps} steps were used up at t = {t:.6g} s; raise max_steps or relax rtol",
+    RunStatus.NOT_FINITE: "the derivatives are not finite at t = {t:.6g} s: the mechanism cannot be assembled there or "
+    "its inertia vanishes",
+    RunStatus.TOO_MANY_EVENTS: "more than {events} events by t = {t:.6g} s: an event storm; raise max_events if wanted",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """Mechanism of one freedom as the integrator sees it.
+
+    ``rows`` are trigonometric velocities (k, 2H + 1); ``load_series`` the load torque in the same basis; ``linkage``
+    the parameters of a four-bar instead.  ``base`` is constant inertia (without the rotor), ``friction`` viscous, and
+    ``load`` a constant torque at the crank, positive when it drives.
+    """
+
+    rows: Array
+    base: float = 0.0
+    friction: float = 0.0
+    load: float = 0.0
+    load_series: Array | None = None
+    linkage: Array | None = None
+    dead_centres: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class DriveEvent:
+    """Event of a run: ``kind``, ``time`` (s), ``angle`` (rad, unwrapped), ``currents`` (A)."""
+
+    kind: str
+    time: float
+    angle: float
+    currents: tuple[float, ...]
+    #: value of ``g w`` of the regularised form (sqrt(J) w), or w of the form with inertia
+    motion: float
+    #: fictitious time of the regularised form, s / (sqrt(kg) m); NaN in the form with inertia
+    fictitious_time: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class DriveRun:
+    """Motion of a drive at the output times; estimated, with its balances.
+
+    ``error`` (n_states,) is the largest difference of angle, speed and currents from a second run at a hundred times
+    the tolerance (NaN if not asked for); ``energy_error`` and ``electric_error`` are the largest relative defects of
+    ``dE = work`` and ``d(magnetic) = supplied - lost - shaft``.  Rows from ``reached`` on are NaN after a failure.
+    """
+
+    time: Array
+    angle: Array
+    speed: Array
+    currents: Array
+    #: angle reduced to a turn, and whole turns: ``angle = turns 2 pi + reduced`` without loss of digits
+    reduced_angle: Array
+    turns: NDArray[np.int64]
+    #: sqrt(J) w, finite at dead centres
+    momentum: Array
+    motor_torque: Array
+    kinetic_energy: Array
+    work: Array
+    energy_error: float
+    electric_error: float
+    error: Array
+    events: tuple[DriveEvent, ...]
+    status: RunStatus
+    reached: int
+    reason: str
+    model: str
+    steps: int
+    rejected: int
+    rtol: float
+    seconds: float
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def complete(self) -> bool:
+        """Whether the last output time was reached."""
+        return self.status is RunStatus.DONE
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    setup: NDArray[np.int64]
+    values: Array
+    rows: Array
+    zeros: Array
+    start: Array
+    scale: Array
+    first: float
+
+
+def run(
+    plant: Plant,
+    motor: Motor,
+    train: Train,
+    times: ArrayLike,
+    *,
+    angle: float = 0.0,
+    speed: float = 0.0,
+    currents: tuple[float, ...] | None = None,
+    regular: bool = False,
+    rtol: float = 1e-10,
+    max_steps: int = 200_000,
+    max_events: int = 2_000,
+    estimate: bool = True,
+    notes: tuple[str, ...] = (),
+) -> DriveRun:
+    """Integrate a motor, its train and a mechanism from ``times[0]`` through all ``times``.
+
+    Parameters
+    ----------
+    plant : Plant
+    motor : Motor
+    train : Train
+    times : array_like, shape (n,)
+        Strictly increasing output times, s; the first is the start.
+    angle, speed : float
+        Crank angle (rad) and speed (rad/s) at the start.
+    currents : tuple of float, optional
+        At the start, A; zero by default.
+    regular : bool
+        Use the regularised form ``dt = sqrt(J) ds`` (section 11.3), which passes dead centres without inertia.
+    rtol : float
+        Tolerance per step, 1e-13 to 1e-3.
+    max_steps, max_events : int
+        Guards; exceeding one is a reported failure.
+    estimate : bool
+        Also run at ``100 rtol`` and report the difference as ``error``.
+
+    Returns
+    -------
+    DriveRun
+
+    Raises
+    ------
+    SpecError
+        Bad numbers; friction, no inductance or no rotor inertia where the form chosen cannot have it.
+    """
+    from graphsynth.dynamics.platform_drive.kernels import radau
+
+    begin = perf_counter()
+    out = _times(times)
+    number("rtol", rtol)
+    if not 1e-13 <= rtol <= 1e-3:
+        raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
+    ready = _prepare(plant, motor, train, out, angle, speed, currents, regular)
+    n = ready.start.size
+    results = []
+    for tolerance in (rtol, min(100.0 * rtol, 1e-2)) if estimate else (rtol,):
+        state, values, setup = ready.start.copy(), ready.values.copy(), ready.setup.copy()
+        Y, turns = np.full((out.size, n), np.nan), np.zeros(out.size, np.int64)
+        balance, marks = np.full((out.size, 6), np.nan), np.full((max_events, 3 + n), np.nan)
+        counts = np.zeros(4, np.int64)
+        status = radau.integrate(
+            setup, values, ready.rows, ready.zeros, state, out, tolerance, ready.scale, ready.first, int(max_steps),
+            Y, turns, balance, marks, counts,
+        )  # fmt: skip
+        results.append((RunStatus(status), Y, turns, balance, marks, counts, state))
+    status, Y, turns, balance, marks, counts, state = results[0]
+    error = _difference(results, ready, plant, regular) if estimate else np.full(n, np.nan)
+    return _result(
+        ready, plant, motor, train, out, results[0], error, regular, rtol, perf_counter() - begin, notes
+    )
+
+
+def _times(times: ArrayLike) -> Array:
+    out = np.array(times, dtype=np.float64)
+    if out.ndim != 1 or out.size < 2 or not np.isfinite(out).all() or not (np.diff(out) > 0).all():
+        raise SpecError(f"times of shape {out.shape} must be at least two finite, strictly increasing numbers (s)")
+    return out
+
+
+def _prepare(
+    plant: Plant, motor: Motor, train: Train, out: Array, angle: float, speed: float,
+    currents: tuple[float, ...] | None, regular: bool,
+) -> _Prepared:  # fmt: skip
+    from graphsynth.dynamics.platform_drive.kernels import systems as s
+
+    if isinstance(motor, IdealTorque):
+        motor = motor.reduced()
+    values = np.zeros(s.SIZE)
+    values[s.BASE] = plant.base + train.reflected(motor.rotor_inertia)
+    values[s.FRICTION] = plant.friction + train.ratio**2 * motor.friction
+    values[s.RATIO], values[s.EFFICIENCY], values[s.CONSTANT] = train.ratio, train.efficiency, plant.load
+    code, electric, amperes = _motor(motor)
+    values[s.ELECTRIC : s.ELECTRIC + electric.size] = electric
+    if plant.linkage is not None:
+        values[s.LINKAGE :] = plant.linkage
+    rows = _rows(plant)
+    given = (0.0,) * amperes if currents is None else tuple(number("current", c) for c in currents)
+    if len(given) != amperes:
+        raise SpecError(f"{len(given)} currents given for a motor with {amperes}; leave them out or give {amperes}")
+    setup = np.array([s.SERIES if plant.linkage is None else s.FOUR_BAR, code, int(regular), 0, 1])
+    q, w = number("angle", angle), number("speed", speed)
+    here = np.zeros(16)
+    s.mechanism(setup, q, values, rows, here)
+    if regular:
+        _allow_regular(values, motor, here[0])
+    elif not here[0] > 0.0 or not _least_inertia(plant, values[s.BASE]) > 0.0:
+        raise SpecError("the inertia vanishes on the way: give J_0 > 0 (rotor or wheels), or use the regularised model")
+    zeros = _bounds(plant, values, q, regular)
+    _modes(setup, values, motor, w, given, train.ratio)
+    reference = _reference_speed(motor, train, w, here[0], out)
+    unit = np.array([1.0, reference, *_currents(motor, train, reference, given, out)])
+    start = np.array([q, w, *given])
+    span = float(out[-1] - out[0])
+    first = 1e-3 * min(span, 1.0 / reference)
+    if isinstance(motor, (DCMotor, SynchronousMotor)):
+        first = min(first, 0.25 * motor.electrical_time)
+    if regular:
+        root = math.sqrt(here[0])
+        start = np.array([q, root * w, *given, out[0]])
+        largest = math.sqrt(float((np.abs(plant.rows).sum(axis=1) ** 2).sum()) + values[s.BASE])
+        unit = np.array([1.0, reference * largest, *unit[2:], span])
+        first /= largest
+    return _Prepared(setup, values, rows, zeros, start, unit, first)
+
+
+def _motor(motor: Motor) -> tuple[int, Array, int]:
+    """Code, electrical parameters and number of currents of a motor."""
+    if isinstance(motor, (DCMotor, SynchronousMotor)) and motor.inductance == 0.0:
+        raise SpecError("inductance = 0 has no current equation; use the reduced motor, motor.reduced()")
+    if isinstance(motor, DCMotor):
+        return 1, np.array([
+            motor.inductance, motor.resistance, motor.emf_constant, motor.torque_constant, motor.gain, motor.speed,
+            motor.voltage_limit,
+        ]), 1  # fmt: skip
+    if isinstance(motor, SynchronousMotor):
+        return 2, np.array([
+            motor.inductance, motor.resistance, motor.pole_pairs, motor.flux, motor.ud, motor.uq,
+        ]), 2  # fmt: skip
+    if isinstance(motor, LinearCharacteristic):
+        return 0, np.array([motor.stall, motor.slope]), 0
+    raise SpecError(f"{type(motor).__name__} is not a motor that drives a motion; give a motor with a torque")
+
+
+def _rows(plant: Plant) -> Array:
+    """Velocity rows with the series of the load as the last row."""
+    load = np.zeros(1) if plant.load_series is None else np.asarray(plant.load_series, dtype=np.float64)
+    if load.ndim != 1 or load.size % 2 == 0 or not np.isfinite(load).all():
+        raise SpecError(f"load_series of shape {load.shape} must be finite coefficients a0, a1, b1, ...: an odd number")
+    rows = np.zeros((plant.rows.shape[0] + 1, max(plant.rows.shape[1], load.size)))
+    rows[:-1, : plant.rows.shape[1]] = plant.rows
+    rows[-1, : load.size] = load
+    return rows
+
+
+def _allow_regular(values: Array, motor: Motor, inertia: float) -> None:
+    from graphsynth.dynamics.platform_drive.kernels import systems as s
+
+    if values[s.FRICTION] > 0.0:
+        raise SpecError(
+            f"viscous friction b = {values[s.FRICTION]:g} is unbounded at a dead centre without inertia; "
+            "give J_0 > 0 (rotor or wheels) or b = 0"
+        )
+    if values[s.BASE] > 0.0:
+        raise SpecError(f"J_0 = {values[s.BASE]:g} leaves no singularity to regularise; use the model with inertia")
+    if isinstance(motor, LinearCharacteristic) and motor.slope > 0.0:
+        raise SpecError(
+            "without inertia the torque of a motor without inductance is unbounded at a dead centre; "
+            "give L > 0, or J_0 > 0"
+        )
+    if isinstance(motor, DCMotor) and motor.voltage_limit < math.inf:
+        raise SpecError(
+            f"voltage_limit = {motor.voltage_limit:g} is met at every dead centre without inertia; give J_0 > 0"
+        )
+    if values[s.EFFICIENCY] < 1.0:
+        raise SpecError(
+            f"efficiency = {values[s.EFFICIENCY]:g} by direction needs the model with inertia; give J_0 > 0"
+        )
+    if inertia == 0.0:
+        raise SpecError("the start is a dead centre, where the speed says nothing; start at another angle")
+
+
+def _least_inertia(plant: Plant, base: float) -> float:
+    if base > 0.0 or plant.linkage is not None:
+        return 1.0
+    q = np.linspace(0.0, math.tau, 720, endpoint=False)
+    from graphsynth.dynamics.platform_drive.inertia import EffectiveInertia
+
+    values = EffectiveInertia(plant.rows).value(q)
+    return -1.0 if plant.dead_centres or not values.max() > 0.0 else float(values.min())
+
+
+def _bounds(plant: Plant, values: Array, q: float, regular: bool) -> Array:
+    """Dead centres in increasing order from the piece that holds q; sets the bounds of that piece."""
+    from graphsynth.dynamics.platform_drive.kernels import systems as s
+
+    if not regular or not plant.dead_centres:
+        values[s.LOW], values[s.HIGH] = -math.inf, math.inf
+        return np.zeros(1)
+    once = np.sort(np.array(plant.dead_centres))
+    turn = math.floor((q - once[0]) / math.tau)
+    around = np.concatenate([once + math.tau * (turn + k) for k in (-1, 0, 1, 2)])
+    first = int(np.searchsorted(around, q, side="right")) - 1
+    zeros = around[first : first + once.size].copy()
+    values[s.LOW], values[s.HIGH] = around[first], around[first + 1]
+    return zeros
+
+
+def _modes(
+    setup: NDArray[np.int64], values: Array, motor: Motor, w: float, given: tuple[float, ...], ratio: float
+) -> None:
+    """Voltage limit and direction of the power flow at the start."""
+    from graphsynth.dynamics.platform_drive.kernels import systems as s
+
+    if isinstance(motor, DCMotor):
+        asked = motor.gain * (motor.speed - ratio * w)
+        setup[s.SATURATED] = 0 if abs(asked) <= motor.voltage_limit else int(math.copysign(1, asked))
+        tendency = given[0] or asked - motor.emf_constant * ratio * w
+    elif isinstance(motor, SynchronousMotor):
+        tendency = given[1] or motor.uq - motor.pole_pairs * ratio * w * motor.flux
+    elif isinstance(motor, LinearCharacteristic):
+        tendency = motor.torque(ratio * w)
+    else:
+        tendency = motor.value
+    setup[s.DRIVING] = -1 if tendency * w < 0.0 else 1
+
+
+def _reference_speed(motor: Motor, train: Train, w: float, inertia: float, out: Array) -> float:
+    """Size of the crank speed to expect: the scale of its absolute tolerance."""
+    if isinstance(motor, DCMotor):
+        total = motor.gain + motor.emf_constant
+        free = motor.gain * motor.speed / total / train.ratio if total else motor.speed / train.ratio
+    elif isinstance(motor, SynchronousMotor):
+        free = motor.uq / (motor.pole_pairs * motor.flux) / train.ratio if motor.flux else 0.0
+    else:
+        line = motor.reduced() if isinstance(motor, IdealTorque) else motor
+        span = float(out[-1] - out[0])
+        pushed = abs(line.stall) * train.ratio * span / inertia if inertia > 0.0 else 1.0
+        free = min(line.stall / line.slope / train.ratio if line.slope else math.inf, pushed)
+    return max(abs(free), abs(w)) or 1.0
+
+
+def _currents(motor: Motor, train: Train, reference: float, given: tuple[float, ...], out: Array) -> list[float]:
+    """Sizes of the currents to expect."""
+    if isinstance(motor, DCMotor):
+        volts = motor.gain * abs(motor.speed) + motor.emf_constant * train.ratio * reference
+        ohms = motor.resistance + motor.inductance / min(0.1, float(out[-1] - out[0]))
+        return [max(volts / ohms, abs(given[0])) or 1.0]
+    if isinstance(motor, SynchronousMotor):
+        size = max(math.hypot(motor.ud, motor.uq) / motor.resistance, *map(abs, given)) or 1.0
+        return [size, size]
+    return []
+
+
+def _physical(Y: Array, turns: NDArray[np.int64], ready: _Prepared, regular: bool) -> tuple[Array, Array, Array]:
+    """Unwrapped angle, speed and sqrt(J) w of state rows."""
+    from graphsynth.dynamics.platform_drive.kernels import systems as s
+
+    table = np.zeros((len(Y), 16))
+    s.tabulate(ready.setup, np.ascontiguousarray(Y[:, 0]), ready.values, ready.rows, table)
+    root = np.sqrt(table[:, 0])
+    angle = Y[:, 0] + turns * math.tau
+    if regular:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return angle, np.asarray(Y[:, 1] / root), Y[:, 1].copy()
+    return angle, Y[:, 1].copy(), np.asarray(root * Y[:, 1])
+
+
+def _difference(results: list[tuple[RunStatus, Array, NDArray[np.int64], Array, Array, NDArray[np.int64], Array]],
+                ready: _Prepared, plant: Plant, regular: bool) -> Array:  # fmt: skip
+    """Largest differences of angle, sqrt(J) w over the largest sqrt(J), and currents between two runs."""
+    n = ready.start.size - int(regular)
+    if any(entry[0] is not RunStatus.DONE for entry in results):
+        return np.full(n, np.nan)
+    first, second = ((entry[1], entry[2]) for entry in results)
+    gap = np.abs(first[0][:, :n] - second[0][:, :n])
+    gap[:, 0] = np.abs(first[0][:, 0] - second[0][:, 0] + math.tau * (first[1] - second[1]))
+    if regular:
+        gap[:, 1] *= ready.scale[1] and 1.0 / _largest_root(plant)
+    return np.asarray(gap.max(axis=0))
+
+
+def _largest_root(plant: Plant) -> float:
+    return math.sqrt(float((np.abs(plant.rows).sum(axis=1) ** 2).sum())) or 1.0
+
+
+def _result(
+    ready: _Prepared, plant: Plant, motor: Motor, train: Train, out: Array,
+    found: tuple[RunStatus, Array, NDArray[np.int64], Array, Array, NDArray[np.int64], Array],
+    error: Array, regular: bool, rtol: float, seconds: float, notes: tuple[str, ...],
+) -> DriveRun:  # fmt: skip
+    status, Y, turns, balance, marks, counts, state = found
+    angle, speed, momentum = _physical(Y, turns, ready, regular)
+    currents = Y[:, 2 : Y.shape[1] - int(regular)]
+    reached = int(counts[3])
+    torque = _torque(motor, speed * train.ratio, currents)
+    work, moved, surplus, supplied = balance[:, 0], balance[:, 1], balance[:, 2], balance[:, 3]
+    kinetic, magnetic = balance[:, 4], balance[:, 5]
+    energy = _defect(kinetic - kinetic[0] - work, np.maximum.accumulate(kinetic) + moved, reached)
+    electric = _defect(magnetic - magnetic[0] - surplus, np.maximum.accumulate(magnetic) + supplied, reached)
+    at = float(state[-1]) if regular else float(marks[counts[2] - 1, 1]) if counts[2] else math.nan
+    at = max(at, float(out[max(reached - 1, 0)])) if at == at else float(out[max(reached - 1, 0)])
+    reason = _REASONS[status].format(t=at, steps=int(counts[0] + counts[1]), events=len(marks))
+    unit = "currents negligible" if currents.shape[1] == 0 else f"{currents.shape[1]} current(s)"
+    name = "S (regularised, without inertia)" if regular else "J (with inertia)"
+    return DriveRun(
+        time=out, angle=angle, speed=speed, currents=currents, reduced_angle=Y[:, 0].copy(), turns=turns,
+        momentum=momentum, motor_torque=torque, kinetic_energy=kinetic, work=work, energy_error=energy,
+        electric_error=electric if currents.shape[1] else 0.0, error=error,
+        events=_events(marks[: counts[2]], regular), status=status, reached=reached, reason=reason,
+        model=f"{name}, {unit}", steps=int(counts[0]), rejected=int(counts[1]), rtol=rtol, seconds=seconds,
+        notes=notes,
+    )  # fmt: skip
+
+
+def _defect(defect: Array, size: Array, reached: int) -> float:
+    """Largest defect of a balance relative to the energy moved so far in the whole run."""
+    if reached < 2:
+        return math.nan
+    largest = float(size[:reached].max())
+    return float(np.abs(defect[:reached]).max()) / largest if largest > 0.0 else 0.0
+
+
+def _torque(motor: Motor, shaft: Array, currents: Array) -> Array:
+    if isinstance(motor, DCMotor):
+        return np.asarray(motor.torque_constant * currents[:, 0])
+    if isinstance(motor, SynchronousMotor):
+        return np.asarray(1.5 * motor.pole_pairs * motor.flux * currents[:, 1])
+    line = motor.reduced() if isinstance(motor, IdealTorque) else motor
+    return np.asarray(line.stall - (line.slope * shaft if line.slope else 0.0 * np.abs(currents.sum(axis=1))))
+
+
+def _events(marks: Array, regular: bool) -> tuple[DriveEvent, ...]:
+    found = []
+    for row in marks:
+        state = row[3:]
+        found.append(DriveEvent(
+            kind=_EVENTS[int(row[0])], time=float(state[-1] if regular else row[1]),
+            angle=float(state[0] + row[2] * math.tau),
+            currents=tuple(map(float, state[2 : state.size - int(regular)])), motion=float(state[1]),
+            fictitious_time=float(row[1]) if regular else math.nan,
+        ))  # fmt: skip
+    return tuple(found)
