@@ -1,6 +1,6 @@
 """Standard fits: which ISO 286 fit leaves every bearing free, proved for all parts inside their tolerances.
 
-The table holds the tolerance grades IT5 to IT11 and the fundamental deviations of the shafts c to h for nominal
+The table holds the tolerance grades IT5 to IT11 and the fundamental deviations of the shafts a to h for nominal
 diameters up to 500 mm (ISO 286-1:2010, tables 1 and 4), for the hole-basis system (holes H).
 """
 
@@ -38,36 +38,22 @@ _BELOW = {  # distance of the upper limit of the shaft below the nominal size, m
     "g": (2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 18, 20),
     "h": (0,) * 13,
 }
-_C_SIZES = (3, 6, 10, 18, 30, 40, 50, 65, 80, 100, 120, 140, 160, 180, 200, 225, 250, 280, 315, 355, 400, 450, 500)
-_C_BELOW = (
-    60,
-    70,
-    80,
-    95,
-    110,
-    120,
-    130,
-    140,
-    150,
-    170,
-    180,
-    200,
-    210,
-    230,
-    240,
-    260,
-    280,
-    300,
-    330,
-    360,
-    400,
-    440,
-    480,
-)
+_FINE_SIZES = (
+    3, 6, 10, 18, 30, 40, 50, 65, 80, 100, 120, 140, 160, 180, 200, 225, 250, 280, 315, 355, 400, 450, 500,
+)  # fmt: skip
+_FINE_BELOW = {
+    "a": (270, 270, 280, 290, 300, 310, 320, 340, 360, 380, 410, 460, 520, 580, 660, 740, 820, 920, 1050, 1200, 1350,
+          1500, 1650),
+    "b": (140, 140, 150, 150, 160, 170, 180, 190, 200, 220, 240, 260, 280, 310, 340, 380, 420, 480, 540, 600, 680, 760,
+          840),
+    "c": (60, 70, 80, 95, 110, 120, 130, 140, 150, 170, 180, 200, 210, 230, 240, 260, 280, 300, 330, 360, 400, 440,
+          480),
+}  # fmt: skip
 
 #: Common clearance fits of the hole-basis system, from tight to loose.
 STANDARD_FITS = (
     "H6/h5", "H7/h6", "H7/g6", "H8/h7", "H7/f7", "H8/f7", "H8/e8", "H9/e9", "H9/d9", "H10/d10", "H11/d11", "H11/c11",
+    "H11/b11", "H11/a11",
 )  # fmt: skip
 
 
@@ -104,17 +90,18 @@ class Fit:
         GeometryError
             For a name that is not in the table, or a diameter outside 0 to 500 mm.
         """
-        parts = re.fullmatch(r"H(\d+)/([c-h])(\d+)", name.strip())
+        parts = re.fullmatch(r"H(\d+)/([a-h])(\d+)", name.strip())
         if not parts or int(parts[1]) not in _GRADES or int(parts[3]) not in _GRADES:
             raise GeometryError(
-                f"fit {name!r} is not in the table; use H5..H11 with c..h and a grade 5..11, as in H7/g6"
+                f"fit {name!r} is not in the table; use H5..H11 with a..h and a grade 5..11, as in H7/g6"
             )
         size = Range.read("diameter", diameter)
         if not size.is_point or not 0 < size.lower <= 500:
             raise GeometryError(f"nominal diameter {size} mm is outside the table; give one number up to 500 mm")
         at = bisect_left(_SIZES, size.lower)
         letter = parts[2]
-        below = _C_BELOW[bisect_left(_C_SIZES, size.lower)] if letter == "c" else _BELOW[letter][at]
+        fine = bisect_left(_FINE_SIZES, size.lower)
+        below = _FINE_BELOW[letter][fine] if letter in _FINE_BELOW else _BELOW[letter][at]
         micro = Fraction(1, 1000)
         wide, narrow = _GRADES[int(parts[1])][at], _GRADES[int(parts[3])][at]
         hole = Range(Fraction(0), wide * micro, size.exact)
@@ -158,6 +145,15 @@ class FitVerdict:
     fit: Fit
     verdict: Verdict
     clearance_left: float
+
+    @property
+    def words(self) -> str:
+        """The verdict in words about pairs of parts."""
+        return {
+            Verdict.CERTIFIED_FREE: "every pair is free",
+            Verdict.CERTIFIED_JAMMED: "every pair jams",
+            Verdict.CERTIFIED_JAMMED_FOR_SOME: "the tightest pair jams",
+        }.get(self.verdict, "undecided")
 
     def row(self) -> dict[str, Any]:
         """Plain values for a table."""
@@ -213,8 +209,8 @@ def tightest_free_fit(
 
     Examples
     --------
-    >>> tightest_free_fit(ToleranceBox(alpha="0.02")).fit.name
-    'H9/d9'
+    >>> tightest_free_fit(ToleranceBox(alpha="1/30")).fit.name
+    'H11/b11'
     """
     free = [found for found in assess_fits(box, condition, fits, diameter) if found.verdict is Verdict.CERTIFIED_FREE]
     return min(free, key=lambda found: found.fit.clearance.upper, default=None)

@@ -28,8 +28,8 @@ class Verdict(Enum):
     """
 
     CERTIFIED_FREE = "free over the whole turn (certified)"
-    CERTIFIED_JAMMED = "jams on part of the turn, whatever the parameters (certified)"
-    CERTIFIED_JAMMED_FOR_SOME = "jams on part of the turn for some of the parameters (certified)"
+    CERTIFIED_JAMMED = "jams on part of the turn, for all parameters given (certified)"
+    CERTIFIED_JAMMED_FOR_SOME = "jams on part of the turn, for some of the parameters given (certified)"
     UNDECIDED = "undecided"
     FREE_ESTIMATED = "free over the whole turn (estimated)"
     JAMMED_ESTIMATED = "jams on part of the turn (estimated)"

@@ -112,7 +112,8 @@ def test_general_pin_is_searched_without_a_closed_form():
     ("name", "diameter", "hole", "shaft"),  # micrometres, ISO 286-2 tables of limit deviations
     [("H7/g6", 35, (0, 25), (-25, -9)), ("H8/f7", 40, (0, 39), (-50, -25)), ("H9/d9", 60, (0, 74), (-174, -100)),
      ("H11/c11", 45, (0, 160), (-290, -130)), ("H7/h6", 25, (0, 21), (-13, 0)), ("H8/e8", 100, (0, 54), (-126, -72)),
-     ("H11/c11", 30, (0, 130), (-240, -110))],
+     ("H11/c11", 30, (0, 130), (-240, -110)),
+     ("H11/b11", 35, (0, 160), (-330, -170)), ("H11/a11", 35, (0, 160), (-470, -310))],
 )  # fmt: skip
 def test_limit_deviations(name, diameter, hole, shaft):
     fit = Fit.read(name, diameter)
@@ -129,7 +130,9 @@ def test_fits_of_a_small_tilt():
     assert verdicts["H7/h6"] is verdicts["H7/g6"] is Verdict.CERTIFIED_JAMMED  # even the loosest: 0.025 mm
     assert verdicts["H8/e8"] is Verdict.CERTIFIED_JAMMED_FOR_SOME  # from 0.025 to 0.064 mm
     assert tightest_free_fit(box).fit.name == "H9/d9"
-    assert tightest_free_fit(ToleranceBox(alpha="1/30")) is None  # 0.0651 mm is more than c11 grants
+    deck = ToleranceBox(alpha="1/30")  # 0.0651 mm is more than c11 grants
+    assert tightest_free_fit(deck).fit.name == "H11/b11"
+    assert tightest_free_fit(deck, fits=("H7/g6", "H11/c11")) is None
     assert assess_fits(box)[0].row()["verdict"] == "CERTIFIED_JAMMED"
     with pytest.raises(GeometryError, match="not in the table"):
         Fit.read("H7/z6", 35)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Literal
 
 from graphsynth.scenes.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each
 from graphsynth.scenes.scene import LambdaTable
@@ -13,9 +15,27 @@ from graphsynth.scenes.steps.records import recognise_by_key, records_of
 
 if TYPE_CHECKING:
     from graphsynth.jamming.assess import JammingReport
+    from graphsynth.jamming.certified_limits import CertifiedLimit
+    from graphsynth.jamming.certify import JamCertificate
+    from graphsynth.jamming.circle_sets import Span
+    from graphsynth.jamming.parameters import ToleranceBox
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage, LambdaPositions
 
-__all__ = ["LambdaMotion", "jamming", "judge", "kinematics", "recognise"]
+__all__ = ["LambdaMotion", "jamming", "judge", "kinematics", "recognise", "tolerance_box"]
+
+_C = Literal["A", "B"]
+#: Key of ``[mechanism.tolerances]``: parameter of the box, and where its nominal value stands in the scene.
+_TOLERANCES: dict[str, tuple[str, tuple[str, str] | None]] = {
+    "frame": ("l1", ("lengths", "frame")),
+    "crank": ("l2", ("lengths", "crank")),
+    "coupler": ("l3", ("lengths", "coupler")),
+    "rocker": ("l4", ("lengths", "rocker")),
+    "alpha_rad": ("alpha", ("tilt", "alpha_rad")),
+    "azimuth_rad": ("azimuth", None),
+    "radius_mm": ("Rb", ("bearing", "radius_mm")),
+    "height_mm": ("Hb", ("bearing", "height_mm")),
+    "clearance_mm": ("clearance", ("bearing", "clearance_mm")),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,16 +103,84 @@ def _move(table: LambdaTable) -> LambdaMotion:
     return LambdaMotion(linkage, replace(linkage, alpha=0.0).positions(f), tilted, residual)
 
 
+def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
+    """Return the exact dimensions of the scene, with the tolerances of ``[mechanism.tolerances]`` if there are any.
+
+    Numbers of the file are taken as the decimals that stand there, not as the doubles nearest to them; a dimension that
+    was changed after reading is taken as the double it is.
+
+    Raises
+    ------
+    SceneError
+        For a tolerance with an unknown name, or one that is no number.
+    """
+    from graphsynth.jamming.parameters import ToleranceBox
+    from graphsynth.jamming.ranges import Range, spread
+
+    table = _table(context)
+    raw = context.scene.raw.get("mechanism", {})
+    raw = raw if isinstance(raw, Mapping) else {}
+    given: dict[str, Any] = {"azimuth": 0}
+    for name, place in _TOLERANCES.values():
+        if place:
+            given[name] = _exact(_inside(raw, *place), getattr(getattr(table, place[0]), place[1]))
+    direction = _inside(raw, "tilt", "axis") or [None] * 3
+    axis = [_exact(text, value) for text, value in zip(direction, table.tilt.axis)]
+    for key, size in (getattr(table, "tolerances", None) or {}).items() if tolerances else ():
+        name = _tolerance_name(context, key)
+        absolute, relative = _tolerance(context, key, size)
+        given[name] = spread(Range.read(key, given[name]), absolute, relative)
+    return ToleranceBox(**given, axis=axis, sgn=table.branch)
+
+
+def _inside(raw: Mapping[str, Any], table: str, key: str) -> Any:
+    inner = raw.get(table, {})
+    return inner.get(key) if isinstance(inner, Mapping) else None
+
+
+def _exact(text: Any, value: float) -> Any:
+    """Return the decimal that stands in the file, if it is the one that was read; else the double."""
+    try:
+        number = Fraction(text if isinstance(text, str | int) else repr(text))
+    except (ValueError, TypeError, ZeroDivisionError):
+        return value
+    return number if float(number) == value else value
+
+
+def _tolerance_name(context: Context, key: str) -> str:
+    from graphsynth.scenes.tables import suggest
+
+    if key not in _TOLERANCES:
+        raise (context.scene.place / "mechanism" / "tolerances").error(
+            f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}"
+        )
+    return _TOLERANCES[key][0]
+
+
+def _tolerance(context: Context, key: str, size: Any) -> tuple[Fraction, Fraction]:
+    """Read an absolute tolerance, or a relative one such as ``"1 %"``."""
+    text = str(size).strip() if isinstance(size, str | int | float) and not isinstance(size, bool) else "?"
+    try:
+        number = Fraction(text.removesuffix("%").strip())
+    except (ValueError, ZeroDivisionError):
+        number = Fraction(-1)
+    if number < 0:
+        raise (context.scene.place / "mechanism" / "tolerances").error(
+            f'has {key} = {size!r}; give a tolerance of zero or more, as in 0.005, or relative, as in "1 %"'
+        )
+    return (Fraction(0), number / 100) if text.endswith("%") else (number, Fraction(0))
+
+
 def jamming(context: Context, motions: tuple[Attempt, ...]) -> tuple[Attempt, ...]:
-    """Assess the bearing of every moved candidate by the closed form, under condition A and condition B."""
+    """Prove what the bearing of every moved candidate does, under condition A and condition B, for all tolerances."""
     from graphsynth.jamming.assess import assess_jamming
     from graphsynth.jamming.bearing import Bearing
 
-    table = _table(context)
+    table, box = _table(context), tolerance_box(context)
     bearing = Bearing(table.bearing.radius_mm, table.bearing.height_mm, table.bearing.clearance_mm)
 
-    def assess(motion: LambdaMotion) -> dict[Literal["A", "B"], JammingReport]:
-        return {c: assess_jamming(motion.linkage, bearing, c, motion.tilted.f) for c in _CONDITIONS}
+    def assess(motion: LambdaMotion) -> dict[_C, JammingReport]:
+        return {c: assess_jamming(motion.linkage, bearing, c, motion.tilted.f, box=box) for c in _CONDITIONS}
 
     return each(motions, assess)
 
@@ -103,45 +191,153 @@ def judge(
     """Give one record per candidate and the tables of the first one assessed."""
     condition = _table(context).bearing.condition
 
-    def verdict(reports: dict[Literal["A", "B"], JammingReport]) -> tuple[str, bool, tuple[Quantity, ...]]:
+    limits: dict[_C, dict[str, CertifiedLimit]] = {}
+
+    def verdict(reports: dict[_C, JammingReport]) -> tuple[str, bool, tuple[Quantity, ...]]:
         report = reports[condition]
-        return f"{report.verdict.value}, condition {condition}", report.verdict.is_free, _margins(report)
+        limits.update({c: _limits(context, c) for c in _CONDITIONS})
+        margins = _margins(report, limits[condition], _nominal(context, condition))
+        return f"{report.verdict.value}, condition {condition}", report.verdict.is_free, margins
 
     records = records_of(recognised, assessments, verdict)
     done = next((a for a in assessments if not a.failed), None)
     if done is None:
         return records, ()
     motion = next(m.value for m in motions if m.candidate.number == done.candidate.number)
-    return records, (_motion_table(motion), _jam_table(done.value))
+    proved = _proof_table(context, done.value, limits)
+    return records, (_motion_table(motion), _jam_table(context, done.value, limits), proved, _fit_table(context))
 
 
-def _margins(report: JammingReport) -> tuple[Quantity, ...]:
-    """Margins of one bearing; the closed forms carry no error bound in floating point."""
-    values = [
-        ("least clearance over the turn", -report.worst_gap, "mm"),
-        ("largest tilt", report.largest_tilt, "rad"),
-        ("critical tilt", report.critical_tilt, "rad"),
-        ("jammed part of the turn", sum(arc.length for arc in report.arcs.arcs) / math.tau, ""),
-        ("smallest clearance", report.smallest_clearance.value if report.smallest_clearance else None, "mm"),
-        ("largest axis tilt", report.largest_misalignment.value if report.largest_misalignment else None, "rad"),
+def _nominal(context: Context, condition: _C) -> JamCertificate:
+    """Return what is proved about the dimensions without their tolerances."""
+    from graphsynth.jamming.certify import certify_jamming
+
+    return certify_jamming(tolerance_box(context, tolerances=False), condition)
+
+
+def _limits(context: Context, condition: _C) -> dict[str, CertifiedLimit]:
+    """Bracket the smallest clearance and the largest tilt of the axis, for the dimensions without tolerances."""
+    from graphsynth.jamming.certified_limits import certified_largest_misalignment, certified_smallest_clearance
+
+    box = tolerance_box(context, tolerances=False)
+    return {
+        "smallest clearance": certified_smallest_clearance(box, condition),
+        "largest axis tilt": certified_largest_misalignment(box, condition),
+    }
+
+
+def _margins(
+    report: JammingReport, limits: Mapping[str, CertifiedLimit], proved: JamCertificate
+) -> tuple[Quantity, ...]:
+    """Margins of the nominal dimensions, each with the proved bound of its error where there is one."""
+    part = sum(arc.length for arc in report.arcs.arcs) / math.tau
+    values: list[tuple[str, float | None, str, tuple[float | None, float | None]]] = [
+        ("least clearance over the turn", -report.worst_gap, "mm", proved.clearance_left),
+        ("largest tilt", report.largest_tilt, "rad", proved.largest_tilt),
+        ("critical tilt", report.critical_tilt, "rad", proved.critical_tilt),
+        ("jammed part of the turn", part, "", (None, None)),
     ]
-    return tuple(Quantity(name, value, unit) for name, value, unit in values if value is not None)
+    names = (
+        ("smallest clearance", report.smallest_clearance, "mm"),
+        ("largest axis tilt", report.largest_misalignment, "rad"),
+    )
+    for name, limit, unit in names:
+        values.append((name, limit.value if limit else None, unit, (limits[name].works, limits[name].fails)))
+    return tuple(_quantity(name, value, unit, ends) for name, value, unit, ends in values if value is not None)
 
 
-def _jam_table(reports: dict[Literal["A", "B"], JammingReport]) -> Table:
+def _quantity(name: str, value: float, unit: str, ends: tuple[float | None, float | None]) -> Quantity:
+    """Return a value with the bound of its error from two proved ends; estimated without them."""
+    a, b = ends
+    if a is None or b is None or not (math.isfinite(a) and math.isfinite(b)):
+        return Quantity(name, value, unit)
+    error = max(abs(Fraction(value) - Fraction(a)), abs(Fraction(value) - Fraction(b)))
+    return Quantity(name, value, unit, "certified", math.nextafter(float(error), math.inf) if error else 0.0)
+
+
+def _proof_table(
+    context: Context, reports: dict[_C, JammingReport], limits: dict[_C, dict[str, CertifiedLimit]]
+) -> Table:
+    """State what is proved for the tolerance box, condition by condition."""
+    found = {c: r.certificate for c, r in reports.items() if r.certificate}
+    rows: list[tuple[str, ...]] = [("statement", *(f.statement for f in found.values()))]
+    if not tolerance_box(context).is_point:
+        rows.append(("without tolerances", *(_nominal(context, c).statement for c in found)))
+    rows += [
+        ("largest gap, mm", *(_bounds(f.largest_gap.lo, f.largest_gap.hi) for f in found.values())),
+        ("jams for certain", *(_spans(f.arcs.inner) for f in found.values())),
+        ("free for certain", *(_spans(f.arcs.free) for f in found.values())),
+        ("neither is proved", *(_total(f.arcs.undecided) for f in found.values())),
+        ("assembled", *(f.assembles for f in found.values())),
+    ]
+    for name in ("smallest clearance", "largest axis tilt"):
+        rows.append((f"{name}: works, fails", *(_works(limits[c][name]) for c in found)))
+    box = tolerance_box(context)
+    ranges = ", ".join(f"{name} {value}" for name, value in box.describe().items() if not box[name].is_point)
+    given = "exact decimals" if box.exact_input else "some inputs are rounded numbers"
+    note = f"Certified with outward rounding; {given}. "
+    note += f"Ranges: {ranges}." if ranges else "No tolerances are given."
+    return Table("What is proved about the bearing", ("", *(f"condition {c}" for c in found)), tuple(rows), note)
+
+
+def _fit_table(context: Context) -> Table:
+    """Judge standard fits for the tilt and the dimensions of the scene."""
+    from graphsynth.errors import GeometryError
+    from graphsynth.jamming.fits import assess_fits
+
+    box, bearing = tolerance_box(context), _table(context).bearing
+    columns = ("fit", "radial clearance [mm]", "verdict", "clearance left for the worst pair [mm]")
+    note = f"Certified for all parts: diameter {2 * bearing.radius_mm:g} mm, condition {bearing.condition}."
+    try:
+        found = assess_fits(box, bearing.condition, diameter=Fraction(repr(2 * bearing.radius_mm)))
+    except GeometryError as error:
+        return Table("Standard fits (ISO 286)", columns, (), f"Not judged: {error}")
+    rows = tuple((f.fit.name, str(f.fit.clearance), f.words, f"{f.clearance_left:+.5f}") for f in found)
+    return Table("Standard fits (ISO 286)", columns, rows, note)
+
+
+def _bounds(low: float, high: float) -> str:
+    from graphsynth.intervals.reading import decimal_outward
+
+    return f"[{decimal_outward(low, -1, 10)}, {decimal_outward(high, 1, 10)}]"
+
+
+def _spans(spans: tuple[Span, ...]) -> str:
+    """Spans in degrees, rounded into their inside."""
+    if any(span.length >= math.tau for span in spans):
+        return "the whole turn"
+    ends = [span.degrees() for span in spans]
+    texts = [f"{math.ceil(a * 1e8 + 1.0) / 1e8:.8f}° to {math.floor(b * 1e8 - 1.0) / 1e8:.8f}°" for a, b in ends]
+    return ", ".join(texts) or "nowhere"
+
+
+def _total(spans: tuple[Span, ...]) -> str:
+    total = sum(span.length for span in spans)
+    return f"{math.degrees(total):.2g}° in {len(spans)} pieces" if spans else "nowhere"
+
+
+def _works(limit: CertifiedLimit) -> str:
+    if limit.works is None or limit.fails is None:
+        return limit.reason
+    return f"{limit.works!r}, {limit.fails!r} {limit.unit}"
+
+
+def _jam_table(
+    context: Context, reports: dict[_C, JammingReport], limits: dict[_C, dict[str, CertifiedLimit]]
+) -> Table:
     """Lay the two contact conditions side by side."""
-    margins = {c: {q.name: q.text for q in _margins(r)} for c, r in reports.items()}
+    margins = {c: {q.name: q.text for q in _margins(r, limits[c], _nominal(context, c))} for c, r in reports.items()}
     names = dict.fromkeys(name for values in margins.values() for name in values)
     rows = [("verdict", *(r.verdict.value for r in reports.values()))]
     arcs = max(len(r.arcs.arcs) for r in reports.values())
     rows += [(f"jam arc {i + 1}", *(_arc_text(r, i) for r in reports.values())) for i in range(arcs)]
     rows += [(name, *(values.get(name, "no limit") for values in margins.values())) for name in names]
-    method = next(iter(reports.values())).method
     columns = ("", *(f"condition {c} ({_CONDITIONS[c]})" for c in reports))
-    return Table("Jamming of the bearing at B", columns, tuple(rows), f"How had: {method}.")
+    note = "Verdict certified; arcs and numbers are the nominal ones, their proved bounds stand in the next table."
+    return Table("Jamming of the bearing at B", columns, tuple(rows), note)
 
 
-_CONDITIONS: dict[Literal["A", "B"], str] = {"A": "short bearing in a long hole", "B": "long shaft in a short hole"}
+_CONDITIONS: dict[_C, str] = {"A": "short bearing in a long hole", "B": "long shaft in a short hole"}
 
 
 def _arc_text(report: JammingReport, i: int) -> str:

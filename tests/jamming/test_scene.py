@@ -1,0 +1,81 @@
+"""The jamming stage of the lambda scene: exact decimals, tolerances, tables that say what is proved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction as F
+
+import pytest
+
+from graphsynth.errors import SceneError
+from graphsynth.jamming import Verdict
+from graphsynth.scenes.runner import execute
+from graphsynth.scenes.scene import LambdaTable, OutputsTable, load_scene
+from graphsynth.scenes.stages import Context
+from graphsynth.scenes.steps.four_bar import tolerance_box
+
+EXAMPLE = {  # specification 10.3
+    "crank": "1e-2 %", "coupler": "1e-2 %", "alpha_rad": "1e-2 %", "azimuth_rad": 0.05, "radius_mm": 0.005,
+    "height_mm": 0.05, "clearance_mm": 0.003,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Toleranced(LambdaTable):
+    tolerances: Mapping[str, object] = field(default_factory=dict)
+
+
+def scene(tolerances=None, **mechanism):
+    shipped = load_scene("lambda")
+    if tolerances is not None:
+        values = {f.name: getattr(shipped.mechanism, f.name) for f in fields(shipped.mechanism)}
+        values["tolerances"] = tolerances
+        shipped = replace(shipped, mechanism=Toleranced(**values))
+    return replace(shipped, mechanism=replace(shipped.mechanism, **mechanism))
+
+
+def test_numbers_of_the_file_are_decimals():
+    box = tolerance_box(Context(scene()), tolerances=False)
+    assert box.exact_input and box.is_point
+    assert (box["clearance"].lower, box["alpha"].lower, box["l3"].lower) == (F(3, 100), F(1, 30), F(5, 2))
+
+
+def test_a_dimension_changed_after_reading_is_the_double_it_is():
+    changed = scene()
+    changed = replace(
+        changed, mechanism=replace(changed.mechanism, bearing=replace(changed.mechanism.bearing, clearance_mm=0.07))
+    )
+    box = tolerance_box(Context(changed), tolerances=False)
+    assert box["clearance"].lower == F(0.07) and not box.exact_input
+
+
+def test_the_tolerances_of_a_scene():
+    box = tolerance_box(Context(scene(EXAMPLE)))
+    assert (box["clearance"].lower, box["clearance"].upper) == (F(27, 1000), F(33, 1000))
+    assert (box["l3"].lower, box["l3"].upper) == (F("2.49975"), F("2.50025"))
+    assert (box["azimuth"].lower, box["Hb"].upper, box["l1"].is_point) == (F(-1, 20), F("10.05"), True)
+    for bad, words in [({"crnk": 1}, "crank"), ({"crank": -1}, "zero or more"), ({"crank": "x %"}, "zero or more"),
+                       ({"crank": True}, "zero or more")]:  # fmt: skip
+        with pytest.raises(SceneError, match=words):
+            tolerance_box(Context(scene(bad)))
+
+
+def test_the_report_says_what_is_proved():
+    wanted = replace(scene(EXAMPLE), outputs=OutputsTable(("records", "tables", "assessments")))
+    report = execute(wanted)
+    (record,) = report["records"]
+    assert record.good is False and "for all parameters given (certified)" in record.verdict
+    assert {m.name: m.guarantee for m in record.margins}["largest axis tilt"] == "certified"
+    assert all(m.error < 1e-15 for m in record.margins if m.guarantee == "certified")
+    (attempt,) = report["assessments"]
+    certificate = attempt.value["A"].certificate
+    assert certificate.verdict is Verdict.CERTIFIED_JAMMED
+    assert certificate.largest_gap.lo > 0.0384521525 and certificate.smallest_worst_gap.lo > 0.0317465
+    tables = {t.title: t for t in report["tables"]}
+    proof = {row[0]: row[1:] for row in tables["What is proved about the bearing"].rows}
+    assert proof["statement"][0].startswith("proved: every bearing of the tolerance box jams")
+    assert proof["without tolerances"][0].startswith("proved: the bearing jams")
+    assert "clearance [0.027, 0.033]" in tables["What is proved about the bearing"].note
+    fits = {row[0]: row[2] for row in tables["Standard fits (ISO 286)"].rows}
+    assert (fits["H7/g6"], fits["H11/b11"]) == ("every pair jams", "every pair is free")
