@@ -47,7 +47,7 @@ def factorise(M, order):
         if not abs(M[best, k]) > 0.0:
             return False
         if best != k:
-            for j in range(m):
+            for j in range(k, m):
                 M[k, j], M[best, j] = M[best, j], M[k, j]
         for i in range(k + 1, m):
             M[i, k] /= M[k, k]
