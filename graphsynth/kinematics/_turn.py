@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite, whole
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage, Straightness
@@ -136,7 +137,8 @@ def straightness(linkage: LambdaLinkage, start: float, stop: float, samples: int
 
     from graphsynth.kinematics.lambda_linkage import Straightness
 
-    f = np.linspace(start, stop, samples)
+    start, stop = finite("start", start), finite("stop", stop)
+    f = np.linspace(start, stop, whole("samples", samples, 2))
     path = linkage.positions(f)
     if not path.assembled.all():
         raise GeometryError(

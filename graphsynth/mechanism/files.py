@@ -202,7 +202,8 @@ def _driver(value: Any, place: str) -> Driver:
         try:
             law = _build(lambda: made(**parts), f"{place}.law")
         except TypeError as error:  # a table law without its values
-            raise FormatError(str(error), f"{place}.law") from error
+            needed = ", ".join(item.name for item in fields(made))
+            raise FormatError(f"a law of this kind needs {needed}", f"{place}.law") from error
     return _build(lambda: Driver(table["base"], table["link"], law), place)
 
 

@@ -103,8 +103,10 @@ class Mechanism:
     pose: tuple[Pose, ...] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", _ordered(self.graph, tuple(self.joints)))
-        object.__setattr__(self, "drivers", self._checked_drivers(tuple(self.drivers)))
+        object.__setattr__(self, "joints", _ordered(self.graph, _sequence("joints", self.joints)))
+        object.__setattr__(self, "drivers", self._checked_drivers(_sequence("drivers", self.drivers)))
+        if not isinstance(self.points, Mapping):
+            raise GeometryError(f"points = {self.points!r} is not a mapping of names to (link, (x, y))")
         object.__setattr__(self, "points", {name: self._checked_point(name, p) for name, p in self.points.items()})
         if self.pose is not None:
             object.__setattr__(self, "pose", self._checked_pose(self.pose))
@@ -117,6 +119,8 @@ class Mechanism:
         seen: set[tuple[int, int]] = set()
         by_pair = {joint.pair: joint for joint in self.joints}
         for driver in drivers:
+            if not isinstance(driver, Driver):
+                raise GeometryError(f"{driver!r} is not a Driver; give Driver(base, link)")
             joint = by_pair.get(driver.pair)
             if joint is None:
                 raise GeometryError(
@@ -144,7 +148,10 @@ class Mechanism:
         return TracePoint(link, point(f"point {name}", at))
 
     def _checked_pose(self, pose: Iterable[Iterable[float]]) -> tuple[Pose, ...]:
-        rows = [tuple(finite(f"pose of link {k}", v) for v in row) for k, row in enumerate(pose)]
+        try:
+            rows = [tuple(finite(f"pose of link {k}", v) for v in row) for k, row in enumerate(pose)]
+        except TypeError as error:
+            raise GeometryError(f"pose = {pose!r} is not a list of (x, y, theta)") from error
         if len(rows) != self.graph.links or any(len(row) != 3 for row in rows):
             raise GeometryError(f"pose must give (x, y, theta) for each of the {self.graph.links} links")
         if rows[self.frame] != (0.0, 0.0, 0.0):
@@ -215,6 +222,13 @@ class Mechanism:
         from graphsynth.mechanism.files import from_toml
 
         return from_toml(text)
+
+
+def _sequence(name: str, values: Any) -> tuple[Any, ...]:
+    try:
+        return tuple(values)
+    except TypeError as error:
+        raise GeometryError(f"{name} = {values!r} is not a sequence; give a list of {name}") from error
 
 
 def _ordered(graph: MechanismGraph, joints: tuple[JointGeometry, ...]) -> tuple[JointGeometry, ...]:

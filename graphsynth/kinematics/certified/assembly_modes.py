@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import three
 from graphsynth.kinematics.certified.exact_modes import exact_roots, parallel_positions, self_motion
 from graphsynth.kinematics.certified.extra import need_flint, precision
 from graphsynth.kinematics.certified.numbers import Gaussian, ball, complex_ball, gaussian, rational
@@ -202,24 +203,19 @@ def certify_direct(
     2
     """
     need_flint()
-    if len(theta) != 3:
-        raise GeometryError(f"theta has {len(theta)} entries; give three angles")
-    angles = [rational(f"theta of leg {k}", value) for k, value in enumerate(theta, 1)]
+    angles = [rational(f"theta of leg {k}", value) for k, value in enumerate(three("theta", theta), 1)]
     arms = ([gaussian("D", v) for v in platform.D], [rational("l1", v) for v in platform.l1], angles)
     problem = _Problem(_points("b", platform.b), _lengths(platform.l2), [], arms)
     return _certify(problem, max_bits, cross_check)
 
 
 def _points(name: str, values: Sequence[Any]) -> list[Any]:
-    if len(values) != 3:
-        raise GeometryError(f"{name} has {len(values)} entries; give three points")
     acb = need_flint().acb
-    return [v if isinstance(v, acb) else gaussian(f"{name} {k}", v) for k, v in enumerate(values, 1)]
+    return [v if isinstance(v, acb) else gaussian(f"{name} {k}", v) for k, v in enumerate(three(name, values), 1)]
 
 
 def _lengths(values: Sequence[Any]) -> list[Any]:
-    if len(values) != 3:
-        raise GeometryError(f"lengths has {len(values)} entries; give three")
+    values = three("lengths", values)
     arb = need_flint().arb
     found = [v if isinstance(v, arb) else rational(f"length of leg {k}", v) for k, v in enumerate(values, 1)]
     for k, value in enumerate(found, 1):

@@ -147,6 +147,8 @@ def certify_full_turn(
     begin = perf_counter()
     need_flint()
     check_rounding()
+    if not isinstance(mechanism, SingleMotorPlatform):
+        raise GeometryError(f"{type(mechanism).__name__} is not a SingleMotorPlatform; certify proves other motions")
     kinds = [turn.kind for turn in mechanism.drive_turns()]
     drives = (kinds[0], kinds[1], kinds[2])
     for verdict, bad in (

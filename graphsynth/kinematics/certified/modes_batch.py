@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import triples
 from graphsynth.kinematics.certified.balls import TINY, UP, Balls, check_rounding, exact, tau_times, unit
 from graphsynth.kinematics.certified.extra import need_flint
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
@@ -139,8 +140,8 @@ def certify_direct_batch(platform: ParallelPlatform, theta: ArrayLike) -> Assemb
     >>> certify_direct_batch(ParallelPlatform.g1(), [[0.0, 0.0, 0.0], [1.82, -2.64, -0.16]]).counts
     array([2, 2])
     """
-    angles = np.atleast_2d(np.asarray(theta, dtype=np.float64))
-    if angles.ndim != 2 or angles.shape[1] != 3 or not np.isfinite(angles).all():
+    angles = np.atleast_2d(triples("theta", theta))
+    if angles.ndim != 2:
         raise GeometryError(f"theta has shape {angles.shape}; give three finite angles for each problem")
     anchors = exact(np.array(platform.D)) + exact(np.array(platform.l1)) * unit(exact(angles))
     return _batch(anchors, platform.b, platform.l2, (platform, angles))

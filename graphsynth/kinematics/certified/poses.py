@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import positive, whole
 from graphsynth.kinematics.certified.balls import Balls, check_rounding, exact, tau_times
 from graphsynth.kinematics.certified.cover import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
 from graphsynth.kinematics.certified.equations import MechanismSystem
 from graphsynth.kinematics.certified.extra import need_flint
 from graphsynth.kinematics.certified.laws import enclosed, whole_periods
+from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.joints import Gear, Prismatic
-
-if TYPE_CHECKING:
-    from graphsynth.kinematics.engine.result import Motion
 
 __all__ = ["MotionCertificate", "Verdict", "certify"]
 
@@ -135,7 +134,9 @@ def certify(
     >>> proof.certified, proof.closed, bool(proof.position_radius.max() < 1e-12)
     (True, True, True)
     """
-    return _certify(motion, between, Budget(max_boxes, seconds))
+    if not isinstance(motion, Motion):
+        raise GeometryError(f"{type(motion).__name__} is not a motion of graphsynth.simulate; give one")
+    return _certify(motion, between, Budget(whole("max_boxes", max_boxes, 1, 10**9), positive("seconds", seconds)))
 
 
 def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate:
@@ -245,8 +246,8 @@ def _certificate(
     n = len(motion.inputs)
     position, angle, room = (np.full(n, np.nan) for _ in range(3))
     poses, intervals = np.zeros(n, dtype=bool), np.zeros(max(n - 1, 0), dtype=bool)
-    for whole, part in zip((position, angle, room), radii):
-        whole[asked] = part
+    for target, part in zip((position, angle, room), radii):
+        target[asked] = part
     poses[asked] = proved
     intervals[: len(found.covered)] = found.covered & proved[:-1] & proved[1:]
     reason = _reason(motion, between, poses, intervals, found)

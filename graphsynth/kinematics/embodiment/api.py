@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.errors import GeometryError, GraphError
+from graphsynth.kinematics._checks import positive
 from graphsynth.kinematics.embodiment.choice import Drivers, choices
 from graphsynth.kinematics.embodiment.design import Design
 from graphsynth.kinematics.embodiment.dimension import dimensioned
@@ -212,14 +213,16 @@ def _check(graph: MechanismGraph, goals: Goals, seed: int, tries: int, seconds: 
         raise GeometryError(f"seed = {seed!r} must be a whole number, 0 or more")
     if isinstance(tries, bool) or not isinstance(tries, int) or tries < 1:
         raise GeometryError(f"tries = {tries!r} must be a whole number, 1 or more")
-    if not seconds > 0.0:
-        raise GeometryError(f"seconds = {seconds!r} must be positive")
+    if seconds != math.inf:
+        positive("seconds", seconds)
 
 
 def _kinds(
     graph: MechanismGraph, inversion: MechanismGraph, joints: Mapping[tuple[int, int], str] | None
 ) -> tuple[str, ...]:
     """Kinds of the joints of an inversion, from those of the graph given."""
+    if joints is not None and not isinstance(joints, Mapping):
+        raise GeometryError(f"joints = {joints!r} is not a mapping of (a, b) to a kind, as in {{(0, 1): 'P'}}")
     given = {(min(pair), max(pair)): kind for pair, kind in (joints or {}).items()}
     allowed = {1: ("R", "P"), 2: ("pin-slot",)}
     kinds = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,13 @@ def _numbers(name: str, values: Iterable[float], least: int) -> tuple[float, ...
     if len(found) < least:
         raise GeometryError(f"{name} has {len(found)} entries; give at least {least}")
     return found
+
+
+def _listed(name: str, values: Any) -> tuple[Any, ...]:
+    try:
+        return tuple(values)
+    except TypeError as error:
+        raise GeometryError(f"{name} = {values!r} is not a list; give one") from error
 
 
 def _rising(name: str, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -97,7 +104,7 @@ class PathGoal:
     tolerance: float = 0.01
 
     def __post_init__(self) -> None:
-        places = tuple(point(f"points[{k}]", p) for k, p in enumerate(self.points))
+        places = tuple(point(f"points[{k}]", p) for k, p in enumerate(_listed("points", self.points)))
         if len(places) < 3 or len(set(places)) < 2:
             raise GeometryError(f"a path needs three or more points that do not all coincide; it has {len(places)}")
         object.__setattr__(self, "points", places)
@@ -129,7 +136,7 @@ class PosesGoal:
     tolerance: float = 0.01
 
     def __post_init__(self) -> None:
-        rows = tuple(_numbers(f"poses[{k}]", pose, 3) for k, pose in enumerate(self.poses))
+        rows = tuple(_numbers(f"poses[{k}]", pose, 3) for k, pose in enumerate(_listed("poses", self.poses)))
         if len(rows) < 3 or any(len(row) != 3 for row in rows):
             raise GeometryError("a poses goal needs three or more poses (x, y, theta)")
         object.__setattr__(self, "poses", rows)

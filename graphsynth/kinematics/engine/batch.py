@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +17,7 @@ from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, sign_table
 from graphsynth.mechanism.checks import link_number
 from graphsynth.mechanism.joints import COLUMNS, Gear
-
-if TYPE_CHECKING:
-    from graphsynth.mechanism.model import Mechanism
+from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["BatchMotion", "simulate_batch"]
 
@@ -159,6 +156,8 @@ def simulate_batch(
     [True, True, False]
     """
     u = monotonic(inputs)
+    if not isinstance(mechanism, Mechanism):
+        raise GeometryError(f"{type(mechanism).__name__} is not a Mechanism; give one")
     sizes = np.ascontiguousarray(finite_array("dimensions", dimensions))
     if sizes.ndim != 3 or sizes.shape[1:] != mechanism.dimensions.shape:
         raise GeometryError(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
 
 __all__ = ["solve_rrr"]
 
@@ -46,12 +47,12 @@ def solve_rrr(A: ArrayLike, B: ArrayLike, l1: ArrayLike, l2: ArrayLike, sign: in
 
     if sign not in (1, -1):
         raise GeometryError(f"sign = {sign!r} must be +1 or -1")
-    first, second = (np.ascontiguousarray(points, dtype=np.float64) for points in (A, B))
+    first, second = (np.ascontiguousarray(finite_array(name, points)) for name, points in (("A", A), ("B", B)))
     if first.ndim != 2 or first.shape[1] != 2 or first.shape != second.shape:
         raise GeometryError(f"A and B have shapes {first.shape} and {second.shape}; give (n, 2) twice")
     lengths = []
     for name, given in (("l1", l1), ("l2", l2)):
-        values = np.asarray(given, dtype=np.float64)
+        values = finite_array(name, given)
         if values.shape not in ((), (1,), (len(first),)) or not (values > 0.0).all():
             raise GeometryError(f"{name} must be one positive length or one for each of the {len(first)} dyads")
         lengths.append(np.ascontiguousarray(np.atleast_1d(values)))

@@ -114,6 +114,8 @@ def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Pr
     GeometryError
         If the drivers do not fit the mobility, or a group can have no definite place with these joint kinds.
     """
+    if not isinstance(mechanism, Mechanism):
+        raise GeometryError(f"{type(mechanism).__name__} is not a Mechanism; give one")
     try:
         found = decompose(mechanism.graph, [driver.pair for driver in mechanism.drivers])
     except GraphError as error:
