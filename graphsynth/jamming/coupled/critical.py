@@ -25,8 +25,7 @@ def critical_range(
     sense = 1 if condition == "A" else -1
     least = _tilt(radius[::sense][0], height[1], clearance[0], condition)
     most = _tilt(radius[::sense][1], height[0], clearance[1], condition)
-    low, high = float(least.lo), float(most.hi)
-    return min(low, nominal), max(high, nominal)
+    return min(least[0], nominal), max(most[1], nominal)
 
 
 def _around(name: str, value: float, tolerance: float) -> tuple[Fraction, Fraction]:
@@ -36,20 +35,22 @@ def _around(name: str, value: float, tolerance: float) -> tuple[Fraction, Fracti
     return low, high
 
 
-def _tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> Interval:
+def _tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> tuple[float, float]:
     """``2 arctan(c / (h + w))`` of section 4.7; infinite where there is no critical tilt (exact decision)."""
     h = H / 2
     room = h * h - c * (2 * R + c) if condition == "A" else h * h + c * (2 * R + c)
     if condition == "A" and (room <= 0 or h == 0):
-        return Interval.from_bounds(math.inf, math.inf)
+        return math.inf, math.inf
     divisor = Interval(h) + Interval(room).sqrt()
     if c == 0:
-        return Interval(0)
+        return 0.0, 0.0
     q = Interval(c) / divisor
     cube = q * q * q
     # alternating series with falling terms for q <= 1: q - q^3/3 <= arctan q <= q - q^3/3 + q^5/5
     if float(q.hi) <= 1e-3:
-        return 2 * (q - cube / 3 + Interval.from_bounds(0.0, 1.0) * (cube * q * q) / 5)
-    from graphsynth.intervals import atan
+        angle = q - cube / 3 + Interval.from_bounds(0.0, 1.0) * (cube * q * q) / 5
+    else:
+        from graphsynth.intervals import atan
 
-    return 2 * atan(q)
+        angle = atan(q)
+    return float((2 * angle).lo), float((2 * angle).hi)

@@ -184,8 +184,8 @@ def _points(values: Array) -> Interval:
 def _enclosed_solve(matrix: Interval, right: Interval) -> tuple[Interval, Mask]:
     """Enclose the solutions of N systems (N, k, k) for all members; False where a matrix may be singular.
 
-    With C near the inverse of the midpoint, ``x - x0 = C (b - A x0) + (1 - C A)(x - x0)``; the norm of the last matrix
-    below 1 bounds ``x - x0`` and proves every A regular (Rump 1980).
+    With C near the inverse of the midpoint, ``x - x0 = C (b - A x0) + (1 - C A)(x - x0)``; a weighted norm of the last
+    matrix below 1 bounds ``x - x0`` and proves every A regular (Rump 1980).
     """
     k = matrix.shape[-1]
     middle = np.where(np.isfinite(matrix.mid), matrix.mid, 0.0)
@@ -197,14 +197,36 @@ def _enclosed_solve(matrix: Interval, right: Interval) -> tuple[Interval, Mask]:
     first = (C * residual.reshape(len(residual), 1, k)).sum(-1).mag
     product = (C.reshape(-1, k, k, 1) * matrix.reshape(-1, 1, k, k)).sum(2)
     rest = _points(np.eye(k)) - product
-    rows = Interval.from_bounds(np.zeros_like(rest.mag), rest.mag).sum(-1).hi
-    norm, largest = rows.max(axis=1), first.max(axis=1)
-    fine = np.isfinite(norm) & (norm < 1.0) & np.isfinite(largest)
+    size = np.where(np.isfinite(rest.mag), rest.mag, 1.0)
+    first = np.where(np.isfinite(first), first, np.inf)
+    weight = _weights(size, first)
+    with np.errstate(all="ignore"):
+        norm = (_nonnegative(size, weight) / _points(weight)).hi.max(axis=1)
+        largest = (_points(first) / _points(weight)).hi.max(axis=1)
+        fine = np.isfinite(rest.mag).all(axis=(1, 2)) & (norm < 1.0) & np.isfinite(largest)
     norm, largest = np.where(fine, norm, 0.0), np.where(fine, largest, 0.0)
     bound = _points(largest) / (1 - _points(norm))
-    spread = (_points(np.where(fine[:, None], first, 0.0)) + _points(rows * fine[:, None]) * bound.reshape(-1, 1)).hi
+    spread = (_points(weight) * bound.reshape(-1, 1)).hi
+    first = np.where(fine[:, None], first, 0.0)
+    for _ in range(3):  # any solution obeys |x - x0| <= first + |rest| |x - x0|
+        spread = np.minimum(spread, (_points(first) + _nonnegative(size, spread)).hi)
     around = Interval.from_bounds(-spread, spread)
     return around + _points(start), np.asarray(fine)
+
+
+def _weights(size: Array, first: Array) -> Array:
+    """Positive weights near the fixed point of ``w = first + size w``; any positive numbers give valid bounds."""
+    start = np.where(np.isfinite(first), first, 1.0)
+    start = start + 1e-3 * start.max(axis=1, keepdims=True) + 1e-300
+    weight = start
+    for _ in range(6):
+        weight = start + (size @ weight[:, :, None])[..., 0]
+    return np.asarray(np.where(np.isfinite(weight), weight, 1.0))
+
+
+def _nonnegative(matrix: Array, vector: Array) -> Interval:
+    """Product of nonnegative numbers, enclosed."""
+    return (_points(matrix) * _points(vector[:, None])).sum(-1)
 
 
 def _upper(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float) -> Array:

@@ -118,15 +118,17 @@ class Work:
             return True
         inputs, back = np.unique(np.concatenate([[self.low], edges]), return_inverse=True)
         found = simulate(self.given.mechanism, inputs, start=self.start, events=False)
-        if not found.assembled.all() or not np.isfinite(found.velocities).all():
+        if not found.assembled.all():
             return False
-        poses = found.poses[back[1:]]
-        x, rate = self.system.coordinates(poses, found.velocities[back[1:]])
-        u = Interval.from_bounds(edges, edges)
-        points = prove_tubes(self.system, (), u, x, rate, self.system.count(poses))
+        poses, velocities = found.poses[back[1:]], found.velocities[back[1:]]
+        if not np.isfinite(velocities).all():
+            return False
+        x, rate = self.system.coordinates(poses, velocities)
+        counted, u = self.system.count(poses), Interval.from_bounds(edges, edges)
+        points = prove_tubes(self.system, (), u, x, rate, counted)
         before = Interval.from_bounds(pieces.box_lo[:-1], pieces.box_hi[:-1])
         after = Interval.from_bounds(pieces.box_lo[1:], pieces.box_hi[1:])
-        return bool(linked(points, before, after).all())
+        return bool(linked(self.system, points, u, before, after, counted).all())
 
 
 def cut(lo: Array, hi: Array) -> tuple[Array, Array]:

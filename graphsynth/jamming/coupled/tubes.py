@@ -3,7 +3,7 @@
 Krawczyk's test (`graphsynth.intervals.image`) on the closing equations of `Positions`, with the input and the
 dimensions as interval parameters: UNIQUE says that for every input of a piece, and every choice of dimensions,
 exactly one assembly lies in the box.  The branch is proved where, at the input shared by two pieces, the one assembly
-of a point box lies in the boxes of both.
+of a point box lies in the boxes of both, or the hull of both holds exactly one.
 """
 
 from __future__ import annotations
@@ -97,11 +97,17 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, ra
         bad = ~good & result.image.is_bounded.all(axis=1)
         wider = result.image[bad].hull(box[bad]).inflate(0.2, 1e-12)
         low[left[bad]], high[left[bad]] = wider.lo, wider.hi
-        # a box much wider than the motion says that the piece is too long: give up, it will be cut
-        fits = (wider.rad < 1e3 * radius[left[bad]]).all(axis=1)
+        # a box of half the size of the mechanism says that the piece is too long: give up, it will be cut
+        fits = (wider.rad < np.maximum(radius[left[bad]], 0.5 * system.weights)).all(axis=1)
         left = left[bad][fits]
     if size == 0:
         proved[:] = True
+    else:  # more room around the solution, so that neighbours can be linked
+        rows = np.flatnonzero(proved)
+        box = Interval.from_bounds(domain_lo[rows], domain_hi[rows]).inflate(0.5)
+        own, turns = [_at(value, rows, count) for value in q], counted[rows]
+        good = image(lambda unknowns: system.equations(unknowns, own, turns), box).status == Status.UNIQUE
+        domain_lo[rows[good]], domain_hi[rows[good]] = box.lo[good], box.hi[good]
     tight = Interval.from_bounds(tight_lo, tight_hi)
     at = system.place([tight[:, k] for k in range(size)], q)
     r, e, base = _places(system, joints, at, count)
@@ -140,7 +146,20 @@ def _places(system: Positions, joints: tuple[int, ...], at: Placement, count: in
     return Interval.stack(r, axis=1), Interval.stack(e, axis=1), Interval.stack(base, axis=1)
 
 
-def linked(points: Tubes, before: Interval, after: Interval) -> Mask:
-    """Whether the assembly of each point box lies in the boxes of the pieces before and after it."""
+def linked(system: Positions, points: Tubes, u: Interval, before: Interval, after: Interval, counted: Array) -> Mask:
+    """Whether neighbouring pieces have the same assembly at the input they share.
+
+    Each box holds exactly one.  It is the same if the one of a point box (``points``, proved at u) lies in both, or if
+    the common hull holds exactly one, for every choice of dimensions.
+    """
     inside = points.tight.subset(before).all(axis=1) & points.tight.subset(after).all(axis=1)
-    return np.asarray(points.proved & inside)
+    found: Mask = np.asarray(points.proved & inside)
+    q, count = system.driven(u), len(before)
+    left = np.flatnonzero(~found)
+    for k in range(0, left.size, _CHUNK):
+        rows = left[k : k + _CHUNK]
+        own, turns = [_at(value, rows, count) for value in q], counted[rows]
+        box = before[rows].hull(after[rows]).inflate(0.05, 1e-13)
+        result = image(lambda unknowns, own=own, turns=turns: system.equations(unknowns, own, turns), box)
+        found[rows] = result.status == Status.UNIQUE
+    return found
