@@ -296,7 +296,7 @@ def test_exact_input_forms_agree() -> None:
     for bad in (math.nan, math.inf, "one", None):
         with pytest.raises(GeometryError, match="finite number"):
             certify_assembly_modes([0, 1, 1j], [0, 1, 1j], [1, 1, bad])
-    with pytest.raises(GeometryError, match="three points"):
+    with pytest.raises(GeometryError, match="anchors has 2 entries"):
         certify_assembly_modes([0, 1], [0, 1, 1j], [1, 1, 1])
     with pytest.raises(GeometryError, match="finite"):
         certify_assembly_modes_batch([[0, 1, np.nan]], [0, 1, 1j], [1, 1, 1])
