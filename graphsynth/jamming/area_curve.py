@@ -1,8 +1,8 @@
 """Areas of interference against the crank angle, enclosed; and what the ordinate of the source's plot was.
 
 The source plots "the part of the ellipse not crossed by the circle" over [90, 450] degrees.  That is the free gap of
-the surrogate ellipse, zero where there is no crossing: it jumps at the onset and falls towards the worst pose.  The true
-interference, `AreaCurve.lid` and `AreaCurve.rim`, does the opposite.  Specification, sections 5.4, 7.2, 13 (14 to 16).
+the surrogate ellipse, zero where there is no crossing: it jumps at the onset and falls towards the worst pose.  The
+true interference, `AreaCurve.lid` and `AreaCurve.rim`, does the opposite.  Specification 5.4, 7.2, 13 (14 to 16).
 """
 
 from __future__ import annotations

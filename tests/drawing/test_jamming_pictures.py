@@ -1,0 +1,106 @@
+"""Pictures of the jammed bearing show what the results say."""
+
+import io
+import math
+
+import numpy as np
+import pytest
+
+from graphsynth.drawing.jamming_pictures import (
+    area_chart,
+    area_picture,
+    crossing_picture,
+    region_picture,
+    section_picture,
+)
+from graphsynth.errors import GeometryError
+from graphsynth.jamming import Bearing
+from graphsynth.jamming.area_curve import area_curve
+from graphsynth.jamming.circle_ellipse import circle_ellipse, exact_hull, krawczyk_boxes
+
+
+def drawn(figure):
+    """Write the figure, which lays it out; warnings are errors."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=40)
+    assert stream.getbuffer().nbytes > 2000
+    return figure
+
+
+def rectangles(axes):
+    return [p.get_bbox() for p in axes.patches if type(p).__name__ == "Rectangle"]
+
+
+def test_boxes_of_the_crossings():
+    problem = circle_ellipse(5, 6, 4, 1, "0.1")
+    boxes = krawczyk_boxes(problem, tolerance=0.05)
+    whole, detail, unrolled = drawn(crossing_picture(problem, boxes)).axes
+    four = exact_hull(problem).four
+    for shown, lo, hi in zip(rectangles(whole), four.lo, four.hi):
+        np.testing.assert_allclose([shown.x0, shown.y0, shown.x1, shown.y1], [*lo, *hi])
+    assert len(rectangles(whole)) == 4
+    assert len(rectangles(detail)) == 1  # the exact hull
+    assert sum(len(c.get_paths()) for c in detail.collections) == len(boxes.boxes)
+    solutions = next(p for p in detail.patches if type(p).__name__ == "Polygon").get_xy()
+    hull = exact_hull(problem).hull
+    np.testing.assert_allclose(solutions.min(axis=0), hull.lo, rtol=1e-12)  # the outline spans its hull
+    np.testing.assert_allclose(solutions.max(axis=0), hull.hi, rtol=1e-12)
+    assert len(unrolled.patches) == 1
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [circle_ellipse(6, 6, 4), circle_ellipse(2, 2, 2), circle_ellipse(7, 6, 4), circle_ellipse(5, 6, 4, 20, "0.8")],
+)  # fmt: skip
+def test_extreme_problems_are_drawn(problem):
+    whole = drawn(crossing_picture(problem, krawczyk_boxes(problem, tolerance=0.1))).axes[0]
+    assert len(rectangles(whole)) == len(exact_hull(problem).four)
+    drawn(region_picture(problem))
+
+
+def test_region_states_its_exaggeration():
+    problem = circle_ellipse("17.5", "17.53", "17.46")
+    assert "× 80" in drawn(region_picture(problem)).axes[0].get_title()
+    assert "× 25" in region_picture(problem, 25).axes[0].get_title()
+    assert "to scale" in region_picture(problem, 1).axes[0].get_title()
+    labels = region_picture(problem).axes[0].get_legend_handles_labels()[1]
+    assert {"ellipse \\ circle: free gap", "circle \\ ellipse: interference"} <= set(labels)
+    with pytest.raises(GeometryError, match="exaggeration = 0"):
+        region_picture(problem, 0)
+
+
+def test_section_without_and_with_jamming():
+    free, jammed = drawn(section_picture(Bearing(), (0.0023, 0.0133312592), ("free", "jammed"), 40.0)).axes
+    assert "free: 0." in free.get_title()
+    assert "jams: 0.0351 mm" in jammed.get_title()
+    marks = [[t.get_text() for t in axes.texts] for axes in (free, jammed)]
+    assert marks == [[], ["overlap", "overlap"]]
+    # the ends of the bearing's wall, scaled back, are where the tilt puts them
+    S, C = math.sin(0.0133312592), math.cos(0.0133312592)
+    wall = next(line for line in jammed.lines if line.get_label() == "bearing")
+    hole = next(line for line in jammed.lines if line.get_label() == "wall of the hole")
+    beyond = (wall.get_xdata()[1] - hole.get_xdata()[0]) / 40.0
+    assert beyond == pytest.approx(17.5 * C + 5 * S - 17.53, rel=1e-9)
+    with pytest.raises(GeometryError, match="tilts is empty"):
+        section_picture(Bearing(), ())
+    with pytest.raises(GeometryError, match="exaggeration"):
+        section_picture(Bearing(), (0.1,), exaggeration=math.nan)
+
+
+def test_areas_with_the_windows_of_the_source():
+    curve = area_curve(f=np.radians(np.linspace(90, 450, 181)))
+    figure = drawn(area_picture(curve))
+    assert [axes.get_xlim() for axes in figure.axes[1:]] == [(90.0, 115.5), (414.0, 450.0)]
+    lines = {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].lines}
+    np.testing.assert_array_equal(lines["ordinate of the source"], curve.source_ordinate)
+    np.testing.assert_array_equal(lines["interference, one lid (B)"], curve.lid.mid)
+    assert "measures no jamming" in figure._supxlabel.get_text()
+
+
+def test_chart_is_themed_svg():
+    curve = area_curve(f=np.radians(np.linspace(90, 450, 181)))
+    text = area_chart(curve, (414.0, 450.0)).svg()
+    assert text.startswith('<svg class="gs"')
+    assert "ordinate of the source" in text
+    with pytest.raises(GeometryError, match="holds no angle"):
+        area_chart(curve, (500.0, 600.0))
