@@ -1,0 +1,46 @@
+"""Dynamics: masses, loads, motion and reactions of any planar mechanism; friction, motors and the named systems.
+
+Every public name is resolved on first use, so that ``import graphsynth.dynamics`` is free.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_PUBLIC: dict[str, str] = {
+    "Body": "model",
+    "DynamicModel": "model",
+    "Rack": "model",
+    "Rigid": "model",
+    "Spring": "elements",
+    "TorsionSpring": "elements",
+    "Force": "elements",
+    "Torque": "elements",
+    "TorqueSource": "elements",
+    "JointFriction": "elements",
+    "Pulse": "elements",
+    "consistent_start": "start",
+    "StartReport": "start",
+    "simulate_dynamics": "integrate",
+    "DynamicMotion": "result",
+    "inverse_dynamics": "inverse",
+    "InverseDynamics": "inverse",
+    "Reactions": "reactions",
+    "effective_inertia": "minimal",
+}
+
+__all__ = sorted(_PUBLIC)
+
+
+def __getattr__(name: str) -> Any:
+    module = _PUBLIC.get(name)
+    if module is None:
+        raise AttributeError(f"module 'graphsynth.dynamics' has no attribute {name!r}")
+    value = getattr(import_module(f"graphsynth.dynamics.{module}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PUBLIC})

@@ -1,0 +1,130 @@
+"""Energies and checks of a computed motion (spec 5.8)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.result import Checks
+from graphsynth.dynamics.tables import Compiled
+
+__all__ = ["Balance", "balance_at", "checks_of", "warnings_of"]
+
+Array = NDArray[np.float64]
+
+
+class Balance(NamedTuple):
+    """What one state gives: accelerations, multipliers, energies, power, residuals."""
+
+    a: Array
+    multipliers: Array
+    kinetic: float
+    potential: float
+    power: float
+    power_error: float
+    power_scale: float
+    position: float
+    velocity: float
+    dalembert: float
+
+
+def balance_at(compiled: Compiled, t: float, q: Array, v: Array, slots: Array, own: Array | None) -> Balance:
+    """Evaluate one state; ``own`` are accelerations of another formulation, used where masses vanish."""
+    from graphsynth.dynamics import kernels
+
+    T = compiled.tables
+    driven = compiled.driven(t)
+    x = kernels.state_rows(T, q, v)
+    Qc, Qn, V, P, _ = kernels.load_vector(T, x)
+    C, J, gam, vel = kernels.constraint_system(T, x, slots, driven)
+    applied = applied_loads(compiled, t, q, v)
+    Q = Qc + Qn + applied
+    out = np.zeros(7)
+    if T.lower.size:
+        a, lam = kernels.accelerate(T, x, J, gam, Q, out)
+    else:
+        assert own is not None  # massless links: minimal form only
+        a = own
+        lam = np.linalg.lstsq(J.T, Q - T.mass @ a, rcond=1e-12)[0]
+    rubbing = np.zeros_like(Q)
+    rubbed = kernels.friction_loads(T, x, J, lam, rubbing) if T.friction.size else 0.0
+    inertial = T.mass @ a
+    drivers = -float(lam @ (J @ v))
+    power = float(P + rubbed + applied @ v + drivers)
+    rate = float(v @ (inertial - Qc))
+    residual = inertial + J.T @ lam - Q - rubbing
+    forces = max(float(np.abs(Q).max(initial=0.0)), float(np.abs(inertial).max(initial=0.0)),
+                 float(np.abs(J * lam[:, None]).max(initial=0.0)), 1e-300)  # fmt: skip
+    unit = np.array([1.0 if info.angular else T.size for info in compiled.info])
+    return Balance(
+        a, lam, 0.5 * float(v @ T.mass @ v), float(V), power, abs(rate - power),
+        float(np.abs(v) @ (np.abs(inertial) + np.abs(Q) + np.abs(J.T) @ np.abs(lam))),
+        float(np.abs(C / unit).max(initial=0.0)), float(np.abs((J @ v - vel) / unit).max(initial=0.0)),
+        float(np.abs(residual).max(initial=0.0)) / forces,
+    )  # fmt: skip
+
+
+def energy_error(times: Array, kinetic: Array, potential: Array, work: Array, power: Array) -> float:
+    """Largest ``|E - E(0) - W|`` over the energies in play.
+
+    The scale is the largest of the ranges of kinetic, potential and total energy and of the power's integral: for a
+    conservative motion the range of the total energy alone is the error itself.
+    """
+    good = np.isfinite(kinetic)
+    if not good.any():
+        return float("nan")
+    E, t = (kinetic + potential)[good], times[good]
+    error = float(np.abs(E - E[0] - work[good]).max())
+    spent = float(np.sum(0.5 * np.diff(t) * (np.abs(power[good][1:]) + np.abs(power[good][:-1])))) if len(t) > 1 else 0.0
+    scale = max(float(np.ptp(part)) for part in (kinetic[good], potential[good], E))
+    scale = max(scale, spent, 1e-12 * float(kinetic[good].max()))
+    return error / scale if scale > 0.0 else 0.0
+
+
+def checks_of(
+    compiled: Compiled, times: Array, balances: list[Balance], work: Array, second: list[Array | None], newton: float,
+    loss: float, contraction: float,
+) -> Checks:  # fmt: skip
+    """Collect the checks over all output times reached."""
+    if not balances:
+        return Checks(*[float("nan")] * 9)
+    kinetic, potential, power = (np.array([getattr(b, name) for b in balances]) for name in ("kinetic", "potential", "power"))
+    n = len(balances)
+    errors = np.array([b.power_error for b in balances])
+    scale = max(b.power_scale for b in balances)
+    unit = np.tile([compiled.tables.size, compiled.tables.size, 1.0], compiled.n // 3)
+    apart = [
+        float(np.abs((b.a - other) / unit).max()) / max(float(np.abs(b.a / unit).max()), 1e-300)
+        for b, other in zip(balances, second) if other is not None
+    ]  # fmt: skip
+    return Checks(
+        max(b.position for b in balances), max(b.velocity for b in balances),
+        energy_error(times[:n], kinetic, potential, work[:n], power),
+        float(errors.max()) / scale if scale > 0.0 else 0.0, max(b.dalembert for b in balances),
+        max(apart, default=float("nan")), newton, loss, contraction,
+    )  # fmt: skip
+
+
+def warnings_of(checks: Checks, rtol: float) -> tuple[str, ...]:
+    """Checks that are worse than expected, each in a sentence."""
+    found = []
+    if checks.energy > max(1e-9, 100.0 * rtol):
+        found.append(
+            f"the energy balance is off by {checks.energy:.2g} of the energies in play, at a relative tolerance of "
+            f"{rtol:g}; tighten rtol"
+        )
+    if checks.position_drift > 1e-9:
+        found.append(f"the joints are open by {checks.position_drift:.2g} characteristic lengths; project, or tighten rtol")
+    if checks.power > 1e-9 or checks.dalembert > 1e-9:
+        found.append(
+            f"the equations of motion are satisfied to {max(checks.power, checks.dalembert):.2g} only: the pose is close "
+            "to a singular one, or the constraints contradict each other"
+        )
+    if checks.second_form > 1e-7:
+        found.append(
+            f"two formulations differ by {checks.second_form:.2g} in the accelerations; a singular pose is near"
+        )
+    return tuple(found)

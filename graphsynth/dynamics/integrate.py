@@ -1,0 +1,317 @@
+"""`simulate_dynamics`: the motion of a dynamic model over time, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.energies import Balance, balance_at, checks_of, warnings_of
+from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
+from graphsynth.dynamics.start import StartReport, start_compiled
+from graphsynth.dynamics.stepping import Trail, integrate
+from graphsynth.dynamics.tables import Compiled, compile_model
+from graphsynth.errors import GeometryError
+
+__all__ = ["simulate_dynamics"]
+
+Array = NDArray[np.float64]
+FormName = Literal["auto", "minimal", "reduced", "constrained"]
+FORMS = ("auto", "minimal", "reduced", "constrained")
+
+
+def simulate_dynamics(
+    model: DynamicModel,
+    times: ArrayLike,
+    *,
+    start: StartReport | None = None,
+    pose: ArrayLike | None = None,
+    rates: ArrayLike | None = None,
+    keep: Mapping[Any, float] | None = None,
+    keep_rates: Mapping[Any, float] | None = None,
+    modes: Mapping[int, int] | None = None,
+    form: FormName = "auto",
+    method: str = "DOP853",
+    rtol: float = 1e-11,
+    atol: float | None = None,
+    outputs: Literal["interpolated", "exact"] = "interpolated",
+    project: bool = True,
+    estimate_error: bool = False,
+    max_steps: int = 1_000_000,
+) -> DynamicMotion:
+    """Integrate the equations of motion, with all checks of spec 5.8.
+
+    Parameters
+    ----------
+    model : DynamicModel
+    times : array_like, shape (n,)
+        Output times, increasing, s; the first is the start.
+    start : StartReport, optional
+        A consistent start; otherwise found from ``pose``, ``rates``, ``keep``, ``keep_rates``, ``modes`` as
+        :func:`consistent_start` does.
+    form : {"auto", "minimal", "reduced", "constrained"}
+        Minimal: one coordinate through the planar engine.  Reduced: independent coordinates chosen by pivoted QR,
+        changed where they fail.  Constrained: all coordinates, multipliers, projection.  Auto takes the minimal form
+        where it exists, and the constrained one elsewhere and beyond a fold.
+    method : str
+        "DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA" of scipy; "CVODE" (extra ``stiff``).
+    rtol, atol : float, optional
+        Of the integrator.  ``atol`` by default a hundredth of ``rtol`` in units of the mechanism's own length,
+        time and energy, component by component.
+    outputs : {"interpolated", "exact"}
+        Exact: steps end at every output time; dearer, and as accurate as the steps themselves.
+    project : bool, optional
+        Project onto the constraints after every accepted step (constrained form).
+    estimate_error : bool, optional
+        Run a second time at a hundredth of the tolerance.
+    max_steps : int, optional
+
+    Returns
+    -------
+    DynamicMotion
+        Estimated.  A solver that gives up is a result with status "failed": arrays are NaN from there on.
+
+    Raises
+    ------
+    GeometryError
+        Times that do not increase, an inconsistent start, an unknown method, a form that the model does not have.
+
+    Examples
+    --------
+    >>> from graphsynth.dynamics.model import Body
+    >>> from graphsynth.mechanism.joints import Revolute
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
+    >>> motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 11), keep={(0, 1): 0.0})
+    >>> motion.completed, motion.checks.energy < 1e-10, motion.form
+    (True, True, 'minimal')
+    """
+    grid = _times(times)
+    compiled = compile_model(model)
+    report = start or start_compiled(compiled, pose, rates, keep or {}, keep_rates or {}, modes, float(grid[0]))
+    if not report.consistent:
+        raise GeometryError(report.message)
+    options = _Options(method, float(rtol), atol, outputs == "exact", project, max_steps)
+    _check_options(form, outputs, options)
+    run = _once(compiled, report, grid, form, options)
+    estimate = None
+    if estimate_error:
+        tighter = replace(options, rtol=max(options.rtol / 100.0, 2.3e-14), atol=None if atol is None else atol / 100.0)
+        again = _once(compiled, report, grid, run.name, tighter)
+        unit = np.tile([compiled.tables.size, compiled.tables.size, 1.0], compiled.n // 3)
+        estimate = np.abs((run.q - again.q) / unit).max(axis=1)
+    return _result(compiled, report, grid, run, options, estimate)
+
+
+def _times(times: ArrayLike) -> Array:
+    grid = np.asarray(times, dtype=np.float64)
+    if grid.ndim != 1 or grid.size < 1 or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
+        raise GeometryError("times must be one list of finite numbers that increase; sort them and remove duplicates")
+    return grid
+
+
+@dataclass(frozen=True)
+class _Options:
+    method: str
+    rtol: float
+    atol: float | None
+    exact: bool
+    project: bool
+    max_steps: int
+
+
+def _check_options(form: str, outputs: str, options: _Options) -> None:
+    from graphsynth.dynamics.stepping import METHODS
+
+    if form not in FORMS:
+        raise GeometryError(f"form = {form!r} is not known; give one of {', '.join(FORMS)}")
+    if outputs not in ("interpolated", "exact"):
+        raise GeometryError(f"outputs = {outputs!r} is not known; give 'interpolated' or 'exact'")
+    if options.method not in METHODS:
+        raise GeometryError(f"method = {options.method!r} is not known; give one of {', '.join(METHODS)}")
+    if not 2.3e-14 <= options.rtol < 1.0:
+        raise GeometryError(f"rtol = {options.rtol} must be at least 2.3e-14 (rounding) and below 1; correct it")
+    if options.atol is not None and not options.atol > 0.0:
+        raise GeometryError(f"atol = {options.atol} must be positive; leave it out for the natural scales")
+
+
+class Form(Protocol):
+    """What a formulation gives the integrator."""
+
+    name: str
+    why: str
+    loss: float
+    pivot: float
+    contraction: float
+    changes: list[tuple[float, str]]
+
+    def begin(self) -> Array: ...
+    def rates(self, t: float, y: Array) -> Array: ...
+    def accept(self, t: float, y: Array) -> Array: ...
+    def state(self, t: float, y: Array) -> tuple[Array, Array]: ...
+
+
+@dataclass
+class _Run:
+    """States at the output times; a workspace."""
+
+    name: str
+    q: Array
+    v: Array
+    own: list[Array | None]
+    slots: Array
+    work: Array
+    done: int
+    trail: Trail
+    form: Form
+    seconds: float
+    events: list[DynamicEvent] = field(default_factory=list)
+
+
+def make_form(compiled: Compiled, report: StartReport, name: str, project: bool) -> Form:
+    """Return the formulation by name."""
+    if name == "minimal":
+        from graphsynth.dynamics.minimal import MinimalForm
+
+        return MinimalForm(compiled, report)
+    if name == "reduced":
+        from graphsynth.dynamics.reduced import ReducedForm
+
+        return ReducedForm(compiled, report)
+    from graphsynth.dynamics.constrained import ConstrainedForm
+
+    return ConstrainedForm(compiled, report, project)
+
+
+def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, options: _Options) -> _Run:
+    """Integrate once; in the form "auto" beyond a fold again in the constrained form."""
+    from graphsynth.dynamics.minimal import minimal_obstacle
+
+    chosen = name
+    if name == "auto":
+        chosen = "constrained" if minimal_obstacle(compiled.model) or report.pose_class == "singular" else "minimal"
+    run = _run(compiled, report, grid, chosen, options)
+    if name == "auto" and chosen == "minimal" and run.done < len(grid) and not compiled.model.massless:
+        other = _run(compiled, report, grid, "constrained", options)
+        text = f"the minimal form ends at t = {run.trail.time:.9g} s ({run.form.why or run.trail.message}); constrained form used"
+        other.events.insert(0, DynamicEvent("fold", run.trail.time, abs(run.trail.last_step), text))
+        return other
+    return run
+
+
+def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, options: _Options) -> _Run:
+    begin = perf_counter()
+    form = make_form(compiled, report, name, options.project)
+    n, count = compiled.n, len(grid)
+    run = _Run(
+        name, np.full((count, n), np.nan), np.full((count, n), np.nan), [None] * count,
+        np.zeros((count, len(report.slots))), np.full(count, np.nan), 0, Trail(), form, 0.0,
+    )  # fmt: skip
+
+    def output(k: int, t: float, y: Array) -> None:
+        run.q[k], run.v[k] = form.state(t, y)
+        run.slots[k] = getattr(form, "slots", report.slots)
+        run.work[k] = y[-1]
+        own = getattr(form, "accelerations", None)
+        run.own[k] = None if own is None else own(t, y)
+        run.done = k + 1
+
+    with np.errstate(all="ignore"):
+        run.trail = integrate(
+            form, grid, compiled.model.breaks, options.method, options.rtol,
+            scales(compiled, report, form) * options.rtol * 0.01 if options.atol is None else options.atol,
+            options.exact, options.max_steps, output,
+        )  # fmt: skip
+    run.seconds = perf_counter() - begin
+    run.events += run.trail.events
+    run.events += [DynamicEvent("change of coordinates", t, 0.0, text) for t, text in form.changes]
+    return run
+
+
+def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
+    """Natural size of every component of the state: lengths, angles, rates, work."""
+    T = compiled.tables
+    unit = np.tile([T.size, T.size, 1.0], compiled.n // 3)
+    speed = float(np.abs(report.v / unit).max(initial=0.0))
+    turn = np.sqrt(float(np.abs(np.nan_to_num(report.a) / unit).max(initial=0.0)))
+    gravity = np.sqrt(float(np.abs(T.gravity).max()) / T.size)
+    rate = max(speed, turn, gravity) or 1.0
+    energy = max(0.5 * rate**2 * float((np.diag(T.mass) * unit**2).max()), 1e-300)
+    own = getattr(form, "unit", unit)
+    if form.name == "minimal":
+        joint = compiled.model.mechanism.joint(*compiled.model.mechanism.drivers[0].pair)
+        own = np.array([T.size if joint.kind == "P" else 1.0])
+    return np.concatenate([own, rate * own, [energy]])
+
+
+def _result(
+    compiled: Compiled, report: StartReport, grid: Array, run: _Run, options: _Options, estimate: Array | None
+) -> DynamicMotion:
+    begin = perf_counter()
+    count, done = len(grid), run.done
+    balances: list[Balance] = []
+    for k in range(done):
+        slots = run.slots[k]
+        if run.name != "constrained":
+            from graphsynth.dynamics.values import initial_slots
+
+            slots = initial_slots(compiled, run.q[k])
+        balances.append(balance_at(compiled, float(grid[k]), run.q[k], run.v[k], slots, run.own[k]))
+    a, lam = np.full((count, compiled.n), np.nan), np.full((count, len(compiled.info)), np.nan)
+    kinetic, potential = np.full(count, np.nan), np.full(count, np.nan)
+    for k, b in enumerate(balances):
+        a[k], lam[k], kinetic[k], potential[k] = b.a, b.multipliers, b.kinetic, b.potential
+    second = run.own[:done] if run.name != "constrained" else _other_form(compiled, run, grid)
+    checks = checks_of(
+        compiled, grid, balances, run.work, second, _newton(compiled, run, grid, a, lam), run.form.loss, run.form.contraction
+    )
+    poses, velocities, accelerations = compiled.to_links(run.q, run.v, a)
+    for array in (poses, velocities, accelerations):
+        array[done:] = np.nan
+    completed = done == count
+    message = "completed" if completed else _failure(run, grid)
+    return DynamicMotion(
+        compiled.model, compiled, grid, poses, velocities, accelerations, run.q, run.v, a, lam, run.slots, kinetic,
+        potential, run.work, "completed" if completed else "failed", message, run.trail.time,
+        tuple(sorted(run.events, key=lambda event: event.time)), report, checks, warnings_of(checks, options.rtol), estimate,
+        run.name, options.method, _backend(options.method), options.rtol, run.trail.evaluations, run.trail.steps, run.seconds,
+        perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _failure(run: _Run, grid: Array) -> str:
+    why = run.form.why or run.trail.message
+    return f"the integration stopped at t = {run.trail.time:.9g} of {grid[-1]:.9g} s: {why}"
+
+
+def _backend(method: str) -> str:
+    if method == "CVODE":
+        from importlib.metadata import version
+
+        return f"scikit-sundae {version('scikit-sundae')}"
+    import scipy
+
+    return f"scipy {scipy.__version__}"
+
+
+def _other_form(compiled: Compiled, run: _Run, grid: Array) -> list[Array | None]:
+    """Accelerations of the constrained run's states in the minimal form, where there is one."""
+    from graphsynth.dynamics.second import minimal_accelerations
+
+    return minimal_accelerations(compiled, grid[: run.done], run.q[: run.done], run.v[: run.done])
+
+
+def _newton(compiled: Compiled, run: _Run, grid: Array, a: Array, lam: Array) -> float:
+    """Largest difference of the reactions to body-by-body equilibrium, at up to 20 instants."""
+    from graphsynth.dynamics.second import newton_euler_difference
+
+    chosen = np.unique(np.linspace(0, run.done - 1, min(run.done, 20)).astype(int)) if run.done else np.empty(0, int)
+    return newton_euler_difference(compiled, grid[chosen], run.q[chosen], run.v[chosen], a[chosen], lam[chosen])
+
+

@@ -1,0 +1,229 @@
+"""Rank-revealing solution of the constraint equations in the metric of the mass matrix."""
+
+import math
+
+import numpy as np
+
+from graphsynth.compilation import kernel
+from graphsynth.dynamics.kernels.systems import pull, twist
+
+#: Diagonal entries of R below this part of the first count as zero (columns have length 1).
+RANK = 1e-10
+#: Friction iteration: rounds, and the change that counts as none.
+ROUNDS, STATIONARY = 200, 1e-14
+
+
+@kernel
+def factor_rows(L, diagonal, J):
+    """Householder QR with column pivoting of ``L^-1 J^T``, columns of length 1.
+
+    Returns B (reflectors below, R above), diag of R, order, column lengths, rank.
+    """
+    m, n = J.shape
+    B, size, order = np.empty((n, m)), np.empty(m), np.arange(m)
+    for k in range(m):
+        total = 0.0
+        for i in range(n):
+            value = J[k, i]
+            if not diagonal:
+                for j in range(i):
+                    value -= L[i, j] * B[j, k]
+            B[i, k] = value / L[i, i]
+            total += B[i, k] * B[i, k]
+        size[k] = math.sqrt(total) if total > 0.0 else 1.0
+        for i in range(n):
+            B[i, k] /= size[k]
+    rank, R = 0, np.zeros(min(m, n))
+    norms = np.empty(m)
+    for s in range(min(m, n)):
+        best, big = s, -1.0
+        for k in range(s, m):
+            total = 0.0
+            for i in range(s, n):
+                total += B[i, k] * B[i, k]
+            norms[k] = total
+            if total > big:
+                best, big = k, total
+        if not math.sqrt(big) > RANK:
+            break
+        if best != s:
+            order[s], order[best] = order[best], order[s]
+            for i in range(n):
+                B[i, s], B[i, best] = B[i, best], B[i, s]
+        alpha = math.sqrt(big) if B[s, s] <= 0.0 else -math.sqrt(big)
+        R[s] = alpha
+        B[s, s] -= alpha  # the reflector is I - 2 u u^T / (u^T u)
+        scale = -1.0 / (alpha * B[s, s])
+        for k in range(s + 1, m):
+            dot = 0.0
+            for i in range(s, n):
+                dot += B[i, s] * B[i, k]
+            dot *= scale
+            for i in range(s, n):
+                B[i, k] -= dot * B[i, s]
+        rank += 1
+    return B, R, order, size, rank
+
+
+@kernel
+def reflect(B, R, rank, y, transposed):
+    """Apply Q (or its transpose) to y in place."""
+    n = B.shape[0]
+    for step in range(rank):
+        s = step if transposed else rank - 1 - step
+        dot = 0.0
+        for i in range(s, n):
+            dot += B[i, s] * y[i]
+        dot *= -1.0 / (R[s] * B[s, s])
+        for i in range(s, n):
+            y[i] -= dot * B[i, s]
+
+
+@kernel
+def least_step(L, diagonal, B, R, order, size, rank, d):
+    """Smallest step x in the metric of the mass matrix with ``J x = d``; also z = R^-T d for the multipliers."""
+    n = B.shape[0]
+    z, y = np.zeros(rank), np.zeros(n)
+    for s in range(rank):
+        value = d[order[s]] / size[order[s]]
+        for i in range(s):
+            value -= B[i, s] * z[i]
+        z[s] = value / R[s]
+        y[s] = z[s]
+    reflect(B, R, rank, y, False)
+    back_lower(L, diagonal, y)
+    return y, z
+
+
+@kernel
+def back_lower(L, diagonal, y):
+    """Solve ``L^T x = y`` in place."""
+    for step in range(y.shape[0]):
+        i = y.shape[0] - 1 - step
+        if not diagonal:
+            for j in range(i + 1, y.shape[0]):
+                y[i] -= L[j, i] * y[j]
+        y[i] /= L[i, i]
+
+
+@kernel
+def forth_lower(L, diagonal, y):
+    """Solve ``L x = y`` in place."""
+    for i in range(y.shape[0]):
+        if not diagonal:
+            for j in range(i):
+                y[i] -= L[i, j] * y[j]
+        y[i] /= L[i, i]
+
+
+@kernel
+def least_multipliers(B, R, order, size, rank, z):
+    """Multipliers with ``B lam = -z`` of least norm (in rows of length 1)."""
+    m = B.shape[1]
+    extra = m - rank
+    S, w = np.zeros((rank, extra)), np.zeros(rank)
+    for c in range(extra + 1):
+        for step in range(rank):
+            s = rank - 1 - step
+            value = -z[s] if c == extra else B[s, rank + c]
+            for i in range(s + 1, rank):
+                value -= B[s, i] * (w[i] if c == extra else S[i, c])
+            if c == extra:
+                w[s] = value / R[s]
+            else:
+                S[s, c] = value / R[s]
+    found = np.zeros(m)
+    tail = np.zeros(extra)
+    if extra > 0:
+        tail = np.linalg.solve(np.eye(extra) + S.T @ S, S.T @ w)
+        w = w - S @ tail
+    for s in range(rank):
+        found[order[s]] = w[s] / size[order[s]]
+    for c in range(extra):
+        found[order[rank + c]] = tail[c] / size[order[rank + c]]
+    return found
+
+
+@kernel
+def solve_rows(L, diagonal, J, d):
+    """Smallest step in the metric of the mass matrix with ``J x = d``; rank and smallest pivot."""
+    B, R, order, size, rank = factor_rows(L, diagonal, J)
+    y, _ = least_step(L, diagonal, B, R, order, size, rank, d)
+    return y, rank, abs(R[rank - 1]) if rank > 0 else 1.0
+
+
+@kernel
+def friction_loads(T, x, J, lam, Q):
+    """Add friction forces for multipliers ``lam``; returns their power."""
+    P = 0.0
+    for f in range(T.friction.shape[0]):
+        r, kind, a, b = T.friction[f, 0], T.friction[f, 1], T.friction[f, 2], T.friction[f, 3]
+        p = T.friction_table[f]
+        kb, ka = T.column[b], T.column[a]
+        if kind == 2:
+            speed = p[4] * (x[b, 7] - x[a, 7])
+            load = math.hypot(lam[r], lam[r + 1])
+        else:
+            # the direction of the guide from the normal in the row's gradient
+            nx, ny = (J[r, kb], J[r, kb + 1]) if kb >= 0 else (-J[r, ka], -J[r, ka + 1])
+            tx, ty = ny, -nx
+            px, py = T.table[r, 2], T.table[r, 3]
+            wx, wy = x[b, 2] * px - x[b, 3] * py, x[b, 3] * px + x[b, 2] * py
+            bx, by = x[b, 0] + wx, x[b, 1] + wy
+            ax, ay = bx - x[a, 0], by - x[a, 1]
+            speed = (tx * (x[b, 5] - x[b, 7] * wy - x[a, 5] + x[a, 7] * ay)
+                     + ty * (x[b, 6] + x[b, 7] * wx - x[a, 6] - x[a, 7] * ax))  # fmt: skip
+            couple = lam[r + 1] / p[5] if p[5] > 0.0 else 0.0
+            load = abs(0.5 * lam[r] + couple) + abs(0.5 * lam[r] - couple)
+        mu = (p[0] + (p[1] - p[0]) * math.exp(-((speed / p[2]) ** 2))) * math.tanh(speed / p[3])
+        if kind == 2:
+            P += twist(T, Q, x, a, b, -mu * p[4] * load)
+        else:
+            P += pull(T, Q, x, b, wx, wy, -mu * load * tx, -mu * load * ty)
+            P += pull(T, Q, x, a, ax, ay, mu * load * tx, mu * load * ty)
+    return P
+
+
+@kernel
+def accelerate(T, x, J, gam, Q, out):
+    """Accelerations and multipliers of ``M a + J^T lam = Q, J a = gam``, with friction.
+
+    ``out``: rank, smallest pivot, power of friction, contraction factor (0 without friction), rounds; the contraction
+    factor is the ratio of the last two changes, 1 or more if the iteration did not become stationary.
+    """
+    n, m = T.mass.shape[0], J.shape[0]
+    B, R, order, size, rank = factor_rows(T.lower, T.diagonal, J)
+    out[0], out[1] = rank, abs(R[rank - 1]) if rank > 0 else 1.0
+    out[2], out[3], out[4] = 0.0, 0.0, 0.0
+    a, lam, before = np.zeros(n), np.zeros(m), 0.0
+    for step in range(ROUNDS):
+        total = Q.copy()
+        if T.friction.shape[0] > 0 and step > 0:
+            out[2] = friction_loads(T, x, J, lam, total)
+        free = total.copy()
+        forth_lower(T.lower, T.diagonal, free)
+        back_lower(T.lower, T.diagonal, free)
+        d = gam - J @ free
+        y, z = least_step(T.lower, T.diagonal, B, R, order, size, rank, d)
+        fresh = least_multipliers(B, R, order, size, rank, z)
+        a = free + y
+        change, scale = 0.0, 0.0
+        for k in range(m):
+            change = max(change, abs(fresh[k] - lam[k]))
+            scale = max(scale, abs(fresh[k]))
+        lam = fresh
+        if T.friction.shape[0] == 0:
+            break
+        out[4] = step
+        if step > 0:
+            if step > 1 and before > 0.0:
+                out[3] = change / before
+            if change <= STATIONARY * scale:
+                if not out[3] < 1.0:
+                    out[3] = 0.0
+                break
+            if not math.isfinite(change) or step == ROUNDS - 1:
+                out[3] = max(1.0, out[3])
+                break
+        before = change
+    return a, lam

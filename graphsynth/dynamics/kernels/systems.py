@@ -1,0 +1,133 @@
+"""Constraint rows and loads at one state; T is `graphsynth.dynamics.tables.Tables`."""
+
+import math
+
+import numpy as np
+
+from graphsynth.compilation import kernel
+from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE, PAX, PAY, RA, SIGN, SLOT, TX, TY
+from graphsynth.kinematics.engine.kernels.rows import gamma, row
+
+RACK_KIND = 20
+
+
+@kernel
+def state_rows(T, q, v):
+    """Rows of the engine's state for every link: x, y, cos, sin, theta, velocities, (accelerations 0)."""
+    x = np.zeros((T.column.shape[0], 11))
+    for link in range(x.shape[0]):
+        k = T.column[link]
+        x[link, 2] = 1.0
+        if k >= 0:
+            x[link, 0], x[link, 1], x[link, 4] = q[k], q[k + 1], q[k + 2]
+            x[link, 2], x[link, 3] = math.cos(q[k + 2]), math.sin(q[k + 2])
+            x[link, 5], x[link, 6], x[link, 7] = v[k], v[k + 1], v[k + 2]
+    return x
+
+
+@kernel
+def constraint_system(T, x, phi, qd):
+    """Constraint values C, Jacobian J, acceleration side gam (J a = gam) and -C_t (J v = vel)."""
+    m, n = T.rows.shape[0], T.mass.shape[0]
+    C, J, gam, vel = np.empty(m), np.zeros((m, n)), np.empty(m), np.zeros(m)
+    g = np.empty(6)
+    for k in range(m):
+        kind, a, b = T.rows[k, 0], T.rows[k, 1], T.rows[k, 2]
+        ka, kb = T.column[a], T.column[b]
+        if kind == RACK_KIND:
+            ex, ey = T.table[k, TX], T.table[k, TY]
+            ux = x[a, 2] * T.table[k, PAX] - x[a, 3] * T.table[k, PAY]
+            uy = x[a, 3] * T.table[k, PAX] + x[a, 2] * T.table[k, PAY]
+            C[k] = ex * (x[a, 0] + ux) + ey * (x[a, 1] + uy) - T.table[k, RA] * x[b, 4] - phi[T.slots[k]]
+            gam[k] = x[a, 7] ** 2 * (ex * ux + ey * uy)
+            if ka >= 0:
+                J[k, ka], J[k, ka + 1], J[k, ka + 2] = ex, ey, ey * ux - ex * uy
+            if kb >= 0:
+                J[k, kb + 2] = -T.table[k, RA]
+            continue
+        C[k] = row(kind, T.table, k, a, b, x, phi, qd, g)
+        gam[k] = -gamma(kind, T.table, k, a, b, x, qd)
+        if kind == DRIVE_ANGLE or kind == DRIVE_SLIDE:
+            vel[k] = T.table[k, SIGN] * qd[int(T.table[k, SLOT]), 1]
+        for c in range(3):
+            if ka >= 0:
+                J[k, ka + c] = g[c]
+            if kb >= 0:
+                J[k, kb + c] = g[3 + c]
+    return C, J, gam, vel
+
+
+@kernel
+def pull(T, Q, x, link, ux, uy, fx, fy):
+    """Add a force at the arm u of a link; returns its power."""
+    k = T.column[link]
+    if k < 0:
+        return 0.0
+    moment = ux * fy - uy * fx
+    Q[k] += fx
+    Q[k + 1] += fy
+    Q[k + 2] += moment
+    return fx * x[link, 5] + fy * x[link, 6] + moment * x[link, 7]
+
+
+@kernel
+def twist(T, Q, x, a, b, torque):
+    """Add a torque to b and its opposite to a; returns the power."""
+    ka, kb = T.column[a], T.column[b]
+    if ka >= 0:
+        Q[ka + 2] -= torque
+    if kb >= 0:
+        Q[kb + 2] += torque
+    return torque * (x[b, 7] - x[a, 7])
+
+
+@kernel
+def load_vector(T, x):
+    """Generalised forces: conservative Qc with potential V, others Qn with power P; False if a spring has length 0."""
+    n = T.mass.shape[0]
+    Qc, Qn = np.zeros(n), np.zeros(n)
+    V, P, good = 0.0, 0.0, True
+    for link in range(T.column.shape[0]):
+        k = T.column[link]
+        if k >= 0:
+            for c in range(2):
+                weight = T.mass[k, k] * T.gravity[c]
+                Qc[k + c] += weight
+                V -= weight * x[link, c]
+    for s in range(T.springs.shape[0]):
+        a, b = T.springs[s, 0], T.springs[s, 1]
+        p = T.spring_table[s]
+        ux, uy = x[a, 2] * p[0] - x[a, 3] * p[1], x[a, 3] * p[0] + x[a, 2] * p[1]
+        wx, wy = x[b, 2] * p[2] - x[b, 3] * p[3], x[b, 3] * p[2] + x[b, 2] * p[3]
+        dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
+        length = math.sqrt(dx * dx + dy * dy)
+        if not length > 0.0:
+            good = False
+        ex, ey = dx / length, dy / length
+        rx = x[b, 5] - x[b, 7] * wy - x[a, 5] + x[a, 7] * uy
+        ry = x[b, 6] + x[b, 7] * wx - x[a, 6] - x[a, 7] * ux
+        f, d = p[4] * (length - p[5]), p[6] * (ex * rx + ey * ry)
+        V += 0.5 * p[4] * (length - p[5]) ** 2
+        pull(T, Qc, x, a, ux, uy, f * ex, f * ey)
+        pull(T, Qc, x, b, wx, wy, -f * ex, -f * ey)
+        P += pull(T, Qn, x, a, ux, uy, d * ex, d * ey) + pull(T, Qn, x, b, wx, wy, -d * ex, -d * ey)
+    for s in range(T.torsions.shape[0]):
+        a, b = T.torsions[s, 0], T.torsions[s, 1]
+        p = T.torsion_table[s]
+        turn = x[b, 4] - x[a, 4] - p[1]
+        V += 0.5 * p[0] * turn * turn
+        twist(T, Qc, x, a, b, -p[0] * turn)
+        P += twist(T, Qn, x, a, b, -p[2] * (x[b, 7] - x[a, 7]))
+    for s in range(T.forces.shape[0]):
+        link, p = T.forces[s, 0], T.force_table[s]
+        c, sn = x[link, 2], x[link, 3]
+        fx, fy = p[2], p[3]
+        if T.forces[s, 1] == 1:
+            fx, fy = c * p[2] - sn * p[3], sn * p[2] + c * p[3]
+        P += pull(T, Qn, x, link, c * p[0] - sn * p[1], sn * p[0] + c * p[1], fx, fy)
+    for s in range(T.sources.shape[0]):
+        a, b = T.sources[s, 0], T.sources[s, 1]
+        torque, eta = T.source_table[s, 0], T.source_table[s, 1]
+        torque = torque * eta if torque * (x[b, 7] - x[a, 7]) >= 0.0 else torque / eta
+        P += twist(T, Qn, x, a, b, torque)
+    return Qc, Qn, V, P, good

@@ -1,0 +1,197 @@
+"""Reactions in the joints, from the multipliers and a second time from the equilibrium of every body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.joints import Cam, Gear
+from graphsynth.mechanism.model import Driver
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.tables import Compiled
+
+__all__ = ["JointReaction", "Reactions", "reactions_from_multipliers"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class JointReaction:
+    """Reaction in one joint over n instants.
+
+    Attributes
+    ----------
+    a, b : int
+        Links; the opposite of everything below acts on a.
+    kind : str
+        "R", "P", "pin-slot", "gear", "cam", "rack", "rigid", "driver".
+    force : ndarray, shape (n, 2)
+        On link b, N, world coordinates.
+    couple : ndarray, shape (n,)
+        On link b at ``point``, N m.
+    point : ndarray, shape (n, 2)
+        Point of application: the joint's point of b; of a gear its pitch point.
+    determined : ndarray of bool, shape (n, 3)
+        Whether the two force components and the couple are determined; with redundant constraints they need not be.
+    """
+
+    a: int
+    b: int
+    kind: str
+    force: Array
+    couple: Array
+    point: Array
+    determined: NDArray[np.bool_]
+    angle_a: Array = field(repr=False)
+    angle_b: Array = field(repr=False)
+
+    def on(self, link: int, frame: str = "world") -> tuple[Array, Array]:
+        """Force (n, 2) and couple (n,) on one of the two links, in the "world" or in that "body"'s frame."""
+        if link not in (self.a, self.b):
+            raise GeometryError(f"link {link} is not in joint {self.a}-{self.b}; name one of the two")
+        if frame not in ("world", "body"):
+            raise GeometryError(f"frame = {frame!r} is not known; give 'world' or 'body'")
+        sign = 1.0 if link == self.b else -1.0
+        force = sign * (self.force[:, 0] + 1j * self.force[:, 1])
+        if frame == "body":
+            force = force * np.exp(-1j * (self.angle_b if link == self.b else self.angle_a))
+        return np.column_stack([force.real, force.imag]), sign * self.couple
+
+    @property
+    def size(self) -> Array:
+        """Magnitude of the force, shape (n,), N."""
+        return np.hypot(self.force[:, 0], self.force[:, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Reactions:
+    """Reactions of all joints over n instants; ``joints`` in the order graph joints, additional, prescribed."""
+
+    times: Array
+    joints: tuple[JointReaction, ...]
+
+    def between(self, a: int, b: int, index: int = 0) -> JointReaction:
+        """Return the reaction between two links; ``index`` chooses among several."""
+        found = [joint for joint in self.joints if {joint.a, joint.b} == {a, b}]
+        if index >= len(found):
+            raise GeometryError(f"links {a} and {b} have {len(found)} joints; number {index} does not exist")
+        return found[index]
+
+    def separating(self, a: int, b: int, pressure_angle: float) -> Array:
+        """Separating force that the teeth of gear pair a-b exert on its link b, shape (n, 2), N.
+
+        ``|tangential force| tan(pressure_angle)`` along the line of centres, away from the other wheel for an external
+        pair; the bearings of the two wheels must carry it besides what they carry already (spec 5.7).
+        """
+        joint = self.between(a, b)
+        if joint.kind != "gear":
+            raise GeometryError(f"joint {a}-{b} is {joint.kind}; only gears have a separating force")
+        across = -1j * (joint.force[:, 0] + 1j * joint.force[:, 1])
+        size = np.abs(across)
+        # the tangential force is along E u; which of its two normals points from a to b is told by the centres
+        u = np.where(size > 0.0, across / np.where(size > 0.0, size, 1.0), 0.0)
+        return np.column_stack([u.real, u.imag]) * (size * np.tan(pressure_angle))[:, None]
+
+
+def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multipliers: Array, times: Array) -> Reactions:
+    """Wrenches ``-C_q^T lam`` of every joint, moved to its point.
+
+    Parameters
+    ----------
+    q, v : ndarray, shape (n, coordinates)
+    multipliers : ndarray, shape (n, rows)
+    times : ndarray, shape (n,)
+    """
+    from graphsynth.dynamics.values import Values, initial_slots
+
+    count, joints = len(q), compiled.joints
+    wrench = np.full((len(joints), count, 3), np.nan)  # on b (on a if b is the frame: negated), about its origin
+    determined = np.zeros((len(joints), count, 3), dtype=np.bool_)
+    angles, points = np.zeros((compiled.links, count)), np.full((len(joints), count), np.nan, dtype=np.complex128)
+    ends = [*compiled.first, len(compiled.info)]
+    for k in range(count):
+        if not np.isfinite(q[k]).all():
+            continue
+        values = Values(compiled, float(times[k]), initial_slots(compiled, q[k]))
+        _, J, _, _ = values.system(q[k], v[k])
+        left = _left_null(J * values.column_scale / values.row_scale[:, None]) / values.row_scale[:, None]
+        place = np.zeros((compiled.links, 3))
+        place[compiled.moving] = q[k].reshape(-1, 3)
+        angles[:, k] = place[:, 2]
+        for index in range(len(joints)):
+            rows = slice(ends[index], ends[index + 1])
+            link, sign, at = _application(compiled, index, place)
+            points[index, k] = at
+            column = int(compiled.tables.column[link])
+            own = -sign * J[rows, column : column + 3].T
+            arm = at - complex(*place[link, :2])
+            move = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [arm.imag, -arm.real, 1.0]])
+            own = move @ own
+            wrench[index, k] = own @ multipliers[k, rows]
+            free = np.abs(own @ left[rows]).max(axis=1, initial=0.0)
+            determined[index, k] = free <= 1e-8 * max(1.0, float(np.abs(own).max(initial=0.0)))
+    found = []
+    for index, joint in enumerate(joints):
+        a, b = _ends(compiled, joint)
+        at = points[index]
+        found.append(JointReaction(
+            a, b, kind_of(joint), wrench[index, :, :2], wrench[index, :, 2], np.column_stack([at.real, at.imag]),
+            determined[index], angles[a], angles[b],
+        ))  # fmt: skip
+    return Reactions(times, tuple(found))
+
+
+def kind_of(joint: Any) -> str:
+    """Name of a constraint."""
+    if isinstance(joint, Driver):
+        return "driver"
+    return str(getattr(joint, "kind", type(joint).__name__.lower()))
+
+
+def _ends(compiled: Compiled, joint: Any) -> tuple[int, int]:
+    if isinstance(joint, Driver):
+        own = compiled.model.mechanism.joint(*joint.pair)
+        return own.a, own.b
+    return (joint.rack, joint.pinion) if hasattr(joint, "rack") else (joint.a, joint.b)
+
+
+def _left_null(J: Array) -> Array:
+    """Columns: null vectors of the transposed Jacobian."""
+    U, S, _ = np.linalg.svd(J)
+    rank = int(np.sum(S > 1e-10 * S[0])) if S.size else 0
+    return np.asarray(U[:, rank:])
+
+
+def world(place: Array, compiled: Compiled, link: int, at: tuple[float, float]) -> complex:
+    """World point of a point given in the link frame."""
+    local = complex(*at) - complex(*compiled.centres[link])
+    return complex(complex(*place[link, :2]) + np.exp(1j * place[link, 2]) * local)
+
+
+def _application(compiled: Compiled, index: int, place: Array) -> tuple[int, float, complex]:
+    """Moving link whose wrench is read, its sign for link b, and the point of application."""
+    joint = compiled.joints[index]
+    a, b = _ends(compiled, joint)
+    if isinstance(joint, Driver):
+        joint = compiled.model.mechanism.joint(*joint.pair)
+    if hasattr(joint, "rack"):
+        centre = complex(*place[joint.pinion, :2])
+        rack = world(place, compiled, joint.rack, joint.at)
+        e = np.exp(1j * joint.angle)
+        at = centre - 1j * e * joint.radius if compiled.tables.column[b] >= 0 else rack
+        return (b, 1.0, complex(at)) if compiled.tables.column[b] >= 0 else (a, -1.0, complex(at))
+    at = world(place, compiled, b, joint.at_b)
+    if isinstance(joint, Gear):
+        other = world(place, compiled, a, joint.at_a)
+        total = joint.radius_a + (-1.0 if joint.internal else 1.0) * joint.radius_b
+        if abs(total) > 1e-9 * (joint.radius_a + joint.radius_b):
+            at = other + (at - other) * (joint.radius_a / total)
+    if isinstance(joint, Cam):
+        at = world(place, compiled, b, joint.at_b)
+    return (b, 1.0, at) if compiled.tables.column[b] >= 0 else (a, -1.0, at)

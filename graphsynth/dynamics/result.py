@@ -1,0 +1,156 @@
+"""The result of a dynamic simulation: motion, energy, reactions, checks, events, status."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.start import StartReport
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.reactions import Reactions
+    from graphsynth.dynamics.tables import Compiled
+
+__all__ = ["Checks", "DynamicEvent", "DynamicMotion"]
+
+Array = NDArray[np.float64]
+
+
+class DynamicEvent(NamedTuple):
+    """Something at one time: "singular pose", "fold", "change of coordinates", "break", "failure"."""
+
+    kind: str
+    time: float
+    uncertainty: float
+    statement: str
+
+
+class Checks(NamedTuple):
+    """Numbers that tell whether a result can be trusted (spec 5.8); NaN where a check does not apply.
+
+    ``position_drift``, ``velocity_drift``: largest violation of scaled rows at the output times (lengths over the
+    characteristic length).  ``energy``: largest ``|E - E(0) - W|`` over the scale of energies in play.  ``power``:
+    largest ``|dE/dt - P|`` over the largest ``|P|`` or kinetic power.  ``dalembert``: largest residual of the body
+    equations with the reported reactions over the largest force.  ``second_form``: largest difference of the
+    accelerations of two formulations over their largest size, counted at regular poses.  ``newton_euler``: the same
+    of the reactions, against body-by-body equilibrium.  ``projection_loss``: energy taken by projection (J).
+    ``contraction``: of the friction iteration, 0 without friction.
+    """
+
+    position_drift: float
+    velocity_drift: float
+    energy: float
+    power: float
+    dalembert: float
+    second_form: float
+    newton_euler: float
+    projection_loss: float
+    contraction: float
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicMotion:
+    """Motion of a dynamic model over time (estimated: floating point; NaN from where it failed).
+
+    Attributes
+    ----------
+    times : ndarray, shape (n,)
+    poses, velocities, accelerations : ndarray, shape (n, links, 3)
+        ``(x, y, theta)`` of the link frames, m and rad; theta continuous.
+    multipliers : ndarray, shape (n, rows)
+    kinetic, potential, work : ndarray, shape (n,)
+        Energies, and the work of all non-conservative loads and drivers since the start, J.
+    status : str
+        "completed" or "failed".
+    message : str
+        One sentence.
+    reached : float
+        Last time reached.
+    events : tuple of DynamicEvent
+    start : StartReport
+    checks : Checks
+    warnings : tuple of str
+        Checks that are worse than expected, each in a sentence.
+    error_estimate : Array or None, shape (n,)
+        Largest difference of coordinates (lengths over the characteristic length, angles) to a run at a tolerance
+        100 times tighter; None if not asked for.
+    form, method, backend : str
+    rtol : float
+    evaluations, steps : int
+        Right-hand sides, accepted steps.
+    seconds : float
+        Of the integration; ``seconds_checks`` of the checks.
+    """
+
+    model: Any
+    compiled: Compiled
+    times: Array
+    poses: Array
+    velocities: Array
+    accelerations: Array
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    slots: Array
+    kinetic: Array
+    potential: Array
+    work: Array
+    status: str
+    message: str
+    reached: float
+    events: tuple[DynamicEvent, ...]
+    start: StartReport
+    checks: Checks
+    warnings: tuple[str, ...]
+    error_estimate: Array | None
+    form: str
+    method: str
+    backend: str
+    rtol: float
+    evaluations: int
+    steps: int
+    seconds: float
+    seconds_checks: float
+
+    #: How the numbers were had.
+    label = "estimated"
+
+    @property
+    def completed(self) -> bool:
+        """Whether the last output time was reached."""
+        return self.status == "completed"
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic and potential energy, J."""
+        return self.kinetic + self.potential
+
+    @cached_property
+    def reactions(self) -> Reactions:
+        """Reactions in all joints at the output times."""
+        from graphsynth.dynamics.reactions import reactions_from_multipliers
+
+        return reactions_from_multipliers(self.compiled, self.q, self.v, self.multipliers, self.times)
+
+    def coordinate(self, base: int, link: int) -> tuple[Array, Array]:
+        """Coordinate of an R or P joint and its rate over time, each (n,)."""
+        from graphsynth.dynamics.minimal import joint_coordinate
+
+        return joint_coordinate(self.model.mechanism, base, link, self.poses, self.velocities)
+
+    def to_pandas(self) -> Any:
+        """Return a table: time, pose, velocity and acceleration of every moving link, energies, work."""
+        import pandas as pd
+
+        columns: dict[str, Array] = {"time": self.times}
+        for link in self.compiled.moving:
+            for name, array in (("", self.poses), ("d_", self.velocities), ("dd_", self.accelerations)):
+                for axis, label in enumerate(("x", "y", "theta")):
+                    columns[f"{name}{label}_{link}"] = array[:, link, axis]
+        columns |= {"kinetic": self.kinetic, "potential": self.potential, "work": self.work}
+        return pd.DataFrame(columns)

@@ -1,0 +1,133 @@
+"""Second formulations for the checks: minimal-form accelerations, and equilibrium body by body (Newton-Euler)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.model import Rack, Rigid
+from graphsynth.dynamics.reactions import reactions_from_multipliers, world
+from graphsynth.dynamics.tables import Compiled
+from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
+from graphsynth.mechanism.model import Driver
+
+__all__ = ["minimal_accelerations", "newton_euler", "newton_euler_difference"]
+
+Array = NDArray[np.float64]
+
+
+def minimal_accelerations(compiled: Compiled, times: Array, q: Array, v: Array) -> list[Array | None]:
+    """Accelerations of given states by the minimal form; None where there is no such form or it is near a fold."""
+    return [None] * len(q)
+
+
+def newton_euler(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> list[tuple[complex, float, complex]]:
+    """Joint reactions from force and moment balance of every body, given the accelerations.
+
+    Unknowns are the contact forces themselves, placed by geometry, not by the constraint Jacobian: pin forces, guide
+    forces and couples, tooth forces at the pitch point, forces along the normal of a cam.  Solved by least squares.
+
+    Returns
+    -------
+    list of (force, couple, point)
+        On link b of every joint, at the point.
+    """
+    place = np.zeros((compiled.links, 3))
+    place[compiled.moving] = q.reshape(-1, 3)
+    wrenches = [_units(compiled, joint, place) for joint in compiled.joints]
+    columns = sum(len(found) for _, _, found in wrenches)
+    matrix, column = np.zeros((compiled.n, columns)), 0
+    for a_link, b_link, found in wrenches:
+        for force, couple, at in found:
+            for link, sign in ((a_link, -1.0), (b_link, 1.0)):
+                k = int(compiled.tables.column[link])
+                if k >= 0:
+                    arm = at - complex(*place[link, :2])
+                    moment = (np.conj(arm) * force).imag + couple
+                    matrix[k : k + 3, column] += sign * np.array([force.real, force.imag, moment])
+            column += 1
+    right = compiled.tables.mass @ a - _loads(compiled, t, q, v, place)
+    scale = np.tile([1.0, 1.0, 1.0 / compiled.tables.size], compiled.n // 3)
+    solution = np.linalg.lstsq(matrix * scale[:, None], right * scale, rcond=1e-12)[0]
+    results, column = [], 0
+    for _, _, found in wrenches:
+        force, couple, at = 0j, 0.0, found[0][2]
+        for unit, turn, _ in found:
+            force, couple = force + solution[column] * unit, couple + float(solution[column]) * turn
+            column += 1
+        results.append((complex(force), couple, at))
+    return results
+
+
+def _loads(compiled: Compiled, t: float, q: Array, v: Array, place: Array) -> Array:
+    from graphsynth.dynamics import kernels
+
+    T = compiled.tables
+    x = kernels.state_rows(T, q, v)
+    Qc, Qn, _, _, _ = kernels.load_vector(T, x)
+    return np.asarray(Qc + Qn + applied_loads(compiled, t, q, v))
+
+
+def _units(compiled: Compiled, joint: object, place: Array) -> tuple[int, int, list[tuple[complex, float, complex]]]:
+    """Unit wrenches (force on b, couple on b, point) that a joint can carry."""
+    if isinstance(joint, Driver):
+        own = compiled.model.mechanism.joint(*joint.pair)
+        at = world(place, compiled, own.b, own.at_b)
+        along = complex(np.exp(1j * (place[own.a, 2] + getattr(own, "angle_a", 0.0))))
+        return own.a, own.b, [(along, 0.0, at) if isinstance(own, Prismatic) else (0j, 1.0, at)]
+    if isinstance(joint, Rack):
+        at = complex(*place[joint.pinion, :2]) - 1j * complex(np.exp(1j * joint.angle)) * joint.radius
+        return joint.rack, joint.pinion, [(complex(np.exp(1j * joint.angle)), 0.0, at)]
+    assert isinstance(joint, Revolute | Prismatic | Gear | Cam | Rigid) or hasattr(joint, "at_b")
+    a, b = joint.a, joint.b  # type: ignore[attr-defined]
+    at = world(place, compiled, b, joint.at_b)  # type: ignore[attr-defined]
+    if isinstance(joint, Revolute | Rigid):
+        couple = [(0j, 1.0, at)] if isinstance(joint, Rigid) else []
+        return a, b, [(1.0 + 0j, 0.0, at), (1j, 0.0, at), *couple]
+    if isinstance(joint, Gear):
+        return a, b, [_tooth(compiled, joint, place, at)]
+    if isinstance(joint, Cam):
+        return a, b, [(_cam_normal(compiled, joint, place, at), 0.0, at)]
+    normal = 1j * complex(np.exp(1j * (place[a, 2] + joint.angle_a)))  # type: ignore[attr-defined]
+    return a, b, [(normal, 0.0, at), *([(0j, 1.0, at)] if isinstance(joint, Prismatic) else [])]
+
+
+def _tooth(compiled: Compiled, joint: Gear, place: Array, centre_b: complex) -> tuple[complex, float, complex]:
+    """Tangential tooth force at the pitch point that divides the line of centres as the radii."""
+    centre_a = world(place, compiled, joint.a, joint.at_a)
+    total = joint.radius_a + (-1.0 if joint.internal else 1.0) * joint.radius_b
+    apart = centre_b - centre_a
+    return 1j * apart / abs(apart), 0.0, centre_a + apart * (joint.radius_a / total)
+
+
+def _cam_normal(compiled: Compiled, joint: Cam, place: Array, roller: complex) -> complex:
+    """Normal of the pitch curve at the roller's centre, from the curve's tangent."""
+    centre = world(place, compiled, joint.a, joint.at_a)
+    out = (roller - centre) / abs(roller - centre)
+    rho, first, _ = joint.pitch_radius(math.atan2(out.imag, out.real) - place[joint.a, 2] - joint.angle_a)
+    tangent = first * out + rho * 1j * out
+    return -1j * tangent / abs(tangent)
+
+
+def newton_euler_difference(compiled: Compiled, times: Array, q: Array, v: Array, a: Array, lam: Array) -> float:
+    """Largest difference of determined reactions between both ways, over the largest force; NaN with friction."""
+    equal = [
+        joint for joint in compiled.joints
+        if isinstance(joint, Gear) and joint.internal and joint.radius_a == joint.radius_b
+    ]  # fmt: skip
+    if compiled.tables.friction.size or equal or not len(q) or not compiled.joints:
+        return float("nan")
+    reactions = reactions_from_multipliers(compiled, q, v, lam, times)
+    worst, size = 0.0, 1e-300
+    for k in range(len(q)):
+        for joint, (force, couple, at) in zip(reactions.joints, newton_euler(compiled, float(times[k]), q[k], v[k], a[k])):
+            arm = complex(*joint.point[k]) - at
+            moment = couple - (np.conj(arm) * force).imag
+            parts = np.array([force.real, force.imag, moment / compiled.tables.size])
+            own = np.array([*joint.force[k], joint.couple[k] / compiled.tables.size])
+            size = max(size, float(np.abs(own).max()))
+            worst = max(worst, float(np.abs(parts - own)[joint.determined[k]].max(initial=0.0)))
+    return worst / size

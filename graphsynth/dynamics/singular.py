@@ -1,0 +1,108 @@
+"""Poses at which the constraint Jacobian loses rank: permanent redundancy, or branches that meet."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.values import Values
+
+__all__ = ["BranchTangents", "PoseClass", "classify_pose"]
+
+Array = NDArray[np.float64]
+PoseClass = Literal["regular", "redundant", "singular", "not tested"]
+
+#: Length of the steps to nearby poses, in characteristic lengths and radians.
+_NEARBY = 1e-3
+
+
+class BranchTangents(NamedTuple):
+    """Motions possible at a singular pose with one lost rank and two instantaneous freedoms.
+
+    ``kind`` is "change point" (two branches cross: ``motions`` (2, links, 3) are their velocities, largest entry 1),
+    "isolated" (the second-order equation has no real solution) or "higher order" (it does not decide).
+    """
+
+    kind: str
+    motions: Array
+    discriminant: float
+
+
+def classify_pose(
+    values: Values, q: Array, rank: int, left: Array, null: Array, tolerance: float
+) -> tuple[PoseClass, int, BranchTangents | None]:
+    """Compare the rank at ``q`` with that at nearby poses on the constraints (spec 5.6, step 3).
+
+    Parameters
+    ----------
+    left, null : ndarray
+        Left and right null vectors of the scaled Jacobian, in columns.
+    """
+    directions = [*null.T, *(null @ np.array([np.cos(t), np.sin(t)]) for t in (0.7, 2.1) if null.shape[1] == 2)]
+    nearby = rank
+    for direction in directions:
+        for sense in (1.0, -1.0):
+            found = _returned(values, q + sense * _NEARBY * values.column_scale * direction)
+            if found is not None:
+                S = np.linalg.svd(values.scaled_jacobian(found), compute_uv=False)
+                nearby = max(nearby, int(np.sum(S > tolerance * S[0])))
+    if nearby == rank:
+        return "redundant", nearby, None
+    return "singular", nearby, _tangents(values, q, left, null) if nearby == rank + 1 else None
+
+
+def _returned(values: Values, q: Array) -> Array | None:
+    """Return to the constraints from a point close to them; None if that does not converge."""
+    for _ in range(30):
+        C = values.system(q, np.zeros_like(q))[0] / values.row_scale
+        if np.abs(C).max() < 1e-14:
+            return q
+        step = np.linalg.lstsq(values.scaled_jacobian(q), -C, rcond=1e-13)[0]
+        size = float(np.abs(step).max())
+        q = q + values.column_scale * step * min(1.0, 0.1 / max(size, 1e-300))
+    return q if np.abs(C).max() < 1e-12 else None
+
+
+def _tangents(values: Values, q: Array, left: Array, null: Array) -> BranchTangents | None:
+    """Solve the second-order equation ``l . C_qq(n, n) = 0`` for the directions of the branches."""
+    special = left
+    if null.shape[1] != 2 or special.shape[1] != 1:
+        return None
+    scale = values.column_scale
+
+    def form(direction: Array) -> float:
+        gam = values.system(q, scale * direction)[2] + _driver_part(values)
+        return float(special[:, 0] @ (-gam / values.row_scale))
+
+    n1, n2 = null[:, 0], null[:, 1]
+    a, c = form(n1), form(n2)
+    b = 0.5 * (form(n1 + n2) - a - c)
+    discriminant = b * b - a * c
+    size = max(abs(a), abs(b), abs(c))
+    if not size > 1e-9 or abs(discriminant) <= 1e-9 * size**2:
+        return BranchTangents("higher order", np.empty((0, values.compiled.links, 3)), discriminant)
+    if discriminant < 0.0:
+        return BranchTangents("isolated", np.empty((0, values.compiled.links, 3)), discriminant)
+    root = np.sqrt(discriminant)
+    # a s^2 + 2 b s t + c t^2 = 0 with (s, t) homogeneous, without cancellation
+    w = -(b + np.copysign(root, b))
+    pairs = [(w, a), (c, w)]
+    motions = []
+    for s, t in pairs:
+        v = scale * (s * n1 + t * n2)
+        rate = values.compiled.to_links(q, v, np.zeros_like(v))[1]
+        motions.append(rate / rate.flat[int(np.argmax(np.abs(rate)))])
+    return BranchTangents("change point", np.array(motions), discriminant)
+
+
+def _driver_part(values: Values) -> Array:
+    """Remove the drivers' own accelerations from the right side."""
+    zero = values.system(np.zeros(values.compiled.n), np.zeros(values.compiled.n))[2]
+    kinds = values.compiled.tables.rows[:, 0]
+    from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE
+
+    return np.where((kinds == DRIVE_ANGLE) | (kinds == DRIVE_SLIDE), -zero, 0.0)
+
+

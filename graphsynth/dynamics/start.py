@@ -1,0 +1,348 @@
+"""Consistent start: positions, velocities, accelerations and reactions that fit the joints, with a full report."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.posing import pose_from_drivers
+from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pose
+from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
+from graphsynth.dynamics.values import Values, initial_slots
+from graphsynth.errors import GeometryError
+
+__all__ = ["StartReport", "consistent_start"]
+
+Array = NDArray[np.float64]
+Keys = Mapping[Any, float]
+
+#: Singular values below this part of the largest count as zero.
+RANK = 1e-10
+_ROUNDS = 60
+#: Scaled residual above which constraints are violated.
+_CLOSED = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class StartReport:
+    """A start state and everything that is known about it (estimated: floating point; spec 5.6).
+
+    Attributes
+    ----------
+    status : str
+        "consistent", "violated" (positions do not close), "contradicting rates" (velocities do not fit).
+    message : str
+        The result in one sentence.
+    time : float
+    poses, velocities, accelerations : ndarray, shape (links, 3)
+        Of the link frames; NaN where not reached.
+    q, v, a : ndarray, shape (n,)
+        Of the centres of mass of the moving links, ascending.
+    multipliers : ndarray, shape (rows,)
+        ``lam`` of ``M a + J^T lam = Q``, least norm where they are not determined.
+    determined : ndarray of bool, shape (rows,)
+        Which multipliers are determined.
+    rows : tuple of str
+        Names of the constraint rows.
+    position_correction, velocity_correction : float
+        Largest change of the guess (lengths over the characteristic length; angles).
+    rank, freedom : int
+        Rank of the scaled Jacobian and ``n - rank``.
+    singular_values : ndarray
+        Of the scaled Jacobian, descending.
+    condition : float
+        Largest over smallest kept singular value.
+    redundant : tuple of tuple of str
+        Sets of rows that depend on each other.
+    violated : dict of str to float
+        Residual of every row in its own unit (m, rad, m/s, rad/s), if the start is not consistent.
+    pose_class : str
+        "regular", "redundant" (permanently), "singular" (the rank is larger nearby), or "not tested".
+    nearby_rank : int
+        Largest rank found at nearby poses.
+    tangents : BranchTangents or None
+        At a singular pose: the motions of the branches that meet.
+    """
+
+    model: DynamicModel
+    status: str
+    message: str
+    time: float
+    poses: Array
+    velocities: Array
+    accelerations: Array
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    determined: NDArray[np.bool_]
+    rows: tuple[str, ...]
+    position_correction: float
+    velocity_correction: float
+    rank: int
+    freedom: int
+    singular_values: Array
+    condition: float
+    redundant: tuple[tuple[str, ...], ...]
+    violated: dict[str, float]
+    pose_class: PoseClass
+    nearby_rank: int
+    tangents: BranchTangents | None
+    slots: Array = field(repr=False)
+
+    @property
+    def consistent(self) -> bool:
+        """Whether a motion can start here."""
+        return self.status == "consistent"
+
+
+def consistent_start(
+    model: DynamicModel,
+    *,
+    pose: ArrayLike | None = None,
+    rates: ArrayLike | None = None,
+    keep: Keys | None = None,
+    keep_rates: Keys | None = None,
+    modes: Mapping[int, int] | None = None,
+    time: float = 0.0,
+) -> StartReport:
+    """Find the state nearest to a guess that satisfies all constraints, and classify it (spec 5.6).
+
+    Parameters
+    ----------
+    model : DynamicModel
+    pose : array_like, shape (links, 3), optional
+        Guess of the link poses; ``mechanism.pose`` by default, or what the planar engine finds for the drivers' kept
+        coordinates and ``modes``.
+    rates : array_like, shape (links, 3), optional
+        Guess of the link velocities; 0 by default.
+    keep, keep_rates : mapping, optional
+        Coordinates and rates to keep: keys ``(base, link)`` for the coordinate of an R or P joint, or ``(link, "x")``,
+        ``(link, "y")``, ``(link, "theta")`` for a link frame.
+    modes : mapping of int to int, optional
+        Assembly modes for the planar engine.
+    time : float, optional
+        For prescribed motions.
+
+    Returns
+    -------
+    StartReport
+        Ask ``consistent`` before using it; violated constraints are a value, not an exception.
+
+    Raises
+    ------
+    GeometryError
+        If there is no guess to start from, or a kept key names nothing.
+
+    Examples
+    --------
+    >>> from graphsynth.dynamics.model import Body
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> from graphsynth.mechanism.joints import Revolute
+    >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
+    >>> start = consistent_start(model, keep={(0, 1): 0.0})
+    >>> start.status, start.freedom, round(float(start.accelerations[1, 2]), 6)  # -3 g / 2
+    ('consistent', 1, -14.715)
+    """
+    return start_compiled(compile_model(model), pose, rates, keep or {}, keep_rates or {}, modes, float(time))
+
+
+def start_compiled(
+    compiled: Compiled, pose: ArrayLike | None, rates: ArrayLike | None, keep: Keys, keep_rates: Keys,
+    modes: Mapping[int, int] | None, time: float,
+) -> StartReport:  # fmt: skip
+    """Do what `consistent_start` says for a compiled model."""
+    q0 = compiled.to_coordinates(_guess(compiled, pose, keep, modes))
+    slots = initial_slots(compiled, q0)
+    values = Values(compiled, time, slots)
+    kept = _kept(values, keep)
+    q, residual = _close(values, kept, q0)
+    values = replace(values, slots=initial_slots(compiled, q, slots))
+    report = _blank(values, q, q0)
+    names = [*report.rows, *(f"kept {key}" for key in keep)]
+    scaled = np.abs(residual / _units(values, kept))
+    if not np.isfinite(residual).all() or scaled.max(initial=0.0) > _CLOSED:
+        units = _row_units(values, kept)
+        worst = {name: float(value) for name, value in zip(names, residual) if not abs(value) < 1e-12}
+        worst_name = names[int(np.argmax(scaled))]
+        return replace(
+            report, status="violated", violated=worst, pose_class="not tested",
+            message=f"the constraints do not close: '{worst_name}' stays open by {abs(residual[np.argmax(scaled)]):.6g} "
+            f"{units[int(np.argmax(scaled))]}; correct the dimensions or the kept coordinates",
+        )  # fmt: skip
+    report = classify(values, report)
+    v0 = np.zeros(compiled.n) if rates is None else compiled.to_rates(q, _checked(compiled, rates, "rates"))
+    return _velocities(values, report, v0, _kept(values, keep_rates), [f"kept {key}" for key in keep_rates])
+
+
+def _checked(compiled: Compiled, given: ArrayLike, name: str) -> Array:
+    array = np.asarray(given, dtype=np.float64)
+    if array.shape != (compiled.links, 3) or not np.isfinite(array).all():
+        raise GeometryError(f"{name} must hold three finite numbers for each of {compiled.links} links; give them all")
+    return array
+
+
+def _guess(compiled: Compiled, pose: ArrayLike | None, keep: Keys, modes: Mapping[int, int] | None) -> Array:
+    mechanism = compiled.model.mechanism
+    if pose is not None:
+        return _checked(compiled, pose, "pose")
+    drivers = [driver.pair for driver in mechanism.drivers]
+    wanted = {(min(key), max(key)): (key, value) for key, value in keep.items() if not isinstance(key[1], str)}
+    if drivers and all(pair in wanted for pair in drivers):
+        found = pose_from_drivers(mechanism, [wanted[pair] for pair in drivers], modes or {})
+        if found is not None:
+            return found
+        raise GeometryError(f"the mechanism cannot be assembled at {dict(keep)}; choose other coordinates or modes")
+    if mechanism.pose is not None:
+        return np.array(mechanism.pose)
+    raise GeometryError("there is no pose to start from; give pose=, or keep= with the coordinate of every driver")
+
+
+def _kept(values: Values, keep: Mapping[Any, float]) -> tuple[list[Any], Array]:
+    """Rows that hold kept coordinates, in the form of `Values.extra`."""
+    rows = [coordinate_row(values.compiled, key, k) for k, key in enumerate(keep)]
+    return rows, np.array([float(value) for value in keep.values()])
+
+
+def _units(values: Values, kept: tuple[list[Any], Array]) -> Array:
+    """Unit of every row: the characteristic length, or 1 for angles."""
+    own = values.row_scale
+    return np.concatenate([own, [1.0 if row[4] else values.size for row in kept[0]]])
+
+
+def _row_units(values: Values, kept: tuple[list[Any], Array]) -> list[str]:
+    angular = [info.angular for info in values.compiled.info] + [row[4] for row in kept[0]]
+    return ["rad" if flag else "m" for flag in angular]
+
+
+def _close(values: Values, kept: tuple[list[Any], Array], q0: Array) -> tuple[Array, Array]:
+    """Nearest point to q0 on the constraints, by Gauss-Newton; also the residual of every row."""
+    q, scale = q0.copy(), values.column_scale
+    size = np.inf
+    unit = _units(values, kept)
+    for _ in range(_ROUNDS):
+        C, J = values.with_extra(q, kept)
+        if not np.isfinite(C).all():
+            return q, np.full(len(C), np.nan)
+        scaled = J * scale / unit[:, None]
+        inverse = np.linalg.pinv(scaled, rcond=RANK)
+        away = (q0 - q) / scale
+        step = -inverse @ (C / unit) + away - inverse @ (scaled @ away)
+        length = float(np.abs(step).max(initial=0.0))
+        if length > 0.5:
+            step *= 0.5 / length
+        q = q + scale * step
+        if length < 1e-15 or (length < 1e-12 and length >= 0.5 * size):
+            break
+        size = length
+    return q, values.with_extra(q, kept)[0]
+
+
+def _blank(values: Values, q: Array, q0: Array) -> StartReport:
+    compiled = values.compiled
+    nan = np.full(compiled.n, np.nan)
+    pose, rate, second = compiled.to_links(q, nan, nan)
+    count = len(compiled.info)
+    moved = float(np.abs((q - q0) / values.column_scale).max(initial=0.0))
+    return StartReport(
+        compiled.model, "consistent", "", values.time, pose, rate, second, q, nan, nan, np.full(count, np.nan),
+        np.zeros(count, dtype=np.bool_), tuple(info.name for info in compiled.info), moved, float("nan"), 0, 0,
+        np.empty(0), float("nan"), (), {}, "not tested", 0, None, values.slots,
+    )  # fmt: skip
+
+
+def classify(values: Values, report: StartReport) -> StartReport:
+    """Rank, dependent sets of rows, pose class."""
+    J = values.scaled_jacobian(report.q)
+    U, S, Vt = np.linalg.svd(J)
+    largest = float(S[0]) if S.size else 1.0
+    rank = int(np.sum(largest * RANK < S))
+    left = U[:, rank:]
+    sets: tuple[tuple[str, ...], ...] = ()
+    pose_class: PoseClass = "regular"
+    nearby, tangents = rank, None
+    if left.shape[1]:
+        sets = _dependent(left, report.rows)
+        pose_class, nearby, tangents = classify_pose(values, report.q, rank, left, Vt[rank:].T, RANK)
+    return replace(
+        report, rank=rank, freedom=values.compiled.n - rank, singular_values=S, redundant=sets,
+        condition=largest / float(S[rank - 1]) if rank else 1.0, pose_class=pose_class, nearby_rank=nearby,
+        tangents=tangents, determined=np.abs(left).max(axis=1, initial=0.0) < 1e-8,
+    )  # fmt: skip
+
+
+def _dependent(left: Array, names: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    """Smallest sets of dependent rows: the reduced echelon form of the left null vectors."""
+    basis = left.T.copy()
+    found = []
+    pivots: list[int] = []
+    for k in range(len(basis)):
+        column = int(np.argmax(np.abs(basis[k])))
+        pivots.append(column)
+        basis[k] /= basis[k, column]
+        for other in range(len(basis)):
+            if other != k:
+                basis[other] -= basis[other, column] * basis[k]
+    for row in basis:
+        members: list[Hashable] = [name for name, value in zip(names, row) if abs(value) > 1e-8]
+        found.append(tuple(str(name) for name in members))
+    return tuple(found)
+
+
+def _velocities(
+    values: Values, report: StartReport, v0: Array, kept: tuple[list[Any], Array], names: list[str]
+) -> StartReport:
+    compiled = values.compiled
+    _, J, _, vel = values.system(report.q, v0)
+    rows, wanted = kept
+    _, Jk = values.extra(report.q, rows, np.zeros(len(rows)))
+    matrix, right = np.vstack([J, Jk]), np.concatenate([vel, wanted])
+    unit = _units(values, kept)
+    weight = values.mass_root_inverse
+    scaled = (matrix @ weight) / unit[:, None]
+    d = (right - matrix @ v0) / unit
+    size = np.linalg.norm(scaled, axis=1, keepdims=True)
+    size[size == 0.0] = 1.0
+    step = weight @ (np.linalg.pinv(scaled / size, rcond=RANK) @ (d / size[:, 0]))
+    v = v0 + step
+    # contradictions are judged by plain least squares, so that the residual is that of the rates themselves
+    residual = matrix @ v - right
+    speed = max(float(np.abs(v / values.column_scale).max(initial=0.0)), float(np.abs(right / unit).max(initial=0.0)))
+    if float(np.abs(residual / unit).max(initial=0.0)) > 1e-9 * speed:
+        plain = (matrix * values.column_scale) / unit[:, None]
+        v = v0 + values.column_scale * (np.linalg.pinv(plain, rcond=RANK) @ d)
+        residual = matrix @ v - right
+        all_names = [*report.rows, *names]
+        worst = int(np.argmax(np.abs(residual / unit)))
+        found = {name: float(value) for name, value in zip(all_names, residual) if abs(value) > 1e-12 * speed}
+        return replace(
+            report, status="contradicting rates", violated=found,
+            message=f"the rates contradict the joints: '{all_names[worst]}' is missed by {abs(residual[worst]):.6g} "
+            f"{_row_units(values, kept)[worst]}/s; keep fewer rates or correct them",
+        )  # fmt: skip
+    moved = float(np.abs(step / values.column_scale).max(initial=0.0))
+    a, lam, text = values.accelerations(report.q, v, applied_loads(compiled, values.time, report.q, v))
+    pose, rate, second = compiled.to_links(report.q, v, a)
+    message = _sentence(report) + text
+    return replace(
+        report, v=v, a=a, multipliers=lam, velocities=rate, accelerations=second, poses=pose,
+        velocity_correction=moved, message=message,
+    )  # fmt: skip
+
+
+def _sentence(report: StartReport) -> str:
+    text = f"consistent: rank {report.rank} of {len(report.rows)} rows, freedom {report.freedom}"
+    if report.pose_class == "redundant":
+        text += f"; {len(report.rows) - report.rank} redundant rows, their reactions are not determined"
+    if report.pose_class == "singular":
+        text += f"; singular pose: the rank is {report.nearby_rank} nearby"
+        if report.tangents is not None:
+            text += f", {report.tangents.kind}"
+    return text

@@ -1,0 +1,174 @@
+"""The integration loop: scipy's steppers, projection after every step, breaks, outputs, singular poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.result import DynamicEvent
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.integrate import Form
+
+__all__ = ["METHODS", "Trail", "integrate"]
+
+Array = NDArray[np.float64]
+Output = Callable[[int, float, Array], None]
+
+METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA", "CVODE")
+_RUNGE_KUTTA = ("DOP853", "RK45", "RK23")
+
+
+@dataclass
+class Trail:
+    """How an integration went; a workspace."""
+
+    time: float = 0.0
+    steps: int = 0
+    evaluations: int = 0
+    last_step: float = 0.0
+    message: str = ""
+    events: list[DynamicEvent] = field(default_factory=list)
+
+
+def integrate(
+    form: Form, grid: Array, breaks: Sequence[float], method: str, rtol: float, atol: Array | float, exact: bool,
+    max_steps: int, output: Output,
+) -> Trail:  # fmt: skip
+    """Integrate a formulation over the output times; how far it came is in the trail.
+
+    Parameters
+    ----------
+    breaks : sequence of float
+        Times that no step crosses; loads are taken from their own side of them.
+    exact : bool
+        End a step at every output time.
+    output : callable
+        Called with index, time and state at every output time reached.
+    """
+    trail = Trail(time=float(grid[0]))
+    y = form.begin()
+    output(0, trail.time, y)
+    inner = [t for t in breaks if grid[0] < t < grid[-1]]
+    for t in inner:
+        trail.events.append(DynamicEvent("break", t, 0.0, f"loads are not smooth at t = {t:.9g} s"))
+    ends = [*inner, float(grid[-1])]
+    for end in ends:
+        stepper = _Stepper(form, trail, method, rtol, atol, exact, end, at_break=end in inner)
+        last = stepper.run(y, grid, max_steps, output)
+        if last is None:
+            break
+        y = last
+    return trail
+
+
+class _Stepper:
+    """Integration over one smooth piece."""
+
+    def __init__(
+        self, form: Form, trail: Trail, method: str, rtol: float, atol: Array | float, exact: bool, end: float,
+        at_break: bool,
+    ) -> None:  # fmt: skip
+        self.form, self.trail, self.method, self.rtol, self.atol = form, trail, method, rtol, atol
+        self.exact = exact or method not in (*_RUNGE_KUTTA, "Radau")
+        self.end = end
+        self.latest = float(np.nextafter(end, -np.inf)) if at_break else np.inf
+
+    def rates(self, t: float, y: Array) -> Array:
+        """Rates of the form, seen from this side of the next break."""
+        self.trail.evaluations += 1
+        return self.form.rates(min(t, self.latest), y)
+
+    def _solver(self, t: float, y: Array, bound: float, first: float | None) -> Any:
+        from scipy import integrate as scipy_integrate
+
+        if self.method == "CVODE":
+            from graphsynth.dynamics.stiff import CvodeStepper
+
+            return CvodeStepper(self.rates, t, y, bound, self.rtol, self.atol)
+        options: dict[str, Any] = {"rtol": self.rtol, "atol": self.atol}
+        if first is not None:
+            options["first_step"] = min(first, bound - t)
+        return getattr(scipy_integrate, self.method)(self.rates, t, y, bound, **options)
+
+    def run(self, y: Array, grid: Array, max_steps: int, output: Output) -> Array | None:
+        """Integrate to the end of the piece; None if that fails."""
+        trail = self.trail
+        if not np.isfinite(self.rates(trail.time, y)).all():
+            trail.message = "the equations of motion have no value at the start"
+            return None
+        k = int(np.searchsorted(grid, trail.time, side="right"))
+        solver = None
+        step: float | None = None
+        while trail.time < self.end:
+            bound = min(float(grid[k]), self.end) if self.exact and k < len(grid) else self.end
+            if solver is None or solver.status == "finished":
+                solver = self._next(solver, trail.time, y, bound, step)
+            before = trail.time
+            message = solver.step()
+            trail.steps += 1
+            if solver.status == "failed" or not np.isfinite(solver.y).all():
+                trail.message = str(message or "the solver gave no finite state")
+                return None
+            if trail.steps >= max_steps:
+                trail.message = f"more than {max_steps} steps"
+                return None
+            k = self._outputs(solver, before, grid, k, output)
+            trail.time, trail.last_step = float(solver.t), float(solver.t) - before
+            y, step = self._accepted(solver, step)
+            self.form_watch(before, solver)
+        return y
+
+    def _next(self, solver: Any, t: float, y: Array, bound: float, step: float | None) -> Any:
+        """Return a solver to go on; a Runge-Kutta solver is taken on with its proposed step."""
+        if solver is not None and self.method in _RUNGE_KUTTA:
+            solver.t_bound, solver.status = bound, "running"
+            if step is not None:
+                solver.h_abs = max(solver.h_abs, step)
+            return solver
+        return self._solver(t, y, bound, step)
+
+    def _outputs(self, solver: Any, before: float, grid: Array, k: int, output: Output) -> int:
+        dense = None
+        while k < len(grid) and grid[k] <= solver.t:
+            t = float(grid[k])
+            if t == solver.t:
+                output(k, t, np.asarray(solver.y))
+            else:
+                dense = solver.dense_output() if dense is None else dense
+                output(k, t, np.asarray(dense(t)))
+            k += 1
+        return k
+
+    def _accepted(self, solver: Any, step: float | None) -> tuple[Array, float | None]:
+        """Project; go on from the projected state with the step size that the method proposed."""
+        y = np.asarray(solver.y)
+        changed = self.form.accept(float(solver.t), y)
+        proposed = getattr(solver, "h_abs", None)
+        if self.method in _RUNGE_KUTTA:
+            step = max(proposed or 0.0, 0.0) if solver.status != "finished" else max(proposed or 0.0, step or 0.0)
+            if changed is not y:
+                solver.y = changed
+                solver.f = self.rates(float(solver.t), changed)
+        elif changed is not y:
+            # a multistep method restarts at low order: only where it lands anyway; Radau restarts with its step
+            if self.method == "Radau" and solver.status == "running":
+                return changed, self._restart(solver, changed, float(proposed or 0.0))
+            step = None if self.method != "Radau" else float(proposed or 0.0) or None
+        return (changed if self.method in (*_RUNGE_KUTTA, "Radau") or solver.status == "finished" else y), step
+
+    def _restart(self, solver: Any, y: Array, proposed: float) -> float:
+        """Start a Radau solver anew at the projected state, in place."""
+        fresh = self._solver(float(solver.t), y, float(solver.t_bound), proposed or None)
+        solver.__dict__.update(fresh.__dict__)
+        return proposed
+
+    def form_watch(self, before: float, solver: Any) -> None:
+        """Let the formulation look for singular poses in the step just made."""
+        watch = getattr(self.form, "watch", None)
+        if watch is not None:
+            watch(self.trail, before, solver)

@@ -1,0 +1,365 @@
+"""A dynamic model as flat tables for the kernels.
+
+Coordinates are those of spec 5.1: for every moving link, ascending, ``(x, y, theta)`` of its centre of mass.  Joint
+points are shifted to the centres of mass, so the rows of the planar engine apply as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.elements import Force, JointFriction, Spring, Torque, TorqueSource, TorsionSpring
+from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
+from graphsynth.mechanism.model import Driver
+from graphsynth.mechanism.rank import characteristic_length
+
+__all__ = ["RACK", "Compiled", "RowInfo", "Tables", "compile_model", "coordinate_row"]
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: Kind of a rack row, beside those of :mod:`graphsynth.kinematics.engine.codes`.
+RACK = 20
+
+
+class Tables(NamedTuple):
+    """What the kernels read; n coordinates, m constraint rows."""
+
+    column: IntArray  #: (links,) first coordinate of a link, -1 for the frame
+    rows: IntArray  #: (m, 3) kind, a, b
+    table: Array  #: (m, width) parameters
+    slots: IntArray  #: (m,) slot of a gear or rack, -1
+    mass: Array  #: (n, n)
+    lower: Array  #: (n, n) Cholesky factor of the mass matrix; (0, 0) if there are massless links
+    diagonal: bool  #: whether the mass matrix is diagonal
+    gravity: Array  #: (2,)
+    springs: IntArray  #: (springs, 2) links
+    spring_table: Array  #: (springs, 7) points, stiffness, free length, damping
+    torsions: IntArray
+    torsion_table: Array  #: stiffness, free angle, damping
+    forces: IntArray  #: (forces, 2) link, 1 if the force turns with it
+    force_table: Array  #: point, force
+    sources: IntArray  #: (torques, 2) links
+    source_table: Array  #: torque behind the train, efficiency
+    friction: IntArray  #: (frictions, 4) first row, rows, a, b
+    friction_table: Array  #: kinetic, static, Stribeck speed, regular speed, radius, length
+    size: float  #: characteristic length
+
+
+class RowInfo(NamedTuple):
+    """What a constraint row belongs to: its name, whether it is an angle, and the joint (index into ``joints``)."""
+
+    name: str
+    angular: bool
+    joint: int
+
+
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """Tables and what they mean.
+
+    ``joints`` are all constraint objects in the order of their rows (graph joints, additional ones, prescribed
+    drivers), ``first`` the first row of each, ``centres`` (links, 2) the centres of mass, ``laws`` the motion laws by
+    driver slot, ``applied`` the loads given as functions.
+    """
+
+    model: DynamicModel
+    tables: Tables
+    info: tuple[RowInfo, ...]
+    joints: tuple[Any, ...]
+    first: tuple[int, ...]
+    centres: Array
+    laws: tuple[Callable[[Array], tuple[Array, Array, Array]], ...]
+    applied: tuple[Force | Torque | TorqueSource, ...]
+
+    @property
+    def links(self) -> int:
+        """Number of links, the frame included."""
+        return self.model.mechanism.graph.links
+
+    @property
+    def moving(self) -> list[int]:
+        """Moving links, ascending."""
+        return list(self.model.bodies)
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return 3 * len(self.model.bodies)
+
+    def to_coordinates(self, poses: ArrayLike) -> Array:
+        """Coordinates of the centres of mass, shape (..., n), from link poses (..., links, 3)."""
+        pose = np.asarray(poses, dtype=np.float64)[..., self.moving, :]
+        arm = np.exp(1j * pose[..., 2]) * (self.centres[self.moving] @ [1.0, 1j])
+        q = np.stack([pose[..., 0] + arm.real, pose[..., 1] + arm.imag, pose[..., 2]], axis=-1)
+        return q.reshape(*pose.shape[:-2], self.n)
+
+    def to_rates(self, q: ArrayLike, rates: ArrayLike) -> Array:
+        """Velocities of the centres of mass (..., n) from link velocities (..., links, 3)."""
+        rate = np.asarray(rates, dtype=np.float64)[..., self.moving, :]
+        angle = np.asarray(q, dtype=np.float64).reshape(*rate.shape)[..., 2]
+        arm = 1j * np.exp(1j * angle) * (self.centres[self.moving] @ [1.0, 1j]) * rate[..., 2]
+        v = np.stack([rate[..., 0] + arm.real, rate[..., 1] + arm.imag, rate[..., 2]], axis=-1)
+        return v.reshape(*rate.shape[:-2], self.n)
+
+    def to_links(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
+        """Poses, velocities and accelerations of the link frames, each (..., links, 3)."""
+        shape = np.shape(q)[:-1]
+        parts = [np.asarray(part, dtype=np.float64).reshape(*shape, -1, 3) for part in (q, v, a)]
+        pose, rate, second = (np.zeros((*shape, self.links, 3)) for _ in range(3))
+        arm = -np.exp(1j * parts[0][..., 2]) * (self.centres[self.moving] @ [1.0, 1j])
+        speed, turn = parts[1][..., 2], parts[2][..., 2]
+        for target, part, extra in (
+            (pose, parts[0], arm),
+            (rate, parts[1], 1j * speed * arm),
+            (second, parts[2], (1j * turn - speed**2) * arm),
+        ):
+            target[..., self.moving, 0] = part[..., 0] + extra.real
+            target[..., self.moving, 1] = part[..., 1] + extra.imag
+            target[..., self.moving, 2] = part[..., 2]
+        return pose, rate, second
+
+    def driven(self, t: float) -> Array:
+        """Prescribed coordinates and their two derivatives, shape (drivers, 3); at least one row."""
+        found = np.zeros((max(1, len(self.laws)), 3))
+        for k, law in enumerate(self.laws):
+            found[k] = [float(part[0]) for part in law(np.array([t]))]
+        return found
+
+
+def compile_model(model: DynamicModel) -> Compiled:
+    """Compile a model.
+
+    Raises
+    ------
+    GeometryError
+        If a mass or an inertia is too small to be told from zero beside the others.
+    """
+    mechanism = model.mechanism
+    links = mechanism.graph.links
+    centres = np.zeros((links, 2))
+    for link, body in model.bodies.items():
+        centres[link] = body.centre
+    joints: list[Any] = [*mechanism.joints, *model.additional, *model.prescribed]
+    rows, table, slots, info, first = _constraints(model, joints, centres)
+    column = np.full(links, -1, dtype=np.int64)
+    column[list(model.bodies)] = 3 * np.arange(len(model.bodies))
+    mass = _mass_matrix(model, column)
+    diagonal = not (mass - np.diag(np.diag(mass))).any()
+    lower = np.zeros((0, 0)) if model.massless else np.linalg.cholesky(mass)
+    tables = Tables(
+        column, rows, table, slots, mass, lower, diagonal, np.array(model.gravity),
+        *_loads(model, centres), *_frictions(model, joints, first), _size(model),
+    )  # fmt: skip
+    applied = tuple(
+        element for element in model.elements
+        if callable(getattr(element, "force", None)) or callable(getattr(element, "torque", None))
+    )  # fmt: skip
+    return Compiled(
+        model, tables, tuple(info), tuple(joints), tuple(first), centres,
+        tuple(driver.law for driver in model.prescribed), applied,
+    )  # fmt: skip
+
+
+def _size(model: DynamicModel) -> float:
+    """Return the characteristic length; of a mechanism of sliders, the radius of gyration of its largest body."""
+    size = characteristic_length(model.mechanism)
+    if size != 1.0:
+        return size
+    found = [math.sqrt(body.inertia / body.mass) for body in model.bodies.values() if body.mass > 0.0]
+    return max(found, default=0.0) or 1.0
+
+
+def _shifted(at: tuple[float, float], centre: Array) -> tuple[float, float]:
+    return at[0] - float(centre[0]), at[1] - float(centre[1])
+
+
+def _constraints(
+    model: DynamicModel, joints: list[Any], centres: Array
+) -> tuple[IntArray, Array, IntArray, list[RowInfo], list[int]]:
+    found: list[tuple[int, int, int, list[float]]] = []
+    info: list[RowInfo] = []
+    first: list[int] = []
+    slots: list[int] = []
+    for index, joint in enumerate(joints):
+        first.append(len(found))
+        if isinstance(joint, Driver):
+            own = _driver_rows(model, joint, centres, len(first) - 1 - len(joints) + len(model.prescribed))
+        else:
+            own = joint_rows(_moved(joint, centres), model.mechanism.frame)
+        for kind, a, b, parameters in own:
+            slots.append(sum(slot >= 0 for slot in slots) if kind in (codes.GEAR, RACK) else -1)
+            info.append(RowInfo(_row_name(kind, joint), _angular(kind), index))
+            found.append((kind, a, b, parameters))
+    width = max([codes.ROW_WIDTH, *(len(row[3]) for row in found)])
+    table = np.zeros((len(found), width))
+    for k, row in enumerate(found):
+        table[k, : len(row[3])] = row[3]
+        if slots[k] >= 0:
+            table[k, codes.SLOT] = slots[k]
+    rows = np.array([row[:3] for row in found], dtype=np.int64).reshape(-1, 3)
+    return rows, table, np.array(slots, dtype=np.int64), info, first
+
+
+def _moved(joint: Any, centres: Array) -> Any:
+    """Return the joint with its points given from the centres of mass."""
+    if isinstance(joint, Rack):
+        return replace(joint, at=_shifted(joint.at, centres[joint.rack]))
+    return replace(
+        joint, at_a=_shifted(joint.at_a, centres[joint.a]), at_b=_shifted(joint.at_b, centres[joint.b])
+    )  # fmt: skip
+
+
+def joint_rows(joint: Any, frame: int) -> list[tuple[int, int, int, list[float]]]:
+    """Equations of a joint, in the parameters of the engine's rows."""
+    if isinstance(joint, Rack):
+        e = [math.cos(joint.angle), math.sin(joint.angle)]
+        row = [0.0] * 12
+        row[codes.PAX], row[codes.PAY], row[codes.TX], row[codes.TY], row[codes.RA] = *joint.at, *e, joint.radius
+        return [(RACK, joint.rack, joint.pinion, row)]
+    base = [*joint.at_a, *joint.at_b, 1.0, 0.0, *[0.0] * 6]
+    a, b = joint.a, joint.b
+    if isinstance(joint, Gear):
+        base[codes.RA], base[codes.RB], base[codes.SIGN], base[codes.H] = joint.row()[6:10]
+        return [(codes.GEAR, a, b, base)]
+    if isinstance(joint, Cam):
+        base[codes.RA], base[codes.H] = joint.angle_a, joint.radius
+        return [(codes.CAM, a, b, [*base, *(part for pair in joint.harmonics for part in pair), 0.0])]
+    turned = list(base)
+    if isinstance(joint, Revolute | Rigid):
+        found = [(codes.RX, a, b, base), (codes.RY, a, b, base)]
+    else:
+        base[codes.TX], base[codes.TY] = math.cos(joint.angle_a), math.sin(joint.angle_a)
+        found = [(codes.LINE, a, b, base)]
+    if isinstance(joint, Prismatic | Rigid):
+        turned[codes.H] = joint.angle_a - joint.angle_b
+        found.append((codes.ANGLE, a, b, turned))
+    return found
+
+
+def _driver_rows(
+    model: DynamicModel, driver: Driver, centres: Array, slot: int
+) -> list[tuple[int, int, int, list[float]]]:
+    joint = model.mechanism.joint(*driver.pair)
+    sign = 1.0 if driver.base == joint.a else -1.0
+    moved = _moved(joint, centres)
+    row = [*moved.at_a, *moved.at_b, 1.0, 0.0, *[0.0] * 6]
+    row[codes.SIGN], row[codes.SLOT] = sign, float(slot)
+    if isinstance(joint, Prismatic):
+        row[codes.TX], row[codes.TY] = math.cos(joint.angle_a), math.sin(joint.angle_a)
+        return [(codes.DRIVE_SLIDE, joint.a, joint.b, row)]
+    return [(codes.DRIVE_ANGLE, joint.a, joint.b, row)]
+
+
+def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> tuple[int, int, int, list[float], bool]:
+    """Row that prescribes a coordinate: ``(link, "x" | "y" | "theta")`` or ``(base, link)`` of a joint.
+
+    Returns kind, a, b, parameters and whether it is an angle.
+
+    Raises
+    ------
+    GeometryError
+        If the key names nothing that can be kept.
+    """
+    model, frame = compiled.model, compiled.model.mechanism.frame
+    try:
+        one, two = key
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{key!r} names no coordinate; give (link, 'x' | 'y' | 'theta') or (base, link)") from error
+    if not isinstance(two, str):
+        driver = Driver(one, two)
+        joint = model.mechanism.joint(*driver.pair)
+        if not isinstance(joint, Revolute | Prismatic):
+            raise GeometryError(f"joint {one}-{two} is {joint.kind}; only coordinates of R and P joints can be kept")
+        kind, a, b, row = _driver_rows(model, driver, compiled.centres, slot)[0]
+        return kind, a, b, row, kind == codes.DRIVE_ANGLE
+    if two not in ("x", "y", "theta") or one not in model.bodies:
+        raise GeometryError(f"{key!r} names no coordinate; give (moving link, 'x' | 'y' | 'theta')")
+    own = (-float(compiled.centres[one, 0]), -float(compiled.centres[one, 1]))
+    row = [0.0, 0.0, *own, 0.0, 0.0, *[0.0] * 6]
+    row[codes.SIGN], row[codes.SLOT] = 1.0, float(slot)
+    row[codes.TX], row[codes.TY] = (1.0, 0.0) if two == "x" else (0.0, 1.0)
+    kind = codes.DRIVE_ANGLE if two == "theta" else codes.DRIVE_SLIDE
+    return kind, frame, one, row, two == "theta"
+
+
+def _angular(kind: int) -> bool:
+    return kind in (codes.ANGLE, codes.DRIVE_ANGLE, codes.GEAR)
+
+
+def _row_name(kind: int, joint: Any) -> str:
+    if isinstance(joint, Rack):
+        return f"rack {joint.rack} - pinion {joint.pinion}"
+    if isinstance(joint, Driver):
+        return f"prescribed {joint.base}-{joint.link}"
+    part = {codes.RX: " x", codes.RY: " y", codes.LINE: " normal", codes.ANGLE: " angle"}.get(kind, "")
+    name = "rigid" if isinstance(joint, Rigid) else joint.kind
+    return f"{name} {joint.a}-{joint.b}{part}"
+
+
+def _mass_matrix(model: DynamicModel, column: IntArray) -> Array:
+    n = 3 * len(model.bodies)
+    mass = np.zeros((n, n))
+    for link, body in model.bodies.items():
+        k = int(column[link])
+        mass[k, k] = mass[k + 1, k + 1] = body.mass
+        mass[k + 2, k + 2] = body.inertia
+    for element in model.elements:
+        if isinstance(element, TorqueSource) and element.rotor_inertia > 0.0:
+            reflected = element.ratio**2 * element.rotor_inertia
+            ends = [(int(column[link]) + 2, sign) for link, sign in ((element.a, -1.0), (element.b, 1.0))]
+            for i, si in ends:
+                for j, sj in ends:
+                    if i >= 2 and j >= 2:
+                        mass[i, j] += si * sj * reflected
+    return mass
+
+
+def _loads(model: DynamicModel, centres: Array) -> tuple[Any, ...]:
+    springs, torsions, forces, sources = [], [], [], []
+    for e in model.elements:
+        if isinstance(e, Spring):
+            ends = (*_shifted(e.at_a, centres[e.a]), *_shifted(e.at_b, centres[e.b]))
+            springs.append(((e.a, e.b), (*ends, e.stiffness, e.free_length, e.damping)))
+        elif isinstance(e, TorsionSpring):
+            torsions.append(((e.a, e.b), (e.stiffness, e.free_angle, e.damping)))
+        elif isinstance(e, Force) and not callable(e.force):
+            place = _shifted(e.at, centres[e.link])
+            forces.append(((e.link, int(e.frame == "body")), (*place, *e.force)))
+        elif isinstance(e, Torque) and not callable(e.torque):
+            sources.append(((e.a, e.b), (e.torque, 1.0)))
+        elif isinstance(e, TorqueSource):
+            if not callable(e.torque):
+                sources.append(((e.a, e.b), (e.ratio * e.torque, e.efficiency)))
+            torsions.append(((e.a, e.b), (0.0, 0.0, e.ratio**2 * e.rotor_damping)))
+    found: list[Any] = []
+    for items, width in ((springs, 7), (torsions, 3), (forces, 4), (sources, 2)):
+        found.append(np.array([item[0] for item in items], dtype=np.int64).reshape(-1, 2))
+        found.append(np.array([item[1] for item in items], dtype=np.float64).reshape(-1, width))
+    return tuple(found)
+
+
+def _frictions(model: DynamicModel, joints: list[Any], first: list[int]) -> tuple[IntArray, Array]:
+    ints, floats = [], []
+    for e in model.elements:
+        if not isinstance(e, JointFriction):
+            continue
+        pair = (min(e.a, e.b), max(e.a, e.b))
+        index = next(k for k, joint in enumerate(model.mechanism.joints) if joint.pair == pair)
+        joint = joints[index]
+        ints.append([first[index], 2 if isinstance(joint, Revolute) else 1, joint.a, joint.b])
+        stribeck = e.stribeck_speed if math.isfinite(e.stribeck_speed) else 1e300
+        floats.append([e.kinetic, e.static, stribeck, e.regular_speed, e.radius, e.length])
+    table = np.array(floats, dtype=np.float64).reshape(-1, 6)
+    return np.array(ints, dtype=np.int64).reshape(-1, 4), table
+
+

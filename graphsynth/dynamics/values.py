@@ -1,0 +1,141 @@
+"""Constraint values, Jacobians and accelerations at single states, in the scaling of rank decisions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.tables import RACK, Compiled
+from graphsynth.kinematics.engine import codes
+
+__all__ = ["Values", "initial_slots"]
+
+Array = NDArray[np.float64]
+
+
+def initial_slots(compiled: Compiled, q: Array, near: Array | None = None) -> Array:
+    """Line-of-centres angles of gears, on the turn that closes best, and constants of racks.
+
+    With ``near`` racks keep their constants and angles are those nearest to it.
+    """
+    T = compiled.tables
+    slots = np.zeros(max(1, int(T.slots.max(initial=-1)) + 1))
+    where = np.flatnonzero(T.slots >= 0)
+    if not where.size:
+        return slots
+    pose, _, _ = compiled.to_links(q, np.zeros_like(q), np.zeros_like(q))
+    coordinates = np.zeros((compiled.links, 3))
+    coordinates[compiled.moving] = np.asarray(q).reshape(-1, 3)
+    for r in where:
+        kind, a, b = (int(v) for v in T.rows[r])
+        slot, p = int(T.slots[r]), T.table[r]
+        P = complex(*coordinates[a, :2]) + np.exp(1j * coordinates[a, 2]) * complex(p[codes.PAX], p[codes.PAY])
+        if kind == RACK:
+            value = p[codes.TX] * P.real + p[codes.TY] * P.imag - p[codes.RA] * coordinates[b, 2]
+            slots[slot] = value if near is None else near[slot]
+            continue
+        R = complex(*coordinates[b, :2]) + np.exp(1j * coordinates[b, 2]) * complex(p[codes.PBX], p[codes.PBY])
+        raw = float(np.angle(R - P))
+        if near is not None:
+            slots[slot] = raw + 2.0 * np.pi * np.round((near[slot] - raw) / (2.0 * np.pi))
+            continue
+        total = p[codes.RA] + p[codes.SIGN] * p[codes.RB]
+        open_ = p[codes.RA] * (coordinates[a, 2] - raw)
+        open_ += p[codes.SIGN] * p[codes.RB] * (coordinates[b, 2] - raw - p[codes.H])
+        turns = 0.0 if abs(total) < 1e-9 * (p[codes.RA] + p[codes.RB]) else np.round(open_ / (2.0 * np.pi * total))
+        slots[slot] = raw + 2.0 * np.pi * turns
+    del pose
+    return slots
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """A compiled model at one time, with the slots of its gears and racks."""
+
+    compiled: Compiled
+    time: float
+    slots: Array
+
+    @property
+    def size(self) -> float:
+        """Characteristic length."""
+        return self.compiled.tables.size
+
+    @cached_property
+    def driven(self) -> Array:
+        """Prescribed coordinates and derivatives."""
+        return self.compiled.driven(self.time)
+
+    @cached_property
+    def row_scale(self) -> Array:
+        """Unit of every row: the characteristic length; 1 for angles."""
+        return np.array([1.0 if info.angular else self.size for info in self.compiled.info])
+
+    @cached_property
+    def column_scale(self) -> Array:
+        """Unit of every coordinate."""
+        return np.tile([self.size, self.size, 1.0], self.compiled.n // 3)
+
+    @cached_property
+    def mass_root_inverse(self) -> Array:
+        """``L^-T`` of the mass matrix; the units of the coordinates if there are massless links."""
+        lower = self.compiled.tables.lower
+        if not lower.size:
+            return np.diag(self.column_scale)
+        return np.asarray(np.linalg.inv(lower).T)
+
+    def system(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+        """Constraint values, Jacobian, right sides of accelerations and velocities."""
+        from graphsynth.dynamics import kernels
+
+        T = self.compiled.tables
+        found = kernels.constraint_system(T, kernels.state_rows(T, q, v), self.slots, self.driven)
+        return found[0], found[1], found[2], found[3]
+
+    def scaled_jacobian(self, q: Array) -> Array:
+        """Jacobian without units."""
+        J = self.system(q, np.zeros_like(q))[1]
+        return np.asarray(J * self.column_scale / self.row_scale[:, None])
+
+    def extra(self, q: Array, rows: list[Any], wanted: Array) -> tuple[Array, Array]:
+        """Values and Jacobian of additional prescribed coordinates."""
+        if not rows:
+            return np.empty(0), np.empty((0, len(q)))
+        from graphsynth.dynamics import kernels
+
+        T = self.compiled.tables
+        table = np.zeros((len(rows), T.table.shape[1]))
+        for k, row in enumerate(rows):
+            table[k, : len(row[3])] = row[3]
+        ints = np.array([row[:3] for row in rows], dtype=np.int64)
+        T = T._replace(rows=ints, table=table, slots=np.full(len(rows), -1, dtype=np.int64))
+        driven = np.zeros((len(rows), 3))
+        driven[:, 0] = wanted
+        C, J, _, _ = kernels.constraint_system(T, kernels.state_rows(T, q, np.zeros_like(q)), self.slots, driven)
+        # the kernel writes a prescribed coordinate as seen from the joint's first link: turn it to the user's sense
+        sense = table[:, codes.SIGN]
+        return sense * C, sense[:, None] * J
+
+    def with_extra(self, q: Array, kept: tuple[list[Any], Array]) -> tuple[Array, Array]:
+        """Values and Jacobian of all constraints and the kept coordinates."""
+        C, J, _, _ = self.system(q, np.zeros_like(q))
+        Ck, Jk = self.extra(q, kept[0], kept[1])
+        return np.concatenate([C, Ck]), np.vstack([J, Jk])
+
+    def accelerations(self, q: Array, v: Array, applied: Array) -> tuple[Array, Array, str]:
+        """Accelerations and multipliers, and what to say about them; NaN with massless links."""
+        from graphsynth.dynamics import kernels
+
+        T = self.compiled.tables
+        m = len(self.compiled.info)
+        if not T.lower.size:
+            return np.full(len(q), np.nan), np.full(m, np.nan), "; accelerations of massless links: minimal form only"
+        out = np.zeros(7)
+        y = np.concatenate([q, v, [0.0]])
+        rates, lam = kernels.constrained_rates(T, y, self.slots, self.driven, applied, out)
+        text = "; the friction iteration does not contract: no or several solutions" if out[3] >= 1.0 else ""
+        return rates[len(q) : 2 * len(q)].copy(), lam, text
