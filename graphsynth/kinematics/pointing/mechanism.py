@@ -13,13 +13,17 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from graphsynth.kinematics.pointing.approach import ApproachToFold
     from graphsynth.kinematics.pointing.charts import ChartReport
+    from graphsynth.kinematics.pointing.comparison import ModelComparison, Reading
     from graphsynth.kinematics.pointing.cranks import CrankAngles
+    from graphsynth.kinematics.pointing.folds import DeadPoint, Fold
     from graphsynth.kinematics.pointing.modes import AssemblyModes
     from graphsynth.kinematics.pointing.newton import LoopSolution, RootSurvey
     from graphsynth.kinematics.pointing.passive import PassiveAngles
     from graphsynth.kinematics.pointing.rates import Rates
     from graphsynth.kinematics.pointing.results import Poses
+    from graphsynth.kinematics.pointing.sweep import PointingSweep
     from graphsynth.structure.graph import MechanismGraph
 
 __all__ = ["PointingMechanism"]
@@ -236,3 +240,125 @@ class PointingMechanism:
         from graphsynth.kinematics.pointing.rates import passive_rates
 
         return passive_rates(self, poses, dphi_x, dphi_y)
+
+    def folds(self, leg: str, phi_other: float = 0.0, *, s_other: int | None = None) -> tuple[Fold, ...]:
+        """All folds of one leg over a full turn of its crank, with place, output, order and coefficient (section 2.7).
+
+        Parameters
+        ----------
+        leg : {"Y", "X"}
+        phi_other : float
+            Angle of the other crank, radians.
+        s_other : {+1, -1}, optional
+            Branch of the other leg; by default that of the rest pose.
+
+        Returns
+        -------
+        tuple of Fold
+            Sorted by crank angle.  The output of the other leg is NaN where that leg does not reach.
+
+        Raises
+        ------
+        GeometryError
+            The fold depends on the other leg, and that leg does not reach at ``phi_other``.
+
+        Examples
+        --------
+        >>> PointingMechanism().folds("X")
+        ()
+        >>> len(PointingMechanism(l3=0.12, l5=0.12).folds("X"))
+        4
+        """
+        from graphsynth.kinematics.pointing.folds import folds
+
+        return folds(self, leg, phi_other, s_other)
+
+    def dead_points(self, leg: str, phi_other: float = 0.0, *, s_other: int | None = None) -> tuple[DeadPoint, ...]:
+        """All dead points of one crank: crank and rod in a plane with the crank axis (section 2.7).
+
+        Parameters are those of `folds`.
+        """
+        from graphsynth.kinematics.pointing.folds import dead_points
+
+        return dead_points(self, leg, phi_other, s_other)
+
+    def sweep(
+        self,
+        t: ArrayLike,
+        direction: tuple[float, float] = (1.0, 1.0),
+        offset: tuple[float, float] = (0.0, 0.0),
+        *,
+        s_y: int = 1,
+        s_x: int = -1,
+    ) -> PointingSweep:
+        """Move both cranks along ``offset + t * direction`` on one assembly mode and stop at the first fold.
+
+        Parameters
+        ----------
+        t : array_like, shape (n,)
+            Rising or falling path parameter, radians.
+        direction, offset : tuple of float
+            Change of ``(phi_x, phi_y)`` per unit of ``t``, and their values at ``t = 0``.
+        s_y, s_x : {+1, -1}
+            Assembly mode.
+
+        Returns
+        -------
+        PointingSweep
+            Never continues on another mode; beyond the fold all angles are NaN.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> sweep = PointingMechanism(l3=0.1, l5=0.1).sweep(np.radians(np.arange(0.0, 76.0)))
+        >>> np.degrees([sweep.fold.parameter, sweep.fold.a]).round(9).tolist(), round(sweep.fold.coefficient, 9)
+        ([69.394627605, 150.578155425], 2.869433008)
+        """
+        from graphsynth.kinematics.pointing.sweep import sweep
+
+        return sweep(self, t, direction, offset, s_y, s_x)
+
+    def approach(self, fold: Fold, distances: ArrayLike, *, branch: int = 1) -> ApproachToFold:
+        """Output at small distances from a fold: exact, compensated, by the square root, and plain with its error.
+
+        Parameters
+        ----------
+        fold : Fold
+        distances : array_like, shape (n,)
+            Positive, radians of the path parameter; may be far below the spacing of floating-point numbers.
+        branch : {+1, -1}
+            Branch sign of the folding leg.
+        """
+        from graphsynth.kinematics.pointing.approach import approach
+
+        return approach(self, fold, distances, branch)
+
+    def compare(
+        self,
+        other: PointingMechanism,
+        phi_x: ArrayLike,
+        phi_y: ArrayLike | None = None,
+        *,
+        reading: Reading | None = None,
+        other_reading: Reading | None = None,
+    ) -> ModelComparison:
+        """Difference of two models over a sweep: gimbal order, lengths, senses, mounting, reading (section 2.8).
+
+        Parameters
+        ----------
+        other : PointingMechanism
+        phi_x, phi_y : array_like
+            Crank angles, radians; ``phi_y = phi_x`` unless given.
+        reading, other_reading : Reading, optional
+            Conventions of each model.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> found = PointingMechanism().compare(PointingMechanism(order="XY"), np.radians([15, 40]))
+        >>> found.arcminutes.round(6).tolist()
+        [0.656059, 30.989576]
+        """
+        from graphsynth.kinematics.pointing.comparison import Reading, compare
+
+        return compare(self, other, phi_x, phi_y, reading or Reading(), other_reading or Reading())
