@@ -26,6 +26,7 @@ __all__ = ["Supremum", "gap_function", "largest_gap", "maximise"]
 
 Array = NDArray[np.float64]
 _ROUND = 4096  # boxes evaluated at once
+_ENOUGH = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +156,15 @@ class _Search:
         lo, hi, value_hi = lo[alive], hi[alive], value_hi[alive]
         reach = np.maximum(np.abs(slope_lo), np.abs(slope_hi))[alive]
         self._cut(lo, hi, value_hi, reach)
+        # few boxes cost as much as many: cut on with the same slopes, so that long arrays take the compiled path
+        while len(first) and 0 < len(self.bound) < _ENOUGH and len(self.bound) > len(rest):
+            count = len(self.bound)
+            first_lo, first_hi, bound = self.lo[len(rest) :], self.hi[len(rest) :], self.bound[len(rest) :]
+            self.lo, self.hi, self.bound = self.lo[: len(rest)], self.hi[: len(rest)], self.bound[: len(rest)]
+            reach = np.tile(reach, (2, 1)) if len(reach) * 2 == len(bound) else np.ones_like(first_lo)
+            self._cut(first_lo, first_hi, bound, reach)
+            if len(self.bound) <= count:
+                break
         keep = self.bound > self.best
         self.lo, self.hi, self.bound = self.lo[keep], self.hi[keep], self.bound[keep]
 

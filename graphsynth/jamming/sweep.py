@@ -28,6 +28,7 @@ __all__ = ["PieceGap", "TurnPartition", "sweep_linkage", "sweep_turn"]
 
 Mask = NDArray[np.bool_]
 _FREE, _JAMS, _OPEN, _OUT = 0, 1, 2, 3
+_ENOUGH = 64
 
 
 class PieceGap(NamedTuple):
@@ -92,7 +93,7 @@ def sweep_turn(
     gap : callable
         Takes pieces of the turn, an `Interval` of shape (m,), and returns a `PieceGap`.
     resolution : float
-        Undecided pieces shorter than this (radians) are left.
+        Undecided pieces no longer than this (radians) are left; at least 1e-15.
     first : int
         Pieces to begin with.
     max_pieces, max_seconds : budgets
@@ -117,8 +118,8 @@ def sweep_turn(
 
     begin = perf_counter()
     check_rounding()
-    if not resolution > 0.0:
-        raise GeometryError(f"resolution = {resolution} must be positive; 1e-6 rad is usual")
+    if not resolution >= 1e-15:
+        raise GeometryError(f"resolution = {resolution} must be at least 1e-15; 1e-6 rad is usual")
     edges = np.linspace(0.0, TURN_HIGH, first + 1)
     lo, hi = edges[:-1], edges[1:]
     done: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int8]]] = []
@@ -130,14 +131,23 @@ def sweep_turn(
             break
         kind = _classify(gap(Interval.from_bounds(lo, hi)), lo.size)
         pieces += lo.size
-        middle = 0.5 * (lo + hi)
-        split = (kind == _OPEN) & (hi - lo > resolution) & (middle > lo) & (middle < hi)
+        split = (kind == _OPEN) & (hi - lo > resolution)
         done.append((lo[~split], hi[~split], kind[~split]))
-        lo, hi = np.concatenate([lo[split], middle[split]]), np.concatenate([middle[split], hi[split]])
+        lo, hi = _split(lo[split], hi[split])
     spans = _joined(done)
     return TurnPartition(
         spans[_FREE], spans[_JAMS], spans[_OPEN], spans[_OUT], pieces, finished, perf_counter() - begin
     )
+
+
+def _split(lo: NDArray[np.float64], hi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cut every piece in two, or in more parts when there are few: long arrays take the compiled path."""
+    parts = 2 if lo.size >= _ENOUGH // 2 else -(-_ENOUGH // max(lo.size, 1))
+    shares = np.linspace(0.0, 1.0, parts + 1)[1:-1]
+    inner = np.clip(lo[:, None] + (hi - lo)[:, None] * shares, lo[:, None], hi[:, None])
+    starts, stops = np.column_stack([lo, inner]), np.column_stack([inner, hi])
+    filled = (starts < stops) | (lo == hi)[:, None]
+    return starts[filled], stops[filled]
 
 
 def _classify(found: PieceGap, size: int) -> NDArray[np.int8]:
