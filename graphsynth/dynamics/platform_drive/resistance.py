@@ -1,0 +1,168 @@
+"""The claim about the armature resistance: when a larger one calms the speed, and that it always calms the torque."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.motors import DCMotor, number
+from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
+from graphsynth.errors import SpecError
+
+__all__ = ["ResistanceEffect", "resistance_effect", "ripple_gain", "steady_ripple"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ResistanceEffect:
+    """Effect of the armature resistance on the steady ripples; peak to peak, speed in rad/s, current in A.
+
+    ``speed_falls`` is the linear criterion ``Om > w_n/sqrt(2)`` at the mean speed (the same for every resistance);
+    ``speed`` and ``current`` are the linear predictions, ``simulated_speed`` and ``simulated_current`` those of the
+    full model (NaN if not asked for, or where the run failed).
+    """
+
+    resistance: Array
+    mean_speed: float
+    mean_inertia: float
+    natural_frequency: float
+    forcing_frequency: float
+    harmonic: int
+    damping: Array
+    speed_falls: bool
+    current_falls: bool
+    speed: Array
+    current: Array
+    simulated_speed: Array
+    simulated_current: Array
+
+    @property
+    def frequency_ratio(self) -> float:
+        """``Om / w_n``."""
+        return self.forcing_frequency / self.natural_frequency
+
+
+def ripple_gain(ratio: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
+    """Dimensionless linear gains of speed and torque over the frequency ratio ``Om/w_n`` and the damping ``zeta``.
+
+    ``|dw| sqrt(J_m K_c / L) / F`` and ``|dM| / F`` for a torque disturbance of amplitude F; arrays broadcast.
+
+    Notes
+    -----
+    With ``nu = Om/w_n``: ``(4 zeta^2 + nu^2) / ((1 - nu^2)^2 + 4 zeta^2 nu^2)`` and ``1`` over the same denominator.
+    The derivative of the first by zeta^2 has the sign of ``1 - 2 nu^2``: specification parallel_platform, 11.5.
+
+    Examples
+    --------
+    >>> speed, torque = ripple_gain(2**-0.5, [0.1, 1.0, 10.0])
+    >>> speed.round(12).tolist()
+    [1.414213562373, 1.414213562373, 1.414213562373]
+    """
+    nu2, z2 = np.square(np.asarray(ratio, dtype=np.float64)), 4.0 * np.square(np.asarray(damping, dtype=np.float64))
+    below = np.square(1.0 - nu2) + z2 * nu2
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt((z2 + nu2) / below)), np.asarray(1.0 / np.sqrt(below))
+
+
+def resistance_effect(
+    drive: MotorDrivenPlatform, resistances: Sequence[float], *, simulate: bool = False, revolutions: int = 40
+) -> ResistanceEffect:
+    """Linear criterion, predicted ripples and, on request, those of the full model for several resistances.
+
+    Parameters
+    ----------
+    drive : MotorDrivenPlatform
+        With a `DCMotor` whose inductance is positive; its resistance is replaced by each of ``resistances`` (ohm).
+    simulate : bool
+        Also integrate the full model from rest and measure over the second half of ``revolutions`` mean revolutions.
+
+    Raises
+    ------
+    SpecError
+        Another motor, no inductance, no variation of the inertia, a resistance that is negative.
+
+    Notes
+    -----
+    Specification parallel_platform, section 11.5, with the train included and the largest harmonic of J.
+
+    Examples
+    --------
+    >>> motor = DCMotor(1.0, 0.01, 0.1, 0.1, gain=20.0, speed=20.0)
+    >>> effect = resistance_effect(MotorDrivenPlatform.source(motor), [0.5, 20.0])
+    >>> effect.speed_falls, effect.speed.round(2).tolist()
+    (False, [0.65, 10.82])
+    """
+    motor = drive.motor
+    if not isinstance(motor, DCMotor) or motor.inductance == 0.0:
+        raise SpecError("the effect of the resistance needs a DCMotor with positive inductance; give one")
+    values = np.array([number("resistance", r, least=0.0) for r in resistances])
+    ratio, feedback = drive.train.ratio, motor.gain + motor.emf_constant
+    harmonic, amplitude, mean = _harmonic(drive)
+    inertia = drive.constant_inertia + mean
+    stiffness = ratio**2 * motor.torque_constant * feedback
+    w = motor.gain * motor.speed / feedback / ratio
+    natural = math.sqrt(stiffness / (motor.inductance * inertia))
+    damping = 0.5 * values * math.sqrt(inertia / (motor.inductance * stiffness))
+    forcing = abs(harmonic * w)
+    force = 0.5 * harmonic * amplitude * w * w
+    speed, torque = ripple_gain(forcing / natural, damping)
+    size = 2.0 * force * math.sqrt(motor.inductance / (inertia * stiffness))
+    found = np.full((values.size, 2), np.nan)
+    if simulate:
+        for k, value in enumerate(values):
+            found[k] = steady_ripple(replace(drive, motor=replace(motor, resistance=float(value))), revolutions)
+    return ResistanceEffect(
+        values, w, inertia, natural, forcing, harmonic, damping, forcing > natural / math.sqrt(2.0), True,
+        np.asarray(size * speed), np.asarray(2.0 * force * torque / (ratio * motor.torque_constant)),
+        found[:, 0], found[:, 1],
+    )  # fmt: skip
+
+
+def _harmonic(drive: MotorDrivenPlatform) -> tuple[int, float, float]:
+    """Number and amplitude of the harmonic of J whose derivative is largest, and the mean of J."""
+    count = 4 * drive.inertia.rows.shape[1] + 8
+    values = drive.inertia.value(np.linspace(0.0, math.tau, count, endpoint=False))
+    spectrum = 2.0 * np.abs(np.fft.rfft(values)) / count
+    harmonic = int(np.argmax(np.arange(spectrum.size) * spectrum))
+    if not spectrum[1:].max() > 1e-14 * spectrum[0]:
+        raise SpecError("the inertia does not vary over a turn: there is no ripple to speak of; give a moving mass")
+    return harmonic, float(spectrum[harmonic]), float(0.5 * spectrum[0])
+
+
+def steady_ripple(drive: MotorDrivenPlatform, revolutions: int = 40, rtol: float = 1e-9) -> tuple[float, float]:
+    """Peak-to-peak speed (rad/s) and current (A) in the second half of ``revolutions`` mean revolutions from rest.
+
+    Estimated: 240 samples per mean revolution, the extremes through parabolas.  NaN if the run fails.
+
+    Raises
+    ------
+    SpecError
+        For a motor that is no DCMotor.
+    """
+    motor = drive.motor
+    if not isinstance(motor, DCMotor):
+        raise SpecError(f"{type(motor).__name__} has no armature current; give a DCMotor")
+    w = abs(motor.gain * motor.speed / (motor.gain + motor.emf_constant) / drive.train.ratio)
+    end = revolutions * math.tau / w
+    times = np.concatenate([[0.0], np.linspace(0.5 * end, end, 120 * revolutions + 1)])
+    motion = drive.simulate(times, rtol=rtol, estimate=False, reduce=False)
+    if not motion.complete:
+        return math.nan, math.nan
+    return _peak_to_peak(motion.speed[1:]), _peak_to_peak(motion.currents[1:, 0])
+
+
+def _peak_to_peak(values: Array) -> float:
+    left, middle, right = values[:-2], values[1:-1], values[2:]
+    bend = left - 2.0 * middle + right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        vertex = middle - 0.125 * (right - left) ** 2 / bend
+    peak = (middle >= left) & (middle >= right) & (bend < 0.0)
+    low = (middle <= left) & (middle <= right) & (bend > 0.0)
+    highest = max(values.max(), *vertex[peak]) if peak.any() else values.max()
+    lowest = min(values.min(), *vertex[low]) if low.any() else values.min()
+    return float(highest - lowest)
