@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certified_arcs import CertifiedArcs, Enclosure, arcs_from, no_arcs, whole_turn
 from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.jamming.ranges import Range, exact_text
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ _PIECES = 256  # pieces of the turn on which assembly is proved
 class Witness:
     """A jam that is proved: exact parameters, a crank angle, and a positive lower bound of the gap function there.
 
-    ``parameters`` are exact numbers as text, ``f`` (radians) encloses the crank angle, ``gap`` (mm) the gap function.
+    ``parameters`` are exact numbers as text; ranges ``[a, b]`` where every parameter vector jams.  ``f`` (radians)
+    encloses the crank angle (one for each vector, after its own phase), ``gap`` (mm) holds a positive lower bound.
     """
 
     parameters: dict[str, str]
@@ -198,6 +200,8 @@ class _Proof:
         self.assembles = self._assembly(box)
 
     def result(self) -> JamCertificate:
+        from graphsynth.jamming import corners
+
         low, high = _pair(self.gaps, 0), _pair(self.gaps, 1)
         verdict, reason, witness = Verdict.UNDECIDED, "", None
         if self.assembles == "never":
@@ -209,7 +213,7 @@ class _Proof:
             if witness:
                 verdict = Verdict.CERTIFIED_JAMMED
             elif high.lo > 0.0:
-                witness = self._jam(worst_corner(self.box, self.condition))
+                witness = self._jam(corners.worst_corner(self.box, self.condition))
                 verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME if witness else Verdict.UNDECIDED
         if verdict is Verdict.UNDECIDED:
             reason = self._why(high)
@@ -260,7 +264,8 @@ class _Proof:
             return None
         best = int(proved[np.argmax(gap.lo[proved])])
         angle = Enclosure(float(f.lo[best]), float(f.hi[best]))
-        return Witness(box.describe(), angle, Enclosure(float(gap.lo[best]), float(gap.hi[best])))
+        exact = {name: _text(value) for name, value in box.ranges.items()}
+        return Witness(exact, angle, Enclosure(float(gap.lo[best]), float(gap.hi[best])))
 
     def _finish(self, verdict: Verdict, reason: str, witness: Witness | None) -> JamCertificate:
         shown = Enclosure(float(self.phase.lo), float(self.phase.hi))
@@ -292,6 +297,13 @@ class _Proof:
         )
 
 
+def _text(value: Range) -> str:
+    """Write a parameter exactly; a range, where every value of it jams, by both ends."""
+    if value.is_point:
+        return exact_text(value.lower)
+    return f"[{exact_text(value.lower)}, {exact_text(value.upper)}]"
+
+
 def _pair(values: Interval, corner: int) -> Enclosure:
     return Enclosure(float(values.lo[corner]), float(values.hi[corner]))
 
@@ -308,42 +320,6 @@ def _angles(sine: Interval) -> Enclosure:
 def _touches_only(box: ToleranceBox) -> bool:
     h, c, R = box["Hb"].upper / 2, box["clearance"].lower, box["Rb"].lower
     return h * h == c * (2 * R + c)
-
-
-def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:
-    """Return the parameter vector of the box at which the gap is largest; the middle where it does not matter.
-
-    For condition "general" with a range of radii the radius is a candidate only: the value there is evaluated anew.
-    """
-    ends: dict[str, Fraction] = {name: (r.lower + r.upper) / 2 for name, r in box.ranges.items()}
-    for name in ("l2", "Hb", "hole_length"):
-        if name in box:
-            ends[name] = box[name].upper
-    ends["l3"], ends["clearance"] = box["l3"].lower, max(box["clearance"].lower, Fraction(0))
-    far = max(box["alpha"].lower, box["alpha"].upper, key=abs)
-    ends["alpha"] = far
-    for name in ("n1", "n2"):
-        ends[name] = max(box[name].lower, box[name].upper, key=abs)
-    low, high = box["n3"].lower, box["n3"].upper
-    ends["n3"] = Fraction(0) if low <= 0 <= high else min(low, high, key=abs)
-    if condition == "A":
-        ends["Rb"] = box["Rb"].lower
-    elif condition == "B":
-        ends["Rb"] = box["Rb"].upper
-    else:
-        ends["Rb"] = _balanced_radius(box, ends)
-    axis = (ends.pop("n1"), ends.pop("n2"), ends.pop("n3"))
-    return ToleranceBox(**ends, axis=axis, sgn=box.sgn, rod=box.rod, convention=box.convention)
-
-
-def _balanced_radius(box: ToleranceBox, ends: dict[str, Fraction]) -> Fraction:
-    """Radius at which both readings of the general pin are about equal: ``R S = hp C - hh`` (section 4.4)."""
-    linkage, _ = box.nominal()
-    sine = linkage.largest_tilt[1]
-    if sine == 0.0:
-        return box["Rb"].upper
-    wanted = float(ends["Hb"]) / 2 * math.sqrt(1.0 - sine * sine) - float(ends["hole_length"]) / 2
-    return min(max(Fraction(wanted / sine), box["Rb"].lower), box["Rb"].upper)
 
 
 def _interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
@@ -364,8 +340,6 @@ def _interference(box: ToleranceBox, condition: Condition, begin: float) -> JamC
 def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
     """Answer for a range of clearances from negative to positive: jams of the sound part count, freedom does not."""
     from dataclasses import replace
-
-    from graphsynth.jamming.ranges import Range
 
     c = box["clearance"]
     sound = box.replace(clearance=Range(Fraction(0), c.upper, c.exact))

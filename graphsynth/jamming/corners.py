@@ -9,6 +9,7 @@ monotonicity is derived in ``docs/explanation/bearing-jamming.md``.
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from graphsynth.kinematics._checks import choice
 
 __all__ = [
     "Tilt", "arcsine", "check_condition", "cosine", "critical_sines", "ends", "gap_corners", "gap_values", "onset",
-    "phase", "sine_of", "sines", "slanted",
+    "phase", "sine_of", "sines", "slanted", "worst_corner",
 ]  # fmt: skip
 
 
@@ -289,3 +290,39 @@ def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, flo
 def arcsine(value: float) -> Interval:
     """Enclose ``asin`` of a double in [0, 1]."""
     return asin(Interval.from_bounds(value, value))
+
+
+def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:
+    """Return the parameter vector of the box at which the gap is largest; the middle where it does not matter.
+
+    For condition "general" with a range of radii the radius is a candidate only: the value there is evaluated anew.
+    """
+    ends: dict[str, Fraction] = {name: (r.lower + r.upper) / 2 for name, r in box.ranges.items()}
+    for name in ("l2", "Hb", "hole_length"):
+        if name in box:
+            ends[name] = box[name].upper
+    ends["l3"], ends["clearance"] = box["l3"].lower, max(box["clearance"].lower, Fraction(0))
+    far = max(box["alpha"].lower, box["alpha"].upper, key=abs)
+    ends["alpha"] = far
+    for name in ("n1", "n2"):
+        ends[name] = max(box[name].lower, box[name].upper, key=abs)
+    low, high = box["n3"].lower, box["n3"].upper
+    ends["n3"] = Fraction(0) if low <= 0 <= high else min(low, high, key=abs)
+    if condition == "A":
+        ends["Rb"] = box["Rb"].lower
+    elif condition == "B":
+        ends["Rb"] = box["Rb"].upper
+    else:
+        ends["Rb"] = _balanced_radius(box, ends)
+    axis = (ends.pop("n1"), ends.pop("n2"), ends.pop("n3"))
+    return ToleranceBox(**ends, axis=axis, sgn=box.sgn, rod=box.rod, convention=box.convention)
+
+
+def _balanced_radius(box: ToleranceBox, ends: dict[str, Fraction]) -> Fraction:
+    """Radius at which both readings of the general pin are about equal: ``R S = hp C - hh`` (section 4.4)."""
+    linkage, _ = box.nominal()
+    sine = linkage.largest_tilt[1]
+    if sine == 0.0:
+        return box["Rb"].upper
+    wanted = float(ends["Hb"]) / 2 * math.sqrt(1.0 - sine * sine) - float(ends["hole_length"]) / 2
+    return min(max(Fraction(wanted / sine), box["Rb"].lower), box["Rb"].upper)

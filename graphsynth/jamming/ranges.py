@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from graphsynth.errors import GeometryError
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
 
-__all__ = ["Given", "Range", "bounds_of", "spread"]
+__all__ = ["Given", "Range", "bounds_of", "exact_text", "spread"]
 
 _PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
 _SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")
@@ -170,14 +170,29 @@ def _number(name: str, value: Any) -> Fraction:
     return number
 
 
-def _short(value: Fraction) -> str:
-    """Write a rational number exactly if that is short, else rounded."""
+def exact_text(value: Fraction) -> str:
+    """Write a rational number exactly: as a decimal if a short one exists, else as a fraction.
+
+    Examples
+    --------
+    >>> exact_text(Fraction(27, 1000)), exact_text(Fraction(1, 30))
+    ('0.027', '1/30')
+    """
     rest = value.denominator
     for prime in (2, 5):
         while rest % prime == 0:
             rest //= prime
-    text = f"{value.numerator}/{value.denominator}"
-    if rest == 1 and len(text) < 40:
-        decimal = Decimal(value.numerator) / Decimal(value.denominator)
-        return f"{decimal.normalize():f}" if 1e-6 < abs(value) < 1e9 or value == 0 else f"{decimal.normalize():e}"
-    return text if len(text) <= 16 else f"{float(value):.12g}"
+    if rest == 1:
+        with localcontext() as context:
+            context.prec = 60
+            decimal = (Decimal(value.numerator) / Decimal(value.denominator)).normalize()
+        if Fraction(decimal) == value:
+            text = f"{decimal:f}"
+            return text if len(text) <= 24 else f"{decimal:e}"
+    return f"{value.numerator}/{value.denominator}"
+
+
+def _short(value: Fraction) -> str:
+    """Write a rational number exactly if that is short, else rounded to 12 digits."""
+    text = exact_text(value)
+    return text if len(text) <= 24 else f"{float(value):.12g}"

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import platform
+import subprocess
+import sys
 from fractions import Fraction
 
 import mpmath
@@ -240,7 +243,41 @@ def test_a_jam_for_some_names_exact_parameters():
     assert found.witness is not None
     assert (found.witness.parameters["clearance"], found.witness.parameters["l2"]) == ("0.03", "1.001")
     assert found.arcs.inner == () and "depends on the parameters" in found.arcs.reason
+    _check_witness(found)
+    floats = certify_jamming(deck(clearance=(0.03, 0.1), l2=(0.9, 1.07)))
+    assert F(floats.witness.parameters["clearance"]) == F(0.03) and F(floats.witness.parameters["l2"]) == F(1.07)
+    _check_witness(floats)
     assert found.largest_gap.lo > 0 > found.smallest_worst_gap.hi
+
+
+def _check_witness(found):
+    """Evaluate the witness to 60 digits, at its own crank angle."""
+    p = {name: F(text) for name, text in found.witness.parameters.items()}
+    axis, lengths = (p["n1"], p["n2"], p["n3"]), (p["l2"], p["l3"])
+    _, S, phase = reference(p["alpha"], axis, lengths, p["Rb"], p["Hb"], p["clearance"], found.condition)
+    with mpmath.workdps(60):
+        f = mpmath.mpf(found.witness.f.mid) - p["azimuth"].numerator / mpmath.mpf(p["azimuth"].denominator)
+        S, R, h, c = abs(S * mpmath.sin(f - phase)), *(mpmath.mpf(v.numerator) / v.denominator for v in (
+            p["Rb"], p["Hb"] / 2, p["clearance"]))  # fmt: skip
+        assert h * mpmath.sqrt(1 - S * S) > R * S
+        assert h * S - c - R * (1 - mpmath.sqrt(1 - S * S)) >= found.witness.gap.lo - 1e-15
+
+
+def test_results_are_refused_after_a_library_has_changed_the_rounding():
+    code = """
+import ctypes, ctypes.util
+from graphsynth.jamming import ToleranceBox, certify_jamming
+certify_jamming(ToleranceBox())
+ctypes.CDLL(ctypes.util.find_library("m")).fesetround(0x800)
+try:
+    certify_jamming(ToleranceBox())
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+    if platform.machine() not in ("x86_64", "AMD64"):
+        pytest.skip("the code of the rounding mode is that of x86")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "GraphsynthError" in done.stdout and "round to nearest" in done.stdout
 
 
 def test_arcs_that_merge_and_phases_that_are_unknown():
