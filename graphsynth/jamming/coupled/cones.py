@@ -15,6 +15,7 @@ Source: Nesterov and Todd (1997); Vandenberghe, "The CVXOPT linear and quadratic
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -124,8 +125,7 @@ class _Program:
         lam = _apply(scale, z)
         Gs = (inverse @ G).reshape(count, 3 * cones, n)
         H = Gs.transpose(0, 2, 1) @ Gs
-        diagonal = np.einsum("nii->ni", H)
-        diagonal *= 1.0 + 1e-15
+        solve = _inverse(H)
         flat = G.reshape(count, 3 * cones, n)
         rx = self.c[rows] + (flat.transpose(0, 2, 1) @ z.reshape(count, -1, 1))[..., 0]
         rz = s + (G @ x[:, None, :, None])[..., 0] - self.h[rows]
@@ -135,11 +135,11 @@ class _Program:
             """Solve for ``lam o (W dz + W^-1 ds) = target``."""
             t = _divide(lam, target)
             right = -rx[:, :, None] - Gs.transpose(0, 2, 1) @ (_apply(inverse, rz) + t).reshape(count, -1, 1)
-            dx = _solve(H, right)
+            dx = solve(right)
             dz = _apply(inverse, _apply(inverse, rz + (G @ dx[:, None])[..., 0]) + t)
             for _ in range(2):  # refine: the closure of tau must stay exact however ill-conditioned H becomes
                 off = -rx - (flat.transpose(0, 2, 1) @ dz.reshape(count, -1, 1))[..., 0]
-                more = _solve(H, off[:, :, None])
+                more = solve(off[:, :, None])
                 dx = dx + more
                 dz = dz + _apply(inverse, _apply(inverse, (G @ more[:, None])[..., 0]))
             ds = -rz - (G @ dx[:, None])[..., 0]
@@ -156,19 +156,22 @@ class _Program:
         return x + a[:, None] * dx, s + a[:, None, None] * ds, z + a[:, None, None] * dz
 
 
-def _solve(H: Array, right: Array) -> Array:
-    """Solve symmetric systems scaled to unit diagonal, with one step of refinement."""
-    d = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", H), 1e-300))
-    scaled = H * d[:, :, None] * d[:, None, :]
-    right = right * d[:, :, None]
+def _inverse(H: Array) -> Callable[[Array], Array]:
+    """Return the solver of symmetric positive systems, scaled to unit diagonal, with one step of refinement."""
+    d = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", H), 1e-300))[:, :, None]
+    scaled = H * d * d.transpose(0, 2, 1)
     scaled[~np.isfinite(scaled).all(axis=(1, 2))] = np.eye(H.shape[1])
     try:
-        x = np.linalg.solve(scaled, right)
+        inverse = np.linalg.inv(scaled)
     except np.linalg.LinAlgError:
-        scaled = scaled + 1e-13 * np.eye(H.shape[1])
-        x = np.linalg.solve(scaled, right)
-    x = x + np.linalg.solve(scaled, right - scaled @ x)
-    return np.asarray(x * d[:, :, None])
+        inverse = np.linalg.inv(scaled + 1e-13 * np.eye(H.shape[1]))
+
+    def solve(right: Array) -> Array:
+        right = right * d
+        x = inverse @ right
+        return np.asarray((x + inverse @ (right - scaled @ x)) * d)
+
+    return solve
 
 
 def _apply(matrices: Array, vectors: Array) -> Array:

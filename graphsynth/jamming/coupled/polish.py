@@ -17,12 +17,13 @@ __all__ = ["polish"]
 
 Array = NDArray[np.float64]
 
+_DELTA = 1e-9
+
 
 def polish(M: Array, F: Array, W: Array, found: ConeSolution, *, robust: bool = False, steps: int = 3) -> ConeSolution:
     """Improve solutions of `solve_cones`; same shapes and units.
 
-    ``robust`` takes the least-squares step of least norm: slower, and right where idle joints share out their tilts in
-    more than one way.
+    ``robust`` takes regularised steps: slower, and right where idle joints share out their tilts in more than one way.
     """
     q, tau, zeta = found.q.copy(), found.tau.copy(), found.zeta.copy()
     count, blocks, _, k = M.shape
@@ -40,7 +41,7 @@ def polish(M: Array, F: Array, W: Array, found: ConeSolution, *, robust: bool = 
             tau = np.where(loaded[..., None], -T[:, None, None] * unit, tau)
             zeta = np.where(pushed, -np.sign(f), zeta)
             matrix, right = _system(M, F, W, (m, f, size, unit, tau, zeta, T), loaded, pushed)
-            step = _least(matrix, right) if robust else _solve(matrix, right)
+            step = _least(matrix, right, k) if robust else _solve(matrix, right, k)
             q = q + step[:, :k]
             T = T + step[:, k]
             end = k + 1 + 2 * blocks
@@ -108,19 +109,29 @@ def _system(
     return matrix, right
 
 
-def _solve(matrix: Array, right: Array) -> Array:
+def _solve(matrix: Array, right: Array, k: int) -> Array:
     try:
         return np.asarray(np.linalg.solve(matrix, right[:, :, None])[..., 0])
     except np.linalg.LinAlgError:
-        return _least(matrix, right)
+        return _least(matrix, right, k)
 
 
-def _least(matrix: Array, right: Array) -> Array:
-    """Solve symmetric systems; directions with eigenvalues near zero are left out."""
+def _least(matrix: Array, right: Array, k: int) -> Array:
+    """Solve symmetric systems that may be singular, by the proximal point method.
+
+    The block of q is negative semidefinite, so with ``-delta`` there and ``+delta`` in the rest the matrix is
+    quasi-definite: always regular (Vanderbei 1995).  Repeating the solve on the residual takes the error of delta away.
+    """
     sound = np.asarray(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1))
-    matrix = np.where(sound[:, None, None], matrix, np.eye(matrix.shape[1]))
-    values, vectors = np.linalg.eigh(matrix)
-    keep = np.abs(values) > 1e-10 * np.abs(values).max(axis=1, keepdims=True)
-    inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
-    part = inverse * (vectors.transpose(0, 2, 1) @ np.where(sound[:, None], right, 0.0)[:, :, None])[..., 0]
-    return np.where(sound[:, None], (vectors @ part[:, :, None])[..., 0], np.nan)
+    n = matrix.shape[1]
+    matrix = np.where(sound[:, None, None], matrix, np.eye(n))
+    right = np.where(sound[:, None], right, 0.0)
+    shift = np.diag(np.where(np.arange(n) < k, -_DELTA, _DELTA))
+    try:
+        inverse = np.linalg.inv(matrix + shift)
+    except np.linalg.LinAlgError:
+        return np.full_like(right, np.nan)
+    x = np.zeros_like(right)
+    for _ in range(4):
+        x = x + (inverse @ (right - (matrix @ x[:, :, None])[..., 0])[:, :, None])[..., 0]
+    return np.asarray(np.where(sound[:, None], x, np.nan))

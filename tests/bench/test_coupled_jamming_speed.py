@@ -1,0 +1,103 @@
+"""How fast the coupled jamming model is, beside scipy's HiGHS on a polygonal form of the same program.
+
+Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_coupled_jamming_speed.py
+--benchmark-enable``.  No time is asserted: machines differ.  Every benchmark checks its result.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains, simulate
+from graphsynth.jamming import Bearing
+from graphsynth.jamming.coupled import JointLimits, Misalignment, certify_coupled, largest_scale
+from graphsynth.jamming.coupled.closure import force_rows, joint_places, moment_rows, shifts, work_row
+from graphsynth.jamming.coupled.problem import problem
+from graphsynth.kinematics.embodiment import embody
+
+TURN = np.linspace(0.0, 2.0 * np.pi, 37)
+
+
+def four_bar() -> Mechanism:
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)), Revolute(0, 3, (2.0, 0.0)),
+    ]  # fmt: skip
+    return Mechanism(graph, joints, [Driver(0, 1)])
+
+
+def timed(benchmark, run, count: int):
+    """Run, and note the rate."""
+    result = benchmark.pedantic(run, rounds=3, warmup_rounds=1)
+    if benchmark.stats:
+        benchmark.extra_info["per second"] = f"{count / benchmark.stats.stats.min:.3g}"
+    return result
+
+
+@pytest.fixture(scope="module")
+def eight():
+    """Return an eight-link mechanism, its motion and its misalignment."""
+    mechanism = embody(next(islice(enumerate_chains(8), 3, None)), seed=0).mechanism
+    driver = mechanism.drivers[0]
+    return mechanism, Misalignment(driver.base, driver.link, 0.01, 0.3)
+
+
+@pytest.mark.parametrize("play", [0.0, 0.01], ids=["no-play", "play"])
+def test_eight_links(benchmark, eight, play):
+    """360 poses, primal and dual."""
+    mechanism, tilt = eight
+    poses = simulate(mechanism, np.linspace(0.0, 6.28, 360 if benchmark.enabled else 12)).poses
+    given = problem(mechanism, JointLimits(0.006, play), tilt)
+    found = timed(benchmark, lambda: given.solve(poses), len(poses))
+    assert ((found.upper - found.lower) <= 1e-9 * found.upper).all()
+
+
+def test_eight_links_by_linear_programs(benchmark, eight):
+    """The dual with 64-sided polygons for circles, one HiGHS call for each pose: three digits."""
+    mechanism, tilt = eight
+    poses = simulate(mechanism, np.linspace(0.0, 6.28, 36 if benchmark.enabled else 2)).poses
+    given = problem(mechanism, JointLimits(0.006), tilt)
+    layout = given.layout
+    r, e, base = joint_places(mechanism, layout.joints, poses)
+    M, W = moment_rows(layout, r, e), work_row(layout, r, shifts(layout, base))
+    assert force_rows(layout).shape[0] == len(layout.joints)
+    costly = np.flatnonzero(layout.limit > 0.0)
+    angle = 2.0 * math.pi * np.arange(64) / 64
+    normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    def run():
+        values = []
+        for m, w in zip(M, W):
+            k = len(w)
+            rows = np.zeros((64 * len(costly) + 1, k + len(costly)))
+            for i, block in enumerate(costly):
+                rows[64 * i : 64 * i + 64, :k], rows[64 * i : 64 * i + 64, k + i] = normals @ m[block], -1.0
+            rows[-1, k:] = layout.limit[costly]
+            right = np.zeros(len(rows))
+            right[-1] = 1.0
+            bounds = [(None, None)] * k + [(0.0, None)] * len(costly)
+            values.append(-linprog(np.append(-w, np.zeros(len(costly))), rows, right, bounds=bounds).fun)
+        return np.array(values)
+
+    values = timed(benchmark, run, len(poses))
+    exact = given.solve(poses).lower
+    assert (values >= exact * (1 - 1e-7)).all() and (values <= exact / math.cos(math.pi / 64) * (1 + 1e-7)).all()
+
+
+def test_certified_turn_of_the_lambda_linkage(benchmark):
+    motion = simulate(four_bar(), TURN)
+    proof = timed(benchmark, lambda: certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.0115)), 1)
+    assert proof.verdict.name == "CERTIFIED_FREE"
+
+
+def test_largest_misalignment_of_the_lambda_linkage(benchmark):
+    motion = simulate(four_bar(), TURN)
+    gap = 1e-3 if benchmark.enabled else 1e-2
+    run = lambda: largest_scale(motion, Bearing(), Misalignment(0, 1, 1 / 30), relative_gap=gap)  # noqa: E731
+    found = timed(benchmark, run, 1)
+    assert found.low / 30 < 2 * 0.006064396559156420 < found.high / 30 * (1 + 1e-15)
