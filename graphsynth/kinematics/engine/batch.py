@@ -73,7 +73,8 @@ class BatchMotion:
     def completed(self) -> NDArray[np.bool_]:
         """True for sets that reached every input.
 
-        Gaps narrower than a step are not looked for: confirm an accepted set with `simulate`.
+        Gaps narrower than a step, and pins that pass the pivot of their slot, are not looked for: confirm an accepted
+        set with `simulate`.
         """
         return np.asarray(self.reached == len(self.inputs))
 

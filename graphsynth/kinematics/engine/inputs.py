@@ -87,8 +87,8 @@ def fine_grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
         )
     counts = parts.astype(np.intp)
     where = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
-    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(u[:-1], u[1:], counts)]
-    grid = u if (counts == 1).all() else np.concatenate([*pieces, u[-1:]])
+    part = np.arange(where[-1]) - np.repeat(where[:-1], counts)
+    grid = np.append(np.repeat(u[:-1], counts) + part * np.repeat(np.diff(u) / counts, counts), u[-1])
     for driver in mechanism.drivers:
         _check_jumps(driver, grid)
     return grid, where
