@@ -9,7 +9,6 @@ sections 5.2 to 5.5.
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,16 +16,18 @@ from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.intervals.guard import check_rounding
-from graphsynth.intervals.interval import Interval
+from graphsynth.intervals.interval import Interval, _make
 
 __all__ = ["EnclosedCrescents", "enclose_crescents", "enclose_lid_area", "enclose_rim_area", "enclose_surrogate_areas"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Terms of the series of x - sin x for |x| <= 1; the tail is below 1e-30 of the first.
-_TERMS = 13
-_COEFFICIENTS = [Interval(Fraction((-1) ** k, math.factorial(2 * k + 3))) for k in range(_TERMS + 1)]
+#: Series of x - sin x for |x| <= 1; what is left out is below 1e-30 of the first term.
+_COEFFICIENTS = [(-1) ** k / math.factorial(2 * k + 3) for k in range(13)]
+#: Relative error of the series in double precision is below 6 units of 2^-53: each partial sum is dominated 19 to 1 by
+#: its first term, so that errors of later ones fade (proof in docs/explanation/circle-and-ellipse.md).
+_SERIES_ERROR = 8.0 * 2.0**-53
 
 
 class EnclosedCrescents(NamedTuple):
@@ -36,43 +37,48 @@ class EnclosedCrescents(NamedTuple):
     circle_only: Interval
 
 
+def _bounds(lo: Array | float, hi: Array | float) -> Interval:
+    """Make an interval of bounds that are known to be in order."""
+    return _make(np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64))
+
+
 def _point(x: Array) -> Interval:
-    return Interval.from_bounds(x, x)
+    return _bounds(x, x)
 
 
 def _choose(mask: Mask, a: Interval, b: Interval) -> Interval:
-    return Interval.from_bounds(np.where(mask, a.lo, b.lo), np.where(mask, a.hi, b.hi))
+    return _bounds(np.where(mask, a.lo, b.lo), np.where(mask, a.hi, b.hi))
 
 
 def _nonnegative(x: Interval) -> Interval:
     """Clip to [0, inf); what is wholly negative becomes 0."""
-    return Interval.from_bounds(np.maximum(x.lo, 0.0), np.maximum(x.hi, 0.0))
+    return _bounds(np.maximum(x.lo, 0.0), np.maximum(x.hi, 0.0))
 
 
 def _limited(x: Interval, top: Interval) -> Interval:
     """Return ``x`` cut to [0, top], where the true value is known to lie."""
-    return Interval.from_bounds(np.clip(x.lo, 0.0, top.hi), np.clip(x.hi, 0.0, top.hi))
-
-
-def _xms_at(x: Array) -> Interval:
-    """Enclose ``x - sin x`` at points."""
-    from graphsynth.intervals import functions
-
-    small = np.abs(x) <= 1.0
-    t = _point(np.where(small, x, 0.0))
-    square = t.sqr()
-    series = Interval(0).hull(
-        _COEFFICIENTS[_TERMS]
-    )  # an alternating series: the tail lies between 0 and its first term
-    for k in reversed(range(_TERMS)):
-        series = _COEFFICIENTS[k] + square * series
-    direct = _point(x)
-    return _choose(small, square * t * series, direct - functions.sin(direct))
+    return _bounds(np.clip(x.lo, 0.0, top.hi), np.clip(x.hi, 0.0, top.hi))
 
 
 def _xms(x: Interval) -> Interval:
-    """Enclose ``x - sin x``, which never falls."""
-    return Interval.from_bounds(_xms_at(x.lo).lo, _xms_at(x.hi).hi)
+    """Enclose ``x - sin x``, which never falls: at both ends, by its series or directly."""
+    from graphsynth.intervals import functions
+
+    ends = np.stack([x.lo, x.hi])
+    small = np.abs(ends) <= 1.0
+    t = np.where(small, ends, 0.0)
+    square, series = t * t, np.zeros_like(t)
+    for coefficient in reversed(_COEFFICIENTS):
+        series = series * square + coefficient
+    value = series * square * t
+    margin = _SERIES_ERROR * np.abs(value) + 1e-300
+    lo, hi = value - margin, value + margin
+    if not small.all():
+        direct = _point(np.where(small, 0.0, ends))
+        direct = direct - functions.sin(direct)
+        lo, hi = np.where(small, lo, direct.lo), np.where(small, hi, direct.hi)
+    zero = ends == 0.0
+    return _bounds(np.where(zero, 0.0, lo)[0], np.where(zero, 0.0, hi)[1])
 
 
 def _segment(s: Interval) -> Interval:
@@ -96,9 +102,7 @@ def _ranges(**values: Any) -> tuple[Interval, ...]:
             raise GeometryError(f"{name} holds an empty or unbounded interval; give finite bounds")
         read.append(item)
     shape = np.broadcast_shapes(*(item.shape for item in read))
-    return tuple(
-        Interval.from_bounds(np.broadcast_to(item.lo, shape), np.broadcast_to(item.hi, shape)) for item in read
-    )
+    return tuple(_bounds(np.broadcast_to(item.lo, shape), np.broadcast_to(item.hi, shape)) for item in read)
 
 
 def _angle(y: Interval, x: Interval) -> Interval:
@@ -112,7 +116,7 @@ def _angle(y: Interval, x: Interval) -> Interval:
 def _pi() -> Interval:
     from graphsynth.intervals.constants import PI
 
-    return Interval.from_bounds(*PI)
+    return _bounds(*PI)
 
 
 # -- centred ellipse and circle ----------------------------------------------------------------------------------------
@@ -145,12 +149,8 @@ def enclose_crescents(R1: Any, pa: Any, qb: Any) -> EnclosedCrescents:
     R1, pa, qb = _ranges(R1=R1, pa=pa, qb=qb)
     if not bool(((R1.lo > 0.0) & (qb.hi < R1.lo) & ((pa + qb).hi >= 0.0)).all()):
         raise GeometryError("an ellipse needs semi-axes a >= b > 0: qb < R1 and pa + qb >= 0 with R1 > 0")
-    wide = _crescents_at(R1, _point(pa.hi), _point(qb.lo))
-    thin = _crescents_at(R1, _point(pa.lo), _point(qb.hi))
-    return EnclosedCrescents(
-        Interval.from_bounds(thin.ellipse_only.lo, wide.ellipse_only.hi),
-        Interval.from_bounds(wide.circle_only.lo, thin.circle_only.hi),
-    )
+    ell, cir = _crescents_at(_twice(R1), _point(np.stack([pa.lo, pa.hi])), _point(np.stack([qb.hi, qb.lo])))
+    return EnclosedCrescents(_bounds(ell.lo[0], ell.hi[1]), _bounds(cir.lo[1], cir.hi[0]))
 
 
 def _crescents_at(R1: Interval, pa: Interval, qb: Interval) -> EnclosedCrescents:
@@ -233,13 +233,13 @@ def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> Enclos
     True
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
-    free = _surrogate_at(R, _point(c.hi), _point(h.lo), _point(S.lo))
-    tight = _surrogate_at(R, _point(c.lo), _point(h.hi), _point(S.hi))
-    never, maybe = free[1].lo >= R.hi, tight[1].hi >= R.lo
-    any_area = Interval.from_bounds(0.0, np.inf)
+    pairs = ((c.lo, c.hi), (h.hi, h.lo), (S.hi, S.lo))  # the tight corner, the free corner
+    areas, gap = _surrogate_at(_twice(R), *(_point(np.stack(pair)) for pair in pairs))
+    never, maybe = gap.lo[1] >= R.hi, gap.hi[0] >= R.lo
+    any_area = _bounds(0.0, np.inf)
     both = []
-    for lo, hi in ((tight[0].ellipse_only, free[0].ellipse_only), (free[0].circle_only, tight[0].circle_only)):
-        found = Interval.from_bounds(np.minimum(lo.lo, hi.hi), hi.hi)
+    for area, low, high in ((areas.ellipse_only, 0, 1), (areas.circle_only, 1, 0)):
+        found = _bounds(np.minimum(area.lo[low], area.hi[high]), area.hi[high])
         both.append(_choose(never, Interval.empty(), _choose(maybe, any_area, found)))
     return EnclosedCrescents(*both)
 
@@ -271,9 +271,9 @@ def enclose_lid_area(R: Any, clearance: Any, h: Any, sine: Any) -> Interval:
     (True, True)
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
-    least = _lid_at(_point(R.lo), _point(c.hi), _point(h.lo), _point(S.lo))
-    most = _lid_at(_point(R.hi), _point(c.lo), _point(h.hi), _point(S.hi))
-    return Interval.from_bounds(least.lo, most.hi)
+    corners = (np.stack(pair) for pair in ((R.lo, R.hi), (c.hi, c.lo), (h.lo, h.hi), (S.lo, S.hi)))
+    area = _lid_at(*(_point(corner) for corner in corners))
+    return _bounds(area.lo[0], area.hi[1])
 
 
 def _lid_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
@@ -283,7 +283,9 @@ def _lid_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     disc = _pi() * R.sqr()
     near = h * S - c + q * tilt.bend
     area = _lid_side(R, c, h, tilt, near)
-    area = area + _lid_side(R, c, -h, tilt, R - d - p)
+    far = R - d - p
+    if bool((far.hi > 0.0).any()):
+        area = area + _lid_side(R, c, -h, tilt, far)
     beyond = d - p - R
     area = _choose(beyond.lo >= 0.0, disc, _choose(beyond.hi >= 0.0, area.hull(disc), area))
     return _limited(_choose(p.lo > 0.0, area, _choose(near.lo > 0.0, disc, disc.hull(Interval(0)))), disc)
@@ -296,13 +298,13 @@ def _lid_side(R: Interval, c: Interval, h: Interval, tilt: _Tilt, gap: Interval)
     q = R + c
     p, d, thin, ring = q * C, h * S, q * bend, c * (2 * R + c)
     m = _nonnegative(gap) * (R + d + p) / (S * (R * S + h + C * (h.sqr() + ring).sqrt()))
-    m = _choose(m.is_empty, Interval.from_bounds(0.0, np.inf), m)
+    m = _choose(m.is_empty, _bounds(0.0, np.inf), m)
     m = _limited(m, 2 * R)
     X, y = R - m, _nonnegative(m * (2 * R - m)).sqrt()
     s1, s2 = _angle(y, X), _angle(y / q, (d + X) / p)
     dl = _angle((y / R) * (d / p + X * thin / (p * q)), X * (d + X) / (p * R) + y.sqr() / (q * R))
     area = (q * thin - ring) * _segment(s1) + p * q * _segment_difference(dl, s1 + s2)
-    area = Interval.from_bounds(np.where(gap.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
+    area = _bounds(np.where(gap.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
     return _choose(gap.hi > 0.0, area, Interval.zeros(area.shape))
 
 
@@ -329,12 +331,15 @@ def enclose_rim_area(R: Any, clearance: Any, h: Any, sine: Any) -> tuple[Interva
     (True, True, True)
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
-    least = _rim_at(R, _point(c.hi), _point(h.lo), _point(S.lo))
-    most = _rim_at(R, _point(c.lo), _point(h.hi), _point(S.hi))
-    over = _rim_at(R, c, h, S)
+    pairs = ((c.hi, c.lo), (h.lo, h.hi), (S.lo, S.hi))
+    area = _rim_at(_twice(R), *(_point(np.stack(pair)) for pair in pairs))
     # the area grows with the tilt while the ends of the rim across the tilt, (d, +-R), lie in the hole
     monotone = (S.lo == S.hi) | ((c * (2 * R + c) - (h * S).sqr()).lo >= 0.0)
-    area = Interval.from_bounds(np.where(monotone, least.lo, over.lo), np.where(monotone, most.hi, over.hi))
+    if monotone.all():
+        area = _bounds(area.lo[0], area.hi[1])
+    else:
+        over = _rim_at(R, c, h, S)
+        area = _bounds(np.where(monotone, area.lo[0], over.lo), np.where(monotone, area.hi[1], over.hi))
     tilt = _tilt(S)
     closed = np.asarray((h * tilt.C - R * S).lo >= 0.0)
     nothing = np.asarray(((R + c).sqr() - R.sqr() - h.sqr()).lo >= 0.0)  # Rh >= sqrt(R^2 + h^2): free at any tilt
@@ -342,6 +347,11 @@ def enclose_rim_area(R: Any, clearance: Any, h: Any, sine: Any) -> tuple[Interva
     area = _choose(closed, area, rim.hull(Interval(0)))
     area = _choose(nothing, Interval.zeros(area.shape), _limited(area, rim))
     return area, np.asarray(closed | nothing)
+
+
+def _twice(x: Interval) -> Interval:
+    """Repeat for two corners."""
+    return _bounds(np.stack([x.lo, x.lo]), np.stack([x.hi, x.hi]))
 
 
 def _rim_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
@@ -353,7 +363,7 @@ def _rim_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     Rh, ring = R + c, c * (2 * R + c)
     p, d = R * C, h * S
     m = _nonnegative(gap) * (p + Rh - d) / (S * (h - Rh * S + C * _nonnegative(h.sqr() - ring).sqrt()))
-    m = _limited(_choose(m.is_empty, Interval.from_bounds(0.0, np.inf), m), 2 * Rh)
+    m = _limited(_choose(m.is_empty, _bounds(0.0, np.inf), m), 2 * Rh)
     x, y = Rh - m, _nonnegative(m * (2 * Rh - m)).sqrt()
     s1, s2 = _angle(y, x), _angle(y / R, (x - d) / p)
     dl = _angle(y * (d - x * bend) / (p * Rh), (x - d) * x / (p * Rh) + y.sqr() / (R * Rh))
@@ -361,7 +371,7 @@ def _rim_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     whole = _pi() * p * R
     beyond = d - p - Rh
     area = _choose(beyond.lo >= 0.0, whole, _choose(beyond.hi >= 0.0, area.hull(whole), area))
-    area = Interval.from_bounds(np.where(gap.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
+    area = _bounds(np.where(gap.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
     area = _choose(gap.hi > 0.0, area, Interval.zeros(area.shape))
     possible = _choose(usable, area, (_pi() * R.sqr()).hull(Interval(0)))
     return _choose(gap.hi > 0.0, possible, Interval.zeros(area.shape))
