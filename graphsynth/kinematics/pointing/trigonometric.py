@@ -77,7 +77,7 @@ def _critical_points(c1: float, s1: float, c2: float, s2: float) -> list[float]:
     if largest == 0.0:
         return []
     z = np.roots(np.where(np.abs(polynomial) < 1e-300, 0.0, polynomial / largest))
-    points = []
+    points: list[float] = []
     for t in np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-4]).tolist():
         for _ in range(3):
             slope = s1 * math.cos(t) - c1 * math.sin(t) + 2 * (s2 * math.cos(2 * t) - c2 * math.sin(2 * t))
