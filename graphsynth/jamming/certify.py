@@ -8,8 +8,10 @@ from fractions import Fraction
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certified_arcs import CertifiedArcs, Enclosure, arcs_from, no_arcs, whole_turn
+from graphsynth.jamming.circle_sets import covers, meets
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.ranges import Range, exact_text
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
@@ -104,6 +106,35 @@ class JamCertificate:
     def statement(self) -> str:
         """The sentence that is proved, or what is missing."""
         return _statement(self)
+
+    def over(self, start: float, stop: float) -> Verdict:
+        """Return what is proved about a part of the turn: from ``start`` counter-clockwise to ``stop``, radians.
+
+        ``stop`` below ``start`` runs across the full turn; a turn or more is the whole turn.
+
+        Examples
+        --------
+        >>> found = certify_jamming(ToleranceBox(alpha="1/30"))
+        >>> found.over(-0.4, 0.4).name, found.over(0.4, 1.0).name, found.over(6.0, 0.4).name
+        ('CERTIFIED_FREE', 'CERTIFIED_JAMMED', 'CERTIFIED_FREE')
+        """
+        for name, value in (("start", start), ("stop", stop)):
+            if not math.isfinite(value):
+                raise GeometryError(f"{name} = {value} is not finite; give crank angles in radians")
+        if self.verdict is Verdict.CANNOT_ASSEMBLE or stop - start >= math.tau:
+            return self.verdict
+        length = (stop - start) % math.tau if stop < start else stop - start
+        first = start % math.tau if abs(start) > math.tau else start
+        last = first + length
+        if (first, last) != (start, stop):  # the reduction was rounded: what is asked lies in a slightly longer piece
+            pad = 1e-15 * (10.0 + abs(start) + abs(stop))  # more than 2.5e-16 for each turn taken off
+            wide, narrow = (first - pad, last + pad), (first + pad, last - pad)
+        else:
+            wide = narrow = (first, last)
+        if covers(self.arcs.free, *wide):
+            return Verdict.CERTIFIED_FREE
+        jams = self.assembles == "always" and narrow[0] <= narrow[1] and meets(self.arcs.inner, *narrow)
+        return Verdict.CERTIFIED_JAMMED if jams else Verdict.UNDECIDED
 
     def summary(self) -> dict[str, Any]:
         """Plain values for a report or a JSON file; angles in radians, lengths in mm."""

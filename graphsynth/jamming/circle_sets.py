@@ -10,10 +10,14 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-__all__ = ["FULL_TURN", "Span", "complement", "contains", "merge_outer", "strictly_inside", "subtract", "total_length"]
+__all__ = [
+    "FULL_TURN", "TURN_HIGH", "TURN_LOW", "Span", "complement", "contains", "covers", "meets", "merge_outer",
+    "strictly_inside", "subtract", "total_length",
+]  # fmt: skip
 
 #: Doubles around 2 pi.
 TURN_LOW, TURN_HIGH = 6.283185307179586, 6.283185307179587
+_TURNS = (0.0, 1.0, -1.0, 2.0, -2.0)
 
 
 class Span(NamedTuple):
@@ -109,16 +113,38 @@ def contains(spans: Iterable[Span], f: float) -> bool:
 
 def strictly_inside(spans: Iterable[Span], f: float) -> bool:
     """Whether a crank angle (a double in [-2 pi, 4 pi]) certainly lies in one of the spans; never true by rounding."""
+    return covers(spans, f, f)
+
+
+def covers(spans: Iterable[Span], start: float, stop: float) -> bool:
+    """Whether one of the spans certainly holds the piece from ``start`` to ``stop`` in its inside."""
     for span in spans:
         if _is_full(span):
             return True
-        for turn in (-2.0, -1.0, 0.0, 1.0, 2.0):
-            low, high = sorted((turn * TURN_LOW, turn * TURN_HIGH))
-            first = math.nextafter(f + low, -math.inf) if turn else f
-            last = math.nextafter(f + high, math.inf) if turn else f
-            if span.start < first and last < span.stop:
+        for turn in _TURNS:
+            if span.start < _shifted(start, turn)[0] and _shifted(stop, turn)[1] < span.stop:
                 return True
     return False
+
+
+def meets(spans: Iterable[Span], start: float, stop: float) -> bool:
+    """Whether the piece from ``start`` to ``stop`` certainly has points inside one of the spans."""
+    for span in spans:
+        if _is_full(span):
+            return True
+        for turn in _TURNS:
+            first, last = max(span.start, _shifted(start, turn)[1]), min(span.stop, _shifted(stop, turn)[0])
+            if first < last or (start == stop and covers([span], start, stop)):
+                return True
+    return False
+
+
+def _shifted(f: float, turn: float) -> tuple[float, float]:
+    """Bounds of ``f`` plus a number of turns."""
+    if turn == 0.0:
+        return f, f
+    low, high = sorted((turn * TURN_LOW, turn * TURN_HIGH))
+    return math.nextafter(f + low, -math.inf), math.nextafter(f + high, math.inf)
 
 
 def total_length(spans: Iterable[Span]) -> float:

@@ -295,6 +295,34 @@ def test_arcs_that_merge_and_phases_that_are_unknown():
     assert all(-1e-14 <= arc.start.lo < math.tau for arc in turned.arcs.arcs)
 
 
+def test_parts_of_the_turn():
+    found = certify_jamming(deck())
+    edge = found.arcs.arcs[0].start
+    free, jams, open_ = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED, Verdict.UNDECIDED
+    assert found.over(0.0, edge.lo - 1e-14) is free and found.over(0.0, edge.hi + 1e-14) is jams
+    assert found.over(0.0, edge.mid) is open_
+    assert found.over(6.1, 0.3) is free and found.over(6.1 + 4 * math.tau, 0.3) is free  # across the full turn
+    assert found.over(3.0, 3.2) is free and found.over(-3.2, -3.0) is free
+    assert found.over(math.pi / 2, 1.5 * math.pi) is jams  # the working stroke
+    assert found.over(0.0, 100.0) is found.verdict
+    assert found.over(1.5, 1.5) is jams and found.over(0.1, 0.1) is free
+    some = certify_jamming(deck(clearance="[0.03, 0.1]"))
+    assert some.over(1.0, 2.0) is open_ and some.over(-0.4, 0.4) is free
+    partly = certify_jamming(ToleranceBox(2, 1, 1, 1, "1/30"))
+    assert partly.over(2.0, 2.5) is open_  # jams if it could get there
+    with pytest.raises(GeometryError, match="finite"):
+        found.over(0.0, math.nan)
+
+
+def test_reversed_axis_and_negative_tilt_have_the_same_zones():
+    base = certify_jamming(deck(axis=(1, 2, 0)))
+    for other in (deck(axis=(-1, -2, 0)), deck(axis=(1, 2, 0), alpha="-1/30"), deck(axis=(1, 2, 0), convention="deck")):
+        found = certify_jamming(other)
+        assert found.verdict is base.verdict
+        for one, two in zip(base.arcs.arcs, found.arcs.arcs):
+            assert one.start.lo <= two.start.hi and two.start.lo <= one.start.hi
+
+
 def test_floats_are_marked():
     found = certify_jamming(ToleranceBox.of(LambdaLinkage(alpha=1 / 30), Bearing()))
     assert not found.exact_input and "floats came in" in found.statement
