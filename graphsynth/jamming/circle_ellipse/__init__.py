@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from graphsynth.jamming.circle_ellipse.boxes import CrossingBoxes, krawczyk_boxes
+from graphsynth.jamming.circle_ellipse.check import CrossCheck, cross_check
 from graphsynth.jamming.circle_ellipse.hull import CrossingHull, exact_hull, mirrored
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse, circle_ellipse, surrogate_problem
 from graphsynth.jamming.circle_ellipse.readings import (
@@ -16,12 +17,14 @@ from graphsynth.jamming.circle_ellipse.reasons import Reason
 
 __all__ = [
     "CircleEllipse",
+    "CrossCheck",
     "CrossingBoxes",
     "CrossingHull",
     "Reading",
     "Reason",
     "TiltedEllipse",
     "circle_ellipse",
+    "cross_check",
     "exact_hull",
     "krawczyk_boxes",
     "mirrored",

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 #: Boxes treated between two looks at the clock.
 _BATCH = 4096
 _MOST_PROVED = 16
+_MOST_BOXES = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +135,7 @@ def krawczyk_boxes(
     Raises
     ------
     SpecError
-        For limits that are not positive.
+        For limits that are not positive, and more than 20 million boxes.
     GraphsynthError
         If the processor's rounding has been changed.
 
@@ -149,6 +150,10 @@ def krawczyk_boxes(
     for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
         if not value > 0:
             raise SpecError(f"{name} = {value} must be positive; give a number above 0")
+    if not isinstance(max_boxes, int | np.integer) or max_boxes > _MOST_BOXES:
+        raise SpecError(
+            f"max_boxes = {max_boxes} must be an integer of at most {_MOST_BOXES}; use fewer, or a tolerance"
+        )
     from graphsynth.jamming.circle_ellipse import kernels
 
     begin = perf_counter()

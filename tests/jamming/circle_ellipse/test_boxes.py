@@ -1,5 +1,6 @@
 """Krawczyk's method in (x, y): what it certifies, what it may never certify, agreement with the exact hull."""
 
+import dataclasses
 from fractions import Fraction
 
 import mpmath
@@ -10,7 +11,8 @@ from hypothesis import strategies as st
 
 from graphsynth.errors import SpecError
 from graphsynth.intervals import Interval, Status
-from graphsynth.jamming.circle_ellipse import Reason, circle_ellipse, exact_hull, krawczyk_boxes
+from graphsynth.jamming.circle_ellipse import Reason, circle_ellipse, cross_check, exact_hull, krawczyk_boxes
+from graphsynth.jamming.circle_ellipse.check import _agree
 
 
 def surrogate(t):
@@ -190,6 +192,23 @@ def test_limits():
     for bad in ({"max_boxes": 0}, {"tolerance": 0.0}, {"max_seconds": float("nan")}):
         with pytest.raises(SpecError, match="must be positive"):
             krawczyk_boxes(problem, **bad)
+    for count in (1.5, 10**9):
+        with pytest.raises(SpecError, match="must be an integer of at most"):
+            krawczyk_boxes(problem, max_boxes=count)
+
+
+def test_cross_check_finds_contradictions():
+    problem = circle_ellipse(5, 6, 4, eps="1e-6")
+    good = cross_check(problem)
+    assert good.consistent
+    other = krawczyk_boxes(circle_ellipse(5, "6.1", 4, eps="1e-6"))
+    empty = krawczyk_boxes(circle_ellipse(7, 6, 4))
+    assert not dataclasses.replace(good, hull_in_boxes=bool(good.hull.hull.subset(other.outer).all())).consistent
+    assert not _agree(good.hull, empty)
+    assert not _agree(exact_hull(empty.problem), other)
+    assert not _agree(exact_hull(circle_ellipse(6, 6, 4)), other)
+    for args in ((6, 6, 4), (2, 2, 2), (7, 6, 4), (5, 6, 4, 1, "0.1"), (5, "[5.9, 6.1]", "[3.9, 6]")):
+        assert cross_check(circle_ellipse(*args), tolerance=0.01, max_boxes=3000).consistent
 
 
 def test_ranges_of_the_radii():

@@ -267,6 +267,17 @@ def test_eps_beside_e1_is_refused():
         circle_ellipse(1, 2, 1, 1, eps=1)
 
 
+def test_poses_of_the_bearing_without_a_crossing():
+    """No tilt, and a tilt of 4e-9: circle inside the ellipse, no division by a^2 - b^2 (specification 12)."""
+    for sine in ("0", "4e-9"):
+        found = exact_hull(surrogate_problem(Bearing(), sine, eps="1e-9"))
+        assert found.status is Status.EMPTY
+        assert found.reasons == (Reason.CIRCLE_INSIDE,)
+    no_clearance = Bearing(clearance=0.0)
+    assert exact_hull(surrogate_problem(no_clearance, "0")).reasons == (Reason.COINCIDENT,)
+    assert exact_hull(surrogate_problem(no_clearance, "0.01")).reasons == (Reason.TANGENT_LONG,)
+
+
 def test_steep_tilt_has_no_surrogate():
     with pytest.raises(GeometryError, match="lid_area"):
         surrogate_problem(Bearing(), "0.999")
