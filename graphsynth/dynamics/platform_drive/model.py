@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import DCMotor, IdealSpeed, LinearCharacteristic, Motor, SynchronousMotor, number
+from graphsynth.dynamics.motors import DCMotor, IdealSpeed, Motor, number
 from graphsynth.dynamics.platform_drive.inertia import EffectiveInertia
+from graphsynth.dynamics.platform_drive.reduction import (
+    ReductionStudy,
+    choose_motor,
+    inductance_study,
+    reduction_error,
+)
 from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, run
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
@@ -19,26 +25,10 @@ from graphsynth.errors import SpecError
 if TYPE_CHECKING:
     from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["MotorDrivenPlatform", "ReductionStudy", "linear_response"]
+__all__ = ["MotorDrivenPlatform"]
 
 Array = NDArray[np.float64]
 _SPIKES = "no rotor inertia: model S; the crank speed is unbounded at dead centres, an artefact of the missing inertia"
-
-
-@dataclass(frozen=True, eq=False)
-class ReductionStudy:
-    """Distance of the full model from the limit L -> 0 for several inductances, and the order that it shows.
-
-    ``angle`` and ``speed`` are the largest differences over the output times from ``after`` on; ``order`` (n - 1,) the
-    slopes of the speed difference between neighbours, 1 where the limit is of first order.
-    """
-
-    inductance: Array
-    angle: Array
-    speed: Array
-    order: Array
-    steps: NDArray[np.int64]
-    limit: DriveRun
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,94 +155,28 @@ class MotorDrivenPlatform:
             model == "auto" and self.constant_inertia == 0.0 and bool(self.inertia.dead_centres)
         )
         notes = (_SPIKES,) if regular else ()
-        options = {"angle": angle, "speed": speed, "rtol": rtol, "estimate": estimate, "max_steps": max_steps}
-        motor = self.motor
-        if self._reducible(reduce):
-            reduced, bound = self._limit(np.asarray(times, dtype=np.float64), reduce, regular, options)
-            if reduced is not None:
-                motor, currents, notes = reduced, None, (*notes, bound)
+        motor, note = choose_motor(
+            self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol, regular=regular
+        )
+        if note:
+            currents, notes = None, (*notes, note)
         return run(
             self.plant(), motor, self.train, times, angle=angle, speed=speed, currents=currents, regular=regular,
             rtol=rtol, estimate=estimate, max_steps=max_steps, notes=notes,
         )  # fmt: skip
 
-    def _reducible(self, reduce: bool | str) -> bool:
-        if reduce not in (True, False, "auto"):
-            raise SpecError(f"reduce = {reduce!r} is unknown; choose 'auto', True or False")
-        if not isinstance(self.motor, (DCMotor, SynchronousMotor)):
-            return False
-        if self.motor.inductance == 0.0 and reduce is False:
-            raise SpecError("inductance = 0 with the unreduced model divides by zero; set reduce = True or 'auto'")
-        return bool(reduce)
-
-    def _limit(
-        self, times: Array, reduce: bool | str, regular: bool, options: dict[str, float]
-    ) -> tuple[LinearCharacteristic | None, str]:
-        """Motor of the limit, with its error; None when the true inductance has to be kept."""
-        motor = self.motor
-        if not isinstance(motor, (DCMotor, SynchronousMotor)):
-            return None, ""
-        if motor.inductance == 0.0:
-            return motor.reduced(), "inductance 0: the reduced model, exact"
-        span = float(times[-1] - times[0])
-        if reduce == "auto" and (
-            regular or not motor.electrical_time <= options["rtol"] * span
-            or (isinstance(motor, DCMotor) and motor.voltage_limit < math.inf)
-        ):  # fmt: skip
-            return None, ""
-        error = self.reduction_error(times, angle=options["angle"], speed=options["speed"])
-        if reduce == "auto" and error > options["rtol"]:
-            return None, ""
-        return motor.reduced(), f"reduced to L -> 0; estimated error of the angle {error:.1e} rad, of first order in L"
-
     def reduction_error(self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0) -> float:
-        """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; estimated.
-
-        From a run at an inductance large enough to be seen, scaled down linearly.
-        """
-        motor = self.motor
-        if not isinstance(motor, (DCMotor, SynchronousMotor)) or motor.inductance == 0.0:
-            return 0.0
-        out = np.asarray(times, dtype=np.float64)
-        factor = max(1.0, 1e-5 * float(out[-1] - out[0]) / motor.electrical_time)
-        seen = replace(motor, inductance=factor * motor.inductance)
-        found = replace(self, motor=seen).inductance_study(
-            out, [seen.inductance], angle=angle, speed=speed, rtol=1e-11
-        )
-        return float(found.angle[0]) / factor
+        """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; see `reduction`."""
+        return reduction_error(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
 
     def inductance_study(
         self, times: ArrayLike, inductances: Sequence[float], *, angle: float = 0.0, speed: float = 0.0,
-        after: float | None = None, rtol: float = 1e-12,
+        after: float | None = None,
     ) -> ReductionStudy:  # fmt: skip
-        """Compare the full model at several inductances (H) with the limit L -> 0 (section 11.4).
-
-        ``after`` excludes times within the electrical transient (default: twenty time constants of each inductance).
-
-        Raises
-        ------
-        SpecError
-            For a motor without inductance, or an inductance that is not positive.
-        """
-        if not isinstance(self.motor, (DCMotor, SynchronousMotor)):
-            raise SpecError(f"{type(self.motor).__name__} has no inductance; give a DCMotor or a SynchronousMotor")
-        out = np.asarray(times, dtype=np.float64)
-        limit = run(self.plant(), self.motor.reduced(), self.train, out, angle=angle, speed=speed, rtol=rtol,
-                    estimate=False)  # fmt: skip
-        rows, steps = [], []
-        for value in inductances:
-            motor = replace(self.motor, inductance=number("inductance", value, least=0.0, above=True))
-            full = run(self.plant(), motor, self.train, out, angle=angle, speed=speed, rtol=rtol, estimate=False)
-            begin = 20.0 * motor.electrical_time if after is None else after
-            late = out - out[0] >= begin
-            if not late.any():
-                raise SpecError(f"all output times lie within {begin:.3g} s, the electrical transient; give later times")
-            rows.append([np.abs(a - b)[late].max() for a, b in ((full.angle, limit.angle), (full.speed, limit.speed))])
-            steps.append(full.steps)
-        gaps, sizes = np.array(rows).reshape(-1, 2), np.array(inductances, dtype=np.float64)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            order = np.diff(np.log(gaps[:, 1])) / np.diff(np.log(sizes))
-        return ReductionStudy(sizes, gaps[:, 0], gaps[:, 1], order, np.array(steps), limit)
+        """Compare the full model at several inductances (H) with the limit L -> 0; see `reduction`."""
+        return inductance_study(
+            self.plant(), self.motor, self.train, times, inductances, angle=angle, speed=speed, after=after
+        )
 
     def torque_at_speed(self, q: ArrayLike, speed: float) -> Array:
         """Torque at the crank that keeps a constant crank speed (rad/s): ``J'(q) w^2 / 2 + b w + load``, N m.
@@ -261,7 +185,8 @@ class MotorDrivenPlatform:
 
         Examples
         --------
-        >>> platform = MotorDrivenPlatform.source(LinearCharacteristic(1.0))
+        >>> from graphsynth.dynamics.motors import IdealTorque
+        >>> platform = MotorDrivenPlatform.source(IdealTorque(1.0))
         >>> platform.torque_at_speed([0.0, 0.7], 20.0).round(6).tolist()
         [0.0, -0.98545]
         """
@@ -271,67 +196,3 @@ class MotorDrivenPlatform:
             load += EffectiveInertia(np.atleast_2d(self.load_series)).components(angle)[0][0]
         friction = self.friction + self.train.ratio**2 * self.motor.friction
         return np.asarray(0.5 * self.inertia.derivative(angle) * w * w + friction * w + load)
-
-
-def linear_response(motor: DCMotor, inertia: float, times: ArrayLike, train: Train | None = None) -> tuple[Array, Array]:
-    """Speed and current of a DC motor with a constant inertia at the crank, from rest: closed form.
-
-    Parameters
-    ----------
-    motor : DCMotor
-        Without friction and voltage limit; its own rotor inertia is added.
-    inertia : float
-        J_0 at the crank, kg m^2.
-    times : array_like
-        Times since the start, s.
-    train : Train, optional
-        Direct coupling by default.
-
-    Returns
-    -------
-    w, I : ndarray
-        rad/s at the crank and A; exact but for rounding, also in the critical and the overdamped case.
-
-    Raises
-    ------
-    SpecError
-        No inertia, no inductance, friction or a voltage limit.
-
-    Notes
-    -----
-    Specification parallel_platform, section 14.10.
-
-    Examples
-    --------
-    >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
-    >>> [round(float(x[0]), 9) for x in linear_response(motor, 0.002, [0.01])]
-    [4.719206188, 18.547829748]
-    """
-    gear = train or Train()
-    total = number("inertia", inertia, least=0.0) + gear.reflected(motor.rotor_inertia)
-    if total == 0.0 or motor.inductance == 0.0:
-        raise SpecError(f"inertia = {total:g} and inductance = {motor.inductance:g} must both be positive here")
-    if motor.friction > 0.0 or motor.voltage_limit < math.inf:
-        raise SpecError("the closed form has neither friction nor a voltage limit; use simulate")
-    if gear.efficiency < 1.0:
-        raise SpecError(f"efficiency = {gear.efficiency:g} changes with the power flow; use simulate, or efficiency 1")
-    t = np.asarray(times, dtype=np.float64)
-    feedback = motor.gain + motor.emf_constant
-    a = motor.resistance / (2.0 * motor.inductance)
-    square = gear.ratio**2 * motor.torque_constant * feedback / (motor.inductance * total)
-    final = motor.gain * motor.speed / feedback / gear.ratio
-    decay, sine = _damped(a, a * a - square, t)
-    current = final * total / (gear.ratio * motor.torque_constant) * square * sine
-    return np.asarray(final * (1.0 - decay - a * sine)), np.asarray(current)
-
-
-def _damped(a: float, excess: float, t: Array) -> tuple[Array, Array]:
-    """``exp(-a t) cosh(s t)`` and ``exp(-a t) sinh(s t)/s`` with ``s^2 = excess`` of either sign."""
-    s = math.sqrt(abs(excess))
-    if excess < 0.0:
-        return np.exp(-a * t) * np.cos(s * t), np.exp(-a * t) * t * np.sinc(s * t / math.pi)
-    small = s * t < 1e-4
-    slow, fast = np.exp((s - a) * t), np.exp(-(s + a) * t)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(small, np.exp(-a * t) * t * (1.0 + (s * t) ** 2 / 6.0), -slow * np.expm1(-2.0 * s * t) / (2.0 * s))
-    return 0.5 * (slow + fast), np.asarray(ratio)

@@ -35,6 +35,7 @@ class RunStatus(IntEnum):
     TOO_MANY_STEPS = 2
     NOT_FINITE = 3
     TOO_MANY_EVENTS = 4
+    CHANGE_POINT = 5
 
 
 _REASONS = {

@@ -20,8 +20,8 @@ BASE, FRICTION, RATIO, EFFICIENCY, LOW, HIGH, CONSTANT = 0, 1, 2, 3, 4, 5, 6
 ELECTRIC = 8
 LINKAGE = 16
 # places of a four-bar linkage behind LINKAGE
-(LA, LB, LC, LG, BRANCH, RS, COS_D, SIN_D, M1, M2, I2, I3, WEIGHT, GX, GY, GH) = range(16)
-SIZE = LINKAGE + 16
+(LA, LB, LC, LG, BRANCH, RS, COS_D, SIN_D, M1, M2, I2, I3, WEIGHT, GX, GY, GH, FAR, NEAR) = range(18)
+SIZE = LINKAGE + 18
 
 
 @kernel
@@ -51,15 +51,15 @@ def series(q, V, P, out):
 def four_bar(theta, P, out):
     """Effective inertia, half its derivative and the generalised thread load of the braider into out[0:3].
 
-    Well-conditioned products of section 4.2; out[3:11] get k2, k3, phi2'', phi3'', AB and O2B.
+    Well-conditioned products of section 4.2, with the excesses ``b + c - a - g`` and ``(g - a)^2 - (b - c)^2`` given; out[3:11] get k2, k3, phi2'', phi3'', AB and O2B.
     """
     L = P[LINKAGE:]
     a, b, c, g = L[LA], L[LB], L[LC], L[LG]
     ct, st = math.cos(theta), math.sin(theta)
     half_s, half_c = math.sin(0.5 * theta), math.cos(0.5 * theta)
     d = math.sqrt((g - a) * (g - a) + 4.0 * a * g * half_s * half_s)
-    far = ((b - a) + (c - g)) * (b + c + a + g) + 4.0 * a * g * half_c * half_c
-    near = ((g - a) - (b - c)) * ((g - a) + (b - c)) + 4.0 * a * g * half_s * half_s
+    far = L[FAR] * (b + c + a + g) + 4.0 * a * g * half_c * half_c
+    near = L[NEAR] + 4.0 * a * g * half_s * half_s
     h = L[BRANCH] * math.sqrt(far * near) / (2.0 * d)
     ex, ey = (g - a * ct) / d, -a * st / d
     u = (b * b - c * c + d * d) / (2.0 * d)
