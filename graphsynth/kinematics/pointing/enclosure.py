@@ -84,10 +84,12 @@ class LengthBoxProblem:
         return {name: (self.iv.sin(phi), 2 * self.iv.sin(phi / 2) ** 2) for name, phi in angles.items()}
 
     def nominal(self, lengths: tuple[float, ...]) -> tuple[float, float]:
-        """Outputs u, v in double precision; NaN where not assembled."""
-        from graphsynth.kinematics.pointing.mechanism import PointingMechanism
+        """Return outputs u, v in double precision; NaN where not assembled."""
+        from dataclasses import replace
 
-        pose = PointingMechanism(*lengths, order=self.mechanism.order).poses(self.phi_x, self.phi_y, self.s_y, self.s_x)
+        l1, l2, l3, l4, l5 = lengths
+        varied = replace(self.mechanism, l1=l1, l2=l2, l3=l3, l4=l4, l5=l5)
+        pose = varied.poses(self.phi_x, self.phi_y, self.s_y, self.s_x)
         a, b = float(pose.a), float(pose.b)
         return (b, a) if self.mechanism.order == "YX" else (a, b)
 

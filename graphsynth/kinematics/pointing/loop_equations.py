@@ -133,7 +133,12 @@ def loop_equations(
     for leg, (steps, goal) in enumerate(zip(_chains(mechanism, chart), goals)):
         H, dH = _product(steps, angles)
         mounting = next(step for step in steps if isinstance(step, _Turn) and step.source == _FIXED)
-        D, dD = _product([*gimbal, *steps, _Turn(2, _FIXED, -mounting.factor)], angles)
+        inverse, dinverse = _product(gimbal, angles)
+        unmount = _matrix(_Turn(2, _FIXED, -mounting.factor), angles)
+        behind = H @ unmount
+        D = inverse @ behind
+        dD = {source: inverse @ part @ unmount for source, part in dH.items()}
+        dD |= {source: part @ behind for source, part in dinverse.items()}
         position = slice(3 * leg, 3 * leg + 3)
         residual[:, position] = (H[:, :3, 3] - goal) / unit
         rows = ((6 + 2 * leg, 0, 2), (7 + 2 * leg, 1, 2), (10 + leg, 1, 0))

@@ -6,7 +6,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -169,23 +169,33 @@ def tolerance(
                 bounds[which] = [max(bounds[which][0].a, low.a), min(bounds[which][1].b, high.b)]
     except NoProof as failure:
         lengths, reason = _explain(problem, box_widths, failure)
-        nan = (math.nan, math.nan)
-        nothing = (False,) * 5
-        outputs = [AngleBounds(part[0], *nan, *part[1:], nothing) for part in estimates]
+        outputs = [_bounds(part, math.nan, math.nan, (False,) * 5) for part in estimates]
         status = ToleranceStatus.UNDECIDED
     else:
         lengths, reason, status = (), "certified: one pose of this mode for all lengths in the box", ToleranceStatus(0)
         outputs = []
         for part, (low, high), gradient in zip(estimates, bounds, (found.du, found.dv)):
             monotone = tuple(bool(rate.a > 0 or rate.b < 0) for rate in gradient)
-            outputs.append(AngleBounds(part[0], _floor(low), _ceil(high), *part[1:], monotone))
+            outputs.append(_bounds(part, _floor(low), _ceil(high), monotone))
     u, v = outputs
     return Tolerance(status, reason, lengths, *((v, u) if mechanism.order == "YX" else (u, v)))
 
 
-def _estimates(
-    problem: LengthBoxProblem, widths: tuple[float, ...]
-) -> list[tuple[float, float, float, float, tuple[float, ...]]]:
+class _Estimate(NamedTuple):
+    """Nominal value, extreme corners, first-order deviation, gradient."""
+
+    nominal: float
+    low: float
+    high: float
+    first_order: float
+    gradient: tuple[float, ...]
+
+
+def _bounds(part: _Estimate, lower: float, upper: float, monotone: tuple[bool, ...]) -> AngleBounds:
+    return AngleBounds(part.nominal, lower, upper, part.low, part.high, part.first_order, part.gradient, monotone)
+
+
+def _estimates(problem: LengthBoxProblem, widths: tuple[float, ...]) -> list[_Estimate]:
     """Nominal value, extreme corners, first-order estimate and gradient of u and of v, in double precision."""
     lengths = problem.mechanism.lengths
     nominal = problem.nominal(lengths)
@@ -197,12 +207,12 @@ def _estimates(
         order = sum(abs(g) * w for g, w in zip(gradient, widths))
         offsets = np.remainder(corners[:, i] - nominal[i] + math.pi, math.tau) - math.pi  # no jump at +-pi
         low, high = nominal[i] + float(offsets.min()), nominal[i] + float(offsets.max())
-        made.append((nominal[i], low, high, order, gradient))
+        made.append(_Estimate(nominal[i], low, high, order, gradient))
     return made
 
 
 def _gradients(problem: LengthBoxProblem, nominal: tuple[float, float]) -> list[tuple[float, ...]]:
-    """Derivatives of u and v by the lengths at the middle; NaN where not assembled or at a fold."""
+    """Return derivatives of u and v by the lengths at the middle; NaN where not assembled or at a fold."""
     if math.isnan(nominal[0]):
         return [(math.nan,) * 5] * 2
     iv = problem.iv
