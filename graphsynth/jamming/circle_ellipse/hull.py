@@ -119,12 +119,12 @@ def _corner(a: Fraction, b: Fraction, Q: Fraction, E: Fraction) -> tuple[Fractio
 
 def _touches(problem: CircleEllipse, u: Fraction, v: Fraction) -> tuple[Reason, ...]:
     """Reasons why not every choice of the parameters has a crossing inside the quadrant."""
-    point = problem.is_exact_data
+    sharp = problem.R1.is_point and problem.e1.hi == 0 == problem.e2.hi
     reasons = []
     if u <= 0:
-        reasons.append(Reason.TANGENT_SHORT if point else Reason.TOUCHES_X)
+        reasons.append(Reason.TANGENT_SHORT if sharp and problem.R1 == problem.b else Reason.TOUCHES_X)
     if v <= 0:
-        reasons.append(Reason.TANGENT_LONG if point else Reason.TOUCHES_Y)
+        reasons.append(Reason.TANGENT_LONG if sharp and problem.R1 == problem.a else Reason.TOUCHES_Y)
     return tuple(reasons)
 
 
