@@ -232,8 +232,8 @@ def gap_function(condition: Condition, axis: tuple[Any, Any, Any] = (1, 0, 0)) -
 
     def gap(v: Sequence[Dual]) -> Dual:
         l2, l3, alpha, R, height, c = v[:6]
-        d = (sin(alpha / 2)).sqr() * inclination * 2
-        S = l2 / l3 * sqrt(d * (2 - d))
+        half = sin(alpha / 2)  # sqrt(d (2 - d)) with d = 2 half^2 (1 - n3^2), written with a bounded derivative at 0
+        S = l2 / l3 * (abs(half) * (inclination.sqrt() * 2) * sqrt(1 - half.sqr() * inclination))
         C = sqrt((1 - S) * (1 + S))
         h = height / 2
         bend = S.sqr() / (1 + C)
