@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.dynamics.energies import Balance, balance_at, checks_of, warnings_of
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
+from graphsynth.dynamics.second import newton_euler_difference, second_accelerations
 from graphsynth.dynamics.start import StartReport, start_compiled
 from graphsynth.dynamics.stepping import Trail, integrate
 from graphsynth.dynamics.tables import Compiled, compile_model
@@ -267,7 +268,9 @@ def _result(
     kinetic, potential = np.full(count, np.nan), np.full(count, np.nan)
     for k, b in enumerate(balances):
         a[k], lam[k], kinetic[k], potential[k] = b.a, b.multipliers, b.kinetic, b.potential
-    second = run.own[:done] if run.name != "constrained" else _other_form(compiled, run, grid)
+    second = run.own[:done]
+    if run.name == "constrained":
+        second = second_accelerations(compiled, report, grid[:done], run.q[:done], run.v[:done])
     checks = checks_of(
         compiled, grid, balances, run.work, second, _newton(compiled, run, grid, a, lam), run.form.loss, run.form.contraction
     )
@@ -300,17 +303,8 @@ def _backend(method: str) -> str:
     return f"scipy {scipy.__version__}"
 
 
-def _other_form(compiled: Compiled, run: _Run, grid: Array) -> list[Array | None]:
-    """Accelerations of the constrained run's states in the minimal form, where there is one."""
-    from graphsynth.dynamics.second import minimal_accelerations
-
-    return minimal_accelerations(compiled, grid[: run.done], run.q[: run.done], run.v[: run.done])
-
-
 def _newton(compiled: Compiled, run: _Run, grid: Array, a: Array, lam: Array) -> float:
     """Largest difference of the reactions to body-by-body equilibrium, at up to 20 instants."""
-    from graphsynth.dynamics.second import newton_euler_difference
-
     chosen = np.unique(np.linspace(0, run.done - 1, min(run.done, 20)).astype(int)) if run.done else np.empty(0, int)
     return newton_euler_difference(compiled, grid[chosen], run.q[chosen], run.v[chosen], a[chosen], lam[chosen])
 

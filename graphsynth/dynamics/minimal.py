@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,6 +24,10 @@ __all__ = ["EffectiveInertia", "MinimalForm", "effective_inertia", "minimal_obst
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+
+#: Sine of a dyad's angle below which modes may meet within a step.
+_CLOSE = 0.2
 
 
 class EngineTables(NamedTuple):
@@ -139,6 +144,7 @@ class MinimalForm:
         self.contraction = 0.0
         self.pivot = 1.0
         self.inertia = float("nan")
+        self._slopes: dict[int, float] = {}
         self._kernels = kernels
         driver = compiled.model.mechanism.drivers[0]
         theta, omega = (
@@ -179,6 +185,21 @@ class MinimalForm:
         if not out[0] > 0.0 or out[3] == 0.0:
             return self._failed(y, out)
         return np.asarray(found)
+
+    @property
+    def stages(self) -> Callable[..., Array] | None:
+        """A compiled Runge-Kutta step, if no load is given as a function and there is no friction."""
+        if self.compiled.applied or self.compiled.tables.friction.size:
+            return None
+
+        def run(y: Array, h: float, A: Array, B: Array, K: Array) -> Array:
+            T, centres = self.compiled.tables, self.compiled.centres
+            fresh = self._kernels.minimal_stages(T, self.E, self.S, centres, y, h, A, B, K)
+            if not np.isfinite(K).all():
+                self.rates(0.0, np.asarray(fresh))  # says why
+            return np.asarray(fresh)
+
+        return run
 
     def _failed(self, y: Array, out: Array) -> Array:
         """Say why; the integrator tries a shorter step, and gives up where none is short enough."""
@@ -226,6 +247,29 @@ class MinimalForm:
             self.why = "the friction iteration does not contract: there may be no solution or several"
             return np.full(3, np.nan)
         return np.array([w, float(Mq @ (a - q2 * w * w)) / inertia, P + out[2]])
+
+    def refuses(self, t: float, y: Array) -> bool:
+        """Whether two assembly modes met within the step: the sign of a mode says nothing of how it goes on there.
+
+        The sine of a dyad's angle is the root of its margin; it falls towards 0 and rises again where modes meet.
+        """
+        self.transmission(float(y[0]))
+        if self.S.done[0] < 2:
+            return False
+        h = float(y[0]) - float(self.S.u[0])
+        for k, step in enumerate(self.program.steps):
+            if not step.has_two_modes or h == 0.0:
+                continue
+            before, after = np.sqrt(np.maximum(self.S.M[k, :2], 0.0))
+            slope = self._slopes.get(k)
+            self._slopes[k] = (after - before) / h
+            if min(before, after) < _CLOSE and slope is not None and before + slope * h < 0.0:
+                self.why = (
+                    f"two assembly modes of group {step.group} meet near the input {float(y[0]):.6g}, and the minimal form "
+                    "cannot tell how the motion goes on; use form='constrained'"
+                )
+                return True
+        return False
 
     def accept(self, t: float, y: Array) -> Array:
         """Move the engine's first sample to the accepted input."""

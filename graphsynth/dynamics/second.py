@@ -3,25 +3,67 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.minimal import MinimalForm, minimal_obstacle
 from graphsynth.dynamics.model import Rack, Rigid
 from graphsynth.dynamics.reactions import reactions_from_multipliers, world
+from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.values import Values, initial_slots
+from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver
 
-__all__ = ["minimal_accelerations", "newton_euler", "newton_euler_difference"]
+__all__ = ["newton_euler", "newton_euler_difference", "second_accelerations"]
 
 Array = NDArray[np.float64]
 
 
-def minimal_accelerations(compiled: Compiled, times: Array, q: Array, v: Array) -> list[Array | None]:
-    """Accelerations of given states by the minimal form; None where there is no such form or it is near a fold."""
-    return [None] * len(q)
+def second_accelerations(compiled: Compiled, report: StartReport, times: Array, q: Array, v: Array) -> list[Array | None]:
+    """Accelerations of given states by a formulation without multipliers.
+
+    Through the planar engine at up to 20 states if there is a minimal form, in a null-space basis elsewhere; None with
+    friction and where a pose is singular.
+    """
+    if compiled.tables.friction.size or compiled.model.massless:
+        return [None] * len(q)
+    found = [_null_space(compiled, float(t), q[k], v[k]) for k, t in enumerate(times)]
+    if not minimal_obstacle(compiled.model):
+        for k in np.unique(np.linspace(0, len(q) - 1, min(len(q), 20)).astype(int)) if len(q) else ():
+            poses, rates, _ = compiled.to_links(q[k], v[k], np.zeros_like(q[k]))
+            try:
+                form = MinimalForm(compiled, replace(report, poses=poses, velocities=rates))
+            except GeometryError:  # next to a fold: the null-space value stays
+                continue
+            a = form.accelerations(float(times[k]), form.begin())
+            _, q1, _ = form.transmission(float(form.begin()[0]))
+            if found[k] is not None and np.isfinite(a).all() and float(np.abs(q1).max()) < 1e3:
+                found[k] = a
+    return found
+
+
+def _null_space(compiled: Compiled, t: float, q: Array, v: Array) -> Array | None:
+    """Solve ``(N^T M N) y = N^T (Q - M a0)`` with N an orthonormal basis of the null space; None at a singular pose."""
+    from graphsynth.dynamics import kernels
+
+    values = Values(compiled, t, initial_slots(compiled, q))
+    T = compiled.tables
+    _, J, gam, _ = values.system(q, v)
+    scale, unit = values.column_scale, values.row_scale
+    U, S, Vt = np.linalg.svd(J * scale / unit[:, None])
+    rank = int(np.sum(S > 1e-10 * S[0])) if S.size else 0
+    if rank and S[rank - 1] < 1e-3 * S[0]:
+        return None
+    a0 = scale * (Vt[:rank].T @ ((U.T @ (gam / unit))[:rank] / S[:rank]))
+    N = scale[:, None] * Vt[rank:].T
+    Qc, Qn, _, _, _ = kernels.load_vector(T, kernels.state_rows(T, q, v))
+    Q = Qc + Qn + applied_loads(compiled, t, q, v)
+    return np.asarray(a0 + N @ np.linalg.solve(N.T @ T.mass @ N, N.T @ (Q - T.mass @ a0)))
 
 
 def newton_euler(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> list[tuple[complex, float, complex]]:
@@ -49,7 +91,7 @@ def newton_euler(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> 
                     moment = (np.conj(arm) * force).imag + couple
                     matrix[k : k + 3, column] += sign * np.array([force.real, force.imag, moment])
             column += 1
-    right = compiled.tables.mass @ a - _loads(compiled, t, q, v, place)
+    right = compiled.tables.mass @ a - _loads(compiled, t, q, v)
     scale = np.tile([1.0, 1.0, 1.0 / compiled.tables.size], compiled.n // 3)
     solution = np.linalg.lstsq(matrix * scale[:, None], right * scale, rcond=1e-12)[0]
     results, column = [], 0
@@ -62,7 +104,7 @@ def newton_euler(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> 
     return results
 
 
-def _loads(compiled: Compiled, t: float, q: Array, v: Array, place: Array) -> Array:
+def _loads(compiled: Compiled, t: float, q: Array, v: Array) -> Array:
     from graphsynth.dynamics import kernels
 
     T = compiled.tables

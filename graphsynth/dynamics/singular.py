@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.values import Values
 
-__all__ = ["BranchTangents", "PoseClass", "classify_pose"]
+__all__ = ["BranchTangents", "PoseClass", "branch_tangents", "classify_pose"]
 
 Array = NDArray[np.float64]
 PoseClass = Literal["regular", "redundant", "singular", "not tested"]
@@ -50,7 +50,7 @@ def classify_pose(
                 nearby = max(nearby, int(np.sum(S > tolerance * S[0])))
     if nearby == rank:
         return "redundant", nearby, None
-    return "singular", nearby, _tangents(values, q, left, null) if nearby == rank + 1 else None
+    return "singular", nearby, branch_tangents(values, q, left, null) if nearby == rank + 1 else None
 
 
 def _returned(values: Values, q: Array) -> Array | None:
@@ -65,7 +65,7 @@ def _returned(values: Values, q: Array) -> Array | None:
     return q if np.abs(C).max() < 1e-12 else None
 
 
-def _tangents(values: Values, q: Array, left: Array, null: Array) -> BranchTangents | None:
+def branch_tangents(values: Values, q: Array, left: Array, null: Array) -> BranchTangents | None:
     """Solve the second-order equation ``l . C_qq(n, n) = 0`` for the directions of the branches."""
     special = left
     if null.shape[1] != 2 or special.shape[1] != 1:

@@ -90,6 +90,11 @@ class _Stepper:
             from graphsynth.dynamics.stiff import CvodeStepper
 
             return CvodeStepper(self.rates, t, y, bound, self.rtol, self.atol)
+        stages = getattr(self.form, "stages", None)
+        if self.method == "DOP853" and stages is not None:
+            from graphsynth.dynamics.compiled_steps import compiled_stepper
+
+            return compiled_stepper(stages, self.rates, t, y, bound, self.rtol, self.atol, first, self.trail)
         options: dict[str, Any] = {"rtol": self.rtol, "atol": self.atol}
         if first is not None:
             options["first_step"] = min(first, bound - t)
@@ -117,11 +122,20 @@ class _Stepper:
             if trail.steps >= max_steps:
                 trail.message = f"more than {max_steps} steps"
                 return None
+            if self._refused(solver):
+                trail.message = "the formulation does not hold beyond this time"
+                return None
             k = self._outputs(solver, before, grid, k, output)
             trail.time, trail.last_step = float(solver.t), float(solver.t) - before
-            y, step = self._accepted(solver, step)
-            self.form_watch(before, solver)
+            y, step, keep = self._accepted(solver, step)
+            self._watch(before, solver)
+            solver = solver if keep else None
         return y
+
+    def _refused(self, solver: Any) -> bool:
+        """Whether the formulation does not hold over the step just made."""
+        refuses = getattr(self.form, "refuses", None)
+        return refuses is not None and bool(refuses(float(solver.t), np.asarray(solver.y)))
 
     def _next(self, solver: Any, t: float, y: Array, bound: float, step: float | None) -> Any:
         """Return a solver to go on; a Runge-Kutta solver is taken on with its proposed step."""
@@ -144,31 +158,29 @@ class _Stepper:
             k += 1
         return k
 
-    def _accepted(self, solver: Any, step: float | None) -> tuple[Array, float | None]:
-        """Project; go on from the projected state with the step size that the method proposed."""
-        y = np.asarray(solver.y)
-        changed = self.form.accept(float(solver.t), y)
-        proposed = getattr(solver, "h_abs", None)
+    def _accepted(self, solver: Any, step: float | None) -> tuple[Array, float | None, bool]:
+        """Project; state, proposed step, and whether the solver goes on from there.
+
+        A Runge-Kutta solver goes on from the projected state with the step size it proposed; Radau starts anew
+        with it; a multistep solver would fall back to low order, so it is left alone except where it lands.
+        """
+        t, y = float(solver.t), np.asarray(solver.y)
+        finished = solver.status == "finished"
+        if self.method not in (*_RUNGE_KUTTA, "Radau") and not finished and self.form.name == "constrained":
+            return y, step, True
+        changed = self.form.accept(t, y)
+        proposed = float(getattr(solver, "h_abs", 0.0))
+        step = max(proposed, step or 0.0) if finished else proposed
+        if changed is y:
+            return y, step or None, True
         if self.method in _RUNGE_KUTTA:
-            step = max(proposed or 0.0, 0.0) if solver.status != "finished" else max(proposed or 0.0, step or 0.0)
-            if changed is not y:
-                solver.y = changed
-                solver.f = self.rates(float(solver.t), changed)
-        elif changed is not y:
-            # a multistep method restarts at low order: only where it lands anyway; Radau restarts with its step
-            if self.method == "Radau" and solver.status == "running":
-                return changed, self._restart(solver, changed, float(proposed or 0.0))
-            step = None if self.method != "Radau" else float(proposed or 0.0) or None
-        return (changed if self.method in (*_RUNGE_KUTTA, "Radau") or solver.status == "finished" else y), step
+            solver.y = changed
+            solver.f = self.rates(t, changed)
+            return changed, step or None, True
+        return changed, (step or None) if self.method == "Radau" else None, False
 
-    def _restart(self, solver: Any, y: Array, proposed: float) -> float:
-        """Start a Radau solver anew at the projected state, in place."""
-        fresh = self._solver(float(solver.t), y, float(solver.t_bound), proposed or None)
-        solver.__dict__.update(fresh.__dict__)
-        return proposed
-
-    def form_watch(self, before: float, solver: Any) -> None:
+    def _watch(self, before: float, solver: Any) -> None:
         """Let the formulation look for singular poses in the step just made."""
         watch = getattr(self.form, "watch", None)
-        if watch is not None:
+        if watch is not None and self.method in _RUNGE_KUTTA:
             watch(self.trail, before, solver)

@@ -1,0 +1,169 @@
+"""Inverse dynamics: the drivers' efforts and all reactions for a given motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
+from graphsynth.dynamics.second import newton_euler_difference
+from graphsynth.dynamics.tables import Compiled, compile_model
+from graphsynth.errors import GeometryError
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+
+__all__ = ["InverseDynamics", "inverse_dynamics"]
+
+Array = NDArray[np.float64]
+
+_FRICTION_ROUNDS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class InverseDynamics:
+    """Efforts and reactions of a given motion (estimated: floating point; NaN where the motion does not reach).
+
+    Attributes
+    ----------
+    inputs : ndarray, shape (n,)
+    efforts : ndarray, shape (n, drivers)
+        Torque (N m) or force (N) of every driver on its ``link``, against its ``base``.
+    reactions : Reactions
+        Of all joints; the last ones are the drivers'.
+    power : ndarray, shape (n,)
+        Of the drivers together, W.
+    power_error : float
+        Largest ``|drivers' power - (dE/dt - power of other loads)|`` over the largest power in play.
+    newton_euler : float
+        Largest difference of the reactions to body-by-body equilibrium, over the largest force.
+    """
+
+    inputs: Array
+    efforts: Array
+    reactions: Reactions
+    power: Array
+    power_error: float
+    newton_euler: float
+
+
+def inverse_dynamics(
+    model: DynamicModel, motion: Motion, speed: ArrayLike = 1.0, acceleration: ArrayLike = 0.0
+) -> InverseDynamics:
+    """Find the efforts of the mechanism's drivers, and the reactions, for a motion of the planar engine.
+
+    Parameters
+    ----------
+    model : DynamicModel
+        Massless links are allowed.
+    motion : Motion
+        Of :func:`graphsynth.kinematics.simulate` for ``model.mechanism``.
+    speed, acceleration : array_like, scalar or shape (n,)
+        First and second time derivative of the input at every sample.
+
+    Raises
+    ------
+    GeometryError
+        If the motion is of another mechanism, or friction does not settle.
+
+    Examples
+    --------
+    A bar of 1 kg and 1 m held still, level: half its weight times its length.
+
+    >>> from graphsynth.dynamics.model import Body
+    >>> from graphsynth.kinematics import simulate
+    >>> from graphsynth.mechanism.joints import Revolute
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> arm = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    >>> model = DynamicModel(arm, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
+    >>> inverse_dynamics(model, simulate(arm, [0.0]), speed=0.0).efforts.round(6).tolist()
+    [[4.905]]
+    """
+    if motion.mechanism.graph != model.mechanism.graph or motion.mechanism.joints != model.mechanism.joints:
+        raise GeometryError("the motion is of another mechanism than the model; simulate model.mechanism")
+    compiled = compile_model(replace(model, prescribed=(*model.prescribed, *motion.mechanism.drivers)))
+    n = len(motion.inputs)
+    rate = np.broadcast_to(np.asarray(speed, dtype=np.float64), (n,))[:, None, None]
+    second = np.broadcast_to(np.asarray(acceleration, dtype=np.float64), (n,))[:, None, None]
+    q = compiled.to_coordinates(motion.poses)
+    rates = motion.velocities * rate
+    v = compiled.to_rates(q, rates)
+    a = _accelerations(compiled, motion.poses, rates, motion.accelerations * rate**2 + motion.velocities * second)
+    lam = np.full((n, len(compiled.info)), np.nan)
+    error, scale = 0.0, 1e-300
+    for k in np.flatnonzero(motion.assembled & np.isfinite(a).all(axis=1)):
+        lam[k], wrong, size = _multipliers(compiled, float(motion.inputs[k]), q[k], v[k], a[k])
+        error, scale = max(error, wrong), max(scale, size)
+    reactions = reactions_from_multipliers(compiled, q, v, lam, motion.inputs)
+    efforts, power = _efforts(compiled, reactions, motion, rates)
+    good = np.flatnonzero(np.isfinite(lam).all(axis=1))
+    chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good
+    return InverseDynamics(
+        motion.inputs, efforts, reactions, power, error / scale,
+        newton_euler_difference(compiled, motion.inputs[chosen], q[chosen], v[chosen], a[chosen], lam[chosen]),
+    )  # fmt: skip
+
+
+def _accelerations(compiled: Compiled, poses: Array, rates: Array, seconds: Array) -> Array:
+    """Accelerations of the centres of mass from those of the link frames."""
+    moving = compiled.moving
+    arm = np.exp(1j * poses[:, moving, 2]) * (compiled.centres[moving] @ [1.0, 1j])
+    extra = (1j * seconds[:, moving, 2] - rates[:, moving, 2] ** 2) * arm
+    found = seconds[:, moving, :].copy()
+    found[..., 0] += extra.real
+    found[..., 1] += extra.imag
+    return np.asarray(found.reshape(len(poses), compiled.n))
+
+
+def _multipliers(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> tuple[Array, float, float]:
+    """Multipliers of all rows, the drivers' included; error and size of the balance along the velocity."""
+    from graphsynth.dynamics import kernels
+    from graphsynth.dynamics.values import initial_slots
+
+    T = compiled.tables
+    x = kernels.state_rows(T, q, v)
+    Qc, Qn, _, _, _ = kernels.load_vector(T, x)
+    Q = Qc + Qn + applied_loads(compiled, t, q, v)
+    _, J, _, _ = kernels.constraint_system(T, x, initial_slots(compiled, q), np.zeros((max(1, len(compiled.laws)), 3)))
+    unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
+    inertial = T.mass @ a
+    matrix = (J * unit).T
+    lam = np.linalg.lstsq(matrix, (Q - inertial) * unit, rcond=1e-12)[0]
+    rubbing = np.zeros_like(Q)
+    for _ in range(_FRICTION_ROUNDS if T.friction.size else 0):
+        rubbing[:] = 0.0
+        kernels.friction_loads(T, x, J, lam, rubbing)
+        fresh = np.linalg.lstsq(matrix, (Q + rubbing - inertial) * unit, rcond=1e-12)[0]
+        change, lam = float(np.abs(fresh - lam).max()), fresh
+        if change <= 1e-13 * float(np.abs(lam).max()):
+            break
+    else:
+        if T.friction.size:
+            raise GeometryError("the friction iteration does not contract at an input; reduce the friction coefficient")
+    along = float((inertial + J.T @ lam - Q - rubbing) @ v)
+    return lam, abs(along), float(np.abs(v) @ (np.abs(inertial) + np.abs(Q)))
+
+
+def _efforts(compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array) -> tuple[Array, Array]:
+    from graphsynth.dynamics.minimal import joint_coordinate
+    from graphsynth.mechanism.joints import Revolute
+
+    mechanism = motion.mechanism
+    n, count = len(motion.inputs), len(mechanism.drivers)
+    efforts, power = np.zeros((n, count)), np.zeros(n)
+    for k, driver in enumerate(mechanism.drivers):
+        own = reactions.joints[len(reactions.joints) - count + k]
+        joint = mechanism.joint(*driver.pair)
+        sense = 1.0 if driver.link == joint.b else -1.0
+        if isinstance(joint, Revolute):
+            efforts[:, k] = sense * own.couple
+        else:
+            direction = np.exp(1j * (motion.poses[:, joint.a, 2] + joint.angle_a))  # type: ignore[union-attr]
+            efforts[:, k] = sense * (np.conj(direction) * (own.force[:, 0] + 1j * own.force[:, 1])).real
+        power += efforts[:, k] * joint_coordinate(mechanism, driver.base, driver.link, motion.poses, rates)[1]
+    return efforts, power
