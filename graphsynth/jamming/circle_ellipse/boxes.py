@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +32,7 @@ Array = NDArray[np.float64]
 _BATCH = 4096
 _MOST_PROVED = 16
 _MOST_BOXES = 20_000_000
+_MOST_POWER = 900
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +105,11 @@ def _hull_of(boxes: Interval) -> Interval:
     return Interval.from_bounds(boxes.lo.min(axis=0), boxes.hi.max(axis=0))
 
 
-def krawczyk_data(problem: CircleEllipse) -> Array:
-    """Bounds of the two right-hand sides and of 1/a^2 and 1/b^2, rounded outward."""
-    pairs = [problem.circle_bounds, problem.level_bounds]
-    ends = [(p.lo, p.hi) for p in pairs] + [(1 / r.hi**2, 1 / r.lo**2) for r in (problem.a, problem.b)]
+def krawczyk_data(problem: CircleEllipse, unit: Fraction = Fraction(1)) -> Array:
+    """Bounds of the two right-hand sides and of 1/a^2 and 1/b^2, lengths in ``unit``, rounded outward."""
+    circle, level = problem.circle_bounds, problem.level_bounds
+    ends = [(circle.lo / unit**2, circle.hi / unit**2), (level.lo, level.hi)]
+    ends += [(unit**2 / r.hi**2, unit**2 / r.lo**2) for r in (problem.a, problem.b)]
     return np.array([bound for lo, hi in ends for bound in (lower_bound(lo), upper_bound(hi))])
 
 
@@ -157,11 +158,11 @@ def krawczyk_boxes(
     from graphsynth.jamming.circle_ellipse import kernels
 
     begin = perf_counter()
-    side = upper_bound(root_bounds(max(problem.circle_bounds.hi, Fraction(0))).hi)
+    side, power = _start_side(problem)
     queue, state = np.empty((2 * max_boxes + 2, 4)), np.zeros(5, dtype=np.int64)
     queue[0], state[kernels.TAIL] = (0.0, side, 0.0, side), 1
     kept, inner = np.empty((max_boxes + 1, 4)), np.zeros(max_boxes + 1, dtype=np.bool_)
-    proved, data = np.empty((_MOST_PROVED, 8)), krawczyk_data(problem)
+    proved, data = np.empty((_MOST_PROVED, 8)), krawczyk_data(problem, Fraction(2) ** power)
     seconds = 0.0
     while state[kernels.HEAD] < state[kernels.TAIL] and state[kernels.TESTED] < max_boxes and seconds < max_seconds:
         limit = min(int(state[kernels.TESTED]) + _BATCH, max_boxes)
@@ -169,8 +170,28 @@ def krawczyk_boxes(
         seconds = perf_counter() - begin
     head, tail, tested, found, count = state.tolist()
     rest = np.concatenate([kept[:count][~inner[:count]], queue[head:tail]])
-    parts = (proved[:found, 4:], proved[:found, :4], kept[:count][inner[:count]], rest)
+    parts = [proved[:found, 4:], proved[:found, :4], kept[:count][inner[:count]], rest]
+    parts = [_carried(part, power) for part in parts]
     return _outcome(problem, parts, head == tail, tested, seconds, tested >= max_boxes)
+
+
+def _start_side(problem: CircleEllipse) -> tuple[float, int]:
+    """Side of the start box in units of ``2**power``, about 1: the same boxes for every unit of length."""
+    side = root_bounds(problem.circle_bounds.hi).hi
+    power = side.numerator.bit_length() - side.denominator.bit_length()
+    if abs(power) > _MOST_POWER:
+        raise SpecError(
+            f"R1 = {float(problem.R1.hi)} is beyond the range for boxes; choose a unit of length nearer to it"
+        )
+    return upper_bound(side / Fraction(2) ** power), power
+
+
+def _carried(rows: Array, power: int) -> Array:
+    """Multiply boxes by ``2**power``; bounds that become subnormal and are rounded move outward."""
+    moved = np.ldexp(rows, power)
+    lost = np.ldexp(moved, -power) - rows
+    outward = np.tile([-np.inf, np.inf], rows.shape[1] // 2)
+    return np.where(lost * outward < 0.0, np.nextafter(moved, outward), moved) if lost.any() else moved
 
 
 def _intervals(rows: Array) -> Interval:
@@ -178,7 +199,7 @@ def _intervals(rows: Array) -> Interval:
 
 
 def _outcome(
-    problem: CircleEllipse, parts: tuple[Any, ...], finished: bool, tested: int, seconds: float, full: bool
+    problem: CircleEllipse, parts: list[Array], finished: bool, tested: int, seconds: float, full: bool
 ) -> CrossingBoxes:
     """Drop boxes that a proved crossing stands for, and say what is known."""
     enclosures, domains, inner, rest = parts

@@ -32,9 +32,9 @@ def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
     """
     if box.is_empty.any():
         return 0.0
-    x, y = box.mid.tolist()
-    rx, ry = box.rad.tolist()
-    bounds = [(1 / r.hi**2, 1 / r.lo**2) for r in (problem.a, problem.b)]
+    unit = problem.R1.hi  # lengths in units of the radius, so that no unit of the data overflows
+    x, y, rx, ry = (np.concatenate([box.mid, box.rad]) / float(unit)).tolist()
+    bounds = [(unit**2 / r.hi**2, unit**2 / r.lo**2) for r in (problem.a, problem.b)]
     (alpha, beta), (da, db) = [float((p + q) / 2) for p, q in bounds], [float((q - p) / 2) for p, q in bounds]
     difference = float(sum(bounds[1]) - sum(bounds[0])) / 2
     determinant = 4.0 * x * y * difference

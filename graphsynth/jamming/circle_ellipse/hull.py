@@ -122,9 +122,9 @@ def _touches(problem: CircleEllipse, u: Fraction, v: Fraction) -> tuple[Reason, 
     sharp = problem.R1.is_point and problem.e1.hi == 0 == problem.e2.hi
     reasons = []
     if u <= 0:
-        reasons.append(Reason.TANGENT_SHORT if sharp and problem.R1 == problem.b else Reason.TOUCHES_X)
+        reasons.append(Reason.TANGENT_SHORT if sharp and problem.b == problem.R1 else Reason.TOUCHES_X)
     if v <= 0:
-        reasons.append(Reason.TANGENT_LONG if sharp and problem.R1 == problem.a else Reason.TOUCHES_Y)
+        reasons.append(Reason.TANGENT_LONG if sharp and problem.a == problem.R1 else Reason.TOUCHES_Y)
     return tuple(reasons)
 
 

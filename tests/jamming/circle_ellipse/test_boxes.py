@@ -227,6 +227,18 @@ def test_change_of_unit(unit):
     np.testing.assert_allclose(other.proved.lo / float(unit), plain.proved.lo, rtol=1e-13)
 
 
+@pytest.mark.parametrize("power", [-600, 600])
+def test_far_units_give_the_same_boxes(power):
+    unit = Fraction(2) ** power
+    plain = krawczyk_boxes(circle_ellipse(5, 6, 4, eps="1e-5"))
+    far = krawczyk_boxes(circle_ellipse(5 * unit, 6 * unit, 4 * unit, Fraction("1e-5") * unit**2, "1e-5"))
+    np.testing.assert_array_equal(np.ldexp(far.proved.lo, -power), plain.proved.lo)
+    assert far.tested == plain.tested
+    assert far.spectral_radius == pytest.approx(plain.spectral_radius)
+    with pytest.raises(SpecError, match="nearer to it"):
+        krawczyk_boxes(circle_ellipse("5e300", "6e300", "4e300"))
+
+
 def test_guarded_against_changed_rounding():
     import graphsynth.intervals.guard as guard
 
