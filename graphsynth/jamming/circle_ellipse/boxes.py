@@ -190,8 +190,8 @@ def _carried(rows: Array, power: int) -> Array:
     """Multiply boxes by ``2**power``; bounds that become subnormal and are rounded move outward."""
     moved = np.ldexp(rows, power)
     lost = np.ldexp(moved, -power) - rows
-    outward = np.tile([-np.inf, np.inf], rows.shape[1] // 2)
-    return np.where(lost * outward < 0.0, np.nextafter(moved, outward), moved) if lost.any() else moved
+    side = np.tile([-1.0, 1.0], rows.shape[1] // 2)
+    return np.asarray(np.where(lost * side < 0.0, np.nextafter(moved, side * np.inf), moved))
 
 
 def _intervals(rows: Array) -> Interval:

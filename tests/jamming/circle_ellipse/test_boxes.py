@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from graphsynth.errors import SpecError
 from graphsynth.intervals import Interval, Status
 from graphsynth.jamming.circle_ellipse import Reason, circle_ellipse, cross_check, exact_hull, krawczyk_boxes
+from graphsynth.jamming.circle_ellipse.boxes import _carried
 from graphsynth.jamming.circle_ellipse.check import _agree
 
 
@@ -237,6 +238,14 @@ def test_far_units_give_the_same_boxes(power):
     assert far.spectral_radius == pytest.approx(plain.spectral_radius)
     with pytest.raises(SpecError, match="nearer to it"):
         krawczyk_boxes(circle_ellipse("5e300", "6e300", "4e300"))
+
+
+def test_bounds_carried_into_subnormal_numbers_move_outward():
+    row = np.array([[2.0**-200 * (1 + 2.0**-52), 2.0**-200 * (1 + 2.0**-52), 0.5, 0.75]])
+    moved = _carried(row, -850)
+    exact = Fraction(row[0, 0]) / 2**850
+    assert Fraction(moved[0, 0]) < exact < Fraction(moved[0, 1])
+    assert moved[0, 2:].tolist() == [2.0**-851, 0.75 * 2.0**-850]
 
 
 def test_guarded_against_changed_rounding():
