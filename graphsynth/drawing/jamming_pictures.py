@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.drawing.crossing_pictures import crossing_picture, dress, new_figure, region_picture
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import GeometryError
 
@@ -19,10 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.drawing.plots import Chart
-    from graphsynth.intervals.interval import Interval
     from graphsynth.jamming.area_curve import AreaCurve
     from graphsynth.jamming.bearing import Bearing
-    from graphsynth.jamming.circle_ellipse import CircleEllipse, CrossingBoxes
 
 __all__ = ["area_chart", "area_picture", "crossing_picture", "region_picture", "section_picture"]
 
@@ -32,273 +31,6 @@ _SOURCE_NOTE = (
     "The dashed curve is the ordinate of the source: the free gap of the surrogate ellipse, recorded as 0 where "
     "nothing crosses.\nIt jumps to πRc at the onset and falls towards the worst pose; it measures no jamming."
 )
-
-
-def _figure(size: tuple[float, float]) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure: Figure = Figure(figsize=size, layout="constrained")
-    return figure
-
-
-def _dress(axes: Any, title: str, x: str = "x", y: str = "y") -> None:
-    axes.set_title(title, fontsize=10, color=LIGHT["ink"])
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    axes.tick_params(labelsize=8)
-
-
-def _curves(problem: CircleEllipse, count: int = 1441) -> tuple[Array, Array]:
-    """Points of the circle and of the ellipse, at the middle of their ranges."""
-    R, a, b = (float((r.lo + r.hi) / 2) for r in (problem.R1, problem.a, problem.b))
-    t = np.linspace(0.0, math.tau, count)
-    return R * np.column_stack([np.cos(t), np.sin(t)]), np.column_stack([a * np.cos(t), b * np.sin(t)])
-
-
-# -- crossings ---------------------------------------------------------------------------------------------------------
-
-
-def crossing_picture(problem: CircleEllipse, boxes: CrossingBoxes | None = None) -> Figure:
-    """Draw the four crossings of a circle and an ellipse with tolerances; one of them enlarged, and unrolled.
-
-    Parameters
-    ----------
-    problem : CircleEllipse
-    boxes : CrossingBoxes, optional
-        Result of Krawczyk's method to be drawn into the detail.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Examples
-    --------
-    >>> from graphsynth.jamming.circle_ellipse import circle_ellipse
-    >>> len(crossing_picture(circle_ellipse(5, 6, 4, "0.1", "0.01")).axes)
-    3
-    """
-    from graphsynth.jamming.circle_ellipse import exact_hull
-
-    found = exact_hull(problem)
-    figure = _figure((13.5, 4.6))
-    whole, detail, unrolled = figure.subplots(1, 3)
-    circle, ellipse = _curves(problem)
-    for axes in (whole, detail):
-        axes.plot(*circle.T, color=LIGHT["a"], lw=1.3, label="circle")
-        axes.plot(*ellipse.T, color=LIGHT["b"], lw=1.3, label="ellipse")
-    rows = found.four
-    for k in range(len(rows)):
-        _box(whole, rows[k], edgecolor=LIGHT["ink"], lw=1.2, zorder=4)
-        middle = rows[k].mid
-        whole.plot(*middle, "o", ms=9, mfc="none", mec=LIGHT["ink"], zorder=4)
-        corner = np.where(middle < 0.0, rows[k].lo, rows[k].hi)
-        whole.annotate(f"{k + 1}", corner, textcoords="offset points", xytext=_away(middle), ha="center", va="center")
-    whole.set_aspect("equal")
-    _dress(whole, f"{len(rows)} box{'es' * (len(rows) != 1)} ({found.status.name}), ringed")
-    if found.hull.is_empty.any():
-        for axes in (detail, unrolled):
-            _dress(axes, "no crossing")
-        return figure
-    points = _region(problem)
-    _shape(detail, points)
-    _unrolled_region(unrolled, problem, points, found.hull)
-    if boxes is not None:
-        _paving(detail, boxes)
-    _box(detail, found.hull, edgecolor=LIGHT["ink"], lw=1.4, ls="--", zorder=5, label="exact hull")
-    _frame(detail, found.hull)
-    _dress(detail, "box 1" if boxes is None else "box 1 and Krawczyk's boxes")
-    detail.ticklabel_format(useOffset=False)
-    detail.tick_params(axis="x", rotation=20)
-    figure.legend(*detail.get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8, frameon=False)
-    return figure
-
-
-def _away(point: Array) -> tuple[float, float]:
-    """Offset in points, from the centre outward."""
-    size = float(np.hypot(*point)) or 1.0
-    return 16.0 * float(point[0]) / size, 16.0 * float(point[1]) / size
-
-
-def _box(axes: Any, box: Interval, **style: Any) -> None:
-    from matplotlib.patches import Rectangle
-
-    width, height = (box.hi - box.lo).tolist()
-    axes.add_patch(Rectangle((box.lo[0], box.lo[1]), width, height, **{"facecolor": "none", **style}))
-
-
-def _region(problem: CircleEllipse) -> Array:
-    """Outline of the solution set: a parallelogram in the squares, its edges sampled and carried to (x, y)."""
-    corners = _clipped(problem)
-    steps = np.linspace(0.0, 1.0, 60)[:-1, None]
-    edges = [p + steps * (q - p) for p, q in zip(corners, np.roll(corners, -1, axis=0))]
-    return np.asarray(np.sqrt(np.maximum(np.concatenate([np.zeros((0, 2)), *edges]), 0.0)))
-
-
-def _shape(axes: Any, points: Array) -> None:
-    from matplotlib.patches import Polygon
-
-    if len(points):
-        look: dict[str, Any] = {"facecolor": LIGHT["c"], "alpha": 0.35, "edgecolor": LIGHT["c"], "lw": 1}
-        axes.add_patch(Polygon(points, label="solutions", zorder=3, **look))
-
-
-def _unrolled_region(axes: Any, problem: CircleEllipse, points: Array, hull: Interval) -> None:
-    """Draw the solutions over the arc of the circle, against the distance from it: the shape that (x, y) hides."""
-    R, a, b = (float((r.lo + r.hi) / 2) for r in (problem.R1, problem.a, problem.b))
-    ends = np.arctan2(points[:, 1], points[:, 0]) if len(points) else np.arctan2(hull.lo[1], hull.lo[0]) * np.ones(1)
-    edge = max(0.3 * float(np.ptp(ends)), 1e-4)
-    t = np.linspace(ends.min() - edge, ends.max() + edge, 400)
-    distance = 1.0 / np.hypot(np.cos(t) / a, np.sin(t) / b) - R
-    axes.axhline(0.0, color=LIGHT["a"], lw=1.3)
-    axes.plot(np.degrees(t), distance, color=LIGHT["b"], lw=1.3)
-    if len(points):
-        height = np.hypot(*points.T) - R
-        _shape(axes, np.column_stack([np.degrees(ends), height]))
-        if np.ptp(height) > 0.0:
-            axes.set_ylim(height.min() - 0.6 * np.ptp(height), height.max() + 0.6 * np.ptp(height))
-    axes.set_xlim(np.degrees(t[0]), np.degrees(t[-1]))
-    _dress(axes, "box 1 unrolled", "direction from the centre, degrees", "distance from the circle")
-
-
-def _clipped(problem: CircleEllipse) -> Array:
-    """Corners of the parallelogram in (x^2, y^2), clipped to the quadrant; of the middle radii."""
-    a, b = (float((r.lo + r.hi) / 2) for r in (problem.a, problem.b))
-    if a == b:
-        return np.zeros((0, 2))
-    circle, level = ([float(v) for v in bounds] for bounds in (problem.circle_bounds, problem.level_bounds))
-    span = (a - b) * (a + b)
-    corners = [
-        np.array([a * a * (Q - b * b * E) / span, b * b * (a * a * E - Q) / span])
-        for Q, E in ((circle[0], level[0]), (circle[1], level[0]), (circle[1], level[1]), (circle[0], level[1]))
-    ]
-    for axis in (0, 1):
-        kept = []
-        for p, q in zip(corners, corners[1:] + corners[:1]):
-            if p[axis] >= 0.0:
-                kept.append(p)
-            if (p[axis] < 0.0) != (q[axis] < 0.0):
-                kept.append(p + (q - p) * p[axis] / (p[axis] - q[axis]))
-        corners = kept
-    return np.array(corners).reshape(-1, 2)
-
-
-def _paving(axes: Any, boxes: CrossingBoxes) -> None:
-    from matplotlib.collections import PolyCollection
-
-    nothing = (0.0, 0.0, 0.0, 0.0)
-    styles: tuple[tuple[Interval, str, dict[str, Any]], ...] = (
-        (boxes.boundary, "boundary boxes (undecided)", {"facecolor": nothing, "edgecolor": LIGHT["soft"], "lw": 0.4}),
-        (boxes.inner, "inner boxes", {"facecolor": LIGHT["c"], "alpha": 0.5, "edgecolor": LIGHT["ink"], "lw": 0.3}),
-        (boxes.proved, "proved crossing", {"facecolor": nothing, "edgecolor": LIGHT["jam"], "lw": 2.0}),
-    )
-    for group, label, style in styles:
-        if len(group):
-            (x0, y0), (x1, y1) = group.lo.T, group.hi.T
-            corners = np.stack([np.column_stack(p) for p in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=1)
-            axes.add_collection(PolyCollection(list(corners), zorder=4, label=label, **style), autolim=False)
-
-
-def _frame(axes: Any, hull: Interval) -> None:
-    """Show the hull with a margin; a point gets a frame of its own scale."""
-    for k, limit in enumerate((axes.set_xlim, axes.set_ylim)):
-        lo, hi = float(hull.lo[k]), float(hull.hi[k])
-        edge = max(0.35 * (hi - lo), 1e-6 * max(abs(hi), 1e-300))
-        limit(lo - edge, hi + edge)
-
-
-# -- the region between the curves -------------------------------------------------------------------------------------
-
-
-def region_picture(problem: CircleEllipse, exaggeration: float | None = None) -> Figure:
-    """Draw both differences of circle and ellipse: the free gap and the interference.
-
-    Parameters
-    ----------
-    problem : CircleEllipse
-    exaggeration : float, optional
-        Factor on the radial distance from the circle in the left picture; by default such that the larger difference of
-        the radii becomes a fifth of the radius.  It is written on the picture.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        For an exaggeration that is not positive.
-
-    Examples
-    --------
-    >>> from graphsynth.jamming.circle_ellipse import circle_ellipse
-    >>> len(region_picture(circle_ellipse(5, 6, 4)).axes)
-    2
-    """
-    R, a, b = (float((r.lo + r.hi) / 2) for r in (problem.R1, problem.a, problem.b))
-    if exaggeration is None:
-        exaggeration = max(1.0, _round_down(0.2 * R / max(abs(a - R), abs(R - b), 1e-12 * R)))
-    if not 0.0 < exaggeration < math.inf:
-        raise GeometryError(f"exaggeration = {exaggeration} must be positive; 1 draws to scale")
-    t = math.atan2(*_nearest_crossing(R, a, b)[::-1]) + np.linspace(0.0, math.tau, 2881)
-    along = np.stack([np.cos(t), np.sin(t)])
-    radius = 1.0 / np.hypot(along[0] / a, along[1] / b)
-    figure = _figure((10.5, 4.6))
-    whole, unrolled = figure.subplots(1, 2)
-    _shade(whole, along, R, R + exaggeration * (radius - R))
-    whole.set_aspect("equal")
-    scale = "to scale" if exaggeration == 1.0 else f"distance from the circle × {exaggeration:g}"
-    _dress(whole, f"both differences, {scale}")
-    whole.legend(fontsize=8, loc="center")
-    turn = np.linspace(0.0, math.tau, 2881)
-    distance = 1.0 / np.hypot(np.cos(turn) / a, np.sin(turn) / b) - R
-    for sign, colour in ((1.0, LIGHT["a"]), (-1.0, LIGHT["jam"])):
-        unrolled.fill_between(
-            np.degrees(turn),
-            distance,
-            0.0,
-            where=sign * distance > 0.0,
-            color=colour,
-            alpha=0.45,
-            lw=0,
-            interpolate=True,
-        )
-    unrolled.axhline(0.0, color=LIGHT["ink"], lw=1.2)
-    unrolled.plot(np.degrees(turn), distance, color=LIGHT["b"], lw=1.2)
-    unrolled.margins(x=0)
-    unrolled.set_xticks(np.arange(0.0, 361.0, 45.0))
-    _dress(unrolled, "unrolled, not exaggerated", "direction from the centre, degrees", "distance from the circle")
-    return figure
-
-
-def _round_down(x: float) -> float:
-    """Round to one significant digit, downward."""
-    unit = 10.0 ** math.floor(math.log10(x))
-    return math.floor(x / unit) * unit
-
-
-def _shade(axes: Any, along: Array, R: float, oval: Array) -> None:
-    circle, ellipse = R * along, oval * along
-    for mask, colour, label in (
-        (oval > R, LIGHT["a"], "ellipse \\ circle: free gap"),
-        (oval < R, LIGHT["jam"], "circle \\ ellipse: interference"),
-    ):
-        inner, outer = np.minimum(oval, R) * along, np.maximum(oval, R) * along
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-        for k, (start, stop) in enumerate(edges.reshape(-1, 2)):
-            ring = np.concatenate([outer[:, start:stop], inner[:, start:stop][:, ::-1]], axis=1)
-            axes.fill(*ring, color=colour, alpha=0.45, lw=0, label=label if k == 0 else None)
-    axes.plot(*circle, color=LIGHT["ink"], lw=1.2, label="circle")
-    axes.plot(*ellipse, color=LIGHT["b"], lw=1.2, label="ellipse")
-
-
-def _nearest_crossing(R: float, a: float, b: float) -> tuple[float, float]:
-    """Crossing in the first quadrant; the end of the nearer axis if there is none."""
-    if not b < R < a:
-        return (R, 0.0) if abs(a - R) <= abs(R - b) else (0.0, R)
-    span = (a - b) * (a + b)
-    return a * math.sqrt((R - b) * (R + b) / span), b * math.sqrt((a - R) * (a + R) / span)
 
 
 # -- the bearing in its hole -------------------------------------------------------------------------------------------
@@ -338,15 +70,13 @@ def section_picture(
         raise GeometryError(f"exaggeration = {exaggeration} must be positive; 1 draws to scale")
     if not tilts:
         raise GeometryError("tilts is empty; give at least one tilt in radians")
-    figure = _figure((5.0 * len(tilts), 4.6))
+    figure = new_figure((5.0 * len(tilts), 4.6))
     panels = np.atleast_1d(figure.subplots(1, len(tilts), sharey=True))
     for axes, tilt, title in zip(panels, tilts, (*titles, *[""] * len(tilts))):
         _section(axes, bearing, tilt, exaggeration)
         gap = float(bearing.gap(abs(math.sin(tilt)), math.cos(tilt), "A"))
         verdict = f"jams: {gap:.4f} mm too much" if gap > 0 else f"free: {-gap:.4f} mm left"
-        _dress(
-            axes, f"{title}\ntilt {tilt:.6f} rad, {verdict}".strip(), "distance from the bearing's wall, mm", "z, mm"
-        )
+        dress(axes, f"{title}\ntilt {tilt:.6f} rad, {verdict}".strip(), "distance from the bearing's wall, mm", "z, mm")
     figure.suptitle(
         f"radial distances from the wall × {exaggeration:g}, heights to scale, middle of the bearing left out",
         fontsize=9,
@@ -425,19 +155,19 @@ def area_picture(curve: AreaCurve, zooms: tuple[tuple[float, float], ...] | None
     from graphsynth.jamming.area_curve import ZOOMS
 
     windows = ZOOMS if zooms is None else zooms
-    figure = _figure((10.5, 7.0))
+    figure = new_figure((10.5, 7.0))
     grid = figure.add_gridspec(2, max(1, len(windows)), height_ratios=(1.15, 1.0))
     f = np.degrees(curve.f)
     whole = figure.add_subplot(grid[0, :])
     _areas(whole, curve, f)
     whole.set_xticks(np.arange(90.0, 451.0, 45.0))
-    _dress(whole, "areas over the crank angle", "crank angle, degrees", "area, mm²")
+    dress(whole, "areas over the crank angle", "crank angle, degrees", "area, mm²")
     whole.legend(fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.12), frameon=False, borderaxespad=0)
     for k, (start, stop) in enumerate(windows):
         axes = figure.add_subplot(grid[1, k])
         _areas(axes, curve, f)
         axes.set_xlim(start, stop)
-        _dress(axes, f"detail, {start:g} to {stop:g} degrees", "crank angle, degrees", "area, mm²")
+        dress(axes, f"detail, {start:g} to {stop:g} degrees", "crank angle, degrees", "area, mm²")
         whole.axvspan(start, stop, color=LIGHT["soft"], alpha=0.15, lw=0)
     figure.supxlabel(_SOURCE_NOTE, fontsize=8.5, color=LIGHT["note"])
     return figure
