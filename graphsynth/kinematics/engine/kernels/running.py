@@ -132,7 +132,8 @@ def seat(poses, X, TH, PHI):
     for k in range(poses.shape[0]):
         X[k, 0, 0], X[k, 1, 0], TH[k, 0] = poses[k, 0], poses[k, 1], poses[k, 2]
         X[k, 2, 0], X[k, 3, 0] = math.cos(poses[k, 2]), math.sin(poses[k, 2])
-    PHI[:, 0] = 0.0
+    for k in range(PHI.shape[0]):
+        PHI[k, 0] = 0.0
 
 
 @kernel
@@ -141,8 +142,10 @@ def deliver(source, rows, done, target):
     for r in range(rows.shape[0]):
         for c in range(target.shape[1]):
             count = min(done, target.shape[2])
-            target[r, c, :count] = source[rows[r], c, :count]
-            target[r, c, count:] = math.nan
+            for i in range(count):
+                target[r, c, i] = source[rows[r], c, i]
+            for i in range(count, target.shape[2]):
+                target[r, c, i] = math.nan
 
 
 @kernel
@@ -166,8 +169,11 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
     P, Q = np.empty((3, 10)), np.empty((3, 6))
     x, T = np.zeros((links, 11)), np.empty((12, n))
     phi, m, ql = np.empty(PHI.shape[0]), np.empty(steps.shape[0]), np.empty((q.shape[0], 3))
-    limits, angles = np.full(steps.shape[0], n), need.any()
+    limits, angles = np.empty(steps.shape[0], np.int64), need[0]
+    for k in range(1, links):
+        angles = angles or need[k]
     for s in range(steps.shape[0]):
+        limits[s] = n
         for i in range(first, n if steps[s, 0] < R_DIST else first):
             if not math.isfinite(q[drv[steps[s, 1], 3], 0, i]):
                 limits[s] = i
@@ -233,5 +239,5 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
             deliver(V, kept, stop, OV[b])
             deliver(W, kept, stop, OW[b])
             for r in range(groups.shape[0]):
-                OM[b, r, :stop] = M[groups[r], :stop]
-                OM[b, r, stop:] = math.nan
+                for i in range(n):
+                    OM[b, r, i] = M[groups[r], i] if i < stop else math.nan
