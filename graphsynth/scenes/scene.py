@@ -135,6 +135,7 @@ class LambdaTable:
     bearing: BearingTable
     branch: Literal[1, -1] = 1
     positions: int = 360
+    tolerances: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check_positions(self.positions)

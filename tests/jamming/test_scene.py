@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import replace
 from fractions import Fraction as F
 
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from graphsynth.errors import SceneError
 from graphsynth.jamming import Verdict
 from graphsynth.scenes.runner import execute
-from graphsynth.scenes.scene import LambdaTable, OutputsTable, load_scene
+from graphsynth.scenes.scene import OutputsTable, load_scene
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.four_bar import tolerance_box
 
@@ -21,18 +20,9 @@ EXAMPLE = {  # specification 10.3
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Toleranced(LambdaTable):
-    tolerances: Mapping[str, object] = field(default_factory=dict)
-
-
 def scene(tolerances=None, **mechanism):
     shipped = load_scene("lambda")
-    if tolerances is not None:
-        values = {f.name: getattr(shipped.mechanism, f.name) for f in fields(shipped.mechanism)}
-        values["tolerances"] = tolerances
-        shipped = replace(shipped, mechanism=Toleranced(**values))
-    return replace(shipped, mechanism=replace(shipped.mechanism, **mechanism))
+    return replace(shipped, mechanism=replace(shipped.mechanism, tolerances=tolerances or {}, **mechanism))
 
 
 def test_numbers_of_the_file_are_decimals():

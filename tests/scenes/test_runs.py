@@ -243,6 +243,7 @@ def test_the_verdict_turns_at_the_published_clearance(
     lambda_tables: dict[str, Any], clearance: float, good: bool
 ) -> None:
     lambda_tables["mechanism"]["bearing"]["clearance_mm"] = clearance
+    del lambda_tables["mechanism"]["tolerances"]
     lambda_tables["outputs"]["products"] = ["records"]
     (record,) = execute(Scene.from_mapping(lambda_tables))["records"]
     assert record.good is good

@@ -126,7 +126,7 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
             given[name] = _exact(_inside(raw, *place), getattr(getattr(table, place[0]), place[1]))
     direction = _inside(raw, "tilt", "axis") or [None] * 3
     axis = [_exact(text, value) for text, value in zip(direction, table.tilt.axis)]
-    for key, size in (getattr(table, "tolerances", None) or {}).items() if tolerances else ():
+    for key, size in table.tolerances.items() if tolerances else ():
         name = _tolerance_name(context, key)
         absolute, relative = _tolerance(context, key, size)
         given[name] = spread(Range.read(key, given[name]), absolute, relative)
