@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 _COARSER = 100.0
 #: ... and with data changed by about this many units in the last place.
 _PERTURBED = 4.0 * np.finfo(float).eps
+#: Relative distance of a force from the friction limit below which rounding decides between stick and slip.
+_TIE = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +55,7 @@ class StickSlipMotion:
     guarantee : str
         "exact" (closed-form pieces joined at roots found to rounding) or "estimated".
     energy_residual : float
-        ``|E(t) - E(0) - W(t)|`` at the end over the larger of the range of ``E`` and the energy exchanged; NaN if not
+        Largest ``|E(t) - E(0) - W(t)|`` over the larger of the range of ``E`` and the energy exchanged; NaN if not
         known.  W is integrated beside the motion and not derived from it.
     friction_loss, drive_work, damper_loss : float
         Energies since the start, J; NaN if not known.
@@ -157,12 +159,16 @@ def event_driven(
         error = _error(values, other, times)
         if status is RunStatus.COMPLETE and not _alike(path, other):
             status, error = RunStatus.UNRELIABLE, float("nan")
+    if status is RunStatus.COMPLETE and _tied(model, path):
+        status, error = RunStatus.UNRELIABLE, float("nan")
     closed = model.closed_form
     drive = model.drive.motion(times)
     known = ~np.isnan(values[:, 0])
+    v1 = np.where(values[:, 2] == 0.0, values[:, 1], drive.v)  # no sliding while sticking, not even by rounding
     residual, drive_work, heat, damped = _balance(model, path)
     motion = StickSlipMotion(
-        model, "event-driven", times, drive.x, drive.v, values[:, 0], values[:, 1], values[:, 3],
+        model, "event-driven", times, drive.x, v1, values[:, 0],
+        values[:, 1], values[:, 3],
         np.where(known, values[:, 2], 0.0).astype(np.int64), events, status, "", path.end, error,
         "exact" if closed else "estimated", residual, heat, drive_work, damped, path.steps, seconds, path,
     )  # fmt: skip
@@ -182,6 +188,15 @@ def _alike(path: EventPath, other: EventPath) -> bool:
     a, b = path.events[:, 3], other.events[:, 3]
     count = min(a.size, b.size)
     return abs(a.size - b.size) <= 1 and bool((a[:count] == b[:count]).all()) and other.status is path.status
+
+
+def _tied(model: Tribometer, path: EventPath) -> bool:
+    """Whether at the end of a slip the force needed to stick equals the largest one but for rounding."""
+    ends = path.nodes[1:][(path.nodes[1:, 7] == 1.0) & (path.nodes[:-1, 3] != 0.0)]
+    drive = model.drive.motion(ends[:, 0])
+    force = model.mass * drive.a + model.stiffness * ends[:, 1] + model.damping * drive.v
+    bound = model.law.static * model.normal
+    return bool((np.abs(np.abs(force) - bound) <= _TIE * bound).any())
 
 
 def _events(path: EventPath, other: EventPath | None) -> tuple[StickSlipEvent, ...]:
@@ -210,7 +225,8 @@ def _balance(model: Tribometer, path: EventPath) -> tuple[float, float, float, f
     energy = 0.5 * model.mass * nodes[:, 2] ** 2 + 0.5 * model.stiffness * nodes[:, 1] ** 2
     drive, heat, damped = nodes[:, 4], nodes[:, 5], nodes[:, 6]
     gap = np.abs(energy - energy[0] - (drive - heat - damped)).max()
-    exchanged = max(np.abs(np.diff(drive)).sum(), heat[-1], damped[-1], float(np.ptp(energy)))
+    # where next to nothing is exchanged, the rounding of the stored energy is no defect
+    exchanged = max(np.abs(np.diff(drive)).sum(), heat[-1], damped[-1], float(np.ptp(energy)), 1e-6 * energy.max())
     return (float(gap / exchanged) if exchanged > 0.0 else 0.0), float(drive[-1]), float(heat[-1]), float(damped[-1])
 
 
@@ -220,8 +236,8 @@ def _statement(motion: StickSlipMotion, duration: float, guard: EventGuard) -> s
         return f"{found} events in {duration:g} s."
     if motion.status is RunStatus.UNRELIABLE:
         return (
-            f"{found} events in {duration:g} s, but a run with another tolerance finds other ones: "
-            "the motion is too sensitive for this precision; shorten the run or ask for time_stepping."
+            f"{found} events in {duration:g} s, but rounding or the tolerance decides between stick and slip at one of "
+            "them: the motion is too sensitive for this precision; shorten the run or change the data slightly."
         )
     if motion.status is RunStatus.STORM:
         return (

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.dynamics.events import EventGuard
 from graphsynth.dynamics.friction import FrictionLaw, StribeckLaw, TwoCoefficientLaw, finite, positive
 from graphsynth.dynamics.stick_slip import StickSlipMotion, event_driven
+from graphsynth.dynamics.stick_slip_forms import regularised, time_stepping
 from graphsynth.dynamics.tribometer_drives import CrankDrive, Drive
 from graphsynth.errors import SpecError
 
@@ -205,3 +206,94 @@ class Tribometer:
         if not 1e-14 <= finite("relative tolerance", rtol) <= 1e-3:
             raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-14 to 1e-3.")
         return event_driven(self, duration, wanted, rtol, guard or EventGuard(), estimate)
+
+    def time_stepping(
+        self,
+        duration: float = 10.0,
+        *,
+        step: float = 1e-4,
+        times: ArrayLike | None = None,
+        weight: float = 0.5,
+        estimate: bool = True,
+    ) -> StickSlipMotion:
+        """March with fixed steps and friction impulses from a complementarity problem.
+
+        First order; needs no event location, so it survives event storms.
+
+        Parameters
+        ----------
+        duration : float
+            Final time, s.
+        step : float
+            Largest step, s; the duration is divided into equal steps.
+        times : array_like, optional
+            Times of the curves; 1001 equal steps if not given.
+        weight : float
+            Weight of the end of a step, 0 to 1.
+        estimate : bool
+            Estimate the error by a second run with steps of twice the length.
+
+        Returns
+        -------
+        StickSlipMotion
+            The times of the changes are whole steps; their errors come from the second run.
+
+        Raises
+        ------
+        SpecError, TooLargeError
+            If a number is out of its bounds, or the steps are too many.
+        """
+        duration, wanted = self._times(duration, times)
+        return time_stepping(self, duration, wanted, step, weight, estimate)
+
+    def regularised(
+        self,
+        duration: float = 10.0,
+        *,
+        speed: float = 1e-5,
+        solver: str = "Radau",
+        times: ArrayLike | None = None,
+        rtol: float = 1e-8,
+        jacobian: bool = True,
+        check: bool | None = None,
+        most_calls: int = 2_000_000,
+    ) -> StickSlipMotion:
+        """Solve the form with ``F = N mu(|u|) tanh(u / speed)``, which any solver accepts.
+
+        It never sticks: the upper platform creeps.  The error of the result is its difference from an event-driven run.
+
+        Parameters
+        ----------
+        duration : float
+            Final time, s.
+        speed : float
+            Regularisation speed epsilon, m/s, below the Stribeck velocity.
+        solver : str
+            "LSODA", "BDF", "Radau", "DOP853", "RK45" or "RK23" of scipy.
+        times : array_like, optional
+            Times of the curves; 1001 equal steps if not given.
+        rtol : float
+            Relative tolerance; the absolute one is a hundredth of it (of metres, metres per second).
+        jacobian : bool
+            Give the implicit solvers the exact Jacobian.
+        check : bool or None
+            Compare with a second implicit solver; None: if the solver is LSODA, which can report a wrong answer as a
+            success.
+        most_calls : int
+            Bound on the calls of the right-hand side.
+
+        Returns
+        -------
+        StickSlipMotion
+            `RunStatus.FAILED` if the solver stopped, `RunStatus.UNRELIABLE` if the cross-check objects.
+
+        Raises
+        ------
+        SpecError
+            If the law has two coefficients, or a number is out of its bounds.
+        """
+        duration, wanted = self._times(duration, times)
+        if not 1e-13 <= finite("relative tolerance", rtol) <= 1e-2:
+            raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-13 to 1e-2.")
+        checked = solver == "LSODA" if check is None else check
+        return regularised(self, duration, wanted, speed, solver, rtol, jacobian, checked, most_calls)

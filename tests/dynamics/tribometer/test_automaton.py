@@ -133,3 +133,12 @@ def test_stribeck_exponents():
         assert motion.complete
         assert motion.energy_residual < 1e-11
         assert motion.error < 1e-10
+
+
+def test_tie_between_stick_and_slip_is_flagged():
+    """Without friction while slipping the platform comes back to the very limit of sticking."""
+    model = Tribometer(stiffness=705.0, damping=0.0, law=TwoCoefficientLaw(0.5, 0.0), drive=BeltDrive(0.015625))
+    motion = model.event_driven(20.0)
+    assert motion.status is RunStatus.UNRELIABLE
+    assert np.isnan(motion.error)
+    assert "rounding" in motion.statement

@@ -57,6 +57,8 @@ def step(p, s, t, x, v, h, tolerance, work):
         three += (e3 / scales[row]) ** 2
         five += (e5 / scales[row]) ** 2
     error = 0.0
-    if five > 0.0 or three > 0.0:
+    if not five + three < math.inf:
+        error = math.inf
+    elif five > 0.0 or three > 0.0:
         error = abs(h) * five / math.sqrt((five + 0.01 * three) * 2.0) / tolerance
     return x + h * dx, v + h * dv, h * driven, h * heat, h * damped, error
