@@ -9,19 +9,39 @@ Specification, sections 9.4 and 9.5.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.intervals import Interval, cos, sin
+from graphsynth.intervals import Dual, Interval, cos, sin
 from graphsynth.jamming.coupled.closure import PITCH, ROLL, ROUND, Layout, moment_rows
-from graphsynth.jamming.coupled.program import PoseSolution
+from graphsynth.jamming.coupled.linear import enclosed_solve, points
+from graphsynth.jamming.coupled.program import PoseSolution, Units
 
-__all__ = ["Pieces", "factor_bounds", "shifts_enclosed"]
+__all__ = ["Moving", "Pieces", "factor_bounds", "shifts_enclosed"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+#: x and y of every joint, intervals or duals of shape (N,).
+Columns: TypeAlias = list[tuple[Any, Any]]
+
+
+class Moving(NamedTuple):
+    """The same at the middle of each piece, their derivatives by the input over it, and the input less its middle.
+
+    Lets the closure be bounded by the mean value theorem: joints that move together do not count as if each moved
+    alone.  ``sound`` (N,) tells where all of it is proved; elsewhere it is not used.
+    """
+
+    r: Interval
+    e: Interval
+    d: Interval
+    r_slope: Interval
+    e_slope: Interval
+    d_slope: Interval
+    step: Interval
+    sound: Mask
 
 
 class Pieces(NamedTuple):
@@ -30,11 +50,7 @@ class Pieces(NamedTuple):
     r: Interval
     e: Interval
     d: Interval
-
-    @property
-    def middle(self) -> tuple[Array, Array, Array]:
-        """Midpoints."""
-        return self.r.mid, self.e.mid, self.d.mid
+    moving: Moving | None = None
 
 
 def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
@@ -133,10 +149,10 @@ def _without_forbidden(layout: Layout, r: Interval, e: Interval, y: Array) -> tu
     if rows is None:
         return exact, every
     direction = rows.mid
-    matrix = (rows.reshape(*rows.shape[:2], 1, rows.shape[2]) * _points(direction[:, None])).sum(-1)
-    right = -(rows * _points(y[:, None])).sum(-1)
-    step, fine = _enclosed_solve(matrix, right)
-    change = (step.reshape(*step.shape, 1) * _points(direction)).sum(1)
+    matrix = (rows.reshape(*rows.shape[:2], 1, rows.shape[2]) * points(direction[:, None])).sum(-1)
+    right = -(rows * points(y[:, None])).sum(-1)
+    step, fine = enclosed_solve(matrix, right)
+    change = (step.reshape(*step.shape, 1) * points(direction)).sum(1)
     return exact + change, fine
 
 
@@ -177,58 +193,6 @@ def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
     return Interval.from_bounds(np.stack(lo, axis=1), np.stack(hi, axis=1))
 
 
-def _points(values: Array) -> Interval:
-    return Interval.from_bounds(values, values)
-
-
-def _enclosed_solve(matrix: Interval, right: Interval) -> tuple[Interval, Mask]:
-    """Enclose the solutions of N systems (N, k, k) for all members; False where a matrix may be singular.
-
-    With C near the inverse of the midpoint, ``x - x0 = C (b - A x0) + (1 - C A)(x - x0)``; a weighted norm of the last
-    matrix below 1 bounds ``x - x0`` and proves every A regular (Rump 1980).
-    """
-    k = matrix.shape[-1]
-    middle = np.where(np.isfinite(matrix.mid), matrix.mid, 0.0)
-    inverse = np.linalg.pinv(middle, rcond=1e-14)
-    C = _points(inverse)
-    start = (inverse @ right.mid[:, :, None])[..., 0]
-    start = np.where(np.isfinite(start), start, 0.0)
-    residual = right - (matrix * _points(start[:, None])).sum(-1)
-    first = (C * residual.reshape(len(residual), 1, k)).sum(-1).mag
-    product = (C.reshape(-1, k, k, 1) * matrix.reshape(-1, 1, k, k)).sum(2)
-    rest = _points(np.eye(k)) - product
-    size = np.where(np.isfinite(rest.mag), rest.mag, 1.0)
-    first = np.where(np.isfinite(first), first, np.inf)
-    weight = _weights(size, first)
-    with np.errstate(all="ignore"):
-        norm = (_nonnegative(size, weight) / _points(weight)).hi.max(axis=1)
-        largest = (_points(first) / _points(weight)).hi.max(axis=1)
-        fine = np.isfinite(rest.mag).all(axis=(1, 2)) & (norm < 1.0) & np.isfinite(largest)
-    norm, largest = np.where(fine, norm, 0.0), np.where(fine, largest, 0.0)
-    bound = _points(largest) / (1 - _points(norm))
-    spread = (_points(weight) * bound.reshape(-1, 1)).hi
-    first = np.where(fine[:, None], first, 0.0)
-    for _ in range(3):  # any solution obeys |x - x0| <= first + |rest| |x - x0|
-        spread = np.minimum(spread, (_points(first) + _nonnegative(size, spread)).hi)
-    around = Interval.from_bounds(-spread, spread)
-    return around + _points(start), np.asarray(fine)
-
-
-def _weights(size: Array, first: Array) -> Array:
-    """Positive weights near the fixed point of ``w = first + size w``; any positive numbers give valid bounds."""
-    start = np.where(np.isfinite(first), first, 1.0)
-    start = start + 1e-3 * start.max(axis=1, keepdims=True) + 1e-300
-    weight = start
-    for _ in range(6):
-        weight = start + (size @ weight[:, :, None])[..., 0]
-    return np.asarray(np.where(np.isfinite(weight), weight, 1.0))
-
-
-def _nonnegative(matrix: Array, vector: Array) -> Interval:
-    """Product of nonnegative numbers, enclosed."""
-    return (_points(matrix) * _points(vector[:, None])).sum(-1)
-
-
 def _upper(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float) -> Array:
     tau, zeta = np.nan_to_num(found.tau), np.nan_to_num(found.zeta)
     tau[:, layout.limit == 0.0], zeta[:, layout.play == 0.0] = 0.0, 0.0
@@ -236,12 +200,16 @@ def _upper(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length:
     tilts, slips = _directions(layout, r.mid, at.e.mid, found, length)
     tau, zeta = _fill_free(layout, r.mid, at, (tau, zeta), length)
     columns = tilts.shape[-1]
-    parts = [_closure(layout, r, at.e, _points(tilts[..., c]), _points(slips[..., c]), length) for c in range(columns)]
+    places, guides = _columns(r), _columns(at.e)
+    parts = [
+        _stacked(_closure(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length))
+        for c in range(columns)
+    ]
     matrix = Interval.stack(parts, axis=-1)
-    off = _closure(layout, r, at.e, _points(tau), _points(zeta), length, at.d)
-    step, fine = _enclosed_solve(matrix, -off)
-    tau_all = _points(tau) + (_points(tilts) * step.reshape(len(step), 1, 1, columns)).sum(-1)
-    zeta_all = _points(zeta) + (_points(slips) * step.reshape(len(step), 1, columns)).sum(-1)
+    off = _off(layout, at, r, points(tau), points(zeta), found.units)
+    step, fine = enclosed_solve(matrix, -off)
+    tau_all = points(tau) + (points(tilts) * step.reshape(len(step), 1, 1, columns)).sum(-1)
+    zeta_all = points(zeta) + (points(slips) * step.reshape(len(step), 1, columns)).sum(-1)
     worst = np.zeros(len(step))
     for block in range(len(layout.limit)):
         least = float(layout.limit_range[0, block])
@@ -263,14 +231,14 @@ def _ratio(size: Array, limit: float) -> Array:
     """Upper bound of size over limit; infinite for a limit that may be zero, unless the size is zero too."""
     if limit == 0.0:
         return np.where(size > 0.0, np.inf, 0.0)
-    return np.asarray((_points(size) / limit).hi)
+    return np.asarray((points(size) / limit).hi)
 
 
 def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length: float) -> tuple[Array, Array]:
     """Return changes of tilts (N, blocks, 2, 3 loops) and slips (N, joints, 3 loops) that may correct the closure.
 
     In proportion to the squares of the limits: the least change measured by what each joint has; joints without limit
-    take most.
+    take most.  Column k changes nearly the sum k of the closure alone, so no bound is lost in a change of basis.
     """
     loops = layout.loops
     rows = moment_rows(layout, r, e)
@@ -281,7 +249,11 @@ def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length:
     share = (play / (length * finite)) ** 2
     slips = np.zeros((len(r), len(layout.joints), 3 * loops))
     slips[:, :, 2::3] = layout.incidence.T * (share * length)[:, None]
-    return tilts, slips
+    flat, lifts = rows.reshape(len(r), -1, 3 * loops), layout.incidence.T / length
+    effect = flat.transpose(0, 2, 1) @ tilts.reshape(flat.shape)
+    effect[:, 2::3] += lifts.T @ slips
+    inverse = np.linalg.pinv(effect, rcond=1e-14)
+    return tilts @ inverse[:, None], slips @ inverse
 
 
 def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array], length: float) -> tuple[Array, Array]:
@@ -294,7 +266,9 @@ def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array],
     rows = moment_rows(layout, r, at.e.mid)[:, blocks].reshape(count, -1, 3 * layout.loops)
     slips = np.zeros((count, int(joints.sum()), 3 * layout.loops))
     slips[:, :, 2::3] = layout.incidence.T[joints]
-    off = _closure(layout, _points(r), _points(at.e.mid), _points(tau), _points(zeta), length, _points(at.d.mid)).mid
+    middle = (_columns(points(value)) for value in (r, at.e.mid, at.d.mid))
+    places, guides, shift = middle
+    off = _stacked(_closure(layout, places, guides, points(tau), points(zeta), length, shift)).mid
     both = np.concatenate([rows, slips], axis=1).transpose(0, 2, 1)
     value = -(np.linalg.pinv(both, rcond=1e-12) @ np.nan_to_num(off)[:, :, None])[..., 0]
     n = 2 * int(blocks.sum())
@@ -305,31 +279,71 @@ def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array],
 
 
 def _closure(
-    layout: Layout, r: Interval, e: Interval, tau: Interval, zeta: Interval, length: float, d: Interval | None = None
-) -> Interval:
-    """Sum up every loop (N, 3 loops): tilts, tilts, slips over ``length``; misalignments d included if given."""
-    count, joints = len(r), len(layout.joints)
-    x, y = [Interval.zeros((count,))] * joints, [Interval.zeros((count,))] * joints
+    layout: Layout, r: Columns, e: Columns, tau: Interval, zeta: Interval, length: float, d: Columns | None = None
+) -> list[Any]:
+    """Sum up every loop (3 for each): tilts, tilts, slips over ``length``; misalignments d included if given."""
+    zero = Interval.zeros((len(tau),))
+    x: list[Any] = [zero] * len(layout.joints)
+    y: list[Any] = [zero] * len(layout.joints)
     for block, place in enumerate(layout.block_joint.tolist()):
         axis = layout.block_axis[block]
         if axis == ROUND:
             x[place], y[place] = x[place] + tau[:, block, 0], y[place] + tau[:, block, 1]
         else:
-            own, a, b = tau[:, block, 0], e[:, place, 0], e[:, place, 1]
+            own, (a, b) = tau[:, block, 0], e[place]
             if axis == PITCH:
                 a, b = -b, a
-            x[place], y[place] = x[place] + own * a, y[place] + own * b
+            x[place], y[place] = x[place] + a * own, y[place] + b * own
     if d is not None:
         for place, _, _ in layout.misalignments:
-            x[place], y[place] = x[place] + d[:, place, 0], y[place] + d[:, place, 1]
-    sums = []
+            x[place], y[place] = x[place] + d[place][0], y[place] + d[place][1]
+    sums: list[Any] = []
     for signs in layout.incidence.tolist():
-        parts = [Interval.zeros((count,))] * 3
+        parts: list[Any] = [zero] * 3
         for place, sign in enumerate(signs):
             if sign == 0.0:
                 continue
-            lift = zeta[:, place] / length + (r[:, place, 0] * y[place] - r[:, place, 1] * x[place])
+            lift = r[place][0] * y[place] - r[place][1] * x[place] + zeta[:, place] / length
             own = (x[place], y[place], lift)
             parts = [p + v if sign > 0.0 else p - v for p, v in zip(parts, own)]
         sums += parts
-    return Interval.stack(sums, axis=-1)
+    return sums
+
+
+def _columns(values: Interval) -> Columns:
+    return [(values[:, k, 0], values[:, k, 1]) for k in range(values.shape[1])]
+
+
+def _moving_columns(values: Interval, slopes: Interval) -> Columns:
+    """Columns with their derivatives by the input."""
+    return [
+        (Dual(a, c.reshape(1, -1)), Dual(b, d.reshape(1, -1)))
+        for (a, b), (c, d) in zip(_columns(values), _columns(slopes))
+    ]
+
+
+def _off(layout: Layout, at: Pieces, scaled: Interval, tau: Interval, zeta: Interval, units: Units) -> Interval:
+    """Enclose what is missing from the closure of given tilts over a piece, (N, 3 loops)."""
+    length = units.length
+    off = _stacked(_closure(layout, _columns(scaled), _columns(at.e), tau, zeta, length, _columns(at.d)))
+    moving = at.moving
+    if moving is None:
+        return off
+    centre = Interval(units.centre)
+    at_middle = _closure(
+        layout, _columns((moving.r - centre) / length), _columns(moving.e), tau, zeta, length, _columns(moving.d)
+    )
+    sums = _closure(
+        layout, _moving_columns(scaled, moving.r_slope / length), _moving_columns(at.e, moving.e_slope), tau, zeta,
+        length, _moving_columns(at.d, moving.d_slope),
+    )  # fmt: skip
+    zero = Interval.zeros((len(tau),))
+    slopes = [value.grad[0] if isinstance(value, Dual) else zero for value in sums]
+    straight = _stacked([m + slope * moving.step for m, slope in zip(at_middle, slopes)])
+    better = off.intersect(straight)
+    use = moving.sound[:, None] & ~better.is_empty
+    return Interval.from_bounds(np.where(use, better.lo, off.lo), np.where(use, better.hi, off.hi))
+
+
+def _stacked(parts: list[Any]) -> Interval:
+    return Interval.stack(parts, axis=-1)

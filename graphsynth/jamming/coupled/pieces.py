@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
-from graphsynth.jamming.coupled.enclosure import Pieces, factor_bounds, shifts_enclosed
+from graphsynth.jamming.coupled.enclosure import Moving, Pieces, factor_bounds, shifts_enclosed
+from graphsynth.jamming.coupled.linear import points
 from graphsynth.jamming.coupled.positions import Positions
 from graphsynth.jamming.coupled.problem import Problem
-from graphsynth.jamming.coupled.tubes import linked, prove_tubes
+from graphsynth.jamming.coupled.slopes import slopes
+from graphsynth.jamming.coupled.tubes import Tubes, linked, prove_tubes
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -87,14 +89,31 @@ class Work:
         if keep.size:
             poses = found.poses[at[keep]]
             x, rate = self.system.coordinates(poses, found.velocities[at[keep]])
-            layout = self.given.layout
-            tubes = prove_tubes(self.system, layout.joints, u[keep], x, rate, self.system.count(poses))
-            d = shifts_enclosed(layout, tubes.base)
-            low, high = factor_bounds(layout, Pieces(tubes.r, tubes.e, d), self.given.solve(poses, "scale"))
+            counted = self.system.count(poses)
+            tubes = prove_tubes(self.system, self.given.layout.joints, u[keep], x, rate, counted)
             proved[keep] = tubes.proved
-            lower[keep], upper[keep] = np.where(tubes.proved, low, 0.0), np.where(tubes.proved, high, np.inf)
             box[0, keep], box[1, keep] = tubes.domain.lo, tubes.domain.hi
+            rows = np.flatnonzero(tubes.proved)
+            if rows.size:
+                at_middle = prove_tubes(
+                    self.system, self.given.layout.joints, points(u.mid[keep[rows]]), x[rows], rate[rows], counted[rows]
+                )
+                whole = self._pieces(u[keep[rows]], tubes.take(rows), at_middle, counted[rows])
+                solution = self.given.solve(poses[rows], "scale")
+                lower[keep[rows]], upper[keep[rows]] = factor_bounds(self.given.layout, whole, solution)
         return Found(lo, hi, lower, upper, proved, box[0], box[1])
+
+    def _pieces(self, u: Interval, tubes: Tubes, middle: Tubes, counted: Array) -> Pieces:
+        """Positions and misalignments over pieces, with what the mean value theorem needs where it is proved."""
+        layout = self.given.layout
+        d = shifts_enclosed(layout, tubes.base)
+        r_slope, e_slope, base_slope, fine = slopes(self.system, layout.joints, u, tubes, counted)
+        step = u - points(u.mid)
+        moving = Moving(
+            middle.r, middle.e, shifts_enclosed(layout, middle.base), r_slope, e_slope,
+            shifts_enclosed(layout, base_slope), step, middle.proved & fine,
+        )  # fmt: skip
+        return Pieces(tubes.r, tubes.e, d, moving)
 
     def estimate(self, inputs: Array) -> Array:
         """Factor at inputs in ascending order (estimated); 0 where there is no pose."""
@@ -125,10 +144,10 @@ class Work:
             return False
         x, rate = self.system.coordinates(poses, velocities)
         counted, u = self.system.count(poses), Interval.from_bounds(edges, edges)
-        points = prove_tubes(self.system, (), u, x, rate, counted)
+        single = prove_tubes(self.system, (), u, x, rate, counted)
         before = Interval.from_bounds(pieces.box_lo[:-1], pieces.box_hi[:-1])
         after = Interval.from_bounds(pieces.box_lo[1:], pieces.box_hi[1:])
-        return bool(linked(self.system, points, u, before, after, counted).all())
+        return bool(linked(self.system, single, u, before, after, counted).all())
 
 
 def cut(lo: Array, hi: Array) -> tuple[Array, Array]:

@@ -49,7 +49,7 @@ class _Edge(NamedTuple):
     driver: int
 
 
-def law_enclosed(law: Law, u: Interval) -> Interval:
+def law_enclosed(law: Law, u: Any) -> Any:
     """Enclose the coordinate of a driver over the inputs u.
 
     Examples
@@ -60,10 +60,9 @@ def law_enclosed(law: Law, u: Interval) -> Interval:
     if isinstance(law, Linear):
         return u * law.rate + law.offset
     if isinstance(law, Harmonic):
-        wave: Interval = sin(u * law.order + law.phase)
-        return wave * law.amplitude + law.mean
+        return sin(u * law.order + law.phase) * law.amplitude + law.mean
     if isinstance(law, Polynomial):
-        total = Interval(0)
+        total: Any = Interval(0)
         for c in reversed(law.coefficients):
             total = total * u + c
         return total
@@ -161,7 +160,7 @@ class Positions:
                 x[:, edge.slide], v[:, edge.slide] = _slide(joint, poses, rates)
         return x, v
 
-    def place(self, x: list[Any], q: list[Interval]) -> Placement:
+    def place(self, x: list[Any], q: list[Any]) -> Placement:
         """Place every link for unknowns x and driven coordinates q."""
         links = self.mechanism.graph.links
         angle: list[Any] = [Interval(0)] * links
@@ -204,7 +203,7 @@ class Positions:
         A = _plus(at.origin[joint.a], _turned(at.turn[joint.a], at_a))
         return A, _plus(at.origin[joint.b], _turned(at.turn[joint.b], at_b))
 
-    def equations(self, x: list[Any], q: list[Interval], counted: Array) -> list[Any]:
+    def equations(self, x: list[Any], q: list[Any], counted: Array) -> list[Any]:
         """Return the closing equations; ``counted`` (N, closing) from `count`."""
         at = self.place(x, q)
         rows: list[Any] = []
@@ -240,7 +239,7 @@ class Positions:
                 found[:, column] = phi + 2.0 * np.pi * np.round(off / period)
         return found
 
-    def driven(self, u: Interval) -> list[Interval]:
+    def driven(self, u: Any) -> list[Any]:
         """Enclose the coordinates of the drivers over the inputs (N,)."""
         return [law_enclosed(driver.law, u) for driver in self.mechanism.drivers]
 

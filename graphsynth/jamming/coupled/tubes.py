@@ -8,6 +8,7 @@ of a point box lies in the boxes of both, or the hull of both holds exactly one.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from graphsynth.intervals import Interval, Status, cos, image, sin
 from graphsynth.jamming.coupled.positions import Placement, Positions
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 
-__all__ = ["Tubes", "linked", "prove_tubes"]
+__all__ = ["Tubes", "linked", "places", "prove_tubes"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -40,6 +41,12 @@ class Tubes(NamedTuple):
     r: Interval
     e: Interval
     base: Interval
+
+    def take(self, rows: NDArray[np.intp]) -> Tubes:
+        """Return some of the pieces."""
+        return Tubes(
+            self.proved[rows], self.domain[rows], self.tight[rows], self.r[rows], self.e[rows], self.base[rows]
+        )
 
 
 def prove_tubes(
@@ -109,28 +116,32 @@ def _prove(system: Positions, joints: tuple[int, ...], u: Interval, x: Array, ra
         good = image(lambda unknowns: system.equations(unknowns, own, turns), box).status == Status.UNIQUE
         domain_lo[rows[good]], domain_hi[rows[good]] = box.lo[good], box.hi[good]
     tight = Interval.from_bounds(tight_lo, tight_hi)
-    at = system.place([tight[:, k] for k in range(size)], q)
-    r, e, base = _places(system, joints, at, count)
-    return Tubes(proved, Interval.from_bounds(domain_lo, domain_hi), tight, r, e, base)
+    domain = Interval.from_bounds(domain_lo, domain_hi)
+    if not joints:
+        return Tubes(proved, domain, tight, *(Interval.zeros((count, 0, *rest)) for rest in ((2,), (2,), (2, 2))))
+    at, zero = system.place([tight[:, k] for k in range(size)], q), Interval.zeros((count,))
+    return Tubes(proved, domain, tight, *places(system, joints, at, lambda value: value + zero))
 
 
 def _at(value: Interval, rows: NDArray[np.intp], count: int) -> Interval:
     return value[rows] if value.shape == (count,) else value
 
 
-def _places(system: Positions, joints: tuple[int, ...], at: Placement, count: int) -> tuple[Interval, ...]:
-    """Stack positions and directions of joints."""
-    zero = Interval.zeros((count,))
+def places(
+    system: Positions, joints: tuple[int, ...], at: Placement, read: Callable[[Any], Interval]
+) -> tuple[Interval, Interval, Interval]:
+    """Stack positions, guide directions and link directions of joints; ``read`` takes what is wanted of each number."""
 
     def full(pair: tuple[Any, Any]) -> Interval:
-        return Interval.stack([pair[0] + zero, pair[1] + zero], axis=-1)
+        return Interval.stack([read(pair[0]), read(pair[1])], axis=-1)
 
     r, e, base = [], [], []
     for k in joints:
         joint = system.mechanism.joints[k]
         A, B = system.ends(k, at)
         if isinstance(joint, Revolute):  # both ends are the same point: each encloses it
-            r.append(full((A[0].intersect(B[0]), A[1].intersect(B[1]))))
+            a, b = full(A), full(B)
+            r.append(a.intersect(b))
         else:
             r.append(full(B))
         if isinstance(joint, Prismatic | PinSlot):
@@ -140,9 +151,6 @@ def _places(system: Positions, joints: tuple[int, ...], at: Placement, count: in
         else:
             e.append(full((Interval(1), Interval(0))))
         base.append(Interval.stack([full(at.turn[joint.a]), full(at.turn[joint.b])], axis=1))
-    if not joints:
-        shape = (count, 0, 2)
-        return Interval.zeros(shape), Interval.zeros(shape), Interval.zeros((count, 0, 2, 2))
     return Interval.stack(r, axis=1), Interval.stack(e, axis=1), Interval.stack(base, axis=1)
 
 

@@ -26,6 +26,7 @@ from graphsynth.jamming.coupled.closure import joint_places, shifts
 from graphsynth.jamming.coupled.enclosure import Pieces, factor_bounds
 from graphsynth.jamming.coupled.positions import Positions
 from graphsynth.jamming.coupled.problem import problem
+from graphsynth.jamming.coupled.slopes import slopes
 from graphsynth.jamming.coupled.tubes import prove_tubes
 from graphsynth.mechanism.laws import Harmonic, Table
 
@@ -126,7 +127,8 @@ def test_whole_turn_of_the_lambda_linkage():
     """Free up to 2 t_A (section 9.6), jammed above, undecided at it."""
     motion = simulate(four_bar(), TURN)
     for alpha, expected in [
-        (2 * T_A * (1 - 1e-3), "CERTIFIED_FREE"), (2 * T_A * (1 + 1e-9), "CERTIFIED_JAMMED"),
+        (2 * T_A * (1 - 1e-3), "CERTIFIED_FREE"), (2 * T_A * (1 - 1e-6), "CERTIFIED_FREE"),
+        (2 * T_A * (1 + 1e-9), "CERTIFIED_JAMMED"),
         (2 * T_A * (1 + 1e-3), "CERTIFIED_JAMMED"), (2 * T_A, "UNDECIDED"), (1 / 30, "CERTIFIED_JAMMED"),
     ]:  # fmt: skip
         proof = certify_coupled(motion, Bearing(), Misalignment(0, 1, alpha))
@@ -181,12 +183,12 @@ def test_tolerances_make_a_verdict_undecided():
     sharp = Misalignment(0, 1, 0.0120)
     assert certify_coupled(motion, Bearing(), sharp).verdict.name == "CERTIFIED_FREE"
     wide = Misalignment(0, 1, 0.0120, alpha_range=(0.0118, 0.0123))
-    proof = certify_coupled(motion, Bearing(), wide, max_pieces=2000)
+    proof = certify_coupled(motion, Bearing(), wide, max_pieces=600)
     assert (proof.verdict.name == "UNDECIDED" and "tolerances" in proof.reason) or "limit of work" in proof.reason
     assert certify_coupled(motion, Bearing(), sharp, length_tolerance=1e-4).verdict.name == "CERTIFIED_FREE"
-    assert certify_coupled(motion, Bearing(), sharp, length_tolerance=2e-2, max_pieces=1500).verdict.name == "UNDECIDED"
+    assert certify_coupled(motion, Bearing(), sharp, length_tolerance=2e-2, max_pieces=600).verdict.name == "UNDECIDED"
     fit = bearing_limits(Bearing(), clearance_tolerance=0.003)
-    assert certify_coupled(motion, fit, sharp, max_pieces=1500).verdict.name == "UNDECIDED"
+    assert certify_coupled(motion, fit, sharp, max_pieces=600).verdict.name == "UNDECIDED"
     assert certify_coupled(motion, fit, Misalignment(0, 1, 0.0108)).verdict.name == "CERTIFIED_FREE"
     assert certify_coupled(motion, fit, Misalignment(0, 1, 0.0134)).verdict.name == "CERTIFIED_JAMMED"
 
@@ -264,8 +266,10 @@ def test_tubes_contain_perturbed_motions(make, low, high):
     pieces = Interval.from_bounds(edges[:-1], edges[1:])
     tubes = prove_tubes(system, joints, pieces, x, rate, system.count(motion.poses))
     assert tubes.proved.mean() > 0.95
+    *rates, fine = slopes(system, joints, pieces, tubes, system.count(motion.poses))
+    assert (fine | ~tubes.proved).all()
     guided = [k for k in joints if not isinstance(mechanism.joints[k], Gear)]
-    for _ in range(4):
+    for _ in range(2):
         moved = []
         for joint in mechanism.joints:
             grow = 1.0 + tolerance * rng.uniform(-1, 1, 4) * (1 - 1e-12)
@@ -278,6 +282,14 @@ def test_tubes_contain_perturbed_motions(make, low, high):
                           start=motion.poses[0])  # fmt: skip
         r, e, _ = joint_places(other, joints, sample.poses[1:])
         keep = tubes.proved & sample.assembled[1:]
+        h = 1e-5
+        near = [
+            simulate(other, [u - h, u, u + h], start=pose, events=False) for u, pose in zip(inputs, sample.poses[1:])
+        ]
+        ends = [joint_places(other, joints, np.array([one.poses[k] for one in near])) for k in (0, 2)]
+        for before, after, rate in zip(*ends, rates):
+            slope, size = (after - before) / (2 * h), 1e-8 + 1e-3 * h
+            assert ((slope >= rate.lo - size) & (slope <= rate.hi + size))[keep][:, guided].all()
         pad = 1e-12
         for value, tube in ((r, tubes.r), (e, tubes.e)):
             inside = (value >= tube.lo - pad) & (value <= tube.hi + pad)
