@@ -39,7 +39,7 @@ def poses(mechanism: PointingMechanism, phi_x: ArrayLike, phi_y: ArrayLike, s_y:
     signs = {"Y": sign("s_y", s_y), "X": sign("s_x", s_x)}
     scale = scale_of(mechanism)
     first, second = solution_order(mechanism, scale)
-    inputs = {"Y": np.ravel(x), "X": np.ravel(y)}
+    inputs = {"Y": np.array(x).ravel(), "X": np.array(y).ravel()}  # writable copies: one compiled kernel
     count = x.size
     u, v, deficit, margin1, margin2 = np.empty((5, count))
     status = np.empty(count, dtype=np.int8)
