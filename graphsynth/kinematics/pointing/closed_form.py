@@ -42,13 +42,13 @@ def poses(mechanism: PointingMechanism, phi_x: ArrayLike, phi_y: ArrayLike, s_y:
     inputs = {"Y": np.array(x).ravel(), "X": np.array(y).ravel()}  # writable copies: one compiled kernel
     count = x.size
     u, v, deficit, margin1, margin2 = np.empty((5, count))
-    status = np.empty(count, dtype=np.int8)
+    status, close = np.empty(count, dtype=np.int8), np.empty(count, dtype=np.bool_)
     triangular(
         mechanism.l1 / scale,
         *(first.crank, first.rod, first.side, float(signs[first.name])),
         *(second.crank, second.rod, second.side, float(signs[second.name])),
         *(inputs[first.name], inputs[second.name]),
-        *(u, v, status, deficit, margin1, margin2),
+        *(u, v, status, deficit, margin1, margin2, close),
     )
     status = np.array(_CODES[mechanism.order], dtype=np.int8)[status]
     if mechanism.order == "YX":
@@ -65,6 +65,7 @@ def poses(mechanism: PointingMechanism, phi_x: ArrayLike, phi_y: ArrayLike, s_y:
         deficit=(deficit * scale).reshape(shape),
         margin_y=margin_y.reshape(shape),
         margin_x=margin_x.reshape(shape),
+        near_limit=close.reshape(shape),
         s_y=int(s_y),
         s_x=int(s_x),
         order=mechanism.order,

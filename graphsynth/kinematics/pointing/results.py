@@ -55,6 +55,9 @@ class Poses:
         ``|K| - hypot(A, B)`` of the leg that does not reach, unit of the lengths; 0 where assembled.
     margin_y, margin_x : ndarray, shape (...)
         Sine of the angle by which each output is away from the fold of its leg, 0 to 1.
+    near_limit : ndarray of bool, shape (...)
+        Rounding may have decided whether a leg reaches: half of the digits of an angle are lost, and only more digits
+        (`precise.precise_angles`) tell.
     s_y, s_x : int
         Branch signs of the assembly mode.
     order : str
@@ -69,6 +72,7 @@ class Poses:
     deficit: Array
     margin_y: Array
     margin_x: Array
+    near_limit: NDArray[np.bool_]
     s_y: int
     s_x: int
     order: str

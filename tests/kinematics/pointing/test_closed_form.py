@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import graphsynth.kinematics.pointing as pointing
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.pointing import PointingMechanism, PoseStatus
+from graphsynth.kinematics.pointing.precise import precise_angles
 
 # section 2.9, equal cranks, degrees: phi, a YX, b YX, a XY, b XY
 EQUAL = [
@@ -146,6 +147,27 @@ def test_lengths_of_any_size():
         got = PointingMechanism(*(float(x) * factor for x in ART)).poses(phi, 0.5 * phi)
         np.testing.assert_array_equal(got.a, want.a)
         np.testing.assert_array_equal(got.b, want.b)
+
+
+@pytest.mark.parametrize("span", [1.0, 6.0])
+def test_length_ratios_up_to_a_million_millions(span):
+    """Against 60 digits: angles to rounding over margin; where reach is decided wrongly, it is flagged."""
+    random = np.random.default_rng(9)
+    wrong = 0
+    for _ in range(400):
+        lengths = (10.0 ** random.uniform(-span, span, 5)).tolist()
+        x, y = random.uniform(-3.0, 3.0, 2).tolist()
+        poses = PointingMechanism(*lengths).poses(x, y)
+        with mp.workdps(60):
+            want = precise_angles(PointingMechanism(*lengths), x, y)
+            if bool(mp.isnan(want[0])) == bool(poses.assembled):
+                assert poses.near_limit
+                wrong += 1
+            elif poses.assembled and not poses.near_limit:
+                errors = [float(abs(mp.arg(mp.expj(w - float(g))))) for w, g in zip(want, (poses.a, poses.b))]
+                assert errors[1] <= 3e-15 / poses.margin_x
+                assert errors[0] <= 3e-15 / poses.margin_y / poses.margin_x
+    assert wrong <= (0 if span == 1.0 else 8)
 
 
 def test_shapes_broadcast():

@@ -11,6 +11,7 @@ import numpy as np
 from graphsynth.compilation import kernel
 
 OK, FOLD_FIRST, FOLD_SECOND, OUT_FIRST, OUT_SECOND, FREE = 0, 1, 2, 3, 4, 5
+DOUBT = 6.4e-15  # relative rounding error of a discriminant, with a factor of safety of about ten
 
 
 @kernel(inline="always")
@@ -26,17 +27,20 @@ def ball_joint(l1, crank, rod, side, phi):
 
 
 @kernel
-def triangular(l1, c1, r1, side1, s1, c2, r2, side2, s2, phi1, phi2, u, v, status, deficit, margin1, margin2):
+def triangular(l1, c1, r1, side1, s1, c2, r2, side2, s2, phi1, phi2, u, v, status, deficit, margin1, margin2, close):
     """Solve ``P1 cos u + Q1 sin u = K1`` and then ``P2 cos v + Q2 cos u sin v = K2`` on the branches s1, s2.
 
-    ``margin`` is the sine of the angle by which an output is away from its fold; ``deficit`` is ``|K| - hypot``.
+    ``margin`` is the sine of the angle by which an output is away from its fold; ``deficit`` is ``|K| - hypot``;
+    ``close`` says that rounding may have decided whether a leg reaches.
     """
     for i in range(phi1.size):
         u[i] = v[i] = margin1[i] = margin2[i] = np.nan
         deficit[i] = 0.0
+        close[i] = False
         p, q, k = ball_joint(l1, c1, r1, side1, phi1[i])
         square = p * p + q * q
         rest = square - k * k
+        close[i] = abs(rest) <= DOUBT * square
         if rest < 0.0:
             status[i] = OUT_FIRST
             deficit[i] = abs(k) - math.sqrt(square)
@@ -54,6 +58,7 @@ def triangular(l1, c1, r1, side1, s1, c2, r2, side2, s2, phi1, phi2, u, v, statu
         q *= cosine / square
         square = p * p + q * q
         rest = square - k * k
+        close[i] |= abs(rest) <= DOUBT * square * (1.0 + 1.0 / margin1[i])
         if rest < 0.0:
             status[i] = OUT_SECOND
             deficit[i] = abs(k) - math.sqrt(square)
