@@ -94,7 +94,7 @@ class IdealTorque:
         _check(self, ("rotor_inertia", "friction"))
 
     def reduced(self) -> LinearCharacteristic:
-        """The same as a linear characteristic."""
+        """Return the same as a linear characteristic."""
         return LinearCharacteristic(self.value, 0.0, self.rotor_inertia, self.friction)
 
 
@@ -120,7 +120,7 @@ class IdealSpeed:
 class DCMotor:
     """Direct-current motor with independent excitation and proportional speed control.
 
-    ``L dI/dt = U - r I - c_e w_m``, ``U = K (w_d - w_m)``, at most ``voltage_limit`` in absolute value; torque ``K_m I``.
+    ``L dI/dt = U - r I - c_e w_m`` with ``U = K (w_d - w_m)``, at most ``voltage_limit`` in size; torque ``K_m I``.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class DCMotor:
         return self.inductance / self.resistance if self.resistance else math.inf
 
     def reduced(self) -> LinearCharacteristic:
-        """The limit L -> 0: ``I = (K (w_d - w_m) - c_e w_m) / r``; its error is of first order in L.
+        """Return the limit L -> 0: ``I = (K (w_d - w_m) - c_e w_m) / r``; its error is of first order in L.
 
         Raises
         ------
@@ -248,7 +248,7 @@ class SynchronousMotor:
         return self.inductance / self.resistance
 
     def reduced(self) -> LinearCharacteristic:
-        """The limit L -> 0: ``i_q = (u_q - p w_m psi) / R``; its error is of first order in L."""
+        """Return the limit L -> 0: ``i_q = (u_q - p w_m psi) / R``; its error is of first order in L."""
         factor = 1.5 * self.pole_pairs * self.flux / self.resistance
         return LinearCharacteristic(
             factor * self.uq, factor * self.pole_pairs * self.flux, self.rotor_inertia, self.friction

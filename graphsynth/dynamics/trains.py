@@ -35,7 +35,7 @@ class Train:
     --------
     >>> train = Train.of_teeth([(10, 44), (10, 33), (20, 80)])
     >>> round(train.ratio, 12), round(train.reflected(8.2e-6), 8)
-    (58.08, 0.02766106)
+    (58.08, 0.02766095)
     """
 
     ratio: float = 1.0
@@ -50,7 +50,9 @@ class Train:
             raise SpecError(f"efficiency = {self.efficiency:g} must be at most 1; give a fraction, not a percentage")
 
     @classmethod
-    def of_teeth(cls, stages: Sequence[tuple[int, int]], efficiency: Sequence[float] = (), inertia: float = 0.0) -> Train:
+    def of_teeth(
+        cls, stages: Sequence[tuple[int, int]], efficiency: Sequence[float] = (), inertia: float = 0.0
+    ) -> Train:
         """Train of stages (driving teeth, driven teeth), with the efficiency of each stage (1 by default)."""
         for driving, driven in stages:
             for teeth in (driving, driven):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.dynamics.motors import number
 from graphsynth.errors import GeometryError, SpecError
 
-__all__ = ["ChangePoint", "FourBarState", "FourBar"]
+__all__ = ["ChangePoint", "FourBar", "FourBarState"]
 
 Array = NDArray[np.float64]
 
@@ -130,10 +130,13 @@ class FourBar:
             f2 = (a * c3t + b * k2**2 * c32 - c * k3**2) / (b * s32)
             f3 = (a * ct2 + b * k2**2 - c * k3**2 * c32) / (c * s32)
         A = np.asarray(a * (ct + 1j * st))
-        return FourBarState(*map(np.asarray, (np.angle(AB), np.angle(OB), k2, k3, f2, f3, A, AB, OB)))
+        return FourBarState(
+            np.asarray(np.angle(AB)), np.asarray(np.angle(OB)), np.asarray(k2), np.asarray(k3), np.asarray(f2),
+            np.asarray(f3), A, np.asarray(AB), np.asarray(OB),
+        )  # fmt: skip
 
     def reach(self) -> tuple[tuple[float, float], ...]:
-        """Closed arcs of crank angles (rad) at which the linkage can be assembled; ``(-pi, pi)`` for a full turn."""
+        """Return the closed arcs of crank angles (rad) that can be assembled; ``(-pi, pi)`` for a full turn."""
         a, b, c, g = self.crank, self.coupler, self.rocker, self.frame
         far, near = self.excess
         # cos(theta/2)^2 >= low,  sin(theta/2)^2 >= high
@@ -164,9 +167,7 @@ class FourBar:
     def _change_point(self, theta: float, side: float) -> ChangePoint:
         a, b, c, g = side * self.crank, self.coupler, self.rocker, self.frame
         # signs of the coupler and the rocker on the line: a + s2 b = g + s3 c
-        s2, s3 = min(
-            ((p, q) for p in (1.0, -1.0) for q in (1.0, -1.0)), key=lambda s: abs(a + s[0] * b - g - s[1] * c)
-        )
+        s2, s3 = min(((p, q) for p in (1.0, -1.0) for q in (1.0, -1.0)), key=lambda s: abs(a + s[0] * b - g - s[1] * c))
         p, q = s2 * b, s3 * c
         # a + p k2 = q k3  and  a + p k2^2 = q k3^2
         lead, middle, last = p * (q - p), -2.0 * a * p, a * (q - a)

@@ -42,7 +42,7 @@ class Thread:
 
     Examples
     --------
-    >>> round(abs(Thread().force(0.06 + 0.08j)), 9)
+    >>> round(float(abs(Thread().force(0.06 + 0.08j))), 9)
     0.034671744
     """
 
@@ -155,7 +155,7 @@ class Braider:
         return self.train.reflected(self.motor.rotor_inertia) + self.inertia
 
     def plant(self) -> Plant:
-        """The mechanism as the integrator sees it."""
+        """Mechanism as the integrator sees it."""
         bar, (_, i2, i3) = self.linkage, self.moments
         far, near = bar.excess
         thread = self.thread

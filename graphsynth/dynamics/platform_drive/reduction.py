@@ -123,12 +123,11 @@ def inductance_study(
     if not isinstance(motor, (DCMotor, SynchronousMotor)):
         raise SpecError(f"{type(motor).__name__} has no inductance; give a DCMotor or a SynchronousMotor")
     out = np.asarray(times, dtype=np.float64)
-    start = {"angle": angle, "speed": speed}
-    limit = run(plant, motor.reduced(), train, out, rtol=rtol, estimate=False, **start)
+    limit = run(plant, motor.reduced(), train, out, angle=angle, speed=speed, rtol=rtol, estimate=False)
     gaps, runs = [], []
     for value in inductances:
         real = replace(motor, inductance=number("inductance", value, least=0.0, above=True))
-        full = run(plant, real, train, out, rtol=rtol, estimate=False, **start)
+        full = run(plant, real, train, out, angle=angle, speed=speed, rtol=rtol, estimate=False)
         begin = 20.0 * real.electrical_time if after is None else after
         late = (out - out[0] >= begin) & (out > out[0])
         if not late.any():

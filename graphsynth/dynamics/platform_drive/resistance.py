@@ -95,7 +95,7 @@ def resistance_effect(
     >>> motor = DCMotor(1.0, 0.01, 0.1, 0.1, gain=20.0, speed=20.0)
     >>> effect = resistance_effect(MotorDrivenPlatform.source(motor), [0.5, 20.0])
     >>> effect.speed_falls, effect.speed.round(2).tolist()
-    (False, [0.65, 10.82])
+    (False, [0.65, 9.73])
     """
     motor = drive.motor
     if not isinstance(motor, DCMotor) or motor.inductance == 0.0:
@@ -124,7 +124,7 @@ def resistance_effect(
 
 
 def _harmonic(drive: MotorDrivenPlatform) -> tuple[int, float, float]:
-    """Number and amplitude of the harmonic of J whose derivative is largest, and the mean of J."""
+    """Return number and amplitude of the harmonic of J whose derivative is largest, and the mean of J."""
     count = 4 * drive.inertia.rows.shape[1] + 8
     values = drive.inertia.value(np.linspace(0.0, math.tau, count, endpoint=False))
     spectrum = 2.0 * np.abs(np.fft.rfft(values)) / count

@@ -1,7 +1,7 @@
 """Radau IIA of order 9 for drives: error control, exact landing on output times and on events, balances.
 
-The angle is kept in (-pi, pi] beside a count of turns in the form with inertia, and every update is compensated, so
-that a long run keeps the angle within a turn as exact as a short one.
+The angle is kept within a few turns beside a count of turns in the form with inertia, and every update is compensated,
+so that roundings do not add up over a long run.
 """
 
 import math
@@ -10,6 +10,7 @@ import numpy as np
 
 from graphsynth.compilation import kernel
 from graphsynth.dynamics.platform_drive.kernels.coefficients import ERROR, SHIFT, STAGES, A, C
+from graphsynth.dynamics.platform_drive.kernels.linear import factorise, norm, substitute
 from graphsynth.dynamics.platform_drive.kernels.systems import (
     DIRECT,
     DRIVING,
@@ -32,46 +33,6 @@ DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, TOO_MANY_EVENTS = 0, 1, 2, 3, 
 NONE, OUTPUT, DEAD_CENTRE, STALL, LIMIT, FLOW = 0, 1, 2, 3, 4, 5
 TURN, TURN_LOW = 6.283185307179586, 2.4492935982947064e-16
 LEAST_ANGLE = 4.0 * math.pi
-
-
-@kernel
-def factorise(M, order):
-    """LU factors with row exchange in place; False for a singular matrix."""
-    m = M.shape[0]
-    for k in range(m):
-        best = k
-        for i in range(k + 1, m):
-            if abs(M[i, k]) > abs(M[best, k]):
-                best = i
-        order[k] = best
-        if not abs(M[best, k]) > 0.0:
-            return False
-        if best != k:
-            for j in range(k, m):
-                M[k, j], M[best, j] = M[best, j], M[k, j]
-        for i in range(k + 1, m):
-            M[i, k] /= M[k, k]
-            factor = M[i, k]
-            if factor != 0.0:
-                for j in range(k + 1, m):
-                    M[i, j] -= factor * M[k, j]
-    return True
-
-
-@kernel
-def substitute(M, order, v):
-    """Solve with the factors of `factorise`, in place."""
-    m = M.shape[0]
-    for k in range(m):
-        p = order[k]
-        if p != k:
-            v[k], v[p] = v[p], v[k]
-        for i in range(k + 1, m):
-            v[i] -= M[i, k] * v[k]
-    for k in range(m - 1, -1, -1):
-        for j in range(k + 1, m):
-            v[k] -= M[k, j] * v[j]
-        v[k] /= M[k, k]
 
 
 @kernel
@@ -154,15 +115,6 @@ def estimate(setup, P, V, y, h, f0, jac, unit, Z, tmp):
         substitute(M, order, e)
         size = norm(e, unit)
     return size if size < 1e200 else -1.0
-
-
-@kernel
-def norm(e, unit):
-    """Root mean square of the scaled components."""
-    total = 0.0
-    for a in range(e.size):
-        total += (e[a] / unit[a]) ** 2
-    return math.sqrt(total / e.size)
 
 
 @kernel

@@ -51,7 +51,8 @@ def series(q, V, P, out):
 def four_bar(theta, P, out):
     """Effective inertia, half its derivative and the generalised thread load of the braider into out[0:3].
 
-    Well-conditioned products of section 4.2, with the excesses ``b + c - a - g`` and ``(g - a)^2 - (b - c)^2`` given; out[3:11] get k2, k3, phi2'', phi3'', AB and O2B.
+    Well-conditioned products of section 4.2, with the excesses ``b + c - a - g`` and
+    ``(g - a)^2 - (b - c)^2`` given; out[3:11] get k2, k3, phi2'', phi3'', AB and O2B.
     """
     L = P[LINKAGE:]
     a, b, c, g = L[LA], L[LB], L[LC], L[LG]
@@ -111,7 +112,7 @@ def transmitted(setup, P, torque):
 
 @kernel
 def field(setup, P, V, y, dy, tmp):
-    """Derivatives of the state into dy; tmp[11:15] get the rates of the four balances.
+    """Put the derivatives of the state into dy; tmp[11:15] get the rates of the four balances.
 
     Net work on the mechanism, its absolute value, source minus losses minus shaft power, source (absolute).
     """
