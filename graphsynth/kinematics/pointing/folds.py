@@ -69,7 +69,8 @@ class Fold:
         )
         where = f"phi_x = {math.degrees(self.phi_x):.6f} deg, phi_y = {math.degrees(self.phi_y):.6f} deg"
         first, second = self.merging
-        return f"fold of leg {self.leg} at {where}, {output} deg: modes {first} and {second} meet"
+        what = "meet" if self.order == 2 else "cross, and which one the motion takes is not determined"
+        return f"fold of leg {self.leg} at {where}, {output} deg: modes {first} and {second} {what}"
 
 
 @dataclass(frozen=True)

@@ -178,7 +178,8 @@ class PointingMechanism:
         start : array_like, shape (..., 12), optional
             Unknowns to start from; by default the rest pose, followed to the given angles in small steps.
         chart : {"corrected", "printed"}
-            "printed" turns the ball joint of leg Y about y, x, y as the source does, which is singular at rest.
+            "printed" turns the ball joint of leg Y about y, x, y as the source does, which is singular at rest; without
+            ``start`` this is noticed and the regular coordinates are used.
 
         Returns
         -------

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics.pointing.charts import RANK_TOLERANCE, check_chart
 from graphsynth.kinematics.pointing.closed_form import crank_arrays
 from graphsynth.kinematics.pointing.loop_equations import loop_equations
 
@@ -45,6 +46,12 @@ class LoopSolution:
         A root was found; its orientations agree (both traces are 3).
     iterations : ndarray of int64, shape (...)
         Iterations in all continuation steps together.
+    chart : str
+        Coordinates that were used: the regular ones if those asked for are singular at the start.
+    start_rank : ndarray of int64, shape (...)
+        Rank of the 12 x 12 Jacobian at the start, in the coordinates asked for.
+    message : str
+        One sentence on the coordinates.
     """
 
     x: Array
@@ -53,6 +60,9 @@ class LoopSolution:
     converged: NDArray[np.bool_]
     genuine: NDArray[np.bool_]
     iterations: NDArray[np.int64]
+    chart: str
+    start_rank: NDArray[np.int64]
+    message: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +132,16 @@ def solve_loops(
     phi = np.stack([given_x.ravel(), given_y.ravel()], axis=1)
     n = len(phi)
     total = np.zeros(n, dtype=np.int64)
+    message = f"coordinates {chart!r}"
     if start is None:
+        # every angle is zero at rest, in any coordinates and for any lengths
+        report = check_chart(mechanism, 0.0, 0.0, chart, 1, -1, scaled=True)
+        ranks = np.full(n, report.rank, dtype=np.int64)
+        if report.rank < 12 and report.use:
+            message = (
+                f"at the start rank {report.rank} of 12: {report.verdict}; {report.use!r} used instead of {chart!r}"
+            )
+            chart = report.use
         x = np.zeros((n, 12))
         stages = max(1, int(np.ceil(np.abs(phi).max(initial=0.0) / STEP)))
         for stage in range(1, stages):
@@ -130,6 +149,8 @@ def solve_loops(
             total += used
     else:
         x = np.broadcast_to(np.asarray(start, dtype=np.float64), (*given_x.shape, 12)).reshape(n, 12)
+        values = np.linalg.svd(loop_equations(mechanism, x, phi, chart).jacobian, compute_uv=False)
+        ranks = (values > RANK_TOLERANCE * values[:, :1]).sum(axis=1)
     x, size, last, used = newton(mechanism, x, phi, chart)
     traces = loop_equations(mechanism, x, phi, chart).traces
     converged = size < RESIDUAL
@@ -139,6 +160,7 @@ def solve_loops(
     return LoopSolution(
         x=x.reshape(*shape, 12), residual=size.reshape(shape), error=last.reshape(shape),
         converged=converged.reshape(shape), genuine=genuine.reshape(shape), iterations=(total + used).reshape(shape),
+        chart=chart, start_rank=ranks.reshape(shape), message=message,
     )  # fmt: skip
 
 

@@ -22,6 +22,8 @@ __all__ = ["PointingSweep", "sweep"]
 
 #: Samples of a discriminant per radian of crank angle, between which a dip is refined.
 DENSITY = 60
+#: A dip to this part of the largest discriminant counts as touching zero: the branches cross there.
+TOUCH = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +75,10 @@ def sweep(
     stop = _first_zero(path, float(values[0]), float(values[-1]))
     if stop is None:
         return PointingSweep(values, poses, poses.assembled, None, "the whole sweep lies on one assembly mode")
-    which, place = stop
+    which, place, multiplicity = stop
     first, second, _ = path.legs()
     leg = (first, second)[which].name
-    fold = fold_on_path(mechanism, leg, place, (ox, oy), (dx, dy), path.s_y, path.s_x)
+    fold = fold_on_path(mechanism, leg, place, (ox, oy), (dx, dy), path.s_y, path.s_x, multiplicity)
     reached = (values <= place) if change[0] > 0.0 else (values >= place)
     reached &= poses.assembled
     return PointingSweep(values, _hide(poses, reached), reached, fold, f"stopped at t = {place:.12g}: {fold.message}")
@@ -88,21 +90,21 @@ def _hide(poses: Poses, reached: NDArray[np.bool_]) -> Poses:
     return replace(poses, a=np.where(reached, poses.a, np.nan), b=np.where(reached, poses.b, np.nan))
 
 
-def _first_zero(path: Path, start: float, stop: float) -> tuple[int, float] | None:
-    """First sign change of either discriminant: index of the leg and parameter.
+def _first_zero(path: Path, start: float, stop: float) -> tuple[int, float, int] | None:
+    """First zero of either discriminant: index of the leg, parameter, and 2 where it only touches zero, else 1.
 
     Samples between which the second derivative cannot hide a dip are refined by minimisation (estimated, not proved).
     """
-    found: tuple[int, float] | None = None
+    found: tuple[int, float, int] | None = None
     end = stop
     for which in (0, 1):
-        place = _zero_of(path, which, start, end)
-        if place is not None:
-            found, end = (which, place), place
+        zero = _zero_of(path, which, start, end)
+        if zero is not None:
+            found, end = (which, *zero), zero[0]
     return found
 
 
-def _zero_of(path: Path, which: int, start: float, stop: float) -> float | None:
+def _zero_of(path: Path, which: int, start: float, stop: float) -> tuple[float, int] | None:
     from scipy.optimize import brentq, minimize_scalar
 
     def value(t: float) -> float:
@@ -111,14 +113,18 @@ def _zero_of(path: Path, which: int, start: float, stop: float) -> float | None:
     turn = abs(stop - start) * max(map(abs, path.direction))
     grid = np.linspace(start, stop, max(64, math.ceil(DENSITY * turn)) + 1).tolist()
     heights = [value(t) for t in grid]
+    touch = TOUCH * max(abs(height) for height in heights if not math.isnan(height))
+    precision = {"xtol": 4e-16 * max(1.0, abs(stop)), "rtol": 8.9e-16}
     for i in range(1, len(grid)):
         if math.isnan(heights[i]):
             return None  # beyond the fold of the first leg by rounding
         if heights[i] < 0.0:
-            return float(brentq(value, grid[i - 1], grid[i], xtol=4e-16 * max(1.0, abs(stop)), rtol=8.9e-16))
+            return float(brentq(value, grid[i - 1], grid[i], **precision)), 1
         if i + 1 < len(grid) and heights[i] < heights[i - 1] and heights[i] <= heights[i + 1]:
             low, high = sorted((grid[i - 1], grid[i + 1]))
             dip = minimize_scalar(value, bounds=(low, high), method="bounded", options={"xatol": 1e-10})
+            if abs(dip.fun) <= touch:
+                return float(dip.x), 2
             if dip.fun < 0.0:
-                return float(brentq(value, grid[i - 1], dip.x, xtol=4e-16 * max(1.0, abs(stop)), rtol=8.9e-16))
+                return float(brentq(value, grid[i - 1], dip.x, **precision)), 1
     return None

@@ -7,7 +7,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import graphsynth.kinematics.pointing as pointing
@@ -88,6 +88,7 @@ def test_small_angles(exact):
         assert got == pytest.approx(ratio * phi - ratio * (1 - ratio**2) * phi**3 / 6 + c4 * phi**4, abs=2 * phi**5)
 
 
+@settings(deadline=None)
 @given(
     st.floats(-math.pi, math.pi),
     st.floats(-math.pi, math.pi),
@@ -97,15 +98,16 @@ def test_small_angles(exact):
 )
 def test_every_pose_has_rigid_rods(exact, phi_x, phi_y, lengths, order, signs):
     poses = PointingMechanism(*lengths, order=order).poses(phi_x, phi_y, *signs)
-    if poses.status == PoseStatus.OK:
+    if poses.assembled:
         errors = exact.rod_errors(*map(float, (poses.a, poses.b)), phi_x, phi_y, map(repr, lengths), order)
-        # rounding of the angles, and of the coefficients where the rod is short beside the other lengths
-        assert max(map(abs, errors)) < 1e-13 * max(lengths) ** 2 / min(lengths) / min(poses.margin_x, poses.margin_y, 1)
+        # even at a fold: what the angles lose there, the rods do not feel
+        assert max(map(abs, errors)) < 1e-14 * max(lengths) ** 2 / min(lengths)
     else:
         assert np.isnan(poses.a) and np.isnan(poses.b)
         assert poses.deficit > 0.0
 
 
+@settings(deadline=None)
 @given(st.floats(-3.1, 3.1), st.floats(-3.1, 3.1), st.sampled_from(ORDERS))
 def test_against_many_digits(exact, phi_x, phi_y, order):
     want = exact.angles(mp.mpf(phi_x), mp.mpf(phi_y), order=order)
@@ -117,6 +119,7 @@ def test_against_many_digits(exact, phi_x, phi_y, order):
         assert any(isinstance(value, mp.mpc) for value in want)
 
 
+@settings(deadline=None)
 @given(st.floats(-1.2, 1.2))
 def test_swapping_the_gimbal_order_reverses_both_cranks(phi):
     there = PointingMechanism(order="XY").poses(phi, phi)

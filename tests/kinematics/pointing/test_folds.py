@@ -205,6 +205,16 @@ def test_sweeps_of_every_direction_stop_before_the_first_failure():
     assert stopped > 10
 
 
+def test_a_sweep_stops_where_branches_cross():
+    """Parallelogram in its flat pose: the sign of the branch would have to change to follow b = phi."""
+    sweep = PARALLELOGRAM.sweep(np.radians(np.arange(0.0, 121.0, 2.5)), (0.0, 1.0))
+    assert sweep.fold is not None and (sweep.fold.leg, sweep.fold.order) == ("X", 1)
+    assert math.degrees(sweep.fold.parameter) == pytest.approx(90.0, abs=1e-5)
+    assert "cross" in sweep.message
+    assert np.isnan(sweep.poses.b[sweep.t > 1.6]).all()
+    np.testing.assert_allclose(sweep.poses.b[sweep.t < 1.55], sweep.t[sweep.t < 1.55], rtol=0, atol=1e-14)
+
+
 def test_sweep_that_cannot_start_and_bad_sweeps():
     sweep = STRETCHED.sweep([1.5, 1.6], (0.0, 1.0))
     assert not sweep.reached.any() and "cannot start" in sweep.message and np.isnan(sweep.poses.b).all()

@@ -111,6 +111,16 @@ def test_verdicts_on_coordinates():
     assert ART.check_chart(0.3, 0.3, "printed").verdict == "regular"
 
 
+def test_singular_coordinates_are_noticed_before_the_first_iteration():
+    """Section 9, case 1: rank 11 of 12, and the regular coordinates are used instead."""
+    solved = ART.solve_loops(0.5, 0.5, chart="printed")
+    assert (solved.chart, int(solved.start_rank)) == ("corrected", 11)
+    assert "coordinates singular, mechanism regular" in solved.message
+    np.testing.assert_array_equal(solved.x, ART.solve_loops(0.5, 0.5).x)
+    told = ART.solve_loops(0.5, 0.5, chart="printed", start=np.full(12, 0.1))
+    assert (told.chart, int(told.start_rank)) == ("printed", 12)
+
+
 def test_the_mechanism_itself_is_singular_at_a_fold():
     # rod of leg X on a line through the centre: |S_X| = l1 + l4
     mechanism = PointingMechanism(0.1, 0.15, 0.12, 0.15, 0.12)
