@@ -163,7 +163,7 @@ def follow(
     node[:4] = start
     bounds = np.array([guard.rate, guard.dwell])
     parts, steps, size, code = [node[None]], 0, _FIRST, FULL
-    memory = np.concatenate([[0.0, 0.0, 0.05], np.full(guard.window, -math.inf)])
+    memory = np.concatenate([[0.0, 0.0, 0.0], np.full(guard.window, -math.inf)])
     while code == FULL:
         room = np.empty((size, 8))
         count, code, taken = advance(data, node, end, bounds, tolerance, guard.steps - steps, room, memory)

@@ -65,7 +65,7 @@ class Tribometer:
     >>> [event.name for event in motion.events]
     ['SLIP(-1)', 'STICK', 'SLIP(-1)', 'STICK']
     >>> round(motion.events[0].time, 12)
-    0.36531187971
+    0.365311879706
     """
 
     mass: float = 1.0

@@ -142,3 +142,45 @@ def test_tie_between_stick_and_slip_is_flagged():
     assert motion.status is RunStatus.UNRELIABLE
     assert np.isnan(motion.error)
     assert "rounding" in motion.statement
+
+
+def test_storm_of_a_very_stiff_undamped_spring():
+    motion = CRANK.stiffened(1e6, scaled_damping=False).event_driven(2.0, estimate=False)
+    assert motion.status is RunStatus.STORM
+    assert 1.0 < motion.end < 2.0
+    assert "Event storm" in motion.statement
+    assert "time_stepping" in motion.statement
+
+
+def test_distance_to_the_limit_shrinks():
+    gaps = []
+    for factor in (1.0, 1e2, 1e4, 1e6):
+        model = CRANK.stiffened(factor)
+        motion = model.event_driven(2.4, times=[2.4], estimate=False)
+        gaps.append(abs(float(model.stiffness * motion.x2[0] / model.normal - model.limit_force(2.4))))
+    assert gaps[3] < gaps[2] < gaps[1] < gaps[0]
+    assert gaps[3] == pytest.approx(0.250013188262 - 0.250013187863, abs=2e-12)
+
+
+def test_capture_may_pass_through_to_the_other_direction():
+    """A stiff spring, pulled far: the platform crosses the velocity of the belt without sticking."""
+    model = Tribometer(law=PLAIN, drive=BeltDrive(0.1), x2=0.05, v2=0.0)
+    motion = model.event_driven(3.0)
+    states = [1, *(event.state for event in motion.events)]
+    assert -1 in states[:3]
+    assert states[1] == -1 or states[2] == -1
+    assert motion.complete
+    assert motion.energy_residual < 1e-13
+    stepped = model.time_stepping(3.0, step=1e-5, times=motion.t)
+    assert np.abs(stepped.x2 - motion.x2).max() < 1e-5
+
+
+def test_long_resumed_run_equals_a_run_in_one_piece(monkeypatch):
+    """Runs with more nodes than fit go on where they stopped, to the bit."""
+    from graphsynth.dynamics import events
+
+    whole = CRANK.event_driven(5.0, estimate=False)
+    monkeypatch.setattr(events, "_FIRST", 7)
+    monkeypatch.setattr(events, "_LARGEST", 7)
+    pieces = CRANK.event_driven(5.0, estimate=False)
+    assert np.array_equal(whole.path.nodes, pieces.path.nodes)

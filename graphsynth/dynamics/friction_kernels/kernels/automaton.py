@@ -200,10 +200,10 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
     closed, bound = parameters_are_closed(p), p[STATIC] * p[NORMAL]
     largest = SLIP_STEP * min(math.sqrt(p[MASS] / p[STIFFNESS]), pace(p))
     count = steps = 0
-    events, short, h = int(memory[0]), memory[1], memory[2] * largest
+    events, short, h = int(memory[0]), memory[1], memory[2] if memory[2] > 0.0 else 0.05 * largest
     while t < end:
         if count + 2 > nodes.shape[0]:
-            memory[0], memory[1], memory[2] = events, short, h / largest
+            memory[0], memory[1], memory[2] = events, short, h
             return count, FULL, steps
         if steps > limit:
             return count, STEP_LIMIT, steps
