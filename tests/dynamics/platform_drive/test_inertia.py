@@ -119,7 +119,7 @@ def test_samples_that_do_not_resolve_are_refused():
         EffectiveInertia.of_samples(np.exp(np.sin(3 * q)))
     good = EffectiveInertia.of_samples(2.0 * np.sin(q))
     assert good.dead_centres == pytest.approx((0.0, math.pi)) or good.dead_centres == pytest.approx((-math.pi, 0.0))
-    with pytest.raises(GeometryError, match="branch ends|home branch"):
+    with pytest.raises(GeometryError, match=r"branch ends|home branch"):
         EffectiveInertia.of_platform(SingleMotorPlatform(crank=(31, 31, 31)), 1.0, 0.02)
     with pytest.raises(SpecError, match="mass = -1"):
         EffectiveInertia.of_platform(SingleMotorPlatform(), -1.0, 0.02)

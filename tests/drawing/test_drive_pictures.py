@@ -1,0 +1,88 @@
+"""Pictures of drives: what is drawn is what was computed, units on the axes, failures visible."""
+
+from __future__ import annotations
+
+import io
+import math
+
+import numpy as np
+import pytest
+
+from graphsynth.drawing.drive_pictures import (
+    drive_curves,
+    reduction_picture,
+    resistance_picture,
+    sensor_picture,
+    start_up_picture,
+)
+from graphsynth.dynamics.braider.model import Braider
+from graphsynth.dynamics.braider.reactions import reactions
+from graphsynth.dynamics.motors import DCMotor
+from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
+from graphsynth.dynamics.platform_drive.resistance import resistance_effect
+from graphsynth.errors import SpecError
+
+DRIVE = MotorDrivenPlatform.source(DCMotor(5.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
+
+
+def drawn(figure) -> bytes:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=50)
+    return stream.getvalue()
+
+
+def test_drive_curves_show_every_run() -> None:
+    times = np.linspace(0.0, 1.0, 101)
+    runs = {"whole": DRIVE.simulate(times), "stopped": DRIVE.simulate(times, max_steps=120)}
+    figure = drive_curves(runs)
+    torque, speed = figure.axes
+    assert (torque.get_ylabel(), speed.get_ylabel()) == ("torque [N m]", "crank speed [rad/s]")
+    np.testing.assert_array_equal(torque.lines[0].get_ydata(), runs["whole"].motor_torque)
+    np.testing.assert_array_equal(speed.lines[1].get_ydata(), runs["stopped"].speed)
+    assert len(speed.lines) == 3  # the end of the failed run is marked
+    assert len(drawn(figure)) > 5000
+    with pytest.raises(SpecError, match="no run"):
+        drive_curves({})
+
+
+def test_resistance_picture_marks_the_criterion() -> None:
+    effect = resistance_effect(DRIVE, [1.0, 5.0], simulate=True)
+    figure = resistance_picture({"L = 0.2 H": effect})
+    chart, ripples = figure.axes[:2]
+    assert any(line.get_xdata()[0] == pytest.approx(1 / math.sqrt(2)) for line in chart.lines)
+    np.testing.assert_array_equal(ripples.lines[0].get_ydata(), effect.speed)
+    np.testing.assert_array_equal(ripples.lines[1].get_ydata(), effect.simulated_speed)
+    assert len(drawn(figure)) > 5000
+    with pytest.raises(SpecError, match="no effect"):
+        resistance_picture({})
+
+
+def test_reduction_picture_is_log_log() -> None:
+    study = DRIVE.inductance_study([0.0, 0.02, 0.05], [1e-4, 1e-5, 1e-6])
+    axes = reduction_picture(study).axes[0]
+    assert axes.get_xscale() == axes.get_yscale() == "log"
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), study.speed)
+
+
+def test_start_up_picture_names_the_settling_time() -> None:
+    braider = Braider()
+    run = braider.simulate(np.linspace(0.0, 0.3, 601), estimate=False)
+    figure = start_up_picture(braider, run)
+    assert figure.axes[0].texts[0].get_text() == "within ±2 % from 0.108 s"
+    assert len(figure.axes[1].lines) == 2 and len(figure.axes[2].lines) == 3
+
+
+def test_sensor_picture_shows_four_joints() -> None:
+    braider = Braider()
+    found = reactions(braider, np.linspace(0.0, math.tau, 91), 1.803, 0.0)
+    figure = sensor_picture(braider, found)
+    rates, forces, paths, torque = figure.axes
+    assert len(rates.lines) == len(forces.lines) == len(paths.lines) == 4
+    np.testing.assert_array_equal(forces.lines[3].get_ydata(), np.hypot(*found.F03.T))
+    np.testing.assert_array_equal(torque.lines[0].get_ydata(), found.torque)
+    # the relative velocities around the loop add up to nothing
+    loop = rates.lines[0].get_ydata() + rates.lines[1].get_ydata() + rates.lines[2].get_ydata()
+    np.testing.assert_allclose(loop, rates.lines[3].get_ydata(), atol=1e-14)
+    timed = sensor_picture(braider, found, time=np.linspace(0.0, 1.0, 91))
+    assert timed.axes[0].get_xlabel() == "time [s]"
+    assert len(drawn(figure)) > 5000
