@@ -55,14 +55,27 @@ def quadratic_roots(coefficients: tuple[float, float, float, float, float]) -> l
         return c0 + c1 * math.cos(t) + s1 * math.sin(t) + c2 * math.cos(2 * t) + s2 * math.sin(2 * t)
 
     critical = _critical_points(c1, s1, c2, s2)
-    found = [TrigRoot(t, 2) for t in critical if abs(value(t)) <= TOUCH * size]
-    marks = sorted({*critical, *np.linspace(-math.pi, math.pi, 17)[1:].tolist()})
+    double = [t for t in critical if abs(value(t)) <= TOUCH * size]
+    found = [TrigRoot(t, 2) for t in double]
+
+    def touched(t: float, distance: float = 1e-9) -> bool:
+        return any(abs(math.remainder(t - other, math.tau)) < distance for other in double)
+
+    # around a double root the sign is rounding noise: no mark there but the root itself
+    even = [t for t in np.linspace(-math.pi, math.pi, 17)[1:].tolist() if not touched(t, 1e-3)]
+    marks = sorted({*critical, *even})
     for left, right in zip([marks[-1] - math.tau, *marks[:-1]], marks):
         f, g = value(left), value(right)
-        near_double = any(min(abs(left - t), abs(right - t)) < 1e-9 for t in critical if abs(value(t)) <= TOUCH * size)
-        if not near_double and (f < 0.0 < g or g < 0.0 < f):
+        if touched(left) or touched(right):
+            # beside a double root the sign is that of the other end: an odd number of changes is left to it
+            near, far = (left, right) if touched(left) else (right, left)
+            inner = value(near + math.copysign(1e-4, far - near)) if abs(far - near) > 1e-3 else 0.0
+            if not touched(far) and inner * value(far) < 0.0:
+                low, high = sorted((near + math.copysign(1e-4, far - near), far))
+                found.append(TrigRoot(_wrap(brentq(value, low, high, xtol=4e-16, rtol=8.9e-16)), 1))
+        elif f < 0.0 < g or g < 0.0 < f:
             found.append(TrigRoot(_wrap(brentq(value, left, right, xtol=4e-16, rtol=8.9e-16)), 1))
-        elif g == 0.0 and not near_double:
+        elif g == 0.0:
             found.append(TrigRoot(_wrap(right), 1))
     return sorted(found)
 
@@ -74,9 +87,9 @@ def _critical_points(c1: float, s1: float, c2: float, s2: float) -> list[float]:
         [s2 + 1j * c2, 0.5 * (s1 + 1j * c1), 0.0, 0.5 * (s1 - 1j * c1), s2 - 1j * c2]
     )
     largest = np.abs(polynomial).max()
-    if largest == 0.0:
+    if largest < 1e-280:
         return []
-    z = np.roots(np.where(np.abs(polynomial) < 1e-300, 0.0, polynomial / largest))
+    z = np.roots(np.where(np.abs(polynomial) < 1e-30 * largest, 0.0, polynomial / largest))
     points: list[float] = []
     for t in np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-4]).tolist():
         for _ in range(3):

@@ -259,3 +259,23 @@ def test_special_roots():
     touching = quadratic_roots((1.0, -1.0, 0.0, 0.0, 0.0))
     assert [(abs(round(r.angle, 7)), r.order) for r in touching] == [(0.0, 2)]
     assert quadratic_roots((0.0, 0.0, 0.0, 0.0, 0.0)) == []
+    # double root at pi, where the turn closes, and two simple ones
+    mixed = quadratic_roots((0.0, -1.0, 0.0, -1.0, -1e-100))
+    assert [(round(abs(math.degrees(r.angle)), 6), r.order) for r in mixed] == [(60.0, 1), (60.0, 1), (180.0, 2)]
+
+
+@settings(deadline=None)
+@given(st.floats(-3.14, 3.14), st.floats(-3.14, 3.14), st.floats(-3.14, 3.14))
+def test_known_roots(p, q, r):
+    """(1 - cos(t - p)) (cos(t - m) - cos d): a double root at p, simple ones at m +- d."""
+    m, d = 0.5 * (q + r), 0.5 * (q - r)
+    gaps = [abs(math.remainder(x - y, math.tau)) for x, y in ((p, q), (p, r), (q, r))]
+    assume(min(gaps) > 0.05)
+    t = np.linspace(0.0, math.tau, 5, endpoint=False)
+    heights = (1.0 - np.cos(t - p)) * (np.cos(t - m) - math.cos(d))
+    basis = np.stack([np.ones(5), np.cos(t), np.sin(t), np.cos(2 * t), np.sin(2 * t)], 1)
+    roots = quadratic_roots(tuple(np.linalg.solve(basis, heights).tolist()))
+    assert sorted(root.order for root in roots) == [1, 1, 2]
+    for root in roots:
+        wanted = [p] if root.order == 2 else [q, r]
+        assert min(abs(math.remainder(root.angle - x, math.tau)) for x in wanted) < (1e-6 if root.order == 2 else 1e-11)
