@@ -63,14 +63,6 @@ class Train:
         driven_teeth, driving_teeth = math.prod(s[1] for s in stages), math.prod(s[0] for s in stages)
         return cls(driven_teeth / driving_teeth, math.prod(efficiency), inertia)
 
-    @property
-    def self_locking(self) -> bool:
-        """Whether a train of two equal halves would lock when driven from the output (efficiency of 1/2 or less).
-
-        An indication only: the model with the efficiency of each direction never locks by itself.
-        """
-        return self.efficiency <= 0.5
-
     def output_torque(self, torque: float, speed: float) -> float:
         """Torque at the output for a motor torque (N m) at a motor speed (rad/s): the sign of the power decides."""
         eta = self.efficiency if torque * speed >= 0.0 else 1.0 / self.efficiency

@@ -38,6 +38,10 @@ class RunStatus(IntEnum):
     CHANGE_POINT = 5
 
 
+#: status, states, turns, balances, marks of events, counts, last state
+_Raw = tuple[RunStatus, Array, NDArray[np.int64], Array, Array, NDArray[np.int64], Array]
+#: relative defect of the energy above which a result carries a warning
+_WARN = 1e-9
 _REASONS = {
     RunStatus.DONE: "",
     RunStatus.STEP_TOO_SMALL: "the step size vanished at t = {t:.6g} s: the model is singular there, or the tolerance "
@@ -151,29 +155,32 @@ def run(
     SpecError
         Bad numbers; friction, no inductance or no rotor inertia where the form chosen cannot have it.
     """
-    from graphsynth.dynamics.platform_drive.kernels import radau
-
     begin = perf_counter()
     out = output_times(times)
     number("rtol", rtol)
     if not 1e-13 <= rtol <= 1e-3:
         raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
     ready = prepare(plant, motor, train, out, angle, speed, currents, regular)
-    n = ready.start.size
-    results = []
-    for tolerance in (rtol, min(100.0 * rtol, 1e-2)) if estimate else (rtol,):
-        state, values, setup = ready.start.copy(), ready.values.copy(), ready.setup.copy()
-        Y, turns = np.full((out.size, n), np.nan), np.zeros(out.size, np.int64)
-        balance, marks = np.full((out.size, 6), np.nan), np.full((max_events, 3 + n), np.nan)
-        counts = np.zeros(4, np.int64)
-        status = radau.integrate(
-            setup, values, ready.rows, ready.zeros, state, out, tolerance, ready.scale, ready.first, int(max_steps),
-            Y, turns, balance, marks, counts,
-        )  # fmt: skip
-        results.append((RunStatus(status), Y, turns, balance, marks, counts, state))
-    status, Y, turns, balance, marks, counts, state = results[0]
-    error = _difference(results, ready, plant, regular) if estimate else np.full(n, np.nan)
+    tolerances = (rtol, min(100.0 * rtol, 1e-2)) if estimate else (rtol,)
+    results = [_integrate(ready, out, tolerance, max_steps, max_events) for tolerance in tolerances]
+    error = _difference(results, ready, plant, regular) if estimate else np.full(ready.start.size - regular, np.nan)
     return _result(ready, plant, motor, train, out, results[0], error, regular, rtol, perf_counter() - begin, notes)
+
+
+def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_events: int) -> _Raw:
+    """One run of the compiled integrator on copies of everything it changes."""
+    from graphsynth.dynamics.platform_drive.kernels import radau
+
+    n = ready.start.size
+    state, values, setup = ready.start.copy(), ready.values.copy(), ready.setup.copy()
+    Y, turns = np.full((out.size, n), np.nan), np.zeros(out.size, np.int64)
+    balance, marks = np.full((out.size, 6), np.nan), np.full((max_events, 3 + n), np.nan)
+    counts = np.zeros(4, np.int64)
+    status = radau.integrate(
+        setup, values, ready.rows, ready.zeros, state, out, rtol, ready.scale, ready.first, int(max_steps),
+        Y, turns, balance, marks, counts,
+    )  # fmt: skip
+    return RunStatus(status), Y, turns, balance, marks, counts, state
 
 
 def _physical(Y: Array, turns: NDArray[np.int64], ready: Prepared, regular: bool) -> tuple[Array, Array, Array]:
@@ -190,7 +197,7 @@ def _physical(Y: Array, turns: NDArray[np.int64], ready: Prepared, regular: bool
     return angle, Y[:, 1].copy(), np.asarray(root * Y[:, 1])
 
 
-def _difference(results: list[tuple[RunStatus, Array, NDArray[np.int64], Array, Array, NDArray[np.int64], Array]],
+def _difference(results: list[_Raw],
                 ready: Prepared, plant: Plant, regular: bool) -> Array:  # fmt: skip
     """Largest differences of angle, sqrt(J) w over the largest sqrt(J), and currents between two runs."""
     n = ready.start.size - int(regular)
@@ -210,7 +217,7 @@ def _largest_root(plant: Plant) -> float:
 
 def _result(
     ready: Prepared, plant: Plant, motor: Motor, train: Train, out: Array,
-    found: tuple[RunStatus, Array, NDArray[np.int64], Array, Array, NDArray[np.int64], Array],
+    found: _Raw,
     error: Array, regular: bool, rtol: float, seconds: float, notes: tuple[str, ...],
 ) -> DriveRun:  # fmt: skip
     status, Y, turns, balance, marks, counts, state = found
@@ -225,6 +232,12 @@ def _result(
     at = float(state[-1]) if regular else float(marks[counts[2] - 1, 1]) if counts[2] else math.nan
     at = max(at, float(out[max(reached - 1, 0)])) if at == at else float(out[max(reached - 1, 0)])
     reason = _REASONS[status].format(t=at, steps=int(counts[0] + counts[1]), events=len(marks))
+    if status is RunStatus.TOO_MANY_EVENTS and (marks[-20:, 0] == 5).any() and (marks[-20:, 0] == 3).any():
+        reason += (
+            f"; the train (efficiency {train.efficiency:g}) holds the mechanism at rest: neither torque overcomes it"
+        )
+    if max(energy, electric) > _WARN:
+        notes = (*notes, f"the energy balance is off by {max(energy, electric):.1e}; tighten rtol")
     unit = "currents negligible" if currents.shape[1] == 0 else f"{currents.shape[1]} current(s)"
     name = "S (regularised, without inertia)" if regular else "J (with inertia)"
     return DriveRun(

@@ -150,6 +150,34 @@ def test_efficiency_follows_the_direction_of_the_power():
     assert found.energy_error < 1e-12
 
 
+def test_train_that_holds_the_mechanism_says_so():
+    """A load between eta M and M / eta keeps a driven mechanism at rest: reported, not simulated as a chatter."""
+    inertia = EffectiveInertia.of_slider(2.0, 0.05)
+    drive = MotorDrivenPlatform(inertia, IdealTorque(0.5), Train(1.0, 0.7), base_inertia=0.002, load=0.5)
+    found = drive.simulate([0.0, 0.5], speed=3.0, estimate=False)
+    assert not found.complete and "holds the mechanism at rest" in found.reason
+
+
+def test_loose_tolerance_that_spoils_the_energy_is_noted():
+    found = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, **DC)).simulate([0.0, 2.0], rtol=1e-3)
+    assert found.energy_error > 1e-9 and any("energy balance" in note for note in found.notes)
+    good = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, **DC)).simulate([0.0, 2.0])
+    assert good.energy_error < 1e-12 and not good.notes
+
+
+@pytest.mark.parametrize("inductance", [1e-3, 1e-7, 1e-12])
+def test_voltage_limit_with_any_inductance(inductance):
+    """The current follows the limited voltage algebraically as L falls: speed from the first-order limit equation."""
+    motor = DCMotor(1.0, inductance, **DC, voltage_limit=24.0)
+    drive = MotorDrivenPlatform.source(motor, mass=0.0)
+    found = drive.simulate([0.0, 0.01, 1.0], reduce=False)
+    # 24 V until the controller asks for less:  J w' = K_m (24 - c_e w) / r, delayed by L / r
+    limited = -240.0 * math.expm1(-0.1 * 0.1 * 0.01 / 0.002)
+    assert found.speed[1] == pytest.approx(limited, abs=1.2 * 1200.0 * inductance + 1e-9)
+    assert found.complete and found.speed[2] == pytest.approx(400.0 / 20.1, rel=1e-9)
+    assert found.currents[2, 0] == pytest.approx(0.0, abs=1e-7)
+
+
 def test_large_ratio_reports_the_reflected_inertia():
     motor = DCMotor(1.0, 0.01, 0.1, 0.1, 20.0, 2000.0, rotor_inertia=1e-6)
     drive = MotorDrivenPlatform(EffectiveInertia.of_slider(2.0, 0.05), motor, Train(1e3))

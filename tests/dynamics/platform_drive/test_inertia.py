@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,7 +80,7 @@ def test_reference_point_of_the_specification():
 
 def test_real_geometry_with_and_without_rotor():
     motor = DCMotor(10.0, 1.0, 0.1, 0.1, 20.0, 20.0)
-    times = np.linspace(0.0, 1.0, 5)
+    times = [0.0, 0.2, 0.4]
     machine = SingleMotorPlatform(phase=LEGS)
     free = MotorDrivenPlatform.of_machine(machine, motor, mass=0.5, gyration=0.02)
     assert free.train.ratio == 2.0 and free.constant_inertia == 0.0
@@ -87,11 +88,9 @@ def test_real_geometry_with_and_without_rotor():
     assert source.model.startswith("S") and source.complete and source.energy_error < 1e-12
     assert {event.kind for event in source.events} >= {"dead centre"}
     gaps = []
-    for rotor in (1e-9, 1e-11, 1e-13):
-        from dataclasses import replace
-
+    for rotor in (1e-8, 1e-10, 1e-12):
         drive = replace(free, motor=replace(motor, rotor_inertia=rotor))
-        found = drive.simulate(times, angle=0.3, speed=1.0, rtol=1e-11)
+        found = drive.simulate(times, angle=0.3, speed=1.0, rtol=1e-10, estimate=False)
         assert found.model.startswith("J") and found.energy_error < 1e-11
         gaps.append(abs(found.angle[1] - source.angle[1]))
     assert gaps[0] > gaps[1] > gaps[2]
