@@ -12,6 +12,8 @@ __all__ = ["TrigRoot", "quadratic_roots", "sinusoid_roots"]
 
 #: A local extremum of this part of the sum of the coefficients counts as a double root.
 TOUCH = 1e-13
+#: The turn is cut here beyond pi, at no special angle, so that no root of a simple problem lies on the cut.
+SEAM = 0.0123456789
 
 
 class TrigRoot(NamedTuple):
@@ -62,8 +64,8 @@ def quadratic_roots(coefficients: tuple[float, float, float, float, float]) -> l
         return any(abs(math.remainder(t - other, math.tau)) < distance for other in double)
 
     # around a double root the sign is rounding noise: no mark there but the root itself
-    even = [t for t in np.linspace(-math.pi, math.pi, 17)[1:].tolist() if not touched(t, 1e-3)]
-    marks = sorted({*critical, *even})
+    even = [t for t in (np.linspace(-math.pi, math.pi, 17)[1:] + SEAM).tolist() if not touched(t, 1e-3)]
+    marks = sorted({*(t if t > SEAM - math.pi else t + math.tau for t in critical), *even})
     for left, right in zip([marks[-1] - math.tau, *marks[:-1]], marks):
         f, g = value(left), value(right)
         if touched(left) or touched(right):
