@@ -17,7 +17,7 @@ from graphsynth.errors import GeometryError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.kinematics.pointing.comparison import Reading
+    from graphsynth.kinematics.pointing.comparison import ModelComparison, Reading
     from graphsynth.kinematics.pointing.mechanism import PointingMechanism
     from graphsynth.kinematics.pointing.results import Poses
 
@@ -198,10 +198,7 @@ def comparison_picture(
         axes.plot(degrees, np.degrees(found.a[which]), color=_LEG_Y, lw=1.8, label="1 about X (elevation)")
         axes.plot(degrees, np.degrees(found.b[which]), color=_LEG_X, lw=1.8, ls="--", label="2 about Y (azimuth)")
         axes.set_title(name, fontsize=10)
-    means = np.degrees(found.means)
-    panels[2].plot(degrees, means[1], color=LIGHT["d"], lw=1.8, label=f"3 mean, order {other.order}")
-    panels[2].plot(degrees, means[0], color=LIGHT["c"], lw=1.8, ls="--", label=f"4 mean, order {mechanism.order}")
-    panels[2].set_title("c: means of both models", fontsize=10)
+    _means(panels[2], degrees, found, (mechanism.order, other.order))
     for axes in panels:
         axes.axvline(15.0, color=_REST, lw=0.8, ls=":")
         axes.grid(alpha=0.25)
@@ -209,19 +206,29 @@ def comparison_picture(
         axes.set_xlim(0.0, degrees[-1])
         axes.set_ylim(bottom=0.0)
     panels[0].set_ylabel("reflector angle [deg]")
-    difference = found.arcminutes
-    twin = panels[2].twinx()
+    for axes in panels[:2]:
+        axes.legend(loc="upper left", fontsize=8, frameon=False)
+    return figure
+
+
+def _means(axes: Any, degrees: Array, found: ModelComparison, orders: tuple[str, str]) -> None:
+    """Draw the means of both models and, on an axis of its own, their difference."""
+    means, difference = np.degrees(found.means), found.arcminutes
+    axes.plot(degrees, means[1], color=LIGHT["d"], lw=1.8, label=f"3 mean, order {orders[1]}")
+    axes.plot(degrees, means[0], color=LIGHT["c"], lw=1.8, ls="--", label=f"4 mean, order {orders[0]}")
+    axes.set_title("c: means of both models", fontsize=10)
+    own = axes.get_lines()[-2:]
+    twin = axes.twinx()
     twin.plot(degrees, difference, color=LIGHT["note"], lw=1.2, label="difference")
     twin.set_ylabel("difference of means [arc-minutes]", color=LIGHT["note"])
-    twin.set_ylim(0.0, 4.0 * max(1.0, float(np.nanmax(np.abs(difference)))))
+    seen = difference[np.isfinite(difference)]
+    size = max(1.0, float(np.abs(seen).max(initial=0.0)))
+    twin.set_ylim((-1.2 * size if seen.min(initial=0.0) < -0.05 * size else 0.0), 4.0 * size)
     if np.isfinite(difference[-1]):
         text = f"{difference[-1]:.2f}′"
         twin.annotate(text, (degrees[-1], difference[-1]), (-6, 8), textcoords="offset points", ha="right", fontsize=9)
-    for axes in panels[:2]:
-        axes.legend(loc="upper left", fontsize=8, frameon=False)
-    lines = [*panels[2].get_lines()[:2], *twin.get_lines()]
-    panels[2].legend(lines, [line.get_label() for line in lines], loc="upper left", fontsize=8, frameon=False)
-    return figure
+    lines = [*own, *twin.get_lines()]
+    axes.legend(lines, [line.get_label() for line in lines], loc="upper left", fontsize=8, frameon=False)
 
 
 def _span(span: float) -> float:
