@@ -130,6 +130,22 @@ def test_model_s_is_the_limit_of_model_j(model_s):
     assert gaps[0] > 10 * gaps[1] > 100 * gaps[2] > 0.0
 
 
+def test_inertia_down_to_1e_minus_14(model_s):
+    """Spikes of 4e6 rad/s at dead centres; the distance to model S falls about in proportion to J_0.
+
+    The angle is rounded to 2e-16 while the spike is sqrt(J_0 / (m L^2)) wide: that limits the energy balance.
+    """
+    gaps, peaks = [], []
+    for base in (1e-10, 1e-12, 1e-14):
+        drive = SOURCE(motor(10.0, 1.0), base_inertia=base)
+        found = drive.simulate([0.0, DEAD[0][1], 0.2], speed=1.0, rtol=1e-11, estimate=False)
+        assert found.complete and found.energy_error < 1e-12 + 2.3e-16 / math.sqrt(base / 0.005)
+        gaps.append(abs(found.angle[-1] - model_s.angle[2]))
+        peaks.append(found.speed[1])
+    assert gaps[0] > 50 * gaps[1] > 2500 * gaps[2]
+    assert peaks[0] > 5e4 and peaks[1] > 4e5 and peaks[2] > 4e6
+
+
 def test_stiff_limits_cost_the_same_and_are_of_first_order():
     study = SOURCE(motor()).inductance_study([0.0, 0.02, 0.05], [10.0**-k for k in range(3, 13)])
     assert study.steps.max() < 250

@@ -6,6 +6,22 @@ from graphsynth.compilation import kernel
 
 
 @kernel
+def clear(M):
+    """Fill with zeros (a slice assignment takes far longer to compile)."""
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            M[i, j] = 0.0
+
+
+@kernel
+def copy(M, out):
+    """Copy ``M`` into ``out``."""
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            out[i, j] = M[i, j]
+
+
+@kernel
 def factorise(M, order):
     """LU factors with row exchange in place; False for a singular matrix."""
     m = M.shape[0]

@@ -10,7 +10,7 @@ import numpy as np
 
 from graphsynth.compilation import kernel
 from graphsynth.dynamics.platform_drive.kernels.coefficients import ERROR, SHIFT, STAGES, A, C
-from graphsynth.dynamics.platform_drive.kernels.linear import factorise, norm, substitute
+from graphsynth.dynamics.platform_drive.kernels.linear import clear, copy, factorise, norm, substitute
 from graphsynth.dynamics.platform_drive.kernels.systems import (
     DIRECT,
     DRIVING,
@@ -51,13 +51,15 @@ def attempt(setup, P, V, y, h, f0, jac, unit, kappa, Z, F, tmp):
         M[a, a] += 1.0
     if not factorise(M, order):
         return -1.0
-    v, stage = np.empty(m), np.empty(n)
+    v, stage, f = np.empty(m), np.empty(n), np.empty(n)
     before, ratio, solved = 0.0, 1.0, False
     for step in range(15):
         for i in range(STAGES):
             for a in range(n):
                 stage[a] = y[a] + Z[i, a]
-            field(setup, P, V, stage, F[i], tmp)
+            field(setup, P, V, stage, f, tmp)
+            for a in range(n):
+                F[i, a] = f[a]
         for i in range(STAGES):
             for a in range(n):
                 value = -Z[i, a]
@@ -157,7 +159,8 @@ def locate(code, target, setup, P, V, y, h, last, f0, jac, unit, kappa, Z, F, tm
     end = np.empty(n)
     low, high = 0.0, h
     at_low, at_high = min(passed(code, setup, P, y, y, target), 0.0), last
-    kept = Z.copy()
+    kept = np.empty((STAGES, n))
+    copy(Z, kept)
     side, best = 0, h
     for step in range(60):
         if step < 40 and at_low < 0.0:
@@ -167,7 +170,7 @@ def locate(code, target, setup, P, V, y, h, last, f0, jac, unit, kappa, Z, F, tm
         middle = min(max(middle, low + 1e-16 * h), high)
         if middle <= low or middle >= high:
             break
-        Z[:] = 0.0
+        clear(Z)
         if attempt(setup, P, V, y, middle, f0, jac, unit, kappa, Z, F, tmp) < 0.0:
             return -1.0
         for a in range(n):
@@ -176,7 +179,7 @@ def locate(code, target, setup, P, V, y, h, last, f0, jac, unit, kappa, Z, F, tm
         if value > 0.0:
             narrow = best - middle
             high, at_high, best = middle, value, middle
-            kept[:] = Z
+            copy(Z, kept)
             if side == 1:
                 at_low *= 0.5
             side = 1
@@ -188,10 +191,10 @@ def locate(code, target, setup, P, V, y, h, last, f0, jac, unit, kappa, Z, F, tm
             side = -1
         if high - low <= 4e-16 * h or (value == 0.0 and code != STALL) or narrow <= 1e-17 * h:
             if value == 0.0:
-                kept[:] = Z
+                copy(Z, kept)
                 best = middle
             break
-    Z[:] = kept
+    copy(kept, Z)
     return best
 
 
@@ -267,7 +270,8 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
     f0, work, unit, low, amount = np.empty(n), np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
     jac, Z, guess, F = np.empty((n, n)), np.zeros((STAGES, n)), np.zeros((STAGES, n)), np.empty((STAGES, n))
     sums, stage = np.zeros(4), np.empty(n)
-    codes = np.array([OUTPUT, DEAD_CENTRE]) if regular else np.array([LIMIT, FLOW])
+    codes = np.empty(3, np.int64)
+    codes[0], codes[1], codes[2] = (OUTPUT, DEAD_CENTRE, STALL) if regular else (LIMIT, FLOW, STALL)
     kappa = max(10.0 * 2.3e-16 / rtol, min(0.01, math.sqrt(rtol)))
     x, wound, piece, target_index = outs[0], 0, 0, 0
     wanted, h, old = first, first, 0.0
@@ -275,9 +279,11 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
     fresh = True
     while True:
         while target_index < outs.size and (y[n - 1] if regular else x) >= outs[target_index]:
-            Y[target_index] = y
+            for a in range(n):
+                Y[target_index, a] = y[a]
             turns[target_index] = wound
-            balance[target_index, :4] = sums
+            for k in range(4):
+                balance[target_index, k] = sums[k]
             balance[target_index, 4], balance[target_index, 5] = kinetic_energy(setup, P, V, y, tmp)
             target_index += 1
             counts[3] = target_index
@@ -301,7 +307,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             if not h > 1e-30 * span or h <= 1e-17 * abs(x):
                 return STEP_TOO_SMALL
             if fresh or h > 20.0 * old:
-                guess[:] = 0.0
+                clear(guess)
             else:
                 extrapolate(Z, h / old, guess)
             error = attempt(setup, P, V, y, h, f0, jac, unit, kappa, guess, F, tmp)
@@ -317,7 +323,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
         trial = h
         for a in range(n):
             stage[a] = y[a] + guess[STAGES - 1, a]
-        for code in (codes[0], codes[1], STALL):
+        for code in codes:
             value = passed(code, setup, P, stage, y, goal)
             if value > 0.0:
                 found = locate(code, goal, setup, P, V, y, h, value, f0, jac, unit, kappa, guess, F, tmp)
@@ -337,7 +343,7 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             field(setup, P, V, stage, work, tmp)
             for k in range(4):
                 sums[k] += h * A[STAGES - 1, i] * tmp[11 + k]
-        Z[:] = guess
+        copy(guess, Z)
         old, fresh = h, False
         for a in range(n):
             amount[a] = Z[STAGES - 1, a]
@@ -354,9 +360,10 @@ def integrate(setup, P, V, zeros, y, outs, rtol, scale, first, most, Y, turns, b
             piece = react(happened, setup, P, y, zeros, piece)
             if happened == DEAD_CENTRE:
                 low[0] = 0.0
-            mark = marks[counts[2]]
-            mark[0], mark[1], mark[2] = happened, x, wound
-            mark[3 : 3 + n] = y
+            row = counts[2]
+            marks[row, 0], marks[row, 1], marks[row, 2] = happened, x, wound
+            for a in range(n):
+                marks[row, 3 + a] = y[a]
             counts[2] += 1
             fresh = True
         if not regular and abs(y[0]) > LEAST_ANGLE:
