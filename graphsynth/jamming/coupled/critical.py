@@ -13,24 +13,42 @@ __all__ = ["critical_range"]
 
 
 def critical_range(
-    bearing: Bearing, condition: str, tolerances: tuple[float, float, float], nominal: float
+    bearing: Bearing, condition: str, tolerances: tuple[float, float, float, float], nominal: float
 ) -> tuple[float, float]:
-    """Enclose the critical tilt for ``Rb``, ``Hb``, ``clearance`` within the tolerances (mm), from two corners."""
+    """Enclose the critical tilt for ``Rb``, ``Hb``, ``clearance``, ``hole_length`` within the tolerances (mm).
+
+    "A" and "B" from their two corners.  A pin in a hole ("general") touches where it would both as a short bearing and
+    as a long shaft in that hole, so that its critical tilt is the larger of the two; each is enclosed by itself.
+    """
     radius, height, clearance = (
         _around(name, value, tolerance)
         for name, value, tolerance in zip(
-            ("Rb", "Hb", "clearance"), (bearing.Rb, bearing.Hb, bearing.clearance), tolerances
+            ("Rb", "Hb", "clearance"), (bearing.Rb, bearing.Hb, bearing.clearance), tolerances[:3]
         )
     )
+    if condition != "general":
+        least, most = _over(radius, height, clearance, condition)
+    else:
+        assert bearing.hole_length is not None  # checked with the nominal tilt
+        hole = _around("hole_length", bearing.hole_length, tolerances[3])
+        ends = (_over(radius, height, clearance, "A"), _over(radius, hole, clearance, "B"))
+        least, most = (max(pair) for pair in zip(*ends))
+    return min(least, nominal), max(most, nominal)
+
+
+_Ends = tuple[Fraction, Fraction]
+
+
+def _over(radius: _Ends, height: _Ends, clearance: _Ends, condition: str) -> tuple[float, float]:
+    """Lower bound at the tightest corner, upper bound at the loosest one."""
     sense = 1 if condition == "A" else -1
-    least = _tilt(radius[::sense][0], height[1], clearance[0], condition)
-    most = _tilt(radius[::sense][1], height[0], clearance[1], condition)
-    return min(least[0], nominal), max(most[1], nominal)
+    least = _tilt(radius[::sense][0], height[1], clearance[0], condition)[0]
+    return least, _tilt(radius[::sense][1], height[0], clearance[1], condition)[1]
 
 
 def _around(name: str, value: float, tolerance: float) -> tuple[Fraction, Fraction]:
     low, high = Fraction(value) - Fraction(tolerance), Fraction(value) + Fraction(tolerance)
-    if low < 0 or (name == "Rb" and low == 0):
+    if low < 0 or (name in ("Rb", "hole_length") and low == 0):
         raise GeometryError(f"{name} = {value} mm with tolerance {tolerance} mm reaches {float(low)}; reduce it")
     return low, high
 

@@ -165,30 +165,31 @@ def bearing_limits(
     radius_tolerance: float = 0.0,
     height_tolerance: float = 0.0,
     clearance_tolerance: float = 0.0,
+    hole_tolerance: float = 0.0,
 ) -> JointLimits:
     """Limits of a bearing: its critical tilt, with a range that encloses it for all dimensions within tolerance.
 
     Parameters
     ----------
     bearing : Bearing
-    condition : {"A", "B"}
-        Contact condition; "general" is taken from its closed form without a proved range.
+    condition : {"A", "B", "general"}
+        Contact condition; "general" needs ``bearing.hole_length``.
     play : float
         Axial play, in the length unit of the mechanism.
-    radius_tolerance, height_tolerance, clearance_tolerance : float
-        Half widths in millimetres of ``Rb``, ``Hb`` and ``clearance``.
+    radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance : float
+        Half widths in millimetres of ``Rb``, ``Hb``, ``clearance`` and ``hole_length``.
 
     Returns
     -------
     JointLimits
-        ``tilt`` is infinite if there is no critical tilt.  The range is certified (outward rounding) for "A" and "B":
-        t_A grows with the clearance and the radius and falls with the height; t_B falls with the radius and the height
-        (specification, section 4.7).
+        ``tilt`` is infinite if there is no critical tilt.  The range is certified (outward rounding): t_A
+        grows with the clearance and the radius and falls with the height; t_B falls with the radius and the height; a
+        pin in a hole has the larger one of both (specification, sections 4.4 and 4.7).
 
     Raises
     ------
     GeometryError
-        For an interference fit, and for tolerances with condition "general".
+        For an interference fit, a tolerance that is negative or reaches zero, "general" without a hole length.
 
     Examples
     --------
@@ -196,20 +197,18 @@ def bearing_limits(
     0.006064396559156
     """
     choice("condition", condition, ("A", "B", "general"))
-    for name, value in (("radius", radius_tolerance), ("height", height_tolerance), ("clearance", clearance_tolerance)):
+    boxes = (radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance)
+    for name, value in zip(("radius", "height", "clearance", "hole"), boxes):
         if not 0.0 <= value < math.inf:
             raise GeometryError(f"{name}_tolerance = {value} must be zero or more; correct the value")
+    if hole_tolerance and condition != "general":
+        raise GeometryError(f'hole_tolerance = {hole_tolerance} needs condition "general"; condition is "{condition}"')
     critical = bearing.critical_tilt(condition)
     if bearing.clearance < 0.0:
         raise GeometryError(f"clearance = {bearing.clearance} mm is an interference fit; the joint cannot be assembled")
     tilt = math.inf if critical.angle is None or critical.reason else critical.angle
-    if condition == "general":
-        if radius_tolerance or height_tolerance or clearance_tolerance:
-            raise GeometryError('tolerances need condition "A" or "B"; "general" has no monotonic closed form')
-        return JointLimits(tilt, play, (tilt * (1.0 - 1e-12), tilt if tilt == math.inf else tilt * (1.0 + 1e-12)))
     from graphsynth.jamming.coupled.critical import critical_range
 
-    boxes = (radius_tolerance, height_tolerance, clearance_tolerance)
     return JointLimits(tilt, play, critical_range(bearing, condition, boxes, tilt))
 
 

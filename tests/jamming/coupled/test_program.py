@@ -2,6 +2,7 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 from coupled_oracles import driven_pair, embodied, four_bar, polygon_bounds, single_loop
@@ -361,6 +362,37 @@ def test_bearing_ranges():
     assert bearing_limits(Bearing(Hb=1.0)).tilt == math.inf  # h^2 < c (2 R + c)
 
 
+def extent(R, half, hole, tilt):
+    """Largest half width of a tilted pin inside the slab of its hole (specification, section 4.4)."""
+    s, c = mpmath.sin(tilt), mpmath.cos(tilt)
+    if R * s >= half * c:
+        return mpmath.sqrt(R * R + half * half)
+    return R * c + half * s if half * c - R * s <= hole else (R + hole * s) / c
+
+
+def test_range_of_the_general_pin_is_proved():
+    """No pin within tolerance jams below the range, every one jams above it: 50 digits, 400 random pins."""
+    rng = np.random.default_rng(6)
+    with mpmath.workdps(50):
+        for _ in range(400):
+            R, H, c = rng.uniform(1, 20), rng.uniform(0.1, 30), rng.choice([rng.uniform(0, 0.5), 1e-6, 0.0])
+            hole = H * rng.choice([1.0, 1.0 - 1e-9, rng.uniform(0.05, 2.0)])
+            sizes = [rng.choice([0.0, 0.01 * rng.random()]) * value for value in (R, H, c, hole)]
+            names = ("radius_tolerance", "height_tolerance", "clearance_tolerance", "hole_tolerance")
+            low, high = bearing_limits(Bearing(R, H, c, hole), "general", **dict(zip(names, sizes))).tilt_range
+            if not any(sizes) and high < 1.5:
+                assert high - low <= 1e-14 * high
+            for _ in range(3):
+                r, h, g, s = (
+                    mpmath.mpf(v) + mpmath.mpf(t) * rng.choice([-1.0, 1.0, rng.uniform(-1, 1)])
+                    for v, t in zip((R, H, c, hole), sizes)
+                )
+                if low > 0.0:
+                    assert extent(r, h / 2, s / 2, min(mpmath.mpf(low), mpmath.pi / 2)) <= r + g + 1e-45
+                if high < 1.5:
+                    assert extent(r, h / 2, s / 2, mpmath.mpf(high)) >= r + g - 1e-45
+
+
 @pytest.mark.parametrize(
     ("make", "text"),
     [
@@ -370,6 +402,8 @@ def test_bearing_ranges():
         (lambda: Misalignment(0, 1, 1.0), "small tilt"),
         (lambda: bearing_limits(Bearing(clearance=-0.01)), "interference fit"),
         (lambda: bearing_limits(Bearing(), clearance_tolerance=0.05), "reaches"),
+        (lambda: bearing_limits(Bearing(), "general"), "hole_length"),
+        (lambda: bearing_limits(Bearing(), hole_tolerance=0.1), "hole_tolerance"),
         (lambda: problem(four_bar(), {}, Misalignment(0, 1, 0.1)), "no limits"),
         (lambda: problem(four_bar(), {(0, 2): RIGID}, Misalignment(0, 1, 0.1)), "does not exist"),
         (lambda: problem(four_bar(), RIGID, Misalignment(0, 2, 0.1)), "no joint"),
