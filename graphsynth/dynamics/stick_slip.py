@@ -55,8 +55,9 @@ class StickSlipMotion:
     guarantee : str
         "exact" (closed-form pieces joined at roots found to rounding) or "estimated".
     energy_residual : float
-        Largest ``|E(t) - E(0) - W(t)|`` over the larger of the range of ``E`` and the energy exchanged; NaN if not
-        known.  W is integrated beside the motion and not derived from it.
+        Largest ``|E(t) - E(0) - W(t)|`` over the larger of the range of ``E`` and the energy exchanged, at least a
+        ten-thousandth of ``E``; NaN if not known (regularised form).  W is integrated beside the motion and not derived
+        from it.
     friction_loss, drive_work, damper_loss : float
         Energies since the start, J; NaN if not known.
     evaluations : int
@@ -225,9 +226,10 @@ def _balance(model: Tribometer, path: EventPath) -> tuple[float, float, float, f
     energy = 0.5 * model.mass * nodes[:, 2] ** 2 + 0.5 * model.stiffness * nodes[:, 1] ** 2
     drive, heat, damped = nodes[:, 4], nodes[:, 5], nodes[:, 6]
     gap = np.abs(energy - energy[0] - (drive - heat - damped)).max()
-    # where next to nothing is exchanged, the rounding of the stored energy is no defect
-    exchanged = max(np.abs(np.diff(drive)).sum(), heat[-1], damped[-1], float(np.ptp(energy)), 1e-6 * energy.max())
-    return (float(gap / exchanged) if exchanged > 0.0 else 0.0), float(drive[-1]), float(heat[-1]), float(damped[-1])
+    # where next to nothing is exchanged, rounding is no defect
+    floor = max(1e-4 * energy.max(), 1e-12 * model.reach**2 * model.stiffness)
+    exchanged = max(np.abs(np.diff(drive)).sum(), heat[-1], damped[-1], float(np.ptp(energy)), floor)
+    return float(gap / exchanged), float(drive[-1]), float(heat[-1]), float(damped[-1])
 
 
 def _statement(motion: StickSlipMotion, duration: float, guard: EventGuard) -> str:

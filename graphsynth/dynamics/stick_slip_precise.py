@@ -211,6 +211,11 @@ class _Run:
             if V[n]:
                 h = min(h, (size * mpf(10) ** (-self.digits) / abs(V[n])) ** (mpf(1) / n))
         sliding = [self.state * (a - b) for a, b in zip(V1, V)][::-1]
+        while self.power:  # far from rest the series does not know the narrow rise of friction there
+            ahead = polyval(sliding, h)
+            if abs(ahead - sliding[-1]) <= self.vs + max(min(ahead, sliding[-1]), 0) / 2:
+                break
+            h /= 2
         low = mpf(0)
         for i in range(1, 33):
             high = h * i / 32

@@ -7,8 +7,9 @@ import pytest
 
 from graphsynth.dynamics.events import EventGuard, RunStatus
 from graphsynth.dynamics.friction import StribeckLaw, TwoCoefficientLaw
+from graphsynth.dynamics.stick_slip_precise import precise_motion
 from graphsynth.dynamics.tribometer import Tribometer
-from graphsynth.dynamics.tribometer_drives import BeltDrive, HarmonicDrive
+from graphsynth.dynamics.tribometer_drives import BeltDrive, CrankDrive, HarmonicDrive
 
 from . import printed
 
@@ -184,3 +185,15 @@ def test_long_resumed_run_equals_a_run_in_one_piece(monkeypatch):
     monkeypatch.setattr(events, "_LARGEST", 7)
     pieces = CRANK.event_driven(5.0, estimate=False)
     assert np.array_equal(whole.path.nodes, pieces.path.nodes)
+
+
+def test_narrow_peak_of_friction_is_not_jumped_over():
+    """Friction only near rest, passed in half a millisecond: a step from one side to the other would miss it."""
+    law = StribeckLaw(0.75, 0.0, 0.0078125)
+    model = Tribometer(mass=0.5, stiffness=10.0, law=law, drive=CrankDrive(0.0976562, 0.1953124, -13.0), x2=0.015625)
+    motion = model.event_driven(1.0, times=[1.0])
+    assert motion.complete
+    assert motion.energy_residual < 1e-11
+    reference = precise_motion(model, 1.0, digits=16)
+    assert [event.state for event in motion.events] == [event.state for event in reference.events]
+    assert motion.x2[0] == pytest.approx(float(reference.x2), abs=max(motion.error, 1e-14))

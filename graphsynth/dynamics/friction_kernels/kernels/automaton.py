@@ -14,6 +14,7 @@ from graphsynth.dynamics.friction_kernels.kernels.plant import (
     DAMPING,
     DRIVE,
     KINETIC,
+    LAW,
     MASS,
     NORMAL,
     RADIUS,
@@ -21,6 +22,8 @@ from graphsynth.dynamics.friction_kernels.kernels.plant import (
     SPEED,
     STATIC,
     STIFFNESS,
+    STRIBECK,
+    STRIBECK_LAW,
     acceleration,
     drive,
     glide,
@@ -176,6 +179,10 @@ def slip_step(p, s, t, x, v, h, end, tolerance, work):
         after = s * (w1 - new[1])
         if u <= 0.0 and after <= 4.0 * spacing(w1):
             h *= 0.25
+            continue
+        if p[LAW] == STRIBECK_LAW and abs(after - u) > p[STRIBECK] + 0.5 * max(min(after, u), 0.0):
+            # the rise of friction at rest is narrow: a step must not jump over it, nor the estimate of its error
+            h *= 0.5
             continue
         slope = s * (b1 - acceleration(p, s, new[0], new[1], w1)[0])
         proposal = h * min(5.0, 0.9 * max(error, 1e-10) ** -0.125)
