@@ -80,9 +80,10 @@ def apex(px, py, qx, qy, gx, gy, l2, sign, M, c, s, i0, i1):
         d = math.sqrt(dd)
         product = (total - d) * (total + d) * (d - difference) * (d + difference)
         M[i] = product * scale if dd > 0.0 else -5e-324  # P on Q: every direction or none
-        k, m = dd + both, sign * math.sqrt(product)
-        # the arm along k d + m i d; lengths do not matter
-        ax, ay = gx * dx + gy * dy, gx * dy - gy * dx
+        unit = 1.0 / d
+        k, m = (dd + both) * unit, sign * math.sqrt(product) * unit
+        # the arm along (k + i m) d; its length does not matter, but must not underflow
+        ax, ay = (gx * dx + gy * dy) * unit, (gx * dy - gy * dx) * unit
         re, im = k * ax - m * ay, k * ay + m * ax
         f = 1.0 / math.sqrt(re * re + im * im)
         c[i], s[i] = re * f, im * f
