@@ -22,7 +22,7 @@ _PUBLIC: dict[str, str] = {
     "JamArcs": "tilt_arcs",
     "JamCertificate": "certify",
     "JammingReport": "assess",
-    "JammingTable": "assess",
+    "JammingTable": "table",
     "Limit": "inverse",
     "Range": "ranges",
     "Region": "friction",

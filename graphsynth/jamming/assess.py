@@ -1,21 +1,22 @@
-"""Assess a lambda linkage and its bearing over a turn: verdict, jam arcs, margins, table."""
+"""Assess jamming: a lambda linkage with its bearing over a turn, or any mechanism over a motion."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing import Bearing, Condition
 from graphsynth.jamming.circle_sets import strictly_inside
 from graphsynth.jamming.inverse import Limit, largest_misalignment, smallest_clearance
 from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.jamming.table import JammingTable, table_over
 from graphsynth.jamming.tilt_arcs import JamArcs, jam_arcs
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
 from graphsynth.kinematics._checks import finite_array
@@ -26,38 +27,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from graphsynth.jamming.certify import JamCertificate
+    from graphsynth.jamming.coupled.limits import Misalignment
+    from graphsynth.jamming.coupled.problem import Bearings
+    from graphsynth.jamming.coupled.report import CoupledReport
+    from graphsynth.kinematics.simulation import Motion
 
 __all__ = ["JammingReport", "JammingTable", "assess_jamming"]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class JammingTable:
-    """Values over the crank angles ``f``; every array has the shape of ``f``.
-
-    Angles in radians, gaps in mm, areas in mm^2.  ``status`` is an `AssemblyStatus`; the other columns are NaN where
-    the linkage cannot be assembled, and the two areas of the surrogate E4 also where its ellipse is not defined.
-    ``rim_by_quadrature`` marks the angles at which the area of the rim is not a closed form.
-    """
-
-    f: Array
-    status: NDArray[np.int8]
-    theta: Array
-    gap_a: Array
-    gap_b: Array
-    gap: Array
-    surrogate_gap_area: Array
-    surrogate_interference_area: Array
-    lid_area: Array
-    rim_area: Array
-    rim_by_quadrature: NDArray[np.bool_]
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the table as a `pandas.DataFrame` (pandas is imported here)."""
-        import pandas as pd
-
-        return pd.DataFrame({name: getattr(self, name) for name in self.__dataclass_fields__})
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,54 +126,154 @@ class JammingReport:
         }
 
 
+@overload
 def assess_jamming(
-    linkage: LambdaLinkage | None = None,
+    subject: LambdaLinkage | None = None,
     bearing: Bearing | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike = 361,
     *,
     box: ToleranceBox | None = None,
     certify: bool = True,
-) -> JammingReport:
-    """Assess whether the bearing at B jams while the crank makes a turn.
+) -> JammingReport: ...
+
+
+@overload
+def assess_jamming(
+    subject: Motion,
+    bearing: Bearings,
+    condition: Condition = "A",
+    *,
+    tilts: Misalignment | Iterable[Misalignment],
+    certify: bool = True,
+    length_tolerance: float = 0.0,
+    seconds: float = 20.0,
+) -> CoupledReport: ...
+
+
+def assess_jamming(
+    subject: LambdaLinkage | Motion | None = None,
+    bearing: Bearings | None = None,
+    condition: Condition = "A",
+    samples: int | ArrayLike | None = None,
+    *,
+    box: ToleranceBox | None = None,
+    tilts: Misalignment | Iterable[Misalignment] | None = None,
+    certify: bool = True,
+    length_tolerance: float = 0.0,
+    seconds: float = 20.0,
+) -> JammingReport | CoupledReport:
+    """Assess whether bearings jam: those of any mechanism over its motion, or the one at B of a lambda linkage.
 
     Parameters
     ----------
-    linkage : LambdaLinkage, optional
-        With its tilted motor axis; needed unless ``box`` is given.
+    subject : Motion or LambdaLinkage
+        A `Motion` of `graphsynth.simulate` is assessed with all its joints (model L1, needs ``tilts``); a
+        `LambdaLinkage` with its tilted motor axis by the model of the source (L0), and may be left out if ``box`` is
+        given.
     bearing : Bearing, optional
-        Defaults to the bearing of the source (17.5 mm, 10 mm, 0.03 mm).
+        L0: the bearing at B, by default that of the source (17.5 mm, 10 mm, 0.03 mm).  L1: limits for all joints, or a
+        mapping of pairs of links to limits, see `graphsynth.jamming.coupled.assess_coupled`.
     condition : {"A", "B", "general"}
         Contact condition; "A" (short bearing in a long hole) is what the source means.
-    samples : int or array_like
-        Number of crank angles of the table over [0, 2 pi], or the angles themselves (radians).
+    samples : int or array_like, optional
+        L0: number of crank angles of the table over [0, 2 pi] (361), or the angles themselves (radians).
     box : ToleranceBox, optional
-        Exact dimensions with tolerances; the verdict then holds for the whole box, table and closed-form arcs for its
-        middle unless ``linkage`` and ``bearing`` say otherwise.
+        L0: exact dimensions with tolerances; the verdict then holds for the whole box, table and closed-form arcs for
+        its middle unless ``subject`` and ``bearing`` say otherwise.
+    tilts : Misalignment or several, optional
+        L1: the axes that are tilted.
     certify : bool
-        If False the verdict is an estimate from closed forms in double precision, and says so.
+        If False the verdict is an estimate in double precision, and says so.
+    length_tolerance, seconds : float
+        L1: relative tolerance of all lengths, and the time that the proof may take.
 
     Returns
     -------
-    JammingReport
-        The verdict is certified (`certify_jamming`) by default: for the whole box, or for the doubles given, which it
-        says.  It never comes from the samples.
+    JammingReport or CoupledReport
+        Both have ``verdict`` (`Verdict`), ``statement``, ``method``, ``condition``, ``certificate``, ``notes``,
+        ``seconds``, ``summary()`` and ``to_pandas()``.  The verdict is certified by default: for all tolerances, or for
+        the doubles given, which it says.  It never comes from the samples.
 
     Raises
     ------
     GeometryError
-        Bad dimensions, an unknown condition, fewer than two samples, neither a linkage nor a box.
+        Bad dimensions, an unknown condition, fewer than two samples, no subject, arguments of the other model.
 
     Examples
     --------
     >>> report = assess_jamming(box=ToleranceBox(alpha="1/30", clearance="0.03 +- 0.003"))
     >>> report.verdict.name, round(report.worst_gap, 12)
     ('CERTIFIED_JAMMED', 0.035099273074)
+
+    The same dimensions with three bearings of that kind, at A, B and C, over half a turn:
+
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> from graphsynth.jamming.coupled import Misalignment
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> linkage = Mechanism(graph, [
+    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+    ...     Revolute(0, 3, (2.0, 0.0)),
+    ... ], [Driver(0, 1)])
+    >>> motion = simulate(linkage, np.linspace(0.0, np.pi, 19))
+    >>> assess_jamming(motion, Bearing(), tilts=Misalignment(0, 1, 0.011)).verdict.name
+    'CERTIFIED_FREE'
     """
+    if subject is not None and not isinstance(subject, LambdaLinkage):
+        _refuse("a motion", {"samples": samples is not None, "box": box is not None})
+        return _any_mechanism(subject, bearing, condition, tilts, certify, length_tolerance, seconds)
+    given = {"tilts": tilts is not None, "length_tolerance": length_tolerance != 0.0}
+    _refuse("a LambdaLinkage or a box", given)
+    if bearing is not None and not isinstance(bearing, Bearing):
+        raise GeometryError(f"bearing = {bearing!r} does not fit a LambdaLinkage; give one Bearing(...)")
+    return _one_bearing(subject, bearing, condition, 361 if samples is None else samples, box, certify)
+
+
+def _refuse(subject: str, given: dict[str, bool]) -> None:
+    """Refuse arguments of the other model."""
+    wrong = [name for name, there in given.items() if there]
+    if wrong:
+        other = "the motion of a mechanism (simulate)" if "tilts" in wrong or "length_tolerance" in wrong else "L0"
+        other = "a LambdaLinkage or a ToleranceBox" if other == "L0" else other
+        raise GeometryError(f"{wrong[0]} does not go with {subject}; it belongs to {other}")
+
+
+def _any_mechanism(
+    subject: Motion,
+    bearings: Bearings | None,
+    condition: Condition,
+    tilts: Misalignment | Iterable[Misalignment] | None,
+    certify: bool,
+    length_tolerance: float,
+    seconds: float,
+) -> CoupledReport:
+    from graphsynth.jamming.coupled.assess import assess_coupled
+    from graphsynth.kinematics.simulation import Motion
+
+    if not isinstance(subject, Motion):
+        raise GeometryError(f"subject = {subject!r} is neither a Motion (simulate) nor a LambdaLinkage; give one")
+    if tilts is None:
+        raise GeometryError("no axis is misaligned; give tilts=Misalignment(base, link, alpha)")
+    if bearings is None:
+        raise GeometryError("the joints have no bearings; give a Bearing or JointLimits, or {(link, link): ...}")
+    return assess_coupled(
+        subject, bearings, tilts, condition=condition, certify=certify, length_tolerance=length_tolerance,
+        seconds=seconds,
+    )  # fmt: skip
+
+
+def _one_bearing(
+    linkage: LambdaLinkage | None,
+    bearing: Bearing | None,
+    condition: Condition,
+    samples: int | ArrayLike,
+    box: ToleranceBox | None,
+    certify: bool,
+) -> JammingReport:
     begin = perf_counter()
     linkage, bearing, box = _given(linkage, bearing, box)
     f = _angles(samples)
-    table = _table(linkage, bearing, condition, f)
+    table = table_over(linkage, bearing, condition, f)
     arcs = jam_arcs(linkage, bearing, condition)
     turn = linkage.full_turn()
     tilt, sine = linkage.largest_tilt
@@ -261,32 +338,6 @@ def _angles(samples: int | ArrayLike) -> Array:
             raise GeometryError(f"samples = {samples} is too few for a table; give 2 or more, or an array of angles")
         return np.linspace(0.0, math.tau, int(samples))
     return np.atleast_1d(finite_array("samples", samples))
-
-
-def _table(linkage: LambdaLinkage, bearing: Bearing, condition: Condition, f: Array) -> JammingTable:
-    path = linkage.positions(f)
-    S, C = np.where(path.assembled, path.sin_theta, 0.0), np.where(path.assembled, path.cos_theta, 1.0)
-    hide = np.where(path.assembled, 0.0, np.nan)
-    if bearing.clearance >= 0.0:
-        crescent = surrogate_areas(bearing, S, C)
-        lid, (rim, by_quadrature) = lid_area(bearing, S, C), rim_area(bearing, S, C)
-    else:  # an interference fit has no free position to measure from
-        lid = rim = hide * np.nan
-        crescent = CrescentAreas(lid, rim)
-        by_quadrature = np.zeros(f.shape, dtype=bool)
-    return JammingTable(
-        f=f,
-        status=path.status,
-        theta=path.theta,
-        gap_a=bearing.gap(S, C, "A") + hide,
-        gap_b=bearing.gap(S, C, "B") + hide,
-        gap=bearing.gap(S, C, condition) + hide,
-        surrogate_gap_area=crescent[0] + hide,
-        surrogate_interference_area=crescent[1] + hide,
-        lid_area=lid + hide,
-        rim_area=rim + hide,
-        rim_by_quadrature=by_quadrature,
-    )
 
 
 def _verdict(bearing: Bearing, arcs: JamArcs, turn: FullTurn) -> Verdict:

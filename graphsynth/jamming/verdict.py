@@ -11,28 +11,30 @@ METHOD_CERTIFIED = "certified: interval arithmetic with outward rounding"
 
 
 class Verdict(Enum):
-    """Verdict over a whole turn of the crank and all parameters of a tolerance box.
+    """Verdict over a whole turn of the crank, or the range of a motion, and all parameters of a tolerance box.
+
+    One vocabulary for both models: one tilted bearing (L0) and joints that share the misalignment (L1).
 
     ============================= ============================== ==================================================
     member                        name in the specification 10.1 what is proved
     ============================= ============================== ==================================================
     ``CERTIFIED_FREE``            ``NO_JAM_CERTIFIED``           g < 0 for every angle and every parameter vector
-    ``CERTIFIED_JAMMED``          ``JAM_FOR_ALL``                every parameter vector jams at some crank angle
-    ``CERTIFIED_JAMMED_FOR_SOME`` ``JAM_FOR_SOME``               some parameter vector jams at some crank angle
+    ``CERTIFIED_JAMMED``          ``JAM_FOR_ALL``                every parameter vector jams at some angle or input
+    ``CERTIFIED_JAMMED_FOR_SOME`` ``JAM_FOR_SOME``               some parameter vector jams at some angle or input
     ``UNDECIDED``                 ``TOUCHING``, ``UNDECIDED``    nothing; the reason says what stands in the way
     ``CANNOT_ASSEMBLE``           (section 12)                   interference fit, or no position of the linkage
     ============================= ============================== ==================================================
 
-    Members whose name ends in ESTIMATED rest on closed forms in floating point: no rounding error is included, so none
-    of them is a certificate.
+    Members whose name ends in ESTIMATED rest on closed forms or samples in floating point: no rounding error is
+    included, so none of them is a certificate.
     """
 
-    CERTIFIED_FREE = "free over the whole turn (certified)"
-    CERTIFIED_JAMMED = "jams on part of the turn, for all parameters given (certified)"
-    CERTIFIED_JAMMED_FOR_SOME = "jams on part of the turn, for some of the parameters given (certified)"
+    CERTIFIED_FREE = "free over the whole turn or range (certified)"
+    CERTIFIED_JAMMED = "jams on part of the turn or range, for all parameters given (certified)"
+    CERTIFIED_JAMMED_FOR_SOME = "jams on part of the turn or range, for some of the parameters given (certified)"
     UNDECIDED = "undecided"
-    FREE_ESTIMATED = "free over the whole turn (estimated)"
-    JAMMED_ESTIMATED = "jams on part of the turn (estimated)"
+    FREE_ESTIMATED = "free over the whole turn or range (estimated)"
+    JAMMED_ESTIMATED = "jams on part of the turn or range (estimated)"
     TOUCHING_ESTIMATED = "touches without clearance left, within the rounding level (estimated)"
     CANNOT_ASSEMBLE = "the parts cannot be assembled"
 

@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
 from graphsynth.errors import GeometryError
 from graphsynth.jamming import (
     Bearing,
+    ToleranceBox,
     Verdict,
     assess_jamming,
     jam_arcs,
@@ -22,6 +24,8 @@ from graphsynth.jamming import (
     largest_misalignment,
     smallest_clearance,
 )
+from graphsynth.jamming.coupled import Misalignment
+from graphsynth.jamming.verdict import METHOD_CERTIFIED
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
 DEG = math.pi / 180.0
@@ -276,3 +280,52 @@ def test_import_is_cheap():
     assert (
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
     )
+
+
+def test_a_motion_is_assessed_with_all_its_joints():
+    """The same entry and the same words for any mechanism: three equal bearings are free up to 2 t_A (spec 9.6)."""
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [
+        Revolute(0, 1),
+        Revolute(1, 2, (1.0, 0.0)),
+        Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+        Revolute(0, 3, (2, 0)),
+    ]
+    mechanism = Mechanism(graph, joints, [Driver(0, 1)])
+    motion = simulate(mechanism, np.linspace(0.0, 2.0 * math.pi, 13))
+    for factor, expected in ((0.99, Verdict.CERTIFIED_FREE), (1.01, Verdict.CERTIFIED_JAMMED)):
+        tilt = Misalignment(0, 1, factor * 0.012128793118312840)
+        report = assess_jamming(motion, Bearing(), tilts=tilt)
+        assert report.verdict is expected and report.method == METHOD_CERTIFIED and report.certificate is not None
+        assert report.summary()["verdict"] == expected.name and report.statement == report.certificate.reason
+        assert list(report.to_pandas().columns)[:2] == ["input", "factor"]
+        estimate = assess_jamming(motion, Bearing(), tilts=tilt, certify=False)
+        assert not estimate.verdict.is_certified and "not certified" in estimate.method
+        assert estimate.verdict.is_free is expected.is_free
+    single = assess_jamming(simulate(mechanism, [0.3]), Bearing(), tilts=tilt)
+    assert single.verdict is Verdict.UNDECIDED and "one assembled sample" in single.statement
+
+
+def test_arguments_of_the_other_model_are_refused():
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [
+        Revolute(0, 1),
+        Revolute(1, 2, (1.0, 0.0)),
+        Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+        Revolute(0, 3, (2, 0)),
+    ]
+    motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), [0.0, 0.1])
+    tilt = Misalignment(0, 1, 0.01)
+    for text, arguments, options in [
+        ("samples does not go", (motion, Bearing(), "A", 5), {"tilts": tilt}),
+        ("box does not go", (motion, Bearing()), {"tilts": tilt, "box": ToleranceBox()}),
+        ("no axis is misaligned", (motion, Bearing()), {}),
+        ("have no bearings", (motion,), {"tilts": tilt}),
+        ("tilts does not go", (DECK,), {"tilts": tilt}),
+        ("length_tolerance does not go", (DECK,), {"length_tolerance": 1e-3}),
+        ("does not fit a LambdaLinkage", (DECK, {(0, 1): Bearing()}), {}),
+        ("neither a Motion", ("shutter",), {"tilts": tilt}),
+        ("neither a Motion", (math.nan,), {}),
+    ]:
+        with pytest.raises(GeometryError, match=text):
+            assess_jamming(*arguments, **options)

@@ -10,7 +10,6 @@ _PUBLIC: dict[str, str] = {
     "RIGID": "limits",
     "SPHERICAL": "limits",
     "CoupledReport": "report",
-    "CoupledVerdict": "report",
     "JointLimits": "limits",
     "Misalignment": "limits",
     "SlideLimits": "limits",

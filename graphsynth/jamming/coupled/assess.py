@@ -15,7 +15,8 @@ from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.coupled.limits import Misalignment
 from graphsynth.jamming.coupled.problem import Bearings, Problem, problem
 from graphsynth.jamming.coupled.program import PoseSolution
-from graphsynth.jamming.coupled.report import CoupledReport, CoupledVerdict, Loosen
+from graphsynth.jamming.coupled.report import CoupledReport, Loosen
+from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -92,17 +93,23 @@ def assess_coupled(
     keep = np.flatnonzero(motion.assembled)
     poses = motion.poses[keep]
     tilt, scale = given.solve(poses), given.solve(poses, "scale")
-    report = _report(given, motion, keep, (tilt, scale), begin)
-    if not certify or keep.size < 2:
+    report = replace(_report(given, motion, keep, (tilt, scale), begin), condition=condition)
+    if not certify or keep.size == 0:
         return report
+    if keep.size == 1:
+        reason = "a proof needs a range of inputs; the motion has one assembled sample"
+        return replace(report, verdict=Verdict.UNDECIDED, reason=reason, notes=(*report.notes, report.reason))
     from graphsynth.jamming.coupled.turn import certify_coupled
 
     proof = certify_coupled(
         motion, bearings, tilts, condition=condition, length_tolerance=length_tolerance, seconds=seconds
     )
+    # where nothing is proved, what the samples say is still worth reading
+    notes = (*report.notes, f"at the samples: {report.reason}") if proof.verdict is Verdict.UNDECIDED else report.notes
     return replace(
-        report, verdict=proof.verdict, reason=proof.reason, certificate=proof, seconds=perf_counter() - begin
-    )
+        report, verdict=proof.verdict, reason=proof.reason, certificate=proof, notes=notes,
+        seconds=perf_counter() - begin,
+    )  # fmt: skip
 
 
 def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:
@@ -152,17 +159,17 @@ def _report(
     )
 
 
-def _verdict(value: Array, motion: Motion, keep: NDArray[np.intp]) -> tuple[CoupledVerdict, str]:
+def _verdict(value: Array, motion: Motion, keep: NDArray[np.intp]) -> tuple[Verdict, str]:
     if keep.size == 0:
-        return CoupledVerdict.CANNOT_ASSEMBLE, f"no sample is assembled: {motion.reason}"
+        return Verdict.CANNOT_ASSEMBLE, f"no sample is assembled: {motion.reason}"
     jammed = value > 1.0 + _TOUCH
     if jammed.any():
-        return CoupledVerdict.JAMMED_ESTIMATED, f"jams at {int(jammed.sum())} of {keep.size} samples (estimated)"
+        return Verdict.JAMMED_ESTIMATED, f"jams at {int(jammed.sum())} of {keep.size} samples (estimated)"
     if (value >= 1.0 - _TOUCH).any():
-        return CoupledVerdict.TOUCHING_ESTIMATED, "no clearance is left at one sample or more (estimated)"
+        return Verdict.TOUCHING_ESTIMATED, "no clearance is left at one sample or more (estimated)"
     if not motion.completed:
-        return CoupledVerdict.FREE_ESTIMATED, f"free at {keep.size} samples; the motion ends: {motion.reason}"
-    return CoupledVerdict.FREE_ESTIMATED, f"free at all {keep.size} samples (estimated)"
+        return Verdict.FREE_ESTIMATED, f"free at {keep.size} samples; the motion ends: {motion.reason}"
+    return Verdict.FREE_ESTIMATED, f"free at all {keep.size} samples (estimated)"
 
 
 def _loosen(given: Problem, scale: PoseSolution, at: int) -> tuple[Loosen, ...]:

@@ -3,45 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
+
 if TYPE_CHECKING:
     from graphsynth.jamming.coupled.limits import Limits, Misalignment
     from graphsynth.jamming.coupled.turn import TurnCertificate
 
-__all__ = ["CoupledReport", "CoupledVerdict", "Loosen"]
+__all__ = ["CoupledReport", "Loosen"]
 
 Array = NDArray[np.float64]
 
-
-class CoupledVerdict(Enum):
-    """Verdict of the coupled model (L1) over the inputs of a motion.
-
-    The members that begin with CERTIFIED are proved, rounding included, for every input of the range and every value of
-    the tolerance boxes; the ESTIMATED ones rest on floating point at the samples.
-    """
-
-    CERTIFIED_FREE = "free over the whole range, proved"
-    CERTIFIED_JAMMED = "jams over a part of the range, proved"
-    UNDECIDED = "not decided"
-    FREE_ESTIMATED = "free at every sample (estimated)"
-    JAMMED_ESTIMATED = "jams at one sample or more (estimated)"
-    TOUCHING_ESTIMATED = "touches, within rounding, without clearance left (estimated)"
-    CANNOT_ASSEMBLE = "no sample can be assembled"
-
-    @property
-    def is_free(self) -> bool:
-        """True only for a verdict that says free."""
-        return self in (CoupledVerdict.CERTIFIED_FREE, CoupledVerdict.FREE_ESTIMATED)
-
-    @property
-    def is_certified(self) -> bool:
-        """True only for a verdict that is proved."""
-        return self in (CoupledVerdict.CERTIFIED_FREE, CoupledVerdict.CERTIFIED_JAMMED)
+METHOD_SAMPLES = "convex program at the samples, double precision, not certified"
 
 
 class Loosen(NamedTuple):
@@ -62,7 +39,7 @@ class CoupledReport:
 
     Attributes
     ----------
-    verdict : CoupledVerdict
+    verdict : Verdict
     reason : str
         One sentence.
     inputs : ndarray, shape (n,)
@@ -99,7 +76,7 @@ class CoupledReport:
     seconds : float
     """
 
-    verdict: CoupledVerdict
+    verdict: Verdict
     reason: str
     inputs: Array
     factor: Array
@@ -118,10 +95,21 @@ class CoupledReport:
     loosen: tuple[Loosen, ...]
     limits: tuple[Limits, ...]
     misalignments: tuple[Misalignment, ...]
+    condition: str = "A"
     certificate: TurnCertificate | None = None
     notes: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
     model: str = "L1: all joints, small-tilt closure (error of relative order alpha squared)"
+
+    @property
+    def method(self) -> str:
+        """How the verdict was had."""
+        return METHOD_CERTIFIED if self.certificate is not None else METHOD_SAMPLES
+
+    @property
+    def statement(self) -> str:
+        """The verdict in one sentence: what is proved, or what was found at the samples."""
+        return self.reason
 
     @property
     def binding(self) -> NDArray[np.bool_]:
@@ -132,8 +120,10 @@ class CoupledReport:
         """Plain values (numbers, strings, lists) for a report or a JSON file."""
         return {
             "verdict": self.verdict.name,
-            "statement": self.reason,
+            "statement": self.statement,
+            "method": self.method,
             "model": self.model,
+            "condition": self.condition,
             "worst_input": self.worst_input,
             "worst_factor": self.worst_factor,
             "smallest_scale": self.smallest_scale,

@@ -20,7 +20,7 @@ from graphsynth.jamming.coupled.limits import Misalignment
 from graphsynth.jamming.coupled.pieces import Found, Work, check_range, cut
 from graphsynth.jamming.coupled.positions import Unsupported
 from graphsynth.jamming.coupled.problem import Bearings, problem
-from graphsynth.jamming.coupled.report import CoupledVerdict
+from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -38,7 +38,7 @@ class TurnCertificate:
 
     Attributes
     ----------
-    verdict : CoupledVerdict
+    verdict : Verdict
         CERTIFIED_FREE: no jam at any input, for any value in the tolerance boxes.  CERTIFIED_JAMMED: at every input of
         the pieces marked so it jams, for every value in the boxes.  UNDECIDED otherwise.
     reason : str
@@ -55,7 +55,7 @@ class TurnCertificate:
     seconds : float
     """
 
-    verdict: CoupledVerdict
+    verdict: Verdict
     reason: str
     low: Array
     high: Array
@@ -229,7 +229,7 @@ def _nothing(motion: Motion, reason: str, seconds: float) -> TurnCertificate:
     low, high = np.array([ends.min()]), np.array([ends.max()])
     zero = np.zeros(1)
     return TurnCertificate(
-        CoupledVerdict.UNDECIDED, reason, low, high, np.zeros(1, dtype=np.int8), zero, zero + np.inf, False, 0, seconds
+        Verdict.UNDECIDED, reason, low, high, np.zeros(1, dtype=np.int8), zero, zero + np.inf, False, 0, seconds
     )
 
 
@@ -243,25 +243,23 @@ def _turn_certificate(work: Work, pieces: Found, stopped: str, begin: float) -> 
     )  # fmt: skip
 
 
-def _judge(
-    work: Work, pieces: Found, state: NDArray[np.int8], stopped: str, branch: bool
-) -> tuple[CoupledVerdict, str]:
+def _judge(work: Work, pieces: Found, state: NDArray[np.int8], stopped: str, branch: bool) -> tuple[Verdict, str]:
     width = pieces.hi - pieces.lo
     share = [float(width[state == s].sum() / width.sum()) for s in (-1, 0, 1)]
     open_text = _why_open(pieces, state, stopped)
     if share[0] == 0.0 and (state == -1).any():
         u = float(pieces.lo[state == -1][0])
-        return CoupledVerdict.CERTIFIED_JAMMED, f"jams at the input {u:.15g}, proved; around it undecided: {open_text}"
+        return Verdict.CERTIFIED_JAMMED, f"jams at the input {u:.15g}, proved; around it undecided: {open_text}"
     if share[0] > 0.0:
         rest = f"; undecided over {share[1]:.3g}: {open_text}" if share[1] > 0.0 else ""
-        return CoupledVerdict.CERTIFIED_JAMMED, f"jams over {share[0]:.6g} of the range, proved{rest}"
+        return Verdict.CERTIFIED_JAMMED, f"jams over {share[0]:.6g} of the range, proved{rest}"
     if share[1] > 0.0:
-        return CoupledVerdict.UNDECIDED, f"{open_text} over {share[1]:.3g} of the range, the rest is proved free"
+        return Verdict.UNDECIDED, f"{open_text} over {share[1]:.3g} of the range, the rest is proved free"
     if not work.motion.completed:
-        return CoupledVerdict.UNDECIDED, f"free as far as the motion goes, proved; it ends: {work.motion.reason}"
+        return Verdict.UNDECIDED, f"free as far as the motion goes, proved; it ends: {work.motion.reason}"
     if not branch:
-        return CoupledVerdict.UNDECIDED, "every piece is free, but the pieces are not proved to be one branch"
-    return CoupledVerdict.CERTIFIED_FREE, f"free over the whole range, proved in {work.evaluated} pieces"
+        return Verdict.UNDECIDED, "every piece is free, but the pieces are not proved to be one branch"
+    return Verdict.CERTIFIED_FREE, f"free over the whole range, proved in {work.evaluated} pieces"
 
 
 def _why_open(pieces: Found, state: NDArray[np.int8], stopped: str) -> str:
