@@ -40,6 +40,7 @@ _PUBLIC: dict[str, str] = {
     "LambdaLinkage": "graphsynth.kinematics.lambda_linkage",
     "ParallelPlatform": "graphsynth.kinematics.parallel_platform",
     "SingleMotorPlatform": "graphsynth.kinematics.single_motor_platform",
+    "PointingMechanism": "graphsynth.kinematics.pointing",
     "Interval": "graphsynth.intervals.interval",
     "krawczyk": "graphsynth.intervals.proving",
     "Status": "graphsynth.intervals.status",
