@@ -16,7 +16,7 @@ from graphsynth.errors import FormatError, SpecError
 
 __all__ = [
     "CLIPPED", "DISCONTINUOUS", "FLOAT_INPUT", "NO_FLAGS", "decimal_outward", "enclose", "lower_bound", "read_bounds",
-    "read_one", "read_points", "upper_bound",
+    "read_one", "read_points", "shortened", "upper_bound",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -147,6 +147,23 @@ def decimal_outward(x: float, side: int, digits: int = 17) -> str:
 
     context = Context(prec=digits, rounding=ROUND_FLOOR if side < 0 else ROUND_CEILING, Emin=-9999, Emax=9999)
     return str(context.create_decimal(Decimal(x)))
+
+
+def shortened(x: float, side: int, digits: int = 6) -> str:
+    """Write a bound in a few digits for a sentence, rounded so that it stays a bound: down (-1) or up (+1).
+
+    Examples
+    --------
+    >>> shortened(0.0350992730735, -1), shortened(0.0350992730735, 1), shortened(0.5, -1)
+    ('0.0350992', '0.0350993', '0.5')
+    """
+    if not math.isfinite(x) or x == 0.0:
+        return "0" if x == 0.0 else repr(x)
+    from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+
+    context = Context(prec=digits, rounding=ROUND_FLOOR if side < 0 else ROUND_CEILING, Emin=-9999, Emax=9999)
+    value = context.create_decimal(Decimal(x))
+    return f"{float(value):.{digits}g}"  # the same digits, written as floats are
 
 
 def read_points(value: Any) -> tuple[Array, Array, Flags]:

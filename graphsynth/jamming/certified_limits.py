@@ -236,16 +236,16 @@ class _Search:
     def one_sided(self, mild: float, harsh: float, unit: str, covers: str, begin: float) -> CertifiedLimit:
         """Answer when no edge was found in the span searched."""
         if self.free(harsh):
-            reason = f"no limit: free up to the end of the search, {harsh:.6g} {unit}"
+            reason = f"no limit: free up to the end of the search, {harsh!r} {unit}"
             return CertifiedLimit(harsh, None, unit, reason, covers, self.trials, perf_counter() - begin)
         speck = harsh + 2.0**-60 * abs(mild - harsh)
         if self.direction < 0 and self.free(speck):
-            reason = f"no limit above {harsh:.6g} {unit}: {self.why or 'every larger value is free'}"
+            reason = f"no limit above {harsh!r} {unit}: {self.why or 'every larger value is free'}"
             return CertifiedLimit(speck, None, unit, reason, covers, self.trials, perf_counter() - begin)
         works = mild if self.free(mild) else None
         fails = mild if works is None and self.jams(mild) else None
         if fails is not None:
-            reason = f"no value works: even {mild:.6g} {unit} is certified to jam"
+            reason = f"no value works: even {mild!r} {unit} is certified to jam"
         else:
             reason = self.why or "neither side is proved"
         return CertifiedLimit(works, fails, unit, reason, covers, self.trials, perf_counter() - begin)

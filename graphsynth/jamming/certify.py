@@ -105,7 +105,9 @@ class JamCertificate:
     @property
     def statement(self) -> str:
         """The sentence that is proved, or what is missing."""
-        return _statement(self)
+        from graphsynth.jamming.statements import statement
+
+        return statement(self)
 
     def over(self, start: float, stop: float) -> Verdict:
         """Return what is proved about a part of the turn: from ``start`` counter-clockwise to ``stop``, radians.
@@ -260,7 +262,9 @@ class _Proof:
             return "touching: no clearance is left at the lower end of its range"
         if self.condition == "A" and _touches_only(self.box):
             return "touching: h^2 = c (2R + c) exactly, the parts can touch but never overlap"
-        width = f"[{high.lo:.3g}, {high.hi:.3g}] mm"
+        from graphsynth.intervals.reading import shortened
+
+        width = f"[{shortened(high.lo, -1, 3)}, {shortened(high.hi, 1, 3)}] mm"
         return f"the largest gap lies in {width}, which contains 0: touching at this resolution; change a tolerance"
 
     def _assembly(self, box: ToleranceBox) -> str:
@@ -372,6 +376,8 @@ def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) 
     """Answer for a range of clearances from negative to positive: jams of the sound part count, freedom does not."""
     from dataclasses import replace
 
+    from graphsynth.jamming import corners
+
     c = box["clearance"]
     sound = box.replace(clearance=Range(Fraction(0), c.upper, c.exact))
     found = _Proof(sound, condition, begin).result()
@@ -381,22 +387,8 @@ def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) 
         verdict, reason = Verdict.CERTIFIED_JAMMED_FOR_SOME, text
     elif found.verdict is not Verdict.CERTIFIED_JAMMED_FOR_SOME:
         verdict, reason = Verdict.UNDECIDED, text
-    return replace(found, verdict=verdict, reason=reason, box=box, seconds=perf_counter() - begin)
-
-
-def _statement(found: JamCertificate) -> str:
-    who = "the bearing" if found.box.is_point else "every bearing of the tolerance box"
-    given = "" if found.exact_input else " (for the doubles given: floats came in, decimals are not guaranteed)"
-    gap = found.largest_gap
-    match found.verdict:
-        case Verdict.CERTIFIED_FREE:
-            text = f"proved: {who} is free at every crank angle; at least {-gap.hi:.6g} mm of clearance are left"
-        case Verdict.CERTIFIED_JAMMED:
-            text = f"proved: {who} jams during the turn; at least {found.smallest_worst_gap.lo:.6g} mm are missing"
-        case Verdict.CERTIFIED_JAMMED_FOR_SOME:
-            text = f"proved: a bearing of the tolerance box jams; at least {gap.lo:.6g} mm are missing there"
-        case Verdict.CANNOT_ASSEMBLE:
-            text = f"the parts cannot be assembled: {found.reason}"
-        case _:
-            text = f"undecided: {found.reason}"
-    return f"{text} (condition {found.condition}){given}"
+    gaps = corners.gap_corners(box, corners.sines(box).sine, condition)  # of all, the interference included
+    return replace(
+        found, verdict=verdict, reason=reason, box=box, largest_gap=_pair(gaps, 1), smallest_worst_gap=_pair(gaps, 0),
+        seconds=perf_counter() - begin,
+    )  # fmt: skip

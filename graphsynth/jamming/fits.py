@@ -100,6 +100,8 @@ class Fit:
             raise GeometryError(f"nominal diameter {size} mm is outside the table; give one number up to 500 mm")
         at = bisect_left(_SIZES, size.lower)
         letter = parts[2]
+        if letter in "ab" and size.lower <= 1:
+            raise GeometryError(f"shaft {letter} is not standardised up to 1 mm; diameter {size} mm needs c to h")
         fine = bisect_left(_FINE_SIZES, size.lower)
         below = _FINE_BELOW[letter][fine] if letter in _FINE_BELOW else _BELOW[letter][at]
         micro = Fraction(1, 1000)

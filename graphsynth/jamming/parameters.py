@@ -185,8 +185,9 @@ def _check(ranges: dict[str, Range]) -> None:
     if ranges["Hb"].lower < 0:
         raise GeometryError(f"Hb = {ranges['Hb']} must be zero or more; correct the value or its tolerance")
     if ranges["clearance"].lower <= -ranges["Rb"].lower:
+        least = float(-ranges["Rb"].lower)
         raise GeometryError(
-            f"clearance = {ranges['clearance']} mm leaves no hole; it must exceed -Rb = {-ranges['Rb'].lower} mm"
+            f"clearance = {ranges['clearance']} mm leaves no hole; it must exceed -Rb = {least:.12g} mm"
         )
     parts = [ranges[f"n{i}"] for i in (1, 2, 3)]
     if all(part.lower <= Fraction(0) <= part.upper for part in parts):

@@ -9,6 +9,8 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -79,10 +81,12 @@ class Range:
             first, last = (cls.read(name, part) for part in value)
             return cls._ordered(name, first.lower, last.upper, first.exact and last.exact)
         if hasattr(value, "lo") and hasattr(value, "hi"):
+            if getattr(value, "shape", ()) != ():
+                raise GeometryError(f"{name} = {value!r} is an array of shape {value.shape}; give one interval")
             low, high = _number(name, float(value.lo)), _number(name, float(value.hi))
             return cls._ordered(name, low, high, bool(value.exact_input))
         number = _number(name, value)
-        return cls(number, number, not isinstance(value, float) and not hasattr(value, "dtype"))
+        return cls(number, number, isinstance(value, int | Fraction | Decimal | np.integer))
 
     @classmethod
     def _text(cls, name: str, text: str) -> Range:
@@ -91,6 +95,8 @@ class Range:
             return cls._ordered(name, _number(name, pair[1]), _number(name, pair[2]), True)
         if spread_:
             middle, radius = _number(name, spread_[1]), _number(name, spread_[2])
+            if radius < 0:
+                raise GeometryError(f"{name} = {text.strip()!r} has a negative tolerance; give 0 or more")
             return cls._ordered(name, middle - radius, middle + radius, True)
         number = _number(name, text)
         return cls(number, number)
@@ -152,13 +158,15 @@ def spread(nominal: Given, absolute: Given = 0, relative: Given = 0) -> Range:
 
 def _number(name: str, value: Any) -> Fraction:
     try:
-        if isinstance(value, bool):
+        if isinstance(value, bool | bytes | bytearray | np.bool_):
             raise ValueError
         if isinstance(value, str | int | Fraction | Decimal):
             exponent = re.search(r"[eE]([+-]?\d+)\s*$", value) if isinstance(value, str) else None
             if exponent and len(exponent[1]) > 5:
                 raise ValueError
             number = Fraction(value.strip() if isinstance(value, str) else value)
+        elif isinstance(value, np.integer):
+            number = Fraction(int(value))
         else:
             number = Fraction(float(value))
         float(number)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
+import re
 import subprocess
 import sys
 from fractions import Fraction
@@ -78,7 +79,7 @@ def test_published_tilts_gaps_and_the_statement():
         ]:
             assert enclosure.lo <= mpmath.mpf(text) <= enclosure.hi
             assert enclosure.width < 1e-15
-    assert found.statement.startswith("proved: the bearing jams") and "0.0350993 mm" in found.statement
+    assert found.statement.startswith("proved: the bearing jams") and "0.0350992 mm" in found.statement  # down
     assert found.summary()["verdict"] == "CERTIFIED_JAMMED"
     assert found.witness is not None and found.witness.gap.lo > 0
 
@@ -460,3 +461,25 @@ def test_random_linkages_with_known_verdicts():
 @pytest.mark.slow
 def test_ten_thousand_random_linkages_with_known_verdicts():
     assert _count_wrong(10_000, 2) <= 200  # fewer than 2 % undecided
+
+
+@pytest.mark.parametrize("alpha", ["1/30", "0.013", "0.0151", "0.02"])
+@pytest.mark.parametrize("condition", ["A", "B"])
+def test_numbers_in_sentences_are_bounds_too(alpha, condition):
+    """A proved sentence must not promise more than its certificate because a number was rounded to nearest."""
+    for box in (deck(alpha=alpha), deck(alpha=alpha, clearance="0.03 +- 0.02")):
+        found = certify_jamming(box, condition)
+        said = re.search(r"at least ([-+.e\d]+) mm", found.statement)
+        proved = {
+            Verdict.CERTIFIED_FREE: -found.largest_gap.hi, Verdict.CERTIFIED_JAMMED: found.smallest_worst_gap.lo,
+            Verdict.CERTIFIED_JAMMED_FOR_SOME: found.largest_gap.lo,
+        }[found.verdict]  # fmt: skip
+        assert 0 < F(said[1]) <= F(proved) and F(said[1]) > F(proved) * (1 - F(1, 10**5))
+
+
+def test_gap_of_a_range_that_begins_with_interference():
+    """The largest gap counts the members with interference: at no tilt it is minus the smallest clearance."""
+    found = certify_jamming(ToleranceBox(clearance="[-0.01, 0.01]"))
+    assert found.verdict is Verdict.UNDECIDED and "interference" in found.reason
+    assert F(1, 100) in (F(found.largest_gap.lo), F(found.largest_gap.hi)) or 0.01 in found.largest_gap
+    assert -0.01 in found.smallest_worst_gap and not found.arcs.free

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.coupled.limits import Misalignment
 from graphsynth.jamming.coupled.pieces import Found, Work, check_range, cut
@@ -249,10 +250,10 @@ def _judge(work: Work, pieces: Found, state: NDArray[np.int8], stopped: str, bra
     open_text = _why_open(pieces, state, stopped)
     if share[0] == 0.0 and (state == -1).any():
         u = float(pieces.lo[state == -1][0])
-        return Verdict.CERTIFIED_JAMMED, f"jams at the input {u:.15g}, proved; around it undecided: {open_text}"
+        return Verdict.CERTIFIED_JAMMED, f"jams at the input {u!r}, proved; around it undecided: {open_text}"
     if share[0] > 0.0:
         rest = f"; undecided over {share[1]:.3g}: {open_text}" if share[1] > 0.0 else ""
-        return Verdict.CERTIFIED_JAMMED, f"jams over {share[0]:.6g} of the range, proved{rest}"
+        return Verdict.CERTIFIED_JAMMED, f"jams over {shortened(share[0], -1)} of the range, proved{rest}"
     if share[1] > 0.0:
         return Verdict.UNDECIDED, f"{open_text} over {share[1]:.3g} of the range, the rest is proved free"
     if not work.motion.completed:
@@ -273,7 +274,8 @@ def _why_open(pieces: Found, state: NDArray[np.int8], stopped: str) -> str:
         u = float(pieces.lo[lost][0])
         return f"the positions are not proved near the input {u:.9g} (a singularity, or two modes that nearly meet)"
     worst = int(np.flatnonzero(left)[np.argmax(pieces.upper[left] - pieces.lower[left])])
+    below, above = shortened(float(pieces.lower[worst]), -1, 9), shortened(float(pieces.upper[worst]), 1, 9)
     return (
-        f"the factor lies between {pieces.lower[worst]:.9g} and {pieces.upper[worst]:.9g} near the input "
+        f"the factor lies between {below} and {above} near the input "
         f"{pieces.lo[worst]:.9g}: a crossing, a touch, or tolerances of which some jam and some do not"
     )

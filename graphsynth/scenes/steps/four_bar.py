@@ -283,6 +283,7 @@ def _proof_table(
 def _fit_table(context: Context) -> Table:
     """Judge standard fits for the tilt and the dimensions of the scene."""
     from graphsynth.errors import GeometryError
+    from graphsynth.intervals.reading import shortened
     from graphsynth.jamming.fits import assess_fits
 
     box, bearing = tolerance_box(context), _table(context).bearing
@@ -292,7 +293,7 @@ def _fit_table(context: Context) -> Table:
         found = assess_fits(box, bearing.condition, diameter=Fraction(repr(2 * bearing.radius_mm)))
     except GeometryError as error:
         return Table("Standard fits (ISO 286)", columns, (), f"Not judged: {error}")
-    rows = tuple((f.fit.name, str(f.fit.clearance), f.words, f"{f.clearance_left:+.5f}") for f in found)
+    rows = tuple((f.fit.name, str(f.fit.clearance), f.words, shortened(f.clearance_left, -1, 4)) for f in found)
     return Table("Standard fits (ISO 286)", columns, rows, note)
 
 
