@@ -1,0 +1,485 @@
+"""A dynamic model as MuJoCo XML (MJCF): a tree of bodies, loops closed by equality constraints (spec 7.2).
+
+The model is written in its start pose, and ``ref`` of every joint is the joint coordinate there, so that ``qpos`` are
+the joint coordinates of graphsynth: ``theta_b - theta_a`` of a turning pair, the displacement of a sliding pair.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
+from graphsynth.dynamics.model import DynamicModel, Rigid
+from graphsynth.dynamics.start import StartReport
+from graphsynth.errors import GeometryError
+from graphsynth.formats.engine_run import turn
+from graphsynth.formats.spanning_tree import SpanningTree, spanning_tree
+from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
+
+__all__ = ["MjcfModel", "MujocoSettings", "to_mjcf"]
+
+Array = NDArray[np.float64]
+Point = tuple[float, float]
+INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
+
+
+@dataclass(frozen=True)
+class MujocoSettings:
+    """How MuJoCo integrates and how stiff its loops are.
+
+    Parameters
+    ----------
+    step : float
+        Seconds.
+    integrator : {"RK4", "Euler", "implicit", "implicitfast"}
+    solref : (float, float), optional
+        Two negative numbers: minus stiffness and minus damping of the loop constraints (1/s^2, 1/s); two positive
+        ones: time constant (s) and damping ratio.  By default ``(-1/step^2, -2/step)``, critically damped and as
+        stiff as the step bears.
+    solimp : (float, float, float)
+        Impedance of the constraints.
+
+    Examples
+    --------
+    >>> MujocoSettings(1e-3).constraint
+    (-1000000.0, -2000.0)
+    """
+
+    step: float = 1e-4
+    integrator: str = "RK4"
+    solref: tuple[float, float] | None = None
+    solimp: tuple[float, float, float] = (0.9999, 0.9999, 0.001)
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.step) and self.step > 0.0):
+            raise GeometryError(f"step = {self.step} s must be positive; give the step of the engine")
+        if self.integrator not in INTEGRATORS:
+            raise GeometryError(
+                f"integrator = {self.integrator!r} is not MuJoCo's; give one of {', '.join(INTEGRATORS)}"
+            )
+        if self.solref is not None and not (min(self.solref) > 0.0 or max(self.solref) < 0.0):
+            raise GeometryError(f"solref = {self.solref}: give two positive or two negative numbers")
+
+    @property
+    def constraint(self) -> tuple[float, float]:
+        """The ``solref`` in use."""
+        return self.solref or (-float(f"{self.step**-2:.12g}"), -float(f"{2.0 / self.step:.12g}"))
+
+    @property
+    def text(self) -> str:
+        """Integrator and constraint parameters in one line."""
+        a, b = self.constraint
+        return f"{self.integrator}, solref {a:g} {b:g}, solimp {' '.join(f'{v:g}' for v in self.solimp)}"
+
+
+@dataclass(frozen=True, eq=False)
+class MjcfModel:
+    """An MJCF text and the map of its coordinates.
+
+    Attributes
+    ----------
+    xml : str
+        The same bytes for the same model, start and settings.
+    tree : SpanningTree
+    coordinates : tuple of (name, base, link)
+        Engine joint name and the graphsynth coordinate it is: of ``link`` relative to ``base``; in the engine's order.
+    qpos, qvel : ndarray
+        Start, also the keyframe "start" of the text.
+    angles : ndarray, shape (links, coordinates)
+        ``theta = theta_start + angles @ (qpos - qpos_start)``.
+    start : StartReport
+    settings : MujocoSettings
+    """
+
+    xml: str
+    tree: SpanningTree
+    coordinates: tuple[tuple[str, int, int], ...]
+    qpos: Array
+    qvel: Array
+    angles: Array
+    start: StartReport
+    settings: MujocoSettings
+
+
+@dataclass
+class _Work:
+    """Workspace of one export."""
+
+    model: DynamicModel
+    start: StartReport
+    tree: SpanningTree
+    names: list[tuple[str, int, int]] = field(default_factory=list)
+    hinge: list[bool] = field(default_factory=list)
+    qpos: list[float] = field(default_factory=list)
+    qvel: list[float] = field(default_factory=list)
+    chain: dict[int, dict[int, int]] = field(default_factory=dict)  # link -> coordinate -> sign of its hinge
+    bodies: dict[int, ET.Element] = field(default_factory=dict)
+    sites: int = 0
+
+    def angle(self, link: int) -> float:
+        return float(self.start.poses[link, 2])
+
+
+def _text(*values: float) -> str:
+    """Shortest decimals that read back as the same doubles; -0 is written 0."""
+    return " ".join(repr(float(v) + 0.0) for v in values)
+
+
+def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | None = None) -> MjcfModel:
+    """Write a model for MuJoCo (the text is exact: every number reads back as the same double).
+
+    Bodies with mass, inertia and centre of mass; R and P joints and slots in a tree; loops closed by ``connect``
+    between two sites; gear pairs as ``joint`` or ``tendon`` equalities; springs and dampers as tendons; constant
+    forces and torques as actuators without control; rotor inertia as armature; contact disabled.
+
+    Parameters
+    ----------
+    model : DynamicModel
+    start : StartReport
+        From :func:`graphsynth.dynamics.consistent_start`; its pose is the reference pose, its state the keyframe.
+    settings : MujocoSettings, optional
+
+    Returns
+    -------
+    MjcfModel
+
+    Raises
+    ------
+    GeometryError
+        What MuJoCo cannot say: cams, joint friction, loads that are functions, prescribed motion, massless links, a
+        loop of sliding pairs and slots alone, a gear pair without carrier; an inconsistent start.
+
+    References
+    ----------
+    Specification of instruments and dynamics, section 7.2; Todorov, Erez, Tassa (2012), MuJoCo.
+
+    Examples
+    --------
+    >>> from graphsynth.dynamics import Body, consistent_start
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
+    >>> export = to_mjcf(model, consistent_start(model, keep={(0, 1): 0.5}))
+    >>> export.coordinates, export.qpos.tolist(), export.tree.cuts
+    ((('j0_1', 0, 1),), [0.5], ())
+    """
+    settings = settings or MujocoSettings()
+    check_common(model, start, "MuJoCo")
+    if model.prescribed:
+        pair = model.prescribed[0].pair
+        raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
+    work = _Work(model, start, spanning_tree(model.mechanism))
+    root = ET.Element("mujoco", model="graphsynth")
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
+    _options(root, model, settings)
+    world = ET.SubElement(root, "worldbody")
+    work.bodies[model.mechanism.frame], work.chain[model.mechanism.frame] = world, {}
+    _hang(work, model.mechanism.frame)
+    tendon, equality, actuator = (ET.Element(tag) for tag in ("tendon", "equality", "actuator"))
+    for index in work.tree.cuts:
+        _close(work, model.mechanism.joints[index], tendon, equality)
+    for extra in model.additional:
+        _close_extra(work, extra, equality)
+    for number, element in enumerate(model.elements):
+        _element(work, element, f"e{number}", tendon, actuator)
+    for constraint in equality:
+        constraint.set("solref", _text(*settings.constraint))
+        constraint.set("solimp", _text(*settings.solimp))
+    root.extend(part for part in (tendon, equality, actuator) if len(part))
+    key = ET.SubElement(root, "keyframe")
+    ET.SubElement(key, "key", name="start", time=_text(start.time), qpos=_text(*work.qpos), qvel=_text(*work.qvel))
+    ET.indent(root)
+    angles = np.zeros((model.mechanism.graph.links, len(work.names)))
+    for link, signs in work.chain.items():
+        for k, sign in signs.items():
+            angles[link, k] = sign
+    return MjcfModel(
+        ET.tostring(root, encoding="unicode") + "\n", work.tree, tuple(work.names), np.array(work.qpos),
+        np.array(work.qvel), angles, start, settings,
+    )  # fmt: skip
+
+
+def check_common(model: DynamicModel, start: StartReport, engine: str) -> None:
+    """Refuse what no engine here can run."""
+    if not start.consistent:
+        raise GeometryError(f"the start is not consistent, so {engine} would run another mechanism: {start.message}")
+    if start.poses.shape[0] != model.mechanism.graph.links:
+        raise GeometryError(f"the start has {start.poses.shape[0]} links, the model {model.mechanism.graph.links}")
+    if model.massless:
+        raise GeometryError(f"links {list(model.massless)} have no mass or inertia; {engine} needs both positive")
+
+
+def _options(root: ET.Element, model: DynamicModel, settings: MujocoSettings) -> None:
+    option = ET.SubElement(
+        root, "option", timestep=_text(settings.step), integrator=settings.integrator, solver="Newton",
+        jacobian="dense", tolerance="1e-14", iterations="100", gravity=_text(*model.gravity, 0.0),
+    )  # fmt: skip
+    ET.SubElement(option, "flag", contact="disable", refsafe="disable")
+
+
+def _hang(work: _Work, link: int) -> None:
+    """Write the bodies that hang on a link, depth first: the order in which the engine counts coordinates."""
+    for child, index in work.tree.children(link):
+        body = work.model.bodies[child]
+        x, y, theta = (float(v) for v in work.start.poses[child])
+        px, py, parent = (float(v) for v in work.start.poses[link])
+        place, half = turn(-parent, (x - px, y - py)), 0.5 * (theta - parent)
+        element = ET.SubElement(
+            work.bodies[link], "body", name=f"link{child}", pos=_text(*place, 0.0),
+            quat=_text(math.cos(half), 0.0, 0.0, math.sin(half)),
+        )  # fmt: skip
+        ET.SubElement(
+            element, "inertial", pos=_text(*body.centre, 0.0), mass=_text(body.mass),
+            diaginertia=_text(body.inertia, body.inertia, body.inertia),
+        )  # fmt: skip
+        work.bodies[child], work.chain[child] = element, dict(work.chain[link])
+        _joint(work, element, work.model.mechanism.joints[index], child)
+        _hang(work, child)
+
+
+def _joint(work: _Work, body: ET.Element, joint: JointGeometry, child: int) -> None:
+    """Write the engine joints of a tree edge; the engine applies them in order, so a slot is slide then hinge."""
+    if isinstance(joint, Revolute):
+        _hinge(work, body, joint, child, joint.at_b if child == joint.b else joint.at_a)
+        return
+    assert isinstance(joint, Prismatic | PinSlot)
+    d, rate = displacement(joint, work.start)
+    along = work.angle(joint.a) + joint.angle_a - work.angle(child)
+    if child == joint.b:
+        _slide(work, body, joint, turn(along, (1.0, 0.0)), d, rate)
+        if isinstance(joint, PinSlot):
+            _hinge(work, body, joint, child, joint.at_b)
+        return
+    if isinstance(joint, PinSlot):
+        dx, dy = turn(joint.angle_a, (d, 0.0))
+        _hinge(work, body, joint, child, (joint.at_a[0] + dx, joint.at_a[1] + dy))
+    _slide(work, body, joint, turn(along, (-1.0, 0.0)), d, rate)
+
+
+def displacement(joint: Prismatic | PinSlot, start: StartReport) -> tuple[float, float]:
+    """Displacement of ``at_b`` along the line of link a, and its rate, at the start."""
+    poses, rates = start.poses, start.velocities
+    arms = [turn(float(poses[k, 2]), p) for k, p in ((joint.a, joint.at_a), (joint.b, joint.at_b))]
+    place = [poses[k, :2] + arm for k, arm in zip((joint.a, joint.b), arms)]
+    speed = [rates[k, :2] + rates[k, 2] * np.array([-arm[1], arm[0]]) for k, arm in zip((joint.a, joint.b), arms)]
+    along = np.array(turn(float(poses[joint.a, 2]) + joint.angle_a, (1.0, 0.0)))
+    return float((place[1] - place[0]) @ along), float((speed[1] - speed[0]) @ along)
+
+
+def _hinge(work: _Work, body: ET.Element, joint: JointGeometry, child: int, at: Point) -> None:
+    sign = 1 if child == joint.b else -1
+    q = work.angle(joint.b) - work.angle(joint.a)
+    rate = float(work.start.velocities[joint.b, 2] - work.start.velocities[joint.a, 2])
+    suffix = "_turn" if isinstance(joint, PinSlot) else ""
+    name = f"j{joint.a}_{joint.b}{suffix}"
+    attributes = {"type": "hinge", "pos": _text(*at, 0.0), "axis": _text(0.0, 0.0, sign), "ref": _text(q)}
+    armature = _armature(work.model.elements, joint)
+    if armature:
+        attributes["armature"] = _text(armature)
+    ET.SubElement(body, "joint", {"name": name, **attributes})
+    work.chain[child][len(work.names)] = sign
+    _count(work, name, joint, q, rate, True)
+
+
+def _slide(work: _Work, body: ET.Element, joint: JointGeometry, axis: Point, d: float, rate: float) -> None:
+    name = f"j{joint.a}_{joint.b}"
+    ET.SubElement(body, "joint", name=name, type="slide", axis=_text(*axis, 0.0), ref=_text(d))
+    _count(work, name, joint, d, rate, False)
+
+
+def _count(work: _Work, name: str, joint: JointGeometry, q: float, rate: float, hinge: bool) -> None:
+    work.names.append((name, joint.a, joint.b))
+    work.hinge.append(hinge)
+    work.qpos.append(q)
+    work.qvel.append(rate)
+
+
+def _armature(elements: Iterable[Element], joint: JointGeometry) -> float:
+    """Reflected rotor inertia of the sources across a turning pair."""
+    return sum(
+        e.ratio**2 * e.rotor_inertia
+        for e in elements
+        if isinstance(e, TorqueSource) and {e.a, e.b} == {joint.a, joint.b}
+    )
+
+
+def _site(work: _Work, link: int, at: Point) -> str:
+    """Add a site to a link and return its name."""
+    name, work.sites = f"s{work.sites}", work.sites + 1
+    ET.SubElement(work.bodies[link], "site", name=name, pos=_text(*at, 0.0))
+    return name
+
+
+def _close(work: _Work, joint: JointGeometry, tendon: ET.Element, equality: ET.Element) -> None:
+    """Close a cut joint by an equality."""
+    name = f"j{joint.a}_{joint.b}"
+    if isinstance(joint, Revolute):
+        sites = _site(work, joint.a, joint.at_a), _site(work, joint.b, joint.at_b)
+        ET.SubElement(equality, "connect", name=name, site1=sites[0], site2=sites[1])
+    elif isinstance(joint, Gear):
+        _gear(work, joint, name, tendon, equality)
+    elif isinstance(joint, Prismatic | PinSlot):
+        raise GeometryError(f"{joint.kind} joint {joint.a}-{joint.b} closes a loop of sliding pairs; use exudyn for it")
+    else:
+        raise GeometryError(f"{joint.kind} joint {joint.a}-{joint.b}: MuJoCo has no such joint; leave it out")
+
+
+def _close_extra(work: _Work, extra: object, equality: ET.Element) -> None:
+    if isinstance(extra, Revolute):
+        sites = _site(work, extra.a, extra.at_a), _site(work, extra.b, extra.at_b)
+        ET.SubElement(equality, "connect", site1=sites[0], site2=sites[1])
+    elif isinstance(extra, Rigid):
+        ET.SubElement(equality, "weld", body1=_body(work, extra.b), body2=_body(work, extra.a))
+    else:
+        raise GeometryError(f"additional {type(extra).__name__}: MuJoCo has no such constraint; leave it out")
+
+
+def _body(work: _Work, link: int) -> str:
+    return "world" if link == work.model.mechanism.frame else f"link{link}"
+
+
+def carrier_of(model: DynamicModel, gear: Gear) -> int:
+    """Return the link that carries both wheels of a gear pair."""
+    for link in range(model.mechanism.graph.links):
+        if link in (gear.a, gear.b):
+            continue
+        if _bears(model, link, gear.a, gear.at_a) and _bears(model, link, gear.b, gear.at_b):
+            return link
+    for link, wheel, at in ((gear.a, gear.b, gear.at_b), (gear.b, gear.a, gear.at_a)):
+        if _bears(model, link, wheel, at):  # the wheel turns on the other one's link: a link of two centres
+            return link
+    raise GeometryError(f"gear pair {gear.a}-{gear.b} has no link that bears both wheels at their centres; give one")
+
+
+def _bears(model: DynamicModel, link: int, wheel: int, centre: Point) -> bool:
+    for joint in model.mechanism.joints:
+        if isinstance(joint, Revolute) and {joint.a, joint.b} == {link, wheel}:
+            own = joint.at_a if joint.a == wheel else joint.at_b
+            return math.dist(own, centre) <= 1e-12 * max(1.0, math.hypot(*centre))
+    return False
+
+
+def gear_weights(model: DynamicModel, gear: Gear) -> dict[int, float]:
+    """Weights of the link angles whose sum a gear pair keeps constant."""
+    carrier, sign = carrier_of(model, gear), -1.0 if gear.internal else 1.0
+    weights = {gear.a: gear.radius_a, gear.b: sign * gear.radius_b}
+    weights[carrier] = weights.get(carrier, 0.0) - gear.radius_a - sign * gear.radius_b
+    largest = max(gear.radius_a, gear.radius_b)
+    return {link: w / largest for link, w in weights.items()}
+
+
+def _gear(work: _Work, gear: Gear, name: str, tendon: ET.Element, equality: ET.Element) -> None:
+    combined = _combine(work, gear_weights(work.model, gear))
+    if len(combined) == 2:
+        (k, wk), (m, wm) = combined.items()
+        ET.SubElement(
+            equality, "joint", name=name, joint1=work.names[k][0], joint2=work.names[m][0],
+            polycoef=_text(0.0, -wm / wk, 0.0, 0.0, 0.0),
+        )  # fmt: skip
+        return
+    _fixed(work, tendon, f"t_{name}", combined)
+    ET.SubElement(equality, "tendon", name=name, tendon1=f"t_{name}", polycoef="0 0 0 0 0")
+
+
+def _combine(work: _Work, weights: dict[int, float]) -> dict[int, float]:
+    """Combination of coordinates equal to a combination of link angles, but for a constant."""
+    total: dict[int, float] = {}
+    for link, weight in weights.items():
+        for k, sign in work.chain[link].items():
+            total[k] = total.get(k, 0.0) + weight * sign
+    return {k: w for k, w in sorted(total.items()) if abs(w) > 1e-14}
+
+
+def _fixed(work: _Work, tendon: ET.Element, name: str, combined: dict[int, float], **attributes: str) -> None:
+    element = ET.SubElement(tendon, "fixed", {"name": name, **attributes})
+    for k, weight in combined.items():
+        ET.SubElement(element, "joint", joint=work.names[k][0], coef=_text(weight))
+
+
+def _element(work: _Work, element: Element, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
+    if isinstance(element, Spring):
+        spatial = ET.SubElement(
+            tendon, "spatial", name=name, stiffness=_text(element.stiffness), damping=_text(element.damping),
+            springlength=_text(element.free_length),
+        )  # fmt: skip
+        for link, at in ((element.a, element.at_a), (element.b, element.at_b)):
+            ET.SubElement(spatial, "site", site=_site(work, link, at))
+    elif isinstance(element, TorsionSpring):
+        _torsion(work, element, name, tendon)
+    elif isinstance(element, Torque | TorqueSource):
+        _torque(work, element, name, tendon, actuator)
+    elif isinstance(element, Force):
+        _force(work, element, name, actuator)
+    else:
+        raise GeometryError(f"{type(element).__name__}: MuJoCo's dry friction is another law; leave the element out")
+
+
+def _torsion(work: _Work, spring: TorsionSpring, name: str, tendon: ET.Element) -> None:
+    combined = _combine(work, {spring.a: -1.0, spring.b: 1.0})
+    if not combined:
+        return  # the two links cannot turn against each other
+    constant = work.angle(spring.b) - work.angle(spring.a) - sum(w * work.qpos[k] for k, w in combined.items())
+    free = spring.free_angle - constant
+    if free < 0.0:  # a rest length must not be negative
+        free, combined = -free, {k: -w for k, w in combined.items()}
+    _fixed(
+        work, tendon, name, combined, stiffness=_text(spring.stiffness), damping=_text(spring.damping),
+        springlength=_text(free),
+    )  # fmt: skip
+
+
+def _torque(work: _Work, element: Torque | TorqueSource, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
+    torque = element.torque
+    if callable(torque):
+        raise GeometryError(f"torque {element.a}-{element.b} is a function; an exported one must be constant")
+    damping = 0.0
+    if isinstance(element, TorqueSource):
+        if element.efficiency != 1.0 and (torque != 0.0):
+            raise GeometryError(
+                f"efficiency = {element.efficiency} of torque source {element.a}-{element.b} depends on the flow of "
+                "power; an exported train must have efficiency 1"
+            )
+        torque, damping = torque * element.ratio, element.ratio**2 * element.rotor_damping
+        if element.rotor_inertia and not any(pair[1:] in _both(element) for pair in _tree_hinges(work)):
+            raise GeometryError(f"rotor of torque source {element.a}-{element.b}: no turning pair of the tree bears it")
+    combined = _combine(work, {element.a: -1.0, element.b: 1.0})
+    if not combined:
+        return
+    _fixed(work, tendon, name, combined, damping=_text(damping))
+    if torque:
+        _constant(actuator, torque, tendon=name)
+
+
+def _both(element: Torque | TorqueSource) -> set[tuple[int, int]]:
+    return {(element.a, element.b), (element.b, element.a)}
+
+
+def _tree_hinges(work: _Work) -> list[tuple[str, int, int]]:
+    return [name for name, hinge in zip(work.names, work.hinge) if hinge]
+
+
+def _constant(actuator: ET.Element, size: float, **where: str) -> None:
+    """Add an actuator that pushes with a constant force, without control."""
+    ET.SubElement(
+        actuator, "general", {**where, "gaintype": "fixed", "gainprm": "0", "biastype": "affine",
+                              "biasprm": _text(size, 0.0, 0.0)},
+    )  # fmt: skip
+
+
+def _force(work: _Work, force: Force, name: str, actuator: ET.Element) -> None:
+    if callable(force.force):
+        raise GeometryError(f"force on link {force.link} is a function; an exported one must be constant")
+    size = math.hypot(*force.force)
+    if size == 0.0:
+        return
+    unit = (force.force[0] / size, force.force[1] / size)
+    where = {"site": _site(work, force.link, force.at), "gear": _text(*unit, 0.0, 0.0, 0.0, 0.0)}
+    if force.frame == "world":
+        where["refsite"] = _site(work, work.model.mechanism.frame, (0.0, 0.0))
+    _constant(actuator, size, name=name, **where)

@@ -1,0 +1,6 @@
+"""Reference models of the tests of dynamics, and their starts."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "dynamics"))
