@@ -126,28 +126,51 @@ class Work:
         value[fine] = self.given.solve(found.poses[len(start) :][fine], "scale").lower
         return value
 
-    def one_branch(self, pieces: Found) -> bool:
-        """Whether the assemblies of neighbouring pieces are proved to be one at the input they share."""
-        if not pieces.proved.all():
-            return False
+    def links(self, pieces: Found) -> Mask:
+        """Whether the assemblies of neighbouring pieces are proved to be one at the input they share, (pieces - 1,)."""
         from graphsynth.kinematics.simulation import simulate
 
         edges = pieces.lo[1:]
-        if edges.size == 0 or self.system.size == 0:
-            return True
-        inputs, back = np.unique(np.concatenate([[self.low], edges]), return_inverse=True)
-        found = simulate(self.given.mechanism, inputs, start=self.start, events=False)
-        if not found.assembled.all():
-            return False
-        poses, velocities = found.poses[back[1:]], found.velocities[back[1:]]
-        if not np.isfinite(velocities).all():
-            return False
+        found: Mask = pieces.proved[:-1] & pieces.proved[1:]
+        rows = np.flatnonzero(found)
+        if rows.size == 0 or self.system.size == 0:
+            return found
+        inputs, back = np.unique(np.concatenate([[self.low], edges[rows]]), return_inverse=True)
+        passed = simulate(self.given.mechanism, inputs, start=self.start, events=False)
+        poses, velocities = passed.poses[back[1:]], passed.velocities[back[1:]]
+        fine = passed.assembled[back[1:]] & np.isfinite(velocities).all(axis=(1, 2))
+        found[rows[~fine]] = False
+        rows, poses, velocities = rows[fine], poses[fine], velocities[fine]
+        if rows.size == 0:
+            return found
         x, rate = self.system.coordinates(poses, velocities)
-        counted, u = self.system.count(poses), Interval.from_bounds(edges, edges)
+        counted, u = self.system.count(poses), Interval.from_bounds(edges[rows], edges[rows])
         single = prove_tubes(self.system, (), u, x, rate, counted)
-        before = Interval.from_bounds(pieces.box_lo[:-1], pieces.box_hi[:-1])
-        after = Interval.from_bounds(pieces.box_lo[1:], pieces.box_hi[1:])
-        return bool(linked(self.system, single, u, before, after, counted).all())
+        before = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
+        after = Interval.from_bounds(pieces.box_lo[rows + 1], pieces.box_hi[rows + 1])
+        found[rows] = linked(self.system, single, u, before, after, counted)
+        return found
+
+    def on_branch(self, pieces: Found, links: Mask) -> Mask:
+        """Whether the assembly of a piece is proved to be that of the motion: it holds a sample, or is linked to one.
+
+        Every box holds exactly one assembly for each input, so the one near a sample is the one meant.
+        """
+        motion = self.motion
+        keep = np.flatnonzero(motion.assembled)
+        u, size = motion.inputs[keep], self.system.size
+        x = self.system.coordinates(motion.poses[keep], np.zeros_like(motion.poses[keep]))[0]
+        place = np.clip(np.searchsorted(pieces.lo, u, side="right") - 1, 0, None)
+        inside = pieces.proved[place] & (pieces.lo[place] <= u) & (u <= pieces.hi[place])
+        if size:
+            inside &= ((pieces.box_lo[place] <= x) & (x <= pieces.box_hi[place])).all(axis=1)
+        found: Mask = np.zeros(len(pieces.lo), dtype=bool)
+        found[place[inside]] = True
+        for k in range(1, len(found)):
+            found[k] |= found[k - 1] & links[k - 1]
+        for k in range(len(found) - 2, -1, -1):
+            found[k] |= found[k + 1] & links[k]
+        return found
 
 
 def cut(lo: Array, hi: Array) -> tuple[Array, Array]:

@@ -9,11 +9,12 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.coupled.limits import Misalignment
-from graphsynth.jamming.coupled.pieces import PARTS, Work, check_range, cut
+from graphsynth.jamming.coupled.pieces import PARTS, Found, Work, check_range, cut
 from graphsynth.jamming.coupled.positions import Unsupported
 from graphsynth.jamming.coupled.problem import Bearings, problem
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
 
 __all__ = ["ScaleCertificate", "largest_scale"]
+
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,19 +85,15 @@ def largest_scale(
     check_range(motion, length_tolerance)
     given = problem(motion.mechanism, bearings, tilts, condition)
     reason = ""
-    best, at, above = 0.0, math.nan, 0.0
+    best, above = 0.0, 0.0
+    parts: list[Found] = []
     try:
         work = Work(given, motion, length_tolerance)
         lo, hi = work.first()
         while lo.size:
             found = work.evaluate(lo, hi)
-            top = np.argsort(-found.upper)[:4]
-            middle = Interval.from_bounds(lo, hi).mid[top]
-            points = work.evaluate(*(np.unique(middle),) * 2)
-            for part in (found, points):
-                k = int(np.argmax(part.lower))
-                if part.lower[k] > best:
-                    best, at = float(part.lower[k]), float(part.lo[k])
+            found = found._replace(lower=_peaks(work, found))
+            best = max(best, float(found.lower.max()))
             rest = found.upper > best * (1.0 + 0.9 * relative_gap)
             above = max(above, float(found.upper[~rest].max(initial=0.0)))
             narrow = hi - lo <= 1e-9 * (work.high - work.low)
@@ -104,14 +104,42 @@ def largest_scale(
             ):
                 above = max(above, float(found.upper[rest].max(initial=0.0)))
                 reason = f"the limit of work was reached after {work.evaluated} pieces" if rest.any() else ""
+                parts.append(found)
                 break
+            parts.append(found.take(~rest))
             lo, hi = cut(lo[rest], hi[rest])
+        pieces = Found.join(parts)
+        links = work.links(pieces)
+        own = work.on_branch(pieces, links)
     except Unsupported as error:
         return ScaleCertificate(0.0, math.inf, math.nan, 0, str(error), perf_counter() - begin)
+    # only what is proved to belong to the branch of the motion counts
+    peak = np.where(own, pieces.lower, 0.0)
+    top = int(np.argmax(peak))
+    best, at = float(peak[top]), float(Interval.from_bounds(pieces.lo[top], pieces.hi[top]).mid)
+    if not (own.all() and links.all()):
+        above = math.inf
+        reason = reason or "the pieces are not proved to be one branch"
     one = Interval(1)
     low = float((one / Interval.from_bounds(above, above)).lo) if 0.0 < above < math.inf else 0.0
     high = float((one / Interval.from_bounds(best, best)).hi) if best > 0.0 else math.inf
     low = math.inf if above == 0.0 else low
+    at = at if best > 0.0 else math.nan
     if not motion.completed:
         reason = reason or f"the motion ends: {motion.reason}"
     return ScaleCertificate(low, high, at, work.evaluated, reason, perf_counter() - begin)
+
+
+def _peaks(work: Work, found: Found) -> Array:
+    """Lower bounds of the largest factor in each piece: over the whole of it, or at its middle for the worst few.
+
+    The middle counts only if its assembly is the one of the piece: it lies in the box that holds exactly one.
+    """
+    peak = found.lower.copy()
+    top = np.argsort(-found.upper)[:4]
+    middle = Interval.from_bounds(found.lo[top], found.hi[top]).mid
+    points = work.evaluate(middle, middle)
+    inside = (points.box_lo >= found.box_lo[top]) & (points.box_hi <= found.box_hi[top])
+    same = points.proved & found.proved[top] & inside.all(axis=1)
+    peak[top] = np.maximum(peak[top], np.where(same, points.lower, 0.0))
+    return peak

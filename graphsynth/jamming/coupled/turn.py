@@ -235,8 +235,17 @@ def _nothing(motion: Motion, reason: str, seconds: float) -> TurnCertificate:
 
 
 def _turn_certificate(work: Work, pieces: Found, stopped: str, begin: float) -> TurnCertificate:
+    links = work.links(pieces)
+    own = work.on_branch(pieces, links)
+    branch = bool(own.all() and links.all())
+    # of another branch, perhaps: nothing is said about the motion
+    pieces = pieces._replace(lower=np.where(own, pieces.lower, 0.0), upper=np.where(own, pieces.upper, np.inf))
     state = np.where(pieces.lower > 1.0, -1, np.where(pieces.upper < 1.0, 1, 0)).astype(np.int8)
-    branch = work.one_branch(pieces)
+    lost = np.flatnonzero(pieces.proved & ~own)
+    if lost.size and not stopped:
+        stopped = (
+            f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
+        )
     verdict, reason = _judge(work, pieces, state, stopped, branch)
     return TurnCertificate(
         verdict, reason, pieces.lo, pieces.hi, state, pieces.lower, pieces.upper, branch, work.evaluated,

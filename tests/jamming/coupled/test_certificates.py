@@ -123,6 +123,33 @@ def test_margins_at_a_pose_are_decided(margin):
             assert lower[0] > 1.0 if side > 0 else upper[0] < 1.0
 
 
+def test_poses_of_another_branch_prove_nothing(monkeypatch):
+    """A solver that slips to the other assembly, which jams, must not turn a free motion into a proved jam."""
+    from graphsynth.kinematics import simulation
+
+    own, mirrored = (simulate(four_bar(), np.linspace(a, b, 9)) for a, b in ((4.2, 5.2), (-4.2, -5.2)))
+    tilt = Misalignment(0, 1, 0.0145)
+    assert certify_coupled(own, Bearing(), tilt).verdict.name == "CERTIFIED_FREE"
+    right = simulation.simulate
+
+    def slips(mechanism, inputs, **options):
+        found = right(mechanism, inputs, **options)
+        other = right(mechanism, -np.asarray(inputs), **{**options, "start": mirrored.poses[0]})
+        beyond = np.asarray(inputs) > 4.6
+        for name in ("poses", "velocities"):
+            sign = np.array([1.0, -1.0, -1.0]) * (1.0 if name == "poses" else -1.0)
+            turned = getattr(other, name) * sign  # reflected in the x axis: the other assembly at the same input
+            getattr(found, name)[beyond] = turned[beyond]
+        return found
+
+    monkeypatch.setattr(simulation, "simulate", slips)
+    found = certify_coupled(own, Bearing(), tilt)
+    assert found.verdict.name == "UNDECIDED" and "branch" in found.reason and not found.one_branch
+    assert not (found.state == -1).any() and (found.state[found.high < 4.59] == 1).all()
+    scale = largest_scale(own, Bearing(), tilt)
+    assert scale.low == 0.0 and scale.high > 1.2 and "branch" in scale.reason
+
+
 def test_whole_turn_of_the_lambda_linkage():
     """Free up to 2 t_A (section 9.6), jammed above, undecided at it."""
     motion = simulate(four_bar(), TURN)
