@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.drawing.bearing_in_space import space_picture
 from graphsynth.drawing.crossing_pictures import crossing_picture, dress, new_figure, region_picture
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import GeometryError
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from graphsynth.jamming.area_curve import AreaCurve
     from graphsynth.jamming.bearing import Bearing
 
-__all__ = ["area_chart", "area_picture", "crossing_picture", "region_picture", "section_picture"]
+__all__ = ["area_chart", "area_picture", "crossing_picture", "region_picture", "section_picture", "space_picture"]
 
 Array = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ from graphsynth.drawing.jamming_pictures import (
     crossing_picture,
     region_picture,
     section_picture,
+    space_picture,
 )
 from graphsynth.errors import GeometryError
 from graphsynth.jamming import Bearing
@@ -85,6 +86,38 @@ def test_section_without_and_with_jamming():
         section_picture(Bearing(), ())
     with pytest.raises(GeometryError, match="exaggeration"):
         section_picture(Bearing(), (0.1,), exaggeration=math.nan)
+
+
+def test_cylinders_in_space_without_and_with_jamming():
+    from matplotlib.colors import to_rgb
+
+    from graphsynth.drawing.bearing_in_space import wall
+    from graphsynth.drawing.palette import LIGHT
+
+    figure = drawn(space_picture(Bearing(), (0.0023, 0.0133312592), ("free", "jammed"), 60.0))
+    free, jammed = figure.axes
+    assert "free: 0." in free.get_title() and "jams: 0.0351 mm" in jammed.get_title()
+    assert "× 60" in figure.get_suptitle()
+    jam = np.array(to_rgb(LIGHT["jam"]))
+    shares = []
+    for axes in (free, jammed):
+        colours = axes.collections[1].get_facecolor()[:, :3]
+        shares.append(np.mean(np.linalg.norm(np.cross(colours, jam), axis=1) < 1e-9))
+    assert shares[0] == 0.0 and 0.05 < shares[1] < 0.5  # only what stands out of the hole has the colour of a jam
+    # the outermost point stands out by the gap of condition A, and is drawn where the factor puts it
+    phi, z = np.meshgrid(np.linspace(0, 2 * np.pi, 721), np.linspace(-5, 5, 11))
+    x, y, up, out = wall(Bearing(), 0.0133312592, 60.0, phi, z)
+    S, C = math.sin(0.0133312592), math.cos(0.0133312592)
+    assert out.max() == pytest.approx(17.5 * C + 5 * S - 17.53, rel=1e-9)
+    assert np.hypot(x, y).max() == pytest.approx(17.5 + 60 * (17.5 * C + 5 * S - 17.5), rel=1e-12)
+    assert up.max() == pytest.approx(5 * C + 17.5 * S)
+    for text, arguments in [
+        ("tilts is empty", (Bearing(), ())), ("exaggeration", (Bearing(), (0.1,), (), math.nan)),
+        ("must lie between", (Bearing(), (1.6,))), ("must lie between", (Bearing(), (math.nan,))),
+        ("interference fit", (Bearing(clearance=-0.01), (0.1,))),
+    ]:  # fmt: skip
+        with pytest.raises(GeometryError, match=text):
+            space_picture(*arguments)
 
 
 def test_areas_with_the_windows_of_the_source():
