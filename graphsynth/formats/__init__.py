@@ -16,6 +16,13 @@ _PUBLIC: dict[str, str] = {
     "MujocoSettings": "mjcf",
     "to_mjcf": "mjcf",
     "run_mujoco": "mujoco_run",
+    "ExudynSettings": "exudyn_model",
+    "ExudynModel": "exudyn_model",
+    "run_exudyn": "exudyn_model",
+    "to_exudyn": "exudyn_model",
+    "ExportCertificate": "export_certificate",
+    "Trial": "export_certificate",
+    "export_certificate": "export_certificate",
 }
 
 __all__ = sorted(_PUBLIC)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
+from graphsynth.errors import GeometryError, GraphsynthError
 
-__all__ = ["EngineRun", "steps_between", "turn"]
+__all__ = ["EngineRun", "load_engine", "steps_between", "turn"]
 
 Array = NDArray[np.float64]
 
@@ -53,6 +55,14 @@ class EngineRun:
     def completed(self) -> bool:
         """Whether the last output time was reached with finite numbers."""
         return self.status == "completed"
+
+
+def load_engine(name: str) -> Any:
+    """Import an engine; `GraphsynthError` with the remedy if it is not installed."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise GraphsynthError(f"{name} is not installed; pip install 'graphsynth[crosscheck]'") from error
 
 
 def steps_between(times: ArrayLike, step: float) -> tuple[Array, list[int]]:

@@ -388,7 +388,7 @@ def _gear(work: _Work, gear: Gear, name: str, tendon: ET.Element, equality: ET.E
 
 
 def _combine(work: _Work, weights: dict[int, float]) -> dict[int, float]:
-    """Combination of coordinates equal to a combination of link angles, but for a constant."""
+    """Return the combination of coordinates equal to a combination of link angles, but for a constant."""
     total: dict[int, float] = {}
     for link, weight in weights.items():
         for k, sign in work.chain[link].items():

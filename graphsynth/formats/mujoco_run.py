@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
-from graphsynth.errors import GraphsynthError
-from graphsynth.formats.engine_run import EngineRun, steps_between
+from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between
 from graphsynth.formats.mjcf import MjcfModel, MujocoSettings, to_mjcf
 
 __all__ = ["run_mujoco"]
@@ -49,10 +48,7 @@ def run_mujoco(
     settings = settings or MujocoSettings()
     grid, counts = steps_between(times, settings.step)
     export = to_mjcf(model, start, settings)
-    try:
-        import mujoco
-    except ImportError as error:
-        raise GraphsynthError("MuJoCo is not installed; pip install 'graphsynth[crosscheck]'") from error
+    mujoco = load_engine("mujoco")
     engine = mujoco.MjModel.from_xml_string(export.xml)
     data = mujoco.MjData(engine)
     mujoco.mj_resetDataKeyframe(engine, data, 0)

@@ -1,0 +1,386 @@
+"""A dynamic model in exudyn: absolute coordinates, every joint a constraint, implicit integration (spec 7.2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import reduce
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
+from graphsynth.dynamics.model import DynamicModel, Rigid
+from graphsynth.dynamics.start import StartReport
+from graphsynth.errors import GeometryError
+from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between, turn
+from graphsynth.formats.mjcf import check_common, gear_weights
+from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.model import Driver
+
+__all__ = ["ExudynModel", "ExudynSettings", "run_exudyn", "to_exudyn"]
+
+Array = NDArray[np.float64]
+Point = tuple[float, float]
+INTEGRATORS = ("generalized-alpha", "trapezoidal")
+
+
+@dataclass(frozen=True)
+class ExudynSettings:
+    """How exudyn integrates.
+
+    Parameters
+    ----------
+    step : float
+        Seconds.
+    integrator : {"generalized-alpha", "trapezoidal"}
+        Index 3 with numerical damping, or the trapezoidal rule with velocity constraints (index 2).
+    spectral_radius : float
+        At infinite frequency, of generalized-alpha; 1 has no damping and is known to stop or diverge.
+    newton_tolerance : float
+        Relative, of the iteration in a step.
+
+    Examples
+    --------
+    >>> ExudynSettings(1e-3).text
+    'generalized-alpha, spectral radius 0.9'
+    """
+
+    step: float = 1e-4
+    integrator: str = "generalized-alpha"
+    spectral_radius: float = 0.9
+    newton_tolerance: float = 1e-10
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.step) and self.step > 0.0):
+            raise GeometryError(f"step = {self.step} s must be positive; give the step of the engine")
+        if self.integrator not in INTEGRATORS:
+            raise GeometryError(f"integrator = {self.integrator!r} is not offered; give one of {', '.join(INTEGRATORS)}")
+        if not 0.0 <= self.spectral_radius <= 1.0:
+            raise GeometryError(f"spectral_radius = {self.spectral_radius} must lie in 0..1; 0.9 is usual")
+
+    @property
+    def text(self) -> str:
+        """Integrator and its parameter in one line."""
+        radius = f", spectral radius {self.spectral_radius:g}" if self.integrator == "generalized-alpha" else ", index 2"
+        return self.integrator + radius
+
+
+@dataclass(eq=False)
+class ExudynModel:
+    """An assembled exudyn system and where its items are.
+
+    Attributes
+    ----------
+    container, system
+        The engine's ``SystemContainer`` (keep it alive) and ``MainSystem``.
+    nodes : dict of int to item
+        Node of every moving link: coordinates of its centre of mass and its angle, as differences to the start.
+    sensors : dict of int to (item, item)
+        Coordinates and rates of every moving link.
+    """
+
+    container: Any
+    system: Any
+    nodes: dict[int, Any]
+    bodies: dict[int, Any]
+    sensors: dict[int, tuple[Any, Any]]
+
+
+class _Work:
+    """Workspace of one export."""
+
+    def __init__(self, model: DynamicModel, start: StartReport) -> None:
+        self.exu, self.items = load_engine("exudyn"), load_engine("exudyn.itemInterface")
+        self.model, self.start = model, start
+        container = self.exu.SystemContainer()
+        self.system = container.AddSystem()
+        self.export = ExudynModel(container, self.system, {}, {}, {})
+
+    def angle(self, link: int) -> float:
+        return float(self.start.poses[link, 2])
+
+    def spot(self, link: int, at: Point) -> Any:
+        """Marker at a point of a link."""
+        body = self.model.bodies.get(link)
+        x, y = (at[0] - body.centre[0], at[1] - body.centre[1]) if body else at
+        return self.system.AddMarker(
+            self.items.MarkerBodyRigid(bodyNumber=self.export.bodies[link], localPosition=[x, y, 0.0])
+        )
+
+    def turning(self, link: int) -> Any:
+        """Marker at the angle of a link."""
+        coordinate = 2 if link != self.model.mechanism.frame else 0
+        return self.system.AddMarker(
+            self.items.MarkerNodeCoordinate(nodeNumber=self.export.nodes[link], coordinate=coordinate)
+        )
+
+
+def to_exudyn(model: DynamicModel, start: StartReport) -> ExudynModel:
+    """Assemble a model in exudyn (floating point; the engine's own types).
+
+    One rigid body for each link, R and P joints and slots as 2D joints, gear pairs as constraints between two angles,
+    springs, dampers, constant forces and torques, drivers of turning pairs on velocity level.
+
+    Parameters
+    ----------
+    model : DynamicModel
+    start : StartReport
+
+    Returns
+    -------
+    ExudynModel
+
+    Raises
+    ------
+    GeometryError
+        What is not exported: cams, racks, gear pairs among three moving links, joint friction, loads that are
+        functions, driven sliding pairs, rotors between two moving links, massless links; an inconsistent start.
+    GraphsynthError
+        exudyn is not installed.
+
+    References
+    ----------
+    Specification of instruments and dynamics, section 7.2; Gerstmayr (2023), Exudyn.
+    """
+    check_common(model, start, "exudyn")
+    work = _Work(model, start)
+    _add_bodies(work)
+    for joint in (*model.mechanism.joints, *model.additional):
+        _add_joint(work, joint)
+    for element in model.elements:
+        _add_element(work, element)
+    for driver in model.prescribed:
+        _add_driver(work, driver)
+    work.system.Assemble()
+    return work.export
+
+
+def _add_bodies(work: _Work) -> None:
+    items, system, export, start = work.items, work.system, work.export, work.start
+    frame = work.model.mechanism.frame
+    export.nodes[frame] = system.AddNode(items.NodePointGround())
+    export.bodies[frame] = system.AddObject(items.ObjectGround())
+    for k, (link, body) in enumerate(work.model.bodies.items()):
+        place, rate = start.q[3 * k : 3 * k + 3], start.v[3 * k : 3 * k + 3]
+        node = system.AddNode(
+            items.NodeRigidBody2D(
+                referenceCoordinates=[float(place[0]), float(place[1]), work.angle(link)],
+                initialCoordinates=[0.0, 0.0, 0.0], initialVelocities=[float(v) for v in rate],
+            )
+        )  # fmt: skip
+        inertia = body.inertia + _rotor(work.model, link)
+        export.nodes[link] = node
+        export.bodies[link] = system.AddObject(
+            items.ObjectRigidBody2D(mass=body.mass, inertia=inertia, nodeNumber=node)
+        )
+        gravity = [body.mass * g for g in (*work.model.gravity, 0.0)]
+        system.AddLoad(items.LoadForceVector(markerNumber=work.spot(link, body.centre), loadVector=gravity))
+        kind = work.exu.OutputVariableType
+        first, second = (
+            system.AddSensor(
+                items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=variable)
+            )
+            for variable in (kind.Coordinates, kind.Coordinates_t)
+        )
+        export.sensors[link] = (first, second)
+
+
+def _rotor(model: DynamicModel, link: int) -> float:
+    """Rotor inertia reflected to a link, of the torque sources between it and the frame."""
+    total, frame = 0.0, model.mechanism.frame
+    for element in model.elements:
+        if not isinstance(element, TorqueSource) or not element.rotor_inertia or link not in (element.a, element.b):
+            continue
+        if frame not in (element.a, element.b):
+            raise GeometryError(f"rotor of torque source {element.a}-{element.b} between moving links is not exported")
+        total += element.ratio**2 * element.rotor_inertia
+    return total
+
+
+def _add_joint(work: _Work, joint: Any) -> None:
+    items, system = work.items, work.system
+    if isinstance(joint, Revolute | Rigid):
+        spots = [work.spot(joint.a, joint.at_a), work.spot(joint.b, joint.at_b)]
+        system.AddObject(items.ObjectJointRevolute2D(markerNumbers=spots))
+        if isinstance(joint, Rigid):
+            turns = [work.turning(joint.a), work.turning(joint.b)]
+            system.AddObject(items.ObjectConnectorCoordinate(markerNumbers=turns))
+    elif isinstance(joint, Prismatic | PinSlot):
+        along = turn(joint.angle_b, (1.0, 0.0)) if isinstance(joint, Prismatic) else (1.0, 0.0)
+        system.AddObject(
+            items.ObjectJointPrismatic2D(  # the line belongs to the second marker
+                markerNumbers=[work.spot(joint.b, joint.at_b), work.spot(joint.a, joint.at_a)],
+                axisMarker0=[*along, 0.0], normalMarker1=[*turn(joint.angle_a, (0.0, 1.0)), 0.0],
+                constrainRotation=isinstance(joint, Prismatic),
+            )
+        )  # fmt: skip
+    elif isinstance(joint, Gear):
+        _add_gear(work, joint)
+    else:
+        raise GeometryError(f"{type(joint).__name__} is not exported to exudyn; leave it out")
+
+
+def _add_gear(work: _Work, gear: Gear) -> None:
+    frame = work.model.mechanism.frame
+    weights = {k: w for k, w in gear_weights(work.model, gear).items() if k != frame and abs(w) > 1e-14}
+    if len(weights) != 2:
+        raise GeometryError(f"gear pair {gear.a}-{gear.b} turns with a moving carrier: exported to MuJoCo only")
+    (k, wk), (m, wm) = weights.items()
+    work.system.AddObject(
+        work.items.ObjectConnectorCoordinate(markerNumbers=[work.turning(k), work.turning(m)], factor1=-wm / wk)
+    )
+
+
+def _add_element(work: _Work, element: Element) -> None:
+    items, system = work.items, work.system
+    if isinstance(element, Spring):
+        system.AddObject(
+            items.ObjectConnectorSpringDamper(
+                markerNumbers=[work.spot(element.a, element.at_a), work.spot(element.b, element.at_b)],
+                referenceLength=element.free_length, stiffness=element.stiffness, damping=element.damping,
+            )
+        )  # fmt: skip
+    elif isinstance(element, TorsionSpring):
+        rest = element.free_angle - (work.angle(element.b) - work.angle(element.a))
+        _torsion(work, element.a, element.b, element.stiffness, element.damping, rest)
+    elif isinstance(element, Torque | TorqueSource):
+        _add_torque(work, element)
+    elif isinstance(element, Force):
+        if callable(element.force):
+            raise GeometryError(f"force on link {element.link} is a function; an exported one must be constant")
+        system.AddLoad(
+            items.LoadForceVector(
+                markerNumber=work.spot(element.link, element.at), loadVector=[*element.force, 0.0],
+                bodyFixed=element.frame == "body",
+            )
+        )  # fmt: skip
+    else:
+        raise GeometryError(f"{type(element).__name__} is not exported to exudyn; leave it out")
+
+
+def _torsion(work: _Work, a: int, b: int, stiffness: float, damping: float, rest: float) -> None:
+    work.system.AddObject(
+        work.items.ObjectConnectorCoordinateSpringDamper(
+            markerNumbers=[work.turning(a), work.turning(b)], stiffness=stiffness, damping=damping, offset=rest
+        )
+    )
+
+
+def _add_torque(work: _Work, element: Torque | TorqueSource) -> None:
+    torque = element.torque
+    if callable(torque):
+        raise GeometryError(f"torque {element.a}-{element.b} is a function; an exported one must be constant")
+    if isinstance(element, TorqueSource):
+        if element.efficiency != 1.0 and torque != 0.0:
+            raise GeometryError(f"efficiency of torque source {element.a}-{element.b} must be 1 to be exported")
+        torque *= element.ratio
+        if element.rotor_damping:
+            _torsion(work, element.a, element.b, 0.0, element.ratio**2 * element.rotor_damping, 0.0)
+    for link, load in ((element.a, -torque), (element.b, torque)):
+        if link != work.model.mechanism.frame:
+            work.system.AddLoad(work.items.LoadCoordinate(markerNumber=work.turning(link), load=load))
+
+
+def _add_driver(work: _Work, driver: Driver) -> None:
+    if not isinstance(work.model.mechanism.joint(*driver.pair), Revolute):
+        raise GeometryError(f"driver {driver.base}-{driver.link} of a sliding pair is not exported to exudyn")
+
+    def rate(system: Any, t: float, item: int, offset: float) -> float:
+        return float(driver.law(np.array([t]))[1][0])
+
+    turns = [work.turning(driver.base), work.turning(driver.link)]
+    work.system.AddObject(
+        work.items.ObjectConnectorCoordinate(
+            markerNumbers=turns, velocityLevel=True, offsetUserFunction_t=rate, offsetUserFunction=lambda *_: 0.0
+        )
+    )
+
+
+def run_exudyn(
+    model: DynamicModel, start: StartReport, times: ArrayLike, settings: ExudynSettings | None = None
+) -> EngineRun:
+    """Assemble a model in exudyn, run it, give the motion of all links back (estimated).
+
+    Parameters
+    ----------
+    model : DynamicModel
+    start : StartReport
+    times : array_like, shape (n,)
+        Output times, s; the step must divide them.
+    settings : ExudynSettings, optional
+
+    Returns
+    -------
+    EngineRun
+        Status "failed" and NaN from where the solver stopped.
+
+    Raises
+    ------
+    GeometryError
+        A model that is not exported (see :func:`to_exudyn`), a step that does not divide the times.
+    GraphsynthError
+        exudyn is not installed.
+    """
+    settings = settings or ExudynSettings()
+    grid, counts = steps_between(times, settings.step)
+    export = to_exudyn(model, start)
+    exu = load_engine("exudyn")
+    every = reduce(math.gcd, counts)
+    options = _options(exu, start, settings, counts[-1], every)
+    kind = exu.DynamicSolverType
+    solver = kind.GeneralizedAlpha if settings.integrator == "generalized-alpha" else kind.TrapezoidalIndex2
+    begin, message = perf_counter(), ""
+    try:
+        if not export.system.SolveDynamic(options, solverType=solver, showHints=False, updateInitialValues=False):
+            message = "the solver stopped"
+    except Exception as error:  # the engine raises its own kinds
+        message = f"the solver stopped: {str(error).strip().splitlines()[0] if str(error).strip() else type(error)}"
+    seconds = perf_counter() - begin
+    poses, rates = _collect(export, model, start, grid, [n // every for n in counts])
+    if not message and not np.isfinite(poses).all():
+        message = "the solver ended before the last output time"
+    return EngineRun(
+        "exudyn", exu.config.Version(), settings.text, settings.step, grid, poses, rates,
+        "failed" if message else "completed", message or "reached the last output time", counts[-1], seconds,
+    )  # fmt: skip
+
+
+def _options(exu: Any, start: StartReport, settings: ExudynSettings, steps: int, every: int) -> Any:
+    options = exu.SimulationSettings()
+    integration = options.timeIntegration
+    integration.startTime, integration.endTime = start.time, start.time + steps * settings.step
+    integration.numberOfSteps = steps
+    integration.verboseMode = 0
+    integration.adaptiveStep = False
+    integration.newton.relativeTolerance = settings.newton_tolerance
+    integration.generalizedAlpha.spectralRadius = settings.spectral_radius
+    options.solutionSettings.writeSolutionToFile = False
+    options.solutionSettings.sensorsWritePeriod = every * settings.step
+    options.displayStatistics = False
+    if len(start.rows) > start.rank:  # redundant constraints: the multipliers are not unique
+        options.linearSolverType = exu.LinearSolverType.EigenDense
+        options.linearSolverSettings.ignoreSingularJacobian = True
+    return options
+
+
+def _collect(
+    export: ExudynModel, model: DynamicModel, start: StartReport, grid: Array, places: list[int]
+) -> tuple[Array, Array]:
+    """Poses and velocities of the link frames from the stored sensors, each (n, links, 3)."""
+    poses, rates = np.full((2, grid.size, model.mechanism.graph.links, 3), np.nan)
+    poses[:, model.mechanism.frame], rates[:, model.mechanism.frame] = 0.0, 0.0
+    for k, (link, body) in enumerate(model.bodies.items()):
+        place, rate = (np.atleast_2d(export.system.GetSensorStoredData(sensor)) for sensor in export.sensors[link])
+        known = [n for n, row in enumerate(places) if row < len(place)]
+        rows = [places[n] for n in known]
+        if not rows or place.shape[1] != 4:
+            continue
+        q = place[rows, 1:] + np.array([*start.q[3 * k : 3 * k + 2], start.poses[link, 2]])
+        v = rate[rows, 1:]
+        arm = np.exp(1j * q[:, 2]) * complex(*body.centre)
+        poses[known, link] = np.column_stack([q[:, 0] - arm.real, q[:, 1] - arm.imag, q[:, 2]])
+        rates[known, link] = np.column_stack([v[:, 0] + v[:, 2] * arm.imag, v[:, 1] - v[:, 2] * arm.real, v[:, 2]])
+    return poses, rates
