@@ -96,8 +96,6 @@ def wall(bearing: Bearing, tilt: float, factor: float, phi: Array, z: Array) -> 
 
 
 def _panel(axes: Any, bearing: Bearing, tilt: float, factor: float) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
     h = max(bearing.h, 1e-6 * bearing.Rb)
     top, hole = 1.35 * h + 0.02 * bearing.Rb, bearing.Rb + factor * bearing.clearance
     view = math.radians(_SIDE)
@@ -105,7 +103,7 @@ def _panel(axes: Any, bearing: Bearing, tilt: float, factor: float) -> None:
     flat = np.array([[-top], [top]])
     axes.plot_surface(
         hole * np.cos(behind) + 0.0 * flat, hole * np.sin(behind) + 0.0 * flat, flat + 0.0 * behind,
-        color=LIGHT["soft"], alpha=0.35, linewidth=0, shade=False, rcount=2, ccount=_AROUND, zorder=1,
+        color="#d9dee3", linewidth=0, shade=False, antialiased=False, rcount=2, ccount=_AROUND, zorder=1,
     )  # fmt: skip
     for level in (-top, top):
         axes.plot(hole * np.cos(behind), hole * np.sin(behind), level, color=LIGHT["ink"], lw=1.3, zorder=2)
@@ -116,8 +114,11 @@ def _panel(axes: Any, bearing: Bearing, tilt: float, factor: float) -> None:
         X, Y, Z, facecolors=_shades(out, phi), linewidth=0, shade=False, antialiased=False, rcount=_ALONG,
         ccount=_AROUND, zorder=3,
     )  # fmt: skip
-    lid = [*zip(X[-1], Y[-1], Z[-1])]
-    axes.add_collection3d(Poly3DCollection([lid], facecolor="#cfe3f2", edgecolor=LIGHT["ink"], lw=1.0, zorder=4))
+    lid = [np.stack([np.full(_AROUND, rim.mean()), rim]) for rim in (X[-1], Y[-1], Z[-1])]
+    axes.plot_surface(
+        *lid, color="#cfe3f2", linewidth=0, shade=False, antialiased=False, rcount=2, ccount=_AROUND, zorder=4
+    )
+    axes.plot(X[-1], Y[-1], Z[-1], color=LIGHT["ink"], lw=1.0, zorder=4)
     front = np.linspace(view - 0.5 * math.pi, view + 0.5 * math.pi, _AROUND)
     for level in (-top, top):  # the part cut away, as a thin line
         axes.plot(
@@ -132,7 +133,7 @@ def _panel(axes: Any, bearing: Bearing, tilt: float, factor: float) -> None:
 
 
 def _shades(out: Array, phi: Array) -> Array:
-    """Colours of the bearing's wall: blue, or the colour of a jam where it stands out of the hole; lit from the right."""
+    """Colours of the bearing's wall: blue, or that of a jam where it stands out of the hole; lit from the right."""
     from matplotlib.colors import to_rgb
 
     light = 0.72 + 0.28 * np.cos(phi[:-1, :-1] - math.radians(_SIDE + 35.0))
