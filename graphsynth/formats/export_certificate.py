@@ -34,6 +34,8 @@ class Trial:
 
     Attributes
     ----------
+    family : str
+        Settings but for the step.
     settings : str
     step : float
         Seconds.
@@ -50,10 +52,11 @@ class Trial:
     energy_error : float
         Largest difference of the mechanical energy to the reference, over the largest kinetic energy.
     order : float
-        Observed, against the next longer step with the same settings; NaN for the longest.
+        Observed, against the next longer step of the family; NaN for the longest.
     seconds : float
     """
 
+    family: str
     settings: str
     step: float
     status: str
@@ -64,6 +67,11 @@ class Trial:
     energy_error: float
     order: float
     seconds: float
+
+    @property
+    def floor(self) -> bool:
+        """Whether a shorter step hardly helped: the observed order is below 0.5."""
+        return self.order < 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +151,7 @@ def _plain(value: Any) -> Any:
 def _row(trial: Trial) -> str:
     if trial.status != "completed":
         return f"| {trial.settings} | {trial.step:g} | **{trial.status}** | | | | |"
-    order = f"{trial.order:.1f}" if math.isfinite(trial.order) else ""
+    order = "floor" if trial.floor else f"{trial.order:.1f}" if math.isfinite(trial.order) else ""
     numbers = " | ".join(f"{v:.1e}" for v in (trial.error, trial.energy_error, trial.gap))
     return f"| {trial.settings} | {trial.step:g} | {numbers} | {order} | {trial.seconds:.2f} |"
 
@@ -196,7 +204,7 @@ def export_certificate(
     version = _version(names["engine"])
     common = {**names, "engine_version": version, "tolerance": float(tolerance), "times": tuple(grid.tolist())}
     if not version:
-        empty = tuple(Trial(s.text, s.step, "not run", "the engine is not installed", *[math.nan] * 6) for s in trials)
+        empty = tuple(_nothing(s, "not run", "the engine is not installed", math.nan) for s in trials)
         return ExportCertificate(
             **common, length=math.nan, reference="", reference_error=math.nan, trials=empty, verdict="not run",
             limit=math.nan, statement=f"{names['engine']} is not installed, so nothing was measured.",
@@ -208,6 +216,12 @@ def export_certificate(
         **common, length=float(reference.compiled.tables.size), reference=method, reference_error=estimate,
         trials=tuple(measured), verdict=verdict, limit=limit, statement=statement,
     )  # fmt: skip
+
+
+def _nothing(settings: Settings, status: str, message: str, seconds: float) -> Trial:
+    """Return a trial without numbers."""
+    none = math.nan
+    return Trial(settings.family, settings.text, settings.step, status, message, none, none, none, none, none, seconds)
 
 
 def _checked(settings: Sequence[Settings], tolerance: float) -> list[Settings]:
@@ -231,7 +245,7 @@ def _version(engine: str) -> str:
 
 
 def _names(model: DynamicModel, start: StartReport, settings: Settings) -> dict[str, Any]:
-    """What the certificate says before anything is run."""
+    """Return what the certificate says before anything is run."""
     from graphsynth import __version__
     from graphsynth.mechanism.constraints import jacobian, residual
 
@@ -256,9 +270,7 @@ def _names(model: DynamicModel, start: StartReport, settings: Settings) -> dict[
     }  # fmt: skip
 
 
-def _reference(
-    model: DynamicModel, start: StartReport, grid: Array, rtol: float
-) -> tuple[DynamicMotion, str, float]:
+def _reference(model: DynamicModel, start: StartReport, grid: Array, rtol: float) -> tuple[DynamicMotion, str, float]:
     """Return the internal motion, what it is, and the estimate of its error."""
     from graphsynth.dynamics.integrate import simulate_dynamics
 
@@ -298,13 +310,13 @@ def _measure(
 
     run = _run(model, start, grid, settings)
     if not run.completed:
-        return Trial(run.settings, run.step, run.status, run.message, *[math.nan] * 5, run.seconds)
+        return _nothing(settings, run.status, run.message, run.seconds)
     size = float(reference.compiled.tables.size)
     speed = float(np.abs(reference.velocities[..., 2]).max()) or 1.0
     kinetic, total = mechanical_energy(model, reference.poses, reference.velocities)
     energy = mechanical_energy(model, run.poses, run.velocities)[1]
     return Trial(
-        run.settings, run.step, run.status, run.message,
+        settings.family, run.settings, run.step, run.status, run.message,
         float(np.abs(residual(model.mechanism.joints, run.poses)).max(initial=0.0)),
         _distance(run.poses, reference.poses, size),
         _distance(run.velocities, reference.velocities, size) / speed,
@@ -343,17 +355,12 @@ def _point(poses: Array, rates: Array, link: int, at: tuple[float, float]) -> tu
     return place, rates[..., link, 0] + 1j * rates[..., link, 1] + 1j * rates[..., link, 2] * arm
 
 
-def _family(trial: Trial) -> str:
-    """Settings but for what follows the step by itself."""
-    return trial.settings.split(",")[0]
-
-
 def _with_orders(trials: list[Trial]) -> list[Trial]:
     """Fill in the observed orders, settings by settings in the order given."""
-    ordered = sorted(trials, key=lambda t: (_family(t), -t.step))
+    ordered = sorted(trials, key=lambda t: (t.family, -t.step))
     found: list[Trial] = []
     for trial in ordered:
-        before = found[-1] if found and _family(found[-1]) == _family(trial) else None
+        before = found[-1] if found and found[-1].family == trial.family else None
         order = math.nan
         if before and before.error > 0.0 and trial.error > 0.0 and before.step > trial.step:
             order = math.log(before.error / trial.error) / math.log(before.step / trial.step)

@@ -16,7 +16,7 @@ from graphsynth.dynamics.model import DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport
 from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between, turn
-from graphsynth.formats.mjcf import check_common, gear_weights
+from graphsynth.formats.exporting import check_common, constant_torque, gear_weights
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver
 
@@ -57,15 +57,24 @@ class ExudynSettings:
         if not (math.isfinite(self.step) and self.step > 0.0):
             raise GeometryError(f"step = {self.step} s must be positive; give the step of the engine")
         if self.integrator not in INTEGRATORS:
-            raise GeometryError(f"integrator = {self.integrator!r} is not offered; give one of {', '.join(INTEGRATORS)}")
+            raise GeometryError(
+                f"integrator = {self.integrator!r} is not offered; give one of {', '.join(INTEGRATORS)}"
+            )
         if not 0.0 <= self.spectral_radius <= 1.0:
             raise GeometryError(f"spectral_radius = {self.spectral_radius} must lie in 0..1; 0.9 is usual")
 
     @property
     def text(self) -> str:
         """Integrator and its parameter in one line."""
-        radius = f", spectral radius {self.spectral_radius:g}" if self.integrator == "generalized-alpha" else ", index 2"
+        radius = (
+            f", spectral radius {self.spectral_radius:g}" if self.integrator == "generalized-alpha" else ", index 2"
+        )
         return self.integrator + radius
+
+    @property
+    def family(self) -> str:
+        """What stays the same when only the step changes."""
+        return self.text
 
 
 @dataclass(eq=False)
@@ -270,15 +279,9 @@ def _torsion(work: _Work, a: int, b: int, stiffness: float, damping: float, rest
 
 
 def _add_torque(work: _Work, element: Torque | TorqueSource) -> None:
-    torque = element.torque
-    if callable(torque):
-        raise GeometryError(f"torque {element.a}-{element.b} is a function; an exported one must be constant")
-    if isinstance(element, TorqueSource):
-        if element.efficiency != 1.0 and torque != 0.0:
-            raise GeometryError(f"efficiency of torque source {element.a}-{element.b} must be 1 to be exported")
-        torque *= element.ratio
-        if element.rotor_damping:
-            _torsion(work, element.a, element.b, 0.0, element.ratio**2 * element.rotor_damping, 0.0)
+    torque, damping = constant_torque(element)
+    if damping:
+        _torsion(work, element.a, element.b, 0.0, damping, 0.0)
     for link, load in ((element.a, -torque), (element.b, torque)):
         if link != work.model.mechanism.frame:
             work.system.AddLoad(work.items.LoadCoordinate(markerNumber=work.turning(link), load=load))

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport
 from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import turn
+from graphsynth.formats.exporting import check_common, gear_weights
+from graphsynth.formats.mjcf_parts import Work, armature, combine, fixed, site, text, write_load
 from graphsynth.formats.spanning_tree import SpanningTree, spanning_tree
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
@@ -77,6 +77,11 @@ class MujocoSettings:
         a, b = self.constraint
         return f"{self.integrator}, solref {a:g} {b:g}, solimp {' '.join(f'{v:g}' for v in self.solimp)}"
 
+    @property
+    def family(self) -> str:
+        """What stays the same when only the step changes."""
+        return self.text if self.solref else f"{self.integrator}, solref by step"
+
 
 @dataclass(frozen=True, eq=False)
 class MjcfModel:
@@ -105,30 +110,6 @@ class MjcfModel:
     angles: Array
     start: StartReport
     settings: MujocoSettings
-
-
-@dataclass
-class _Work:
-    """Workspace of one export."""
-
-    model: DynamicModel
-    start: StartReport
-    tree: SpanningTree
-    names: list[tuple[str, int, int]] = field(default_factory=list)
-    hinge: list[bool] = field(default_factory=list)
-    qpos: list[float] = field(default_factory=list)
-    qvel: list[float] = field(default_factory=list)
-    chain: dict[int, dict[int, int]] = field(default_factory=dict)  # link -> coordinate -> sign of its hinge
-    bodies: dict[int, ET.Element] = field(default_factory=dict)
-    sites: int = 0
-
-    def angle(self, link: int) -> float:
-        return float(self.start.poses[link, 2])
-
-
-def _text(*values: float) -> str:
-    """Shortest decimals that read back as the same doubles; -0 is written 0."""
-    return " ".join(repr(float(v) + 0.0) for v in values)
 
 
 def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | None = None) -> MjcfModel:
@@ -174,7 +155,7 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     if model.prescribed:
         pair = model.prescribed[0].pair
         raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
-    work = _Work(model, start, spanning_tree(model.mechanism))
+    work = Work(model, start, spanning_tree(model.mechanism))
     root = ET.Element("mujoco", model="graphsynth")
     ET.SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
     _options(root, model, settings)
@@ -187,13 +168,13 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     for extra in model.additional:
         _close_extra(work, extra, equality)
     for number, element in enumerate(model.elements):
-        _element(work, element, f"e{number}", tendon, actuator)
+        write_load(work, element, f"e{number}", tendon, actuator)
     for constraint in equality:
-        constraint.set("solref", _text(*settings.constraint))
-        constraint.set("solimp", _text(*settings.solimp))
+        constraint.set("solref", text(*settings.constraint))
+        constraint.set("solimp", text(*settings.solimp))
     root.extend(part for part in (tendon, equality, actuator) if len(part))
     key = ET.SubElement(root, "keyframe")
-    ET.SubElement(key, "key", name="start", time=_text(start.time), qpos=_text(*work.qpos), qvel=_text(*work.qvel))
+    ET.SubElement(key, "key", name="start", time=text(start.time), qpos=text(*work.qpos), qvel=text(*work.qvel))
     ET.indent(root)
     angles = np.zeros((model.mechanism.graph.links, len(work.names)))
     for link, signs in work.chain.items():
@@ -205,25 +186,15 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     )  # fmt: skip
 
 
-def check_common(model: DynamicModel, start: StartReport, engine: str) -> None:
-    """Refuse what no engine here can run."""
-    if not start.consistent:
-        raise GeometryError(f"the start is not consistent, so {engine} would run another mechanism: {start.message}")
-    if start.poses.shape[0] != model.mechanism.graph.links:
-        raise GeometryError(f"the start has {start.poses.shape[0]} links, the model {model.mechanism.graph.links}")
-    if model.massless:
-        raise GeometryError(f"links {list(model.massless)} have no mass or inertia; {engine} needs both positive")
-
-
 def _options(root: ET.Element, model: DynamicModel, settings: MujocoSettings) -> None:
     option = ET.SubElement(
-        root, "option", timestep=_text(settings.step), integrator=settings.integrator, solver="Newton",
-        jacobian="dense", tolerance="1e-14", iterations="100", gravity=_text(*model.gravity, 0.0),
+        root, "option", timestep=text(settings.step), integrator=settings.integrator, solver="Newton",
+        jacobian="dense", tolerance="1e-14", iterations="100", gravity=text(*model.gravity, 0.0),
     )  # fmt: skip
     ET.SubElement(option, "flag", contact="disable", refsafe="disable")
 
 
-def _hang(work: _Work, link: int) -> None:
+def _hang(work: Work, link: int) -> None:
     """Write the bodies that hang on a link, depth first: the order in which the engine counts coordinates."""
     for child, index in work.tree.children(link):
         body = work.model.bodies[child]
@@ -231,19 +202,19 @@ def _hang(work: _Work, link: int) -> None:
         px, py, parent = (float(v) for v in work.start.poses[link])
         place, half = turn(-parent, (x - px, y - py)), 0.5 * (theta - parent)
         element = ET.SubElement(
-            work.bodies[link], "body", name=f"link{child}", pos=_text(*place, 0.0),
-            quat=_text(math.cos(half), 0.0, 0.0, math.sin(half)),
+            work.bodies[link], "body", name=f"link{child}", pos=text(*place, 0.0),
+            quat=text(math.cos(half), 0.0, 0.0, math.sin(half)),
         )  # fmt: skip
         ET.SubElement(
-            element, "inertial", pos=_text(*body.centre, 0.0), mass=_text(body.mass),
-            diaginertia=_text(body.inertia, body.inertia, body.inertia),
+            element, "inertial", pos=text(*body.centre, 0.0), mass=text(body.mass),
+            diaginertia=text(body.inertia, body.inertia, body.inertia),
         )  # fmt: skip
         work.bodies[child], work.chain[child] = element, dict(work.chain[link])
         _joint(work, element, work.model.mechanism.joints[index], child)
         _hang(work, child)
 
 
-def _joint(work: _Work, body: ET.Element, joint: JointGeometry, child: int) -> None:
+def _joint(work: Work, body: ET.Element, joint: JointGeometry, child: int) -> None:
     """Write the engine joints of a tree edge; the engine applies them in order, so a slot is slide then hinge."""
     if isinstance(joint, Revolute):
         _hinge(work, body, joint, child, joint.at_b if child == joint.b else joint.at_a)
@@ -272,55 +243,39 @@ def displacement(joint: Prismatic | PinSlot, start: StartReport) -> tuple[float,
     return float((place[1] - place[0]) @ along), float((speed[1] - speed[0]) @ along)
 
 
-def _hinge(work: _Work, body: ET.Element, joint: JointGeometry, child: int, at: Point) -> None:
+def _hinge(work: Work, body: ET.Element, joint: JointGeometry, child: int, at: Point) -> None:
     sign = 1 if child == joint.b else -1
     q = work.angle(joint.b) - work.angle(joint.a)
     rate = float(work.start.velocities[joint.b, 2] - work.start.velocities[joint.a, 2])
     suffix = "_turn" if isinstance(joint, PinSlot) else ""
     name = f"j{joint.a}_{joint.b}{suffix}"
-    attributes = {"type": "hinge", "pos": _text(*at, 0.0), "axis": _text(0.0, 0.0, sign), "ref": _text(q)}
-    armature = _armature(work.model.elements, joint)
-    if armature:
-        attributes["armature"] = _text(armature)
+    attributes = {"type": "hinge", "pos": text(*at, 0.0), "axis": text(0.0, 0.0, sign), "ref": text(q)}
+    rotor = armature(work.model.elements, joint)
+    if rotor:
+        attributes["armature"] = text(rotor)
     ET.SubElement(body, "joint", {"name": name, **attributes})
     work.chain[child][len(work.names)] = sign
     _count(work, name, joint, q, rate, True)
 
 
-def _slide(work: _Work, body: ET.Element, joint: JointGeometry, axis: Point, d: float, rate: float) -> None:
+def _slide(work: Work, body: ET.Element, joint: JointGeometry, axis: Point, d: float, rate: float) -> None:
     name = f"j{joint.a}_{joint.b}"
-    ET.SubElement(body, "joint", name=name, type="slide", axis=_text(*axis, 0.0), ref=_text(d))
+    ET.SubElement(body, "joint", name=name, type="slide", axis=text(*axis, 0.0), ref=text(d))
     _count(work, name, joint, d, rate, False)
 
 
-def _count(work: _Work, name: str, joint: JointGeometry, q: float, rate: float, hinge: bool) -> None:
+def _count(work: Work, name: str, joint: JointGeometry, q: float, rate: float, hinge: bool) -> None:
     work.names.append((name, joint.a, joint.b))
     work.hinge.append(hinge)
     work.qpos.append(q)
     work.qvel.append(rate)
 
 
-def _armature(elements: Iterable[Element], joint: JointGeometry) -> float:
-    """Reflected rotor inertia of the sources across a turning pair."""
-    return sum(
-        e.ratio**2 * e.rotor_inertia
-        for e in elements
-        if isinstance(e, TorqueSource) and {e.a, e.b} == {joint.a, joint.b}
-    )
-
-
-def _site(work: _Work, link: int, at: Point) -> str:
-    """Add a site to a link and return its name."""
-    name, work.sites = f"s{work.sites}", work.sites + 1
-    ET.SubElement(work.bodies[link], "site", name=name, pos=_text(*at, 0.0))
-    return name
-
-
-def _close(work: _Work, joint: JointGeometry, tendon: ET.Element, equality: ET.Element) -> None:
+def _close(work: Work, joint: JointGeometry, tendon: ET.Element, equality: ET.Element) -> None:
     """Close a cut joint by an equality."""
     name = f"j{joint.a}_{joint.b}"
     if isinstance(joint, Revolute):
-        sites = _site(work, joint.a, joint.at_a), _site(work, joint.b, joint.at_b)
+        sites = site(work, joint.a, joint.at_a), site(work, joint.b, joint.at_b)
         ET.SubElement(equality, "connect", name=name, site1=sites[0], site2=sites[1])
     elif isinstance(joint, Gear):
         _gear(work, joint, name, tendon, equality)
@@ -330,9 +285,9 @@ def _close(work: _Work, joint: JointGeometry, tendon: ET.Element, equality: ET.E
         raise GeometryError(f"{joint.kind} joint {joint.a}-{joint.b}: MuJoCo has no such joint; leave it out")
 
 
-def _close_extra(work: _Work, extra: object, equality: ET.Element) -> None:
+def _close_extra(work: Work, extra: object, equality: ET.Element) -> None:
     if isinstance(extra, Revolute):
-        sites = _site(work, extra.a, extra.at_a), _site(work, extra.b, extra.at_b)
+        sites = site(work, extra.a, extra.at_a), site(work, extra.b, extra.at_b)
         ET.SubElement(equality, "connect", site1=sites[0], site2=sites[1])
     elif isinstance(extra, Rigid):
         ET.SubElement(equality, "weld", body1=_body(work, extra.b), body2=_body(work, extra.a))
@@ -340,146 +295,18 @@ def _close_extra(work: _Work, extra: object, equality: ET.Element) -> None:
         raise GeometryError(f"additional {type(extra).__name__}: MuJoCo has no such constraint; leave it out")
 
 
-def _body(work: _Work, link: int) -> str:
+def _body(work: Work, link: int) -> str:
     return "world" if link == work.model.mechanism.frame else f"link{link}"
 
 
-def carrier_of(model: DynamicModel, gear: Gear) -> int:
-    """Return the link that carries both wheels of a gear pair."""
-    for link in range(model.mechanism.graph.links):
-        if link in (gear.a, gear.b):
-            continue
-        if _bears(model, link, gear.a, gear.at_a) and _bears(model, link, gear.b, gear.at_b):
-            return link
-    for link, wheel, at in ((gear.a, gear.b, gear.at_b), (gear.b, gear.a, gear.at_a)):
-        if _bears(model, link, wheel, at):  # the wheel turns on the other one's link: a link of two centres
-            return link
-    raise GeometryError(f"gear pair {gear.a}-{gear.b} has no link that bears both wheels at their centres; give one")
-
-
-def _bears(model: DynamicModel, link: int, wheel: int, centre: Point) -> bool:
-    for joint in model.mechanism.joints:
-        if isinstance(joint, Revolute) and {joint.a, joint.b} == {link, wheel}:
-            own = joint.at_a if joint.a == wheel else joint.at_b
-            return math.dist(own, centre) <= 1e-12 * max(1.0, math.hypot(*centre))
-    return False
-
-
-def gear_weights(model: DynamicModel, gear: Gear) -> dict[int, float]:
-    """Weights of the link angles whose sum a gear pair keeps constant."""
-    carrier, sign = carrier_of(model, gear), -1.0 if gear.internal else 1.0
-    weights = {gear.a: gear.radius_a, gear.b: sign * gear.radius_b}
-    weights[carrier] = weights.get(carrier, 0.0) - gear.radius_a - sign * gear.radius_b
-    largest = max(gear.radius_a, gear.radius_b)
-    return {link: w / largest for link, w in weights.items()}
-
-
-def _gear(work: _Work, gear: Gear, name: str, tendon: ET.Element, equality: ET.Element) -> None:
-    combined = _combine(work, gear_weights(work.model, gear))
+def _gear(work: Work, gear: Gear, name: str, tendon: ET.Element, equality: ET.Element) -> None:
+    combined = combine(work, gear_weights(work.model, gear))
     if len(combined) == 2:
         (k, wk), (m, wm) = combined.items()
         ET.SubElement(
             equality, "joint", name=name, joint1=work.names[k][0], joint2=work.names[m][0],
-            polycoef=_text(0.0, -wm / wk, 0.0, 0.0, 0.0),
+            polycoef=text(0.0, -wm / wk, 0.0, 0.0, 0.0),
         )  # fmt: skip
         return
-    _fixed(work, tendon, f"t_{name}", combined)
+    fixed(work, tendon, f"t_{name}", combined)
     ET.SubElement(equality, "tendon", name=name, tendon1=f"t_{name}", polycoef="0 0 0 0 0")
-
-
-def _combine(work: _Work, weights: dict[int, float]) -> dict[int, float]:
-    """Return the combination of coordinates equal to a combination of link angles, but for a constant."""
-    total: dict[int, float] = {}
-    for link, weight in weights.items():
-        for k, sign in work.chain[link].items():
-            total[k] = total.get(k, 0.0) + weight * sign
-    return {k: w for k, w in sorted(total.items()) if abs(w) > 1e-14}
-
-
-def _fixed(work: _Work, tendon: ET.Element, name: str, combined: dict[int, float], **attributes: str) -> None:
-    element = ET.SubElement(tendon, "fixed", {"name": name, **attributes})
-    for k, weight in combined.items():
-        ET.SubElement(element, "joint", joint=work.names[k][0], coef=_text(weight))
-
-
-def _element(work: _Work, element: Element, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
-    if isinstance(element, Spring):
-        spatial = ET.SubElement(
-            tendon, "spatial", name=name, stiffness=_text(element.stiffness), damping=_text(element.damping),
-            springlength=_text(element.free_length),
-        )  # fmt: skip
-        for link, at in ((element.a, element.at_a), (element.b, element.at_b)):
-            ET.SubElement(spatial, "site", site=_site(work, link, at))
-    elif isinstance(element, TorsionSpring):
-        _torsion(work, element, name, tendon)
-    elif isinstance(element, Torque | TorqueSource):
-        _torque(work, element, name, tendon, actuator)
-    elif isinstance(element, Force):
-        _force(work, element, name, actuator)
-    else:
-        raise GeometryError(f"{type(element).__name__}: MuJoCo's dry friction is another law; leave the element out")
-
-
-def _torsion(work: _Work, spring: TorsionSpring, name: str, tendon: ET.Element) -> None:
-    combined = _combine(work, {spring.a: -1.0, spring.b: 1.0})
-    if not combined:
-        return  # the two links cannot turn against each other
-    constant = work.angle(spring.b) - work.angle(spring.a) - sum(w * work.qpos[k] for k, w in combined.items())
-    free = spring.free_angle - constant
-    if free < 0.0:  # a rest length must not be negative
-        free, combined = -free, {k: -w for k, w in combined.items()}
-    _fixed(
-        work, tendon, name, combined, stiffness=_text(spring.stiffness), damping=_text(spring.damping),
-        springlength=_text(free),
-    )  # fmt: skip
-
-
-def _torque(work: _Work, element: Torque | TorqueSource, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
-    torque = element.torque
-    if callable(torque):
-        raise GeometryError(f"torque {element.a}-{element.b} is a function; an exported one must be constant")
-    damping = 0.0
-    if isinstance(element, TorqueSource):
-        if element.efficiency != 1.0 and (torque != 0.0):
-            raise GeometryError(
-                f"efficiency = {element.efficiency} of torque source {element.a}-{element.b} depends on the flow of "
-                "power; an exported train must have efficiency 1"
-            )
-        torque, damping = torque * element.ratio, element.ratio**2 * element.rotor_damping
-        if element.rotor_inertia and not any(pair[1:] in _both(element) for pair in _tree_hinges(work)):
-            raise GeometryError(f"rotor of torque source {element.a}-{element.b}: no turning pair of the tree bears it")
-    combined = _combine(work, {element.a: -1.0, element.b: 1.0})
-    if not combined:
-        return
-    _fixed(work, tendon, name, combined, damping=_text(damping))
-    if torque:
-        _constant(actuator, torque, tendon=name)
-
-
-def _both(element: Torque | TorqueSource) -> set[tuple[int, int]]:
-    return {(element.a, element.b), (element.b, element.a)}
-
-
-def _tree_hinges(work: _Work) -> list[tuple[str, int, int]]:
-    return [name for name, hinge in zip(work.names, work.hinge) if hinge]
-
-
-def _constant(actuator: ET.Element, size: float, **where: str) -> None:
-    """Add an actuator that pushes with a constant force, without control."""
-    ET.SubElement(
-        actuator, "general", {**where, "gaintype": "fixed", "gainprm": "0", "biastype": "affine",
-                              "biasprm": _text(size, 0.0, 0.0)},
-    )  # fmt: skip
-
-
-def _force(work: _Work, force: Force, name: str, actuator: ET.Element) -> None:
-    if callable(force.force):
-        raise GeometryError(f"force on link {force.link} is a function; an exported one must be constant")
-    size = math.hypot(*force.force)
-    if size == 0.0:
-        return
-    unit = (force.force[0] / size, force.force[1] / size)
-    where = {"site": _site(work, force.link, force.at), "gear": _text(*unit, 0.0, 0.0, 0.0, 0.0)}
-    if force.frame == "world":
-        where["refsite"] = _site(work, work.model.mechanism.frame, (0.0, 0.0))
-    _constant(actuator, size, name=name, **where)

@@ -1,0 +1,70 @@
+"""What every export shares: refusals, carriers of gear pairs, constant torques."""
+
+from __future__ import annotations
+
+import math
+
+from graphsynth.dynamics.elements import Torque, TorqueSource
+from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.start import StartReport
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.joints import Gear, Revolute
+
+__all__ = ["carrier_of", "check_common", "constant_torque", "gear_weights"]
+
+Point = tuple[float, float]
+
+
+def check_common(model: DynamicModel, start: StartReport, engine: str) -> None:
+    """Refuse what no engine here can run."""
+    if not start.consistent:
+        raise GeometryError(f"the start is not consistent, so {engine} would run another mechanism: {start.message}")
+    if start.poses.shape[0] != model.mechanism.graph.links:
+        raise GeometryError(f"the start has {start.poses.shape[0]} links, the model {model.mechanism.graph.links}")
+    if model.massless:
+        raise GeometryError(f"links {list(model.massless)} have no mass or inertia; {engine} needs both positive")
+
+
+def carrier_of(model: DynamicModel, gear: Gear) -> int:
+    """Return the link that carries both wheels of a gear pair."""
+    for link in range(model.mechanism.graph.links):
+        if link in (gear.a, gear.b):
+            continue
+        if _bears(model, link, gear.a, gear.at_a) and _bears(model, link, gear.b, gear.at_b):
+            return link
+    for link, wheel, at in ((gear.a, gear.b, gear.at_b), (gear.b, gear.a, gear.at_a)):
+        if _bears(model, link, wheel, at):  # the wheel turns on the other one's link: a link of two centres
+            return link
+    raise GeometryError(f"gear pair {gear.a}-{gear.b} has no link that bears both wheels at their centres; give one")
+
+
+def _bears(model: DynamicModel, link: int, wheel: int, centre: Point) -> bool:
+    for joint in model.mechanism.joints:
+        if isinstance(joint, Revolute) and {joint.a, joint.b} == {link, wheel}:
+            own = joint.at_a if joint.a == wheel else joint.at_b
+            return math.dist(own, centre) <= 1e-12 * max(1.0, math.hypot(*centre))
+    return False
+
+
+def gear_weights(model: DynamicModel, gear: Gear) -> dict[int, float]:
+    """Weights of the link angles whose sum a gear pair keeps constant."""
+    carrier, sign = carrier_of(model, gear), -1.0 if gear.internal else 1.0
+    weights = {gear.a: gear.radius_a, gear.b: sign * gear.radius_b}
+    weights[carrier] = weights.get(carrier, 0.0) - gear.radius_a - sign * gear.radius_b
+    largest = max(gear.radius_a, gear.radius_b)
+    return {link: w / largest for link, w in weights.items()}
+
+
+def constant_torque(element: Torque | TorqueSource) -> tuple[float, float]:
+    """Return torque and viscous damping of an element on its link b."""
+    torque, pair = element.torque, f"{element.a}-{element.b}"
+    if callable(torque):
+        raise GeometryError(f"torque {pair} is a function; an exported one must be constant")
+    if isinstance(element, Torque):
+        return torque, 0.0
+    if element.efficiency != 1.0 and torque != 0.0:
+        raise GeometryError(
+            f"efficiency = {element.efficiency} of torque source {pair} depends on the flow of power; an exported "
+            "train must have efficiency 1"
+        )
+    return torque * element.ratio, element.ratio**2 * element.rotor_damping
