@@ -9,6 +9,7 @@
     ├── GraphError (ValueError)      a graph that is not what the operation needs (no frame, disconnected, ...)
     ├── TooLargeError                an enumeration that cannot finish; carries an estimate and the remedy
     ├── SceneError (ValueError)      a scene file with an unknown key, a wrong unit or a missing section
+    ├── IntervalError (ValueError)   bounds, boxes or functions that interval arithmetic cannot take
     └── GeometryError (ValueError)   dimensions that no mechanism can have (negative length, zero axis, ...)
 
 A message names the value, the bound and the remedy.  Outcomes of a computation (a pose that cannot be
@@ -23,6 +24,7 @@ __all__ = [
     "GraphError",
     "GraphsynthError",
     "InfeasibleSpecError",
+    "IntervalError",
     "SceneError",
     "SpecError",
     "TooLargeError",
@@ -91,6 +93,10 @@ class TooLargeError(GraphsynthError):
 
 class SceneError(GraphsynthError, ValueError):
     """A scene file that asks for something unknown or leaves out something needed."""
+
+
+class IntervalError(GraphsynthError, ValueError):
+    """Bounds, boxes, matrices or functions that interval arithmetic cannot take (reversed bounds, NaN, ...)."""
 
 
 class GeometryError(GraphsynthError, ValueError):

@@ -11,31 +11,21 @@ are carried through every further operation, so the last result tells whether a 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from enum import IntFlag
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import SpecError
+from graphsynth.errors import IntervalError
 from graphsynth.intervals import operations
 from graphsynth.intervals.measures import Measures
-from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, decimal_outward, read_bounds, read_points
+from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, Decoration, decimal_outward, read_bounds, read_points
 
 __all__ = ["Decoration", "Interval"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Flags = NDArray[np.uint8]
-
-
-class Decoration(IntFlag):
-    """What happened on the way to an interval; 0 says: defined and continuous throughout, exact input."""
-
-    NONE = 0
-    CLIPPED = 1  # an operation was undefined on part of its argument, which was left out
-    DISCONTINUOUS = 2  # an operation was not continuous on its argument (atan2 across its cut, tan across a pole)
-    FLOAT_INPUT = 4  # a plain float came in: whatever rounding made it is not included
 
 
 def _both(*flags: Flags) -> Flags:
@@ -67,7 +57,7 @@ class Interval(Measures):
 
     Raises
     ------
-    SpecError
+    IntervalError
         For NaN, reversed bounds, shapes that do not fit.
     FormatError
         For text or objects that are no numbers.
@@ -126,7 +116,7 @@ class Interval(Measures):
         """
         centre, radius = cls(mid), cls(rad)
         if bool((radius.lo < 0.0).any()):
-            raise SpecError(f"radius {rad!r} is negative; give a radius of at least 0")
+            raise IntervalError(f"radius {rad!r} is negative; give a radius of at least 0")
         low, high = centre - radius, centre + radius
         return _make(low.lo, high.hi, low.flags)
 
@@ -156,21 +146,6 @@ class Interval(Measures):
         return _make(np.stack(lo, axis), np.stack(hi, axis), flags)
 
     # -- shape -----------------------------------------------------------------------------------------------------
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the array of intervals."""
-        return self.lo.shape
-
-    @property
-    def size(self) -> int:
-        """Number of intervals."""
-        return self.lo.size
-
-    @property
-    def ndim(self) -> int:
-        """Number of axes."""
-        return self.lo.ndim
 
     def __len__(self) -> int:
         return len(self.lo)
@@ -231,25 +206,6 @@ class Interval(Measures):
     def possibly_equal(self, other: Any) -> Mask:
         """Whether they have a point in common."""
         return ~self.intersect(other).is_empty
-
-    def contains(self, point: Any) -> Any:
-        """Whether a number lies inside, exactly decided; text and fractions for one interval, floats for arrays.
-
-        Examples
-        --------
-        >>> Interval("1/30").contains("1/30")
-        True
-        """
-        if isinstance(point, np.ndarray):
-            return np.asarray((self.lo <= point) & (point <= self.hi))
-        from fractions import Fraction
-
-        value = point if isinstance(point, float) else Fraction(point)
-        lo, hi = self.lo, self.hi
-        if self.ndim == 0:
-            return bool(float(lo) <= value <= float(hi))
-        inside = [a <= value <= b for a, b in zip(lo.ravel().tolist(), hi.ravel().tolist())]
-        return np.array(inside, dtype=np.bool_).reshape(self.shape)
 
     def subset(self, other: Any) -> Mask:
         """Whether inside the other; the empty one always is."""
@@ -343,7 +299,7 @@ class Interval(Measures):
 
     def __pow__(self, exponent: int) -> Interval:
         if not isinstance(exponent, int | np.integer):
-            raise SpecError(f"exponent {exponent!r} is not an integer; use exp(b * log(a)) for other powers")
+            raise IntervalError(f"exponent {exponent!r} is not an integer; use exp(b * log(a)) for other powers")
         if exponent == 2:
             return self.sqr()
         flags = _clipped(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if exponent < 0 else self.flags

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from graphsynth.errors import SpecError
+from graphsynth.errors import IntervalError
 from graphsynth.intervals.functions import divide_extended
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
@@ -51,9 +51,9 @@ def _read(matrix: Any, right: Any) -> tuple[Interval, Interval]:
     check_rounding()
     A, b = interval(matrix), interval(right)
     if A.ndim != 2 or A.shape[0] != A.shape[1] or b.shape != A.shape[:1]:
-        raise SpecError(f"shapes {A.shape} and {b.shape} are not (n, n) and (n,); give a square system")
+        raise IntervalError(f"shapes {A.shape} and {b.shape} are not (n, n) and (n,); give a square system")
     if not (A.is_bounded.all() and b.is_bounded.all()):
-        raise SpecError("the system has an empty or unbounded entry; give finite bounds")
+        raise IntervalError("the system has an empty or unbounded entry; give finite bounds")
     return A, b
 
 
@@ -72,7 +72,7 @@ def solve_linear(matrix: Any, right: Any) -> LinearResult:
 
     Raises
     ------
-    SpecError
+    IntervalError
         For shapes that do not fit and for unbounded entries.
 
     Examples
@@ -141,7 +141,7 @@ def gauss_seidel(matrix: Any, right: Any, box: Any, *, rounds: int = _ROUNDS) ->
     A, b = _read(matrix, right)
     X = interval(box)
     if X.shape != b.shape:
-        raise SpecError(f"the box has shape {X.shape}, the system {b.shape}; give one interval per unknown")
+        raise IntervalError(f"the box has shape {X.shape}, the system {b.shape}; give one interval per unknown")
     n = b.size
     parts = [X[i] for i in range(n)]
     for _ in range(rounds):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import operations
-from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT
+from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, fraction
 
 __all__ = ["Measures"]
 
@@ -23,6 +25,21 @@ class Measures:
     lo: Array
     hi: Array
     flags: Flags
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the array of intervals."""
+        return self.lo.shape
+
+    @property
+    def size(self) -> int:
+        """Number of intervals."""
+        return self.lo.size
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return self.lo.ndim
 
     @property
     def is_empty(self) -> Mask:
@@ -78,3 +95,23 @@ class Measures:
     def exact_input(self) -> Mask:
         """Where no plain float came in."""
         return np.asarray((self.flags & FLOAT_INPUT) == 0)
+
+    def contains(self, point: Any) -> Any:
+        """Whether a number lies inside, exactly decided; text and fractions for one interval, floats for arrays.
+
+        Examples
+        --------
+        >>> from graphsynth.intervals import Interval
+        >>> Interval("1/30").contains("1/30")
+        True
+        """
+        if isinstance(point, np.ndarray):
+            return np.asarray((self.lo <= point) & (point <= self.hi))
+        from fractions import Fraction
+
+        value = point if isinstance(point, float) else fraction(point) if isinstance(point, str) else Fraction(point)
+        lo, hi = self.lo, self.hi
+        if self.ndim == 0:
+            return bool(float(lo) <= value <= float(hi))
+        inside = [a <= value <= b for a, b in zip(lo.ravel().tolist(), hi.ravel().tolist())]
+        return np.array(inside, dtype=np.bool_).reshape(self.shape)

@@ -14,8 +14,9 @@ __all__ = ["binary", "power", "unary"]
 
 Array = NDArray[np.float64]
 
-#: From this size on the compiled form is loaded; once it is there it is used from the second size on.
-LOAD_FROM, USE_FROM = 5_000, 64
+#: From this size on the compiled form is loaded; once it is there it is used for every size: a call costs 6 to 15
+#: microseconds against 30 to 130 of the numpy form, up to 64 intervals alike.
+LOAD_FROM, USE_FROM = 5_000, 1
 _LOOPS = "graphsynth.intervals.kernels.loops"
 
 

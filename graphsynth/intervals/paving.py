@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import FormatError, SpecError
+from graphsynth.errors import FormatError, IntervalError
 from graphsynth.intervals.boxes import Paving, Progress
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
@@ -64,7 +64,7 @@ class Search:
 
     Raises
     ------
-    SpecError
+    IntervalError
         For a box that is empty, unbounded or no vector, budgets and tolerances that are not positive.
 
     Examples
@@ -85,20 +85,22 @@ class Search:
         check_rounding()
         start = interval(box)
         if start.ndim != 1 or start.size == 0 or not start.is_bounded.all():
-            raise SpecError(f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)")
+            raise IntervalError(
+                f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)"
+            )
         for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
             if not value > 0:
-                raise SpecError(f"{name} = {value} must be positive")
+                raise IntervalError(f"{name} = {value} must be positive")
         self.f, self.start, self.progress = f, start, progress
         self.parameters = None if parameters is None else interval(parameters)
         self.tolerance, self.max_boxes, self.max_seconds, self.batch = tolerance, max_boxes, max_seconds, batch
         size = np.asarray(start.width if scale is None else scale, dtype=np.float64)
         if size.shape != start.shape or not np.isfinite(size).all() or (size < 0.0).any():
-            raise SpecError(f"scale {scale!r} must hold {start.size} positive numbers")
+            raise IntervalError(f"scale {scale!r} must hold {start.size} positive numbers")
         self.scale = np.where(size > 0.0, size, 1.0)
         self.inner_by = None if inner is None else list(inner)
         if self.inner_by is not None and (self.parameters is None or len(self.inner_by) != start.size):
-            raise SpecError(f"inner = {inner!r} must name as many parameters as there are equations, {start.size}")
+            raise IntervalError(f"inner = {inner!r} must name as many parameters as there are equations, {start.size}")
         n = start.size
         none = np.zeros((0, n))
         self._state: dict[str, NDArray[Any]] = dict.fromkeys(_ARRAYS[2:6], none)

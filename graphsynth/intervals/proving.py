@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import SpecError
+from graphsynth.errors import IntervalError
 from graphsynth.intervals.dual import jacobian_of, values_of, variables
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
@@ -129,7 +129,7 @@ def evaluate(f: System, x: Sequence[Any], parameters: Interval | None) -> Sequen
     else:
         results = f(x, [parameters[..., j] for j in range(parameters.shape[-1])])
     if len(results) != len(x):
-        raise SpecError(
+        raise IntervalError(
             f"the system returns {len(results)} equations for {len(x)} unknowns; Krawczyk's test needs as many"
         )
     return results
@@ -252,7 +252,7 @@ def krawczyk(
 
     Raises
     ------
-    SpecError
+    IntervalError
         For a box that is empty, unbounded or not a vector, and for a number of equations that differs from n.
     GraphsynthError
         If the processor's rounding has been changed.
@@ -302,9 +302,9 @@ def krawczyk(
 def _start(box: Any) -> Interval:
     start = interval(box)
     if start.ndim != 1 or start.size == 0:
-        raise SpecError(f"the box has shape {start.shape}; give one interval per unknown, shape (n,)")
+        raise IntervalError(f"the box has shape {start.shape}; give one interval per unknown, shape (n,)")
     if not start.is_bounded.all():
-        raise SpecError(f"the box {start!r} is empty or unbounded; give finite bounds")
+        raise IntervalError(f"the box {start!r} is empty or unbounded; give finite bounds")
     return start
 
 

@@ -6,17 +6,29 @@ import math
 import re
 from collections.abc import Sequence
 from decimal import Decimal
+from enum import IntFlag
 from fractions import Fraction
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import FormatError, SpecError
+from graphsynth.errors import FormatError, IntervalError
 
 __all__ = [
-    "CLIPPED", "DISCONTINUOUS", "FLOAT_INPUT", "NO_FLAGS", "decimal_outward", "enclose", "lower_bound", "read_bounds",
-    "read_one", "read_points", "shortened", "upper_bound",
+    "CLIPPED",
+    "DISCONTINUOUS",
+    "FLOAT_INPUT",
+    "NO_FLAGS",
+    "Decoration",
+    "decimal_outward",
+    "enclose",
+    "lower_bound",
+    "read_bounds",
+    "read_one",
+    "read_points",
+    "shortened",
+    "upper_bound",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -30,6 +42,15 @@ _FLOAT: Flags = np.asarray(FLOAT_INPUT)
 _PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
 _SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")
 _LONGEST = 10_000
+
+
+class Decoration(IntFlag):
+    """What happened on the way to an interval; 0 says: defined and continuous throughout, exact input."""
+
+    NONE = 0
+    CLIPPED = 1  # an operation was undefined on part of its argument, which was left out
+    DISCONTINUOUS = 2  # an operation was not continuous on its argument (atan2 across its cut, tan across a pole)
+    FLOAT_INPUT = 4  # a plain float came in: whatever rounding made it is not included
 
 
 def lower_bound(value: Fraction) -> float:
@@ -57,7 +78,8 @@ def enclose(value: Fraction) -> tuple[float, float]:
     return lower_bound(value), upper_bound(value)
 
 
-def _fraction(text: str) -> Fraction:
+def fraction(text: str) -> Fraction:
+    """Read text as a rational number; `FormatError` if it is none."""
     if len(text) > _LONGEST:
         raise FormatError(f"a number of {len(text)} characters; at most {_LONGEST} are read: shorten it")
     exponent = re.search(r"[eE]([+-]?\d+)\s*$", text)
@@ -82,19 +104,19 @@ def _text(text: str) -> tuple[float, float]:
         return -math.inf, math.inf
     pair = _PAIR.fullmatch(text)
     if pair:
-        lo = -math.inf if pair[1].lower() in ("-inf", "-infinity") else _fraction(pair[1])
-        hi = math.inf if pair[2].lower() in ("inf", "+inf", "infinity") else _fraction(pair[2])
+        lo = -math.inf if pair[1].lower() in ("-inf", "-infinity") else fraction(pair[1])
+        hi = math.inf if pair[2].lower() in ("inf", "+inf", "infinity") else fraction(pair[2])
         if lo > hi:
-            raise SpecError(f"{text.strip()!r} has its lower bound above its upper bound; exchange them")
+            raise IntervalError(f"{text.strip()!r} has its lower bound above its upper bound; exchange them")
         low = lo if isinstance(lo, float) else lower_bound(lo)
         return low, hi if isinstance(hi, float) else upper_bound(hi)
     spread = _SPREAD.fullmatch(text)
     if spread:
-        mid, rad = _fraction(spread[1]), _fraction(spread[2])
+        mid, rad = fraction(spread[1]), fraction(spread[2])
         if rad < 0:
-            raise SpecError(f"{text.strip()!r} has a negative radius; give a radius of at least 0")
+            raise IntervalError(f"{text.strip()!r} has a negative radius; give a radius of at least 0")
         return lower_bound(mid - rad), upper_bound(mid + rad)
-    return enclose(_fraction(text))
+    return enclose(fraction(text))
 
 
 def read_one(value: Any) -> tuple[float, float, bool]:
@@ -104,7 +126,7 @@ def read_one(value: Any) -> tuple[float, float, bool]:
     ------
     FormatError
         For text that is no number, or an object of another kind.
-    SpecError
+    IntervalError
         For NaN, infinities, and bounds in the wrong order.
 
     Examples
@@ -119,10 +141,10 @@ def read_one(value: Any) -> tuple[float, float, bool]:
     if isinstance(value, float | np.floating):
         number = float(value)
         if not math.isfinite(number):
-            raise SpecError(f"{number} is not a point; give a finite number, or bounds that may be infinite")
+            raise IntervalError(f"{number} is not a point; give a finite number, or bounds that may be infinite")
         return number, number, False
     if isinstance(value, Decimal) and not value.is_finite():
-        raise SpecError(f"{value} is not a point; give a finite number, or bounds that may be infinite")
+        raise IntervalError(f"{value} is not a point; give a finite number, or bounds that may be infinite")
     if isinstance(value, int | np.integer | Fraction | Decimal):
         if isinstance(value, Decimal) and abs(value.adjusted()) > _LONGEST:
             raise FormatError(f"{value} has an exponent beyond +-{_LONGEST}: bring it into the range of doubles")
@@ -179,7 +201,7 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
         if not nested:
             return np.zeros(0), np.zeros(0), NO_FLAGS
         if len({part[0].shape for part in nested}) > 1:
-            raise SpecError("the rows of intervals have different lengths; give a full array")
+            raise IntervalError("the rows of intervals have different lengths; give a full array")
         flags = NO_FLAGS
         if any(part[2].any() for part in nested):
             flags = np.stack([np.broadcast_to(part[2], part[0].shape) for part in nested])
@@ -192,7 +214,7 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
 def _finite(array: Array) -> None:
     if not np.isfinite(array).all():
         bad = array[~np.isfinite(array)].ravel()[0]
-        raise SpecError(f"{bad} is not a point; give finite numbers, or bounds that may be infinite")
+        raise IntervalError(f"{bad} is not a point; give finite numbers, or bounds that may be infinite")
 
 
 def _bound(value: Any, side: int) -> Array:
@@ -212,11 +234,11 @@ def read_bounds(lower: Any, upper: Any) -> tuple[Array, Array]:
     try:
         lo, hi = (np.array(a) for a in np.broadcast_arrays(lo, hi))
     except ValueError:
-        raise SpecError(f"bounds of shapes {lo.shape} and {hi.shape} do not fit; give equal shapes") from None
+        raise IntervalError(f"bounds of shapes {lo.shape} and {hi.shape} do not fit; give equal shapes") from None
     if np.isnan(lo).any() or np.isnan(hi).any():
-        raise SpecError("a bound is NaN, which is no number; give numbers, -inf or inf")
+        raise IntervalError("a bound is NaN, which is no number; give numbers, -inf or inf")
     wrong = ((lo > hi) & ~((lo == np.inf) & (hi == -np.inf))) | ((lo == hi) & np.isinf(lo))
     if wrong.any():
         a, b = lo[wrong].ravel()[0], hi[wrong].ravel()[0]
-        raise SpecError(f"lower bound {a} and upper bound {b} hold no number; give lower <= upper")
+        raise IntervalError(f"lower bound {a} and upper bound {b} hold no number; give lower <= upper")
     return lo, hi

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graphsynth.errors import FormatError, SpecError
+from graphsynth.errors import FormatError, IntervalError
 from graphsynth.intervals import Decoration, Interval
 
 INF = math.inf
@@ -64,25 +64,25 @@ def test_floats_are_marked_and_bounds_are_not():
 @pytest.mark.parametrize(
     ("make", "error", "word"),
     [
-        (lambda: Interval(math.nan), SpecError, "nan"),
-        (lambda: Interval(1.0, math.nan), SpecError, "NaN"),
-        (lambda: Interval(np.array([1.0, math.nan])), SpecError, "nan"),
-        (lambda: Interval(INF), SpecError, "inf"),
-        (lambda: Interval(2, 1), SpecError, "lower <= upper"),
-        (lambda: Interval(INF, INF), SpecError, "hold no number"),
-        (lambda: Interval("[2, 1]"), SpecError, "exchange"),
-        (lambda: Interval("1 +- -1"), SpecError, "negative radius"),
-        (lambda: Interval.midrad(1, -1), SpecError, "negative"),
+        (lambda: Interval(math.nan), IntervalError, "nan"),
+        (lambda: Interval(1.0, math.nan), IntervalError, "NaN"),
+        (lambda: Interval(np.array([1.0, math.nan])), IntervalError, "nan"),
+        (lambda: Interval(INF), IntervalError, "inf"),
+        (lambda: Interval(2, 1), IntervalError, "lower <= upper"),
+        (lambda: Interval(INF, INF), IntervalError, "hold no number"),
+        (lambda: Interval("[2, 1]"), IntervalError, "exchange"),
+        (lambda: Interval("1 +- -1"), IntervalError, "negative radius"),
+        (lambda: Interval.midrad(1, -1), IntervalError, "negative"),
         (lambda: Interval("one"), FormatError, "not a number"),
         (lambda: Interval("1e999999999"), FormatError, "exponent"),
         (lambda: Interval(Decimal("1e999999")), FormatError, "exponent"),
-        (lambda: Interval(Decimal("nan")), SpecError, "point"),
+        (lambda: Interval(Decimal("nan")), IntervalError, "point"),
         (lambda: Interval("1" * 20000), FormatError, "characters"),
         (lambda: Interval(1j), FormatError, "complex"),
         (lambda: Interval(True), FormatError, "truth"),
-        (lambda: Interval([[1], [1, 2]]), SpecError, "lengths"),
-        (lambda: Interval(np.zeros(2), np.ones(3)), SpecError, "shapes"),
-        (lambda: Interval(2) ** 0.5, SpecError, "integer"),
+        (lambda: Interval([[1], [1, 2]]), IntervalError, "lengths"),
+        (lambda: Interval(np.zeros(2), np.ones(3)), IntervalError, "shapes"),
+        (lambda: Interval(2) ** 0.5, IntervalError, "integer"),
     ],
 )  # fmt: skip
 def test_bad_input_gets_a_sentence(make, error, word):
@@ -163,3 +163,8 @@ def test_shapes():
         x.lo = np.zeros(3)
     with pytest.raises(ValueError, match="read-only"):
         x.lo[0, 0] = 5.0
+
+
+def test_contains_refuses_what_is_no_number():
+    with pytest.raises(FormatError, match="not a number"):
+        Interval(1, 2).contains("one")

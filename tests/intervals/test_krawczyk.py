@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth import intervals
-from graphsynth.errors import SpecError
+from graphsynth.errors import IntervalError
 from graphsynth.intervals import (
     Interval,
     Status,
@@ -145,12 +145,12 @@ def test_a_plain_float_is_reported():
     [([], "shape"), (Interval.entire(2), "unbounded"), (Interval.empty(2), "empty"), ([[1, 2]], "shape")],
 )
 def test_bad_boxes(box, word):
-    with pytest.raises(SpecError, match=word):
+    with pytest.raises(IntervalError, match=word):
         krawczyk(circle_and_parabola, box)
 
 
 def test_equations_and_unknowns_must_match():
-    with pytest.raises(SpecError, match="1 equations for 2 unknowns"):
+    with pytest.raises(IntervalError, match="1 equations for 2 unknowns"):
         krawczyk(lambda x: [x[0]], ["[0, 1]", "[0, 1]"])
 
 
@@ -372,7 +372,7 @@ def test_gauss_seidel_proves_emptiness():
     assert gauss_seidel([[2, 0], [0, 1]], [2, 2], ["[2, 3]", "[0, 3]"]).status is Status.EMPTY
     cut = gauss_seidel([["[-1, 1]"]], [1], ["[-0.5, 3]"])
     assert float(cut.x.lo[0]) == 1.0
-    with pytest.raises(SpecError, match="square"):
+    with pytest.raises(IntervalError, match="square"):
         solve_linear([[1, 2]], [1])
 
 

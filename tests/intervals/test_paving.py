@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from graphsynth.errors import FormatError, SpecError
+from graphsynth.errors import FormatError, IntervalError
 from graphsynth.intervals import Interval, Search, Status, cos, krawczyk, pave, sin, sqrt
 
 B_90 = "17.4617879639289313590283215334"
@@ -257,9 +257,9 @@ def test_bad_states_and_arguments(tmp_path):
     with pytest.raises(FormatError, match="not a saved search"):
         search.load(tmp_path / "c.npz")
     for options in ({"tolerance": 0.0}, {"max_boxes": 0}, {"max_seconds": -1.0}, {"scale": [-1.0]}, {"inner": [0]}):
-        with pytest.raises(SpecError):
+        with pytest.raises(IntervalError):
             Search(f, ["[0, 1]"], **options)
-    with pytest.raises(SpecError, match="bounded"):
+    with pytest.raises(IntervalError, match="bounded"):
         Search(f, Interval.entire(1))
 
 

@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import SpecError
+from graphsynth.errors import IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.reading import lower_bound, upper_bound
@@ -135,7 +135,7 @@ def krawczyk_boxes(
 
     Raises
     ------
-    SpecError
+    IntervalError
         For limits that are not positive, and more than 20 million boxes.
     GraphsynthError
         If the processor's rounding has been changed.
@@ -150,9 +150,9 @@ def krawczyk_boxes(
     check_rounding()
     for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
         if not value > 0:
-            raise SpecError(f"{name} = {value} must be positive; give a number above 0")
+            raise IntervalError(f"{name} = {value} must be positive; give a number above 0")
     if not isinstance(max_boxes, int | np.integer) or max_boxes > _MOST_BOXES:
-        raise SpecError(
+        raise IntervalError(
             f"max_boxes = {max_boxes} must be an integer of at most {_MOST_BOXES}; use fewer, or a tolerance"
         )
     from graphsynth.jamming.circle_ellipse import kernels
@@ -180,7 +180,7 @@ def _start_side(problem: CircleEllipse) -> tuple[float, int]:
     side = root_bounds(problem.circle_bounds.hi).hi
     power = side.numerator.bit_length() - side.denominator.bit_length()
     if abs(power) > _MOST_POWER:
-        raise SpecError(
+        raise IntervalError(
             f"R1 = {float(problem.R1.hi)} is beyond the range for boxes; choose a unit of length nearer to it"
         )
     return upper_bound(side / Fraction(2) ** power), power

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import SpecError
+from graphsynth.errors import IntervalError
 from graphsynth.intervals import Interval, Status
 from graphsynth.jamming.circle_ellipse import Reason, circle_ellipse, cross_check, exact_hull, krawczyk_boxes
 from graphsynth.jamming.circle_ellipse.boxes import _carried
@@ -191,10 +191,10 @@ def test_limits():
     assert late.reasons == (Reason.SECONDS,)
     assert exact_hull(problem).hull.subset(late.outer).all()
     for bad in ({"max_boxes": 0}, {"tolerance": 0.0}, {"max_seconds": float("nan")}):
-        with pytest.raises(SpecError, match="must be positive"):
+        with pytest.raises(IntervalError, match="must be positive"):
             krawczyk_boxes(problem, **bad)
     for count in (1.5, 10**9):
-        with pytest.raises(SpecError, match="must be an integer of at most"):
+        with pytest.raises(IntervalError, match="must be an integer of at most"):
             krawczyk_boxes(problem, max_boxes=count)
 
 
@@ -236,7 +236,7 @@ def test_far_units_give_the_same_boxes(power):
     np.testing.assert_array_equal(np.ldexp(far.proved.lo, -power), plain.proved.lo)
     assert far.tested == plain.tested
     assert far.spectral_radius == pytest.approx(plain.spectral_radius)
-    with pytest.raises(SpecError, match="nearer to it"):
+    with pytest.raises(IntervalError, match="nearer to it"):
         krawczyk_boxes(circle_ellipse("5e300", "6e300", "4e300"))
 
 
