@@ -32,18 +32,26 @@ def carrier_of(model: DynamicModel, gear: Gear) -> int:
             continue
         if _bears(model, link, gear.a, gear.at_a) and _bears(model, link, gear.b, gear.at_b):
             return link
-    for link, wheel, at in ((gear.a, gear.b, gear.at_b), (gear.b, gear.a, gear.at_a)):
-        if _bears(model, link, wheel, at):  # the wheel turns on the other one's link: a link of two centres
-            return link
     raise GeometryError(f"gear pair {gear.a}-{gear.b} has no link that bears both wheels at their centres; give one")
 
 
 def _bears(model: DynamicModel, link: int, wheel: int, centre: Point) -> bool:
-    for joint in model.mechanism.joints:
-        if isinstance(joint, Revolute) and {joint.a, joint.b} == {link, wheel}:
-            own = joint.at_a if joint.a == wheel else joint.at_b
-            return math.dist(own, centre) <= 1e-12 * max(1.0, math.hypot(*centre))
+    """Whether the centre of a wheel is fixed in a link: turning pairs of both, at one point of one link."""
+    for middle, spot in [(wheel, centre), *_hinges(model, wheel, centre)]:
+        if middle == link or any(other == link for other, _ in _hinges(model, middle, spot)):
+            return True
     return False
+
+
+def _hinges(model: DynamicModel, link: int, at: Point) -> list[tuple[int, Point]]:
+    """Links that turn on a link at the given point of it, and the point in them."""
+    found = []
+    for joint in model.mechanism.joints:
+        if isinstance(joint, Revolute) and link in (joint.a, joint.b):
+            own, other = (joint.at_a, joint.at_b) if joint.a == link else (joint.at_b, joint.at_a)
+            if math.dist(own, at) <= 1e-12 * max(1.0, math.hypot(*at)):
+                found.append((joint.b if joint.a == link else joint.a, other))
+    return found
 
 
 def gear_weights(model: DynamicModel, gear: Gear) -> dict[int, float]:

@@ -336,11 +336,14 @@ def run_exudyn(
     kind = exu.DynamicSolverType
     solver = kind.GeneralizedAlpha if settings.integrator == "generalized-alpha" else kind.TrapezoidalIndex2
     begin, message = perf_counter(), ""
+    exu.config.printToConsole, told = False, exu.config.printToConsole
     try:
         if not export.system.SolveDynamic(options, solverType=solver, showHints=False, updateInitialValues=False):
             message = "the solver stopped"
     except Exception as error:  # the engine raises its own kinds
         message = f"the solver stopped: {str(error).strip().splitlines()[0] if str(error).strip() else type(error)}"
+    finally:
+        exu.config.printToConsole = told
     seconds = perf_counter() - begin
     poses, rates = _collect(export, model, start, grid, [n // every for n in counts])
     if not message and not np.isfinite(poses).all():

@@ -18,7 +18,7 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import turn
 from graphsynth.formats.exporting import check_common, gear_weights
-from graphsynth.formats.mjcf_parts import Work, armature, combine, fixed, site, text, write_load
+from graphsynth.formats.mjcf_parts import Work, combine, fixed, site, text, write_load
 from graphsynth.formats.spanning_tree import SpanningTree, spanning_tree
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
@@ -250,9 +250,6 @@ def _hinge(work: Work, body: ET.Element, joint: JointGeometry, child: int, at: P
     suffix = "_turn" if isinstance(joint, PinSlot) else ""
     name = f"j{joint.a}_{joint.b}{suffix}"
     attributes = {"type": "hinge", "pos": text(*at, 0.0), "axis": text(0.0, 0.0, sign), "ref": text(q)}
-    rotor = armature(work.model.elements, joint)
-    if rotor:
-        attributes["armature"] = text(rotor)
     ET.SubElement(body, "joint", {"name": name, **attributes})
     work.chain[child][len(work.names)] = sign
     _count(work, name, joint, q, rate, True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
@@ -13,9 +12,8 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.errors import GeometryError
 from graphsynth.formats.exporting import constant_torque
 from graphsynth.formats.spanning_tree import SpanningTree
-from graphsynth.mechanism.joints import JointGeometry
 
-__all__ = ["Work", "armature", "combine", "fixed", "site", "text", "write_load"]
+__all__ = ["Work", "combine", "fixed", "site", "text", "write_load"]
 
 Point = tuple[float, float]
 
@@ -68,15 +66,6 @@ def fixed(work: Work, tendon: ET.Element, name: str, combined: dict[int, float],
         ET.SubElement(element, "joint", joint=work.names[k][0], coef=text(weight))
 
 
-def armature(elements: Iterable[Element], joint: JointGeometry) -> float:
-    """Reflected rotor inertia of the sources across a turning pair."""
-    return sum(
-        e.ratio**2 * e.rotor_inertia
-        for e in elements
-        if isinstance(e, TorqueSource) and {e.a, e.b} == {joint.a, joint.b}
-    )
-
-
 def write_load(work: Work, element: Element, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
     """Write one spring, damper, torque or force."""
     if isinstance(element, Spring):
@@ -112,21 +101,13 @@ def _torsion(work: Work, spring: TorsionSpring, name: str, tendon: ET.Element) -
 
 def _torque(work: Work, element: Torque | TorqueSource, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
     torque, damping = constant_torque(element)
-    if isinstance(element, TorqueSource) and element.rotor_inertia:
-        _check_rotor(work, element)
+    rotor = element.ratio**2 * element.rotor_inertia if isinstance(element, TorqueSource) else 0.0
     combined = combine(work, {element.a: -1.0, element.b: 1.0})
     if not combined:
         return
-    fixed(work, tendon, name, combined, damping=text(damping))
+    fixed(work, tendon, name, combined, damping=text(damping), armature=text(rotor))
     if torque:
         _constant(actuator, torque, tendon=name)
-
-
-def _check_rotor(work: Work, element: TorqueSource) -> None:
-    """Refuse a rotor across anything but a turning pair of the tree."""
-    pairs = {frozenset(name[1:]) for name, hinge in zip(work.names, work.hinge) if hinge}
-    if frozenset((element.a, element.b)) not in pairs:
-        raise GeometryError(f"rotor of torque source {element.a}-{element.b}: no turning pair of the tree bears it")
 
 
 def _constant(actuator: ET.Element, size: float, **where: str) -> None:
