@@ -10,8 +10,8 @@ from typing import Any
 
 _PUBLIC: dict[str, str] = {
     "EngineRun": "engine_run",
-    "SpanningTree": "spanning_tree",
-    "spanning_tree": "spanning_tree",
+    "SpanningTree": "trees",
+    "spanning_tree": "trees",
     "MjcfModel": "mjcf",
     "MujocoSettings": "mjcf",
     "to_mjcf": "mjcf",
@@ -22,7 +22,7 @@ _PUBLIC: dict[str, str] = {
     "to_exudyn": "exudyn_model",
     "ExportCertificate": "export_certificate",
     "Trial": "export_certificate",
-    "export_certificate": "export_certificate",
+    "certify_export": "export_certificate",
 }
 
 __all__ = sorted(_PUBLIC)

@@ -20,7 +20,7 @@ from graphsynth.formats.engine_run import EngineRun
 from graphsynth.formats.exudyn_model import ExudynSettings
 from graphsynth.formats.mjcf import MujocoSettings, to_mjcf
 
-__all__ = ["ExportCertificate", "Trial", "export_certificate"]
+__all__ = ["ExportCertificate", "Trial", "certify_export"]
 
 Array = NDArray[np.float64]
 Settings = MujocoSettings | ExudynSettings
@@ -156,7 +156,7 @@ def _row(trial: Trial) -> str:
     return f"| {trial.settings} | {trial.step:g} | {numbers} | {order} | {trial.seconds:.2f} |"
 
 
-def export_certificate(
+def certify_export(
     model: DynamicModel,
     start: StartReport,
     times: ArrayLike,

@@ -363,12 +363,12 @@ def _options(exu: Any, start: StartReport, settings: ExudynSettings, steps: int,
     integration.adaptiveStep = False
     integration.newton.relativeTolerance = settings.newton_tolerance
     integration.generalizedAlpha.spectralRadius = settings.spectral_radius
-    options.solutionSettings.writeSolutionToFile = False
-    options.solutionSettings.sensorsWritePeriod = every * settings.step
-    options.displayStatistics = False
+    options.solution.file.write = False
+    options.solution.sensors.writePeriod = every * settings.step
+    options.show.statistics = False
     if len(start.rows) > start.rank:  # redundant constraints: the multipliers are not unique
-        options.linearSolverType = exu.LinearSolverType.EigenDense
-        options.linearSolverSettings.ignoreSingularJacobian = True
+        options.linearSolver.solverType = exu.LinearSolverType.EigenDense
+        options.linearSolver.ignoreSingularJacobian = True
     return options
 
 

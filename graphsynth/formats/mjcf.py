@@ -19,7 +19,7 @@ from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import turn
 from graphsynth.formats.exporting import check_common, gear_weights
 from graphsynth.formats.mjcf_parts import Work, combine, fixed, site, text, write_load
-from graphsynth.formats.spanning_tree import SpanningTree, spanning_tree
+from graphsynth.formats.trees import SpanningTree, spanning_tree
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
 __all__ = ["MjcfModel", "MujocoSettings", "to_mjcf"]

@@ -11,7 +11,7 @@ from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
 from graphsynth.errors import GeometryError
 from graphsynth.formats.exporting import constant_torque
-from graphsynth.formats.spanning_tree import SpanningTree
+from graphsynth.formats.trees import SpanningTree
 
 __all__ = ["Work", "combine", "fixed", "site", "text", "write_load"]
 

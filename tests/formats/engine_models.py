@@ -2,7 +2,7 @@
 
 import math
 
-from dynamic_models import bar, g3, slider_crank
+from dynamic_models import bar, g3
 
 from graphsynth.dynamics import Body, DynamicModel, Force, Spring, Torque, TorqueSource, TorsionSpring, consistent_start
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
@@ -34,7 +34,8 @@ def yoke(slot_on_crank=False):
     mechanism = Mechanism(graph, [Revolute(0, 1), slot, guide], [Driver(0, 1)])
     bodies = {1: bar(0.2, 0.1), 2: Body(0.5, 1e-3, (0.02, 0.01))}
     elements = [
-        TorsionSpring(0, 1, 0.4, -1.7, 0.01), Force(2, (1.0, -0.5), (0.03, 0.0)), Force(1, (0.3, 0.9), (0.05, 0.02), "body"),
+        TorsionSpring(0, 1, 0.4, -1.7, 0.01), Force(2, (1.0, -0.5), (0.03, 0.0)),
+        Force(1, (0.3, 0.9), (0.05, 0.02), "body"),
         TorqueSource(0, 1, 0.02, ratio=3.0, rotor_inertia=5e-5, rotor_damping=1e-4),
     ]  # fmt: skip
     model = DynamicModel(mechanism, bodies, elements)
@@ -90,6 +91,3 @@ def two_guides():
     extra = Prismatic(0, 3, (0.0, 0.02), (0.1, 0.0))
     model = g3(additional=[extra])
     return model, consistent_start(model, pose=start_g3().poses, keep={(0, 1): 0.5}, keep_rates={(0, 1): 15.0})
-
-
-__all__ = ["slider_crank"]
