@@ -32,6 +32,11 @@ def _stepper_class() -> Any:
         stages: Callable[..., Array]
         trail: Trail
 
+        t: float
+        y: Array
+        f: Array
+        h_abs: float
+
         def _step_impl(self) -> tuple[bool, str | None]:
             t, y = self.t, self.y
             least = 10.0 * abs(np.nextafter(t, np.inf) - t)
@@ -72,6 +77,8 @@ def compiled_stepper(
     rates : callable
         The same right-hand side, for the first step and the interpolant.
     """
-    solver = _stepper_class()(rates, t, y, bound, rtol=rtol, atol=atol, first_step=None if first is None else min(first, bound - t))
+    solver = _stepper_class()(
+        rates, t, y, bound, rtol=rtol, atol=atol, first_step=None if first is None else min(first, bound - t)
+    )
     solver.stages, solver.trail = stages, trail
     return solver

@@ -29,6 +29,7 @@ class Balance(NamedTuple):
     position: float
     velocity: float
     dalembert: float
+    bodies: Array
 
 
 def balance_at(compiled: Compiled, t: float, q: Array, v: Array, slots: Array, own: Array | None) -> Balance:
@@ -64,23 +65,27 @@ def balance_at(compiled: Compiled, t: float, q: Array, v: Array, slots: Array, o
         float(np.abs(v) @ (np.abs(inertial) + np.abs(Q) + np.abs(J.T) @ np.abs(lam))),
         float(np.abs(C / unit).max(initial=0.0)), float(np.abs((J @ v - vel) / unit).max(initial=0.0)),
         float(np.abs(residual).max(initial=0.0)) / forces,
+        0.5 * (np.diag(T.mass) * v**2).reshape(-1, 3).sum(axis=1),
     )  # fmt: skip
 
 
-def energy_error(times: Array, kinetic: Array, potential: Array, work: Array, power: Array) -> float:
+def energy_error(times: Array, kinetic: Array, potential: Array, work: Array, power: Array, bodies: Array) -> float:
     """Largest ``|E - E(0) - W|`` over the energies in play.
 
-    The scale is the largest of the ranges of kinetic, potential and total energy and of the power's integral: for a
-    conservative motion the range of the total energy alone is the error itself.
+    The scale is the largest of the ranges of kinetic (of all, and of every body), potential and total energy and of
+    the power's integral, and at least a thousandth of the kinetic energy: for a conservative motion the range of
+    the total energy alone is the error itself.
     """
     good = np.isfinite(kinetic)
     if not good.any():
         return float("nan")
     E, t = (kinetic + potential)[good], times[good]
     error = float(np.abs(E - E[0] - work[good]).max())
-    spent = float(np.sum(0.5 * np.diff(t) * (np.abs(power[good][1:]) + np.abs(power[good][:-1])))) if len(t) > 1 else 0.0
+    spent = (
+        float(np.sum(0.5 * np.diff(t) * (np.abs(power[good][1:]) + np.abs(power[good][:-1])))) if len(t) > 1 else 0.0
+    )
     scale = max(float(np.ptp(part)) for part in (kinetic[good], potential[good], E))
-    scale = max(scale, spent, 1e-12 * float(kinetic[good].max()))
+    scale = max(scale, spent, float(np.ptp(bodies[good], axis=0).max(initial=0.0)), 1e-3 * float(kinetic[good].max()))
     return error / scale if scale > 0.0 else 0.0
 
 
@@ -91,7 +96,9 @@ def checks_of(
     """Collect the checks over all output times reached."""
     if not balances:
         return Checks(*[float("nan")] * 9)
-    kinetic, potential, power = (np.array([getattr(b, name) for b in balances]) for name in ("kinetic", "potential", "power"))
+    kinetic, potential, power = (
+        np.array([getattr(b, name) for b in balances]) for name in ("kinetic", "potential", "power")
+    )
     n = len(balances)
     errors = np.array([b.power_error for b in balances])
     scale = max(b.power_scale for b in balances)
@@ -102,14 +109,14 @@ def checks_of(
     ]  # fmt: skip
     return Checks(
         max(b.position for b in balances), max(b.velocity for b in balances),
-        energy_error(times[:n], kinetic, potential, work[:n], power),
+        energy_error(times[:n], kinetic, potential, work[:n], power, np.array([b.bodies for b in balances])),
         float(errors.max()) / scale if scale > 0.0 else 0.0, max(b.dalembert for b in balances),
         max(apart, default=float("nan")), newton, loss, contraction,
     )  # fmt: skip
 
 
 def warnings_of(checks: Checks, rtol: float) -> tuple[str, ...]:
-    """Checks that are worse than expected, each in a sentence."""
+    """Say which checks are worse than expected, each in a sentence."""
     found = []
     if checks.energy > max(1e-9, 100.0 * rtol):
         found.append(
@@ -117,11 +124,13 @@ def warnings_of(checks: Checks, rtol: float) -> tuple[str, ...]:
             f"{rtol:g}; tighten rtol"
         )
     if checks.position_drift > 1e-9:
-        found.append(f"the joints are open by {checks.position_drift:.2g} characteristic lengths; project, or tighten rtol")
+        found.append(
+            f"the joints are open by {checks.position_drift:.2g} characteristic lengths; project, or tighten rtol"
+        )
     if checks.power > 1e-9 or checks.dalembert > 1e-9:
         found.append(
-            f"the equations of motion are satisfied to {max(checks.power, checks.dalembert):.2g} only: the pose is close "
-            "to a singular one, or the constraints contradict each other"
+            f"the equations of motion are satisfied to {max(checks.power, checks.dalembert):.2g} only: the pose is "
+            "close to a singular one, or the constraints contradict each other"
         )
     if checks.second_form > 1e-7:
         found.append(

@@ -147,6 +147,7 @@ class Form(Protocol):
 
     name: str
     why: str
+    stall: str
     loss: float
     pivot: float
     contraction: float
@@ -200,7 +201,8 @@ def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, optio
     run = _run(compiled, report, grid, chosen, options)
     if name == "auto" and chosen == "minimal" and run.done < len(grid) and not compiled.model.massless:
         other = _run(compiled, report, grid, "constrained", options)
-        text = f"the minimal form ends at t = {run.trail.time:.9g} s ({run.form.why or run.trail.message}); constrained form used"
+        why = run.form.why or run.trail.message
+        text = f"the minimal form ends at t = {run.trail.time:.9g} s ({why}); constrained form used"
         other.events.insert(0, DynamicEvent("fold", run.trail.time, abs(run.trail.last_step), text))
         return other
     return run
@@ -272,18 +274,27 @@ def _result(
     if run.name == "constrained":
         second = second_accelerations(compiled, report, grid[:done], run.q[:done], run.v[:done])
     checks = checks_of(
-        compiled, grid, balances, run.work, second, _newton(compiled, run, grid, a, lam), run.form.loss, run.form.contraction
+        compiled,
+        grid,
+        balances,
+        run.work,
+        second,
+        _newton(compiled, run, grid, a, lam),
+        run.form.loss,
+        run.form.contraction,
     )
     poses, velocities, accelerations = compiled.to_links(run.q, run.v, a)
     for array in (poses, velocities, accelerations):
         array[done:] = np.nan
     completed = done == count
     message = "completed" if completed else _failure(run, grid)
+    events = tuple(sorted(run.events, key=lambda event: event.time))
+    warnings, backend = warnings_of(checks, options.rtol), _backend(options.method)
     return DynamicMotion(
         compiled.model, compiled, grid, poses, velocities, accelerations, run.q, run.v, a, lam, run.slots, kinetic,
         potential, run.work, "completed" if completed else "failed", message, run.trail.time,
-        tuple(sorted(run.events, key=lambda event: event.time)), report, checks, warnings_of(checks, options.rtol), estimate,
-        run.name, options.method, _backend(options.method), options.rtol, run.trail.evaluations, run.trail.steps, run.seconds,
+        events, report, checks, warnings, estimate, run.name, options.method, backend, options.rtol,
+        run.trail.evaluations, run.trail.steps, run.seconds,
         perf_counter() - begin,
     )  # fmt: skip
 
@@ -307,5 +318,3 @@ def _newton(compiled: Compiled, run: _Run, grid: Array, a: Array, lam: Array) ->
     """Largest difference of the reactions to body-by-body equilibrium, at up to 20 instants."""
     chosen = np.unique(np.linspace(0, run.done - 1, min(run.done, 20)).astype(int)) if run.done else np.empty(0, int)
     return newton_euler_difference(compiled, grid[chosen], run.q[chosen], run.v[chosen], a[chosen], lam[chosen])
-
-

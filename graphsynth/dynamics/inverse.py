@@ -146,7 +146,7 @@ def _multipliers(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> 
         if T.friction.size:
             raise GeometryError("the friction iteration does not contract at an input; reduce the friction coefficient")
     along = float((inertial + J.T @ lam - Q - rubbing) @ v)
-    return lam, abs(along), float(np.abs(v) @ (np.abs(inertial) + np.abs(Q)))
+    return lam, abs(along), float(np.abs(v) @ (np.abs(inertial) + np.abs(Q) + np.abs(J.T) @ np.abs(lam)))
 
 
 def _efforts(compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array) -> tuple[Array, Array]:

@@ -130,6 +130,10 @@ class MinimalForm:
 
     name = "minimal"
     loss = 0.0
+    stall = (
+        "the input is next to a fold or a change point, where two assembly modes merge or meet, and is no coordinate "
+        "there; use form='constrained' or 'reduced'"
+    )
 
     def __init__(self, compiled: Compiled, start: StartReport) -> None:
         from graphsynth.dynamics import kernels
@@ -178,10 +182,12 @@ class MinimalForm:
         return self._begin.copy()
 
     def rates(self, t: float, y: Array) -> Array:
-        """Derivative of the state; NaN where the mechanism cannot be assembled."""
+        """Return the derivative of the state; NaN where the mechanism cannot be assembled."""
         if self.compiled.applied or self.compiled.tables.friction.size:
             return self._loaded_rates(t, y)
-        found, out = self._kernels.minimal_rates(self.compiled.tables, self.E, self.S, self.compiled.centres, y)
+        found, out = self._kernels.minimal_rates(
+            self.compiled.tables, self.E, self.S, self.compiled.centres, np.ascontiguousarray(y)
+        )
         if not out[0] > 0.0 or out[3] == 0.0:
             return self._failed(y, out)
         return np.asarray(found)
@@ -210,8 +216,8 @@ class MinimalForm:
             )  # fmt: skip
         else:
             self.why = (
-                f"the coordinate cannot go beyond {self.S.u[0]:.9g}: at a fold next to it two assembly modes merge, and "
-                "it is no coordinate there; use form='constrained' or 'reduced'"
+                f"the coordinate cannot go beyond {self.S.u[0]:.9g}: at a fold next to it two assembly modes merge, "
+                "and it is no coordinate there; use form='constrained' or 'reduced'"
             )
         return np.full(3, np.nan)
 
@@ -265,19 +271,21 @@ class MinimalForm:
             self._slopes[k] = (after - before) / h
             if min(before, after) < _CLOSE and slope is not None and before + slope * h < 0.0:
                 self.why = (
-                    f"two assembly modes of group {step.group} meet near the input {float(y[0]):.6g}, and the minimal form "
-                    "cannot tell how the motion goes on; use form='constrained'"
+                    f"two assembly modes of group {step.group} meet near the input {float(y[0]):.6g}, and the minimal "
+                    "form cannot tell how the motion goes on; use form='constrained'"
                 )
                 return True
         return False
 
     def accept(self, t: float, y: Array) -> Array:
         """Move the engine's first sample to the accepted input."""
-        q, q1, _ = self.transmission(float(y[0]))
+        _, q1, _ = self.transmission(float(y[0]))
         if self.S.done[0] == 2:
             self.S.u[0] = y[0]
             for part in (self.S.X, self.S.TH, self.S.V, self.S.W, self.S.PHI, self.S.M):
                 part[..., 0] = part[..., 1]
+            sines = [self.S.M[k, 1] for k, step in enumerate(self.program.steps) if step.has_two_modes]
+            self.pivot = float(np.sqrt(max(min(sines, default=1.0), 0.0)))
             self.inertia = float(q1 @ self.compiled.tables.mass @ q1)
         return y
 
@@ -289,7 +297,7 @@ class MinimalForm:
     def accelerations(self, t: float, y: Array) -> Array:
         """Accelerations of all coordinates in this form."""
         _, q1, q2 = self.transmission(float(y[0]))
-        return q1 * self.rates(t, y)[1] + q2 * y[1] ** 2
+        return np.asarray(q1 * self.rates(t, y)[1] + q2 * y[1] ** 2)
 
 
 def _modes(program: Program, theta: float, poses: Array) -> Array:
@@ -308,14 +316,15 @@ def engine_tables(tracker: Tracker) -> EngineTables:
     empty4, empty3, none = np.empty((0, 0, 0, 0)), np.empty((0, 0, 0)), np.empty(0, np.int64)
     return EngineTables(
         p.step_table, p.touched, p.rows, p.row_table, p.core, p.eliminated, p.eliminated_table, p.drives,
-        p.drive_table, p.need_angle, np.ones(p.mechanism.graph.links, dtype=np.bool_), tracker.modes, empty3, none, none,
-        empty4, empty4, empty4, empty3, p.Lc,
+        p.drive_table, p.need_angle, np.ones(p.mechanism.graph.links, dtype=np.bool_), tracker.modes, empty3, none,
+        none, empty4, empty4, empty4, empty3, p.Lc,
     )  # fmt: skip
 
 
 def engine_buffers(trace: Trace) -> EngineState:
     """Pack a two-sample trace for the kernel; it shares the trace's memory."""
-    return EngineState(trace.u, trace.q, *trace.memory, np.zeros(1, np.int64), np.zeros((1, 2), np.int64))
+    X, TH, V, W, PHI, M = trace.memory
+    return EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, np.zeros(1, np.int64), np.zeros((1, 2), np.int64))
 
 
 def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object) -> EffectiveInertia:

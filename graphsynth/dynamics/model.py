@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from graphsynth.dynamics.elements import (
-    Element, Force, JointFriction, Spring, Torque, TorqueSource, TorsionSpring, not_negative,
+    Element,
+    Force,
+    JointFriction,
+    Spring,
+    Torque,
+    TorqueSource,
+    TorsionSpring,
+    not_negative,
 )  # fmt: skip
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.checks import Point, finite, link_number, nonzero, point
@@ -55,17 +62,18 @@ class Body:
 
 @dataclass(frozen=True)
 class Rack:
-    """Rack and pinion: a point of link ``rack`` moves along ``angle`` of the frame as a wheel of ``pinion`` rolls.
+    """Rack and pinion: link ``rack`` slides along ``angle`` of the frame, a wheel of link ``pinion`` rolls on it.
 
-    ``e . p_rack - radius theta_pinion`` is constant, ``e`` the direction ``angle`` of the frame, the constant that of
-    the start pose; the pinion's centre must be fixed (spec 5.2).
+    ``e . (r_rack - c) - radius theta_pinion`` keeps its value at the start; e is the direction ``angle`` of the frame,
+    c the pinion's ``centre`` (in its link frame), which must be fixed, as the rack must not turn (spec 5.2).  The tooth
+    force acts along e at the pitch point, so the reactions in guide and bearing contain it.
     """
 
     rack: int
     pinion: int
     radius: float
     angle: float = 0.0
-    at: Point = (0.0, 0.0)
+    centre: Point = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rack", link_number("rack", self.rack))
@@ -74,7 +82,7 @@ class Rack:
             raise GeometryError(f"link {self.rack} cannot be rack and pinion; name two links")
         object.__setattr__(self, "radius", nonzero("radius of the pinion", self.radius))
         object.__setattr__(self, "angle", finite("angle of the rack", self.angle))
-        object.__setattr__(self, "at", point("point of the rack", self.at))
+        object.__setattr__(self, "centre", point("centre of the pinion", self.centre))
 
 
 @dataclass(frozen=True)
@@ -197,7 +205,9 @@ class DynamicModel:
                 raise GeometryError(f"prescribed = {driver!r} is not a Driver(base, link, law)")
             joint = self.mechanism.joint(*driver.pair)
             if not isinstance(joint, Revolute | Prismatic):
-                raise GeometryError(f"prescribed joint {driver.base}-{driver.link} is {joint.kind}; only R and P move so")
+                raise GeometryError(
+                    f"prescribed joint {driver.base}-{driver.link} is {joint.kind}; only R and P move so"
+                )
         return drivers
 
     @property

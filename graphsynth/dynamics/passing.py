@@ -35,7 +35,9 @@ def passed_singular_pose(
     coarse = np.linspace(start, end, 41)
     best = int(np.argmin([pivot(float(t)) for t in coarse]))
     low, high = float(coarse[max(best - 1, 0)]), float(coarse[min(best + 1, 40)])
-    found = minimize_scalar(pivot, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * max(abs(end), width)})
+    found = minimize_scalar(
+        pivot, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * max(abs(end), width)}
+    )
     t, least = float(found.x), float(found.fun) / largest
     if least > _NEARLY:
         return None
@@ -43,7 +45,7 @@ def passed_singular_pose(
     _, q = form.pivot_at(t, y)
     n = form.compiled.n
     if least > _SINGULAR:
-        text = f"nearly singular pose at t = {t:.9g} s: smallest pivot {least:.2g} of the largest; reactions are large there"
+        text = f"nearly singular pose at t = {t:.9g} s: smallest pivot {least:.2g} of the largest; large reactions"
         return DynamicEvent("nearly singular pose", t, 1e-9 * width, text)
     text = f"singular pose passed at t = {t:.9g} s"
     return DynamicEvent("singular pose", t, 1e-7 * width, text + _branches(form, t, q, y[n : 2 * n]))
@@ -53,7 +55,7 @@ def _branches(form: ConstrainedForm, t: float, q: Array, v: Array) -> str:
     """Say which branches meet, and which one the motion follows."""
     values = Values(form.compiled, t, form.slots)
     U, S, Vt = np.linalg.svd(values.scaled_jacobian(q))
-    count = int(np.sum(S < 1e-4 * S[0])) + max(0, U.shape[0] - len(S))
+    count = int(np.sum(1e-4 * S[0] > S)) + max(0, U.shape[0] - len(S))
     kept = U.shape[0] - count
     tangents = branch_tangents(values, q, U[:, kept:], Vt[kept:].T)
     if tangents is None or tangents.kind != "change point":
@@ -61,12 +63,13 @@ def _branches(form: ConstrainedForm, t: float, q: Array, v: Array) -> str:
     rate = form.compiled.to_links(q, v, np.zeros_like(v))[1]
     unit = np.array([form.compiled.tables.size, form.compiled.tables.size, 1.0])
     along = [
-        abs(float(((motion / unit) * (rate / unit)).sum())) / float(np.linalg.norm(motion / unit)) for motion in tangents.motions
-    ]  # fmt: skip
+        abs(float(((motion / unit) * (rate / unit)).sum())) / float(np.linalg.norm(motion / unit))
+        for motion in tangents.motions
+    ]
     size = float(np.linalg.norm(rate / unit)) or 1.0
     own = int(np.argmax(along))
     return (
         f"; two branches meet; the motion goes on along its own velocity, branch {own} "
-        f"(cosines {along[0] / size:.6f}, {along[1] / size:.6f}): the other one would need an impulse; a change of the start "
-        "by rounding does not change this choice, but close to rest it may"
+        f"(cosines {along[0] / size:.6f}, {along[1] / size:.6f}): the other one would need an impulse; a change of the "
+        "start by rounding does not change this choice, but close to rest it may"
     )

@@ -50,6 +50,7 @@ class JointReaction:
     determined: NDArray[np.bool_]
     angle_a: Array = field(repr=False)
     angle_b: Array = field(repr=False)
+    apart: Complex = field(repr=False)
 
     def on(self, link: int, frame: str = "world") -> tuple[Array, Array]:
         """Force (n, 2) and couple (n,) on one of the two links, in the "world" or in that "body"'s frame."""
@@ -86,17 +87,17 @@ class Reactions:
     def separating(self, a: int, b: int, pressure_angle: float) -> Array:
         """Separating force that the teeth of gear pair a-b exert on its link b, shape (n, 2), N.
 
-        ``|tangential force| tan(pressure_angle)`` along the line of centres, away from the other wheel for an external
-        pair; the bearings of the two wheels must carry it besides what they carry already (spec 5.7).
+        ``|tangential force| tan(pressure_angle)`` along the line of centres: it pushes a wheel with outer teeth from
+        the pitch point towards its own centre.  The bearings must carry it besides what they carry already (spec 5.7).
         """
         joint = self.between(a, b)
         if joint.kind != "gear":
             raise GeometryError(f"joint {a}-{b} is {joint.kind}; only gears have a separating force")
-        across = -1j * (joint.force[:, 0] + 1j * joint.force[:, 1])
-        size = np.abs(across)
-        # the tangential force is along E u; which of its two normals points from a to b is told by the centres
-        u = np.where(size > 0.0, across / np.where(size > 0.0, size, 1.0), 0.0)
-        return np.column_stack([u.real, u.imag]) * (size * np.tan(pressure_angle))[:, None]
+        sense = 1.0 if joint.b == b else -1.0
+        return (
+            np.column_stack([joint.apart.real, joint.apart.imag])
+            * (sense * joint.size * np.tan(pressure_angle))[:, None]
+        )
 
 
 def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multipliers: Array, times: Array) -> Reactions:
@@ -114,6 +115,7 @@ def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multiplie
     wrench = np.full((len(joints), count, 3), np.nan)  # on b (on a if b is the frame: negated), about its origin
     determined = np.zeros((len(joints), count, 3), dtype=np.bool_)
     angles, points = np.zeros((compiled.links, count)), np.full((len(joints), count), np.nan, dtype=np.complex128)
+    apart = np.zeros((len(joints), count), dtype=np.complex128)
     ends = [*compiled.first, len(compiled.info)]
     for k in range(count):
         if not np.isfinite(q[k]).all():
@@ -128,6 +130,8 @@ def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multiplie
             rows = slice(ends[index], ends[index + 1])
             link, sign, at = _application(compiled, index, place)
             points[index, k] = at
+            if isinstance(joints[index], Gear):
+                apart[index, k] = _separation(compiled, joints[index], place)
             column = int(compiled.tables.column[link])
             own = -sign * J[rows, column : column + 3].T
             arm = at - complex(*place[link, :2])
@@ -142,9 +146,18 @@ def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multiplie
         at = points[index]
         found.append(JointReaction(
             a, b, kind_of(joint), wrench[index, :, :2], wrench[index, :, 2], np.column_stack([at.real, at.imag]),
-            determined[index], angles[a], angles[b],
+            determined[index], angles[a], angles[b], apart[index],
         ))  # fmt: skip
     return Reactions(times, tuple(found))
+
+
+def _separation(compiled: Compiled, gear: Gear, place: Array) -> complex:
+    """Return the unit vector of the separating force on link b.
+
+    A wheel with outer teeth is pushed from the pitch point towards its own centre, a ring the other way.
+    """
+    u = world(place, compiled, gear.b, gear.at_b) - world(place, compiled, gear.a, gear.at_a)
+    return (-u if gear.internal else u) / (abs(u) or 1.0)
 
 
 def kind_of(joint: Any) -> str:
@@ -164,7 +177,7 @@ def _ends(compiled: Compiled, joint: Any) -> tuple[int, int]:
 def _left_null(J: Array) -> Array:
     """Columns: null vectors of the transposed Jacobian."""
     U, S, _ = np.linalg.svd(J)
-    rank = int(np.sum(S > 1e-10 * S[0])) if S.size else 0
+    rank = int(np.sum(1e-10 * S[0] < S)) if S.size else 0
     return np.asarray(U[:, rank:])
 
 
@@ -175,17 +188,15 @@ def world(place: Array, compiled: Compiled, link: int, at: tuple[float, float]) 
 
 
 def _application(compiled: Compiled, index: int, place: Array) -> tuple[int, float, complex]:
-    """Moving link whose wrench is read, its sign for link b, and the point of application."""
+    """Find the moving link whose wrench is read, its sign for link b, and the point of application."""
     joint = compiled.joints[index]
     a, b = _ends(compiled, joint)
     if isinstance(joint, Driver):
         joint = compiled.model.mechanism.joint(*joint.pair)
     if hasattr(joint, "rack"):
-        centre = complex(*place[joint.pinion, :2])
-        rack = world(place, compiled, joint.rack, joint.at)
-        e = np.exp(1j * joint.angle)
-        at = centre - 1j * e * joint.radius if compiled.tables.column[b] >= 0 else rack
-        return (b, 1.0, complex(at)) if compiled.tables.column[b] >= 0 else (a, -1.0, complex(at))
+        centre = world(place, compiled, joint.pinion, joint.centre)
+        at = complex(centre - 1j * np.exp(1j * joint.angle) * joint.radius)
+        return (b, 1.0, at) if compiled.tables.column[b] >= 0 else (a, -1.0, at)
     at = world(place, compiled, b, joint.at_b)
     if isinstance(joint, Gear):
         other = world(place, compiled, a, joint.at_a)

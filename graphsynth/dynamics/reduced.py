@@ -40,6 +40,10 @@ class ReducedForm:
     """
 
     name = "reduced"
+    stall = (
+        "at the singular pose there branches meet or nearly meet, and the equations do not tell how the motion goes "
+        "on; change the dimensions, or start elsewhere"
+    )
     loss = 0.0
 
     def __init__(self, compiled: Compiled, start: StartReport) -> None:
@@ -158,7 +162,7 @@ class ReducedForm:
         return a, P + drivers
 
     def rates(self, t: float, y: Array) -> Array:
-        """Derivative of the state; NaN where the mechanism cannot be assembled."""
+        """Return the derivative of the state; NaN where the mechanism cannot be assembled."""
         k = len(self.chosen)
         a, power = self._accelerate(t, y)
         return np.concatenate([y[k : 2 * k], a[self.chosen], [power]])

@@ -24,7 +24,9 @@ __all__ = ["newton_euler", "newton_euler_difference", "second_accelerations"]
 Array = NDArray[np.float64]
 
 
-def second_accelerations(compiled: Compiled, report: StartReport, times: Array, q: Array, v: Array) -> list[Array | None]:
+def second_accelerations(
+    compiled: Compiled, report: StartReport, times: Array, q: Array, v: Array
+) -> list[Array | None]:
     """Accelerations of given states by a formulation without multipliers.
 
     Through the planar engine at up to 20 states if there is a minimal form, in a null-space basis elsewhere; None with
@@ -56,7 +58,7 @@ def _null_space(compiled: Compiled, t: float, q: Array, v: Array) -> Array | Non
     _, J, gam, _ = values.system(q, v)
     scale, unit = values.column_scale, values.row_scale
     U, S, Vt = np.linalg.svd(J * scale / unit[:, None])
-    rank = int(np.sum(S > 1e-10 * S[0])) if S.size else 0
+    rank = int(np.sum(1e-10 * S[0] < S)) if S.size else 0
     if rank and S[rank - 1] < 1e-3 * S[0]:
         return None
     a0 = scale * (Vt[:rank].T @ ((U.T @ (gam / unit))[:rank] / S[:rank]))
@@ -114,18 +116,18 @@ def _loads(compiled: Compiled, t: float, q: Array, v: Array) -> Array:
 
 
 def _units(compiled: Compiled, joint: object, place: Array) -> tuple[int, int, list[tuple[complex, float, complex]]]:
-    """Unit wrenches (force on b, couple on b, point) that a joint can carry."""
+    """Return unit wrenches (force on b, couple on b, point) that a joint can carry."""
     if isinstance(joint, Driver):
         own = compiled.model.mechanism.joint(*joint.pair)
         at = world(place, compiled, own.b, own.at_b)
         along = complex(np.exp(1j * (place[own.a, 2] + getattr(own, "angle_a", 0.0))))
         return own.a, own.b, [(along, 0.0, at) if isinstance(own, Prismatic) else (0j, 1.0, at)]
     if isinstance(joint, Rack):
-        at = complex(*place[joint.pinion, :2]) - 1j * complex(np.exp(1j * joint.angle)) * joint.radius
+        at = world(place, compiled, joint.pinion, joint.centre) - 1j * complex(np.exp(1j * joint.angle)) * joint.radius
         return joint.rack, joint.pinion, [(complex(np.exp(1j * joint.angle)), 0.0, at)]
     assert isinstance(joint, Revolute | Prismatic | Gear | Cam | Rigid) or hasattr(joint, "at_b")
     a, b = joint.a, joint.b  # type: ignore[attr-defined]
-    at = world(place, compiled, b, joint.at_b)  # type: ignore[attr-defined]
+    at = world(place, compiled, b, joint.at_b)
     if isinstance(joint, Revolute | Rigid):
         couple = [(0j, 1.0, at)] if isinstance(joint, Rigid) else []
         return a, b, [(1.0 + 0j, 0.0, at), (1j, 0.0, at), *couple]
@@ -146,7 +148,7 @@ def _tooth(compiled: Compiled, joint: Gear, place: Array, centre_b: complex) -> 
 
 
 def _cam_normal(compiled: Compiled, joint: Cam, place: Array, roller: complex) -> complex:
-    """Normal of the pitch curve at the roller's centre, from the curve's tangent."""
+    """Return the normal of the pitch curve at the roller's centre, from the curve's tangent."""
     centre = world(place, compiled, joint.a, joint.at_a)
     out = (roller - centre) / abs(roller - centre)
     rho, first, _ = joint.pitch_radius(math.atan2(out.imag, out.real) - place[joint.a, 2] - joint.angle_a)
@@ -165,7 +167,9 @@ def newton_euler_difference(compiled: Compiled, times: Array, q: Array, v: Array
     reactions = reactions_from_multipliers(compiled, q, v, lam, times)
     worst, size = 0.0, 1e-300
     for k in range(len(q)):
-        for joint, (force, couple, at) in zip(reactions.joints, newton_euler(compiled, float(times[k]), q[k], v[k], a[k])):
+        for joint, (force, couple, at) in zip(
+            reactions.joints, newton_euler(compiled, float(times[k]), q[k], v[k], a[k])
+        ):
             arm = complex(*joint.point[k]) - at
             moment = couple - (np.conj(arm) * force).imag
             parts = np.array([force.real, force.imag, moment / compiled.tables.size])

@@ -47,7 +47,7 @@ def classify_pose(
             found = _returned(values, q + sense * _NEARBY * values.column_scale * direction)
             if found is not None:
                 S = np.linalg.svd(values.scaled_jacobian(found), compute_uv=False)
-                nearby = max(nearby, int(np.sum(S > tolerance * S[0])))
+                nearby = max(nearby, int(np.sum(tolerance * S[0] < S)))
     if nearby == rank:
         return "redundant", nearby, None
     return "singular", nearby, branch_tangents(values, q, left, null) if nearby == rank + 1 else None
@@ -104,5 +104,3 @@ def _driver_part(values: Values) -> Array:
     from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE
 
     return np.where((kinds == DRIVE_ANGLE) | (kinds == DRIVE_SLIDE), -zero, 0.0)
-
-

@@ -27,6 +27,8 @@ RANK = 1e-10
 _ROUNDS = 60
 #: Scaled residual above which constraints are violated.
 _CLOSED = 1e-11
+#: Speed (characteristic lengths or radians per second) below which a mechanism counts as at rest.
+_REST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +161,7 @@ def start_compiled(
     modes: Mapping[int, int] | None, time: float,
 ) -> StartReport:  # fmt: skip
     """Do what `consistent_start` says for a compiled model."""
-    q0 = compiled.to_coordinates(_guess(compiled, pose, keep, modes))
+    q0 = compiled.to_coordinates(_guess(compiled, pose, keep, modes, time))
     slots = initial_slots(compiled, q0)
     values = Values(compiled, time, slots)
     kept = _kept(values, keep)
@@ -174,7 +176,7 @@ def start_compiled(
         worst_name = names[int(np.argmax(scaled))]
         return replace(
             report, status="violated", violated=worst, pose_class="not tested",
-            message=f"the constraints do not close: '{worst_name}' stays open by {abs(residual[np.argmax(scaled)]):.6g} "
+            message=f"the constraints do not close: '{worst_name}' is open by {abs(residual[np.argmax(scaled)]):.6g} "
             f"{units[int(np.argmax(scaled))]}; correct the dimensions or the kept coordinates",
         )  # fmt: skip
     report = classify(values, report)
@@ -189,12 +191,22 @@ def _checked(compiled: Compiled, given: ArrayLike, name: str) -> Array:
     return array
 
 
-def _guess(compiled: Compiled, pose: ArrayLike | None, keep: Keys, modes: Mapping[int, int] | None) -> Array:
+def _guess(
+    compiled: Compiled, pose: ArrayLike | None, keep: Keys, modes: Mapping[int, int] | None, time: float
+) -> Array:
     mechanism = compiled.model.mechanism
     if pose is not None:
         return _checked(compiled, pose, "pose")
     drivers = [driver.pair for driver in mechanism.drivers]
-    wanted = {(min(key), max(key)): (key, value) for key, value in keep.items() if not isinstance(key[1], str)}
+    driven = compiled.driven(time)[:, 0]
+    wanted: dict[Any, tuple[Any, float]] = {
+        driver.pair: ((driver.base, driver.link), float(driven[k]))
+        for k, driver in enumerate(compiled.model.prescribed)
+    }
+    for key, value in keep.items():
+        coordinate_row(compiled, key, 0)  # a key that names nothing is refused
+        if not isinstance(key[1], str):
+            wanted[(min(key), max(key))] = (key, value)
     if drivers and all(pair in wanted for pair in drivers):
         found = pose_from_drivers(mechanism, [wanted[pair] for pair in drivers], modes or {})
         if found is not None:
@@ -212,7 +224,7 @@ def _kept(values: Values, keep: Mapping[Any, float]) -> tuple[list[Any], Array]:
 
 
 def _units(values: Values, kept: tuple[list[Any], Array]) -> Array:
-    """Unit of every row: the characteristic length, or 1 for angles."""
+    """Return the unit of every row: the characteristic length, or 1 for angles."""
     own = values.row_scale
     return np.concatenate([own, [1.0 if row[4] else values.size for row in kept[0]]])
 
@@ -315,13 +327,15 @@ def _velocities(
     # contradictions are judged by plain least squares, so that the residual is that of the rates themselves
     residual = matrix @ v - right
     speed = max(float(np.abs(v / values.column_scale).max(initial=0.0)), float(np.abs(right / unit).max(initial=0.0)))
-    if float(np.abs(residual / unit).max(initial=0.0)) > 1e-9 * speed:
+    if float(np.abs(residual / unit).max(initial=0.0)) > 1e-9 * max(speed, _REST):
         plain = (matrix * values.column_scale) / unit[:, None]
         v = v0 + values.column_scale * (np.linalg.pinv(plain, rcond=RANK) @ d)
         residual = matrix @ v - right
         all_names = [*report.rows, *names]
         worst = int(np.argmax(np.abs(residual / unit)))
-        found = {name: float(value) for name, value in zip(all_names, residual) if abs(value) > 1e-12 * speed}
+        found = {
+            name: float(value) for name, value in zip(all_names, residual) if abs(value) > 1e-12 * max(speed, _REST)
+        }
         return replace(
             report, status="contradicting rates", violated=found,
             message=f"the rates contradict the joints: '{all_names[worst]}' is missed by {abs(residual[worst]):.6g} "

@@ -21,6 +21,10 @@ Output = Callable[[int, float, Array], None]
 
 METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA", "CVODE")
 _RUNGE_KUTTA = ("DOP853", "RK45", "RK23")
+#: Steps shorter than this part of the longest, so many in a row next to a singular pose, are a failure.
+_STALL, _STALLED = 1e-2, 200
+#: The same for steps shorter than this part of the whole time.
+_TINY = 1e-5
 
 
 @dataclass
@@ -74,6 +78,7 @@ class _Stepper:
         at_break: bool,
     ) -> None:  # fmt: skip
         self.form, self.trail, self.method, self.rtol, self.atol = form, trail, method, rtol, atol
+        self.longest, self.stalled = 0.0, 0
         self.exact = exact or method not in (*_RUNGE_KUTTA, "Radau")
         self.end = end
         self.latest = float(np.nextafter(end, -np.inf)) if at_break else np.inf
@@ -114,10 +119,21 @@ class _Stepper:
             if solver is None or solver.status == "finished":
                 solver = self._next(solver, trail.time, y, bound, step)
             before = trail.time
+            leap = self._leap(solver) if self.method == "DOP853" else None
+            if leap is not None:
+                trail.time, y, path = leap
+                while k < len(grid) and grid[k] <= trail.time:
+                    output(k, float(grid[k]), path(float(grid[k])))
+                    k += 1
+                step, solver = trail.last_step, None
+                continue
             message = solver.step()
             trail.steps += 1
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 trail.message = str(message or "the solver gave no finite state")
+                return None
+            if self._stalls(float(solver.t) - before, float(grid[-1] - grid[0])):
+                trail.message = f"no way past t = {float(solver.t):.9g} s: {self.form.stall}"
                 return None
             if trail.steps >= max_steps:
                 trail.message = f"more than {max_steps} steps"
@@ -131,6 +147,22 @@ class _Stepper:
             self._watch(before, solver)
             solver = solver if keep else None
         return y
+
+    def _stalls(self, step: float, span: float) -> bool:
+        """Whether steps have become hopelessly short next to a singular pose."""
+        self.longest = max(self.longest, step)
+        short = step < max(_STALL * self.longest, _TINY * span) and self.form.pivot < 0.05
+        self.stalled = self.stalled + 1 if short else 0
+        return self.stalled > _STALLED
+
+    def _leap(self, solver: Any) -> Any:
+        """Propose the next step; where a singular pose is ahead, the state beyond it."""
+        propose = getattr(self.form, "proposed_step", None)
+        if propose is None:
+            return None
+        solver.h_abs = propose(self.trail.time, solver.h_abs)
+        found: Any = getattr(self.form, "leap", lambda *_: None)(self.trail, self.end)
+        return found
 
     def _refused(self, solver: Any) -> bool:
         """Whether the formulation does not hold over the step just made."""

@@ -20,7 +20,6 @@ from graphsynth.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver
-from graphsynth.mechanism.rank import characteristic_length
 
 __all__ = ["RACK", "Compiled", "RowInfo", "Tables", "compile_model", "coordinate_row"]
 
@@ -155,14 +154,16 @@ def compile_model(model: DynamicModel) -> Compiled:
     column[list(model.bodies)] = 3 * np.arange(len(model.bodies))
     mass = _mass_matrix(model, column)
     diagonal = not (mass - np.diag(np.diag(mass))).any()
-    lower = np.zeros((0, 0)) if model.massless else np.linalg.cholesky(mass)
+    lower: Array = np.zeros((0, 0)) if model.massless else np.asarray(np.linalg.cholesky(mass), dtype=np.float64)
+    springs, torsions, forces, sources = _loads(model, centres)
     tables = Tables(
-        column, rows, table, slots, mass, lower, diagonal, np.array(model.gravity),
-        *_loads(model, centres), *_frictions(model, joints, first), _size(model),
+        column, rows, table, slots, mass, lower, diagonal, np.array(model.gravity), *springs, *torsions, *forces,
+        *sources, *_frictions(model, joints, first), _size(model),
     )  # fmt: skip
     applied = tuple(
         element for element in model.elements
-        if callable(getattr(element, "force", None)) or callable(getattr(element, "torque", None))
+        if (isinstance(element, Force) and callable(element.force))
+        or (isinstance(element, Torque | TorqueSource) and callable(element.torque))
     )  # fmt: skip
     return Compiled(
         model, tables, tuple(info), tuple(joints), tuple(first), centres,
@@ -171,12 +172,15 @@ def compile_model(model: DynamicModel) -> Compiled:
 
 
 def _size(model: DynamicModel) -> float:
-    """Return the characteristic length; of a mechanism of sliders, the radius of gyration of its largest body."""
-    size = characteristic_length(model.mechanism)
-    if size != 1.0:
+    """Return the largest distance of joint points and centre of mass on a link; else a radius of gyration."""
+    points: dict[int, list[complex]] = {link: [complex(*body.centre)] for link, body in model.bodies.items()}
+    for joint in model.mechanism.joints:
+        points.setdefault(joint.a, []).append(complex(*joint.at_a))
+        points.setdefault(joint.b, []).append(complex(*joint.at_b))
+    size = max(abs(p - q) for found in points.values() for p in found for q in found)
+    if size > 0.0:
         return size
-    found = [math.sqrt(body.inertia / body.mass) for body in model.bodies.values() if body.mass > 0.0]
-    return max(found, default=0.0) or 1.0
+    return max((math.sqrt(b.inertia / b.mass) for b in model.bodies.values() if b.mass > 0.0), default=0.0) or 1.0
 
 
 def _shifted(at: tuple[float, float], centre: Array) -> tuple[float, float]:
@@ -198,7 +202,11 @@ def _constraints(
             own = joint_rows(_moved(joint, centres), model.mechanism.frame)
         for kind, a, b, parameters in own:
             slots.append(sum(slot >= 0 for slot in slots) if kind in (codes.GEAR, RACK) else -1)
-            info.append(RowInfo(_row_name(kind, joint), _angular(kind), index))
+            own_name = _row_name(kind, joint)
+            number = index - len(model.mechanism.joints)
+            if 0 <= number < len(model.additional):
+                own_name = f"additional {number + 1}: {own_name}"
+            info.append(RowInfo(own_name, _angular(kind), index))
             found.append((kind, a, b, parameters))
     width = max([codes.ROW_WIDTH, *(len(row[3]) for row in found)])
     table = np.zeros((len(found), width))
@@ -213,7 +221,7 @@ def _constraints(
 def _moved(joint: Any, centres: Array) -> Any:
     """Return the joint with its points given from the centres of mass."""
     if isinstance(joint, Rack):
-        return replace(joint, at=_shifted(joint.at, centres[joint.rack]))
+        return replace(joint, centre=_shifted(joint.centre, centres[joint.pinion]))
     return replace(
         joint, at_a=_shifted(joint.at_a, centres[joint.a]), at_b=_shifted(joint.at_b, centres[joint.b])
     )  # fmt: skip
@@ -224,7 +232,7 @@ def joint_rows(joint: Any, frame: int) -> list[tuple[int, int, int, list[float]]
     if isinstance(joint, Rack):
         e = [math.cos(joint.angle), math.sin(joint.angle)]
         row = [0.0] * 12
-        row[codes.PAX], row[codes.PAY], row[codes.TX], row[codes.TY], row[codes.RA] = *joint.at, *e, joint.radius
+        row[codes.PBX], row[codes.PBY], row[codes.TX], row[codes.TY], row[codes.RA] = *joint.centre, *e, joint.radius
         return [(RACK, joint.rack, joint.pinion, row)]
     base = [*joint.at_a, *joint.at_b, 1.0, 0.0, *[0.0] * 6]
     a, b = joint.a, joint.b
@@ -324,7 +332,8 @@ def _mass_matrix(model: DynamicModel, column: IntArray) -> Array:
     return mass
 
 
-def _loads(model: DynamicModel, centres: Array) -> tuple[Any, ...]:
+def _loads(model: DynamicModel, centres: Array) -> list[tuple[IntArray, Array]]:
+    """Springs, torsion springs, forces, torques: links and numbers of each."""
     springs, torsions, forces, sources = [], [], [], []
     for e in model.elements:
         if isinstance(e, Spring):
@@ -341,11 +350,14 @@ def _loads(model: DynamicModel, centres: Array) -> tuple[Any, ...]:
             if not callable(e.torque):
                 sources.append(((e.a, e.b), (e.ratio * e.torque, e.efficiency)))
             torsions.append(((e.a, e.b), (0.0, 0.0, e.ratio**2 * e.rotor_damping)))
-    found: list[Any] = []
-    for items, width in ((springs, 7), (torsions, 3), (forces, 4), (sources, 2)):
-        found.append(np.array([item[0] for item in items], dtype=np.int64).reshape(-1, 2))
-        found.append(np.array([item[1] for item in items], dtype=np.float64).reshape(-1, width))
-    return tuple(found)
+    kinds: list[tuple[list[Any], int]] = [(springs, 7), (torsions, 3), (forces, 4), (sources, 2)]
+    return [
+        (
+            np.array([item[0] for item in items], dtype=np.int64).reshape(-1, 2),
+            np.array([item[1] for item in items], dtype=np.float64).reshape(-1, width),
+        )
+        for items, width in kinds
+    ]
 
 
 def _frictions(model: DynamicModel, joints: list[Any], first: list[int]) -> tuple[IntArray, Array]:
@@ -361,5 +373,3 @@ def _frictions(model: DynamicModel, joints: list[Any], first: list[int]) -> tupl
         floats.append([e.kinetic, e.static, stribeck, e.regular_speed, e.radius, e.length])
     table = np.array(floats, dtype=np.float64).reshape(-1, 6)
     return np.array(ints, dtype=np.int64).reshape(-1, 4), table
-
-

@@ -27,18 +27,17 @@ def initial_slots(compiled: Compiled, q: Array, near: Array | None = None) -> Ar
     where = np.flatnonzero(T.slots >= 0)
     if not where.size:
         return slots
-    pose, _, _ = compiled.to_links(q, np.zeros_like(q), np.zeros_like(q))
     coordinates = np.zeros((compiled.links, 3))
     coordinates[compiled.moving] = np.asarray(q).reshape(-1, 3)
     for r in where:
         kind, a, b = (int(v) for v in T.rows[r])
         slot, p = int(T.slots[r]), T.table[r]
         P = complex(*coordinates[a, :2]) + np.exp(1j * coordinates[a, 2]) * complex(p[codes.PAX], p[codes.PAY])
-        if kind == RACK:
-            value = p[codes.TX] * P.real + p[codes.TY] * P.imag - p[codes.RA] * coordinates[b, 2]
-            slots[slot] = value if near is None else near[slot]
-            continue
         R = complex(*coordinates[b, :2]) + np.exp(1j * coordinates[b, 2]) * complex(p[codes.PBX], p[codes.PBY])
+        if kind == RACK:
+            along = (np.conj(complex(p[codes.TX], p[codes.TY])) * (P - R)).real
+            slots[slot] = along - p[codes.RA] * coordinates[b, 2] if near is None else near[slot]
+            continue
         raw = float(np.angle(R - P))
         if near is not None:
             slots[slot] = raw + 2.0 * np.pi * np.round((near[slot] - raw) / (2.0 * np.pi))
@@ -48,7 +47,6 @@ def initial_slots(compiled: Compiled, q: Array, near: Array | None = None) -> Ar
         open_ += p[codes.SIGN] * p[codes.RB] * (coordinates[b, 2] - raw - p[codes.H])
         turns = 0.0 if abs(total) < 1e-9 * (p[codes.RA] + p[codes.RB]) else np.round(open_ / (2.0 * np.pi * total))
         slots[slot] = raw + 2.0 * np.pi * turns
-    del pose
     return slots
 
 

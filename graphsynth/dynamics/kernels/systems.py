@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from graphsynth.compilation import kernel
-from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE, PAX, PAY, RA, SIGN, SLOT, TX, TY
+from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE, PBX, PBY, RA, SIGN, SLOT, TX, TY
 from graphsynth.kinematics.engine.kernels.rows import gamma, row
 
 RACK_KIND = 20
@@ -35,19 +35,22 @@ def constraint_system(T, x, phi, qd):
         kind, a, b = T.rows[k, 0], T.rows[k, 1], T.rows[k, 2]
         ka, kb = T.column[a], T.column[b]
         if kind == RACK_KIND:
+            # tooth force along e at the pitch point; the centre of the pinion is w from its centre of mass
             ex, ey = T.table[k, TX], T.table[k, TY]
-            ux = x[a, 2] * T.table[k, PAX] - x[a, 3] * T.table[k, PAY]
-            uy = x[a, 3] * T.table[k, PAX] + x[a, 2] * T.table[k, PAY]
-            C[k] = ex * (x[a, 0] + ux) + ey * (x[a, 1] + uy) - T.table[k, RA] * x[b, 4] - phi[T.slots[k]]
-            gam[k] = x[a, 7] ** 2 * (ex * ux + ey * uy)
+            px, py, radius = T.table[k, PBX], T.table[k, PBY], T.table[k, RA]
+            wx, wy = x[b, 2] * px - x[b, 3] * py, x[b, 3] * px + x[b, 2] * py
+            cx, cy = x[b, 0] + wx, x[b, 1] + wy
+            C[k] = ex * (x[a, 0] - cx) + ey * (x[a, 1] - cy) - radius * x[b, 4] - phi[T.slots[k]]
+            gam[k] = -(x[b, 7] ** 2) * (ex * wx + ey * wy)
             if ka >= 0:
-                J[k, ka], J[k, ka + 1], J[k, ka + 2] = ex, ey, ey * ux - ex * uy
+                ux, uy = cx + radius * ey - x[a, 0], cy - radius * ex - x[a, 1]
+                J[k, ka], J[k, ka + 1], J[k, ka + 2] = ex, ey, ux * ey - uy * ex
             if kb >= 0:
-                J[k, kb + 2] = -T.table[k, RA]
+                J[k, kb], J[k, kb + 1], J[k, kb + 2] = -ex, -ey, -(wx * ey - wy * ex) - radius
             continue
         C[k] = row(kind, T.table, k, a, b, x, phi, qd, g)
         gam[k] = -gamma(kind, T.table, k, a, b, x, qd)
-        if kind == DRIVE_ANGLE or kind == DRIVE_SLIDE:
+        if kind in (DRIVE_ANGLE, DRIVE_SLIDE):
             vel[k] = T.table[k, SIGN] * qd[int(T.table[k, SLOT]), 1]
         for c in range(3):
             if ka >= 0:

@@ -1,0 +1,197 @@
+"""Extreme cases of spec section 9 that concern planar dynamics: right, or flagged, never silently wrong."""
+
+import math
+
+import numpy as np
+import pytest
+from dynamic_models import bar, four_bar, g1, seven_body, seven_pose
+
+from graphsynth.dynamics import (
+    Body,
+    DynamicModel,
+    JointFriction,
+    Spring,
+    Torque,
+    TorqueSource,
+    consistent_start,
+    simulate_dynamics,
+)
+from graphsynth.errors import GeometryError
+from graphsynth.mechanism.joints import Prismatic, Revolute
+from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.structure.graph import MechanismGraph
+
+
+def parallelogram():
+    bodies = {1: bar(1.0, 0.2), 2: bar(2.0, 0.5), 3: bar(1.0, 0.2)}
+    return DynamicModel(four_bar(0.2, 0.5, 0.2, 0.5), bodies, gravity=(0.0, 0.0))
+
+
+def test_case_19_parallelogram_through_the_flat_pose():
+    """It passes flat poses at theta = 0, pi: the motion stays that of a parallelogram, each passage is an event."""
+    model = parallelogram()
+    start = consistent_start(model, keep={(0, 1): 1.0}, keep_rates={(0, 1): 3.0}, modes={0: -1})
+    if abs(start.poses[2, 2]) > 1e-9:
+        start = consistent_start(model, keep={(0, 1): 1.0}, keep_rates={(0, 1): 3.0}, modes={0: 1})
+    motion = simulate_dynamics(model, np.linspace(0.0, 3.0, 31), start=start)
+    assert motion.completed and motion.form == "constrained"
+    assert motion.events[0].kind == "fold" and "meet" in motion.events[0].statement
+    passed = [event for event in motion.events if event.kind == "singular pose"]
+    exact = [(k * math.pi - 1.0) / 3.0 for k in (1, 2, 3)]
+    assert [event.time for event in passed] == pytest.approx(exact, abs=1e-6)
+    assert all("two branches meet" in event.statement for event in passed)
+    # no force in the plane and constant speed: the coupler does not turn, k3 = 1
+    assert np.abs(motion.poses[:, 2, 2]).max() < 1e-7
+    assert np.abs(motion.poses[:, 1, 2] - (1.0 + 3.0 * motion.times)).max() < 1e-7
+    assert np.abs(motion.poses[:, 3, 2] - motion.poses[:, 1, 2]).max() < 1e-7
+
+
+def test_case_19_sensitivity_to_the_start():
+    model = parallelogram()
+    ends = []
+    for delta in (0.0, 1e-9):
+        start = consistent_start(model, keep={(0, 1): 1.0 + delta}, keep_rates={(0, 1): 3.0}, modes={0: 1})
+        ends.append(simulate_dynamics(model, [0.0, 1.0], start=start, form="constrained").poses[-1, 1:, 2])
+    assert np.abs(ends[0] - ends[1]).max() < 1e-6
+
+
+def test_start_at_a_change_point_is_a_failure_with_a_reason():
+    """Accelerations are not determined there by the equations: said quickly, not after a million steps."""
+    bodies = {1: bar(1.0, 0.02), 2: bar(1.0, 0.05), 3: bar(1.0, 0.03)}
+    model = DynamicModel(four_bar(0.02, 0.05, 0.03, 0.06), bodies, gravity=(0.0, 0.0))
+    pose = [(0.0, 0.0, 0.0), (0.0, 0.0, np.pi), (-0.02, 0.0, 0.0), (0.06, 0.0, np.pi)]
+    first = consistent_start(model, pose=pose)
+    moving = consistent_start(model, pose=pose, rates=5.0 * first.tangents.motions[0])
+    motion = simulate_dynamics(model, np.linspace(0.0, 0.05, 6), start=moving)
+    assert motion.form == "constrained" and motion.status == "failed"
+    assert "branches meet" in motion.message and motion.steps < 2000 and np.isnan(motion.poses[-1]).all()
+
+
+def test_fold_of_the_input_is_left_by_the_constrained_form():
+    """A crank that cannot turn fully: the minimal form ends at the fold, the whole motion goes on."""
+    bodies = {1: bar(0.4, 0.4), 2: bar(0.35, 0.35), 3: bar(0.5, 0.5)}
+    model = DynamicModel(four_bar(0.4, 0.35, 0.5, 0.7), bodies, gravity=(0.0, 0.0))
+    start = consistent_start(model, keep={(0, 1): 0.5}, keep_rates={(0, 1): 4.0}, modes={0: 1})
+    failed = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start, form="minimal")
+    assert failed.status == "failed" and "fold" in failed.message
+    assert np.isnan(failed.poses[-1]).all() and 0.0 < failed.reached < 1.0
+    motion = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start)
+    assert motion.completed and motion.form == "constrained" and motion.checks.energy < 1e-9
+    assert motion.events[0].kind == "fold" and abs(motion.events[0].time - failed.reached) < 1e-3
+    reduced = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start, form="reduced", rtol=1e-9)
+    assert reduced.completed
+    assert any(event.kind == "change of coordinates" for event in reduced.events)
+    assert np.abs(reduced.poses - motion.poses).max() < 1e-5
+
+
+def test_case_20_nearly_massless_link():
+    """Coupler times 1e-9: the constrained form against the massless limit in the minimal form."""
+    light = {1: bar(0.2, 0.2), 2: Body(0.6e-9, 0.018e-9, (0.3, 0.0)), 3: bar(0.4, 0.4)}
+    none = {**light, 2: Body(0.0, 0.0, (0.3, 0.0))}
+    keep = {"keep": {(0, 1): 0.0}, "keep_rates": {(0, 1): 10.0}, "modes": {0: 1}}
+    limit = simulate_dynamics(g1(bodies=none), [0.0, 1.0], form="minimal", **keep)
+    near = simulate_dynamics(g1(bodies=light), [0.0, 1.0], form="constrained", **keep)
+    assert near.completed and near.start.condition < 1e3
+    assert np.abs(near.poses[-1] - limit.poses[-1]).max() < 1e-7
+    assert near.checks.dalembert < 1e-9
+    with pytest.raises(GeometryError, match=r"links \[2\] have no mass"):
+        simulate_dynamics(g1(bodies=none), [0.0, 1.0], form="constrained", **keep)
+
+
+def test_case_21_large_train_ratio():
+    G, Jm = 1e3, 8.2e-6
+    model = g1(elements=[TorqueSource(0, 1, 1e-3, G, rotor_inertia=Jm)])
+    motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 5), keep={(0, 1): 0.0}, modes={0: 1}, form="constrained")
+    other = simulate_dynamics(model, np.linspace(0.0, 1.0, 5), keep={(0, 1): 0.0}, modes={0: 1}, form="minimal")
+    assert motion.checks.second_form < 1e-9 and motion.checks.energy < 1e-9
+    assert np.abs(motion.poses - other.poses).max() < 1e-8
+
+
+def test_case_18_contradicting_start_is_refused():
+    keep = {"keep": {(0, 1): 0.0}, "keep_rates": {(0, 1): 10.0, (0, 3): 4.0}, "modes": {0: 1}}
+    with pytest.raises(GeometryError, match="contradict the joints"):
+        simulate_dynamics(g1(), [0.0, 1.0], **keep)
+
+
+def test_spring_of_length_zero_is_a_failure():
+    slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])
+    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [Spring(0, 1, stiffness=10.0)], gravity=(0.0, 0.0))
+    for form in ("minimal", "constrained", "reduced"):
+        motion = simulate_dynamics(model, [0.0, 1.0], keep={(0, 1): 0.0}, form=form)
+        assert motion.status == "failed" and "length 0" in motion.message and np.isnan(motion.poses[1]).all()
+
+
+def test_step_limit_is_a_failure():
+    motion = simulate_dynamics(g1(), [0.0, 2.0], keep={(0, 1): 0.0}, modes={0: 1}, max_steps=10)
+    assert motion.status == "failed" and "more than 10 steps" in motion.message and motion.reached < 2.0
+
+
+@pytest.mark.parametrize("method", ["RK45", "Radau", "LSODA", "BDF"])
+def test_other_methods(method):
+    """Constrained form: Radau restarts after every projection, multistep methods are projected where they land."""
+    reference = simulate_dynamics(g1(), [0.0, 0.1, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, rtol=1e-12)
+    motion = simulate_dynamics(
+        g1(), [0.0, 0.1, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, form="constrained", method=method, rtol=1e-7
+    )
+    assert motion.completed and motion.method == method
+    assert np.abs(motion.poses - reference.poses).max() < 1e-4
+    assert motion.checks.position_drift < 1e-13
+
+
+def test_case_24_cyclic_coordinate_with_implicit_solver():
+    rotor = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    model = DynamicModel(rotor, {1: Body(1.0, 0.1)}, [Torque(0, 1, lambda t, a, w: 1.0 - 0.01 * w)], (0.0, 0.0))
+    for method in ("Radau", "BDF"):
+        motion = simulate_dynamics(model, [0.0, 50.0], keep={(0, 1): 0.0}, method=method, rtol=1e-6)
+        exact = 100.0 * (1.0 - math.exp(-0.1 * 50.0))
+        assert motion.completed and motion.velocities[-1, 1, 2] == pytest.approx(exact, rel=1e-4)
+
+
+def test_cvode():
+    pytest.importorskip("sksundae")
+    motion = simulate_dynamics(g1(), [0.0, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, method="CVODE", rtol=1e-8)
+    reference = simulate_dynamics(g1(), [0.0, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, rtol=1e-12)
+    assert motion.completed and np.abs(motion.poses - reference.poses).max() < 1e-5 and "sundae" in motion.backend
+
+
+def test_stiff_friction_is_reported_not_quiet():
+    """Block braking to rest with a law regularised at 1e-8 m/s: right, or a failure with its time."""
+    slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])
+    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [JointFriction(0, 1, 0.3, regular_speed=1e-8)])
+    motion = simulate_dynamics(
+        model,
+        [0.0, 0.2, 0.5],
+        keep={(0, 1): 0.0},
+        keep_rates={(0, 1): 1.0},
+        form="constrained",
+        rtol=1e-8,
+        max_steps=3000,
+    )
+    stop = 1.0 / (0.3 * 9.81)
+    assert motion.velocities[1, 1, 0] == pytest.approx(1.0 - 0.3 * 9.81 * 0.2, rel=1e-7)
+    if motion.completed:
+        assert motion.poses[-1, 1, 0] == pytest.approx(0.5 * stop, rel=1e-5)
+    else:
+        assert "stopped at t" in motion.message and motion.reached == pytest.approx(stop, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_case_22_long_run():
+    """G1 for 1000 s without damping: energy drift, closure; the phase error is what the error estimate says."""
+    motion = simulate_dynamics(
+        g1(), np.linspace(0.0, 1000.0, 101), keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1},
+        form="constrained", rtol=1e-12, estimate_error=True,
+    )  # fmt: skip
+    assert motion.completed
+    assert motion.checks.energy < 1e-7 and motion.checks.position_drift < 1e-13
+    assert motion.error_estimate[-1] < 1e-3
+
+
+def test_seven_bodies_all_forms_agree():
+    model = seven_body()
+    start = consistent_start(model, pose=seven_pose())
+    ends = [
+        simulate_dynamics(model, [0.0, 0.003], start=start, form=form, rtol=rtol).poses[-1]
+        for form, rtol in (("minimal", 1e-12), ("constrained", 1e-12), ("reduced", 1e-11))
+    ]
+    assert np.abs(ends[0] - ends[1]).max() < 1e-10 and np.abs(ends[2] - ends[1]).max() < 1e-9
