@@ -1,5 +1,6 @@
 """MuJoCo runs the exported model: spec 5.9 and 7.3, and every kind of joint and load against the internal motion."""
 
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
@@ -45,6 +46,25 @@ def test_default_loops_are_springs(start):
         soft = MujocoSettings(step, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001))
         errors.append(run_mujoco(g1(), start, [0.0, 2.0], soft).poses[-1, 1, 2] - G1_THETA)
     assert errors[0] == pytest.approx(errors[1], rel=1e-3) and -0.6 < errors[0] < -0.4
+
+
+@pytest.mark.parametrize(
+    ("settings", "error"),
+    [
+        (MujocoSettings(1e-3, solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001)), -0.467),
+        (MujocoSettings(1e-4, solref=(0.002, 1.0)), -3.9e-6),
+        (MujocoSettings(1e-4, solref=(-1e6, -2e3)), -6.2e-7),
+    ],
+)
+def test_floors_of_the_spec_in_an_open_reference_pose(start, settings, error):
+    """Spec 7.3 has its floors from a model written with all angles 0: the engine scales its springs there."""
+    mujoco = pytest.importorskip("mujoco")
+    text = re.sub(r' (quat|ref)="[^"]*"', "", to_mjcf(g1(), start, settings).xml)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, round(2.0 / settings.step))
+    assert data.qpos[0] - G1_THETA == pytest.approx(error, rel=0.01)
 
 
 def test_constraints_tied_to_the_step_have_order_two(start):
