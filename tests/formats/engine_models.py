@@ -2,9 +2,19 @@
 
 import math
 
-from dynamic_models import bar, g3
+from dynamic_models import bar, g1, g3
 
-from graphsynth.dynamics import Body, DynamicModel, Force, Spring, Torque, TorqueSource, TorsionSpring, consistent_start
+from graphsynth.dynamics import (
+    Body,
+    DynamicModel,
+    Force,
+    Rigid,
+    Spring,
+    Torque,
+    TorqueSource,
+    TorsionSpring,
+    consistent_start,
+)
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -91,3 +101,33 @@ def two_guides():
     extra = Prismatic(0, 3, (0.0, 0.02), (0.1, 0.0))
     model = g3(additional=[extra])
     return model, consistent_start(model, pose=start_g3().poses, keep={(0, 1): 0.5}, keep_rates={(0, 1): 15.0})
+
+
+def double_pendulum(*additional, pose, rate=2.0):
+    """Two bars, with constraints beyond the joints."""
+    graph = MechanismGraph(3, [(0, 1), (1, 2)], frame=0)
+    mechanism = Mechanism(graph, [Revolute(0, 1), Revolute(1, 2, (0.2, 0.0))], [Driver(0, 1)])
+    model = DynamicModel(mechanism, {1: bar(0.2, 0.2), 2: bar(0.6, 0.6)}, additional=additional)
+    keep = {(0, 1): pose[1][2]}
+    return model, consistent_start(model, pose=pose, keep=keep, keep_rates={(0, 1): rate})
+
+
+def welded():
+    """Both bars fixed to each other at 0.5 rad: one pendulum."""
+    c, s = 0.2 * math.cos(0.3), 0.2 * math.sin(0.3)
+    weld = Rigid(1, 2, (0.2, 0.0), (0.0, 0.0), 0.5, 0.0)
+    return double_pendulum(weld, pose=[[0.0] * 3, [0.0, 0.0, 0.3], [c, s, 0.8]])
+
+
+def tip_in_a_slot():
+    """The double pendulum with its tip in a slot of the frame."""
+    c, s = 0.2 * math.cos(0.3), 0.2 * math.sin(0.3)
+    slot = PinSlot(0, 2, (0.0, 0.1), (0.6, 0.0))
+    return double_pendulum(slot, pose=[[0.0] * 3, [0.0, 0.0, 0.3], [c, s, 0.07]])
+
+
+def doubled_pin():
+    """G1 with one of its pins stated twice."""
+    model = g1(additional=[Revolute(2, 3, (0.6, 0.0), (0.4, 0.0))])
+    pose = consistent_start(g1(), modes={0: 1}, keep={(0, 1): 0.0}).poses
+    return model, consistent_start(model, pose=pose, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0})

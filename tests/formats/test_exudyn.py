@@ -42,7 +42,19 @@ def test_a_solver_that_stops_is_a_failure(start, capfd):
     assert "FAILED" not in capfd.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["reversed_slider_crank", "yoke", "slot_on_crank", "trammel", "two_guides"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "reversed_slider_crank",
+        "yoke",
+        "slot_on_crank",
+        "trammel",
+        "two_guides",
+        "welded",
+        "tip_in_a_slot",
+        "doubled_pin",
+    ],
+)
 def test_every_joint_and_load(name):
     model, start = models.yoke(True) if name == "slot_on_crank" else getattr(models, name)()
     times = np.linspace(0.0, 0.4, 5)

@@ -82,7 +82,10 @@ def test_too_stiff_for_the_step_is_a_failure(start, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())  # no log file
 
 
-@pytest.mark.parametrize("name", ["reversed_slider_crank", "yoke", "slot_on_crank", "trammel", "gear_pair", "planet"])
+@pytest.mark.parametrize(
+    "name",
+    ["reversed_slider_crank", "yoke", "slot_on_crank", "trammel", "gear_pair", "planet", "welded", "doubled_pin"],
+)
 def test_every_joint_and_load(name):
     """Two steps: the difference to the internal motion is small and of second order."""
     pytest.importorskip("mujoco")
