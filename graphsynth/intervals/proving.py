@@ -124,10 +124,14 @@ def _inverse(matrices: Array) -> tuple[Array, Mask]:
 
 def evaluate(f: System, x: Sequence[Any], parameters: Interval | None) -> Sequence[Any]:
     """Return the equations at ``x``; parameters of shape (m,) or (N, m)."""
+    if not callable(f):
+        raise IntervalError(f"the system {f!r} cannot be called; give a function that returns equations")
     if parameters is None:
         results = f(x)
     else:
         results = f(x, [parameters[..., j] for j in range(parameters.shape[-1])])
+    if not isinstance(results, Sequence | np.ndarray | Interval):
+        raise IntervalError(f"the system returns {results!r}; it must return a list of equations, one for each unknown")
     if len(results) != len(x):
         raise IntervalError(
             f"the system returns {len(results)} equations for {len(x)} unknowns; Krawczyk's test needs as many"

@@ -224,6 +224,8 @@ def assess_jamming(
         return _any_mechanism(subject, bearing, condition, tilts, certify, length_tolerance, seconds)
     given = {"tilts": tilts is not None, "length_tolerance": length_tolerance != 0.0}
     _refuse("a LambdaLinkage or a box", given)
+    if box is not None and not isinstance(box, ToleranceBox):
+        raise GeometryError(f"box = {box!r} is no ToleranceBox; give ToleranceBox(alpha=..., clearance=..., ...)")
     if bearing is not None and not isinstance(bearing, Bearing):
         raise GeometryError(f"bearing = {bearing!r} does not fit a LambdaLinkage; give one Bearing(...)")
     return _one_bearing(subject, bearing, condition, 361 if samples is None else samples, box, certify)

@@ -208,6 +208,8 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
 
     begin = perf_counter()
     check_rounding()
+    if not isinstance(box, ToleranceBox):
+        raise GeometryError(f"box = {box!r} is no ToleranceBox; give ToleranceBox(alpha=..., clearance=..., ...)")
     check_condition(box, condition)
     clearance = box["clearance"]
     if clearance.upper < 0:

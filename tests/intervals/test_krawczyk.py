@@ -386,3 +386,10 @@ def test_traps_of_the_literature():
     x = Interval("0.995")
     p = x**8 - 8 * x**7 + 28 * x**6 - 56 * x**5 + 70 * x**4 - 56 * x**3 + 28 * x**2 - 8 * x + 1
     assert p.contains(Fraction(-1, 200) ** 8)
+
+
+def test_what_is_no_system_is_refused():
+    with pytest.raises(IntervalError, match="cannot be called"):
+        krawczyk(None, ["[0, 1]"])
+    with pytest.raises(IntervalError, match="must return a list"):
+        krawczyk(lambda x: None, ["[0, 1]"])

@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth.errors import GeometryError
+from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, ToleranceBox, Verdict, certify_jamming, spread
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
@@ -483,3 +484,15 @@ def test_gap_of_a_range_that_begins_with_interference():
     assert found.verdict is Verdict.UNDECIDED and "interference" in found.reason
     assert F(1, 100) in (F(found.largest_gap.lo), F(found.largest_gap.hi)) or 0.01 in found.largest_gap
     assert -0.01 in found.smallest_worst_gap and not found.arcs.free
+
+
+def test_what_is_no_tolerance_box_or_no_number_is_refused():
+    with pytest.raises(GeometryError, match="no ToleranceBox"):
+        certify_jamming(None)
+    for value, text in [
+        (b"0.03", "not a finite number"), (np.bool_(True), "not a finite number"), ("0.03 +- -1", "negative tolerance"),
+        (Interval([1, 2]), "array of shape"),
+    ]:  # fmt: skip
+        with pytest.raises(GeometryError, match=text):
+            deck(clearance=value)
+    assert deck(Hb=np.int64(10)).exact_input and not deck(Hb=np.float32(10)).exact_input

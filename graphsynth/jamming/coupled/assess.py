@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.coupled.limits import Misalignment
-from graphsynth.jamming.coupled.problem import Bearings, Problem, problem
+from graphsynth.jamming.coupled.problem import Bearings, Problem, check_motion, problem
 from graphsynth.jamming.coupled.program import PoseSolution
 from graphsynth.jamming.coupled.report import CoupledReport, Loosen
 from graphsynth.jamming.verdict import Verdict
@@ -88,7 +88,7 @@ def assess_coupled(
     ('FREE_ESTIMATED', [0.9694, 0.9894, 0.7915])
     """
     begin = perf_counter()
-    tilts = (tilts,) if isinstance(tilts, Misalignment) else tuple(tilts)
+    check_motion(motion)
     given = problem(motion.mechanism, bearings, tilts, condition)
     keep = np.flatnonzero(motion.assembled)
     poses = motion.poses[keep]
@@ -102,7 +102,7 @@ def assess_coupled(
     from graphsynth.jamming.coupled.turn import certify_coupled
 
     proof = certify_coupled(
-        motion, bearings, tilts, condition=condition, length_tolerance=length_tolerance, seconds=seconds
+        motion, bearings, given.misalignments, condition=condition, length_tolerance=length_tolerance, seconds=seconds
     )
     # where nothing is proved, what the samples say is still worth reading
     notes = (*report.notes, f"at the samples: {report.reason}") if proof.verdict is Verdict.UNDECIDED else report.notes

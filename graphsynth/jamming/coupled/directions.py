@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.coupled.limits import Misalignment
-from graphsynth.jamming.coupled.problem import Bearings, problem
+from graphsynth.jamming.coupled.problem import Bearings, check_motion, problem
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -86,8 +86,9 @@ def direction_map(
     -----
     Specification lambda_and_jamming, section 9.6: the direction of the tilt matters.
     """
-    if directions < 3:
-        raise GeometryError(f"directions = {directions} are too few for a map; give 3 or more")
+    if not isinstance(directions, int | np.integer) or directions < 3:
+        raise GeometryError(f"directions = {directions} are too few for a map; give a whole number, 3 or more")
+    check_motion(motion)
     given = problem(motion.mechanism, bearings, tilts, condition)
     keep = np.flatnonzero(motion.assembled)
     if keep.size == 0:

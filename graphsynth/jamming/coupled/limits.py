@@ -21,19 +21,32 @@ __all__ = ["FREE", "RIGID", "SPHERICAL", "JointLimits", "Limits", "Misalignment"
 Range: TypeAlias = tuple[float, float]
 
 
+#: Smallest limit above zero: products of smaller ones would vanish.
+_SMALLEST = 1e-150
+
+
 def _limit(name: str, value: float) -> float:
     if not isinstance(value, bool) and value == math.inf:
         return math.inf
     number = finite(name, value)
+    if 0.0 < number < _SMALLEST:
+        raise GeometryError(f"{name} = {number} is smaller than {_SMALLEST}; give 0 (rigid), or another unit of length")
     if number < 0.0:
         raise GeometryError(f"{name} = {number} is negative; give 0 (rigid), a positive limit, or inf (no limit)")
     return number
 
 
+def _pair(name: str, given: Range) -> Range:
+    """Return both bounds; raise `GeometryError` for anything that is no pair."""
+    if not isinstance(given, tuple | list) or len(given) != 2:
+        raise GeometryError(f"{name}_range = {given!r} is no pair of bounds; give (low, high)")
+    return given[0], given[1]
+
+
 def _range(name: str, value: float, given: Range | None) -> Range:
     if given is None:
         return (value, value)
-    low, high = (_limit(f"{name} of the range", bound) for bound in given)
+    low, high = (_limit(f"{name} of the range", bound) for bound in _pair(name, given))
     if not low <= value <= high:
         raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
     return (low, high)
@@ -144,12 +157,13 @@ class Misalignment:
             value = finite(name, getattr(self, name))
             object.__setattr__(self, name, value)
             given = getattr(self, f"{name}_range")
-            low, high = (value, value) if given is None else (finite(name, bound) for bound in given)
+            low, high = (value, value) if given is None else (finite(name, bound) for bound in _pair(name, given))
             if not low <= value <= high:
                 raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
             object.__setattr__(self, f"{name}_range", (low, high))
-        if abs(self.alpha) > 0.5:
-            raise GeometryError(f"alpha = {self.alpha} rad is no small tilt; the coupled model needs |alpha| <= 0.5")
+            if name == "alpha" and max(abs(low), abs(high)) > 0.5:
+                largest = max(low, high, key=abs)
+                raise GeometryError(f"alpha = {largest} rad is no small tilt; the coupled model needs |alpha| <= 0.5")
 
     @property
     def vector(self) -> tuple[float, float]:

@@ -12,9 +12,10 @@ from graphsynth.intervals import Interval, check_rounding
 from graphsynth.jamming.coupled.enclosure import Moving, Pieces, factor_bounds, shifts_enclosed
 from graphsynth.jamming.coupled.linear import points
 from graphsynth.jamming.coupled.positions import Positions
-from graphsynth.jamming.coupled.problem import Problem
+from graphsynth.jamming.coupled.problem import Problem, check_motion
 from graphsynth.jamming.coupled.slopes import slopes
 from graphsynth.jamming.coupled.tubes import Tubes, linked, prove_tubes
+from graphsynth.kinematics._checks import finite
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -180,10 +181,14 @@ def cut(lo: Array, hi: Array) -> tuple[Array, Array]:
     return edges[:, :-1].ravel(), edges[:, 1:].ravel()
 
 
-def check_range(motion: Motion, length_tolerance: float) -> None:
-    """Refuse a changed rounding mode, a tolerance out of bounds, and a motion without a range."""
+def check_range(motion: Motion, length_tolerance: float, **limits: float) -> None:
+    """Refuse a changed rounding mode, a tolerance or a limit of the work out of bounds, a motion without a range."""
     check_rounding()
-    if not 0.0 <= length_tolerance < 0.5:
+    check_motion(motion)
+    for name, value in limits.items():
+        if not isinstance(value, int | float | np.number) or not value >= 0:
+            raise GeometryError(f"{name} = {value!r} must be a number of zero or more; correct the value")
+    if not 0.0 <= finite("length_tolerance", length_tolerance) < 0.5:
         raise GeometryError(f"length_tolerance = {length_tolerance} must be a relative half width from 0 to 0.5")
     if int(motion.assembled.sum()) < 2:
         raise GeometryError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from graphsynth.jamming.coupled.program import Mode, PoseSolution, solve_poses
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Bearings", "Problem", "problem"]
+__all__ = ["Bearings", "Problem", "check_motion", "problem"]
 
 Array = NDArray[np.float64]
 Bearings: TypeAlias = Bearing | Limits | Mapping[tuple[int, int], Bearing | Limits]
@@ -50,6 +50,14 @@ class Problem:
         return solve_poses(self.layout, r, e, shifts(self.layout, base, turned), mode)
 
 
+def check_motion(motion: Any) -> None:
+    """Refuse anything that is no `Motion`."""
+    from graphsynth.kinematics.simulation import Motion
+
+    if not isinstance(motion, Motion):
+        raise GeometryError(f"motion = {motion!r} is no Motion; give the result of simulate(mechanism, inputs)")
+
+
 def problem(
     mechanism: Mechanism, bearings: Bearings, tilts: Misalignment | Iterable[Misalignment], condition: Condition = "A"
 ) -> Problem:
@@ -60,7 +68,13 @@ def problem(
     GeometryError
         A joint without limits, limits that do not fit a joint, a misalignment of a joint that does not exist.
     """
-    chosen = (tilts,) if isinstance(tilts, Misalignment) else tuple(tilts)
+    chosen = tuple(tilts) if isinstance(tilts, Iterable) else (tilts,)
+    for tilt in chosen:
+        if not isinstance(tilt, Misalignment):
+            raise GeometryError(
+                f"tilts = {tilt!r} is no misalignment; give Misalignment(base, link, alpha), or several"
+            )
+    chosen = tuple(chosen)
     by_pair: dict[tuple[int, int], Misalignment] = {}
     for tilt in chosen:
         pair = (min(tilt.base, tilt.link), max(tilt.base, tilt.link))

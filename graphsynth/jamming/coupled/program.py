@@ -163,6 +163,9 @@ def _solve_group(rows: _Rows, basis: Array, poses: NDArray[np.intp], mode: Mode,
         chosen, span = chosen[~lost], span[~lost]
         if chosen.size == 0:
             continue
+        if n == 0:  # nothing costs anything, and nothing does work
+            _write(rows, poses[chosen], np.zeros((len(chosen), rows.F.shape[1])), None, mode, out)
+            continue
         parts = M[chosen] @ span[:, None], F[chosen] @ span, (W[chosen, None] @ span)[:, 0]
         rounds = max(rounds, _solve_regular(rows, basis[chosen] @ span, poses[chosen], parts, mode, out))
     return rounds

@@ -82,7 +82,7 @@ def largest_scale(
         As `certify_coupled`; and for a motion or mechanism whose positions cannot be proved at all.
     """
     begin = perf_counter()
-    check_range(motion, length_tolerance)
+    check_range(motion, length_tolerance, relative_gap=relative_gap, max_pieces=max_pieces, seconds=seconds)
     given = problem(motion.mechanism, bearings, tilts, condition)
     reason = ""
     best, above = 0.0, 0.0

@@ -163,7 +163,7 @@ def certify_coupled(
     'CERTIFIED_FREE'
     """
     begin = perf_counter()
-    check_range(motion, length_tolerance)
+    check_range(motion, length_tolerance, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
     given = problem(motion.mechanism, bearings, tilts, condition)
     try:
         work = Work(given, motion, length_tolerance)
@@ -264,6 +264,8 @@ def _judge(work: Work, pieces: Found, state: NDArray[np.int8], stopped: str, bra
         rest = f"; undecided over {share[1]:.3g}: {open_text}" if share[1] > 0.0 else ""
         return Verdict.CERTIFIED_JAMMED, f"jams over {shortened(share[0], -1)} of the range, proved{rest}"
     if share[1] > 0.0:
+        if share[1] == 1.0:
+            return Verdict.UNDECIDED, f"nothing is proved: {open_text}"
         return Verdict.UNDECIDED, f"{open_text} over {share[1]:.3g} of the range, the rest is proved free"
     if not work.motion.completed:
         return Verdict.UNDECIDED, f"free as far as the motion goes, proved; it ends: {work.motion.reason}"

@@ -335,3 +335,20 @@ def test_reasons_of_what_is_not_proved():
         certify_coupled(simulate(four_bar(), TURN), RIGID, Misalignment(0, 1, 0.01), length_tolerance=-1.0)
     cut = certify_coupled(simulate(four_bar(), TURN), Bearing(), Misalignment(0, 1, 0.012), max_pieces=50)
     assert cut.verdict.name == "UNDECIDED" and "limit of work" in cut.reason
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [({"seconds": math.nan}, "seconds = nan"), ({"max_pieces": -1}, "max_pieces"),
+     ({"resolution": math.nan}, "resolution"), ({"length_tolerance": "x"}, "length_tolerance = 'x'"), ({"length_tolerance": 0.5}, "0 to 0.5")],
+)  # fmt: skip
+def test_limits_of_the_work_that_make_no_sense(options, text):
+    motion = simulate(four_bar(), [0.0, 0.5])
+    with pytest.raises(GeometryError, match=text):
+        certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.01), **options)
+
+
+def test_no_work_proves_nothing_and_says_so():
+    motion = simulate(four_bar(), [0.0, 0.5])
+    found = certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.01), seconds=0.0)
+    assert found.verdict.name == "UNDECIDED" and "nothing is proved" in found.reason and "free" not in found.reason

@@ -411,8 +411,23 @@ def test_range_of_the_general_pin_is_proved():
         (lambda: problem(four_bar(), SlideLimits(0.1, 0.1), Misalignment(0, 1, 0.1)), "without a direction"),
         (lambda: problem(slider_crank(), Bearing(), Misalignment(0, 1, 0.1)), "does not fit"),
         (lambda: problem(four_bar(), "x", Misalignment(0, 1, 0.1)), "no limits"),
+        (lambda: problem(four_bar(), RIGID, None), "no misalignment"),
+        (lambda: problem(four_bar(), RIGID, [0.01]), "no misalignment"),
+        (lambda: Misalignment(0, 1, 0.01, alpha_range=(-3.0, 3.0)), "small tilt"),
+        (lambda: Misalignment(0, 1, 0.01, alpha_range=0.02), "no pair"),
+        (lambda: JointLimits(0.1, tilt_range=(0.1, 0.1, 0.2)), "no pair"),
+        (lambda: JointLimits(5e-324), "smaller than"),
+        (lambda: assess_coupled(None, RIGID, Misalignment(0, 1, 0.1)), "no Motion"),
     ],
 )
 def test_bad_input_gets_a_sentence(make, text):
     with pytest.raises(GeometryError, match=text):
         make()
+
+
+def test_rigid_joints_without_misalignment_are_free():
+    """No limit has any width, and nothing does work: factor 0, not an exception."""
+    motion = simulate(four_bar(), [0.0, 0.5, 1.0])
+    report = assess_coupled(motion, Bearing(clearance=0.0), Misalignment(0, 1, 0.0), certify=True)
+    assert (report.factor == 0.0).all() and report.verdict.name in ("CERTIFIED_FREE", "UNDECIDED")
+    assert assess_coupled(motion, RIGID, Misalignment(0, 1, 1e-9), certify=True).verdict.name == "CERTIFIED_JAMMED"
