@@ -74,7 +74,6 @@ def problem(
             raise GeometryError(
                 f"tilts = {tilt!r} is no misalignment; give Misalignment(base, link, alpha), or several"
             )
-    chosen = tuple(chosen)
     by_pair: dict[tuple[int, int], Misalignment] = {}
     for tilt in chosen:
         pair = (min(tilt.base, tilt.link), max(tilt.base, tilt.link))

@@ -340,7 +340,8 @@ def test_reasons_of_what_is_not_proved():
 @pytest.mark.parametrize(
     ("options", "text"),
     [({"seconds": math.nan}, "seconds = nan"), ({"max_pieces": -1}, "max_pieces"),
-     ({"resolution": math.nan}, "resolution"), ({"length_tolerance": "x"}, "length_tolerance = 'x'"), ({"length_tolerance": 0.5}, "0 to 0.5")],
+     ({"resolution": math.nan}, "resolution"), ({"length_tolerance": "x"}, "length_tolerance = 'x'"),
+     ({"length_tolerance": 0.5}, "0 to 0.5")],
 )  # fmt: skip
 def test_limits_of_the_work_that_make_no_sense(options, text):
     motion = simulate(four_bar(), [0.0, 0.5])
