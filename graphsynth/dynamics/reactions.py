@@ -94,10 +94,8 @@ class Reactions:
         if joint.kind != "gear":
             raise GeometryError(f"joint {a}-{b} is {joint.kind}; only gears have a separating force")
         sense = 1.0 if joint.b == b else -1.0
-        return (
-            np.column_stack([joint.apart.real, joint.apart.imag])
-            * (sense * joint.size * np.tan(pressure_angle))[:, None]
-        )
+        size = sense * joint.size * np.tan(pressure_angle)
+        return np.asarray(np.column_stack([joint.apart.real, joint.apart.imag]) * size[:, None])
 
 
 def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multipliers: Array, times: Array) -> Reactions:

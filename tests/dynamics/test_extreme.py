@@ -183,7 +183,9 @@ def test_case_22_long_run():
         form="constrained", rtol=1e-12, estimate_error=True,
     )  # fmt: skip
     assert motion.completed
-    assert motion.checks.energy < 1e-7 and motion.checks.position_drift < 1e-13
+    # the crank's angle is some 9000 rad at the end: the joints close to its last digit
+    turned = float(np.spacing(np.abs(motion.poses[:, 1, 2]).max()))
+    assert motion.checks.energy < 1e-9 and motion.checks.position_drift < turned < 2e-12
     assert motion.error_estimate[-1] < 1e-3
 
 
