@@ -19,7 +19,7 @@ from typing import Any
 
 __all__ = ["announce", "kernel", "source_digest"]
 
-_IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+([^#\n]+))?", re.MULTILINE)
+_IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+(\([^)]*\)|[^#\n]+))?", re.MULTILINE)
 _ROOT = Path(__file__).parent.parent
 
 

@@ -65,14 +65,15 @@ def written(folder: Path, texts: dict[str, str]) -> Path:
 def test_digest_follows_imports(tmp_path: Path) -> None:
     texts = {
         "room/kernels/one": "from graphsynth.room.kernels.two import f\n",
-        "room/kernels/two": "from graphsynth.room import codes\n",
+        "room/kernels/two": "from graphsynth.room import (\n    codes,\n    more,\n)\n",
+        "room/more": "C = 1\n",
         "room/codes": "A = 1\n",
         "other": "B = 1\n",
     }
     first = written(tmp_path / "a", texts)
     start = Path("graphsynth/room/kernels/one.py")
     digest = source_digest(first / start, first)
-    for name, changed in (("room/codes", True), ("room/kernels/two", True), ("other", False)):
+    for name, changed in (("room/codes", True), ("room/more", True), ("room/kernels/two", True), ("other", False)):
         other = written(tmp_path / name.replace("/", "-"), {**texts, name: texts[name] + "# new\n"})
         assert (source_digest(other / start, other) != digest) == changed
 
