@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.drawing.crossing_pictures import new_figure
+from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import GeometryError
 

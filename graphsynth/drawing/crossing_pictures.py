@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import GeometryError
 
@@ -20,17 +21,9 @@ if TYPE_CHECKING:
     from graphsynth.intervals.interval import Interval
     from graphsynth.jamming.circle_ellipse import CircleEllipse, CrossingBoxes
 
-__all__ = ["crossing_picture", "dress", "new_figure", "region_picture"]
+__all__ = ["crossing_picture", "dress", "region_picture"]
 
 Array = NDArray[np.float64]
-
-
-def new_figure(size: tuple[float, float]) -> Figure:
-    """Return an empty figure of a size in inches."""
-    from matplotlib.figure import Figure
-
-    figure: Figure = Figure(figsize=size, layout="constrained")
-    return figure
 
 
 def dress(axes: Any, title: str, x: str = "x", y: str = "y") -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from graphsynth.drawing.figures import new_figure
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -28,13 +29,6 @@ __all__ = ["drive_curves", "reduction_picture", "resistance_picture", "sensor_pi
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 _STYLES = ("-", (0, (5, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2)), (0, (2, 2)))
 _JOINTS = ("O1: frame on crank", "A: crank on coupler", "B: coupler on rocker", "O2: frame on rocker")
-
-
-def _figure(size: tuple[float, float]) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure: Figure = Figure(figsize=size, layout="constrained")
-    return figure
 
 
 def _panel(axes: Any, title: str, x: str, y: str) -> None:
@@ -74,7 +68,7 @@ def drive_curves(runs: Mapping[str, DriveRun], *, size: tuple[float, float] = (7
     """
     if not runs:
         raise SpecError("there is no run to draw; give at least one, for example {'1 ohm': run}")
-    figure = _figure(size)
+    figure = new_figure(size)
     torque, speed = figure.subplots(2, 1, sharex=True)
     for k, (label, run) in enumerate(runs.items()):
         style = {"color": _COLOURS[k % 6], "ls": _STYLES[k % 6], "lw": 1.4}
@@ -115,7 +109,7 @@ def resistance_picture(
     """
     if not effects:
         raise SpecError("there is no effect to draw; give at least one result of resistance_effect")
-    figure = _figure(size)
+    figure = new_figure(size)
     chart, ripples = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     _gain_map(figure, chart)
     for k, (label, effect) in enumerate(effects.items()):
@@ -162,7 +156,7 @@ def reduction_picture(study: ReductionStudy, *, size: tuple[float, float] = (5.4
     -------
     matplotlib.figure.Figure
     """
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.add_subplot()
     axes.loglog(study.inductance, study.speed, "o-", color=_COLOURS[0], lw=1.3, ms=4, label="speed [rad/s]")
     axes.loglog(study.inductance, study.angle, "s--", color=_COLOURS[1], lw=1.3, ms=4, label="angle [rad]")
@@ -188,7 +182,7 @@ def start_up_picture(
     -------
     matplotlib.figure.Figure
     """
-    figure = _figure(size)
+    figure = new_figure(size)
     speed, current, links = figure.subplots(3, 1, sharex=True)
     speed.axhspan(target * (1 - band), target * (1 + band), color="#DDE6EE")
     speed.plot(run.time, run.speed, color=_COLOURS[0], lw=1.5)
@@ -236,7 +230,7 @@ def sensor_picture(
     w1, w2, w3 = found.speed, s.k2 * found.speed, s.k3 * found.speed
     x = np.degrees(found.theta) if time is None else np.asarray(time, dtype=np.float64)
     name = "crank angle [deg]" if time is None else "time [s]"
-    figure = _figure(size)
+    figure = new_figure(size)
     grid = figure.subplots(2, 2)
     rates, forces, paths, torque = grid.ravel()
     relative = (w1, w2 - w1, w3 - w2, w3)

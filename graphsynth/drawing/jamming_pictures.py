@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.drawing.bearing_in_space import space_picture
-from graphsynth.drawing.crossing_pictures import crossing_picture, dress, new_figure, region_picture
+from graphsynth.drawing.crossing_pictures import crossing_picture, dress, region_picture
+from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import GeometryError
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from graphsynth.drawing.figures import new_figure
 from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -40,13 +41,6 @@ _MAPS = {
     "link_force": ("largest link forces per wrench", "magma_r", ""),
     "reach": ("smallest sine of the angle rocker-link", "viridis", ""),
 }
-
-
-def _figure(size: tuple[float, float]) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure: Figure = Figure(figsize=size, layout="constrained")
-    return figure
 
 
 def _axis(name: str, unit: str) -> str:
@@ -128,7 +122,7 @@ def workspace_picture(work: Workspace, *, unit: str = "mm", size: tuple[float, f
     >>> figure.axes[0].get_xlabel()
     'x [mm]'
     """
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.add_subplot()
     _fill(axes, work)
     _arcs(axes, work, 2.0)
@@ -175,7 +169,7 @@ def loci_picture(
     from graphsynth.kinematics.platform.workspace import constant_orientation_workspace
 
     work = constant_orientation_workspace(platform, loci.alpha)
-    figure = _figure(size)
+    figure = new_figure(size)
     grid = figure.subplots(2, 4, sharex=True, sharey=True)
     for axes, mode in zip(grid.ravel(), WORKING_MODES):
         _panel(axes, platform, loci, work, working_mode([int(s) for s in mode]))
@@ -250,7 +244,7 @@ def map_picture(
         raise GeometryError(f"quantity = {quantity!r} is unknown; use one of {', '.join(_MAPS)}")
     title, colours, measured = _MAPS[quantity]
     values = np.where(np.isfinite(getattr(found.quality, quantity)), getattr(found.quality, quantity), np.nan)
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.add_subplot()
     work = constant_orientation_workspace(found.platform, found.alpha)
     if not work.empty:
@@ -306,7 +300,7 @@ def harmonics_picture(
         ("mean shift / first harmonic", [row.mean for row in found], "s", _LEGS[2], 1),
         ("error of predicted first harmonic", [row.first_error for row in found], "^", _LEGS[1], 2),
     )
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.add_subplot()
     for label, values, marker, colour, order in curves:
         y = np.array(values)

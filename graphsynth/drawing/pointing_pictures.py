@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import GeometryError
 
@@ -26,13 +27,6 @@ __all__ = ["comparison_picture", "fold_map_picture", "pointing_picture", "tolera
 Array = NDArray[np.float64]
 
 _LEG_Y, _LEG_X, _REST = LIGHT["a"], LIGHT["b"], LIGHT["soft"]
-
-
-def _figure(size: tuple[float, float]) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure: Figure = Figure(figsize=size, layout="constrained")
-    return figure
 
 
 def _joints(mechanism: PointingMechanism, poses: Poses) -> dict[str, Array]:
@@ -88,7 +82,7 @@ def pointing_picture(
     poses = mechanism.poses(phi_x, phi_y, s_y, s_x)
     if not poses.assembled:
         raise GeometryError(f"no picture at phi_x = {phi_x}, phi_y = {phi_y}: {poses.reasons()[0]}")
-    figure = _figure(size)
+    figure = new_figure(size)
     axes: Any = figure.add_subplot(projection="3d")
     joints, l1, R = _joints(mechanism, poses), mechanism.l1, poses.rotation
     _discs(axes, l1, R)
@@ -191,7 +185,7 @@ def comparison_picture(
     phi = np.linspace(0.0, largest, samples)
     found = mechanism.compare(other, phi, reading=reading, other_reading=other_reading)
     degrees = np.degrees(phi)
-    figure = _figure(size)
+    figure = new_figure(size)
     panels = figure.subplots(1, 3, sharex=True, sharey=True)
     for axes, which, name in ((panels[0], 1, f"a: model of order {other.order}"),
                               (panels[1], 0, f"b: model of order {mechanism.order}")):  # fmt: skip
@@ -270,7 +264,7 @@ def fold_map_picture(
     grid = np.linspace(-_span(span), span, nodes)
     poses = mechanism.poses(grid[:, None], grid[None, :], s_y, s_x)
     margin = np.where(poses.assembled, np.minimum(poses.margin_y, poses.margin_x), np.nan)
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.add_subplot()
     degrees = np.degrees(grid)
     image = axes.pcolormesh(degrees, degrees, margin.T, cmap="viridis", vmin=0.0, vmax=1.0, rasterized=True)
@@ -346,7 +340,7 @@ def tolerance_map_picture(
         for j, y in enumerate(grid.tolist()):
             found = mechanism.tolerance(x, y, widths, method="mean_value")
             worst[:, i, j] = [max(map(abs, bounds.deviation)) for bounds in (found.a, found.b)]
-    figure = _figure(size)
+    figure = new_figure(size)
     degrees = np.degrees(grid)
     for axes, values, name in zip(figure.subplots(1, 2, sharey=True), worst, ("elevation", "azimuth")):
         axes.set_facecolor("#dddddd")

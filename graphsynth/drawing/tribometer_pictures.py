@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.drawing.figures import new_figure
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -37,13 +38,6 @@ _LOWER, _UPPER, _THIRD, _FOURTH = "#0072B2", "#D55E00", "#009E73", "#AA4499"
 _STICK, _FAIL, _SOFT = "#E3E7EC", "#AA0044", "#8794A1"
 _COLOURS = (_LOWER, _UPPER, _THIRD, _FOURTH, "#56B4E9", "#E69F00", "#555555")
 _MARKERS = "osD^vP*"
-
-
-def _figure(size: tuple[float, float]) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure: Figure = Figure(figsize=size, layout="constrained")
-    return figure
 
 
 def _plain(axes: Any) -> None:
@@ -90,7 +84,7 @@ def platforms_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (9
         If the run failed at its start.
     """
     _known(motion)
-    figure = _figure(size)
+    figure = new_figure(size)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for axes in (above, below):
         _plain(axes)
@@ -134,7 +128,7 @@ def phase_picture(
         If the run failed at its start.
     """
     _known(motion)
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.subplots()
     _plain(axes)
     # points of the events too, so that no corner is cut
@@ -166,7 +160,7 @@ def friction_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (6.
         If the run failed at its start.
     """
     _known(motion)
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.subplots()
     _plain(axes)
     model = motion.model
@@ -212,7 +206,7 @@ def error_picture(
     good = [row for row in rows if row.status.value == "complete"]
     if not good:
         raise SpecError("No run of the studies succeeded, so there is nothing to draw.")
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.subplots()
     _plain(axes)
 
@@ -259,7 +253,7 @@ def stiffness_picture(
     size : tuple of float
         Inches.
     """
-    figure = _figure(size)
+    figure = new_figure(size)
     axes = figure.subplots()
     _plain(axes)
     times = np.linspace(0.0, duration, 3001)
@@ -310,7 +304,7 @@ def save_tribometer_gif(
     _known(motion)
     if not 2 <= frames <= 1000:
         raise SpecError(f"The number of frames is {frames}; give 2 to 1000.")
-    figure = _figure((6.4, 4.2))
+    figure = new_figure((6.4, 4.2))
     FigureCanvasAgg(figure)
     scene, curves = figure.subplots(2, 1, height_ratios=(3, 2))
     last = int(np.flatnonzero(np.isfinite(motion.x2))[-1])
