@@ -53,7 +53,9 @@ class Trace:
     stop: Stop | None = field(default=None)
 
     def __post_init__(self) -> None:
-        self.X, self.TH, self.V, self.W, self.PHI, self.M = (np.moveaxis(part, -1, 0) for part in self.memory)
+        self.X, self.TH, self.V, self.W, self.PHI, self.M = (
+            part.transpose(part.ndim - 1, *range(part.ndim - 1)) for part in self.memory
+        )
 
     def row(self, k: int) -> tuple[Array, ...]:
         """State at sample k."""
