@@ -5,8 +5,9 @@ Every public name is resolved on first use, so that ``import graphsynth.dynamics
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
+
+from graphsynth.lazy import resolve
 
 _PUBLIC: dict[str, str] = {
     "Body": "model",
@@ -34,12 +35,7 @@ __all__ = sorted(_PUBLIC)
 
 
 def __getattr__(name: str) -> Any:
-    module = _PUBLIC.get(name)
-    if module is None:
-        raise AttributeError(f"module 'graphsynth.dynamics' has no attribute {name!r}")
-    value = getattr(import_module(f"graphsynth.dynamics.{module}"), name)
-    globals()[name] = value
-    return value
+    return resolve(__name__, _PUBLIC, name)
 
 
 def __dir__() -> list[str]:

@@ -5,8 +5,9 @@ Every public name is resolved on first use, so that ``import graphsynth.formats`
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
+
+from graphsynth.lazy import resolve
 
 _PUBLIC: dict[str, str] = {
     "EngineRun": "engine_run",
@@ -29,12 +30,7 @@ __all__ = sorted(_PUBLIC)
 
 
 def __getattr__(name: str) -> Any:
-    module = _PUBLIC.get(name)
-    if module is None:
-        raise AttributeError(f"module 'graphsynth.formats' has no attribute {name!r}")
-    value = getattr(import_module(f"graphsynth.formats.{module}"), name)
-    globals()[name] = value
-    return value
+    return resolve(__name__, _PUBLIC, name)
 
 
 def __dir__() -> list[str]:

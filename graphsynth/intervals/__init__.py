@@ -6,10 +6,10 @@ subnormal numbers; every public solve checks it again.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 from graphsynth.intervals.guard import check_rounding
+from graphsynth.lazy import resolve
 
 _PUBLIC: dict[str, str] = {
     "Decoration": "interval",
@@ -50,10 +50,7 @@ __all__ = ["check_rounding", *sorted(_PUBLIC)]
 
 
 def __getattr__(name: str) -> Any:
-    module = _PUBLIC.get(name)
-    if module is None:
-        raise AttributeError(f"module 'graphsynth.intervals' has no attribute {name!r}")
-    return getattr(import_module(f"graphsynth.intervals.{module}"), name)
+    return resolve(__name__, _PUBLIC, name)
 
 
 check_rounding()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
+
+from graphsynth.lazy import resolve
 
 _PUBLIC: dict[str, str] = {
     "FREE": "limits",
@@ -27,7 +28,4 @@ __all__ = sorted(_PUBLIC)
 
 
 def __getattr__(name: str) -> Any:
-    module = _PUBLIC.get(name)
-    if module is None:
-        raise AttributeError(f"module 'graphsynth.jamming.coupled' has no attribute {name!r}")
-    return getattr(import_module(f"graphsynth.jamming.coupled.{module}"), name)
+    return resolve(__name__, _PUBLIC, name)

@@ -5,8 +5,9 @@ This file loads nothing: every name is resolved on first use.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
+
+from graphsynth.lazy import resolve
 
 _PUBLIC: dict[str, str] = {
     "AssemblyCertificate": "assembly_modes",
@@ -33,7 +34,4 @@ __all__ = sorted(_PUBLIC)
 
 
 def __getattr__(name: str) -> Any:
-    module = _PUBLIC.get(name)
-    if module is None:
-        raise AttributeError(f"module 'graphsynth.kinematics.certified' has no attribute {name!r}")
-    return getattr(import_module(f"graphsynth.kinematics.certified.{module}"), name)
+    return resolve(__name__, _PUBLIC, name)

@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
+
+from graphsynth.lazy import resolve
 
 _PUBLIC = {
     "Embodiment": "api",
@@ -36,9 +37,4 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load a name on first use."""
-    if name not in _PUBLIC:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_PUBLIC[name]}"), name)
-    globals()[name] = value
-    return value
+    return resolve(__name__, _PUBLIC, name)

@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
+
+from graphsynth.lazy import resolve
 
 _PUBLIC: dict[str, str] = {
     "ApproachToFold": "approach",
@@ -32,7 +33,4 @@ __all__ = sorted(_PUBLIC)
 
 
 def __getattr__(name: str) -> Any:
-    module = _PUBLIC.get(name)
-    if module is None:
-        raise AttributeError(f"module 'graphsynth.kinematics.pointing' has no attribute {name!r}")
-    return getattr(import_module(f"graphsynth.kinematics.pointing.{module}"), name)
+    return resolve(__name__, _PUBLIC, name)
