@@ -40,10 +40,8 @@ def subtract(al, ah, bl, bh):
 
 
 @kernel(forceinline=True)
-def multiply_plain(al, ah, bl, bh):
-    """Product of intervals of ordinary size; the lower bound is NaN where `multiply_any` must be asked."""
-    p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
-    e1, e2, e3, e4 = fma(al, bl, -p1), fma(al, bh, -p2), fma(ah, bl, -p3), fma(ah, bh, -p4)
+def ends_of_four(p1, p2, p3, p4, e1, e2, e3, e4):
+    """Least and largest of four rounded values, and whether they bound the exact ones, which are p + e."""
     l1 = p1 if p1 < p2 else p2
     l2 = p3 if p3 < p4 else p4
     u1 = p1 if p1 > p2 else p2
@@ -56,6 +54,15 @@ def multiply_plain(al, ah, bl, bh):
     above = (
         ((p1 < hi) | (e1 <= 0.0)) & ((p2 < hi) | (e2 <= 0.0)) & ((p3 < hi) | (e3 <= 0.0)) & ((p4 < hi) | (e4 <= 0.0))
     )
+    return lo, hi, below, above
+
+
+@kernel(forceinline=True)
+def multiply_plain(al, ah, bl, bh):
+    """Product of intervals of ordinary size; the lower bound is NaN where `multiply_any` must be asked."""
+    p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
+    e1, e2, e3, e4 = fma(al, bl, -p1), fma(al, bh, -p2), fma(ah, bl, -p3), fma(ah, bh, -p4)
+    lo, hi, below, above = ends_of_four(p1, p2, p3, p4, e1, e2, e3, e4)
     safe = (al >= -FACTOR_MAX) & (ah <= FACTOR_MAX) & (bl >= -FACTOR_MAX) & (bh <= FACTOR_MAX) & (al <= ah) & (bl <= bh)
     safe = safe & (abs(lo) >= PRODUCT_MIN) & (abs(hi) >= PRODUCT_MIN)
     lo = lo if below else lo - (PHI * abs(lo) + ETA)
@@ -72,18 +79,7 @@ def multiply_any(al, ah, bl, bh):
     p2 = 0.0 if p2 != p2 else p2
     p3 = 0.0 if p3 != p3 else p3
     p4 = 0.0 if p4 != p4 else p4
-    l1 = p1 if p1 < p2 else p2
-    l2 = p3 if p3 < p4 else p4
-    u1 = p1 if p1 > p2 else p2
-    u2 = p3 if p3 > p4 else p4
-    lo = l1 if l1 < l2 else l2
-    hi = u1 if u1 > u2 else u2
-    below = (
-        ((p1 > lo) | (e1 >= 0.0)) & ((p2 > lo) | (e2 >= 0.0)) & ((p3 > lo) | (e3 >= 0.0)) & ((p4 > lo) | (e4 >= 0.0))
-    )
-    above = (
-        ((p1 < hi) | (e1 <= 0.0)) & ((p2 < hi) | (e2 <= 0.0)) & ((p3 < hi) | (e3 <= 0.0)) & ((p4 < hi) | (e4 <= 0.0))
-    )
+    lo, hi, below, above = ends_of_four(p1, p2, p3, p4, e1, e2, e3, e4)
     safe = (-al <= FACTOR_MAX) & (ah <= FACTOR_MAX) & (-bl <= FACTOR_MAX) & (bh <= FACTOR_MAX)
     lo = down(lo, safe & below & (abs(lo) >= PRODUCT_MIN))
     hi = up(hi, safe & above & (abs(hi) >= PRODUCT_MIN))
@@ -123,18 +119,7 @@ def divide_nonzero(al, ah, bl, bh):
     q2 = 0.0 if q2 != q2 else q2
     q3 = 0.0 if q3 != q3 else q3
     q4 = 0.0 if q4 != q4 else q4
-    l1 = q1 if q1 < q2 else q2
-    l2 = q3 if q3 < q4 else q4
-    u1 = q1 if q1 > q2 else q2
-    u2 = q3 if q3 > q4 else q4
-    lo = l1 if l1 < l2 else l2
-    hi = u1 if u1 > u2 else u2
-    below = (
-        ((q1 > lo) | (r1 >= 0.0)) & ((q2 > lo) | (r2 >= 0.0)) & ((q3 > lo) | (r3 >= 0.0)) & ((q4 > lo) | (r4 >= 0.0))
-    )
-    above = (
-        ((q1 < hi) | (r1 <= 0.0)) & ((q2 < hi) | (r2 <= 0.0)) & ((q3 < hi) | (r3 <= 0.0)) & ((q4 < hi) | (r4 <= 0.0))
-    )
+    lo, hi, below, above = ends_of_four(q1, q2, q3, q4, r1, r2, r3, r4)
     inner = bl if bl > 0.0 else -bh
     outer = bh if bl > 0.0 else -bl
     safe = (inner >= DIVISOR_MIN) & (outer <= FACTOR_MAX)
