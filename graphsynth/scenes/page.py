@@ -70,12 +70,11 @@ def report_html(report: Report) -> str:
         *(f"<p>{escape(text)}</p>" for text in scene.description.strip().split("\n\n") if text),
         _facts(report),
     ]
-    pictures = {name: products[name] for name in ("mechanism_pictures", "plots", "graph_pictures") if name in products}
-    for name, heading in (("mechanism_pictures", "The mechanism"), ("plots", "Over a turn")):
-        parts.append(_gallery(heading, pictures.get(name, ())))
+    galleries = {name: value for name, value in products.items() if name != "graph_pictures" and _are_pictures(value)}
+    parts += [_gallery(_heading(name), galleries[name]) for name in sorted(galleries, key=_place_of)]
     parts += [_table(table) for table in summary_tables(report)]
-    parts.append(_sheet(pictures.get("graph_pictures", ())))
-    if "records" in products:
+    parts.append(_sheet(products.get("graph_pictures", ())))
+    if any(r.key for r in products.get("records", ())):
         parts.append(_records(products["records"]))
     parts.append(_provenance(report))
     return (
@@ -87,6 +86,23 @@ def report_html(report: Report) -> str:
     )
 
 
+#: Headings of the galleries, in the order of the page; other products that are pictures follow under their names.
+_HEADINGS = {"animations": "In motion", "mechanism_pictures": "The mechanism", "plots": "Curves"}
+
+
+def _place_of(name: str) -> tuple[int, str]:
+    order = list(_HEADINGS)
+    return (order.index(name) if name in order else len(order), name)
+
+
+def _heading(name: str) -> str:
+    return _HEADINGS.get(name, name.replace("_", " ").capitalize())
+
+
+def _are_pictures(value: object) -> bool:
+    return isinstance(value, tuple) and bool(value) and all(isinstance(item, Picture) for item in value)
+
+
 def _facts(report: Report) -> str:
     """Give the run in a row of numbers and the verdicts of what was assessed."""
     products, facts = report.products, []
@@ -96,7 +112,8 @@ def _facts(report: Report) -> str:
     if records:
         assessed = [r for r in records if r.status == "assessed"]
         failed = sum(r.status == "failed" for r in records)
-        facts += [(str(len(records)), "candidate mechanisms", ""), (str(len(assessed)), "assessed", "")]
+        if any(r.key for r in records):
+            facts += [(str(len(records)), "candidate mechanisms", ""), (str(len(assessed)), "assessed", "")]
         if failed:
             facts.append((str(failed), "failed", "bad"))
     facts.append((f"{sum(t.seconds + t.import_seconds for t in report.times):.2f} s", "all stages", ""))

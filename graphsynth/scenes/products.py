@@ -71,16 +71,18 @@ class Record:
 
     Attributes
     ----------
-    status : {"assessed", "not recognised", "failed"}
-        A candidate no module recognises is not a failure; a failed one carries its reason.
+    number, key, solution
+        Of the candidate; a scene without candidates has one record and leaves them out.
+    status : {"assessed", "not recognised", "rejected", "failed"}
+        A candidate that no module recognises or that a goal rejects is not a failure; all but the first carry a reason.
     good : bool or None
         Whether the verdict is what a designer hopes for; None if there is none.
     """
 
-    number: int
-    key: str
-    solution: str
-    status: Literal["assessed", "not recognised", "failed"]
+    number: int = 1
+    key: str = ""
+    solution: str = ""
+    status: Literal["assessed", "not recognised", "rejected", "failed"] = "assessed"
     recognised_as: str = ""
     verdict: str = ""
     good: bool | None = None

@@ -13,7 +13,7 @@ from typing import Any
 from graphsynth.errors import SceneError
 from graphsynth.scenes.report import loaded_versions, write_report
 from graphsynth.scenes.scene import Scene, load_scene
-from graphsynth.scenes.stages import Context, Progress, Stage, load, registry, resolve
+from graphsynth.scenes.stages import Context, Progress, Stage, load, resolve
 
 __all__ = ["Report", "StageTime", "execute", "run"]
 
@@ -108,7 +108,7 @@ def execute(scene: str | Path | Scene, executor: Executor | None = None, progres
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
     wanted = scene.outputs.products
-    stages = resolve(registry(scene.mechanism.module), wanted, scene.place / "outputs")
+    stages = resolve(scene.stages(), wanted, scene.place / "outputs")
     products, times = run_stages(stages, wanted, Context(scene, executor), progress)
     return Report(scene, MappingProxyType(products), times, MappingProxyType(loaded_versions()))
 

@@ -3,35 +3,22 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from graphsynth.errors import FormatError, SceneError
-from graphsynth.scenes.tables import Place, read_table, suggest
+from graphsynth.scenes.family import Family, family, family_names
+from graphsynth.scenes.stages import STRUCTURE, Stage
+from graphsynth.scenes.tables import Place, read_table, require, suggest
 from graphsynth.structure.variables import nearest
 
-__all__ = [
-    "MECHANISMS",
-    "GenerateTable",
-    "LambdaTable",
-    "PlatformTable",
-    "Scene",
-    "available_scenes",
-    "find_scene",
-    "load_scene",
-]
+__all__ = ["GenerateTable", "OutputsTable", "Scene", "StructureTable", "available_scenes", "find_scene", "load_scene"]
 
 _PACKAGE = Path(__file__).resolve().parent
-
-
-def _require(condition: bool, sentence: str) -> None:
-    if not condition:
-        raise SceneError(sentence)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +31,7 @@ class SceneTable:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        _require(
+        require(
             re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", self.name) is not None,
             f"has name {self.name!r}; it names a folder, so use letters, digits, '-', '_' and '.'",
         )
@@ -69,11 +56,11 @@ class GenerateTable:
     limit: int = 10_000
 
     def __post_init__(self) -> None:
-        _require(self.symmetry in (None, 3), f"has symmetry {self.symmetry}; only 3 is known, or leave it out")
-        _require(self.limit >= 1, f"has limit {self.limit}; it must be at least 1")
+        require(self.symmetry in (None, 3), f"has symmetry {self.symmetry}; only 3 is known, or leave it out")
+        require(self.limit >= 1, f"has limit {self.limit}; it must be at least 1")
         if self.fixed_moving_links is not None:
-            _require(self.symmetry is not None, "gives fixed_moving_links without symmetry; add symmetry = 3")
-            _require(self.fixed_moving_links >= 0, f"has fixed_moving_links {self.fixed_moving_links}; at least 0")
+            require(self.symmetry is not None, "gives fixed_moving_links without symmetry; add symmetry = 3")
+            require(self.fixed_moving_links >= 0, f"has fixed_moving_links {self.fixed_moving_links}; at least 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,113 +72,14 @@ class StructureTable:
 
 
 @dataclass(frozen=True, slots=True)
-class LambdaLengths:
-    """Link lengths of the four-bar, in any one unit: the model only uses their ratios."""
-
-    frame: float
-    crank: float
-    coupler: float
-    rocker: float
-
-    def __post_init__(self) -> None:
-        for name in ("frame", "crank", "coupler", "rocker"):
-            _require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
-
-
-@dataclass(frozen=True, slots=True)
-class Tilt:
-    """Tilt of the motor axis: by `alpha_rad` about the direction `axis`."""
-
-    alpha_rad: float
-    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        _require(any(self.axis), "has axis [0, 0, 0]; a direction must not vanish")
-        _require(abs(self.alpha_rad) < math.pi / 2, f"has alpha_rad = {self.alpha_rad}; it must be within pi/2")
-
-
-@dataclass(frozen=True, slots=True)
-class BearingTable:
-    """The bearing at B: radius, height and radial clearance in millimetres, and the contact condition."""
-
-    radius_mm: float
-    height_mm: float
-    clearance_mm: float
-    condition: Literal["A", "B"] = "A"
-
-    def __post_init__(self) -> None:
-        _require(self.radius_mm > 0, f"has radius_mm = {self.radius_mm}; it must be positive")
-        _require(self.height_mm > 0, f"has height_mm = {self.height_mm}; it must be positive")
-        _require(self.clearance_mm >= 0, f"has clearance_mm = {self.clearance_mm}; it must not be negative")
-
-
-@dataclass(frozen=True, slots=True)
-class LambdaTable:
-    """``[mechanism]`` with ``module = "lambda_linkage"``."""
-
-    module: Literal["lambda_linkage"]
-    lengths: LambdaLengths
-    tilt: Tilt
-    bearing: BearingTable
-    branch: Literal[1, -1] = 1
-    positions: int = 360
-    tolerances: Mapping[str, object] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        _check_positions(self.positions)
-
-
-@dataclass(frozen=True, slots=True)
-class PlatformTable:
-    """``[mechanism]`` with ``module = "single_motor_platform"``: one leg, repeated at three directions.
-
-    Points are ``[along, across]`` in the frame of a leg, whose first axis points away from the centre.
-    """
-
-    module: Literal["single_motor_platform"]
-    leg_directions_deg: tuple[float, float, float]
-    wheel_axis_mm: tuple[float, float]
-    rocker_pivot_mm: tuple[float, float]
-    platform_vertex_mm: tuple[float, float]
-    arm_mm: float
-    intermediate_mm: float
-    rocker_mm: float
-    coupler_mm: float
-    crank_mm: tuple[float, float, float]
-    crank_phase_rad: tuple[float, float, float]
-    rocker_angle_deg: float
-    pinion_teeth: int
-    wheel_teeth: int
-    drive_branch: Literal[1, -1] = 1
-    working_mode: tuple[Literal[1, -1], Literal[1, -1], Literal[1, -1]] = (-1, -1, -1)
-    positions: int = 360
-
-    def __post_init__(self) -> None:
-        for name in ("arm_mm", "intermediate_mm", "rocker_mm", "coupler_mm"):
-            _require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
-        for name in ("pinion_teeth", "wheel_teeth"):
-            _require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a gear needs teeth")
-        _require(min(self.crank_mm) >= 0, f"has crank_mm = {list(self.crank_mm)}; a crank must not be negative")
-        _check_positions(self.positions)
-
-
-def _check_positions(positions: int) -> None:
-    _require(8 <= positions <= 1_000_000, f"has positions = {positions}; use 8 to 1000000 crank positions per turn")
-
-
-#: Every mechanism module a scene can name, with the schema of its ``[mechanism]`` table.
-MECHANISMS: dict[str, type] = {"lambda_linkage": LambdaTable, "single_motor_platform": PlatformTable}
-
-
-@dataclass(frozen=True, slots=True)
 class OutputsTable:
     """``[outputs]``: the products wanted; nothing that they do not need is imported or computed."""
 
     products: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        _require(bool(self.products), "has no products; name at least one output")
-        _require(len(set(self.products)) == len(self.products), f"names a product twice in {list(self.products)}")
+        require(bool(self.products), "has no products; name at least one output")
+        require(len(set(self.products)) == len(self.products), f"names a product twice in {list(self.products)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,8 +88,8 @@ class Scene:
 
     Attributes
     ----------
-    scene, structure, mechanism, outputs
-        The four tables of the file.
+    scene, mechanism, outputs, structure
+        The tables of the file; `mechanism` has the type its family says, `structure` may be missing.
     source : str
         File name, or ``<mapping>``.
     raw : Mapping
@@ -211,9 +99,9 @@ class Scene:
     """
 
     scene: SceneTable
-    structure: StructureTable
-    mechanism: LambdaTable | PlatformTable
+    mechanism: Any
     outputs: OutputsTable
+    structure: StructureTable | None = None
     source: str = "<mapping>"
     raw: Mapping[str, object] = field(default_factory=dict, compare=False, repr=False)
     digest: str = ""
@@ -240,35 +128,39 @@ class Scene:
         place = Place(source)
         if not isinstance(tables, Mapping):
             raise place.error("must hold tables")
-        known: dict[str, type | None] = {
-            "scene": SceneTable,
-            "structure": StructureTable,
-            "mechanism": None,  # chosen by its module, below
-            "outputs": OutputsTable,
-        }
+        known: dict[str, type] = {"scene": SceneTable, "structure": StructureTable, "mechanism": object}
+        known["outputs"] = OutputsTable
         for key in tables:
             if key not in known:
                 raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}")
-        for key in known:
+        for key in ("scene", "mechanism", "outputs"):
             if key not in tables:
                 raise place.error(f"lacks the table [{key}]")
-        known["mechanism"] = _mechanism_schema(tables["mechanism"], place / "mechanism")
+        chosen = _family(tables["mechanism"], place / "mechanism")
+        if chosen.structure == "required" and "structure" not in tables:
+            raise place.error("lacks the table [structure]")
+        if chosen.structure == "none" and "structure" in tables:
+            raise place.error("has a table [structure], which its mechanism does not need; remove it")
+        known["mechanism"] = chosen.table
         read: dict[str, Any] = {
-            key: read_table(schema, tables[key], place / key) for key, schema in known.items() if schema
+            key: read_table(schema, tables[key], place / key) for key, schema in known.items() if key in tables
         }
         return cls(**read, source=source, raw=dict(tables), digest=digest)
 
+    def stages(self) -> tuple[Stage, ...]:
+        """Return every stage this scene can use; most are not needed for its outputs."""
+        common = STRUCTURE if self.structure is not None else ()
+        return (*common, *family(self.mechanism.module).stages)
 
-def _mechanism_schema(table: object, place: Place) -> type:
-    """Choose the schema of ``[mechanism]`` by its key ``module``."""
+
+def _family(table: object, place: Place) -> Family:
+    """Choose the family by the key ``module`` of ``[mechanism]``."""
     if not isinstance(table, Mapping):
         raise place.error("must be a table")
     module = table.get("module")
     if not isinstance(module, str):
-        raise place.error(f"lacks the key 'module'{suggest('', MECHANISMS)}")
-    if module not in MECHANISMS:
-        raise place.error(f"has module = {module!r}, which no room provides{suggest(module, MECHANISMS)}")
-    return MECHANISMS[module]
+        raise place.error(f"lacks the key 'module'{suggest('', family_names())}")
+    return family(module, place)
 
 
 def _folders() -> tuple[Path, ...]:
@@ -281,8 +173,8 @@ def available_scenes() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> available_scenes()
-    ('didenko', 'lambda')
+    >>> "lambda" in available_scenes()
+    True
     """
     return tuple(sorted({path.stem for folder in _folders() for path in folder.glob("*.toml")}))
 

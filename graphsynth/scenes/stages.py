@@ -11,13 +11,15 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from graphsynth.errors import SceneError
-from graphsynth.scenes.scene import Scene
 from graphsynth.scenes.tables import Place, suggest
 
-__all__ = ["Context", "Progress", "Stage", "StageFunction", "load", "registry", "resolve"]
+if TYPE_CHECKING:
+    from graphsynth.scenes.scene import Scene
+
+__all__ = ["STRUCTURE", "Context", "Progress", "Stage", "StageFunction", "load", "resolve"]
 
 _STEPS = "graphsynth.scenes.steps"
 
@@ -64,40 +66,12 @@ class StageFunction(Protocol):
         """Return the product, or a tuple of the products in the order of ``gives``."""
 
 
-_COMMON = (
+#: Stages of ``[structure]``, which every family shares; "sketch graphs" asks the family for ``recognised``.
+STRUCTURE = (
     Stage("solve", f"{_STEPS}.structural:solve", (), ("solutions",)),
     Stage("generate", f"{_STEPS}.structural:generate", ("solutions",), ("candidates",)),
     Stage("sketch graphs", f"{_STEPS}.graphs:pictures", ("candidates", "recognised"), ("graph_pictures",)),
 )
-_LAMBDA = (
-    Stage("recognise", f"{_STEPS}.four_bar:recognise", ("candidates",), ("recognised",)),
-    Stage("kinematics", f"{_STEPS}.four_bar:kinematics", ("recognised",), ("motions",)),
-    Stage("jamming", f"{_STEPS}.four_bar:jamming", ("motions",), ("assessments",)),
-    Stage("judge", f"{_STEPS}.four_bar:judge", ("recognised", "motions", "assessments"), ("records", "tables")),
-    Stage(
-        "sketch mechanism", f"{_STEPS}.four_bar_pictures:sketches", ("motions", "assessments"), ("mechanism_pictures",)
-    ),
-    Stage("plot", f"{_STEPS}.four_bar_pictures:plots", ("motions", "assessments"), ("plots",)),
-)
-_PLATFORM = (
-    Stage("recognise", f"{_STEPS}.platform:recognise", ("candidates",), ("recognised",)),
-    Stage("kinematics", f"{_STEPS}.platform:kinematics", ("recognised",), ("motions",)),
-    Stage("judge", f"{_STEPS}.platform:judge", ("recognised", "motions"), ("records", "tables")),
-    Stage("sketch mechanism", f"{_STEPS}.platform_pictures:sketches", ("motions",), ("mechanism_pictures",)),
-    Stage("plot", f"{_STEPS}.platform_pictures:plots", ("motions",), ("plots",)),
-)
-_BY_MODULE = {"lambda_linkage": _LAMBDA, "single_motor_platform": _PLATFORM}
-
-
-def registry(module: str) -> tuple[Stage, ...]:
-    """Return the stages a scene with this ``[mechanism] module`` can use.
-
-    Examples
-    --------
-    >>> [stage.name for stage in registry("lambda_linkage")][:3]
-    ['solve', 'generate', 'sketch graphs']
-    """
-    return (*_COMMON, *_BY_MODULE[module])
 
 
 def _givers(stages: Iterable[Stage]) -> dict[str, Stage]:

@@ -20,9 +20,10 @@ def summary_tables(report: Report) -> tuple[Table, ...]:
     products = report.products
     if "solutions" in products:
         tables.append(_solutions_table(products["solutions"]))
-    if "records" in products:
+    if any(record.key for record in products.get("records", ())):
         tables.append(_verdict_table(products["records"]))
-    tables += products.get("tables", ())
+    for value in products.values():
+        tables += [item for item in value if isinstance(item, Table)] if isinstance(value, tuple) else []
     rows = [(t.stage, f"{t.import_seconds:.3f}", f"{t.seconds:.3f}") for t in report.times]
     total = (sum(t.import_seconds for t in report.times), sum(t.seconds for t in report.times))
     rows.append(("total", f"{total[0]:.3f}", f"{total[1]:.3f}"))

@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeVar, Union
 from graphsynth.errors import SceneError
 from graphsynth.structure.variables import nearest
 
-__all__ = ["Place", "read_table", "suggest", "unknown"]
+__all__ = ["Place", "check_positions", "read_table", "require", "suggest", "unknown"]
 
 T = TypeVar("T")
 
@@ -50,6 +50,22 @@ class Place:
     def error(self, sentence: str) -> SceneError:
         """Return the exception for this place."""
         return SceneError(f"{self} {sentence}")
+
+
+def require(condition: bool, sentence: str) -> None:
+    """Raise a `SceneError` unless the condition holds: for ``__post_init__`` of a schema; the reader adds the place.
+
+    Examples
+    --------
+    >>> require(1 > 0, "has length 0; a length must be positive")
+    """
+    if not condition:
+        raise SceneError(sentence)
+
+
+def check_positions(positions: int) -> None:
+    """Refuse a number of positions per turn that nobody can mean."""
+    require(8 <= positions <= 1_000_000, f"has positions = {positions}; use 8 to 1000000 crank positions per turn")
 
 
 def suggest(word: str, choices: Iterable[str]) -> str:

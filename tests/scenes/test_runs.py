@@ -71,8 +71,20 @@ def test_a_scene_loads_no_more_than_its_outputs_need(name: str, product: str, tm
     assert extra == set()
 
 
-# numba imports these when they are installed, for its own features (yaml brings Cython's runtime along).
-OF_NUMBA = {"yaml", "cython_runtime", "scipy", "colorama", "cffi", "pkg_resources", "setuptools", "cloudpickle"}
+# numba and what it imports load these when they are installed, for their own features.
+OF_NUMBA = {
+    "yaml",
+    "cython_runtime",
+    "cython",
+    "Cython",
+    "charset_normalizer",
+    "scipy",
+    "colorama",
+    "cffi",
+    "pkg_resources",
+    "setuptools",
+    "cloudpickle",
+}
 
 
 @pytest.mark.parametrize("name", ["lambda", "didenko"])

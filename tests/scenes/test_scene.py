@@ -15,7 +15,7 @@ from graphsynth.scenes.scene import Scene, available_scenes, find_scene, load_sc
 
 
 def test_shipped_scenes_are_found_by_name_and_by_path() -> None:
-    assert available_scenes() == ("didenko", "lambda")
+    assert {"didenko", "lambda"} <= set(available_scenes())
     assert load_scene("lambda") == load_scene(find_scene("lambda"))
     assert [load_scene(name).name for name in available_scenes()] == list(available_scenes())
 
@@ -37,7 +37,7 @@ def test_lambda_scene_has_the_published_dimensions() -> None:
 
 
 def test_unknown_scene_names_the_available_ones() -> None:
-    with pytest.raises(SceneError, match=r"'lambada'.*'didenko', 'lambda'; did you mean 'lambda'"):
+    with pytest.raises(SceneError, match=r"'lambada'.*'didenko'.*'lambda'.*; did you mean 'lambda'"):
         find_scene("lambada")
 
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graphsynth.errors import SceneError
-from graphsynth.scenes.scene import MECHANISMS
-from graphsynth.scenes.stages import Stage, load, registry, resolve
+from graphsynth.scenes.scene import available_scenes, load_scene
+from graphsynth.scenes.stages import Stage, load, resolve
 
 
 def stage(name: str, needs: str = "", gives: str = "") -> Stage:
@@ -58,9 +58,9 @@ def test_random_pipelines_are_minimal_and_ordered(data: st.DataObject) -> None:
     assert have == closure
 
 
-@pytest.mark.parametrize("module", sorted(MECHANISMS))
-def test_every_registered_stage_can_be_loaded_and_resolved(module: str) -> None:
-    stages = registry(module)
+@pytest.mark.parametrize("name", available_scenes())
+def test_every_stage_of_a_shipped_scene_can_be_loaded_and_resolved(name: str) -> None:
+    stages = load_scene(name).stages()
     products = [product for s in stages for product in s.gives]
     assert {s.name for s in resolve(stages, products)} == {s.name for s in stages}
     assert all(callable(load(s)) for s in stages)

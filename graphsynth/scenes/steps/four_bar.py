@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal
 
+from graphsynth.scenes.families.lambda_linkage import LambdaTable
 from graphsynth.scenes.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each
-from graphsynth.scenes.scene import LambdaTable
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.records import recognise_by_key, records_of
 

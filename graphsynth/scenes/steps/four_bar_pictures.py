@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from graphsynth.drawing.lambda_linkage import lambda_sketch, lambda_sketch_3d
 from graphsynth.drawing.sketch import degrees
+from graphsynth.scenes.families.lambda_linkage import LambdaTable
 from graphsynth.scenes.products import Attempt, Picture
-from graphsynth.scenes.scene import LambdaTable
 from graphsynth.scenes.stages import Context
 
 if TYPE_CHECKING:

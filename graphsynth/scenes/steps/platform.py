@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from graphsynth.scenes.families.single_motor_platform import PlatformTable
 from graphsynth.scenes.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each, exact
-from graphsynth.scenes.scene import PlatformTable
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.records import recognise_by_key, records_of
 

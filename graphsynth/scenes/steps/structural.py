@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.errors import FormatError, SceneError, SpecError, TooLargeError
 from graphsynth.scenes.products import Candidate
+from graphsynth.scenes.scene import StructureTable
 from graphsynth.scenes.stages import Context
 
 if TYPE_CHECKING:
@@ -21,12 +22,18 @@ def solve(context: Context) -> tuple[LinkAssortment, ...]:
     return tuple(_spec(context).solve())
 
 
+def _structure(context: Context) -> StructureTable:
+    table = context.scene.structure
+    assert table is not None  # a scene without [structure] has none of these stages
+    return table
+
+
 def _spec(context: Context) -> StructuralSpec:
     from graphsynth.structure.spec import StructuralSpec
 
     place = context.scene.place / "structure" / "question"
     try:
-        return StructuralSpec.from_mapping(context.scene.structure.question)
+        return StructuralSpec.from_mapping(_structure(context).question)
     except (FormatError, SpecError) as error:
         raise place.error(f"cannot be read: {error}") from error
 
@@ -39,7 +46,7 @@ def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> tuple[C
     TooLargeError
         If there are more than ``limit``.
     """
-    options = context.scene.structure.generate
+    options = _structure(context).generate
     candidates: list[Candidate] = []
     for graph in _mechanisms(context):
         if len(candidates) == options.limit:
@@ -59,7 +66,7 @@ def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> tuple[C
 def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
     from graphsynth.synthesis import enumerate_mechanisms
 
-    options = context.scene.structure.generate
+    options = _structure(context).generate
     for graph in enumerate_mechanisms(_spec(context), symmetry=options.symmetry):
         if options.fixed_moving_links is None or has_threefold_symmetry(graph, options.fixed_moving_links):
             yield graph

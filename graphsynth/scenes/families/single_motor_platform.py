@@ -1,0 +1,60 @@
+"""``module = "single_motor_platform"``: a planar platform on three legs, driven by one motor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from graphsynth.scenes.family import Family
+from graphsynth.scenes.stages import Stage
+from graphsynth.scenes.tables import check_positions, require
+
+__all__ = ["FAMILY", "PlatformTable"]
+
+
+@dataclass(frozen=True, slots=True)
+class PlatformTable:
+    """``[mechanism]`` with ``module = "single_motor_platform"``: one leg, repeated at three directions.
+
+    Points are ``[along, across]`` in the frame of a leg, whose first axis points away from the centre.
+    """
+
+    module: Literal["single_motor_platform"]
+    leg_directions_deg: tuple[float, float, float]
+    wheel_axis_mm: tuple[float, float]
+    rocker_pivot_mm: tuple[float, float]
+    platform_vertex_mm: tuple[float, float]
+    arm_mm: float
+    intermediate_mm: float
+    rocker_mm: float
+    coupler_mm: float
+    crank_mm: tuple[float, float, float]
+    crank_phase_rad: tuple[float, float, float]
+    rocker_angle_deg: float
+    pinion_teeth: int
+    wheel_teeth: int
+    drive_branch: Literal[1, -1] = 1
+    working_mode: tuple[Literal[1, -1], Literal[1, -1], Literal[1, -1]] = (-1, -1, -1)
+    positions: int = 360
+
+    def __post_init__(self) -> None:
+        for name in ("arm_mm", "intermediate_mm", "rocker_mm", "coupler_mm"):
+            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
+        for name in ("pinion_teeth", "wheel_teeth"):
+            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a gear needs teeth")
+        require(min(self.crank_mm) >= 0, f"has crank_mm = {list(self.crank_mm)}; a crank must not be negative")
+        check_positions(self.positions)
+
+
+_STEPS = "graphsynth.scenes.steps"
+FAMILY = Family(
+    table=PlatformTable,
+    structure="required",
+    stages=(
+        Stage("recognise", f"{_STEPS}.platform:recognise", ("candidates",), ("recognised",)),
+        Stage("kinematics", f"{_STEPS}.platform:kinematics", ("recognised",), ("motions",)),
+        Stage("judge", f"{_STEPS}.platform:judge", ("recognised", "motions"), ("records", "tables")),
+        Stage("sketch mechanism", f"{_STEPS}.platform_pictures:sketches", ("motions",), ("mechanism_pictures",)),
+        Stage("plot", f"{_STEPS}.platform_pictures:plots", ("motions",), ("plots",)),
+    ),
+)
