@@ -26,7 +26,7 @@ from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 if TYPE_CHECKING:
     import pandas as pd
 
-    from graphsynth.jamming.certify import JamCertificate
+    from graphsynth.jamming.certificate import JamCertificate
     from graphsynth.jamming.coupled.limits import Misalignment
     from graphsynth.jamming.coupled.problem import Bearings
     from graphsynth.jamming.coupled.report import CoupledReport

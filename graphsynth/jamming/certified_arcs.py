@@ -106,7 +106,7 @@ def arcs_from(kappa: Enclosure, phase: Interval) -> CertifiedArcs:
     if kappa.lo > 1.0:
         return no_arcs(kappa, shown, "the largest tilt stays below the critical tilt")
     known = float(phase.width) < 3.14
-    ends = [_arc(kappa, phase, turn) for turn in (0, 1)] if known else []
+    ends = _both_arcs(kappa, phase) if known else []
     if not ends:
         return whole_turn(kappa, shown, "the direction of the tilt is not known within half a turn", False)
     outer = merge_outer(Span(arc.start.lo, arc.stop.hi) for arc in ends)
@@ -128,16 +128,18 @@ def _about(kappa: Enclosure) -> str:
     return ""
 
 
-def _arc(kappa: Enclosure, phase: Interval, half_turns: int) -> ArcEnclosure:
-    """Enclose one arc over the box, its start brought into [0, 2 pi) as a whole."""
+def _both_arcs(kappa: Enclosure, phase: Interval) -> list[ArcEnclosure]:
+    """Enclose both arcs over the box, the start of each brought into [0, 2 pi) as a whole."""
     from graphsynth.intervals import pi
     from graphsynth.jamming.corners import arcsine
 
-    low, high = arcsine(min(kappa.lo, 1.0)), arcsine(min(kappa.hi, 1.0))
-    edge = low.hull(high)
-    base = phase if half_turns == 0 else phase + pi()
-    turns = math.floor(float((base + edge).mid) / math.tau)
-    if turns:
-        base = base - pi() * (2 * turns)
-    start, stop = base + edge, base + pi() - edge
-    return ArcEnclosure(Enclosure(float(start.lo), float(start.hi)), Enclosure(float(stop.lo), float(stop.hi)))
+    half, edge = pi(), arcsine(min(kappa.lo, 1.0)).hull(arcsine(min(kappa.hi, 1.0)))
+    arcs = []
+    for base in (phase, phase + half):
+        turns = math.floor(float((base + edge).mid) / math.tau)
+        whole = base - half * (2 * turns) if turns else base
+        start, stop = whole + edge, whole + half - edge
+        arcs.append(
+            ArcEnclosure(Enclosure(float(start.lo), float(start.hi)), Enclosure(float(stop.lo), float(stop.hi)))
+        )
+    return arcs

@@ -16,7 +16,8 @@ from time import perf_counter
 
 from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Condition
-from graphsynth.jamming.certify import JamCertificate, certify_jamming
+from graphsynth.jamming.certificate import JamCertificate
+from graphsynth.jamming.certify import certify_jamming
 from graphsynth.jamming.corners import worst_corner
 from graphsynth.jamming.inverse import largest_height, largest_misalignment, smallest_clearance
 from graphsynth.jamming.parameters import ToleranceBox

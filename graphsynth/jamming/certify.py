@@ -3,171 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from fractions import Fraction
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Condition
-from graphsynth.jamming.certified_arcs import CertifiedArcs, Enclosure, arcs_from, no_arcs, whole_turn
-from graphsynth.jamming.circle_sets import covers, meets
+from graphsynth.jamming.certificate import JamCertificate, Witness
+from graphsynth.jamming.certified_arcs import Enclosure, arcs_from, no_arcs, whole_turn
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.ranges import Range, exact_text
-from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
+from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from graphsynth.intervals import Interval
 
-__all__ = ["JamCertificate", "Witness", "certify_jamming"]
+__all__ = ["JamCertificate", "certify_jamming"]
 
 _ANGLES = 64  # angles of the turn tried as positions of a jam
 _PIECES = 256  # pieces of the turn on which assembly is proved
-
-
-@dataclass(frozen=True)
-class Witness:
-    """A jam that is proved: exact parameters, a crank angle, and a positive lower bound of the gap function there.
-
-    ``parameters`` are exact numbers as text; ranges ``[a, b]`` where every parameter vector jams.  ``f`` (radians)
-    encloses the crank angle (one for each vector, after its own phase), ``gap`` (mm) holds a positive lower bound.
-    """
-
-    parameters: dict[str, str]
-    f: Enclosure
-    gap: Enclosure
-
-
-@dataclass(frozen=True, eq=False)
-class JamCertificate:
-    """What is proved about the bearing at B, for every crank angle and every parameter vector of the box.
-
-    Attributes
-    ----------
-    verdict : Verdict
-        See the table there.
-    reason : str
-        Why nothing is proved, or what is special; empty for a plain verdict.
-    condition : str
-        Contact condition used.
-    box : ToleranceBox
-        The parameters.
-    largest_gap : Enclosure
-        Of the largest gap function over the turn and the box, mm; a negative upper end proves that all is free.
-    smallest_worst_gap : Enclosure
-        Of the smallest value over the box of the largest gap over the turn, mm; a positive lower end proves that every
-        parameter vector jams.
-    largest_tilt, critical_tilt : Enclosure
-        Range over the box of the largest tilt of a turn and of the critical tilt, radians; infinite: none.
-    arcs : CertifiedArcs
-        Jam arcs with inner and outer bounds.
-    assembles : {"always", "at some angles", "never", "not decided"}
-        What is proved about assembly, for every parameter vector.
-    witness : Witness or None
-        Evidence of a jam for ``CERTIFIED_JAMMED`` and ``CERTIFIED_JAMMED_FOR_SOME``.
-    exact_input : bool
-        False if a plain float came in; the statement then holds for that double.
-    boxes : int
-        Boxes evaluated.
-    seconds : float
-        Run time.
-    """
-
-    verdict: Verdict
-    reason: str
-    condition: str
-    box: ToleranceBox
-    largest_gap: Enclosure
-    smallest_worst_gap: Enclosure
-    largest_tilt: Enclosure
-    critical_tilt: Enclosure
-    arcs: CertifiedArcs
-    assembles: str
-    witness: Witness | None
-    exact_input: bool
-    boxes: int
-    seconds: float = field(default=0.0, compare=False)
-    method: str = METHOD_CERTIFIED
-
-    @property
-    def clearance_left(self) -> Enclosure:
-        """Range that holds the clearance left at the worst angle of the worst parameters, mm; negative is missing."""
-        return Enclosure(-self.largest_gap.hi, -self.largest_gap.lo)
-
-    @property
-    def tilt_margin(self) -> Enclosure:
-        """Critical tilt minus largest tilt for the worst and the best parameters, radians (outward)."""
-        low = math.nextafter(self.critical_tilt.lo - self.largest_tilt.hi, -math.inf)
-        return Enclosure(low, math.nextafter(self.critical_tilt.hi - self.largest_tilt.lo, math.inf))
-
-    @property
-    def statement(self) -> str:
-        """The sentence that is proved, or what is missing."""
-        from graphsynth.jamming.statements import statement
-
-        return statement(self)
-
-    def over(self, start: float, stop: float) -> Verdict:
-        """Return what is proved about a part of the turn: from ``start`` counter-clockwise to ``stop``, radians.
-
-        ``stop`` below ``start`` runs across the full turn; a turn or more is the whole turn.
-
-        Examples
-        --------
-        >>> found = certify_jamming(ToleranceBox(alpha="1/30"))
-        >>> found.over(-0.4, 0.4).name, found.over(0.4, 1.0).name, found.over(6.0, 0.4).name
-        ('CERTIFIED_FREE', 'CERTIFIED_JAMMED', 'CERTIFIED_FREE')
-        """
-        for name, value in (("start", start), ("stop", stop)):
-            if not math.isfinite(value):
-                raise GeometryError(f"{name} = {value} is not finite; give crank angles in radians")
-        if self.verdict is Verdict.CANNOT_ASSEMBLE or stop - start >= math.tau:
-            return self.verdict
-        length = (stop - start) % math.tau if stop < start else stop - start
-        first = start % math.tau if abs(start) > math.tau else start
-        last = first + length
-        if (first, last) != (start, stop):  # the reduction was rounded: what is asked lies in a slightly longer piece
-            pad = 1e-15 * (10.0 + abs(start) + abs(stop))  # more than 2.5e-16 for each turn taken off
-            wide, narrow = (first - pad, last + pad), (first + pad, last - pad)
-        else:
-            wide = narrow = (first, last)
-        if covers(self.arcs.free, *wide):
-            return Verdict.CERTIFIED_FREE
-        jams = self.assembles == "always" and narrow[0] <= narrow[1] and meets(self.arcs.inner, *narrow)
-        return Verdict.CERTIFIED_JAMMED if jams else Verdict.UNDECIDED
-
-    def summary(self) -> dict[str, Any]:
-        """Plain values for a report or a JSON file; angles in radians, lengths in mm."""
-        arcs = self.arcs
-        return {
-            "verdict": self.verdict.name,
-            "statement": self.statement,
-            "method": self.method,
-            "condition": self.condition,
-            "parameters": self.box.describe(),
-            "exact_input": self.exact_input,
-            "largest_gap_mm": list(self.largest_gap),
-            "smallest_worst_gap_mm": list(self.smallest_worst_gap),
-            "largest_tilt": list(self.largest_tilt),
-            "critical_tilt": list(self.critical_tilt),
-            "kappa": list(arcs.kappa),
-            "arcs": [{"start": list(a.start), "stop": list(a.stop)} for a in arcs.arcs],
-            **{name: [list(span) for span in getattr(arcs, name)] for name in ("inner", "outer", "undecided", "free")},
-            "assembles": self.assembles,
-            "boxes": self.boxes,
-            "seconds": self.seconds,
-        }
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the partition of the turn as a table: kind, start and stop in radians."""
-        import pandas as pd
-
-        kinds = ("free", "inner", "undecided")
-        rows = [(kind, *span) for kind in kinds for span in getattr(self.arcs, kind)]
-        frame = pd.DataFrame(rows, columns=["kind", "start", "stop"])
-        return frame.sort_values("start", ignore_index=True)
 
 
 def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertificate:
@@ -203,6 +57,7 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     >>> found.verdict.name, found.largest_gap.hi < 0
     ('CERTIFIED_FREE', True)
     """
+    import graphsynth.intervals.kernels.loops  # noqa: F401  # few intervals, many operations: the compiled path pays
     from graphsynth.intervals import check_rounding
     from graphsynth.jamming.corners import check_condition
 
@@ -244,11 +99,11 @@ class _Proof:
         elif high.hi < 0.0:
             verdict = Verdict.CERTIFIED_FREE
         else:
-            witness = self._jam(self.box) if low.lo > 0.0 else None
+            witness = self._jam_of_all(low) if low.lo > 0.0 else None
             if witness:
                 verdict = Verdict.CERTIFIED_JAMMED
             elif high.lo > 0.0:
-                witness = self._jam(corners.worst_corner(self.box, self.condition))
+                witness = self._jam_of_worst()
                 verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME if witness else Verdict.UNDECIDED
         if verdict is Verdict.UNDECIDED:
             reason = self._why(high)
@@ -271,8 +126,10 @@ class _Proof:
 
     def _assembly(self, box: ToleranceBox) -> str:
         """Say at how much of the turn the linkage is proved to be assembled, for every parameter vector."""
-        from graphsynth.jamming.poses import pose, turn_pieces
+        from graphsynth.jamming.poses import pose, turn_pieces, turns_freely
 
+        if turns_freely(box, float(self.tilt.amplitude.hi[1])):
+            return "always"
         found = pose(box, turn_pieces(_PIECES))
         self.boxes += _PIECES
         if found.assembled.all():
@@ -281,7 +138,24 @@ class _Proof:
             return "never"
         return "at some angles" if found.assembled.any() else "not decided"
 
-    def _jam(self, box: ToleranceBox) -> Witness | None:
+    def _jam_of_all(self, gap: Enclosure) -> Witness | None:
+        """Find a position in which every parameter vector jams, if ``gap`` is the least one at the worst angle."""
+        if self.assembles == "always":
+            return _at_worst_angle(self.box, gap)
+        return self._jam_on_grid(self.box)
+
+    def _jam_of_worst(self) -> Witness | None:
+        """Find a position in which the worst parameter vector jams."""
+        from graphsynth.jamming import corners
+
+        worst = corners.worst_corner(self.box, self.condition)
+        if self.assembles != "always":
+            return self._jam_on_grid(worst)
+        self.boxes += 1
+        gap = _pair(corners.gap_corners(worst, corners.sines(worst).sine, self.condition), 0)
+        return _at_worst_angle(worst, gap) if gap.lo > 0.0 else None
+
+    def _jam_on_grid(self, box: ToleranceBox) -> Witness | None:
         """Look for an angle at which every parameter vector of ``box`` is proved assembled and jammed."""
         import numpy as np
 
@@ -301,8 +175,7 @@ class _Proof:
             return None
         best = int(proved[np.argmax(gap.lo[proved])])
         angle = Enclosure(float(f.lo[best]), float(f.hi[best]))
-        exact = {name: _text(value) for name, value in box.ranges.items()}
-        return Witness(exact, angle, Enclosure(float(gap.lo[best]), float(gap.hi[best])))
+        return _witness(box, angle, Enclosure(float(gap.lo[best]), float(gap.hi[best])))
 
     def _finish(self, verdict: Verdict, reason: str, witness: Witness | None) -> JamCertificate:
         shown = Enclosure(float(self.phase.lo), float(self.phase.hi))
@@ -332,6 +205,19 @@ class _Proof:
             boxes=self.boxes,
             seconds=perf_counter() - self.begin,
         )
+
+
+def _at_worst_angle(box: ToleranceBox, gap: Enclosure) -> Witness:
+    """Return the position a quarter turn after the phase, where the tilt of every parameter vector is largest."""
+    from graphsynth.intervals import pi
+    from graphsynth.jamming.corners import phase
+
+    f = phase(box) + pi() / 2
+    return _witness(box, Enclosure(float(f.lo), float(f.hi)), gap)
+
+
+def _witness(box: ToleranceBox, angle: Enclosure, gap: Enclosure) -> Witness:
+    return Witness({name: _text(value) for name, value in box.ranges.items()}, angle, gap)
 
 
 def _text(value: Range) -> str:

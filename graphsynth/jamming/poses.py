@@ -6,6 +6,7 @@ formula with the closed form of the arcs, so that each checks the other.
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.corners import check_condition, gap_values, sine_of, slanted
 from graphsynth.jamming.parameters import ToleranceBox
 
-__all__ = ["Pose", "corner_gap", "grid", "pose", "pose_gap", "turn_pieces"]
+__all__ = ["Pose", "corner_gap", "grid", "pose", "pose_gap", "turn_pieces", "turns_freely"]
 
 Mask = NDArray[np.bool_]
 
@@ -41,6 +42,43 @@ def turn_pieces(count: int) -> Interval:
     """Cut [0, 2 pi] into pieces that overlap by rounding only and cover the turn."""
     edges = np.linspace(0.0, float(np.nextafter(2.0 * np.pi, 7.0)), count + 1)
     return Interval.from_bounds(edges[:-1], edges[1:])
+
+
+def turns_freely(box: ToleranceBox, amplitude: float) -> bool:
+    """Whether a few exact inequalities prove that every parameter vector is assembled at every crank angle.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        The linkage.
+    amplitude : float
+        Upper bound over the box of the largest ``|A_z| / l3`` of a turn.
+
+    Returns
+    -------
+    bool
+        True is a proof; False says nothing (then `pose` decides piece by piece).
+
+    Notes
+    -----
+    With ``z`` the largest ``|A_z|``: the pin runs at a plan radius in ``[sqrt(l2^2 - z^2), l2]``, the plan length s3 of
+    the coupler lies in ``[sqrt(l3^2 - z^2), l3]``, and ``sqrt(1 - x^2) >= 1 - x^2`` keeps all bounds rational.  Then
+    ``|l4 - s3| <= D <= l4 + s3`` (specification 2.3 and 3.3) holds for every D between the bounds of ``|A - C|``.
+
+    Examples
+    --------
+    >>> turns_freely(ToleranceBox(), 0.014), turns_freely(ToleranceBox(2, 1, 1, 1), 0.0)
+    (True, False)
+    """
+    if not amplitude < 1.0:
+        return False
+    l1, l2, l3, l4 = (box[name] for name in ("l1", "l2", "l3", "l4"))
+    z = Fraction(amplitude) * l3.lower  # the largest ratio is that of the largest crank and the smallest coupler
+    radius = l2.lower - z * z / l2.lower
+    plan = l3.lower if box.rod == "deck" else l3.lower - z * z / l3.lower
+    nearest = max(l1.lower - l2.upper, radius - l1.upper)
+    apart = max(l4.upper - plan, l3.upper - l4.lower, Fraction(0))
+    return nearest > 0 and nearest >= apart and l1.upper + l2.upper <= l4.lower + plan
 
 
 def pose(box: ToleranceBox, f: Interval) -> Pose:

@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -119,12 +120,12 @@ class Range:
         """Double nearest to the middle."""
         return float((self.lower + self.upper) / 2)
 
-    @property
+    @cached_property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Tightest double bounds of the lower and of the upper end."""
         return bounds_of(self.lower), bounds_of(self.upper)
 
-    @property
+    @cached_property
     def outer(self) -> Interval:
         """The smallest interval of doubles around the range."""
         from graphsynth.intervals import Interval

@@ -8,7 +8,7 @@ from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.certify import JamCertificate
+    from graphsynth.jamming.certificate import JamCertificate
 
 __all__ = ["statement"]
 
