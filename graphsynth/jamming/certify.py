@@ -90,7 +90,6 @@ class _Proof:
         self.assembles = self._assembly(box)
 
     def result(self) -> JamCertificate:
-        from graphsynth.jamming import corners
 
         low, high = _pair(self.gaps, 0), _pair(self.gaps, 1)
         verdict, reason, witness = Verdict.UNDECIDED, "", None

@@ -6,8 +6,9 @@ box that there is exactly one, and an overlap proves nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from fractions import Fraction
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -16,10 +17,8 @@ from numpy.typing import NDArray
 from graphsynth.errors import IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
-from graphsynth.intervals.reading import lower_bound, upper_bound
 from graphsynth.intervals.status import Status
 from graphsynth.jamming.circle_ellipse.criterion import spectral_radius
-from graphsynth.jamming.circle_ellipse.exact import root_bounds
 from graphsynth.jamming.circle_ellipse.hull import mirrored
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse
 from graphsynth.jamming.circle_ellipse.reasons import Reason
@@ -52,6 +51,8 @@ class CrossingBoxes:
         Boxes of which every point is a solution for some choice of the parameters.
     boundary : Interval, shape (N, 2)
         Boxes about which nothing is proved: the layer around a thick solution set, and boxes not treated.
+    rows : four ndarrays, shape (K, 4)
+        The same four as bounds x lo, x hi, y lo, y hi.
     finished : bool
         False if a limit ended the search; all boxes together hold every solution all the same.
     tested, seconds : int, float
@@ -61,13 +62,30 @@ class CrossingBoxes:
     problem: CircleEllipse
     status: Status
     reasons: tuple[Reason, ...]
-    proved: Interval
-    domains: Interval
-    inner: Interval
-    boundary: Interval
+    rows: tuple[Array, Array, Array, Array] = field(repr=False)
     finished: bool
     tested: int
-    seconds: float
+    seconds: float = field(compare=False)
+
+    @cached_property
+    def proved(self) -> Interval:
+        """Enclosures of the crossings that are proved, shape (P, 2)."""
+        return _intervals(self.rows[0])
+
+    @cached_property
+    def domains(self) -> Interval:
+        """Boxes in which each of them is the only crossing, shape (P, 2)."""
+        return _intervals(self.rows[1])
+
+    @cached_property
+    def inner(self) -> Interval:
+        """Boxes of solutions, shape (M, 2)."""
+        return _intervals(self.rows[2])
+
+    @cached_property
+    def boundary(self) -> Interval:
+        """Boxes about which nothing is proved, shape (N, 2)."""
+        return _intervals(self.rows[3])
 
     @property
     def spectral_radius(self) -> float:
@@ -105,12 +123,43 @@ def _hull_of(boxes: Interval) -> Interval:
     return Interval.from_bounds(boxes.lo.min(axis=0), boxes.hi.max(axis=0))
 
 
-def krawczyk_data(problem: CircleEllipse, unit: Fraction = Fraction(1)) -> Array:
-    """Bounds of the two right-hand sides and of 1/a^2 and 1/b^2, lengths in ``unit``, rounded outward."""
-    circle, level = problem.circle_bounds, problem.level_bounds
-    ends = [(circle.lo / unit**2, circle.hi / unit**2), (level.lo, level.hi)]
-    ends += [(unit**2 / r.hi**2, unit**2 / r.lo**2) for r in (problem.a, problem.b)]
-    return np.array([bound for lo, hi in ends for bound in (lower_bound(lo), upper_bound(hi))])
+def krawczyk_data(problem: CircleEllipse, power: int = 0) -> Array:
+    """Bounds of the two right-hand sides and of 1/a^2 and 1/b^2, lengths in units of ``2**power``, rounded outward."""
+    (low, high), level = _squared_radii(problem), problem.e2.hi
+    one = level.denominator
+    ends = [(*_scaled(*low, -2 * power), 0), (*_scaled(*high, -2 * power), 1)]
+    ends += [(one - level.numerator, one, 0), (one + level.numerator, one, 1)]
+    for r in (problem.a, problem.b):
+        for side, end in enumerate((r.hi, r.lo)):
+            ends.append((*_scaled(end.denominator**2, end.numerator**2, 2 * power), side))
+    return np.array([_bounds(top, bottom)[side] for top, bottom, side in ends])
+
+
+def _squared_radii(problem: CircleEllipse) -> list[tuple[int, int]]:
+    """Smallest and largest ``x^2 + y^2`` as quotients of integers, not reduced."""
+    e = problem.e1.hi
+    found = []
+    for sign, r in ((-1, problem.R1.lo), (1, problem.R1.hi)):
+        bottom = r.denominator**2
+        found.append((r.numerator**2 * e.denominator + sign * e.numerator * bottom, bottom * e.denominator))
+    return found
+
+
+def _scaled(top: int, bottom: int, power: int) -> tuple[int, int]:
+    """Multiply a quotient by ``2**power``."""
+    return (top << power, bottom) if power >= 0 else (top, bottom << -power)
+
+
+def _bounds(top: int, bottom: int) -> tuple[float, float]:
+    """Return the tightest doubles around a quotient of integers (``bottom > 0``), which need not be reduced."""
+    try:
+        nearest = top / bottom  # correctly rounded
+    except OverflowError:
+        return (math.nextafter(math.inf, 0.0), math.inf) if top > 0 else (-math.inf, -math.nextafter(math.inf, 0.0))
+    n, d = nearest.as_integer_ratio()
+    excess = n * bottom - top * d
+    low = math.nextafter(nearest, -math.inf) if excess > 0 else nearest
+    return low, math.nextafter(nearest, math.inf) if excess < 0 else nearest
 
 
 def krawczyk_boxes(
@@ -162,32 +211,37 @@ def krawczyk_boxes(
     queue, state = np.empty((2 * max_boxes + 2, 4)), np.zeros(5, dtype=np.int64)
     queue[0], state[kernels.TAIL] = (0.0, side, 0.0, side), 1
     kept, inner = np.empty((max_boxes + 1, 4)), np.zeros(max_boxes + 1, dtype=np.bool_)
-    proved, data = np.empty((_MOST_PROVED, 8)), krawczyk_data(problem, Fraction(2) ** power)
+    proved, data = np.empty((_MOST_PROVED, 8)), krawczyk_data(problem, power)
     seconds = 0.0
     while state[kernels.HEAD] < state[kernels.TAIL] and state[kernels.TESTED] < max_boxes and seconds < max_seconds:
         limit = min(int(state[kernels.TESTED]) + _BATCH, max_boxes)
         kernels.search(queue, state, kept, inner, proved, data, tolerance * side, limit)
         seconds = perf_counter() - begin
     head, tail, tested, found, count = state.tolist()
-    rest = np.concatenate([kept[:count][~inner[:count]], queue[head:tail]])
-    parts = [proved[:found, 4:], proved[:found, :4], kept[:count][inner[:count]], rest]
-    parts = [_carried(part, power) for part in parts]
+    within, layer = kept[:count], queue[head:tail]
+    if count:
+        solved = inner[:count]
+        within, layer = within[solved], np.concatenate([within[~solved], layer])
+    parts = [_carried(part, power) for part in (proved[:found, 4:], proved[:found, :4], within, layer)]
     return _outcome(problem, parts, head == tail, tested, seconds, tested >= max_boxes)
 
 
 def _start_side(problem: CircleEllipse) -> tuple[float, int]:
     """Side of the start box in units of ``2**power``, about 1: the same boxes for every unit of length."""
-    side = root_bounds(problem.circle_bounds.hi).hi
-    power = side.numerator.bit_length() - side.denominator.bit_length()
+    top, bottom = _squared_radii(problem)[1]
+    power = (top.bit_length() - bottom.bit_length()) // 2
     if abs(power) > _MOST_POWER:
         raise IntervalError(
             f"R1 = {float(problem.R1.hi)} is beyond the range for boxes; choose a unit of length nearer to it"
         )
-    return upper_bound(side / Fraction(2) ** power), power
+    square = _bounds(*_scaled(top, bottom, -2 * power))[1]
+    return math.nextafter(math.sqrt(square), math.inf), power
 
 
 def _carried(rows: Array, power: int) -> Array:
     """Multiply boxes by ``2**power``; bounds that become subnormal and are rounded move outward."""
+    if len(rows) == 0 or power >= 0:
+        return rows * 2.0**power
     moved = np.ldexp(rows, power)
     lost = np.ldexp(moved, -power) - rows
     side = np.tile([-1.0, 1.0], rows.shape[1] // 2)
@@ -203,7 +257,7 @@ def _outcome(
 ) -> CrossingBoxes:
     """Drop boxes that a proved crossing stands for, and say what is known."""
     enclosures, domains, inner, rest = parts
-    for domain in domains:
+    for domain in domains if len(rest) else ():
         for_it = (rest[:, ::2] >= domain[::2]).all(axis=1) & (rest[:, 1::2] <= domain[1::2]).all(axis=1)
         rest = rest[~for_it]
     left = len(rest) + len(inner) > 0
@@ -217,5 +271,5 @@ def _outcome(
         reasons.append(Reason.CIRCLE_OUTSIDE if outside else Reason.CIRCLE_INSIDE)
     elif left:
         reasons.append(Reason.RESOLUTION if finished else Reason.BOXES if full else Reason.SECONDS)
-    found, unique, within, layer = (_intervals(rows) for rows in (enclosures, domains, inner, rest))
-    return CrossingBoxes(problem, status, tuple(reasons), found, unique, within, layer, finished, tested, seconds)
+    rows = (enclosures, domains, inner, rest)
+    return CrossingBoxes(problem, status, tuple(reasons), rows, finished, tested, seconds)

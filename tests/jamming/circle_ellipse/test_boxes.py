@@ -1,6 +1,7 @@
 """Krawczyk's method in (x, y): what it certifies, what it may never certify, agreement with the exact hull."""
 
 import dataclasses
+import math
 from fractions import Fraction
 
 import mpmath
@@ -11,8 +12,8 @@ from hypothesis import strategies as st
 
 from graphsynth.errors import IntervalError
 from graphsynth.intervals import Interval, Status
-from graphsynth.jamming.circle_ellipse import Reason, circle_ellipse, cross_check, exact_hull, krawczyk_boxes
-from graphsynth.jamming.circle_ellipse.boxes import _carried
+from graphsynth.jamming.circle_ellipse import Reason, circle_ellipse, cross_check, exact_hull, kernels, krawczyk_boxes
+from graphsynth.jamming.circle_ellipse.boxes import _bounds, _carried, krawczyk_data
 from graphsynth.jamming.circle_ellipse.check import _agree
 
 
@@ -28,6 +29,7 @@ def section(t):
 
 
 WORST = "0.0133312592085829611560698794957554253"
+F = Fraction
 EPS = ("1e-9", "1e-8", "1e-7", "1e-6", "1e-5", "1e-4")
 # specification 6.6: spectral radius on the exact hull, and how many of the six tolerances are certified
 TABLE = [
@@ -272,3 +274,62 @@ def test_compiled_search_agrees_with_the_general_solver():
     unique = np.asarray(general.status) == Status.UNIQUE
     assert unique.sum() == 1
     assert not Interval(own.proved[0]).disjoint(general.boxes[np.flatnonzero(unique)[0]]).any()
+
+
+huge = st.integers(-(10**400), 10**400) | st.integers(-1000, 1000)
+
+
+@given(huge, st.integers(1, 10**400) | st.integers(1, 1000), st.integers(0, 1200))
+def test_bounds_of_quotients_are_the_tightest(top, bottom, shift):
+    value = Fraction(top, bottom) / 2**shift
+    low, high = _bounds(top, bottom << shift)
+    assert (low == -math.inf or Fraction(low) <= value) and (high == math.inf or value <= Fraction(high))
+    assert low == high or math.nextafter(low, math.inf) == high
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.fractions(F("0.01"), 3, max_denominator=10**6), min_size=4, max_size=4),
+    st.fractions(F("0.1"), 3, max_denominator=10**6), st.fractions(F("0.1"), 3, max_denominator=10**6),
+    st.fractions(F("0.1"), 3, max_denominator=10**6), st.sampled_from(["0", "1e-9", "0.1"]), st.integers(-300, 300),
+)  # fmt: skip
+def test_compiled_image_holds_the_exact_one(sides, R1, a, b, eps, power):
+    """Krawczyk's image with the kernel's own preconditioner, evaluated in rational numbers."""
+    a, b = max(a, b), min(a, b) * F(9, 10)
+    (xl, xh), (yl, yh) = (sorted(F(float(v)) for v in pair) for pair in (sides[:2], sides[2:]))
+    problem = circle_ellipse(R1, a, F(b) * F(2) ** -abs(power), e1=eps, e2=eps)  # far from a circle: huge 1 / b^2
+    data, out = krawczyk_data(problem), np.empty(4)
+    if not kernels.image(float(xl), float(xh), float(yl), float(yh), data, out) < np.inf:
+        return
+    q, e, alpha, beta = ((F(data[k]), F(data[k + 1])) for k in (0, 2, 4, 6))
+    zx, zy = F(0.5 * float(xl + xh)), F(0.5 * (float(yl) + float(yh)))
+    zx = F(0.5 * (float(xl) + float(xh)))
+    am, bm = 0.5 * (data[4] + data[5]), 0.5 * (data[6] + data[7])
+    fx, fy = float(zx), float(zy)
+    scale = 0.5 / (fx * fy * (bm - am))
+    Y = [[F(bm * fy * scale), F(-fy * scale)], [F(-am * fx * scale), F(fx * scale)]]
+    for circle in q:
+        for level in e:
+            for s in alpha:
+                for t in beta:
+                    f = (zx**2 + zy**2 - circle, s * zx**2 + t * zy**2 - level)
+                    for row in range(2):
+                        centre = (zx, zy)[row] - Y[row][0] * f[0] - Y[row][1] * f[1]
+                        for x in (xl, xh):
+                            for y in (yl, yh):
+                                L = [[2 * x, 2 * y], [2 * s * x, 2 * t * y]]
+                                m, n = (abs((k == row) - Y[row][0] * L[0][k] - Y[row][1] * L[1][k]) for k in range(2))
+                                reach = m * (xh - xl) / 2 + n * (yh - yl) / 2
+                                assert F(out[2 * row]) <= centre - reach and centre + reach <= F(out[2 * row + 1])
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.fractions(F("0.5"), 2, max_denominator=10**4), st.fractions(F("0.5"), 2, max_denominator=10**4),
+    st.fractions(F("0.5"), 2, max_denominator=10**4), st.integers(0, 1000), st.integers(0, 1000),
+    st.sampled_from(["0", "1e-12", "1e-3", "10", "1e200"]),
+)  # fmt: skip
+def test_extreme_ratios_contradict_nothing(R1, a, b, long, thin, eps):
+    a, b = max(a, b) * F(2) ** long, min(a, b) / F(2) ** thin
+    found = cross_check(circle_ellipse(R1, a, b, eps=eps), max_boxes=500)
+    assert found.consistent
