@@ -29,6 +29,19 @@ _PUBLIC: dict[str, str] = {
     "InverseDynamics": "inverse",
     "Reactions": "reactions",
     "effective_inertia": "minimal",
+    "DCMotor": "motors",
+    "SynchronousMotor": "motors",
+    "LinearCharacteristic": "motors",
+    "IdealTorque": "motors",
+    "IdealSpeed": "motors",
+    "Train": "trains",
+    "MotorDrivenPlatform": "platform_drive.model",
+    "EffectiveInertia": "platform_drive.inertia",
+    "resistance_effect": "platform_drive.resistance",
+    "DriveRun": "platform_drive.run",
+    "Braider": "braider.model",
+    "Thread": "braider.model",
+    "FourBar": "braider.linkage",
 }
 
 __all__ = sorted(_PUBLIC)

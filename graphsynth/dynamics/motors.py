@@ -7,6 +7,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.errors import SpecError
 
@@ -27,12 +31,36 @@ def number(name: str, value: float, *, least: float = -math.inf, above: bool = F
     return given
 
 
+def numbers(name: str, values: Any, unit: str = "SI units", *, finite: bool = True) -> NDArray[np.float64]:
+    """Return an array of floats (finite ones unless said otherwise), or raise `SpecError` naming what was given."""
+    try:
+        found = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        shown = repr(values)
+        raise SpecError(
+            f"{name} = {shown if len(shown) <= 60 else shown[:57] + '...'} are not real numbers; give them in {unit}"
+        ) from None
+    if finite and not np.isfinite(found).all():
+        raise SpecError(f"{name} of shape {found.shape} must be finite; remove what is not a finite number")
+    return found
+
+
+def whole(name: str, value: Any, advice: str) -> int:
+    """Return a whole number of at least 1, or raise `SpecError` with the advice."""
+    try:
+        given = float(value)
+    except (TypeError, ValueError):
+        given = math.nan
+    if not given >= 1.0 or math.isinf(given) or given != math.floor(given):
+        raise SpecError(f"{name} = {value!r} must be a whole number of at least 1; {advice}")
+    return int(given)
+
+
 def _check(motor: object, zero_or_more: tuple[str, ...], positive: tuple[str, ...] = ()) -> None:
     for item in fields(motor):  # type: ignore[arg-type]
         name, value = item.name, getattr(motor, item.name)
         if name == "pole_pairs":
-            if value != int(value) or value < 1:
-                raise SpecError(f"pole_pairs = {value!r} must be a whole number of at least 1; count pairs, not poles")
+            object.__setattr__(motor, name, whole(name, value, "count pairs, not poles"))
             continue
         low = 0.0 if name in zero_or_more or name in positive else -math.inf
         checked = number(name, value, least=low, above=name in positive, infinite=name == "voltage_limit")
@@ -255,4 +283,14 @@ class SynchronousMotor:
         )
 
 
+#: Motors with a torque, which drive a motion.
 Motor = DCMotor | SynchronousMotor | LinearCharacteristic | IdealTorque
+
+
+def check_motor(motor: object) -> None:
+    """Raise `SpecError` for anything that is neither a motor with a torque nor an ideal speed."""
+    if not isinstance(motor, (DCMotor, SynchronousMotor, LinearCharacteristic, IdealTorque, IdealSpeed)):
+        raise SpecError(
+            f"motor = {motor!r} is no motor; give a DCMotor, SynchronousMotor, LinearCharacteristic, IdealTorque or "
+            "IdealSpeed"
+        )

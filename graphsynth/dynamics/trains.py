@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from graphsynth.dynamics.motors import number
+from graphsynth.dynamics.motors import number, whole
 from graphsynth.errors import SpecError
 
 __all__ = ["Train"]
@@ -54,10 +54,11 @@ class Train:
         cls, stages: Sequence[tuple[int, int]], efficiency: Sequence[float] = (), inertia: float = 0.0
     ) -> Train:
         """Train of stages (driving teeth, driven teeth), with the efficiency of each stage (1 by default)."""
-        for driving, driven in stages:
-            for teeth in (driving, driven):
-                if teeth != int(teeth) or teeth < 1:
-                    raise SpecError(f"teeth = {teeth!r} must be a whole number of at least 1; give (driving, driven)")
+        for stage in stages:
+            if not isinstance(stage, Sequence) or len(stage) != 2:
+                raise SpecError(f"stage {stage!r} of the train must be a pair; give (driving teeth, driven teeth)")
+            for teeth in stage:
+                whole("teeth", teeth, "give (driving, driven)")
         if efficiency and len(efficiency) != len(stages):
             raise SpecError(f"{len(efficiency)} efficiencies for {len(stages)} stages; give one for each stage")
         driven_teeth, driving_teeth = math.prod(s[1] for s in stages), math.prod(s[0] for s in stages)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -10,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.braider.linkage import FourBar
-from graphsynth.dynamics.motors import Motor, SynchronousMotor, number
+from graphsynth.dynamics.motors import IdealSpeed, Motor, SynchronousMotor, check_motor, number
+from graphsynth.dynamics.platform_drive.prescribed import prescribed_run
 from graphsynth.dynamics.platform_drive.reduction import ReductionStudy, choose_motor, inductance_study
 from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, RunStatus, run
 from graphsynth.dynamics.trains import Train
@@ -54,7 +56,10 @@ class Thread:
     def __post_init__(self) -> None:
         for name in ("weight", "height", "gravity"):
             object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
-        point = complex(self.guide)
+        try:
+            point = complex(self.guide)
+        except (TypeError, ValueError):
+            raise SpecError(f"guide = {self.guide!r} is no point; give x + 1j * y in metres") from None
         number("guide x", point.real)
         number("guide y", point.imag)
         object.__setattr__(self, "guide", point)
@@ -102,7 +107,7 @@ class Braider:
     masses : tuple of 4 floats
         Crank, coupler, rocker, switch; uniform bars, kg, not negative.
     thread : Thread
-    motor : SynchronousMotor, DCMotor, LinearCharacteristic or IdealTorque
+    motor : SynchronousMotor, DCMotor, LinearCharacteristic, IdealTorque or IdealSpeed
     train : Train
     inertia : float
         Further constant inertia at the crank, kg m^2.
@@ -128,7 +133,7 @@ class Braider:
     switch_angle: float = 5.0 * math.pi / 6.0
     masses: tuple[float, float, float, float] = (0.015, 0.045, 0.030, 0.020)
     thread: Thread = field(default_factory=Thread)
-    motor: Motor = field(default_factory=_motor)
+    motor: Motor | IdealSpeed = field(default_factory=_motor)
     train: Train = field(default_factory=_train)
     inertia: float = 0.0
 
@@ -137,9 +142,13 @@ class Braider:
         object.__setattr__(self, "switch_angle", number("switch_angle", self.switch_angle))
         object.__setattr__(self, "inertia", number("inertia", self.inertia, least=0.0))
         names = ("crank", "coupler", "rocker", "switch")
-        if len(self.masses) != 4:
-            raise SpecError(f"{len(self.masses)} masses given; give four: {', '.join(names)}")
-        checked = tuple(number(f"mass of the {n}", m, least=0.0) for n, m in zip(names, self.masses))
+        if not isinstance(self.linkage, FourBar) or not isinstance(self.thread, Thread):
+            raise SpecError("linkage and thread must be a FourBar and a Thread; make them first")
+        check_motor(self.motor)
+        masses = tuple(self.masses) if isinstance(self.masses, Iterable) else (self.masses,)
+        if len(masses) != 4:
+            raise SpecError(f"{len(masses)} masses given; give four: {', '.join(names)}")
+        checked = tuple(number(f"mass of the {n}", m, least=0.0) for n, m in zip(names, masses))
         object.__setattr__(self, "masses", checked)
 
     @property
@@ -217,6 +226,9 @@ class Braider:
         """
         if not math.isfinite(float(self.linkage.motion(number("angle", angle)).k3)):
             raise SpecError(f"the linkage cannot be assembled at angle = {angle:g} rad; start within linkage.reach()")
+        if isinstance(self.motor, IdealSpeed):
+            given = prescribed_run(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
+            return self._until_change_point(given)
         motor, note = choose_motor(
             self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol
         )
@@ -241,6 +253,8 @@ class Braider:
 
     def inductance_study(self, times: ArrayLike, inductances: tuple[float, ...]) -> ReductionStudy:
         """Distance to the limit L -> 0 for several inductances (section 4.6), from rest."""
+        if isinstance(self.motor, IdealSpeed):
+            raise SpecError("an ideal speed has no inductance to take to zero; give a SynchronousMotor or a DCMotor")
         return inductance_study(self.plant(), self.motor, self.train, times, inductances)
 
     def link_motion(self, found: DriveRun) -> LinkMotion:
@@ -267,6 +281,8 @@ class Braider:
         The last crossing between samples is solved on the cubic through speeds and accelerations, 2000 samples.
         """
         number("band", band, least=0.0, above=True)
+        if number("target", target) == 0.0:
+            raise SpecError("target = 0 has no relative band; give the speed that is to be reached, rad/s")
         times = np.linspace(0.0, number("end", end, least=0.0, above=True), 2001)
         found = self.simulate(times, rtol=rtol, estimate=False)
         outside = np.nonzero(~(np.abs(found.speed / target - 1.0) <= band))[0]

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.dynamics.motors import numbers
+from graphsynth.errors import SpecError
+
 if TYPE_CHECKING:
     from graphsynth.dynamics.braider.model import Braider
     from graphsynth.dynamics.platform_drive.run import DriveRun
@@ -59,6 +62,11 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
     Reactions
         Closed form up to rounding; NaN where the linkage cannot be assembled.
 
+    Raises
+    ------
+    SpecError
+        What is no number, or lengths that do not fit.
+
     Notes
     -----
     Specification instruments_and_dynamics, section 4.5.  The dyad is solved first: the moments of the coupler about A
@@ -71,9 +79,15 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
     >>> round(float(found.torque[0]), 15)
     -7.9020145597e-05
     """
-    theta, w, alpha = (np.array(x, dtype=np.float64) for x in np.broadcast_arrays(
-        np.atleast_1d(theta), np.atleast_1d(speed), np.atleast_1d(acceleration)
-    ))  # fmt: skip
+    given = [
+        numbers(name, value, finite=False)  # rows of a run that ended early are NaN
+        for name, value in (("theta", theta), ("speed", speed), ("acceleration", acceleration))
+    ]
+    try:
+        theta, w, alpha = (x.copy() for x in np.broadcast_arrays(*map(np.atleast_1d, given)))
+    except ValueError:
+        shapes = ", ".join(str(x.shape) for x in given)
+        raise SpecError(f"theta, speed and acceleration of shapes {shapes} do not fit; give equal lengths") from None
     s = braider.linkage.motion(theta)
     m1, m2 = braider.masses[:2]
     _, i2, i3 = braider.moments

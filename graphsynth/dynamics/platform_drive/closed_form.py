@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import DCMotor, number
+from graphsynth.dynamics.motors import DCMotor, number, numbers
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
 
@@ -56,11 +56,13 @@ def linear_response(
     total = number("inertia", inertia, least=0.0) + gear.reflected(motor.rotor_inertia)
     if total == 0.0 or motor.inductance == 0.0:
         raise SpecError(f"inertia = {total:g} and inductance = {motor.inductance:g} must both be positive here")
+    if motor.torque_constant == 0.0 or motor.gain + motor.emf_constant == 0.0:
+        raise SpecError("torque_constant and gain + emf_constant must be positive: give a motor that turns and brakes")
     if motor.friction > 0.0 or motor.voltage_limit < math.inf:
         raise SpecError("the closed form has neither friction nor a voltage limit; use simulate")
     if gear.efficiency < 1.0:
         raise SpecError(f"efficiency = {gear.efficiency:g} changes with the power flow; use simulate, or efficiency 1")
-    t = np.asarray(times, dtype=np.float64)
+    t = numbers("times", times, "seconds")
     feedback = motor.gain + motor.emf_constant
     a = motor.resistance / (2.0 * motor.inductance)
     square = gear.ratio**2 * motor.torque_constant * feedback / (motor.inductance * total)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import number
+from graphsynth.dynamics.motors import number, numbers
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -54,9 +54,9 @@ class EffectiveInertia:
     truncation: float = 0.0
 
     def __post_init__(self) -> None:
-        rows = np.array(self.rows, dtype=np.float64, ndmin=2)
-        if rows.shape[1] % 2 == 0 or not np.isfinite(rows).all():
-            raise SpecError(f"rows of shape {rows.shape} must be finite with an odd number of columns: a0, a1, b1, ...")
+        rows = np.atleast_2d(numbers("rows", self.rows))
+        if rows.ndim != 2 or rows.shape[1] % 2 == 0:
+            raise SpecError(f"rows of shape {rows.shape} must have an odd number of columns; give a0, a1, b1, ...")
         rows.setflags(write=False)
         object.__setattr__(self, "rows", rows)
 
@@ -82,7 +82,7 @@ class EffectiveInertia:
         SpecError
             If N samples do not resolve the velocities to ``tolerance`` (relative to the largest).
         """
-        values = np.array(velocities, dtype=np.float64, ndmin=2)
+        values = np.atleast_2d(numbers("velocities", velocities))
         rows, tail = _series(values)
         if not tail <= tolerance:
             raise SpecError(

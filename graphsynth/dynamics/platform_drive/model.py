@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import IdealSpeed, Motor, number
+from graphsynth.dynamics.motors import IdealSpeed, Motor, check_motor, number
 from graphsynth.dynamics.platform_drive.inertia import EffectiveInertia
+from graphsynth.dynamics.platform_drive.prescribed import prescribed_run
 from graphsynth.dynamics.platform_drive.reduction import (
     ReductionStudy,
     choose_motor,
@@ -18,6 +19,7 @@ from graphsynth.dynamics.platform_drive.reduction import (
     reduction_error,
 )
 from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, run
+from graphsynth.dynamics.platform_drive.setup import load_coefficients
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
 
@@ -38,7 +40,7 @@ class MotorDrivenPlatform:
     ----------
     inertia : EffectiveInertia
         Of the moving platform (and further links).
-    motor : DCMotor, SynchronousMotor, LinearCharacteristic or IdealTorque
+    motor : DCMotor, SynchronousMotor, LinearCharacteristic, IdealTorque or IdealSpeed
     train : Train
         Between motor and crank.
     base_inertia : float
@@ -69,7 +71,7 @@ class MotorDrivenPlatform:
     """
 
     inertia: EffectiveInertia
-    motor: Motor
+    motor: Motor | IdealSpeed
     train: Train = field(default_factory=Train)
     base_inertia: float = 0.0
     friction: float = 0.0
@@ -80,21 +82,25 @@ class MotorDrivenPlatform:
         for name in ("base_inertia", "friction"):
             object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
         object.__setattr__(self, "load", number("load", self.load))
-        if isinstance(self.motor, IdealSpeed):
-            raise SpecError("an ideal speed source has no motion to integrate; use torque_at_speed on any platform")
+        if not isinstance(self.inertia, EffectiveInertia):
+            raise SpecError(f"inertia = {self.inertia!r} is no EffectiveInertia; use EffectiveInertia.of_slider(...)")
+        if self.load_series is not None:
+            object.__setattr__(self, "load_series", load_coefficients(self.load_series))
+        check_motor(self.motor)
 
     @classmethod
     def source(
-        cls, motor: Motor, *, mass: float = 2.0, amplitude: float = 0.05, base_inertia: float = 0.002
+        cls, motor: Motor | IdealSpeed, *, mass: float = 2.0, amplitude: float = 0.05, base_inertia: float = 0.002
     ) -> MotorDrivenPlatform:
         """Model of the source: ``J = J_0 + m L^2 cos(q)^2``, crank coupled directly to the motor."""
         return cls(EffectiveInertia.of_slider(mass, amplitude), motor, base_inertia=base_inertia)
 
     @classmethod
     def of_machine(
-        cls, machine: SingleMotorPlatform, motor: Motor, *, mass: float, gyration: float, mass_centre: complex = 0.0,
-        rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0), wheel_inertia: float = 0.0, pinion_inertia: float = 0.0,
-        efficiency: float = 1.0, friction: float = 0.0, load: float = 0.0, length: float = 1e-3,
+        cls, machine: SingleMotorPlatform, motor: Motor | IdealSpeed, *, mass: float, gyration: float,
+        mass_centre: complex = 0.0, rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0), wheel_inertia: float = 0.0,
+        pinion_inertia: float = 0.0, efficiency: float = 1.0, friction: float = 0.0, load: float = 0.0,
+        length: float = 1e-3,
     ) -> MotorDrivenPlatform:  # fmt: skip
         """Real geometry: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of the gears."""
         series = EffectiveInertia.of_platform(
@@ -142,7 +148,8 @@ class MotorDrivenPlatform:
         Returns
         -------
         DriveRun
-            Estimated.  A failure of the integrator is a status with NaN after ``reached``, never an early end.
+            Estimated; for an ideal speed the motion is given and the torque a closed form (`prescribed_run`).  A
+            failure of the integrator is a status with NaN after ``reached``, never an early end.
 
         Raises
         ------
@@ -151,6 +158,8 @@ class MotorDrivenPlatform:
         """
         if model not in ("auto", "J", "S"):
             raise SpecError(f"model = {model!r} is unknown; choose 'auto', 'J' or 'S'")
+        if isinstance(self.motor, IdealSpeed):
+            return prescribed_run(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
         regular = model == "S" or (model == "auto" and self.constant_inertia == 0.0 and bool(self.inertia.dead_centres))
         notes = (_SPIKES,) if regular else ()
         motor, note = choose_motor(
@@ -165,7 +174,7 @@ class MotorDrivenPlatform:
 
     def reduction_error(self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0) -> float:
         """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; see `reduction`."""
-        return reduction_error(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
+        return reduction_error(self.plant(), self._driving(), self.train, times, angle=angle, speed=speed)
 
     def inductance_study(
         self, times: ArrayLike, inductances: Sequence[float], *, angle: float = 0.0, speed: float = 0.0,
@@ -173,8 +182,13 @@ class MotorDrivenPlatform:
     ) -> ReductionStudy:  # fmt: skip
         """Compare the full model at several inductances (H) with the limit L -> 0; see `reduction`."""
         return inductance_study(
-            self.plant(), self.motor, self.train, times, inductances, angle=angle, speed=speed, after=after
+            self.plant(), self._driving(), self.train, times, inductances, angle=angle, speed=speed, after=after
         )
+
+    def _driving(self) -> Motor:
+        if isinstance(self.motor, IdealSpeed):
+            raise SpecError("an ideal speed has no inductance to take to zero; give a DCMotor or a SynchronousMotor")
+        return self.motor
 
     def torque_at_speed(self, q: ArrayLike, speed: float) -> Array:
         """Torque at the crank that keeps a constant crank speed (rad/s): ``J'(q) w^2 / 2 + b w + load``, N m.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.motors import DCMotor, Motor, SynchronousMotor, number
 from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, run
+from graphsynth.dynamics.platform_drive.setup import output_times
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
 
@@ -59,7 +60,7 @@ def choose_motor(
         if reduce is False:
             raise SpecError("inductance = 0 with the unreduced model divides by zero; set reduce = True or 'auto'")
         return motor.reduced(), "inductance 0: the reduced model, exact"
-    out = np.asarray(times, dtype=np.float64)
+    out = output_times(times)
     if reduce == "auto":
         limited = isinstance(motor, DCMotor) and motor.voltage_limit < math.inf
         if regular or limited or not motor.electrical_time <= rtol * float(out[-1] - out[0]):
@@ -79,7 +80,7 @@ def reduction_error(
     """
     if not isinstance(motor, (DCMotor, SynchronousMotor)) or motor.inductance == 0.0:
         return 0.0
-    out = np.asarray(times, dtype=np.float64)
+    out = output_times(times)
     factor = max(1.0, 1e-5 * float(out[-1] - out[0]) / motor.electrical_time)
     seen = [factor * motor.inductance]
     study = inductance_study(plant, motor, train, out, seen, angle=angle, speed=speed)
@@ -122,7 +123,9 @@ def inductance_study(
     """
     if not isinstance(motor, (DCMotor, SynchronousMotor)):
         raise SpecError(f"{type(motor).__name__} has no inductance; give a DCMotor or a SynchronousMotor")
-    out = np.asarray(times, dtype=np.float64)
+    out = output_times(times)
+    if len(inductances) == 0:
+        raise SpecError("there is no inductance to try; give at least one, in H")
     limit = run(plant, motor.reduced(), train, out, angle=angle, speed=speed, rtol=rtol, estimate=False)
     gaps, runs = [], []
     for value in inductances:

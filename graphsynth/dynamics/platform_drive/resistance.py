@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import DCMotor, number
+from graphsynth.dynamics.motors import DCMotor, number, whole
 from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
 from graphsynth.errors import SpecError
 
@@ -100,7 +100,15 @@ def resistance_effect(
     motor = drive.motor
     if not isinstance(motor, DCMotor) or motor.inductance == 0.0:
         raise SpecError("the effect of the resistance needs a DCMotor with positive inductance; give one")
+    _must_be_bounded(drive)
+    if 0.0 in (motor.gain, motor.speed, motor.torque_constant):
+        raise SpecError(
+            f"gain = {motor.gain:g}, speed = {motor.speed:g} and torque_constant = {motor.torque_constant:g} must not "
+            "vanish: the machine would stand still; give what drives it"
+        )
     values = np.array([number("resistance", r, least=0.0) for r in resistances])
+    if values.size == 0:
+        raise SpecError("there is no resistance to try; give at least one, in ohm")
     ratio, feedback = drive.train.ratio, motor.gain + motor.emf_constant
     harmonic, amplitude, mean = _harmonic(drive)
     inertia = drive.constant_inertia + mean
@@ -147,13 +155,25 @@ def steady_ripple(drive: MotorDrivenPlatform, revolutions: int = 40, rtol: float
     motor = drive.motor
     if not isinstance(motor, DCMotor):
         raise SpecError(f"{type(motor).__name__} has no armature current; give a DCMotor")
-    w = abs(motor.gain * motor.speed / (motor.gain + motor.emf_constant) / drive.train.ratio)
+    _must_be_bounded(drive)
+    whole("revolutions", revolutions, "two halves of the run are compared")
+    free = motor.gain * motor.speed
+    if free == 0.0:
+        raise SpecError(
+            f"gain = {motor.gain:g} and speed = {motor.speed:g} leave the machine at rest; give both another value"
+        )
+    w = abs(free / (motor.gain + motor.emf_constant) / drive.train.ratio)
     end = revolutions * math.tau / w
     times = np.concatenate([[0.0], np.linspace(0.5 * end, end, 120 * revolutions + 1)])
     motion = drive.simulate(times, rtol=rtol, estimate=False, reduce=False)
     if not motion.complete:
         return math.nan, math.nan
     return _peak_to_peak(motion.speed[1:]), _peak_to_peak(motion.currents[1:, 0])
+
+
+def _must_be_bounded(drive: MotorDrivenPlatform) -> None:
+    if drive.constant_inertia == 0.0 and drive.inertia.dead_centres:
+        raise SpecError("without inertia the crank speed is unbounded at dead centres: no ripple; give J_0 > 0")
 
 
 def _peak_to_peak(values: Array) -> float:

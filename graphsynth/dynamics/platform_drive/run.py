@@ -16,6 +16,7 @@ from graphsynth.dynamics.motors import (
     Motor,
     SynchronousMotor,
     number,
+    whole,
 )
 from graphsynth.dynamics.platform_drive.setup import Plant, Prepared, output_times, prepare
 from graphsynth.dynamics.trains import Train
@@ -158,12 +159,16 @@ def run(
     begin = perf_counter()
     out = output_times(times)
     number("rtol", rtol)
+    max_steps = whole("max_steps", max_steps, "raise it for long runs")
+    max_events = whole("max_events", max_events, "raise it for many events")
     if not 1e-13 <= rtol <= 1e-3:
         raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
     ready = prepare(plant, motor, train, out, angle, speed, currents, regular)
     tolerances = (rtol, min(100.0 * rtol, 1e-2)) if estimate else (rtol,)
     results = [_integrate(ready, out, tolerance, max_steps, max_events) for tolerance in tolerances]
     error = _difference(results, ready, plant, regular) if estimate else np.full(ready.start.size - regular, np.nan)
+    if len(results) == 2 and results[1][0] is not RunStatus.DONE and results[0][0] is RunStatus.DONE:
+        notes = (*notes, "no error estimate: the second run, at a hundred times the tolerance, did not reach the end")
     return _result(ready, plant, motor, train, out, results[0], error, regular, rtol, perf_counter() - begin, notes)
 
 
@@ -197,8 +202,7 @@ def _physical(Y: Array, turns: NDArray[np.int64], ready: Prepared, regular: bool
     return angle, Y[:, 1].copy(), np.asarray(root * Y[:, 1])
 
 
-def _difference(results: list[_Raw],
-                ready: Prepared, plant: Plant, regular: bool) -> Array:  # fmt: skip
+def _difference(results: list[_Raw], ready: Prepared, plant: Plant, regular: bool) -> Array:
     """Largest differences of angle, sqrt(J) w over the largest sqrt(J), and currents between two runs."""
     n = ready.start.size - int(regular)
     if any(entry[0] is not RunStatus.DONE for entry in results):
@@ -207,7 +211,7 @@ def _difference(results: list[_Raw],
     gap = np.abs(first[0][:, :n] - second[0][:, :n])
     gap[:, 0] = np.abs(first[0][:, 0] - second[0][:, 0] + math.tau * (first[1] - second[1]))
     if regular:
-        gap[:, 1] *= ready.scale[1] and 1.0 / _largest_root(plant)
+        gap[:, 1] /= _largest_root(plant)
     return np.asarray(gap.max(axis=0))
 
 
@@ -216,11 +220,10 @@ def _largest_root(plant: Plant) -> float:
 
 
 def _result(
-    ready: Prepared, plant: Plant, motor: Motor, train: Train, out: Array,
-    found: _Raw,
-    error: Array, regular: bool, rtol: float, seconds: float, notes: tuple[str, ...],
+    ready: Prepared, plant: Plant, motor: Motor, train: Train, out: Array, found: _Raw, error: Array,
+    regular: bool, rtol: float, seconds: float, notes: tuple[str, ...],
 ) -> DriveRun:  # fmt: skip
-    status, Y, turns, balance, marks, counts, state = found
+    status, Y, turns, balance, marks, counts, _ = found
     angle, speed, momentum = _physical(Y, turns, ready, regular)
     currents = Y[:, 2 : Y.shape[1] - int(regular)]
     reached = int(counts[3])
@@ -229,13 +232,6 @@ def _result(
     kinetic, magnetic = balance[:, 4], balance[:, 5]
     energy = _defect(kinetic - kinetic[0] - work, np.maximum.accumulate(kinetic) + moved, reached)
     electric = _defect(magnetic - magnetic[0] - surplus, np.maximum.accumulate(magnetic) + supplied, reached)
-    at = float(state[-1]) if regular else float(marks[counts[2] - 1, 1]) if counts[2] else math.nan
-    at = max(at, float(out[max(reached - 1, 0)])) if at == at else float(out[max(reached - 1, 0)])
-    reason = _REASONS[status].format(t=at, steps=int(counts[0] + counts[1]), events=len(marks))
-    if status is RunStatus.TOO_MANY_EVENTS and (marks[-20:, 0] == 5).any() and (marks[-20:, 0] == 3).any():
-        reason += (
-            f"; the train (efficiency {train.efficiency:g}) holds the mechanism at rest: neither torque overcomes it"
-        )
     if max(energy, electric) > _WARN:
         notes = (*notes, f"the energy balance is off by {max(energy, electric):.1e}; tighten rtol")
     unit = "currents negligible" if currents.shape[1] == 0 else f"{currents.shape[1]} current(s)"
@@ -244,10 +240,30 @@ def _result(
         time=out, angle=angle, speed=speed, currents=currents, reduced_angle=Y[:, 0].copy(), turns=turns,
         momentum=momentum, motor_torque=torque, kinetic_energy=kinetic, work=work, energy_error=energy,
         electric_error=electric if currents.shape[1] else 0.0, error=error,
-        events=_events(marks[: counts[2]], regular), status=status, reached=reached, reason=reason,
+        events=_events(marks[: counts[2]], regular), status=status, reached=reached,
+        reason=_reason(found, train, out, regular),
         model=f"{name}, {unit}", steps=int(counts[0]), rejected=int(counts[1]), rtol=rtol, seconds=seconds,
         notes=notes,
     )  # fmt: skip
+
+
+def _reason(found: _Raw, train: Train, out: Array, regular: bool) -> str:
+    """Why the run ended before its last output time, and the remedy; empty if it did not."""
+    status, _, _, _, marks, counts, state = found
+    if status is RunStatus.DONE:
+        return ""
+    last = marks[: counts[2]][-20:]
+    known = float(out[max(int(counts[3]) - 1, 0)])
+    at = float(state[-1]) if regular else max(known, float(last[-1, 1])) if len(last) else known
+    reason = _REASONS[status].format(t=at, steps=int(counts[0] + counts[1]), events=len(marks))
+    kinds = {_EVENTS[int(code)] for code in last[:, 0]}
+    if status is RunStatus.TOO_MANY_EVENTS and {"direction of power flow", "stall"} <= kinds:
+        reason += (
+            f"; the train (efficiency {train.efficiency:g}) holds the mechanism at rest: neither torque overcomes it"
+        )
+    if regular and {"dead centre", "stall"} <= kinds and len({round(angle, 6) for angle in last[-4:, 3]}) == 1:
+        reason += "; the mechanism comes to rest at a dead centre, where model S says nothing: give J_0 > 0"
+    return reason
 
 
 def _defect(defect: Array, size: Array, reached: int) -> float:

@@ -8,11 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import DCMotor, IdealTorque, LinearCharacteristic, Motor, SynchronousMotor, number
+from graphsynth.dynamics.motors import (
+    DCMotor,
+    IdealTorque,
+    LinearCharacteristic,
+    Motor,
+    SynchronousMotor,
+    number,
+    numbers,
+)
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
 
-__all__ = ["Plant", "Prepared", "output_times", "prepare"]
+__all__ = ["Plant", "Prepared", "load_coefficients", "output_times", "prepare"]
 
 Array = NDArray[np.float64]
 
@@ -50,17 +58,20 @@ class Prepared:
 
 def output_times(times: ArrayLike) -> Array:
     """Return strictly increasing finite times as an array, or raise `SpecError`."""
-    out = np.array(times, dtype=np.float64)
-    if out.ndim != 1 or out.size < 2 or not np.isfinite(out).all() or not (np.diff(out) > 0).all():
-        raise SpecError(f"times of shape {out.shape} must be at least two finite, strictly increasing numbers (s)")
+    out = numbers("times", times, "seconds")
+    if out.ndim != 1 or out.size < 2 or not (np.diff(out) > 0).all():
+        raise SpecError(f"times of shape {out.shape} must be at least two strictly increasing numbers; give them in s")
     return out
 
 
 def prepare(
     plant: Plant, motor: Motor, train: Train, out: Array, angle: float, speed: float,
-    currents: tuple[float, ...] | None, regular: bool,
+    currents: tuple[float, ...] | None, regular: bool, *, singular: bool = False,
 ) -> Prepared:  # fmt: skip
-    """Check everything and lay it out for the integrator; the arguments are those of `run`."""
+    """Check everything and lay it out for the integrator; the arguments are those of `run`.
+
+    ``singular`` allows an inertia that vanishes, for motions that are given.
+    """
     from graphsynth.dynamics.platform_drive.kernels import systems as s
 
     if isinstance(motor, IdealTorque):
@@ -74,7 +85,7 @@ def prepare(
     if plant.linkage is not None:
         values[s.LINKAGE :] = plant.linkage
     rows = _rows(plant)
-    given = (0.0,) * amperes if currents is None else tuple(number("current", c) for c in currents)
+    given = (0.0,) * amperes if currents is None else tuple(numbers("currents", currents, "A").ravel().tolist())
     if len(given) != amperes:
         raise SpecError(f"{len(given)} currents given for a motor with {amperes}; leave them out or give {amperes}")
     setup = np.array([s.SERIES if plant.linkage is None else s.FOUR_BAR, code, int(regular), 0, 1])
@@ -83,7 +94,7 @@ def prepare(
     s.mechanism(setup, q, values, rows, here)
     if regular:
         _allow_regular(values, motor, plant.dead_centres, q)
-    elif not here[0] > 0.0 or not _least_inertia(plant, values[s.BASE]) > 0.0:
+    elif not singular and (not here[0] > 0.0 or not _least_inertia(plant, values[s.BASE]) > 0.0):
         raise SpecError("the inertia vanishes on the way: give J_0 > 0 (rotor or wheels), or use the regularised model")
     zeros = _bounds(plant, values, q, regular)
     _modes(setup, values, motor, w, given, train.ratio)
@@ -118,14 +129,20 @@ def _motor(motor: Motor) -> tuple[int, Array, int]:
         ]), 2  # fmt: skip
     if isinstance(motor, LinearCharacteristic):
         return 0, np.array([motor.stall, motor.slope]), 0
-    raise SpecError(f"{type(motor).__name__} is not a motor that drives a motion; give a motor with a torque")
+    raise SpecError(f"{type(motor).__name__} has no equation of motion to integrate; give a motor with a torque")
+
+
+def load_coefficients(series: ArrayLike) -> Array:
+    """Return the coefficients ``a0, a1, b1, ...`` of a load torque, checked."""
+    load = numbers("load_series", series, "N m")
+    if load.ndim != 1 or load.size % 2 == 0:
+        raise SpecError(f"load_series of shape {load.shape} must be coefficients a0, a1, b1, ...; give an odd number")
+    return load
 
 
 def _rows(plant: Plant) -> Array:
     """Velocity rows with the series of the load as the last row."""
-    load = np.zeros(1) if plant.load_series is None else np.asarray(plant.load_series, dtype=np.float64)
-    if load.ndim != 1 or load.size % 2 == 0 or not np.isfinite(load).all():
-        raise SpecError(f"load_series of shape {load.shape} must be finite coefficients a0, a1, b1, ...: an odd number")
+    load = np.zeros(1) if plant.load_series is None else load_coefficients(plant.load_series)
     rows = np.zeros((plant.rows.shape[0] + 1, max(plant.rows.shape[1], load.size)))
     rows[:-1, : plant.rows.shape[1]] = plant.rows
     rows[-1, : load.size] = load

@@ -14,6 +14,7 @@ from graphsynth.dynamics.braider.linkage import FourBar
 from graphsynth.dynamics.braider.model import Braider, Thread
 from graphsynth.dynamics.braider.multipliers import solve_with_multipliers
 from graphsynth.dynamics.braider.reactions import reactions, run_reactions
+from graphsynth.dynamics.motors import IdealSpeed
 from graphsynth.dynamics.platform_drive.run import RunStatus
 from graphsynth.errors import GeometryError, SpecError
 
@@ -277,6 +278,18 @@ def test_link_motion_and_energy(start_up):
     np.testing.assert_allclose(motion.acceleration[5], second.acceleration[:, 2], rtol=1e-11)
 
 
+def test_ideal_speed_needs_the_torque_of_the_inverse_dynamics():
+    braider = Braider(motor=IdealSpeed(58.08 * 1.803, rotor_inertia=8.2e-6, friction=1e-6))
+    found = braider.simulate(np.linspace(0.0, 4.0, 81))
+    assert found.complete and found.energy_error < 1e-14
+    shaft = reactions(braider, found.angle, 1.803, 0.0).torque
+    np.testing.assert_allclose(58.08 * found.motor_torque - 58.08**2 * 1e-6 * 1.803, shaft, atol=1e-15)
+    blocked = Braider(linkage=FourBar(0.03, 0.03, 0.04, 0.06), motor=IdealSpeed(58.08)).simulate([0, 1, 2, 3])
+    assert blocked.status is RunStatus.NOT_FINITE and np.isnan(blocked.motor_torque[blocked.reached :]).all()
+    met = Braider(linkage=CHANGE, motor=IdealSpeed(58.08)).simulate([0, 1, 2, 3, 4])
+    assert met.status is RunStatus.CHANGE_POINT and met.reached == 4
+
+
 def test_gravity_of_the_thread_does_the_work_of_its_weight():
     """The thread is conservative: its work is the weight times the shortening between guide and tip."""
     braider = Braider()
@@ -297,6 +310,14 @@ REFUSED = {
     "inductance = 0 with the unreduced": lambda: replace(
         Braider(), motor=replace(Braider().motor, inductance=0.0)
     ).simulate([0, 1], reduce=False),
+    "guide = 'x' is no point": lambda: Thread(guide="x"),
+    "1 masses given": lambda: Braider(masses=3.0),
+    "is no motor": lambda: Braider(motor=3.0),
+    "FourBar and a Thread": lambda: Braider(linkage="x"),
+    "target = 0 has no relative band": lambda: Braider().settling(0.0),
+    "theta = 'x' are not": lambda: reactions(Braider(), "x", 1.0, 0.0),
+    "do not fit": lambda: reactions(Braider(), [0.0, 1.0], [1.0, 2.0, 3.0], 0.0),
+    "no inductance to take to zero": lambda: Braider(motor=IdealSpeed(1.0)).inductance_study([0, 1], (1e-3,)),
     "only one of them": lambda: solve_with_multipliers(Braider(), 0.0, 1.0),
     "cannot be assembled at theta": lambda: solve_with_multipliers(
         Braider(linkage=FourBar(0.03, 0.03, 0.04, 0.06)), 3.0, 1.0, acceleration=0.0

@@ -193,8 +193,27 @@ def test_ideal_torque_and_speed():
     assert (found.speed[-1], found.angle[-1]) == pytest.approx((50.0, 5.0), rel=1e-12)
     held = MotorDrivenPlatform.source(IdealTorque(0.0)).torque_at_speed([0.3], 10.0)
     assert held[0] == pytest.approx(-0.5 * 0.005 * math.sin(0.6) * 100.0, rel=1e-12)
-    with pytest.raises(SpecError, match="torque_at_speed"):
-        MotorDrivenPlatform.source(IdealSpeed(3.0))
+
+
+def test_ideal_speed_gives_the_torque():
+    """Against the equation of motion by hand, with train, efficiency by direction, friction and a load series."""
+    source = IdealSpeed(30.0, rotor_inertia=1e-4, friction=2e-3)
+    drive = MotorDrivenPlatform(
+        EffectiveInertia.of_slider(2.0, 0.05), source, Train(3.0, 0.8), friction=0.01, load_series=[-0.1, 0.2, -0.3]
+    )
+    found = drive.simulate(np.linspace(1.0, 3.0, 41), angle=0.3)
+    q, w = 0.3 + 10.0 * (found.time - 1.0), 10.0
+    load = -0.1 + 0.2 * np.cos(q) - 0.3 * np.sin(q)
+    needed = -0.5 * 0.005 * np.sin(2 * q) * w * w + (0.01 + 9 * 2e-3) * w + load
+    np.testing.assert_allclose(found.motor_torque, needed / 3.0 * np.where(needed > 0, 1 / 0.8, 0.8), rtol=1e-12)
+    assert (needed > 0).any() and (needed < 0).any()
+    np.testing.assert_allclose(found.kinetic_energy, 0.5 * (0.005 * np.cos(q) ** 2 + 9e-4) * w * w, rtol=1e-12)
+    assert found.complete and found.energy_error < 1e-13 and found.currents.shape == (41, 0)
+    np.testing.assert_allclose(found.reduced_angle + found.turns * math.tau, q, rtol=1e-14)
+    with pytest.raises(SpecError, match="speed = 3 contradicts the ideal source, which turns the crank at 10"):
+        drive.simulate([0.0, 1.0], speed=3.0)
+    with pytest.raises(SpecError, match="no inductance"):
+        drive.inductance_study([0.0, 1.0], [1e-3])
 
 
 REFUSED = {
@@ -213,6 +232,24 @@ REFUSED = {
     "teeth = 0": lambda: Train.of_teeth([(0, 30)]),
     "2 efficiencies for 1 stages": lambda: Train.of_teeth([(10, 30)], (0.9, 0.9)),
     "is not a number": lambda: DCMotor("one", 0.1, **DC),
+    "pole_pairs = 'two' must be a whole number": lambda: SynchronousMotor("two", 1.0, 0.1, 0.1, 0.0, 1.0),
+    "stage 10 of the train must be a pair": lambda: Train.of_teeth([10]),
+    "teeth = 'x'": lambda: Train.of_teeth([(10, "x")]),
+    "'motor' is no motor": lambda: MotorDrivenPlatform.source("motor"),
+    "is no EffectiveInertia": lambda: MotorDrivenPlatform(5, DCMotor(1.0, 0.1, **DC)),
+    "are not real numbers": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate(["a", "b"]),
+    "at least two strictly increasing": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate(5),
+    "max_steps = -5": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate([0, 1], max_steps=-5),
+    "2 currents given": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).simulate([0, 1], currents=(1, 2)),
+    "must be positive: give a motor that turns": lambda: linear_response(
+        DCMotor(1.0, 0.1, 0.0, 0.1, 20.0, 20.0), 0.1, [0, 1]
+    ),
+    "no inductance to try": lambda: MotorDrivenPlatform.source(DCMotor(1.0, 0.1, **DC)).inductance_study([0, 1], []),
+    "rows = 'abc' are not": lambda: EffectiveInertia("abc"),
+    "odd number of columns": lambda: EffectiveInertia([[1.0, 2.0]]),
+    "load_series of shape": lambda: MotorDrivenPlatform(
+        EffectiveInertia([[1.0]]), DCMotor(1.0, 0.1, **DC), load_series=[1, 2]
+    ),
 }
 
 
@@ -221,3 +258,16 @@ def test_refusals_name_value_and_remedy(said):
     with pytest.raises(SpecError, match=said) as caught:
         REFUSED[said]()
     assert "\n" not in str(caught.value)
+
+
+def test_names_are_found_in_the_room_without_loading_it():
+    import subprocess
+    import sys
+
+    names = "DCMotor SynchronousMotor LinearCharacteristic IdealTorque IdealSpeed Train MotorDrivenPlatform "
+    names += "EffectiveInertia resistance_effect DriveRun Braider Thread FourBar"
+    probe = (
+        "import sys, graphsynth.dynamics as d; assert 'numpy' not in sys.modules; "
+        f"assert all(getattr(d, n).__name__ == n and n in d.__all__ for n in {names.split()!r})"
+    )
+    subprocess.run([sys.executable, "-c", probe], check=True, timeout=60)

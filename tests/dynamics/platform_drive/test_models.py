@@ -179,6 +179,21 @@ def test_reversal_is_an_event():
     assert found.energy_error < 1e-12
 
 
+def test_rest_at_a_dead_centre_says_so():
+    """The kinetic energy dies exactly where J vanishes: model S has no continuation there, and the reason says why."""
+    drive = MotorDrivenPlatform(
+        EffectiveInertia.of_slider(0.1332598003584945, 0.09162041481064319),
+        DCMotor(
+            2.310810549976273, 0.04469342315103243, 0.4783690154056197, 0.10447004049375043, 5.838930779194312,
+            31.356057269576226,
+        ),
+        Train(3.5697091996194663), load=-0.02531458291571574,
+    )  # fmt: skip
+    found = drive.simulate(np.linspace(0.0, 1.25, 5), angle=0.7671041258862648, speed=1.0997214360195429)
+    assert not found.complete and "rest at a dead centre" in found.reason and "J_0 > 0" in found.reason
+    assert np.isnan(found.angle[found.reached :]).all() and found.reached == 4
+
+
 def test_regularised_form_of_any_inertia_agrees_with_the_form_with_inertia():
     """An inertia without zeros can be run in both forms."""
     inertia = EffectiveInertia(np.array([[0.08, 0.05, 0.01, 0.004, -0.01], [0.02, 0.0, 0.03, 0.01, 0.0]]))
