@@ -19,7 +19,7 @@ from graphsynth.jamming.coupled.closure import PITCH, ROLL, ROUND, Layout, momen
 from graphsynth.jamming.coupled.linear import enclosed_solve, points
 from graphsynth.jamming.coupled.program import PoseSolution, Units
 
-__all__ = ["Moving", "Pieces", "factor_bounds", "shifts_enclosed"]
+__all__ = ["Moving", "Pieces", "factor_bounds", "lower_bounds", "shifts_enclosed", "upper_bounds"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -85,13 +85,25 @@ def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Arra
     lower, upper : ndarray, shape (N,)
         For every member of the box ``lower <= T <= upper``; 0 and infinity where nothing is proved.
     """
-    count = len(at.r)
+    return lower_bounds(layout, at, found), upper_bounds(layout, at, found)
+
+
+def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> Array:
+    """Bounds from equilibrium; see `factor_bounds`."""
     if layout.loops == 0:
-        return np.zeros(count), np.zeros(count)
-    centre, length = found.units.centre, found.units.length
-    r = (at.r - Interval(centre)) / length
+        return np.zeros(len(at.r))
+    length = found.units.length
     with np.errstate(all="ignore"):
-        return _lower(layout, r, at, found, length), _upper(layout, r, at, found, length)
+        return _lower(layout, (at.r - Interval(found.units.centre)) / length, at, found, length)
+
+
+def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> Array:
+    """Bounds from closure; see `factor_bounds`."""
+    if layout.loops == 0:
+        return np.zeros(len(at.r))
+    length = found.units.length
+    with np.errstate(all="ignore"):
+        return _upper(layout, (at.r - Interval(found.units.centre)) / length, at, found, length)
 
 
 def _lower(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float) -> Array:

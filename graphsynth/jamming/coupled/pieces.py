@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,7 +10,9 @@ from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
-from graphsynth.jamming.coupled.enclosure import Moving, Pieces, factor_bounds, shifts_enclosed
+from graphsynth.jamming.coupled.closure import Layout
+from graphsynth.jamming.coupled.corners import corner_layouts
+from graphsynth.jamming.coupled.enclosure import Moving, Pieces, lower_bounds, shifts_enclosed, upper_bounds
 from graphsynth.jamming.coupled.linear import points
 from graphsynth.jamming.coupled.positions import Positions
 from graphsynth.jamming.coupled.problem import Problem, check_motion
@@ -58,8 +61,9 @@ class Work:
     """Evaluation of pieces of one problem along one motion."""
 
     def __init__(self, given: Problem, motion: Motion, tolerance: float) -> None:
-        self.given, self.motion = given, motion
+        self.given, self.motion, self.tolerance = given, motion, tolerance
         self.system = Positions(motion.mechanism, tolerance)
+        self.corners = corner_layouts(given.layout)
         keep = np.flatnonzero(motion.assembled)
         ends = motion.inputs[keep]
         self.low, self.high = float(ends.min()), float(ends.max())
@@ -99,22 +103,33 @@ class Work:
                 at_middle = prove_tubes(
                     self.system, self.given.layout.joints, points(u.mid[keep[rows]]), x[rows], rate[rows], counted[rows]
                 )
-                whole = self._pieces(u[keep[rows]], tubes.take(rows), at_middle, counted[rows])
-                solution = self.given.solve(poses[rows], "scale")
-                lower[keep[rows]], upper[keep[rows]] = factor_bounds(self.given.layout, whole, solution)
+                whole = u[keep[rows]], tubes.take(rows), at_middle, counted[rows]
+                lower[keep[rows]], upper[keep[rows]] = self._bounds(poses[rows], *whole)
         return Found(lo, hi, lower, upper, proved, box[0], box[1])
 
-    def _pieces(self, u: Interval, tubes: Tubes, middle: Tubes, counted: Array) -> Pieces:
-        """Positions and misalignments over pieces, with what the mean value theorem needs where it is proved."""
+    def _bounds(self, poses: Array, u: Interval, tubes: Tubes, middle: Tubes, counted: Array) -> tuple[Array, Array]:
+        """Bound the factor: below over the whole boxes, above at the corners of the misalignments."""
         layout = self.given.layout
-        d = shifts_enclosed(layout, tubes.base)
-        r_slope, e_slope, base_slope, fine = slopes(self.system, layout.joints, u, tubes, counted)
+        rates = slopes(self.system, layout.joints, u, tubes, counted)
         step = u - points(u.mid)
-        moving = Moving(
-            middle.r, middle.e, shifts_enclosed(layout, middle.base), r_slope, e_slope,
-            shifts_enclosed(layout, base_slope), step, middle.proved & fine,
-        )  # fmt: skip
-        return Pieces(tubes.r, tubes.e, d, moving)
+
+        def pieces(own: Layout) -> Pieces:
+            """Positions and misalignments, with what the mean value theorem needs where it is proved."""
+            r_slope, e_slope, base_slope, fine = rates
+            moving = Moving(
+                middle.r, middle.e, shifts_enclosed(own, middle.base), r_slope, e_slope,
+                shifts_enclosed(own, base_slope), step, middle.proved & fine,
+            )  # fmt: skip
+            return Pieces(tubes.r, tubes.e, shifts_enclosed(own, tubes.base), moving)
+
+        upper = np.zeros(len(poses))
+        for corner in self.corners:
+            found = replace(self.given, layout=corner).solve(poses, "scale")
+            upper = np.maximum(upper, upper_bounds(corner, pieces(corner), found))
+        if len(self.corners) > 1:  # one alone differs by a factor at most, which the bound from below does not see
+            found = self.given.solve(poses, "scale")
+        lower = lower_bounds(layout, pieces(layout), found)
+        return lower, upper
 
     def estimate(self, inputs: Array) -> Array:
         """Factor at inputs in ascending order (estimated); 0 where there is no pose."""

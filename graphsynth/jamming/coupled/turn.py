@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.bearing import Condition
+from graphsynth.jamming.coupled.judgement import judge, states
 from graphsynth.jamming.coupled.limits import Misalignment
-from graphsynth.jamming.coupled.pieces import Found, Work, check_range, cut
+from graphsynth.jamming.coupled.pieces import Found, Work, check_range
 from graphsynth.jamming.coupled.positions import Unsupported
 from graphsynth.jamming.coupled.problem import Bearings, problem
+from graphsynth.jamming.coupled.search import Budget, search
+from graphsynth.jamming.coupled.witness import Witness, jamming_member
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -30,8 +32,6 @@ __all__ = ["TurnCertificate", "certify_coupled"]
 
 Array = NDArray[np.float64]
 
-_PEAKS = 4
-
 
 @dataclass(frozen=True, eq=False)
 class TurnCertificate:
@@ -40,8 +40,9 @@ class TurnCertificate:
     Attributes
     ----------
     verdict : Verdict
-        CERTIFIED_FREE: no jam at any input, for any value in the tolerance boxes.  CERTIFIED_JAMMED: at every input of
-        the pieces marked so it jams, for every value in the boxes.  UNDECIDED otherwise.
+        CERTIFIED_FREE: no jam at any input of the range (between the samples too), for any value in the tolerance
+        boxes.  CERTIFIED_JAMMED: at every input of the pieces marked so it jams, for every value in the boxes.
+        CERTIFIED_JAMMED_FOR_SOME: the member ``witness`` of the boxes jams.  UNDECIDED otherwise.
     reason : str
     low, high : ndarray, shape (pieces,)
         Pieces of the input, ascending.
@@ -51,6 +52,8 @@ class TurnCertificate:
         Proved bounds of the factor on limits and plays together (the inverse of the allowed scale).
     one_branch : bool
         All pieces are proved to belong to one continuous branch.
+    witness : Witness or None
+        The member that jams, for CERTIFIED_JAMMED_FOR_SOME.
     evaluated : int
         Pieces evaluated.
     seconds : float
@@ -64,6 +67,7 @@ class TurnCertificate:
     lower: Array
     upper: Array
     one_branch: bool
+    witness: Witness | None
     evaluated: int
     seconds: float
 
@@ -96,6 +100,7 @@ class TurnCertificate:
             "jammed": self.arcs(-1),
             "undecided": self.arcs(0),
             "one_branch": self.one_branch,
+            "witness": None if self.witness is None else self.witness.summary(),
             "evaluated": self.evaluated,
             "seconds": self.seconds,
         }
@@ -167,62 +172,31 @@ def certify_coupled(
     given = problem(motion.mechanism, bearings, tilts, condition)
     try:
         work = Work(given, motion, length_tolerance)
+        budget = Budget(resolution * (work.high - work.low), max_pieces, seconds, begin)
+        return _proved(work, budget, *search(work, budget))
     except Unsupported as error:
         return _nothing(motion, str(error), perf_counter() - begin)
-    parts: list[Found] = []
-    lo, hi = work.first()
-    stopped = ""
-    smallest = resolution * (work.high - work.low)
-    while lo.size:
-        if work.evaluated + lo.size > max_pieces or perf_counter() - begin > seconds:
-            stopped = f"the limit of work was reached after {work.evaluated} pieces"
-            parts.append(_open(lo, hi, work.system.size))
-            break
-        try:
-            found = work.evaluate(lo, hi)
-        except Unsupported as error:
-            return _nothing(motion, str(error), perf_counter() - begin)
-        again = ~((found.lower > 1.0) | (found.upper < 1.0)) & (hi - lo > smallest)
-        parts.append(found.take(~again))
-        lo, hi = cut(lo[again], hi[again])
-    pieces = Found.join(parts)
-    if not (pieces.lower > 1.0).any() and not ((pieces.upper < 1.0) | ~pieces.proved).all():
-        pieces = _with_peak(work, pieces)
-    return _turn_certificate(work, pieces, stopped, begin)
 
 
-def _with_peak(work: Work, pieces: Found) -> Found:
-    """Look in undecided pieces for an input at which the jam can be proved; add it as a piece of no width."""
-    left = np.flatnonzero((pieces.upper >= 1.0) & pieces.proved)
-    left = left[np.argsort(-pieces.lower[left])][:_PEAKS]
-    lo, hi = pieces.lo[left], pieces.hi[left]
-    for _ in range(8):
-        inputs = np.unique(lo[:, None] + (hi - lo)[:, None] * (np.arange(9) / 8.0))
-        value = work.estimate(inputs)
-        for k in range(len(lo)):
-            own = np.flatnonzero((inputs >= lo[k]) & (inputs <= hi[k]))
-            if own.size > 2:
-                best = own[int(np.argmax(value[own]))]
-                lo[k], hi[k] = inputs[max(best - 1, own[0])], inputs[min(best + 1, own[-1])]
-    inputs = np.unique(np.concatenate([lo, 0.5 * (lo + hi), hi]))
-    points = work.evaluate(inputs, inputs)
-    jams = np.flatnonzero(points.lower > 1.0)
-    if jams.size == 0:
-        return pieces
-    top = jams[[int(np.argmax(points.lower[jams]))]]
-    u = float(points.lo[top[0]])
-    place = int(np.searchsorted(pieces.lo, u, side="right")) - 1
-    split = pieces.take(np.array([place, place]))
-    split.hi[0] = split.lo[1] = u
-    rest = np.delete(np.arange(len(pieces.lo)), place)
-    return Found.join([pieces.take(rest), split, points.take(top)])
-
-
-def _open(lo: Array, hi: Array, size: int) -> Found:
-    """Pieces about which nothing is known."""
-    none = np.zeros(len(lo))
-    box = np.full((len(lo), size), np.nan)
-    return Found(lo, hi, none, none + np.inf, none > 1.0, box, box)
+def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCertificate:
+    """Keep what is proved to be on the branch of the motion; judge."""
+    links = work.links(pieces)
+    own = work.on_branch(pieces, links)
+    branch = bool(own.all() and links.all())
+    lost = np.flatnonzero(pieces.proved & ~own)
+    # of another branch, perhaps: nothing is said about the motion
+    pieces = pieces._replace(lower=np.where(own, pieces.lower, 0.0), upper=np.where(own, pieces.upper, np.inf))
+    if lost.size and not stopped:
+        stopped = (
+            f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
+        )
+    state = states(pieces)
+    witness = None if (state == -1).any() or (state == 1).all() else jamming_member(work, pieces, own)
+    verdict, reason = judge(work, pieces, state, stopped, branch, witness)
+    return TurnCertificate(
+        verdict, reason, pieces.lo, pieces.hi, state, pieces.lower, pieces.upper, branch, witness, work.evaluated,
+        perf_counter() - budget.begin,
+    )  # fmt: skip
 
 
 def _nothing(motion: Motion, reason: str, seconds: float) -> TurnCertificate:
@@ -230,63 +204,5 @@ def _nothing(motion: Motion, reason: str, seconds: float) -> TurnCertificate:
     low, high = np.array([ends.min()]), np.array([ends.max()])
     zero = np.zeros(1)
     return TurnCertificate(
-        Verdict.UNDECIDED, reason, low, high, np.zeros(1, dtype=np.int8), zero, zero + np.inf, False, 0, seconds
-    )
-
-
-def _turn_certificate(work: Work, pieces: Found, stopped: str, begin: float) -> TurnCertificate:
-    links = work.links(pieces)
-    own = work.on_branch(pieces, links)
-    branch = bool(own.all() and links.all())
-    # of another branch, perhaps: nothing is said about the motion
-    pieces = pieces._replace(lower=np.where(own, pieces.lower, 0.0), upper=np.where(own, pieces.upper, np.inf))
-    state = np.where(pieces.lower > 1.0, -1, np.where(pieces.upper < 1.0, 1, 0)).astype(np.int8)
-    lost = np.flatnonzero(pieces.proved & ~own)
-    if lost.size and not stopped:
-        stopped = (
-            f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
-        )
-    verdict, reason = _judge(work, pieces, state, stopped, branch)
-    return TurnCertificate(
-        verdict, reason, pieces.lo, pieces.hi, state, pieces.lower, pieces.upper, branch, work.evaluated,
-        perf_counter() - begin,
-    )  # fmt: skip
-
-
-def _judge(work: Work, pieces: Found, state: NDArray[np.int8], stopped: str, branch: bool) -> tuple[Verdict, str]:
-    width = pieces.hi - pieces.lo
-    share = [float(width[state == s].sum() / width.sum()) for s in (-1, 0, 1)]
-    open_text = _why_open(pieces, state, stopped)
-    if share[0] == 0.0 and (state == -1).any():
-        u = float(pieces.lo[state == -1][0])
-        return Verdict.CERTIFIED_JAMMED, f"jams at the input {u!r}, proved; around it undecided: {open_text}"
-    if share[0] > 0.0:
-        rest = f"; undecided over {share[1]:.3g}: {open_text}" if share[1] > 0.0 else ""
-        return Verdict.CERTIFIED_JAMMED, f"jams over {shortened(share[0], -1)} of the range, proved{rest}"
-    if share[1] > 0.0:
-        if share[1] == 1.0:
-            return Verdict.UNDECIDED, f"nothing is proved: {open_text}"
-        return Verdict.UNDECIDED, f"{open_text} over {share[1]:.3g} of the range, the rest is proved free"
-    if not work.motion.completed:
-        return Verdict.UNDECIDED, f"free as far as the motion goes, proved; it ends: {work.motion.reason}"
-    if not branch:
-        return Verdict.UNDECIDED, "every piece is free, but the pieces are not proved to be one branch"
-    return Verdict.CERTIFIED_FREE, f"free over the whole range, proved in {work.evaluated} pieces"
-
-
-def _why_open(pieces: Found, state: NDArray[np.int8], stopped: str) -> str:
-    left = state == 0
-    if not left.any():
-        return ""
-    lost = left & ~pieces.proved
-    if stopped:
-        return stopped
-    if lost.any():
-        u = float(pieces.lo[lost][0])
-        return f"the positions are not proved near the input {u:.9g} (a singularity, or two modes that nearly meet)"
-    worst = int(np.flatnonzero(left)[np.argmax(pieces.upper[left] - pieces.lower[left])])
-    below, above = shortened(float(pieces.lower[worst]), -1, 9), shortened(float(pieces.upper[worst]), 1, 9)
-    return (
-        f"the factor lies between {below} and {above} near the input "
-        f"{pieces.lo[worst]:.9g}: a crossing, a touch, or tolerances of which some jam and some do not"
+        Verdict.UNDECIDED, reason, low, high, np.zeros(1, dtype=np.int8), zero, zero + np.inf, False, None, 0, seconds
     )

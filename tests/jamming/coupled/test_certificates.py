@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from coupled_oracles import driven_pair, embodied, four_bar
+from coupled_oracles import driven_pair, embodied, four_bar, single_loop
 
 from graphsynth import Driver, Gear, Mechanism, MechanismGraph, PinSlot, Prismatic, Revolute, simulate
 from graphsynth.errors import GeometryError
@@ -205,19 +205,56 @@ def test_pieces_against_dense_samples(links, number, resolution):
         assert (value <= proof.upper[place] * (1 + 1e-12)).all()
 
 
-def test_tolerances_make_a_verdict_undecided():
+def test_tolerances_within_which_all_are_free_or_all_jam():
     motion = simulate(four_bar(), TURN)
     sharp = Misalignment(0, 1, 0.0120)
-    assert certify_coupled(motion, Bearing(), sharp).verdict.name == "CERTIFIED_FREE"
-    wide = Misalignment(0, 1, 0.0120, alpha_range=(0.0118, 0.0123))
-    proof = certify_coupled(motion, Bearing(), wide, max_pieces=600)
-    assert (proof.verdict.name == "UNDECIDED" and "tolerances" in proof.reason) or "limit of work" in proof.reason
     assert certify_coupled(motion, Bearing(), sharp, length_tolerance=1e-4).verdict.name == "CERTIFIED_FREE"
-    assert certify_coupled(motion, Bearing(), sharp, length_tolerance=2e-2, max_pieces=600).verdict.name == "UNDECIDED"
     fit = bearing_limits(Bearing(), clearance_tolerance=0.003)
-    assert certify_coupled(motion, fit, sharp, max_pieces=600).verdict.name == "UNDECIDED"
-    assert certify_coupled(motion, fit, Misalignment(0, 1, 0.0108)).verdict.name == "CERTIFIED_FREE"
+    free = certify_coupled(motion, fit, Misalignment(0, 1, 0.0108))
+    assert free.verdict.name == "CERTIFIED_FREE" and free.witness is None
     assert certify_coupled(motion, fit, Misalignment(0, 1, 0.0134)).verdict.name == "CERTIFIED_JAMMED"
+
+
+@pytest.mark.parametrize(
+    ("fit", "alpha", "alpha_range", "tolerance"),
+    [
+        (Bearing(), 0.0120, (0.0118, 0.0123), 0.0),
+        (Bearing(), 0.0120, (-0.0123, 0.0121), 0.0),
+        (bearing_limits(Bearing(), clearance_tolerance=0.003), 0.0120, None, 0.0),
+        (Bearing(), 2 * T_A * (1 - 2e-3), None, 5e-3),
+    ],
+    ids=["alpha", "sign", "fit", "lengths"],
+)
+def test_some_members_jam(fit, alpha, alpha_range, tolerance):
+    """The witness is a member of the boxes, and jams by the search over points of section 9.4 in many digits."""
+    tilt = Misalignment(0, 1, alpha, alpha_range=alpha_range)
+    motion = simulate(four_bar(), TURN)
+    found = certify_coupled(motion, fit, tilt, length_tolerance=tolerance, resolution=1e-2)
+    assert found.verdict.name == "CERTIFIED_JAMMED_FOR_SOME" and found.certified, found.reason
+    assert not (found.state == -1).any() and found.share(1) > 0.4
+    one = found.witness
+    (own,) = one.misalignments
+    assert tilt.alpha_range[0] <= own.alpha <= tilt.alpha_range[1]
+    for joint, plain in zip(one.mechanism.joints, four_bar().joints):
+        for value, nominal in zip((*joint.at_a, *joint.at_b), (*plain.at_a, *plain.at_b)):
+            assert abs(value - nominal) <= tolerance * abs(nominal)
+    pose = simulate(one.mechanism, [one.input], start=motion.poses[np.argmin(abs(motion.inputs - one.input))])
+    points = [pose.point(1, one.mechanism.joint(1, 2).at_a).position[0],
+              pose.point(2, one.mechanism.joint(2, 3).at_a).position[0], one.mechanism.joint(0, 3).at_a]  # fmt: skip
+    limits = [own.tilt for joint, own in zip(one.mechanism.joints, one.limits) if joint.pair != (0, 1)]
+    lowest = fit.tilt_range[0] if isinstance(fit, JointLimits) else T_A
+    assert limits == pytest.approx([lowest] * 3, rel=1e-14)
+    exact = float(single_loop(points, limits, own.vector, (0.0, 0.0), 0.0, digits=16))
+    assert 1.0 < one.factor <= exact * (1 + 1e-12) and one.factor == pytest.approx(exact, rel=1e-6)
+    assert found.summary()["witness"]["factor"] == one.factor and repr(one.input) in found.reason
+
+
+def test_what_no_member_decides():
+    """At the limit itself a member touches: neither free nor a proved jam, whatever the tolerance below it."""
+    motion = simulate(four_bar(), TURN)
+    touching = Misalignment(0, 1, 0.0120, alpha_range=(0.0118, 2 * T_A * (1 - 1e-17)))
+    proof = certify_coupled(motion, Bearing(), touching, resolution=1e-3)
+    assert proof.verdict.name == "UNDECIDED" and "touch" in proof.reason and proof.witness is None
 
 
 def test_change_points_and_folds_are_not_proved():
