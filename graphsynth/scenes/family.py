@@ -93,14 +93,16 @@ def family(name: str, place: Place | None = None) -> Family:
     at = place or Place("scene")
     value = FAMILIES.get(name) or _installed().get(name)
     if value is None:
-        raise at.error(f"has module = {name!r}, which is no family of mechanisms{suggest(name, family_names())}")
+        raise at.error(
+            f"has module = {name!r}, which is no family of mechanisms{suggest(name, family_names())}", "module"
+        )
     module, _, attribute = value.partition(":")
     try:
         found = getattr(import_module(module), attribute or "FAMILY")
     except (ImportError, AttributeError) as error:
         missing = isinstance(error, ModuleNotFoundError) and error.name == module
         why = "this installation does not have it" if missing else f"it cannot be imported: {error}"
-        raise at.error(f"has module = {name!r}, but {why} (looked for {value})") from error
+        raise at.error(f"has module = {name!r}, but {why} (looked for {value})", "module") from error
     if not isinstance(found, Family):
-        raise at.error(f"has module = {name!r}, but {value} is no Family but {type(found).__name__}")
+        raise at.error(f"has module = {name!r}, but {value} is no Family but {type(found).__name__}", "module")
     return found

@@ -96,6 +96,8 @@ class Scene:
         The tables as TOML gave them.
     digest : str
         SHA-256 of the file's bytes, empty for a mapping.
+    text : str
+        The file, for the line numbers of messages; empty for a mapping.
     """
 
     scene: SceneTable
@@ -105,6 +107,7 @@ class Scene:
     source: str = "<mapping>"
     raw: Mapping[str, object] = field(default_factory=dict, compare=False, repr=False)
     digest: str = ""
+    text: str = field(default="", compare=False, repr=False)
 
     @property
     def name(self) -> str:
@@ -114,10 +117,10 @@ class Scene:
     @property
     def place(self) -> Place:
         """Where the scene was read from, for messages."""
-        return Place(self.source)
+        return Place(self.source, (), self.text)
 
     @classmethod
-    def from_mapping(cls, tables: object, source: str = "<mapping>", digest: str = "") -> Scene:
+    def from_mapping(cls, tables: object, source: str = "<mapping>", digest: str = "", text: str = "") -> Scene:
         """Read a scene from the tables of a TOML document.
 
         Raises
@@ -125,14 +128,14 @@ class Scene:
         SceneError
             With the file, the key, what was expected and the nearest valid key.
         """
-        place = Place(source)
+        place = Place(source, (), text)
         if not isinstance(tables, Mapping):
             raise place.error("must hold tables")
         known: dict[str, type] = {"scene": SceneTable, "structure": StructureTable, "mechanism": object}
         known["outputs"] = OutputsTable
         for key in tables:
             if key not in known:
-                raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}")
+                raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}", str(key))
         for key in ("scene", "mechanism", "outputs"):
             if key not in tables:
                 raise place.error(f"lacks the table [{key}]")
@@ -145,7 +148,7 @@ class Scene:
         read: dict[str, Any] = {
             key: read_table(schema, tables[key], place / key) for key, schema in known.items() if key in tables
         }
-        return cls(**read, source=source, raw=dict(tables), digest=digest)
+        return cls(**read, source=source, raw=dict(tables), digest=digest, text=text)
 
     def stages(self) -> tuple[Stage, ...]:
         """Return every stage this scene can use; most are not needed for its outputs."""
@@ -207,6 +210,21 @@ def find_scene(name_or_path: str | Path) -> Path:
     )
 
 
+_LARGEST_FILE = 1 << 20
+
+
+def _read_bytes(path: Path) -> bytes:
+    """Read a scene file; one of more than a megabyte is no scene."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        raise FormatError(f"cannot be read: {error.strerror}", path.name) from None
+    if len(data) > _LARGEST_FILE:
+        raise FormatError(f"has more than {_LARGEST_FILE} bytes; a scene is a short text", path.name)
+    return data
+
+
 def load_scene(name_or_path: str | Path) -> Scene:
     """Read a scene by name or path.
 
@@ -223,11 +241,12 @@ def load_scene(name_or_path: str | Path) -> Scene:
     True
     """
     path = find_scene(name_or_path)
-    data = path.read_bytes()
+    data = _read_bytes(path)
     try:
-        tables = tomllib.loads(data.decode("utf-8"))
+        text = data.decode("utf-8")
+        tables = tomllib.loads(text)
     except UnicodeDecodeError as error:
         raise FormatError("not UTF-8 text; save the scene as UTF-8", f"{path.name}, byte {error.start}") from None
     except (ValueError, RecursionError) as error:  # ValueError: TOMLDecodeError, and integers of thousands of digits
         raise FormatError(f"not TOML: {error}", path.name) from None
-    return Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest())
+    return Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest(), text)

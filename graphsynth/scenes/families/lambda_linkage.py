@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import Stage
-from graphsynth.scenes.tables import check_positions, require
+from graphsynth.scenes.tables import ANY_LENGTH, check_positions, require
 
 __all__ = ["FAMILY", "BearingTable", "LambdaLengths", "LambdaTable", "Tilt"]
 
@@ -18,10 +18,10 @@ __all__ = ["FAMILY", "BearingTable", "LambdaLengths", "LambdaTable", "Tilt"]
 class LambdaLengths:
     """Link lengths of the four-bar, in any one unit: the model only uses their ratios."""
 
-    frame: float
-    crank: float
-    coupler: float
-    rocker: float
+    frame: Annotated[float, ANY_LENGTH]
+    crank: Annotated[float, ANY_LENGTH]
+    coupler: Annotated[float, ANY_LENGTH]
+    rocker: Annotated[float, ANY_LENGTH]
 
     def __post_init__(self) -> None:
         for name in ("frame", "crank", "coupler", "rocker"):

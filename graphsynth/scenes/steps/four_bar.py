@@ -124,8 +124,7 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
     for name, place in _TOLERANCES.values():
         if place:
             given[name] = _exact(_inside(raw, *place), getattr(getattr(table, place[0]), place[1]))
-    direction = _inside(raw, "tilt", "axis") or [None] * 3
-    axis = [_exact(text, value) for text, value in zip(direction, table.tilt.axis)]
+    axis = [_exact(number, value) for number, value in zip(_axis(raw), table.tilt.axis)]
     for key, size in table.tolerances.items() if tolerances else ():
         name = _tolerance_name(context, key)
         absolute, relative = _tolerance(context, key, size)
@@ -133,18 +132,24 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
     return ToleranceBox(**given, axis=axis, sgn=table.branch)
 
 
-def _inside(raw: Mapping[str, Any], table: str, key: str) -> Any:
-    inner = raw.get(table, {})
-    return inner.get(key) if isinstance(inner, Mapping) else None
+def _axis(raw: Mapping[str, Any]) -> list[Fraction | None]:
+    from graphsynth.scenes.tables import exact_number
+    from graphsynth.scenes.units import Unit
+
+    tilt = raw.get("tilt", {})
+    numbers = tilt.get("axis") if isinstance(tilt, Mapping) else None
+    return [exact_number(number, Unit.parse("")) for number in numbers or [None] * 3]
 
 
-def _exact(text: Any, value: float) -> Any:
-    """Return the decimal that stands in the file, if it is the one that was read; else the double."""
-    try:
-        number = Fraction(text if isinstance(text, str | int) else repr(text))
-    except (ValueError, TypeError, ZeroDivisionError):
-        return value
-    return number if float(number) == value else value
+def _inside(raw: Mapping[str, Any], table: str, key: str) -> Fraction | None:
+    from graphsynth.scenes.tables import written
+
+    return written(raw.get(table, {}), key)
+
+
+def _exact(number: Fraction | None, value: float) -> Any:
+    """Return the number that stands in the file, if it is the one that was read; else the double."""
+    return number if number is not None and float(number) == value else value
 
 
 def _tolerance_name(context: Context, key: str) -> str:
@@ -152,23 +157,32 @@ def _tolerance_name(context: Context, key: str) -> str:
 
     if key not in _TOLERANCES:
         raise (context.scene.place / "mechanism" / "tolerances").error(
-            f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}"
+            f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}", key
         )
     return _TOLERANCES[key][0]
 
 
 def _tolerance(context: Context, key: str, size: Any) -> tuple[Fraction, Fraction]:
     """Read an absolute tolerance, or a relative one such as ``"1 %"``."""
-    text = str(size).strip() if isinstance(size, str | int | float) and not isinstance(size, bool) else "?"
+    from graphsynth.scenes.tables import ANY_LENGTH
+    from graphsynth.scenes.units import Unit, convert, split_suffix, split_value
+
+    expected = Unit.parse(split_suffix(key)[1]) if split_suffix(key)[1] else ANY_LENGTH
     try:
-        number = Fraction(text.removesuffix("%").strip())
-    except (ValueError, ZeroDivisionError):
-        number = Fraction(-1)
-    if number < 0:
+        number, text = split_value(size if isinstance(size, str) else repr(size))
+        unit = Unit.parse(text)
+        if text and text != "%":
+            number, exact = convert(number, unit, expected) if unit.agrees(expected) else (Fraction(-1), True)
+            number *= 1 if exact else 1 + Fraction(1, 10**40)  # outward: more than the error of pi
+    except ValueError:
+        number, text = Fraction(-1), ""
+    if number < 0 or isinstance(size, bool):
         raise (context.scene.place / "mechanism" / "tolerances").error(
-            f'has {key} = {size!r}; give a tolerance of zero or more, as in 0.005, or relative, as in "1 %"'
+            f'has {key} = {size!r}; give a tolerance of zero or more, as in 0.005 or "0.005 {expected.text}", '
+            'or relative, as in "1 %"',
+            key,
         )
-    return (Fraction(0), number / 100) if text.endswith("%") else (number, Fraction(0))
+    return (Fraction(0), number / 100) if text == "%" else (number, Fraction(0))
 
 
 def jamming(context: Context, motions: tuple[Attempt, ...]) -> tuple[Attempt, ...]:

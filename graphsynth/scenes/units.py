@@ -1,0 +1,193 @@
+"""Units written in scene files: ``"17.5 mm"``, ``"2 deg"``, ``"0.01 %"``, ``"0.3 N m/rad"``.
+
+A unit is an exact rational factor to SI (radians for angles), a power of pi, and exponents of metre, kilogram,
+second, ampere and radian.  A value is converted exactly and rounded once.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+
+__all__ = ["SUFFIXES", "Unit", "convert", "split_suffix", "split_value", "unit_of_key"]
+
+Dimensions = tuple[int, int, int, int, int]
+_PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
+_NONE: Dimensions = (0, 0, 0, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit of measurement; ``dimensions`` are exponents of (m, kg, s, A, rad).
+
+    Examples
+    --------
+    >>> Unit.parse("N m/rad").dimensions
+    (2, 1, -2, 0, -1)
+    """
+
+    text: str
+    factor: Fraction
+    pi: int
+    dimensions: Dimensions
+
+    @classmethod
+    def parse(cls, text: str) -> Unit:
+        """Read a unit: symbols with optional powers, joined by space, ``*`` or ``/`` (which divides by the next one).
+
+        Raises
+        ------
+        ValueError
+            For a symbol nobody knows; its text is the symbol.
+        """
+        return _parse(text.strip())
+
+    def agrees(self, other: Unit) -> bool:
+        """Whether both measure the same quantity; a radian may be left out of mechanical and electrical units."""
+        if self.dimensions[:4] != other.dimensions[:4]:
+            return False
+        return self.dimensions[4] == other.dimensions[4] or self.dimensions[1] != 0
+
+    @property
+    def quantity(self) -> str:
+        """The quantity in words, as in ``a length``; the unit itself if it has no common name."""
+        return _QUANTITIES.get(self.dimensions, f"a quantity in {self.text}")
+
+
+def _table() -> dict[str, tuple[Fraction, int, Dimensions]]:
+    base = {
+        "m": (1, 0, 0, 0, 0), "g": (0, 1, 0, 0, 0), "s": (0, 0, 1, 0, 0), "A": (0, 0, 0, 1, 0), "rad": (0, 0, 0, 0, 1),
+        "N": (1, 1, -2, 0, 0), "J": (2, 1, -2, 0, 0), "W": (2, 1, -3, 0, 0), "Pa": (-1, 1, -2, 0, 0),
+        "V": (2, 1, -3, -1, 0), "ohm": (2, 1, -3, -2, 0), "H": (2, 1, -2, -2, 0), "Wb": (2, 1, -2, -1, 0),
+    }  # fmt: skip
+    prefixes = {"": 0, "n": -9, "u": -6, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}
+    units: dict[str, tuple[Fraction, int, Dimensions]] = {}
+    for symbol, dimensions in base.items():
+        for prefix, power in prefixes.items():
+            units[prefix + symbol] = (Fraction(10) ** (power - (3 if symbol == "g" else 0)), 0, dimensions)
+    length, time, angle = base["m"], base["s"], base["rad"]
+    units |= {
+        "": (Fraction(1), 0, _NONE), "1": (Fraction(1), 0, _NONE), "%": (Fraction(1, 100), 0, _NONE),
+        "‰": (Fraction(1, 1000), 0, _NONE), "ppm": (Fraction(1, 10**6), 0, _NONE),
+        "cm": (Fraction(1, 100), 0, length), "in": (Fraction(254, 10000), 0, length),
+        "min": (Fraction(60), 0, time), "h": (Fraction(3600), 0, time), "t": (Fraction(1000), 0, base["g"]),
+        "deg": (Fraction(1, 180), 1, angle), "°": (Fraction(1, 180), 1, angle), "turn": (Fraction(2), 1, angle),
+        "arcmin": (Fraction(1, 10800), 1, angle), "arcsec": (Fraction(1, 648000), 1, angle),
+        "rpm": (Fraction(1, 30), 1, (0, 0, -1, 0, 1)), "Nm": (Fraction(1), 0, base["J"]),
+        "mNm": (Fraction(1, 1000), 0, base["J"]), "Nmm": (Fraction(1, 1000), 0, base["J"]),
+        "Ω": (Fraction(1), 0, base["ohm"]),
+    }  # fmt: skip
+    return units
+
+
+_UNITS = _table()
+_QUANTITIES: dict[Dimensions, str] = {
+    _NONE: "a plain number", (1, 0, 0, 0, 0): "a length", (2, 0, 0, 0, 0): "an area", (0, 0, 0, 0, 1): "an angle",
+    (0, 0, 1, 0, 0): "a time", (0, 1, 0, 0, 0): "a mass", (1, 1, -2, 0, 0): "a force", (2, 1, -2, 0, 0): "a torque",
+    (0, 0, -1, 0, 1): "an angular velocity", (0, 0, -2, 0, 1): "an angular acceleration",
+    (1, 0, -1, 0, 0): "a velocity", (1, 0, -2, 0, 0): "an acceleration", (2, 1, 0, 0, 0): "a moment of inertia",
+    (2, 1, -3, -1, 0): "a voltage", (0, 0, 0, 1, 0): "a current", (2, 1, -3, -2, 0): "a resistance",
+    (2, 1, -2, -2, 0): "an inductance", (2, 1, -3, 0, 0): "a power", (0, 1, -2, 0, 0): "a stiffness",
+    (0, 1, -1, 0, 0): "a damping", (-1, 1, -2, 0, 0): "a pressure",
+}  # fmt: skip
+_SYMBOL = re.compile(r"([^\W\d]+|[%‰°Ω]|1)(?:\^?(-?[1-9])|([²³]))?")
+
+
+@cache
+def _parse(text: str) -> Unit:
+    factor, pi, dimensions, sign = Fraction(1), 0, [0] * 5, 1
+    for part in re.findall(r"/|[^\s*·/]+", text):
+        if part == "/":
+            if sign < 0:
+                raise ValueError(text)
+            sign = -1
+            continue
+        match = _SYMBOL.fullmatch(part)
+        known = _UNITS.get(match[1]) if match else None
+        if known is None or match is None:
+            raise ValueError(part)
+        power = sign * (int(match[2]) if match[2] else {"²": 2, "³": 3}.get(match[3], 1))
+        factor *= known[0] ** power
+        pi += known[1] * power
+        dimensions = [have + power * more for have, more in zip(dimensions, known[2], strict=True)]
+        sign = 1
+    if sign < 0:  # a stroke with nothing behind it
+        raise ValueError(text)
+    a, b, c, d, e = dimensions
+    return Unit(text, factor, pi, (a, b, c, d, e))
+
+
+#: Endings of keys that say the unit of a bare number: ``radius_mm = 17.5``.
+SUFFIXES: dict[str, str] = {
+    **{u: u for u in ("mm", "cm", "m", "um", "mm2", "mm4", "m2", "rad", "mrad", "deg", "arcmin", "arcsec", "s", "ms")},
+    **{u: u for u in ("us", "kg", "g", "N", "kN", "Nm", "Nmm", "J", "V", "A", "ohm", "H", "mH", "W", "rpm")},
+    **{u: u for u in ("Pa", "MPa", "GPa")},
+    "percent": "%", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "mm_s2": "mm/s^2",
+    "rad_s2": "rad/s^2", "m_s2": "m/s^2", "kg_m2": "kg m^2", "g_mm2": "g mm^2", "kg_mm2": "kg mm^2", "V_s": "V s",
+    "N_per_m": "N/m", "N_per_mm": "N/mm", "Nm_per_rad": "N m/rad", "Nm_s": "N m s", "N_s_per_m": "N s/m",
+    "Nm_per_A": "N m/A", "V_per_rad_s": "V s/rad", "Nm_s_per_rad": "N m s/rad", "kg_m": "kg m", "Nms": "N m s",
+}  # fmt: skip
+
+
+def split_suffix(key: str) -> tuple[str, str]:
+    """Split a key into its name and the unit its ending says, empty if it says none.
+
+    Examples
+    --------
+    >>> split_suffix("clearance_mm"), split_suffix("speed_rad_s"), split_suffix("branch")
+    (('clearance', 'mm'), ('speed', 'rad/s'), ('branch', ''))
+    """
+    parts = key.split("_")
+    for start in range(1, len(parts)):
+        unit = SUFFIXES.get("_".join(parts[start:]))
+        if unit:
+            return "_".join(parts[:start]), unit
+    return key, ""
+
+
+def unit_of_key(key: str) -> Unit:
+    """Return the unit a bare number of this key has."""
+    return Unit.parse(split_suffix(key)[1])
+
+
+_NUMBER = re.compile(
+    r"\s*([+-]?(?:[0-9][0-9_]*)?(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?(?:/[0-9]{1,18})?)\s*(.*?)\s*", re.S
+)
+
+
+def split_value(text: str) -> tuple[Fraction, str]:
+    """Split a written value into its exact number and the text of its unit.
+
+    Raises
+    ------
+    ValueError
+        If it does not begin with a number.
+
+    Examples
+    --------
+    >>> split_value("17.5 mm"), split_value("1/30")
+    ((Fraction(35, 2), 'mm'), (Fraction(1, 30), ''))
+    """
+    match = _NUMBER.fullmatch(text)
+    if match is None or len(text) > 200 or not any(c.isdigit() for c in match[1]):
+        raise ValueError(text)
+    number, _, below = match[1].partition("/")
+    try:
+        return Fraction(number) / Fraction(below or 1), match[2]
+    except ZeroDivisionError:
+        raise ValueError(text) from None
+
+
+def convert(number: Fraction, unit: Unit, to: Unit) -> tuple[Fraction, bool]:
+    """Return a number in another unit of the same quantity, and whether it is exact (pi may not cancel).
+
+    Examples
+    --------
+    >>> convert(Fraction(3), Unit.parse("cm"), Unit.parse("mm"))
+    (Fraction(30, 1), True)
+    """
+    pi = unit.pi - to.pi
+    value = number * unit.factor / to.factor
+    return (value * _PI**pi, number == 0) if pi else (value, True)
