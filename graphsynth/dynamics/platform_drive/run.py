@@ -261,8 +261,8 @@ def _reason(found: _Raw, train: Train, out: Array, regular: bool) -> str:
         reason += (
             f"; the train (efficiency {train.efficiency:g}) holds the mechanism at rest: neither torque overcomes it"
         )
-    if regular and {"dead centre", "stall"} <= kinds and len({round(angle, 6) for angle in last[-4:, 3]}) == 1:
-        reason += "; the mechanism comes to rest at a dead centre, where model S says nothing: give J_0 > 0"
+    if regular and {"dead centre", "stall"} <= kinds and np.ptp(last[-4:, 3]) < 1e-5:
+        reason += "; ever shorter reversals bring it to rest at a dead centre, where model S ends: give J_0 > 0"
     return reason
 
 
