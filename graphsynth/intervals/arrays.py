@@ -1,15 +1,20 @@
 """Interval operations on arrays of bounds, the numpy form: bounds in, bounds out, any equal shapes.
 
-Empty is ``(inf, -inf)``.  The compiled form (``kernels/arithmetic.py``) gives the same results to the bit; it is used
-for large arrays, this one where loading compiled code would take longer than the work.
+Empty is ``(inf, -inf)``.  Long arrays are done in blocks (``blocks.py``).  The compiled form (``kernels/arithmetic.py``)
+gives the same results to the bit; it is used for large arrays, this one where loading compiled code would take longer
+than the work.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.intervals import rounding
+from graphsynth.intervals import blocks, rounding
 from graphsynth.intervals.rounding import down, up
 
 __all__ = ["absolute", "add", "divide", "multiply", "power", "root", "square", "subtract"]
@@ -23,46 +28,46 @@ def _masked(lo: Array, hi: Array, void: Mask) -> Bounds:
     return np.where(void, np.inf, lo), np.where(void, -np.inf, hi)
 
 
-def add(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+def _add(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
     """Sum."""
     s, below, _ = rounding.add(al, bl)
     t, _, above = rounding.add(ah, bh)
     return _masked(down(s, below), up(t, above), (al > ah) | (bl > bh))
 
 
-def subtract(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+def _subtract(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
     """Difference."""
     s, below, _ = rounding.add(al, -bh)
     t, _, above = rounding.add(ah, -bl)
     return _masked(down(s, below), up(t, above), (al > ah) | (bl > bh))
 
 
-def _extremes(values: list[tuple[Array, Array]], low: float, high: float, safe: Mask) -> Bounds:
-    """Bounds of four nearest values with the signs of their errors; ``low <= |value| <= high`` where trusted."""
+def _ends(values: list[tuple[Array, Array]]) -> tuple[Array, Array, Mask, Mask]:
+    """Least and largest of four nearest values with the signs of their errors, and whether they bound the exact ones.
+
+    An error that is NaN belongs to a product with an infinity, which is exact.
+    """
     lo = np.minimum(np.minimum(values[0][0], values[1][0]), np.minimum(values[2][0], values[3][0]))
     hi = np.maximum(np.maximum(values[0][0], values[1][0]), np.maximum(values[2][0], values[3][0]))
-    below, above = safe.copy(), safe.copy()
+    below, above = np.ones(lo.shape, dtype=np.bool_), np.ones(lo.shape, dtype=np.bool_)
     for value, error in values:
-        below &= (value > lo) | (error >= 0.0)
-        above &= (value < hi) | (error <= 0.0)
-    below &= (np.abs(lo) >= low) & (np.abs(lo) <= high)
-    above &= (np.abs(hi) >= low) & (np.abs(hi) <= high)
-    return down(lo, below), up(hi, above)
+        below &= ~((value == lo) & (error < 0.0))
+        above &= ~((value == hi) & (error > 0.0))
+    return lo, hi, below, above
 
 
-def multiply(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+def _multiply(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
     """Product, with ``0 * inf = 0``."""
-    limit = rounding.FACTOR_MAX
-    safe = (-al <= limit) & (ah <= limit) & (-bl <= limit) & (bh <= limit)
-    products = [rounding.multiply(a, b) for a in (al, ah) for b in (bl, bh)]
-    lo, hi = _extremes(products, rounding.PRODUCT_MIN, np.inf, safe)
+    lo, hi, below, above = _ends([rounding.multiply(a, b) for a in (al, ah) for b in (bl, bh)])
+    lo = down(lo, below & (np.abs(lo) >= rounding.PRODUCT_MIN))
+    hi = up(hi, above & (np.abs(hi) >= rounding.PRODUCT_MIN))
     zero = ((al == 0.0) & (ah == 0.0)) | ((bl == 0.0) & (bh == 0.0))
     lo = np.where((lo < 0.0) & (zero | ((al >= 0.0) & (bl >= 0.0)) | ((ah <= 0.0) & (bh <= 0.0))), 0.0, lo)
     hi = np.where((hi > 0.0) & (zero | ((al >= 0.0) & (bh <= 0.0)) | ((ah <= 0.0) & (bl >= 0.0))), 0.0, hi)
     return _masked(lo, hi, (al > ah) | (bl > bh))
 
 
-def divide(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+def _divide(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
     """Quotients by the nonzero part of the divisor."""
     touched = (bl <= 0.0) & (bh >= 0.0)
     if not touched.any():
@@ -85,8 +90,10 @@ def divide(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
 def _divide_nonzero(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
     inner, outer = np.where(bl > 0.0, bl, -bh), np.where(bl > 0.0, bh, -bl)
     safe = (inner >= rounding.DIVISOR_MIN) & (outer <= rounding.FACTOR_MAX)
-    quotients = [rounding.divide(a, b) for a in (al, ah) for b in (bl, bh)]
-    lo, hi = _extremes(quotients, rounding.QUOTIENT_MIN, rounding.QUOTIENT_MAX, safe)
+    lo, hi, below, above = _ends([rounding.divide(a, b) for a in (al, ah) for b in (bl, bh)])
+    low, high = rounding.QUOTIENT_MIN, rounding.QUOTIENT_MAX
+    lo = down(lo, safe & below & (np.abs(lo) >= low) & (np.abs(lo) <= high))
+    hi = up(hi, safe & above & (np.abs(hi) >= low) & (np.abs(hi) <= high))
     zero = (al == 0.0) & (ah == 0.0)
     lo = np.where((lo < 0.0) & (zero | ((al >= 0.0) & (bl > 0.0)) | ((ah <= 0.0) & (bh < 0.0))), 0.0, lo)
     hi = np.where((hi > 0.0) & (zero | ((al >= 0.0) & (bh < 0.0)) | ((ah <= 0.0) & (bl > 0.0))), 0.0, hi)
@@ -97,7 +104,7 @@ def _one_product(a: Array, b: Array) -> Bounds:
     """Lower and upper bound of the product of two numbers that are not negative."""
     p, e = rounding.multiply(a, b)
     zero = (a == 0.0) | (b == 0.0)
-    safe = (p >= rounding.PRODUCT_MIN) & (a <= rounding.FACTOR_MAX) & (b <= rounding.FACTOR_MAX)
+    safe = p >= rounding.PRODUCT_MIN
     return np.maximum(down(p, zero | (safe & (e >= 0.0))), 0.0), up(p, zero | (safe & (e <= 0.0)))
 
 
@@ -106,13 +113,13 @@ def absolute(al: Array, ah: Array) -> Bounds:
     return _masked(np.maximum(np.maximum(al, -ah), 0.0), np.maximum(-al, ah), al > ah)
 
 
-def square(al: Array, ah: Array) -> Bounds:
+def _square(al: Array, ah: Array) -> Bounds:
     """Square, not the product with itself."""
     low, high = absolute(al, ah)
     return _masked(_one_product(low, low)[0], _one_product(high, high)[1], al > ah)
 
 
-def root(al: Array, ah: Array) -> Bounds:
+def _root(al: Array, ah: Array) -> Bounds:
     """Square roots of the part at or above 0."""
     low, high = np.maximum(al, 0.0), np.maximum(ah, 0.0)
     s, below, _ = rounding.square_root(low)
@@ -132,7 +139,7 @@ def _power_bounds(x: Array, n: int, side: int) -> Array:
         factor = _one_product(factor, factor)[side]
 
 
-def power(al: Array, ah: Array, n: int) -> Bounds:
+def _power(al: Array, ah: Array, n: int) -> Bounds:
     """Integer power; a negative exponent is the quotient of 1 by the positive one."""
     void = al > ah
     if n == 0:
@@ -145,5 +152,56 @@ def power(al: Array, ah: Array, n: int) -> Bounds:
         low, high = absolute(al, ah)
         lo, hi = _power_bounds(low, m, 0), _power_bounds(high, m, 1)
     if n < 0:
-        lo, hi = divide(np.ones_like(lo), np.ones_like(hi), lo, hi)
+        lo, hi = _divide(np.ones_like(lo), np.ones_like(hi), lo, hi)
     return _masked(lo, hi, void)
+
+
+#: From this size on the quick form pays.
+_QUICK_FROM = 256
+
+
+def _spread(form: Callable[..., Bounds], operands: tuple[Array, ...], **options: Any) -> Bounds:
+    """Apply a form of flat arrays to arrays of any one shape."""
+    lo, hi = form(*[np.reshape(a, -1) for a in operands], **options)
+    return lo.reshape(operands[0].shape), hi.reshape(operands[0].shape)
+
+
+def add(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Sum."""
+    if al.size < _QUICK_FROM:
+        return _add(al, ah, bl, bh)
+    return _spread(blocks.add, (al, ah, bl, bh), complete=_add)
+
+
+def subtract(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Difference."""
+    if al.size < _QUICK_FROM:
+        return _subtract(al, ah, bl, bh)
+    return _spread(blocks.subtract, (al, ah, bl, bh), complete=_subtract)
+
+
+def multiply(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Product, with ``0 * inf = 0``."""
+    if al.size < _QUICK_FROM:
+        return _multiply(al, ah, bl, bh)
+    return _spread(blocks.multiply, (al, ah, bl, bh), complete=_multiply)
+
+
+def divide(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
+    """Quotients by the nonzero part of the divisor."""
+    return _spread(partial(blocks.in_blocks, _divide), (al, ah, bl, bh))
+
+
+def square(al: Array, ah: Array) -> Bounds:
+    """Square, not the product with itself."""
+    return _spread(partial(blocks.in_blocks, _square), (al, ah))
+
+
+def root(al: Array, ah: Array) -> Bounds:
+    """Square roots of the part at or above 0."""
+    return _spread(partial(blocks.in_blocks, _root), (al, ah))
+
+
+def power(al: Array, ah: Array, n: int) -> Bounds:
+    """Integer power; a negative exponent is the quotient of 1 by the positive one."""
+    return _spread(partial(blocks.in_blocks, _power), (al, ah), extra=(n,))

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ETA", "MAX", "PHI", "down", "up"]
+__all__ = ["ETA", "MAX", "PHI", "PRODUCT_MIN", "SPLIT", "SPLIT_MAX", "down", "up"]
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,8 @@ MAX = float(np.finfo(np.float64).max)
 #: Limits within which the error of a product or quotient is computed without error itself.
 PRODUCT_MIN, FACTOR_MAX = 2.0**-960, 2.0**500
 DIVISOR_MIN, QUOTIENT_MIN, QUOTIENT_MAX, ROOT_MAX = 2.0**-500, 2.0**-400, 2.0**490, 2.0**1000
-_SPLIT = 2.0**27 + 1.0
+#: Veltkamp's number, and a limit below which halving with it does not overflow.
+SPLIT, SPLIT_MAX = 2.0**27 + 1.0, 2.0**900
 
 
 def down(x: Array, exact: NDArray[np.bool_] | bool = False) -> Array:
@@ -49,7 +50,7 @@ def two_sum(a: Array, b: Array) -> tuple[Array, Array]:
 def two_product(a: Array, b: Array) -> tuple[Array, Array]:
     """Product and its rounding error (Dekker, Veltkamp), exact within the limits above."""
     p = a * b
-    ca, cb = _SPLIT * a, _SPLIT * b
+    ca, cb = SPLIT * a, SPLIT * b
     ah, bh = ca - (ca - a), cb - (cb - b)
     al, bl = a - ah, b - bh
     return p, al * bl - (((p - ah * bh) - al * bh) - ah * bl)
@@ -62,8 +63,17 @@ def add(a: Array, b: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]
 
 
 def multiply(a: Array, b: Array) -> tuple[Array, Array]:
-    """Return the product with ``0 * inf = 0`` and its error (within the limits above)."""
-    p, e = two_product(a, b)
+    """Return the product with ``0 * inf = 0`` and a number with the sign of its error; NaN beside an infinity.
+
+    The sign is right for products of at least ``PRODUCT_MIN``.  Where a factor is so large that something on the way
+    to the error would overflow, the other one is below 2^124, and both are scaled by powers of two.
+    """
+    p = a * b
+    big, large = np.abs(a) > SPLIT_MAX, np.abs(b) > SPLIT_MAX
+    if (big | large).any():
+        a = a * np.where(big, 2.0**-300, np.where(large, 2.0**200, 1.0))
+        b = b * np.where(big, 2.0**200, np.where(large, 2.0**-300, 1.0))
+    _, e = two_product(a, b)
     return np.where(np.isnan(p), 0.0, p), e
 
 

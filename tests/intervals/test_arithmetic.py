@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from interval_samples import bounds
+from interval_samples import SPECIAL, bounds
 
 from graphsynth.intervals import Interval, divide_extended
 from graphsynth.intervals import arrays as numpy_form
@@ -168,6 +168,54 @@ def test_numpy_and_compiled_forms_agree_to_the_bit(name):
         empty = lo > hi
         assert (lo[empty] == INF).all()
         assert (hi[empty] == -INF).all()
+
+
+ENDS = sorted({0.0, INF, *(s * x for s in (1.0, -1.0) for x in SPECIAL if x > 0.0 and x < INF), -INF})
+GRID = [(a, b) for i, a in enumerate(ENDS) for b in ENDS[i:] if a < INF and b > -INF]
+
+
+@pytest.mark.parametrize("name", ["add", "subtract", "multiply", "divide"])
+def test_every_pair_of_special_intervals(name):
+    """Zeros, infinities, the smallest and largest numbers: containment by fractions, both forms equal."""
+    from graphsynth.intervals.kernels import loops
+
+    some = GRID[:: max(1, len(GRID) // 140)]
+    a, b = (np.array([p[k] for p in some for _ in some]) for k in (0, 1))
+    c, d = (np.array([q[k] for _ in some for q in some]) for k in (0, 1))
+    lo, hi = np.empty(a.size), np.empty(a.size)
+    getattr(loops, name)(a, b, c, d, lo, hi)
+    with np.errstate(all="ignore"):
+        low, high = getattr(numpy_form, name)(a, b, c, d)
+    assert np.array_equal(lo, low)
+    assert np.array_equal(hi, high)
+    operation = {**OPERATIONS, "divide": lambda x, y: x / y}[name]
+    step = 7  # fractions are slow
+    for al, ah, bl, bh, l, h in zip(*(v[::step].tolist() for v in (a, b, c, d, lo, hi))):
+        for x in (al, ah):
+            for y in (bl, bh):
+                if math.isfinite(x) and math.isfinite(y) and (name != "divide" or y != 0.0):
+                    value = operation(Fraction(x), Fraction(y))
+                    assert l == -INF or (l < INF and Fraction(l) <= value), (al, ah, bl, bh)
+                    assert h == INF or (h > -INF and Fraction(h) >= value), (al, ah, bl, bh)
+
+
+@pytest.mark.parametrize("name", ["add", "subtract", "multiply"])
+def test_long_arrays_in_numpy_equal_short_ones(name):
+    """Blocks of ordinary numbers are done by a quick form, any others by the complete one; no place differs."""
+    from graphsynth.intervals import blocks
+
+    rng = np.random.default_rng(8)
+    count = 2 * blocks.BLOCK + 77
+    lo, other = rng.normal(size=(2, count))
+    a, b = (lo, lo + rng.random(count)), (other, other + rng.random(count))
+    odd = [bounds(rng, 40) for _ in range(2)]
+    for pair, values in zip((a, b), odd):  # special numbers in the first and last block only
+        for end, value in zip(pair, values):
+            end[:20], end[-20:] = value[:20], value[20:]
+    with np.errstate(all="ignore"):
+        long = getattr(numpy_form, name)(*a, *b)
+        short = getattr(numpy_form, f"_{name}")(*a, *b)
+    assert all(np.array_equal(p, q) for p, q in zip(long, short))
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,9 @@
 from graphsynth.compilation import kernel
 from graphsynth.intervals.kernels.rounding import (
     DIVISOR_MIN,
-    ETA,
     FACTOR_MAX,
     INF,
+    MAX,
     NAN,
     PHI,
     PRODUCT_MIN,
@@ -58,31 +58,49 @@ def ends_of_four(p1, p2, p3, p4, e1, e2, e3, e4):
 
 
 @kernel(forceinline=True)
+def _least_and_largest(al, ah, bl, bh):
+    """Return the rounded products that bound all others, with ``0 * inf = NaN``, and the pairs of factors of each.
+
+    For a fixed factor the other one is chosen by its sign, so two products are left for each end.
+    """
+    u, v = (bl, bh) if al >= 0.0 else (bh, bl)
+    w, z = (bl, bh) if ah >= 0.0 else (bh, bl)
+    return al * u, ah * w, al * v, ah * z, u, v, w, z
+
+
+@kernel(forceinline=True)
 def multiply_plain(al, ah, bl, bh):
-    """Product of intervals of ordinary size; the lower bound is NaN where `multiply_any` must be asked."""
-    p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
-    e1, e2, e3, e4 = fma(al, bl, -p1), fma(al, bh, -p2), fma(ah, bl, -p3), fma(ah, bh, -p4)
-    lo, hi, below, above = ends_of_four(p1, p2, p3, p4, e1, e2, e3, e4)
-    safe = (al >= -FACTOR_MAX) & (ah <= FACTOR_MAX) & (bl >= -FACTOR_MAX) & (bh <= FACTOR_MAX) & (al <= ah) & (bl <= bh)
-    safe = safe & (abs(lo) >= PRODUCT_MIN) & (abs(hi) >= PRODUCT_MIN)
-    lo = lo if below else lo - (PHI * abs(lo) + ETA)
-    hi = hi if above else hi + (PHI * abs(hi) + ETA)
+    """Product of intervals of ordinary size; the lower bound is NaN where `multiply_any` must be asked.
+
+    The bounds are moved only if a product lies beyond them: the residual has the sign of the exact difference.
+    """
+    p, q, r, s, u, v, w, z = _least_and_largest(al, ah, bl, bh)
+    lo = p if p < q else q
+    hi = r if r > s else s
+    below = (fma(al, u, -lo) < 0.0) | (fma(ah, w, -lo) < 0.0)
+    above = (fma(al, v, -hi) > 0.0) | (fma(ah, z, -hi) > 0.0)
+    small, large = abs(lo), abs(hi)
+    # empty and unbounded operands give bounds that are not finite
+    safe = (small >= PRODUCT_MIN) & (large >= PRODUCT_MIN) & (small <= MAX) & (large <= MAX)
+    lo = fma(small, -PHI, lo) if below else lo
+    hi = fma(large, PHI, hi) if above else hi
     return lo if safe else NAN, hi
 
 
-@kernel
+@kernel(forceinline=True)
 def multiply_any(al, ah, bl, bh):
     """Product of any intervals."""
-    p1, p2, p3, p4 = al * bl, al * bh, ah * bl, ah * bh
-    e1, e2, e3, e4 = fma(al, bl, -p1), fma(al, bh, -p2), fma(ah, bl, -p3), fma(ah, bh, -p4)
-    p1 = 0.0 if p1 != p1 else p1
-    p2 = 0.0 if p2 != p2 else p2
-    p3 = 0.0 if p3 != p3 else p3
-    p4 = 0.0 if p4 != p4 else p4
-    lo, hi, below, above = ends_of_four(p1, p2, p3, p4, e1, e2, e3, e4)
-    safe = (-al <= FACTOR_MAX) & (ah <= FACTOR_MAX) & (-bl <= FACTOR_MAX) & (bh <= FACTOR_MAX)
-    lo = down(lo, safe & below & (abs(lo) >= PRODUCT_MIN))
-    hi = up(hi, safe & above & (abs(hi) >= PRODUCT_MIN))
+    p, q, r, s, u, v, w, z = _least_and_largest(al, ah, bl, bh)
+    p = 0.0 if p != p else p
+    q = 0.0 if q != q else q
+    r = 0.0 if r != r else r
+    s = 0.0 if s != s else s
+    lo = p if p < q else q
+    hi = r if r > s else s
+    below = (fma(al, u, -lo) < 0.0) | (fma(ah, w, -lo) < 0.0)
+    above = (fma(al, v, -hi) > 0.0) | (fma(ah, z, -hi) > 0.0)
+    lo = down(lo, (not below) & (abs(lo) >= PRODUCT_MIN))
+    hi = up(hi, (not above) & (abs(hi) >= PRODUCT_MIN))
     zero = ((al == 0.0) & (ah == 0.0)) | ((bl == 0.0) & (bh == 0.0))
     lo = 0.0 if (lo < 0.0) & (zero | ((al >= 0.0) & (bl >= 0.0)) | ((ah <= 0.0) & (bh <= 0.0))) else lo
     hi = 0.0 if (hi > 0.0) & (zero | ((al >= 0.0) & (bh <= 0.0)) | ((ah <= 0.0) & (bl >= 0.0))) else hi

@@ -26,7 +26,11 @@ def multiply(al, ah, bl, bh, lo, hi):
         low, high = arithmetic.multiply_plain(al[i], ah[i], bl[i], bh[i])
         lo[i], hi[i] = low, high
         rare += 1 if low != low else 0
-    if rare > 0:  # afterwards, so that the loop above uses vector instructions
+    # the others afterwards, so that the loop above uses vector instructions
+    if 16 * rare > lo.size:
+        for i in range(lo.size):
+            lo[i], hi[i] = arithmetic.multiply_any(al[i], ah[i], bl[i], bh[i])
+    elif rare > 0:
         for i in range(lo.size):
             if lo[i] != lo[i]:
                 lo[i], hi[i] = arithmetic.multiply_any(al[i], ah[i], bl[i], bh[i])

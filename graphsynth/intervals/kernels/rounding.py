@@ -73,7 +73,7 @@ def multiply_both(a, b):
     e = fma(a, b, -p)
     p = 0.0 if p != p else p
     zero = (a == 0.0) | (b == 0.0)
-    safe = (abs(p) >= PRODUCT_MIN) & (abs(a) <= FACTOR_MAX) & (abs(b) <= FACTOR_MAX)
+    safe = abs(p) >= PRODUCT_MIN
     return down(p, zero | (safe & (e >= 0.0))), up(p, zero | (safe & (e <= 0.0)))
 
 
