@@ -261,8 +261,9 @@ def _reason(found: _Raw, train: Train, out: Array, regular: bool) -> str:
         reason += (
             f"; the train (efficiency {train.efficiency:g}) holds the mechanism at rest: neither torque overcomes it"
         )
-    if regular and {"dead centre", "stall"} <= kinds and np.ptp(last[-4:, 3]) < 1e-5:
-        reason += "; ever shorter reversals bring it to rest at a dead centre, where model S ends: give J_0 > 0"
+    dead = last[last[:, 0] == 2]
+    if regular and len(dead) and (last[-4:, 0] == 3).any() and abs(dead[-1, 3] - last[-1, 3]) < 1e-5:
+        reason += "; it comes to rest at a dead centre, where model S ends: give J_0 > 0"
     return reason
 
 

@@ -191,9 +191,14 @@ def test_rest_at_a_dead_centre_says_so():
     )  # fmt: skip
     for rtol in (1e-9, 1e-10, 1e-12):
         found = drive.simulate([0.0, 0.6, 1.3], angle=0.7671041258862648, speed=1.0997214360195429, rtol=rtol)
-        assert not found.complete and "rest at a dead centre" in found.reason and "J_0 > 0" in found.reason
+        assert (
+            not found.complete
+            and "rest at a dead centre, where model S ends" in found.reason
+            and "J_0 > 0" in found.reason
+        )
         assert np.isnan(found.angle[2]) and found.reached == 2
-        assert len(found.events) > 500 and found.events[-1].time == pytest.approx(1.18508, abs=1e-4)
+        last = found.events[-1]
+        assert len(found.events) > 500 and abs(last.motion) < 1e-15 and abs(math.cos(last.angle)) < 1e-14
 
 
 def test_regularised_form_of_any_inertia_agrees_with_the_form_with_inertia():
