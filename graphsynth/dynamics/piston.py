@@ -1,0 +1,401 @@
+"""Side load on the cylinder of a crank drive with and without a floating piston: inverse dynamics in closed form.
+
+Every reaction follows from the balance of one body after the other, without any system larger than two by two.
+Signs of normal forces are guessed and checked, so Coulomb friction needs no iteration.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.dynamics.elements import not_negative
+from graphsynth.dynamics.piston_gas import CompressorCycle, ConstantForce, GasLaw, GivenForce
+from graphsynth.dynamics.piston_solving import Reaction, cross, one_contact, two_contacts, wedge
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics.piston.drives import CrankSlider
+from graphsynth.kinematics.piston.model import FloatingPiston, PistonMotion
+from graphsynth.mechanism.checks import Point, finite, nonzero, point
+
+__all__ = ["PistonFriction", "PistonLoads", "PistonMachine", "PistonMasses"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+
+@dataclass(frozen=True)
+class PistonMasses:
+    """Masses (kg) and moments of inertia about the centres of mass (kg m^2).
+
+    ``crank_centre`` and ``rod_centre`` are the distances of the centres of mass from the crank's bearing and from the
+    crank pin, m.  The centre of a yoke's block lies in its pin, those of crosshead and piston in their reference
+    points.
+    """
+
+    crank: float = 0.0
+    follower: float = 0.0
+    crosshead: float = 0.0
+    piston: float = 0.0
+    crank_inertia: float = 0.0
+    rod_inertia: float = 0.0
+    crank_centre: float = 0.0
+    rod_centre: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("crank", "follower", "crosshead", "piston", "crank_inertia", "rod_inertia"):
+            object.__setattr__(self, name, not_negative(f"mass or inertia {name}", getattr(self, name)))
+        for name in ("crank_centre", "rod_centre"):
+            object.__setattr__(self, name, finite(name, getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class PistonFriction:
+    """Coefficients of dry friction in the sliding pairs, and the friction of the rings.
+
+    ``mu tanh(v / regular_speed) |N|`` acts against the sliding, N the normal force; pins run without friction.
+
+    Parameters
+    ----------
+    guide, cylinder, slot, yoke : float
+        Of crosshead on guide, piston on cylinder, piston in the crosshead's slot, block in the yoke.
+    rings : float
+        Force of the piston rings, N, whatever the side load.
+    regular_speed : float
+        m/s.
+    """
+
+    guide: float = 0.0
+    cylinder: float = 0.0
+    slot: float = 0.0
+    yoke: float = 0.0
+    rings: float = 0.0
+    regular_speed: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name in ("guide", "cylinder", "slot", "yoke", "rings"):
+            object.__setattr__(self, name, not_negative(f"friction {name}", getattr(self, name)))
+        object.__setattr__(self, "regular_speed", nonzero("regular_speed", self.regular_speed))
+
+
+@dataclass(frozen=True, eq=False)
+class PistonLoads:
+    """Reactions and powers over the crank angle (closed form, a few roundings; NaN where friction jams).
+
+    Forces are on the body with the higher number, in N, world coordinates; couples on it at its reference point, N m.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (n,)
+    gas : ndarray, shape (n,)
+        Force of the gas away from the head.
+    wall : ndarray, shape (n,)
+        Side load of the cylinder on the piston, along its normal.
+    guide : ndarray, shape (n,)
+        Normal force of the guide on the crosshead; the wall force if there is no second group.
+    slot : ndarray, shape (n,)
+        Normal force of the crosshead's slot on the piston; 0 without a second group.
+    yoke : ndarray, shape (n,)
+        Normal force of the block on the yoke; 0 for a crank-slider.
+    guide_couple, wall_couple : ndarray, shape (n,)
+        With a slot that carries no couple.  One couple may circulate on top of it, see `self_stress`.
+    crank_pin, crosshead_pin, bearing : ndarray, shape (n, 2)
+        Of crank on rod or block, of rod on crosshead (0 for a yoke), of frame on crank.
+    torque : ndarray, shape (n,)
+        Of the motor on the crank, N m.
+    driving, gas_power, friction_power, kinetic_power, weight_power : ndarray, shape (n,)
+        W: of the motor, taken by the gas, lost in friction, into kinetic energy, of the weights.
+    held : ndarray, shape (n,)
+        Where the slot does not slide: the force across the cylinder that its friction can hold, ``mu |slot|``; the wall
+        may carry up to so much more or less than `wall`.  0 where it slides.
+    """
+
+    angle: Array
+    gas: Array
+    wall: Array
+    guide: Array
+    slot: Array
+    yoke: Array
+    guide_couple: Array
+    wall_couple: Array
+    crank_pin: Array
+    crosshead_pin: Array
+    bearing: Array
+    torque: Array
+    driving: Array
+    gas_power: Array
+    friction_power: Array
+    kinetic_power: Array
+    weight_power: Array
+    held: Array
+
+    #: Couples on crosshead (guide), piston (slot) and piston (wall) that balance each other in every pose.
+    self_stress = (1.0, 1.0, -1.0)
+
+    @property
+    def power_error(self) -> float:
+        """Largest error of the power balance over the largest power in play; NaN if nothing is determined."""
+        parts = np.array([self.driving, -self.gas_power, -self.friction_power, -self.kinetic_power, self.weight_power])
+        good = np.isfinite(parts).all(axis=0)
+        if not good.any():
+            return float("nan")
+        return float(np.abs(parts[:, good].sum(axis=0)).max() / max(np.abs(parts[:, good]).max(), 1e-300))
+
+    def edges(self, length: float) -> tuple[Array, Array]:
+        """Return the forces at the two ends of a piston of this length that give side load and couple of the wall.
+
+        Parameters
+        ----------
+        length : float
+            m; the reference point is in its middle.
+
+        Returns
+        -------
+        near, far : ndarray, shape (n,)
+            N; ``far`` at the end towards the head.
+        """
+        lever = self.wall_couple / nonzero("length of the piston", length)
+        return 0.5 * self.wall - lever, 0.5 * self.wall + lever
+
+
+@dataclass(frozen=True)
+class PistonMachine:
+    """A floating piston (or a plain drive) with masses, gas force and friction, its crank turned at a given speed.
+
+    Parameters
+    ----------
+    mechanism : FloatingPiston
+    masses : PistonMasses
+    gas : CompressorCycle, ConstantForce or GivenForce
+    friction : PistonFriction
+    speed, acceleration : float
+        Of the crank, rad/s and rad/s^2.
+    gravity : (gx, gy)
+        m/s^2; (0, 0) by default.  (-9.81, 0) puts the cylinder above the crank.
+
+    Raises
+    ------
+    GeometryError
+        Negative masses, coefficients or powers of the gas law; values that are not finite.
+
+    Examples
+    --------
+    With 1 kN on the piston the connecting rod presses a plain piston to the wall; the floating piston is free.
+
+    >>> machine = PistonMachine(FloatingPiston.crank_slider(0.05, 0.2), gas=ConstantForce(1000.0))
+    >>> round(machine.without_group().loads(np.pi / 2).wall.item(), 3), machine.loads(np.pi / 2).wall.round(12) + 0.0
+    (258.199, array([0.]))
+    """
+
+    mechanism: FloatingPiston
+    masses: PistonMasses = field(default_factory=PistonMasses)
+    gas: GasLaw = field(default_factory=ConstantForce)
+    friction: PistonFriction = field(default_factory=PistonFriction)
+    speed: float = 1.0
+    acceleration: float = 0.0
+    gravity: Point = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name, kind in (
+            ("mechanism", FloatingPiston),
+            ("masses", PistonMasses),
+            ("friction", PistonFriction),
+            ("gas", CompressorCycle | ConstantForce | GivenForce),
+        ):
+            if not isinstance(getattr(self, name), kind):
+                raise GeometryError(
+                    f"{name} = {getattr(self, name)!r} is not a {getattr(kind, '__name__', kind)}; give one"
+                )
+        for name in ("speed", "acceleration"):
+            object.__setattr__(self, name, finite(f"{name} of the crank", getattr(self, name)))
+        object.__setattr__(self, "gravity", point("gravity", self.gravity))
+
+    def without_group(self) -> PistonMachine:
+        """Return the plain machine: piston and crosshead one body of the same mass in the cylinder, the same gas."""
+        masses = replace(self.masses, crosshead=self.masses.crosshead + self.masses.piston, piston=0.0)
+        return replace(self, mechanism=self.mechanism.without_group(), masses=masses)
+
+    def gas_force(self, angle: ArrayLike) -> Array:
+        """Force of the gas on the piston away from the head, N."""
+        motion = self.mechanism.motion(angle)
+        outer, _ = self.mechanism.dead_centres()
+        closing = np.asarray(motion.piston.first * (self.speed or 1.0) > 0.0)
+        return self.gas.force(motion.angle, outer.piston - motion.piston.value, closing, self.mechanism.stroke)
+
+    def loads(self, angle: ArrayLike) -> PistonLoads:
+        """Find all reactions at crank angles.
+
+        Parameters
+        ----------
+        angle : array_like
+            Radians; a scalar gives arrays of length 1.
+
+        Returns
+        -------
+        PistonLoads
+            NaN where friction leaves no or several solutions: the machine jams there, or may.
+        """
+        motion = self.mechanism.motion(np.atleast_1d(np.asarray(angle, dtype=np.float64)))
+        return _Balance(self, motion).loads()
+
+
+class _Balance:
+    """Balance of piston, crosshead, follower and crank, one after the other."""
+
+    def __init__(self, machine: PistonMachine, motion: PistonMotion) -> None:
+        self.machine, self.motion = machine, motion
+        drive, group = machine.mechanism.drive, machine.mechanism.group
+        w, a = machine.speed, machine.acceleration
+        self.weight = complex(*machine.gravity)
+
+        def rates(of: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+            return of[1] * w, of[2] * w**2 + of[1] * a
+
+        phi = motion.angle
+        self.turning = np.exp(1j * phi)
+        self.pin = drive.crank * self.turning  # of the crank
+        self.pin_rates = 1j * w * self.pin, (1j * a - w**2) * self.pin
+        self.at = motion.crosshead.value + 1j * drive.offset
+        self.crosshead, self.follower = rates(motion.crosshead), rates(motion.follower)
+        self.piston, self.slot = rates(motion.piston), rates(motion.slot)
+        self.cylinder = complex(1.0) if group is None else complex(np.exp(1j * group.cylinder_angle))
+        self.gas = machine.gas_force(phi)
+
+    def _mu(self, name: str, speed: Array) -> Array:
+        friction = self.machine.friction
+        return np.asarray(getattr(friction, name) * np.tanh(speed / friction.regular_speed))
+
+    def _own_forces(self) -> Complex:
+        """Force that gas and rings put on the piston."""
+        return -self.cylinder * (self.gas + self._mu("rings", self.piston[0]))
+
+    def loads(self) -> PistonLoads:
+        """Assemble everything."""
+        zero = np.zeros(len(self.motion.angle))
+        slot, wall = Reaction.none(zero), Reaction.none(zero)
+        if self.machine.mechanism.group is not None:
+            slot, wall = self._piston()
+        pin, guide, yoke = self._crosshead(slot.force)
+        if self.machine.mechanism.group is None:
+            wall = guide
+        crank_pin, bearing, torque = self._crank(pin)
+        arm = self._slot_place() - self.at
+        guide_couple = cross(arm, slot.force) - cross(self.pin - self.at, yoke.force)
+        plain = self.machine.mechanism.group is None
+        friction = guide.loss + slot.loss + yoke.loss + (0.0 if plain else wall.loss)
+        friction = friction + self._mu("rings", self.piston[0]) * self.piston[0]
+        return PistonLoads(
+            angle=self.motion.angle, gas=self.gas, wall=wall.normal, guide=guide.normal, slot=slot.normal,
+            yoke=yoke.normal, guide_couple=guide_couple, wall_couple=guide_couple if plain else zero.copy(),
+            crank_pin=_pairs(crank_pin), crosshead_pin=_pairs(pin if self._is_slider else zero + 0j),
+            bearing=_pairs(bearing), torque=torque, driving=torque * self.machine.speed,
+            gas_power=self.gas * self.piston[0], friction_power=friction, kinetic_power=self._kinetic_power(),
+            weight_power=self._weight_power(), held=self._held(slot),
+        )  # fmt: skip
+
+    @property
+    def _is_slider(self) -> bool:
+        return isinstance(self.machine.mechanism.drive, CrankSlider)
+
+    def _slot_place(self) -> Complex:
+        """Where the piston's reference point is."""
+        group = self.machine.mechanism.group
+        if group is None:
+            return self.at
+        base = 1j * (self.machine.mechanism.drive.offset + group.cylinder_offset)
+        return base + self.motion.piston.value * self.cylinder
+
+    def _piston(self) -> tuple[Reaction, Reaction]:
+        """Slot on piston, cylinder on piston: ``slot + wall = m a - other forces``."""
+        group = self.machine.mechanism.group
+        assert group is not None
+        wanted = self.machine.masses.piston * (self.piston[1] * self.cylinder - self.weight) - self._own_forces()
+        along = complex(np.exp(1j * group.slot_angle))
+        return two_contacts(
+            wanted,
+            wedge(along, self._mu("slot", self.slot[0]), self.slot[0]),
+            wedge(self.cylinder, self._mu("cylinder", self.piston[0]), self.piston[0]),
+        )
+
+    def _crosshead(self, slot: Complex) -> tuple[Complex, Reaction, Reaction]:
+        """Force of the follower on the crosshead, guide on crosshead, block on yoke."""
+        machine = self.machine
+        plain = machine.mechanism.group is None
+        wanted = machine.masses.crosshead * (self.crosshead[1] - self.weight) + slot
+        wanted = wanted - (self._own_forces() if plain else 0.0)
+        name = "cylinder" if plain else "guide"
+        guide_wedge = wedge(1.0 + 0j, self._mu(name, self.crosshead[0]), self.crosshead[0])
+        drive = machine.mechanism.drive
+        zero = np.zeros(len(self.motion.angle))
+        if isinstance(drive, CrankSlider):
+            rod = np.exp(1j * self.motion.follower.value)
+            guide = one_contact(cross(rod, wanted) - self._rod_moment() / drive.rod, rod, guide_wedge)
+            return wanted - guide.force, guide, Reaction.none(zero)
+        along = complex(np.exp(1j * drive.yoke_angle))
+        # the yoke slides against the block with the opposite speed
+        yoke, guide = two_contacts(
+            wanted, wedge(along, self._mu("yoke", -self.follower[0]), -self.follower[0]), guide_wedge
+        )
+        return yoke.force, guide, yoke
+
+    def _rod_motion(self) -> tuple[Complex, Complex, Complex]:
+        """Lever from crank pin to the rod's centre of mass, velocity and acceleration of the latter."""
+        lever = self.machine.masses.rod_centre * np.exp(1j * self.motion.follower.value)
+        w, a = self.follower
+        return lever, self.pin_rates[0] + 1j * w * lever, self.pin_rates[1] + (1j * a - w**2) * lever
+
+    def _rod_moment(self) -> Array:
+        """Moment about the crank pin that the force of the rod on the crosshead must have, N m."""
+        masses = self.machine.masses
+        lever, _, acceleration = self._rod_motion()
+        moment = cross(lever, masses.follower * (self.weight - acceleration))
+        return np.asarray(moment - masses.rod_inertia * self.follower[1])
+
+    def _crank(self, pin: Complex) -> tuple[Complex, Complex, Array]:
+        """Force of crank on follower, of frame on crank, torque of the motor."""
+        machine = self.machine
+        masses = machine.masses
+        acceleration = self._rod_motion()[2] if self._is_slider else self.pin_rates[1]
+        crank_pin = masses.follower * (acceleration - self.weight) + pin
+        lever = masses.crank_centre * self.turning
+        own = (1j * machine.acceleration - machine.speed**2) * lever
+        inertia = masses.crank_inertia + masses.crank * masses.crank_centre**2
+        torque = inertia * machine.acceleration + cross(self.pin, crank_pin) - cross(lever, masses.crank * self.weight)
+        return crank_pin, masses.crank * (own - self.weight) + crank_pin, np.asarray(torque)
+
+    def _centres(self) -> list[tuple[float, Complex, Complex]]:
+        """Mass, velocity and acceleration of every centre of mass."""
+        machine = self.machine
+        masses = machine.masses
+        lever = masses.crank_centre * self.turning
+        w, a = machine.speed, machine.acceleration
+        follower = self._rod_motion()[1:] if self._is_slider else self.pin_rates
+        return [
+            (masses.crank, 1j * w * lever, (1j * a - w**2) * lever),
+            (masses.follower, *follower),
+            (masses.crosshead, self.crosshead[0] + 0j, self.crosshead[1] + 0j),
+            (masses.piston, self.piston[0] * self.cylinder, self.piston[1] * self.cylinder),
+        ]
+
+    def _kinetic_power(self) -> Array:
+        machine = self.machine
+        turning = np.full(len(self.motion.angle), machine.masses.crank_inertia * machine.acceleration * machine.speed)
+        if self._is_slider:
+            turning = turning + machine.masses.rod_inertia * self.follower[0] * self.follower[1]
+        return np.asarray(turning + sum(m * (np.conj(v) * a).real for m, v, a in self._centres()))
+
+    def _weight_power(self) -> Array:
+        return np.asarray(sum(m * (np.conj(v) * self.weight).real for m, v, _ in self._centres()))
+
+    def _held(self, slot: Reaction) -> Array:
+        group = self.machine.mechanism.group
+        if group is None or math.sin(group.cylinder_angle) != 0.0:
+            return np.zeros(len(self.motion.angle))
+        return np.asarray(self.machine.friction.slot * np.abs(slot.normal))
+
+
+def _pairs(values: Complex) -> Array:
+    return np.column_stack([values.real, values.imag])
