@@ -38,8 +38,14 @@ _STIFF = 3.0
 _HEIGHT = 0.6
 #: Trials of a step, each with the offending vertices moved less.
 _RETRIES = 4
-#: Least area of a triangle of the drawing, as a share of the square of the mean side.
-_FLAT = 0.04
+#: Share of the area of a triangle that a step must leave.
+_KEPT = 0.4
+#: Distance of joints from sides they are not on below which a force acts, in mean sides, and its strength.
+_CLEAR, _CLEARING = 0.5, 3.0
+#: Distance of two joints below which a further force acts, in mean sides.
+_APART = 0.6
+#: Strength of the force that keeps triangles from becoming flat.
+_BARRIER = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,22 +170,27 @@ class _Drawing:
         )
         z = _tutte(count + len(inner), np.array(sides + spokes), self.outer)
         self.z = z / float(np.abs(self.springs.stretch(z)).mean())
-        areas = _areas(self.z, self.triangles)
-        self.sense, self.floor = np.sign(areas), np.minimum(np.abs(areas), _FLAT)
+        self.sense = np.sign(_areas(self.z, self.triangles))
+        self.faces_on = self.triangles.T.ravel()
         self.joints = count
         self.corners = np.array(self.plates, dtype=np.intp).reshape(-1, 3)
+        self.corners_on = self.corners.T.ravel()
         self.turned = np.sign(_areas(self.z, self.corners))
 
     def even_out(self, steps: int) -> None:
-        """Let springs and repulsion act; faces keep their orientation."""
+        """Let springs, repulsion and the room of the faces act; no face turns over.
+
+        A step keeps a share of the area of every triangle, so it never gets stuck at a face that is small already.
+        """
         step = 0.15
         for _ in range(steps):
-            move = self.springs.force(self.z)
+            areas = _areas(self.z, self.triangles) * self.sense
+            move = self.springs.force(self.z) + self._room_of_faces(areas) + self.springs.clearing(self.z)
             if self.plates:
                 self._raise_corners(move)
             move *= min(step, 0.2 / max(float(np.abs(move).max()), 1e-9))
             for _ in range(_RETRIES):
-                bad = _areas(self.z + move, self.triangles) * self.sense < self.floor
+                bad = _areas(self.z + move, self.triangles) * self.sense < _KEPT * areas
                 if not bad.any():
                     self.z, step = self.z + move, min(0.3, step * 1.2)
                     break
@@ -189,16 +200,22 @@ class _Drawing:
             if step < 1e-3:
                 break
 
+    def _room_of_faces(self, areas: Array) -> Complex:
+        """Force of a logarithmic barrier: every triangle wants some area."""
+        a, b, c = self.triangles.T
+        push = 1j * self.sense * _BARRIER / np.maximum(areas, 1e-3)
+        p, q, r = self.z[a], self.z[b], self.z[c]
+        shares = np.concatenate([push * (r - q), push * (p - r), push * (q - p)])  # across the opposite side
+        return _gathered(len(self.z), self.faces_on, shares)
+
     def _raise_corners(self, move: Complex) -> None:
         """Push corners of flat plates out: springs alone leave them nearly on a line."""
-        a, b, c = self.corners.T
+        a, _, c = self.corners.T
         side = self.z[c] - self.z[a]
         length = np.maximum(np.abs(side), 1e-9)
         heights = _areas(self.z, self.corners) * self.turned / length
         push = -2.0 * np.maximum(0.0, _HEIGHT - heights) * self.turned * 1j * side / length
-        np.add.at(move, b, push)
-        np.add.at(move, a, -0.5 * push)
-        np.add.at(move, c, -0.5 * push)
+        move += _gathered(len(self.z), self.corners_on, np.concatenate([-0.5 * push, push, -0.5 * push]))
 
     def room(self) -> float:
         """Smallest distance of two joints, or height of a plate, over the size of the picture."""
@@ -216,15 +233,29 @@ class _Springs:
     def __init__(self, sides: IntArray, stiffness: list[float], joints: int, hubs: int) -> None:
         count = joints + hubs
         self.first, self.second, self.stiffness = sides[:, 0], sides[:, 1], np.array(stiffness)
-        self.incidence = np.zeros((count, len(sides)))
-        self.incidence[self.first, np.arange(len(sides))] = 1.0
-        self.incidence[self.second, np.arange(len(sides))] = -1.0
+        self.ends = sides.T.ravel()
         weight = np.where(np.arange(count) < joints, 1.0, 0.2)
+        self.touching = 3.0 * np.outer(weight == 1.0, weight == 1.0)
         self.weight, self.eye = 0.35 * np.outer(weight, weight), np.eye(count)
+        self.foreign = np.array(
+            [(k, p, q) for k in range(joints) for p, q in sides.tolist() if k not in (p, q)], dtype=np.intp
+        ).reshape(-1, 3)
+        self.clearing_on = self.foreign.T.ravel()
 
     def stretch(self, z: Complex) -> Complex:
         """Vectors along the sides."""
         return np.asarray(z[self.second] - z[self.first])
+
+    def clearing(self, z: Complex) -> Complex:
+        """Force that drives joints away from sides they are not on."""
+        k, p, q = self.foreign.T
+        side, way = z[q] - z[p], z[k] - z[p]
+        at = np.clip((way * np.conj(side)).real / np.maximum(np.abs(side) ** 2, 1e-12), 0.0, 1.0)
+        gap = way - at * side
+        distance = np.maximum(np.abs(gap), 1e-9)
+        push = gap * (_CLEARING * np.maximum(0.0, _CLEAR - distance) / distance)
+        shares = np.concatenate([push, (at - 1.0) * push, -at * push])
+        return _gathered(len(z), self.clearing_on, shares)
 
     def force(self, z: Complex) -> Complex:
         """Force on every vertex."""
@@ -232,7 +263,18 @@ class _Springs:
         square = gap.real**2 + gap.imag**2 + self.eye
         d = self.stretch(z)
         pull = d * (self.stiffness * (1.0 - 1.0 / np.maximum(np.abs(d), 1e-9)))
-        return np.asarray((gap * (self.weight / square**2)).sum(axis=1) + self.incidence @ pull)
+        distance = np.sqrt(square)
+        near = self.touching * np.maximum(0.0, _APART - distance) / distance
+        return np.asarray((gap * (self.weight / square**2 + near)).sum(axis=1)) + _gathered(
+            len(z), self.ends, np.concatenate([pull, -pull])
+        )
+
+
+def _gathered(count: int, index: IntArray, shares: Complex) -> Complex:
+    """Sum the shares that go to each vertex (no matrix product: its threads would cost more than the sum)."""
+    return np.asarray(
+        np.bincount(index, shares.real, minlength=count) + 1j * np.bincount(index, shares.imag, minlength=count)
+    )
 
 
 def _sides(polygons: Polygons) -> list[tuple[int, int]]:
