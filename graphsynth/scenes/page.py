@@ -68,6 +68,7 @@ def report_html(report: Report) -> str:
     parts = [
         f"<h1>{escape(scene.title)}</h1>",
         *(f"<p>{escape(text)}</p>" for text in scene.description.strip().split("\n\n") if text),
+        *(f'<p class="verdict"><b class="bad">{escape(text)}</b></p>' for text in report.notes),
         _facts(report),
     ]
     galleries = {name: value for name, value in products.items() if name != "graph_pictures" and _are_pictures(value)}
@@ -103,6 +104,10 @@ def _are_pictures(value: object) -> bool:
     return isinstance(value, tuple) and bool(value) and all(isinstance(item, Picture) for item in value)
 
 
+#: Verdicts printed in words at the top; more are read in the tables.
+_VERDICTS = 12
+
+
 def _facts(report: Report) -> str:
     """Give the run in a row of numbers and the verdicts of what was assessed."""
     products, facts = report.products, []
@@ -112,8 +117,11 @@ def _facts(report: Report) -> str:
     if records:
         assessed = [r for r in records if r.status == "assessed"]
         failed = sum(r.status == "failed" for r in records)
+        rejected = sum(r.status == "rejected" for r in records)
         if any(r.key for r in records):
             facts += [(str(len(records)), "candidate mechanisms", ""), (str(len(assessed)), "assessed", "")]
+        if rejected:
+            facts.append((str(rejected), "rejected", ""))
         if failed:
             facts.append((str(failed), "failed", "bad"))
     facts.append((f"{sum(t.seconds + t.import_seconds for t in report.times):.2f} s", "all stages", ""))
@@ -129,7 +137,7 @@ def _verdicts(records: Iterable[Record]) -> str:
     verdicts = dict.fromkeys((r.recognised_as, r.verdict, r.good) for r in records if r.status == "assessed")
     return "".join(
         f'<p class="verdict {tones[good]}"><b>{escape(verdict)}</b> <span class="soft">{escape(module)}</span></p>'
-        for module, verdict, good in verdicts
+        for module, verdict, good in list(verdicts)[:_VERDICTS]
     )
 
 

@@ -6,7 +6,20 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeVar
 
-__all__ = ["Candidate", "Picture", "Quantity", "Recognised", "Record", "Table", "each", "exact"]
+__all__ = [
+    "Candidate",
+    "Objective",
+    "Outcome",
+    "Picture",
+    "Quantity",
+    "Ranking",
+    "Recognised",
+    "Record",
+    "Rejected",
+    "Table",
+    "each",
+    "exact",
+]
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -29,7 +42,57 @@ class Candidate:
 
     number: int
     graph: Any
-    solution: str
+    solution: str = ""
+
+    @property
+    def key(self) -> str:
+        """Canonical key of the graph."""
+        return str(self.graph.key)
+
+
+class Rejected(Exception):  # noqa: N818  # not an error: a candidate that does not meet a goal
+    """Raised by a stage for each candidate: this one does not meet a goal, and later stages need not look at it.
+
+    Parameters
+    ----------
+    cause : str
+        The reason in words that are the same for all candidates it holds for; causes are counted.
+    detail : str, optional
+        What holds for this candidate only, as in ``"transmission angle 12.3 deg, at least 30 deg is asked"``.
+    """
+
+    def __init__(self, cause: str, detail: str = "") -> None:
+        super().__init__(f"{cause}: {detail}" if detail else cause)
+        self.cause = cause
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one candidate in the stages for each candidate.
+
+    Attributes
+    ----------
+    number : int
+        From 1, in the order of the stream.
+    key, solution : str
+        Of the candidate, if it has them.
+    status : {"assessed", "rejected", "failed"}
+        Through all stages; or stopped by a goal; or by an exception.
+    stage, cause, reason : str
+        Where it was stopped, why in countable words, and why in full.
+    products : Mapping
+        What later stages and the report need of it: text, numbers, booleans, None, tuples, dictionaries with text
+        keys, and the frozen dataclasses of this module.
+    """
+
+    number: int
+    key: str = ""
+    solution: str = ""
+    status: Literal["assessed", "rejected", "failed"] = "assessed"
+    stage: str = ""
+    cause: str = ""
+    reason: str = ""
+    products: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +140,8 @@ class Record:
         A candidate that no module recognises or that a goal rejects is not a failure; all but the first carry a reason.
     good : bool or None
         Whether the verdict is what a designer hopes for; None if there is none.
+    cause : str
+        The reason in words that can be counted; empty if the reason is that already.
     """
 
     number: int = 1
@@ -88,6 +153,7 @@ class Record:
     good: bool | None = None
     margins: tuple[Quantity, ...] = ()
     reason: str = ""
+    cause: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,3 +216,39 @@ def each(attempts: Iterable[Attempt], step: Callable[[Any], Any]) -> tuple[Attem
 def exact(name: str, value: float, unit: str = "") -> Quantity:
     """Return a quantity that carries no rounding (a count, an order)."""
     return Quantity(name, value, unit, "exact", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """One thing to rank by: a margin of the records, whether less, more or a value is wanted, and its weight."""
+
+    quantity: str
+    goal: Literal["min", "max"] | float
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Ranking:
+    """Records in the order of preference.
+
+    Attributes
+    ----------
+    objectives : tuple of Objective
+    numbers : tuple of int
+        Candidates with all objectives, the best first.
+    scores : tuple of float
+        In that order: weighted mean of the objectives, each scaled to 0 (worst of all) .. 1 (best of all).
+    front : tuple of int
+        The candidates that no other one beats in every objective (Pareto front), in the order of `numbers`.
+    values : tuple of tuple of float
+        In the order of `numbers`: the value of each objective.
+    unranked : tuple of (int, str)
+        Assessed candidates without some objective, and which.
+    """
+
+    objectives: tuple[Objective, ...]
+    numbers: tuple[int, ...]
+    scores: tuple[float, ...]
+    front: tuple[int, ...]
+    values: tuple[tuple[float, ...], ...]
+    unranked: tuple[tuple[int, str], ...] = ()

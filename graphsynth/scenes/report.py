@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 import platform
 import sys
@@ -128,9 +129,17 @@ def scene_json(report: Report) -> str:
         "versions": dict(report.versions),
         "platform": f"{platform.system()} {platform.machine()}",
         "stages": [
-            {"stage": t.stage, "import_seconds": round(t.import_seconds, 6), "seconds": round(t.seconds, 6)}
+            {
+                "stage": t.stage,
+                "runs": t.runs,
+                "import_seconds": round(t.import_seconds, 6),
+                "seconds": round(t.seconds, 6),
+                "peak_MB": round(t.peak_mb, 1) if math.isfinite(t.peak_mb) else None,
+                "imports": list(t.modules),
+            }
             for t in report.times
         ],
+        "notes": list(report.notes),
     }
     return json.dumps(content, indent=2, ensure_ascii=False, default=str) + "\n"
 
@@ -141,6 +150,8 @@ def print_summary(report: Report, console: Console) -> None:
     from rich.table import Table as RichTable
 
     console.print(f"[bold]{escape(report.scene.scene.title)}[/bold]")
+    for text in report.notes:
+        console.print(f"[yellow]{escape(text)}[/yellow]")
     for table in summary_tables(report):
         shown = RichTable(
             title=escape(table.title), title_justify="left", caption=escape(table.note) or None, caption_justify="left"
@@ -151,7 +162,7 @@ def print_summary(report: Report, console: Console) -> None:
             shown.add_row(*map(escape, row))
         console.print(shown)
     if report.folder is not None:
-        names = ["report.html", "results.csv", "scene.json"]
+        names = ["report.html", "results.csv", "results.parquet", "scene.json", "candidates.jsonl"]
         console.print(
             f"Report: {escape(str(report.folder))} ({', '.join(n for n in names if (report.folder / n).exists())})"
         )

@@ -8,15 +8,25 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from graphsynth.errors import FormatError, SceneError
 from graphsynth.scenes.family import Family, family, family_names
-from graphsynth.scenes.stages import STRUCTURE, Stage
+from graphsynth.scenes.stages import RANK, STRUCTURE, Stage
 from graphsynth.scenes.tables import Place, read_table, require, suggest
 from graphsynth.structure.variables import nearest
 
-__all__ = ["GenerateTable", "OutputsTable", "Scene", "StructureTable", "available_scenes", "find_scene", "load_scene"]
+__all__ = [
+    "BudgetTable",
+    "GenerateTable",
+    "OutputsTable",
+    "RankingTable",
+    "Scene",
+    "StructureTable",
+    "available_scenes",
+    "find_scene",
+    "load_scene",
+]
 
 _PACKAGE = Path(__file__).resolve().parent
 
@@ -76,10 +86,60 @@ class OutputsTable:
     """``[outputs]``: the products wanted; nothing that they do not need is imported or computed."""
 
     products: tuple[str, ...]
+    files: tuple[Literal["csv", "parquet"], ...] = ("csv",)
 
     def __post_init__(self) -> None:
         require(bool(self.products), "has no products; name at least one output")
         require(len(set(self.products)) == len(self.products), f"names a product twice in {list(self.products)}")
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetTable:
+    """``[budget]``: where a run stops.  What is stored by then stays, and a run with more goes on from it.
+
+    Attributes
+    ----------
+    time_s : float or None
+        Wall time; looked at after each candidate and between stages.
+    memory_MB : float or None
+        Resident memory of the process that runs the scene; looked at at the same places.
+    boxes : int or None
+        For stages that pave or prove: the most boxes they may look at.
+    """
+
+    time_s: float | None = None
+    memory_MB: float | None = None
+    boxes: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "memory_MB", "boxes"):
+            value = getattr(self, name)
+            require(value is None or value > 0, f"has {name} = {value}; it must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectiveTable:
+    """One of ``[[ranking.objectives]]``: a margin of the records, and what is wanted of it."""
+
+    quantity: str
+    goal: Literal["min", "max"] = "min"
+    target: float | None = None
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        require(self.weight > 0, f"has weight = {self.weight}; it must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class RankingTable:
+    """``[ranking]``: the objectives, and how many candidates the report lists."""
+
+    objectives: tuple[ObjectiveTable, ...]
+    show: int = 10
+
+    def __post_init__(self) -> None:
+        require(bool(self.objectives), "has no objectives; name at least one quantity")
+        require(self.show >= 1, f"has show = {self.show}; it must be at least 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +148,8 @@ class Scene:
 
     Attributes
     ----------
-    scene, mechanism, outputs, structure
-        The tables of the file; `mechanism` has the type its family says, `structure` may be missing.
+    scene, mechanism, outputs, structure, ranking, budget
+        The tables of the file; `mechanism` has the type its family says, the last three may be missing.
     source : str
         File name, or ``<mapping>``.
     raw : Mapping
@@ -104,6 +164,8 @@ class Scene:
     mechanism: Any
     outputs: OutputsTable
     structure: StructureTable | None = None
+    ranking: RankingTable | None = None
+    budget: BudgetTable = field(default_factory=BudgetTable)
     source: str = "<mapping>"
     raw: Mapping[str, object] = field(default_factory=dict, compare=False, repr=False)
     digest: str = ""
@@ -132,7 +194,7 @@ class Scene:
         if not isinstance(tables, Mapping):
             raise place.error("must hold tables")
         known: dict[str, type] = {"scene": SceneTable, "structure": StructureTable, "mechanism": object}
-        known["outputs"] = OutputsTable
+        known |= {"ranking": RankingTable, "budget": BudgetTable, "outputs": OutputsTable}
         for key in tables:
             if key not in known:
                 raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}", str(key))
@@ -153,7 +215,8 @@ class Scene:
     def stages(self) -> tuple[Stage, ...]:
         """Return every stage this scene can use; most are not needed for its outputs."""
         common = STRUCTURE if self.structure is not None else ()
-        return (*common, *family(self.mechanism.module).stages)
+        ranking = (RANK,) if self.ranking is not None else ()
+        return (*common, *ranking, *family(self.mechanism.module).stages)
 
 
 def _family(table: object, place: Place) -> Family:

@@ -19,7 +19,7 @@ from graphsynth.scenes.tables import Place, suggest
 if TYPE_CHECKING:
     from graphsynth.scenes.scene import Scene
 
-__all__ = ["STRUCTURE", "Context", "Progress", "Stage", "StageFunction", "load", "resolve"]
+__all__ = ["COLLECT", "GROUP", "RANK", "STRUCTURE", "Context", "Progress", "Stage", "StageFunction", "load", "resolve"]
 
 _STEPS = "graphsynth.scenes.steps"
 
@@ -36,16 +36,28 @@ class Stage:
         ``"package.module:function"``; called as ``function(context, *needs)`` in the order of `needs`.
     needs, gives : tuple of str
         Names of products. A stage that gives several returns a tuple in the order of `gives`.
+    stream : bool
+        It gives one product, an iterable of candidates, and may make them one by one.
+    each : bool
+        It works on one candidate at a time: of what the stream or another such stage gives it gets the candidate's
+        own value, of everything else the whole product.  Candidates go through all such stages one after the other,
+        in parallel if there is an executor; one that raises is recorded and stops nobody else
+        (:class:`~graphsynth.scenes.products.Rejected`: it does not meet a goal; anything else: it failed).
+    cost : float
+        Of stages for each candidate that could come next, the cheapest comes first.
     """
 
     name: str
     function: str
-    needs: tuple[str, ...]
-    gives: tuple[str, ...]
+    needs: tuple[str, ...] = ()
+    gives: tuple[str, ...] = ()
+    stream: bool = False
+    each: bool = False
+    cost: float = 1.0
 
 
 class Progress(Protocol):
-    """Told before each stage (``done`` of ``total`` finished) and once more at the end."""
+    """Told before each stage (``done`` of ``total`` finished), after candidates, and once more at the end."""
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show the progress; must not raise."""
@@ -69,9 +81,49 @@ class StageFunction(Protocol):
 #: Stages of ``[structure]``, which every family shares; "sketch graphs" asks the family for ``recognised``.
 STRUCTURE = (
     Stage("solve", f"{_STEPS}.structural:solve", (), ("solutions",)),
-    Stage("generate", f"{_STEPS}.structural:generate", ("solutions",), ("candidates",)),
+    Stage("generate", f"{_STEPS}.structural:generate", ("solutions",), ("candidates",), stream=True),
     Stage("sketch graphs", f"{_STEPS}.graphs:pictures", ("candidates", "recognised"), ("graph_pictures",)),
 )
+
+
+#: Collects what stages for each candidate gave as ``record`` into ``records``: one per candidate, with reasons.
+COLLECT = Stage("collect", f"{_STEPS}.collect:records", ("record",), ("records",))
+
+#: Ranks the records by the objectives of ``[ranking]``.
+RANK = Stage("rank", f"{_STEPS}.rank:rank", ("records",), ("ranking",))
+
+#: Entry points of this group are stages of other packages: ``product = "package.module:STAGE"``, one for each product.
+GROUP = "graphsynth.stages"
+
+
+def installed_stage(product: str) -> Stage | None:
+    """Return the stage of another package that gives this product, or None if no package announces one.
+
+    Raises
+    ------
+    SceneError
+        If it cannot be imported, is no stage or does not give the product.
+    """
+    from importlib.metadata import entry_points
+
+    for point in entry_points(group=GROUP, name=product):
+        try:
+            stage = point.load()
+        except (ImportError, AttributeError, ValueError) as error:
+            raise SceneError(
+                f"product {product!r} is announced by {point.value!r}, which cannot be imported: {error}"
+            ) from error
+        if not isinstance(stage, Stage) or product not in stage.gives:
+            raise SceneError(f"product {product!r} is announced by {point.value!r}, which is no Stage that gives it")
+        return stage
+    return None
+
+
+def installed_products() -> tuple[str, ...]:
+    """Return the products that stages of other packages announce."""
+    from importlib.metadata import entry_points
+
+    return tuple(sorted(entry_points(group=GROUP).names))
 
 
 def _givers(stages: Iterable[Stage]) -> dict[str, Stage]:
@@ -87,7 +139,12 @@ def _givers(stages: Iterable[Stage]) -> dict[str, Stage]:
     return givers
 
 
-def resolve(stages: Iterable[Stage], outputs: Sequence[str], place: Place | None = None) -> tuple[Stage, ...]:
+def resolve(
+    stages: Iterable[Stage],
+    outputs: Sequence[str],
+    place: Place | None = None,
+    installed: Callable[[str], Stage | None] = installed_stage,
+) -> tuple[Stage, ...]:
     """Return the smallest set of stages that yields `outputs`, in an order in which each finds what it needs.
 
     Backward from the outputs; the order depends on `outputs` and `stages` alone.
@@ -100,6 +157,8 @@ def resolve(stages: Iterable[Stage], outputs: Sequence[str], place: Place | None
         Products wanted.
     place : Place, optional
         Where the outputs were named, for the message.
+    installed : callable, optional
+        Finds a stage of another package for a product that none of `stages` gives.
 
     Raises
     ------
@@ -118,13 +177,13 @@ def resolve(stages: Iterable[Stage], outputs: Sequence[str], place: Place | None
     path: list[str] = []
 
     def visit(product: str) -> None:
-        giver = givers.get(product)
+        giver = givers.get(product) or installed(product)
         if giver is None:
-            if path:
-                raise SceneError(
-                    f"{at}stage {path[-1]!r} needs {product!r}, which no stage gives{suggest(product, givers)}"
-                )
-            raise SceneError(f"{at}asks for {product!r}, which no stage gives{suggest(product, givers)}")
+            who = f"stage {path[-1]!r} needs" if path else "asks for"
+            raise SceneError(
+                f"{at}{who} {product!r}, which no stage gives{suggest(product, (*givers, *installed_products()))}"
+            )
+        givers[product] = giver
         if giver in order:
             return
         if giver.name in path:

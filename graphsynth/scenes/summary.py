@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from graphsynth.scenes.products import Record, Table
+from graphsynth.scenes.products import Ranking, Record, Table
 
 if TYPE_CHECKING:
     from graphsynth.scenes.runner import Report
@@ -22,15 +23,59 @@ def summary_tables(report: Report) -> tuple[Table, ...]:
         tables.append(_solutions_table(products["solutions"]))
     if any(record.key for record in products.get("records", ())):
         tables.append(_verdict_table(products["records"]))
+    if any(record.status in ("rejected", "failed") for record in products.get("records", ())):
+        tables.append(_reasons_table(products["records"]))
+    tables += [_ranking_table(value, report) for value in products.values() if isinstance(value, Ranking)]
     for value in products.values():
         tables += [item for item in value if isinstance(item, Table)] if isinstance(value, tuple) else []
-    rows = [(t.stage, f"{t.import_seconds:.3f}", f"{t.seconds:.3f}") for t in report.times]
-    total = (sum(t.import_seconds for t in report.times), sum(t.seconds for t in report.times))
-    rows.append(("total", f"{total[0]:.3f}", f"{total[1]:.3f}"))
-    tables.append(
-        Table("Time per stage", ("stage", "import [s]", "run [s]"), tuple(rows), "Wall clock, one measurement.")
-    )
+    tables.append(_times_table(report))
     return tuple(tables)
+
+
+def _times_table(report: Report) -> Table:
+    rows = [(t.stage, str(t.runs), f"{t.import_seconds:.3f}", f"{t.seconds:.3f}", _mb(t.peak_mb)) for t in report.times]
+    imports, seconds = math.fsum(t.import_seconds for t in report.times), math.fsum(t.seconds for t in report.times)
+    rows.append(("total", "", f"{imports:.3f}", f"{seconds:.3f}", ""))
+    note = "Wall clock and resident memory, one measurement; of stages for each candidate, the sum over candidates."
+    return Table("Time per stage", ("stage", "runs", "import [s]", "run [s]", "peak [MB]"), tuple(rows), note)
+
+
+def _mb(value: float) -> str:
+    return f"{value:.0f}" if math.isfinite(value) else "unknown"
+
+
+def _reasons_table(records: tuple[Record, ...]) -> Table:
+    """Count why candidates were rejected or failed, the most frequent reason first."""
+    counts = Counter((r.status, r.cause or r.reason) for r in records if r.status in ("rejected", "failed"))
+    rows = tuple((str(count), *key) for key, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+    return Table("Why candidates were turned down", ("count", "status", "reason"), rows)
+
+
+def _ranking_table(ranking: Ranking, report: Report) -> Table:
+    """List the best candidates with the values of their objectives."""
+    most = report.scene.ranking.show if report.scene.ranking else len(ranking.numbers)
+    rows = tuple(
+        (
+            str(place),
+            str(number),
+            f"{score:.4f}",
+            "yes" if number in ranking.front else "no",
+            *(f"{v:.8g}" for v in row),
+        )
+        for place, (number, score, row) in enumerate(zip(ranking.numbers, ranking.scores, ranking.values), 1)
+    )[:most]
+    goals = tuple(
+        f"{o.quantity} ({o.goal if isinstance(o.goal, str) else f'near {o.goal:g}'})" for o in ranking.objectives
+    )
+    weights = ", ".join(f"{o.weight:g}" for o in ranking.objectives)
+    note = (
+        f"{len(ranking.front)} of {len(ranking.numbers)} ranked candidates are on the Pareto front: no other one is at "
+        f"least as good in every objective and better in one. Score: weighted mean (weights {weights}) of the "
+        "objectives, each scaled from 0 (worst of all) to 1 (best of all)."
+    )
+    if ranking.unranked:
+        note += f" {len(ranking.unranked)} without all objectives are not ranked ({ranking.unranked[0][1]}, ...)."
+    return Table("Ranking", ("place", "candidate", "score", "Pareto front", *goals), rows, note)
 
 
 def _solutions_table(solutions: tuple[LinkAssortment, ...]) -> Table:
@@ -51,7 +96,8 @@ def _solutions_table(solutions: tuple[LinkAssortment, ...]) -> Table:
 
 def _verdict_table(records: tuple[Record, ...]) -> Table:
     counts = Counter(
-        (r.solution, r.status, r.recognised_as, r.verdict, "" if r.status == "assessed" else r.reason) for r in records
+        (r.solution, r.status, r.recognised_as, r.verdict, "" if r.status == "assessed" else r.cause or r.reason)
+        for r in records
     )
     columns = ("count", "assortment", "status", "recognised as", "verdict", "reason")
     rows = [(str(count), *key) for key, count in counts.items()]

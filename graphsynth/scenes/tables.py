@@ -44,7 +44,7 @@ _NAMED = re.compile(r"(?:has|gives) (\w+)")
 _lines = lru_cache(maxsize=4)(key_lines)
 
 #: Annotation of lengths that may be in any one unit: all of them with a written unit, or none.
-ANY_LENGTH = Unit("mm", Fraction(1, 1000), 0, (1, 0, 0, 0, 0))
+ANY_LENGTH = Unit("mm", Fraction(1, 1000), 0, (1, 0, 0, 0, 0, 0))
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Units written in scene files: ``"17.5 mm"``, ``"2 deg"``, ``"0.01 %"``, ``"0.3 N m/rad"``.
 
 A unit is an exact rational factor to SI (radians for angles), a power of pi, and exponents of metre, kilogram,
-second, ampere and radian.  A value is converted exactly and rounded once.
+second, ampere, radian and byte.  A value is converted exactly and rounded once.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from functools import cache
 
 __all__ = ["SUFFIXES", "Unit", "convert", "split_suffix", "split_value", "unit_of_key"]
 
-Dimensions = tuple[int, int, int, int, int]
+Dimensions = tuple[int, int, int, int, int, int]
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
-_NONE: Dimensions = (0, 0, 0, 0, 0)
+_NONE: Dimensions = (0, 0, 0, 0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit of measurement; ``dimensions`` are exponents of (m, kg, s, A, rad).
+    """A unit of measurement; ``dimensions`` are exponents of (m, kg, s, A, rad, byte).
 
     Examples
     --------
     >>> Unit.parse("N m/rad").dimensions
-    (2, 1, -2, 0, -1)
+    (2, 1, -2, 0, -1, 0)
     """
 
     text: str
@@ -46,7 +46,7 @@ class Unit:
 
     def agrees(self, other: Unit) -> bool:
         """Whether both measure the same quantity; a radian may be left out of mechanical and electrical units."""
-        if self.dimensions[:4] != other.dimensions[:4]:
+        if (*self.dimensions[:4], self.dimensions[5]) != (*other.dimensions[:4], other.dimensions[5]):
             return False
         return self.dimensions[4] == other.dimensions[4] or self.dimensions[1] != 0
 
@@ -58,9 +58,10 @@ class Unit:
 
 def _table() -> dict[str, tuple[Fraction, int, Dimensions]]:
     base = {
-        "m": (1, 0, 0, 0, 0), "g": (0, 1, 0, 0, 0), "s": (0, 0, 1, 0, 0), "A": (0, 0, 0, 1, 0), "rad": (0, 0, 0, 0, 1),
-        "N": (1, 1, -2, 0, 0), "J": (2, 1, -2, 0, 0), "W": (2, 1, -3, 0, 0), "Pa": (-1, 1, -2, 0, 0),
-        "V": (2, 1, -3, -1, 0), "ohm": (2, 1, -3, -2, 0), "H": (2, 1, -2, -2, 0), "Wb": (2, 1, -2, -1, 0),
+        "m": (1, 0, 0, 0, 0, 0), "g": (0, 1, 0, 0, 0, 0), "s": (0, 0, 1, 0, 0, 0), "A": (0, 0, 0, 1, 0, 0),
+        "rad": (0, 0, 0, 0, 1, 0), "B": (0, 0, 0, 0, 0, 1), "N": (1, 1, -2, 0, 0, 0), "J": (2, 1, -2, 0, 0, 0),
+        "W": (2, 1, -3, 0, 0, 0), "Pa": (-1, 1, -2, 0, 0, 0), "V": (2, 1, -3, -1, 0, 0), "H": (2, 1, -2, -2, 0, 0),
+        "ohm": (2, 1, -3, -2, 0, 0), "Wb": (2, 1, -2, -1, 0, 0),
     }  # fmt: skip
     prefixes = {"": 0, "n": -9, "u": -6, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}
     units: dict[str, tuple[Fraction, int, Dimensions]] = {}
@@ -75,7 +76,7 @@ def _table() -> dict[str, tuple[Fraction, int, Dimensions]]:
         "min": (Fraction(60), 0, time), "h": (Fraction(3600), 0, time), "t": (Fraction(1000), 0, base["g"]),
         "deg": (Fraction(1, 180), 1, angle), "°": (Fraction(1, 180), 1, angle), "turn": (Fraction(2), 1, angle),
         "arcmin": (Fraction(1, 10800), 1, angle), "arcsec": (Fraction(1, 648000), 1, angle),
-        "rpm": (Fraction(1, 30), 1, (0, 0, -1, 0, 1)), "Nm": (Fraction(1), 0, base["J"]),
+        "rpm": (Fraction(1, 30), 1, (0, 0, -1, 0, 1, 0)), "Nm": (Fraction(1), 0, base["J"]),
         "mNm": (Fraction(1, 1000), 0, base["J"]), "Nmm": (Fraction(1, 1000), 0, base["J"]),
         "Ω": (Fraction(1), 0, base["ohm"]),
     }  # fmt: skip
@@ -83,21 +84,12 @@ def _table() -> dict[str, tuple[Fraction, int, Dimensions]]:
 
 
 _UNITS = _table()
-_QUANTITIES: dict[Dimensions, str] = {
-    _NONE: "a plain number", (1, 0, 0, 0, 0): "a length", (2, 0, 0, 0, 0): "an area", (0, 0, 0, 0, 1): "an angle",
-    (0, 0, 1, 0, 0): "a time", (0, 1, 0, 0, 0): "a mass", (1, 1, -2, 0, 0): "a force", (2, 1, -2, 0, 0): "a torque",
-    (0, 0, -1, 0, 1): "an angular velocity", (0, 0, -2, 0, 1): "an angular acceleration",
-    (1, 0, -1, 0, 0): "a velocity", (1, 0, -2, 0, 0): "an acceleration", (2, 1, 0, 0, 0): "a moment of inertia",
-    (2, 1, -3, -1, 0): "a voltage", (0, 0, 0, 1, 0): "a current", (2, 1, -3, -2, 0): "a resistance",
-    (2, 1, -2, -2, 0): "an inductance", (2, 1, -3, 0, 0): "a power", (0, 1, -2, 0, 0): "a stiffness",
-    (0, 1, -1, 0, 0): "a damping", (-1, 1, -2, 0, 0): "a pressure",
-}  # fmt: skip
 _SYMBOL = re.compile(r"([^\W\d]+|[%‰°Ω]|1)(?:\^?(-?[1-9])|([²³]))?")
 
 
 @cache
 def _parse(text: str) -> Unit:
-    factor, pi, dimensions, sign = Fraction(1), 0, [0] * 5, 1
+    factor, pi, dimensions, sign = Fraction(1), 0, [0] * 6, 1
     for part in re.findall(r"/|[^\s*·/]+", text):
         if part == "/":
             if sign < 0:
@@ -115,15 +107,27 @@ def _parse(text: str) -> Unit:
         sign = 1
     if sign < 0:  # a stroke with nothing behind it
         raise ValueError(text)
-    a, b, c, d, e = dimensions
-    return Unit(text, factor, pi, (a, b, c, d, e))
+    a, b, c, d, e, f = dimensions
+    return Unit(text, factor, pi, (a, b, c, d, e, f))
+
+
+_QUANTITIES: dict[Dimensions, str] = {
+    _parse(text).dimensions: words
+    for text, words in {
+        "": "a plain number", "m": "a length", "m^2": "an area", "rad": "an angle", "s": "a time", "kg": "a mass",
+        "N": "a force", "N m": "a torque", "rad/s": "an angular velocity", "rad/s^2": "an angular acceleration",
+        "m/s": "a velocity", "m/s^2": "an acceleration", "kg m^2": "a moment of inertia", "V": "a voltage",
+        "A": "a current", "ohm": "a resistance", "H": "an inductance", "W": "a power", "N/m": "a stiffness",
+        "N s/m": "a damping", "Pa": "a pressure", "B": "a size of memory",
+    }.items()
+}  # fmt: skip
 
 
 #: Endings of keys that say the unit of a bare number: ``radius_mm = 17.5``.
 SUFFIXES: dict[str, str] = {
     **{u: u for u in ("mm", "cm", "m", "um", "mm2", "mm4", "m2", "rad", "mrad", "deg", "arcmin", "arcsec", "s", "ms")},
     **{u: u for u in ("us", "kg", "g", "N", "kN", "Nm", "Nmm", "J", "V", "A", "ohm", "H", "mH", "W", "rpm")},
-    **{u: u for u in ("Pa", "MPa", "GPa")},
+    **{u: u for u in ("Pa", "MPa", "GPa", "MB")},
     "percent": "%", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "mm_s2": "mm/s^2",
     "rad_s2": "rad/s^2", "m_s2": "m/s^2", "kg_m2": "kg m^2", "g_mm2": "g mm^2", "kg_mm2": "kg mm^2", "V_s": "V s",
     "N_per_m": "N/m", "N_per_mm": "N/mm", "Nm_per_rad": "N m/rad", "Nm_s": "N m s", "N_s_per_m": "N s/m",

@@ -12,10 +12,12 @@ from typing import Any
 import pytest
 
 from graphsynth.errors import SceneError
+from graphsynth.scenes.measure import StageTime
 from graphsynth.scenes.page import report_html
 from graphsynth.scenes.products import Attempt, Candidate, Picture, Quantity, Record, Table, each
 from graphsynth.scenes.report import results_csv, scene_json, write_report
-from graphsynth.scenes.runner import Report, StageTime, run_stages
+from graphsynth.scenes.runner import Report
+from graphsynth.scenes.running import Running
 from graphsynth.scenes.scene import Scene
 from graphsynth.scenes.stages import Context, Stage
 
@@ -85,7 +87,8 @@ def test_scene_json_holds_scene_versions_seed_and_times(report: Report) -> None:
     content = json.loads(scene_json(report))
     assert content["scene"]["mechanism"]["tilt"]["alpha_rad"] == "1/30"
     assert content["sha256"] == "ab" * 32 and content["seed"] == 0
-    assert content["stages"] == [{"stage": "solve", "import_seconds": 0.5, "seconds": 0.25}]
+    (stage,) = content["stages"]
+    assert (stage["stage"], stage["import_seconds"], stage["seconds"], stage["peak_MB"]) == ("solve", 0.5, 0.25, None)
 
 
 def test_files_appear_whole_or_not_at_all(report: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,7 +127,8 @@ def test_stages_run_once_in_order_and_unneeded_products_are_dropped(lambda_table
         Stage("two", f"{__name__}:two", ("x",), ("y", "z")),
     )
     context = Context(Scene.from_mapping(lambda_tables))
-    products, times = run_stages(stages, ("z",), context, lambda s, d, n: told.append((s, d, n)))
+    running = Running(stages, ("z",), context, lambda s, d, n: told.append((s, d, n)))
+    products, times = running.run(), running.times
     assert products == {"z": "z1"}
     assert [t.stage for t in times] == ["one", "two"] and all(t.seconds >= 0 for t in times)
     assert told == [("one", 0, 2), ("two", 1, 2), ("done", 2, 2)]

@@ -38,29 +38,31 @@ def _spec(context: Context) -> StructuralSpec:
         raise place.error(f"cannot be read: {error}") from error
 
 
-def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> tuple[Candidate, ...]:
-    """Return the mechanisms of the question, each once up to isomorphism, filtered as ``[structure.generate]`` says.
+def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterator[Candidate]:
+    """Yield the mechanisms of the question, each once up to isomorphism, filtered as ``[structure.generate]`` says.
 
     Raises
     ------
     TooLargeError
         If there are more than ``limit``.
+    SceneError
+        If there is none.
     """
     options = _structure(context).generate
-    candidates: list[Candidate] = []
+    count = 0
     for graph in _mechanisms(context):
-        if len(candidates) == options.limit:
+        if count == options.limit:
             raise TooLargeError(
                 f"{context.scene.place / 'structure' / 'generate'} the question has more than limit = {options.limit} "
                 "mechanisms; raise the limit, or fix more variables of the question"
             )
-        candidates.append(Candidate(len(candidates) + 1, graph, assortment_text(graph)))
-    if not candidates:
+        count += 1
+        yield Candidate(count, graph, assortment_text(graph))
+    if not count:
         raise SceneError(
             f"{context.scene.place / 'structure'} has {len(solutions)} integer solutions but no mechanism passes the "
             "filters of [structure.generate]; relax them"
         )
-    return tuple(candidates)
 
 
 def _mechanisms(context: Context) -> Iterator[MechanismGraph]:

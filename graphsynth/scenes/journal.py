@@ -1,0 +1,152 @@
+"""``candidates.jsonl``: one line per candidate, written as it comes; an interrupted run goes on from it.
+
+The first line says which run it is, the last one that it is complete.  Lines are only appended, in the order of the
+candidates, so whatever stops a run, all whole lines are valid; a torn last line is cut off.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import graphsynth
+from graphsynth.errors import FormatError, SceneError
+from graphsynth.scenes.codec import decode
+from graphsynth.scenes.products import Outcome
+
+if TYPE_CHECKING:
+    from graphsynth.scenes.scene import Scene
+    from graphsynth.scenes.stages import Stage
+
+__all__ = ["Journal", "signature"]
+
+
+def signature(scene: Scene, stages: Sequence[Stage], kept: Sequence[str]) -> str:
+    """Digest of all that the lines of a journal depend on: the question, the stages, the version of graphsynth.
+
+    Titles, budgets, outputs and the limit on the number of candidates may change between runs.
+    """
+    tables: dict[str, Any] = {key: scene.raw[key] for key in ("structure", "mechanism") if key in scene.raw}
+    structure = tables.get("structure")
+    if isinstance(structure, dict) and isinstance(structure.get("generate"), dict):
+        generate = {key: value for key, value in structure["generate"].items() if key != "limit"}
+        tables["structure"] = {**structure, "generate": generate}
+    content = {
+        "version": graphsynth.__version__,
+        "seed": scene.scene.seed,
+        "tables": tables,
+        "boxes": scene.budget.boxes,
+        "stages": [(stage.name, stage.function) for stage in stages],
+        "kept": list(kept),
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
+
+
+class Journal:
+    """The file of results of one run; without a path nothing is kept on disk.
+
+    Parameters
+    ----------
+    path : Path or None
+        The file.
+    scene : str
+        Name of the scene, for people.
+    signature : str
+        Of this run; a file of another unfinished run is refused.
+    fresh : bool
+        Replace whatever is there.
+
+    Attributes
+    ----------
+    done : tuple of Outcome
+        What an interrupted run had written.
+
+    Raises
+    ------
+    SceneError
+        If the file belongs to another unfinished run.
+    FormatError
+        If it is not a file of results.
+    """
+
+    def __init__(self, path: Path | None, scene: str, signature: str, fresh: bool = False) -> None:
+        self.path = path
+        self.done: tuple[Outcome, ...] = ()
+        self._stream: Any = None
+        if path is None:
+            return
+        kept = 0
+        if path.exists() and not fresh:
+            kept, self.done = _read(path, signature)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream = path.open("r+b" if kept else "wb")
+        except OSError as error:
+            raise SceneError(f"cannot write {path}: {error.strerror}; choose another folder with --out") from error
+        self._stream.seek(kept)
+        self._stream.truncate()
+        if not kept:
+            self._write({"results of": scene, "signature": signature})
+
+    def append(self, line: str) -> None:
+        """Write one encoded outcome; it is in the file when this returns."""
+        if self._stream is not None:
+            self._stream.write(line.encode() + b"\n")
+            self._stream.flush()
+
+    def complete(self) -> None:
+        """Say that no more candidates come."""
+        if self._stream is not None:
+            self._write({"complete": True})
+
+    def _write(self, content: dict[str, object]) -> None:
+        self.append(json.dumps(content, sort_keys=True))
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._stream is not None:
+            self._stream.close()
+
+
+def _read(path: Path, signature: str) -> tuple[int, tuple[Outcome, ...]]:
+    """Return how many bytes of a journal to keep, and the outcomes in them; nothing of a complete one."""
+    remedy = "; add --fresh to start anew, or choose another folder with --out"
+    data = path.read_bytes()
+    lines = data[: data.rfind(b"\n") + 1].splitlines()
+    if not lines:
+        return 0, ()
+    head = _json(lines[0])
+    if not isinstance(head, dict) or "signature" not in head:
+        raise FormatError(f"not a file of results{remedy}", str(path))
+    if _json(lines[-1]) == {"complete": True}:
+        return 0, ()
+    if head["signature"] != signature:
+        raise SceneError(f"{path} holds an interrupted run of another question or version{remedy}")
+    outcomes = []
+    for number, line in enumerate(lines[1:], 1):
+        outcome = _outcome(line)
+        if outcome is None or outcome.number != number:
+            raise FormatError(f"not the result of candidate {number}{remedy}", f"{path}, line {number + 1}")
+        outcomes.append(outcome)
+    return sum(len(line) + 1 for line in lines), tuple(outcomes)
+
+
+def _json(line: bytes) -> Any:
+    try:
+        return json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _outcome(line: bytes) -> Outcome | None:
+    try:
+        value = decode(line.decode())
+    except (FormatError, UnicodeDecodeError):
+        return None
+    return value if isinstance(value, Outcome) else None

@@ -1,0 +1,248 @@
+"""Candidates one by one through the stages that work on each: in parallel, recorded as they come, resumed."""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+from graphsynth.errors import SceneError
+from graphsynth.scenes.codec import decode, encode
+from graphsynth.scenes.journal import Journal
+from graphsynth.scenes.products import Outcome, Rejected
+from graphsynth.scenes.stages import Context, Stage, load
+
+__all__ = ["Plan", "Streamed", "evaluate", "plan_stream", "stream"]
+
+_LONG = 0.05  # seconds: chunks of candidates grow until they take this long
+_MOST = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Stages for each candidate in the order of running, the product they start from, and what is kept of each.
+
+    Attributes
+    ----------
+    stages : tuple of Stage
+        Cheap ones first, as far as their needs allow.
+    source : str
+        Product of the stream.
+    shared : tuple of str
+        Whole products they need besides.
+    kept : tuple of str
+        Products of a candidate that other stages or the report need.
+    """
+
+    stages: tuple[Stage, ...]
+    source: str
+    shared: tuple[str, ...]
+    kept: tuple[str, ...]
+
+
+def plan_stream(stages: Sequence[Stage], wanted: Sequence[str]) -> Plan | None:
+    """Pick the stages for each candidate out of resolved stages; None if there is none.
+
+    Raises
+    ------
+    SceneError
+        If they do not start from exactly one stream, or one of them needs what only all candidates together give.
+    """
+    each = [stage for stage in stages if stage.each]
+    if not each:
+        return None
+    given = {product for stage in each for product in stage.gives}
+    sources = {product for stage in stages if stage.stream for product in stage.gives}
+    used = sorted({need for stage in each for need in stage.needs if need in sources})
+    if len(used) != 1:
+        names = ", ".join(repr(stage.name) for stage in each)
+        raise SceneError(f"stages for each candidate ({names}) must start from one stream, not {len(used)}")
+    shared = {need for stage in each for need in stage.needs} - given - set(used)
+    for stage in stages:
+        if not stage.each and set(stage.gives) & _before(stages, shared) and set(stage.needs) & given:
+            raise SceneError(
+                f"stage {stage.name!r} needs all candidates, but a stage for each candidate needs what comes of it; "
+                "make that one a stage over all candidates"
+            )
+    rest = {need for stage in stages if not stage.each for need in stage.needs} | set(wanted)
+    kept = tuple(product for stage in each for product in stage.gives if product in rest)
+    return Plan(_cheapest_first(each, {*used, *shared}), used[0], tuple(sorted(shared)), kept)
+
+
+def _before(stages: Sequence[Stage], products: set[str]) -> set[str]:
+    """Return the products of stages over all that these need, directly or not; these included."""
+    found = set(products)
+    for stage in reversed(stages):  # each stage stands behind all it needs
+        if not stage.each and found & set(stage.gives):
+            found |= set(stage.needs)
+    return found
+
+
+def _cheapest_first(each: Sequence[Stage], ready: set[str]) -> tuple[Stage, ...]:
+    """Order stages so that each finds what it needs and, of those that could come next, the cheapest comes first."""
+    waiting = dict(enumerate(each))
+    order: list[Stage] = []
+    have = set(ready)
+    while waiting:
+        possible = [(stage.cost, place) for place, stage in waiting.items() if set(stage.needs) <= have]
+        stage = waiting.pop(heapq.nsmallest(1, possible)[0][1])
+        order.append(stage)
+        have |= set(stage.gives)
+    return tuple(order)
+
+
+def evaluate(
+    plan: Plan, context: Context, shared: Mapping[str, Any], number: int, item: Any
+) -> tuple[Outcome, list[float]]:
+    """Take one candidate through the stages until one stops it; also the seconds each stage took."""
+    have: dict[str, Any] = {**shared, plan.source: item}
+    outcome = Outcome(number, str(getattr(item, "key", "")), str(getattr(item, "solution", "")))
+    seconds: list[float] = []
+    for stage in plan.stages:
+        start = time.perf_counter()
+        try:
+            values = given_by(stage, load(stage)(context, *(have[need] for need in stage.needs)))
+        except Rejected as why:
+            return replace(outcome, status="rejected", stage=stage.name, cause=why.cause, reason=str(why)), seconds
+        except Exception as error:
+            if _interrupted(error):
+                raise KeyboardInterrupt from error
+            cause = type(error).__name__
+            return replace(outcome, status="failed", stage=stage.name, cause=cause, reason=f"{cause}: {error}"), seconds
+        finally:
+            seconds.append(time.perf_counter() - start)
+        have.update(values)
+    return replace(outcome, products={name: have[name] for name in plan.kept}), seconds
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether an exception only wraps a Ctrl-C, as the compiler of the kernels does."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def given_by(stage: Stage, result: Any) -> dict[str, Any]:
+    """Name what a stage returned.
+
+    Raises
+    ------
+    SceneError
+        If it is not what the stage says it gives.
+    """
+    values = (result,) if len(stage.gives) == 1 else result
+    if not isinstance(values, tuple) or len(values) != len(stage.gives):
+        raise SceneError(f"stage {stage.name!r} says it gives {', '.join(stage.gives)} but returned something else")
+    return dict(zip(stage.gives, values, strict=True))
+
+
+def _evaluate_chunk(
+    plan: Plan, context: Context, shared: Mapping[str, Any], chunk: list[tuple[int, Any]]
+) -> list[tuple[str, list[float]]]:
+    """Evaluate some candidates anywhere; outcomes come back as the text that is stored."""
+    lines = []
+    for number, item in chunk:
+        outcome, seconds = evaluate(plan, context, shared, number, item)
+        lines.append((encode(outcome), seconds))
+    return lines
+
+
+@dataclass(slots=True)
+class Streamed:
+    """What a stream gave: outcomes in the order of candidates, seconds and runs of each stage, why it stopped early."""
+
+    outcomes: list[Outcome] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)
+    runs: dict[str, int] = field(default_factory=dict)
+    stopped: str = ""
+    resumed: int = 0
+
+
+def stream(
+    plan: Plan,
+    context: Context,
+    shared: Mapping[str, Any],
+    items: Iterable[Any],
+    journal: Journal,
+    used_up: Callable[[], str],
+    progress: Callable[[int], None] | None = None,
+) -> Streamed:
+    """Evaluate every item, in order whoever computes it, and write each outcome as it comes.
+
+    Parameters
+    ----------
+    items : iterable
+        The candidates; taken one by one, at most some chunks ahead.
+    journal : Journal
+        What it has already is not computed again.
+    used_up : callable
+        Says which budget is used up, or nothing; asked after each chunk.
+    progress : callable, optional
+        Told the number of candidates done.
+
+    Raises
+    ------
+    SceneError
+        If the journal was written for other candidates.
+    """
+    from graphsynth.synthesis.parallel import in_order
+
+    done = Streamed()
+    numbered = enumerate(items, 1)
+    _skip(numbered, journal.done, done)
+    executor: Executor | None = context.executor
+    size = [1]
+    work = partial(_evaluate_chunk, plan, replace(context, executor=None), shared)
+    with closing(_results(in_order, executor, work, _chunks(numbered, size))) as results:
+        for chunk in results:
+            for line, seconds in chunk:
+                journal.append(line)
+                done.outcomes.append(decode(line))
+                for stage, spent in zip(plan.stages, seconds):
+                    done.seconds[stage.name] = done.seconds.get(stage.name, 0.0) + spent
+                    done.runs[stage.name] = done.runs.get(stage.name, 0) + 1
+            if executor is not None and sum(sum(s) for _, s in chunk) < _LONG:
+                size[0] = min(_MOST, 2 * size[0])
+            if progress:
+                progress(len(done.outcomes))
+            done.stopped = used_up()
+            if done.stopped:
+                return done
+    journal.complete()
+    return done
+
+
+def _results(
+    in_order: Callable[..., Iterator[Any]], executor: Executor | None, work: Callable[[Any], Any], chunks: Iterator[Any]
+) -> Generator[list[tuple[str, list[float]]], None, None]:
+    yield from in_order(executor, work, chunks)
+
+
+def _chunks(numbered: Iterator[tuple[int, Any]], size: list[int]) -> Iterator[list[tuple[int, Any]]]:
+    """Cut into runs of candidates, as long as ``size[0]`` says when they are cut; outcomes do not depend on it."""
+    chunk: list[tuple[int, Any]] = []
+    for pair in numbered:
+        chunk.append(pair)
+        if len(chunk) >= size[0]:
+            yield chunk
+            chunk = []
+    if chunk:
+        yield chunk
+
+
+def _skip(numbered: Iterator[tuple[int, Any]], stored: Sequence[Outcome], done: Streamed) -> None:
+    """Pass over the candidates an interrupted run has finished, making sure they are the same ones."""
+    for outcome in stored:
+        number, item = next(numbered, (0, None))
+        if (number, str(getattr(item, "key", ""))) != (outcome.number, outcome.key):
+            raise SceneError(
+                f"candidate {outcome.number} of the interrupted run ({outcome.key or 'no key'}) is not candidate "
+                f"{number or 'any'} of this one; add --fresh to start anew"
+            )
+        done.outcomes.append(outcome)
+    done.resumed = len(stored)
