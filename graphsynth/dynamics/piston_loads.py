@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,18 +133,21 @@ class PistonLoads:
             return float("nan")
         return float(np.abs(parts[:, good].sum(axis=0)).max() / max(np.abs(parts[:, good]).max(), 1e-300))
 
-    def edges(self, length: float) -> tuple[Array, Array]:
-        """Return the forces at the two ends of a piston of this length that give side load and couple of the wall.
+    def edges(self, length: float, of: Literal["wall", "guide"] = "wall") -> tuple[Array, Array]:
+        """Return the forces at the two ends of a piston (or of the crosshead's shoe) that give side load and couple.
 
         Parameters
         ----------
         length : float
             m; the reference point is in its middle.
+        of : {"wall", "guide"}
+            Of the cylinder on the piston, or of the guide on the crosshead.
 
         Returns
         -------
         near, far : ndarray, shape (n,)
             N; ``far`` at the end towards the head.
         """
-        lever = self.wall_couple / nonzero("length of the piston", length)
-        return 0.5 * self.wall - lever, 0.5 * self.wall + lever
+        force, couple = (self.wall, self.wall_couple) if of == "wall" else (self.guide, self.guide_couple)
+        lever = couple / nonzero("length of the piston", length)
+        return 0.5 * force - lever, 0.5 * force + lever

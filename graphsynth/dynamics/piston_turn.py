@@ -44,8 +44,8 @@ class PistonTurn:
         Largest and mean side load of the cylinder, N (magnitudes).
     peak_guide, mean_guide : float
         The same of the crosshead's guide.
-    peak_edge : float
-        Largest force at an end of the piston, N.
+    peak_edge, peak_guide_edge : float
+        Largest force at an end of the piston, and of the crosshead's shoe, N.
     peak_held : float
         Largest side load that the slot's static friction can add, N; 0 where the slot slides.
     """
@@ -62,6 +62,7 @@ class PistonTurn:
     peak_guide: float
     mean_guide: float
     peak_edge: float
+    peak_guide_edge: float
     peak_held: float
 
 
@@ -73,11 +74,12 @@ class PistonComparison:
     ----------
     floating, plain : PistonTurn
     wall_ratio : float
-        Peak side load of the cylinder with over without the second group; NaN if there is none without.
+        Peak side load of the cylinder with over without the second group; NaN if there is none without, up to
+        rounding.
     edge_ratio : float
         The same of the forces at the ends of the piston.
     guide_share : float
-        Peak load of the crosshead's guide over the peak side load of the plain piston: where it goes.
+        Peak force at an end of the crosshead's shoe over that at an end of the plain piston: where the load goes.
     friction_ratio : float
         Work lost with over without; NaN without friction.
     squareness : float
@@ -114,7 +116,7 @@ def piston_turn(machine: PistonMachine, length: float | None = None) -> PistonTu
     machine : PistonMachine
         With an acceleration of 0.
     length : float, optional
-        Of the piston, for the forces at its ends, m; the stroke by default.
+        Of piston and shoe, for the forces at their ends, m; the stroke by default.
 
     Raises
     ------
@@ -156,6 +158,7 @@ def piston_turn(machine: PistonMachine, length: float | None = None) -> PistonTu
         peak_guide=_peak(machine, lambda found: np.abs(found.guide), loads),
         mean_guide=float(weights @ np.abs(loads.guide)) / turn,
         peak_edge=_peak(machine, lambda found: np.maximum(*map(np.abs, found.edges(size))), loads),
+        peak_guide_edge=_peak(machine, lambda found: np.maximum(*map(np.abs, found.edges(size, "guide"))), loads),
         peak_held=float(loads.held.max()),
     )  # fmt: skip
 
@@ -168,7 +171,7 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
     machine : PistonMachine
         With a second group.
     length : float, optional
-        Of both pistons, m; the stroke by default.
+        Of both pistons and of the crosshead's shoe, m; the stroke by default.
 
     Raises
     ------
@@ -189,15 +192,19 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
     size = machine.mechanism.stroke if length is None else length
     floating, plain = piston_turn(machine, size), piston_turn(machine.without_group(), size)
     drive = machine.mechanism.drive
+    some = np.linspace(0.0, 2.0 * math.pi, 91)
+    least = 1e-10 * float(np.abs(machine.loads(some).crank_pin).max())
     return PistonComparison(
-        floating, plain, _ratio(floating.peak_wall, plain.peak_wall), _ratio(floating.peak_edge, plain.peak_edge),
-        _ratio(floating.peak_guide, plain.peak_wall), _ratio(floating.friction, plain.friction),
+        floating, plain, _ratio(floating.peak_wall, plain.peak_wall, least),
+        _ratio(floating.peak_edge, plain.peak_edge, least), _ratio(floating.peak_guide_edge, plain.peak_edge, least),
+        _ratio(floating.friction, plain.friction, 0.0),
         drive.steepest if isinstance(drive, CrankSlider) else math.nan,
     )  # fmt: skip
 
 
-def _ratio(one: float, other: float) -> float:
-    return one / other if other > 0.0 else math.nan
+def _ratio(one: float, other: float, least: float) -> float:
+    """NaN where the other is 0, or not more than rounding."""
+    return one / other if other > least else math.nan
 
 
 def _check(loads: PistonLoads) -> None:

@@ -205,6 +205,8 @@ def test_scotch_yoke_presses_with_its_ends():
     found = compare_pistons(machine, length=0.08)
     assert found.plain.peak_edge == pytest.approx(1000.0 * 0.05 / 0.08, rel=1e-9)
     assert found.edge_ratio < 1e-12
+    assert found.guide_share == pytest.approx(1.0, rel=1e-9)
+    assert math.isnan(found.wall_ratio)  # a plain yoke has no side load to compare with
     assert math.isnan(found.squareness)
     near, far = plain.edges(0.08)
     assert np.abs(near + far - plain.wall).max() < 1e-12 * 1000.0
