@@ -19,19 +19,28 @@ from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from matplotlib.figure import Figure
 
     from graphsynth.drawing.plots import Chart
     from graphsynth.jamming.area_curve import AreaCurve
+    from graphsynth.jamming.assess import JammingReport
     from graphsynth.jamming.bearing import Bearing
+    from graphsynth.jamming.error_against_time import ErrorRow
 
-__all__ = ["area_chart", "area_picture", "crossing_picture", "region_picture", "section_picture", "space_picture"]
+__all__ = [
+    "area_chart", "area_picture", "crossing_picture", "error_time_picture", "region_picture", "report_picture",
+    "section_picture", "space_picture",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
 _SOURCE_NOTE = (
     "The dashed curve is the ordinate of the source: the free gap of the surrogate ellipse, recorded as 0 where "
-    "nothing crosses.\nIt jumps to πRc at the onset and falls towards the worst pose; it measures no jamming."
+    "nothing crosses.\nIt jumps to πRc at the onset and falls towards the worst pose; it measures no jamming. "
+    "The shaded windows are details of the source's plot, not jam zones.\nIts values of tens or hundreds of mm² are "
+    "widths of interval sums over many boxes, not areas."
 )
 
 
@@ -127,7 +136,8 @@ def _overlap(axes: Any, ends: list[tuple[float, float]], hole: float, side: floa
     corner = beyond[0]
     axes.fill([hole, corner[0], hole], [z, corner[1], corner[1]], color=LIGHT["jam"], alpha=0.9, lw=0, zorder=5)
     axes.annotate(
-        "overlap", corner, textcoords="offset points", xytext=(0, 14 if corner[1] > 0 else -18), ha="center",
+        "overlap", corner, textcoords="offset points", xytext=(-4 * side, 14 if corner[1] > 0 else -18),
+        ha="left" if side > 0.0 else "right",
         fontsize=8, color=LIGHT["jam"],
     )  # fmt: skip
 
@@ -221,3 +231,124 @@ def area_chart(curve: AreaCurve, window: tuple[float, float] | None = None) -> C
         Line(f[use], curve.source_ordinate[use], "ordinate of the source", "ink", "--"),
     ]
     return Chart(lines, "crank angle, degrees", "area, mm²")
+
+
+# -- a report ----------------------------------------------------------------------------------------------------------
+
+
+def report_picture(report: JammingReport) -> Figure:
+    """Draw tilt and gap over the crank angle, with the parts of the turn that are proved free or jammed.
+
+    The curves are the sampled table of the report (nominal dimensions), the bands come from its certificate and hold
+    for all tolerances; without a certificate there are no bands.
+
+    Parameters
+    ----------
+    report : JammingReport
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> from graphsynth.jamming import ToleranceBox, assess_jamming
+    >>> len(report_picture(assess_jamming(box=ToleranceBox(alpha="1/30"))).axes)
+    2
+    """
+    figure = new_figure((9.0, 5.6))
+    tilts, gaps = figure.subplots(2, 1, sharex=True)
+    f = np.degrees(report.table.f)
+    tilts.plot(f, 1e3 * report.table.theta, color=LIGHT["a"], lw=1.5)
+    if report.critical_tilt is not None:
+        for sign in (1.0, -1.0):
+            tilts.axhline(sign * 1e3 * report.critical_tilt, color=LIGHT["soft"], lw=1.0, ls=(0, (4, 2)))
+        tilts.annotate("critical tilt", (f[0], 1e3 * report.critical_tilt), xytext=(4, 3), fontsize=8,
+                       textcoords="offset points", color=LIGHT["note"])  # fmt: skip
+    gaps.plot(f, report.table.gap, color=LIGHT["ink"], lw=1.5)
+    gaps.axhline(0.0, color=LIGHT["soft"], lw=1.0)
+    if report.certificate is not None:
+        _bands((tilts, gaps), report, (float(f.min()), float(f.max())))
+    dress(tilts, report.statement, "", "tilt of the coupler, mrad")
+    dress(gaps, "", "crank angle, degrees", f"gap function (condition {report.condition}), mm")
+    for axes in (tilts, gaps):
+        axes.margins(x=0)
+    handles, labels = gaps.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    return figure
+
+
+def _bands(panels: tuple[Any, ...], report: JammingReport, shown: tuple[float, float]) -> None:
+    """Shade the turn by what the certificate proves; pieces too short to be seen get a line."""
+    assert report.certificate is not None
+    arcs = report.certificate.arcs
+    where = "" if report.certificate.assembles == "always" else ", where it can be assembled"
+    for spans, colour, label in (
+        (arcs.inner, LIGHT["jam"], f"jams for all tolerances (proved){where}"),
+        (arcs.undecided, LIGHT["soft"], "depends on the tolerances, or not decided"),
+        (arcs.free, LIGHT["c"], "free for all tolerances (proved)"),
+    ):
+        pieces = [
+            (math.degrees(span.start) + turn, math.degrees(span.stop) + turn)
+            for span in spans
+            for turn in (-720.0, -360.0, 0.0, 360.0, 720.0)
+        ]
+        seen = [(max(a, shown[0]), min(b, shown[1])) for a, b in pieces if b > shown[0] and a < shown[1]]
+        for axes in panels:
+            for k, (a, b) in enumerate(seen):
+                axes.axvspan(a, b, color=colour, alpha=0.22, lw=0 if b - a > 0.2 else 1.0, label="" if k else label)
+
+
+# -- error against run time --------------------------------------------------------------------------------------------
+
+
+def error_time_picture(groups: Mapping[str, Sequence[ErrorRow]]) -> Figure:
+    """Draw error against run time, log-log: one panel for each question, one colour and marker for each method.
+
+    Parameters
+    ----------
+    groups : mapping of str to rows
+        Question with its unit, to the rows of `graphsynth.jamming.crossing_errors`, `area_errors` or `arc_errors`.
+        Subdivisions of one method are joined by a line; the first and the last are labelled with their setting.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    GeometryError
+        If there is no row.
+
+    Examples
+    --------
+    >>> from graphsynth.jamming import ErrorRow
+    >>> rows = [ErrorRow("sweep", "0.1 rad", 1e-1, 0.002), ErrorRow("sweep", "0.01 rad", 1e-2, 0.004)]
+    >>> len(error_time_picture({"arc ends, rad": rows}).axes)
+    1
+    """
+    if not any(len(rows) for rows in groups.values()):
+        raise GeometryError("groups holds no rows; give those of crossing_errors, area_errors or arc_errors")
+    figure = new_figure((5.4 * len(groups), 4.8))
+    for axes, (question, rows) in zip(np.atleast_1d(figure.subplots(1, len(groups))), groups.items()):
+        for k, method in enumerate(dict.fromkeys(row.method for row in rows)):
+            _method_line(axes, [row for row in rows if row.method == method], k)
+        dress(axes, question, "run time, s", "error")
+        axes.grid(True, color=LIGHT["soft"], alpha=0.3, lw=0.6)
+        axes.margins(0.14, 0.1)
+        axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False)
+    return figure
+
+
+def _method_line(axes: Any, rows: Sequence[ErrorRow], k: int) -> None:
+    """Draw the runs of one method; an error of 0 is drawn at the smallest double step of 1."""
+    colour, marker = LIGHT[("a", "b", "c", "d", "ink")[k % 5]], "osD^vPX"[k % 7]
+    place = [(row.seconds, max(row.error, 2.0**-52)) for row in rows]
+    axes.loglog(*zip(*place), color=colour, marker=marker, ms=6, lw=1.2, label=rows[0].method)
+    for at in sorted({0, len(rows) - 1}):
+        if rows[at].setting:
+            last = at > 0 and place[at][0] > 3.0 * place[0][0]
+            axes.annotate(
+                rows[at].setting, place[at], textcoords="offset points", xytext=(-6 if last else 6, 6), fontsize=7,
+                color=colour, ha="right" if last else "left",
+            )  # fmt: skip

@@ -52,7 +52,8 @@ class JammingReport:
     arcs : JamArcs
         Closed-form jam arcs of the nominal dimensions, radians (estimated; proved bounds are in the certificate).
     worst_gap, worst_angle : float
-        Largest gap function over the turn (mm; negative is the clearance left) and a crank angle where it is reached.
+        Largest gap function over the crank angles that can be assembled (mm; negative is the clearance left) and one at
+        which it is reached; NaN if there are none.
     largest_tilt, critical_tilt : float or None
         Radians; None if there is no critical tilt, with the sentence in ``arcs.reason``.
     full_turn : FullTurn
@@ -278,7 +279,7 @@ def _one_bearing(
     table = table_over(linkage, bearing, condition, f)
     arcs = jam_arcs(linkage, bearing, condition)
     turn = linkage.full_turn()
-    tilt, sine = linkage.largest_tilt
+    worst = _worst(linkage, bearing, condition, turn)
     certificate = _certificate(box, condition) if certify else None
     inverse = condition != "general" and linkage.rod == "rigid" and linkage.pin_height <= linkage.l3
     return JammingReport(
@@ -288,9 +289,9 @@ def _one_bearing(
         method=METHOD_CERTIFIED if certificate else METHOD_CLOSED_FORM,
         condition=condition,
         arcs=arcs,
-        worst_gap=float(bearing.gap(sine, math.cos(tilt), condition)),
-        worst_angle=(linkage.pin_phase + 0.5 * math.pi) % math.tau,
-        largest_tilt=tilt,
+        worst_gap=worst[0],
+        worst_angle=worst[1],
+        largest_tilt=linkage.largest_tilt[0],
         critical_tilt=bearing.critical_tilt(condition).angle,
         full_turn=turn,
         table=table,
@@ -340,6 +341,27 @@ def _angles(samples: int | ArrayLike) -> Array:
             raise GeometryError(f"samples = {samples} is too few for a table; give 2 or more, or an array of angles")
         return np.linspace(0.0, math.tau, int(samples))
     return np.atleast_1d(finite_array("samples", samples))
+
+
+def _worst(linkage: LambdaLinkage, bearing: Bearing, condition: Condition, turn: FullTurn) -> tuple[float, float]:
+    """Largest gap over the assembled part of the turn, and a crank angle of it.
+
+    That is a quarter turn before or after the phase, or a dead point if neither can be reached.
+    """
+    if turn.kind == "never assembled":
+        return math.nan, math.nan
+    tilt, sine = linkage.largest_tilt
+    angle = (linkage.pin_phase + 0.5 * math.pi) % math.tau
+    both = np.array([angle, (angle + math.pi) % math.tau])
+    reached = linkage.positions(both).assembled
+    if turn.possible or reached.any() or not turn.limit_angles:
+        at = int(reached[1] and not reached[0])
+        return float(bearing.gap(sine, math.cos(tilt), condition)), float(both[at])
+    rise = linkage.pin_height / linkage.l3 * np.abs(np.sin(np.array(turn.limit_angles) - linkage.pin_phase))
+    S = rise if linkage.rod == "rigid" else rise / np.hypot(1.0, rise)
+    gap = bearing.gap(S, np.sqrt((1.0 - S) * (1.0 + S)), condition)
+    best = int(np.argmax(gap))
+    return float(gap[best]), turn.limit_angles[best]
 
 
 def _verdict(bearing: Bearing, arcs: JamArcs, turn: FullTurn) -> Verdict:

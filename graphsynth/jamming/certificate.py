@@ -46,10 +46,11 @@ class JamCertificate:
     box : ToleranceBox
         The parameters.
     largest_gap : Enclosure
-        Of the largest gap function over the turn and the box, mm; a negative upper end proves that all is free.
+        Of the largest gap function over the turn and the box, mm, whether the linkage can be assembled there or not;
+        a negative upper end proves that all is free.
     smallest_worst_gap : Enclosure
         Of the smallest value over the box of the largest gap over the turn, mm; a positive lower end proves that every
-        parameter vector jams.
+        parameter vector jams if ``assembles`` is "always" (else ``witness`` does).
     largest_tilt, critical_tilt : Enclosure
         Range over the box of the largest tilt of a turn and of the critical tilt, radians; infinite: none.
     arcs : CertifiedArcs

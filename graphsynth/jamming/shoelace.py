@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.intervals.interval import Interval
 
-__all__ = ["crescent_boxes", "interval_shoelace"]
+__all__ = ["crescent_boxes", "crescent_points", "interval_shoelace"]
 
 Array = NDArray[np.float64]
 
@@ -42,6 +42,20 @@ def crescent_boxes(R1: float, a: float, b: float, count: int = 250) -> Interval:
     >>> crescent_boxes(5.0, 6.0, 4.0, 8).shape
     (8, 2)
     """
+    points = crescent_points(R1, a, b, count)
+    after = np.roll(points, -1, axis=0)
+    return Interval.from_bounds(np.minimum(points, after), np.maximum(points, after))
+
+
+def crescent_points(R1: float, a: float, b: float, count: int) -> Array:
+    """Points on the boundary of one crescent of the ellipse outside the circle, counter-clockwise.
+
+    Parameters and errors as for `crescent_boxes`.
+
+    Returns
+    -------
+    ndarray, shape (2 * (count // 2), 2)
+    """
     if not 0.0 < b < R1 < a:
         raise GeometryError(f"b = {b}, R1 = {R1}, a = {a}: a crescent needs 0 < b < R1 < a")
     if count < 4:
@@ -52,9 +66,7 @@ def crescent_boxes(R1: float, a: float, b: float, count: int = 250) -> Interval:
     outer, inner = np.arctan2(y0 / b, x0 / a) * sweep, np.arctan2(y0, x0) * sweep[::-1]
     ellipse = np.column_stack([a * np.cos(outer), b * np.sin(outer)])
     circle = R1 * np.column_stack([np.cos(inner), np.sin(inner)])
-    points = np.concatenate([ellipse[:-1], circle[:-1]])
-    after = np.roll(points, -1, axis=0)
-    return Interval.from_bounds(np.minimum(points, after), np.maximum(points, after))
+    return np.concatenate([ellipse[:-1], circle[:-1]])
 
 
 def interval_shoelace(vertices: Interval) -> Interval:

@@ -18,14 +18,16 @@ def statement(found: JamCertificate) -> str:
     who = "the bearing" if found.box.is_point else "every bearing of the tolerance box"
     given = "" if found.exact_input else " (for the doubles given: floats came in, decimals are not guaranteed)"
     gap = found.largest_gap
-    left, missing = shortened(-gap.hi, -1), shortened(found.smallest_worst_gap.lo, -1)
+    left = shortened(-gap.hi, -1)
+    # of a position that can be assembled: the largest gap of all may lie beyond a dead centre
+    missing = shortened(found.witness.gap.lo, -1) if found.witness else "0"
     match found.verdict:
         case Verdict.CERTIFIED_FREE:
             text = f"proved: {who} is free at every crank angle; at least {left} mm of clearance are left"
         case Verdict.CERTIFIED_JAMMED:
             text = f"proved: {who} jams during the turn; at least {missing} mm are missing"
         case Verdict.CERTIFIED_JAMMED_FOR_SOME:
-            text = f"proved: a bearing of the tolerance box jams; at least {shortened(gap.lo, -1)} mm are missing there"
+            text = f"proved: a bearing of the tolerance box jams; at least {missing} mm are missing there"
         case Verdict.CANNOT_ASSEMBLE:
             text = f"the parts cannot be assembled: {found.reason}"
         case _:

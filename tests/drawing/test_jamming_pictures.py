@@ -10,12 +10,14 @@ from graphsynth.drawing.jamming_pictures import (
     area_chart,
     area_picture,
     crossing_picture,
+    error_time_picture,
     region_picture,
+    report_picture,
     section_picture,
     space_picture,
 )
 from graphsynth.errors import GeometryError
-from graphsynth.jamming import Bearing
+from graphsynth.jamming import Bearing, ErrorRow, ToleranceBox, assess_jamming
 from graphsynth.jamming.area_curve import area_curve
 from graphsynth.jamming.circle_ellipse import circle_ellipse, exact_hull, krawczyk_boxes
 
@@ -137,3 +139,37 @@ def test_chart_is_themed_svg():
     assert "ordinate of the source" in text
     with pytest.raises(GeometryError, match="holds no angle"):
         area_chart(curve, (500.0, 600.0))
+
+
+def bands(axes):
+    """Shaded pieces with their colours, degrees."""
+    return [(p.get_x(), p.get_x() + p.get_width(), p.get_facecolor()[:3]) for p in axes.patches]
+
+
+def test_report_shows_what_is_proved():
+    report = assess_jamming(box=ToleranceBox(alpha="1/30", azimuth="0 +- 0.05"), samples=91)
+    figure = drawn(report_picture(report))
+    tilts, gaps = figure.axes
+    assert report.statement == tilts.get_title()
+    turn = np.linspace(0.05, 359.95, 700)
+    shown = {f: [c for a, b, c in bands(gaps) if a < f < b] for f in turn}
+    assert all(len(colours) == 1 for colours in shown.values())  # the bands cover the turn once
+    assert len({colours[0] for colours in shown.values()}) == 3
+    inner = report.certificate.arcs.inner[0]
+    middle = math.degrees(0.5 * (inner.start + inner.stop))
+    assert any(a < middle < b and b - a == pytest.approx(math.degrees(inner.length)) for a, b, _ in bands(tilts))
+    assert bands(drawn(report_picture(assess_jamming(box=ToleranceBox(), certify=False, samples=31))).axes[0]) == []
+    stops = report_picture(assess_jamming(box=ToleranceBox(2, 1, 1, 1, "0.05"), samples=31))
+    assert any("where it can be assembled" in text.get_text() for text in stops.legends[0].get_texts())
+
+
+def test_error_against_run_time_is_drawn_for_each_method():
+    rows = [ErrorRow("sweep", f"{e:g} rad", e, 1e-3 / e) for e in (0.1, 0.01, 0.001)] + [ErrorRow("exact", "", 0, 1e-4)]
+    figure = drawn(error_time_picture({"arc ends, rad": rows, "areas, mm²": rows[:1]}))
+    left = figure.axes[0]
+    assert left.get_xscale() == left.get_yscale() == "log"
+    assert [line.get_label() for line in left.lines] == ["sweep", "exact"]
+    np.testing.assert_allclose(left.lines[0].get_ydata(), [0.1, 0.01, 0.001])
+    assert [text.get_text() for text in left.texts] == ["0.1 rad", "0.001 rad"]
+    with pytest.raises(GeometryError, match="no rows"):
+        error_time_picture({"arcs": []})

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 
@@ -329,3 +330,17 @@ def test_arguments_of_the_other_model_are_refused():
     ]:
         with pytest.raises(GeometryError, match=text):
             assess_jamming(*arguments, **options)
+
+
+def test_what_lies_beyond_a_dead_centre_does_not_count():
+    """The crank of (2, 1, 1, 1) stops at 75 degrees: the gap of 90 degrees is neither promised nor reported."""
+    report = assess_jamming(box=ToleranceBox(2, 1, 1, 1, "0.05"))
+    assert not report.full_turn.possible and report.verdict is Verdict.CERTIFIED_JAMMED
+    f = np.linspace(*report.full_turn.limit_angles, 20_001)
+    path = report.linkage.positions(np.concatenate([f, np.linspace(-1.3176, 1.3176, 20_001)]))
+    seen = report.bearing.gap(path.sin_theta, path.cos_theta, "A")[path.assembled].max()
+    assert report.worst_gap == pytest.approx(seen, rel=1e-4) and report.worst_gap >= seen - 1e-12
+    said = float(re.search(r"at least ([-+.e\d]+) mm", report.statement)[1])
+    assert said <= report.worst_gap < report.certificate.smallest_worst_gap.lo
+    never = assess_jamming(LambdaLinkage(10, 1, 1, 1), Bearing())
+    assert never.verdict is Verdict.CANNOT_ASSEMBLE and math.isnan(never.worst_gap)
