@@ -1,8 +1,8 @@
 """Interval operations on arrays of bounds, the numpy form: bounds in, bounds out, any equal shapes.
 
 Empty is ``(inf, -inf)``.  Long arrays are done in blocks (``blocks.py``).  The compiled form in
-``kernels/arithmetic.py`` gives the same results to the bit; it is used for large arrays, this one where loading compiled
-code would take longer than the work.
+``kernels/arithmetic.py`` gives the same results to the bit; it is used for large arrays, this one where loading
+compiled code would take longer than the work.
 """
 
 from __future__ import annotations

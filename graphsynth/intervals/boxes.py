@@ -79,3 +79,14 @@ class Paving:
         if len(self.status) == 1 and self.status[0] == Status.UNIQUE:
             return Status.UNIQUE
         return Status.EXISTS if proved.any() else Status.UNDECIDED
+
+    @property
+    def solutions(self) -> int | None:
+        """Number of solutions in the start box, for every parameter value; None if that is not proved."""
+        if not self.finished or not (self.status == Status.UNIQUE).all():
+            return None
+        lo, hi = self.boxes.lo, self.boxes.hi
+        for k in range(len(lo) - 1):  # enclosures with a common point might hold one solution twice
+            if ((lo[k + 1 :] <= hi[k]) & (lo[k] <= hi[k + 1 :])).all(axis=1).any():
+                return None
+        return len(lo)

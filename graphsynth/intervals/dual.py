@@ -7,14 +7,15 @@ holds all its generalised gradients (Clarke), which by the mean value theorem of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
 
-__all__ = ["Dual", "variables"]
+__all__ = ["Dual", "jacobian", "jacobian_of", "values_of", "variables"]
 
 
 class Dual:
@@ -123,6 +124,49 @@ def jacobian_of(results: Sequence[Any], n: int, shape: tuple[int, ...]) -> Inter
         parts = [_spread(grad[j], shape) for j in range(n)]
         rows.append(Interval.stack(parts, axis=-1))
     return Interval.stack(rows, axis=-2)
+
+
+def jacobian(f: Callable[..., Sequence[Any]], box: Any, parameters: Any = None) -> tuple[Interval, Interval]:
+    """Enclose a system and its derivatives over boxes.
+
+    Parameters
+    ----------
+    f : callable
+        ``f(x)`` or ``f(x, p)``, written with operators and the functions of `graphsynth.intervals`; any number of
+        equations.
+    box : Interval or anything it takes, shape (n,) or (N, n)
+    parameters : Interval or anything it takes, shape (m,) or (N, m), optional
+
+    Returns
+    -------
+    values : Interval, shape (equations,) or (N, equations)
+    derivatives : Interval, shape (equations, n) or (N, equations, n)
+        Certified; where ``guaranteed`` is False something was undefined or discontinuous, and no mean value theorem
+        holds over the box.
+
+    Raises
+    ------
+    GraphsynthError
+        If the processor's rounding has been changed.
+
+    Examples
+    --------
+    >>> values, slopes = jacobian(lambda x: [x[0] * x[1], x[0] ** 2], ["[1, 2]", 3])
+    >>> values
+    Interval([[3, 6], [1, 4]])
+    >>> slopes[1, 0], slopes[0, 1]
+    (Interval([2, 4]), Interval([1, 2]))
+    """
+    check_rounding()
+    boxes = interval(box)
+    unknowns = variables(boxes)
+    if parameters is None:
+        results = f(unknowns)
+    else:
+        p = interval(parameters)
+        results = f(unknowns, [p[..., j] for j in range(p.shape[-1])])
+    shape = boxes.shape[:-1]
+    return values_of(results, shape), jacobian_of(results, boxes.shape[-1], shape)
 
 
 def _spread(part: Interval, shape: tuple[int, ...]) -> Interval:

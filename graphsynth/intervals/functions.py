@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals.dual import Dual
 from graphsynth.intervals.interval import Interval, _clipped, _make, interval
+from graphsynth.intervals.operations import flat_of
 from graphsynth.intervals.reading import DISCONTINUOUS
 
 __all__ = [
@@ -28,14 +29,14 @@ def _apply(name: str, *arguments: Interval) -> Interval:
     """Run a compiled loop over broadcast arguments; decorations of all are joined."""
     from graphsynth.intervals.kernels import elementary
 
-    bounds = np.broadcast_arrays(*[side for a in arguments for side in (a.lo, a.hi)])
-    flat = [np.ascontiguousarray(b).reshape(-1) for b in bounds]
-    lo, hi = np.empty(flat[0].size), np.empty(flat[0].size)
-    getattr(elementary, name)(*flat, lo, hi)
+    sides = [side for a in arguments for side in (a.lo, a.hi)]
+    shape = sides[0].shape if len(arguments) == 1 else np.broadcast(*sides).shape
+    lo, hi = np.empty(shape), np.empty(shape)
+    getattr(elementary, name)(*[flat_of(a, shape) for a in sides], lo.reshape(-1), hi.reshape(-1))
     flags = arguments[0].flags
     for a in arguments[1:]:
         flags = np.asarray(np.bitwise_or(flags, a.flags))
-    return _make(lo.reshape(bounds[0].shape), hi.reshape(bounds[0].shape), flags)
+    return _make(lo, hi, flags)
 
 
 def _mark(x: Interval, where: NDArray[np.bool_]) -> Interval:

@@ -87,7 +87,7 @@ class Interval(Measures):
         else:
             lo, hi = read_bounds(value, upper)
             flags = NO_FLAGS
-        _fill(self, lo, hi, flags)
+        _fill(self, np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64), flags)
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         raise AttributeError(f"an Interval does not change; {name} cannot be set")
@@ -338,22 +338,24 @@ def _clipped(flags: Flags, where: Mask) -> Flags:
     return np.asarray(np.bitwise_or(flags, np.where(where, CLIPPED, np.uint8(0))))
 
 
+# an Interval refuses to be set; its slots are filled once, through their descriptors
+_set_lo, _set_hi, _set_flags = (vars(Interval)[name].__set__ for name in ("lo", "hi", "flags"))
+
+
 def _fill(target: Interval, lo: Array, hi: Array, flags: Flags) -> None:
-    lo, hi = np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64)
-    lo.flags.writeable = False
-    hi.flags.writeable = False
+    lo.setflags(write=False)
+    hi.setflags(write=False)
     if flags.ndim and flags.shape != lo.shape:
         flags = np.broadcast_to(flags, lo.shape)
-    object.__setattr__(target, "lo", lo)
-    object.__setattr__(target, "hi", hi)
-    object.__setattr__(target, "flags", flags)
+    _set_lo(target, lo)
+    _set_hi(target, hi)
+    _set_flags(target, flags)
 
 
 def _make(lo: ArrayLike, hi: ArrayLike, flags: Flags = NO_FLAGS) -> Interval:
     """Make an interval from bounds known to be right; views of others' arrays are not frozen."""
     result = Interval.__new__(Interval)
-    low, high = np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64)
-    _fill(result, low.view(), high.view(), flags)
+    _fill(result, np.asarray(lo, dtype=np.float64).view(), np.asarray(hi, dtype=np.float64).view(), flags)
     return result
 
 

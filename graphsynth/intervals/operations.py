@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import arrays
 
-__all__ = ["binary", "power", "unary"]
+__all__ = ["binary", "flat_of", "power", "unary"]
 
 Array = NDArray[np.float64]
 
@@ -22,40 +24,52 @@ _LOOPS = "graphsynth.intervals.kernels.loops"
 
 def _loops(size: int) -> Any:
     """Return the compiled loops if they pay, else None."""
-    if size < USE_FROM or (size < LOAD_FROM and _LOOPS not in sys.modules):
+    if size < USE_FROM:
         return None
-    from graphsynth.intervals.kernels import loops
+    loaded = sys.modules.get(_LOOPS)
+    if loaded is None and size >= LOAD_FROM:
+        loaded = import_module(_LOOPS)
+    return loaded
 
-    return loops
 
-
-def _run(name: str, operands: list[Array], extra: tuple[int, ...] = ()) -> tuple[Array, Array]:
-    if any(a.shape != operands[0].shape for a in operands):
-        operands = list(np.broadcast_arrays(*operands))
-    loops = _loops(operands[0].size)
+def _run(name: str, operands: tuple[Array, ...], extra: tuple[int, ...] = ()) -> tuple[Array, Array]:
+    shape = operands[0].shape
+    for a in operands:
+        if a.shape != shape:
+            shape = np.broadcast(*operands).shape
+            break
+    loops = _loops(math.prod(shape))
     if loops is None:
         with np.errstate(all="ignore"):
-            lo, hi = getattr(arrays, name)(*operands, *extra)
+            lo, hi = getattr(arrays, name)(*[np.broadcast_to(a, shape) for a in operands], *extra)
         return lo, hi
-    shape = operands[0].shape
-    flat = [np.ascontiguousarray(a).reshape(-1) for a in operands]
-    lo, hi = np.empty(flat[0].size), np.empty(flat[0].size)
-    getattr(loops, name)(*flat, *extra, lo, hi)
-    return lo.reshape(shape), hi.reshape(shape)
+    flat = [flat_of(a, shape) for a in operands]
+    lo, hi = np.empty(shape), np.empty(shape)
+    getattr(loops, name)(*flat, *extra, lo.reshape(-1), hi.reshape(-1))
+    return lo, hi
+
+
+def flat_of(a: Array, shape: tuple[int, ...]) -> Array:
+    """Spread an array to a shape and flatten it, contiguous; cheaper than numpy's own broadcasting for few numbers."""
+    if a.shape == shape:
+        return np.ascontiguousarray(a).reshape(-1)
+    spread = np.empty(shape)
+    spread[...] = a
+    return spread.reshape(-1)
 
 
 def binary(name: str, al: Array, ah: Array, bl: Array, bh: Array) -> tuple[Array, Array]:
     """Add, subtract, multiply or divide, with numpy's broadcasting."""
-    return _run(name, [al, ah, bl, bh])
+    return _run(name, (al, ah, bl, bh))
 
 
 def unary(name: str, al: Array, ah: Array) -> tuple[Array, Array]:
     """Absolute, square or root."""
     if name == "absolute":
         return arrays.absolute(al, ah)
-    return _run(name, [al, ah])
+    return _run(name, (al, ah))
 
 
 def power(al: Array, ah: Array, n: int) -> tuple[Array, Array]:
     """Integer power."""
-    return _run("power", [al, ah], (n,))
+    return _run("power", (al, ah), (n,))

@@ -257,62 +257,6 @@ def test_many_boxes_at_once_equal_one_by_one():
     assert set(together.status.tolist()) >= {Status.EMPTY, Status.UNIQUE, Status.UNDECIDED}
 
 
-def test_compiled_test_agrees_with_arrays():
-    from graphsynth.intervals.kernels import arithmetic as ia
-    from graphsynth.intervals.kernels.krawczyk import krawczyk_boxes, krawczyk_pave, system
-
-    @system
-    def equations(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
-        ul, uh = ia.square(xl[0], xh[0])
-        vl, vh = ia.square(xl[1], xh[1])
-        sl, sh = ia.add(ul, uh, vl, vh)
-        fl[0], fh[0] = ia.subtract(sl, sh, pl[0], ph[0])
-        fl[1], fh[1] = ia.subtract(xl[0], xh[0], vl, vh)
-        if derivatives:
-            jl[0, 0], jh[0, 0] = ia.scale(2.0, xl[0], xh[0])
-            jl[0, 1], jh[0, 1] = ia.scale(2.0, xl[1], xh[1])
-            jl[1, 0], jh[1, 0] = 1.0, 1.0
-            jl[1, 1], jh[1, 1] = ia.scale(-2.0, xl[1], xh[1])
-        return True
-
-    rng = np.random.default_rng(3)
-    root = np.array([0.6180339887498949, 0.7861513777574233])
-    lo = np.concatenate([rng.uniform(-1.5, 1.0, (1500, 2)), root - rng.uniform(0.0, 0.02, (1500, 2))])
-    hi = lo + rng.uniform(0.0, 0.06, (3000, 2))
-    out_lo, out_hi, status = np.empty_like(lo), np.empty_like(lo), np.empty(3000, dtype=np.int8)
-    one = np.array([1.0])
-    krawczyk_boxes(equations, lo, hi, one, one, out_lo, out_hi, status)
-    reference = image(circle_and_parabola, Interval.from_bounds(lo, hi))
-    agree = status == reference.status
-    assert agree.mean() > 0.999
-    has_root = ((lo <= root - 1e-15) & (hi >= root + 1e-15)).all(axis=1)
-    mirror = root * [1.0, -1.0]
-    has_mirror = ((lo <= mirror - 1e-15) & (hi >= mirror + 1e-15)).all(axis=1)
-    close = [((lo <= r + 1e-15) & (hi >= r - 1e-15)).all(axis=1) for r in (root, mirror)]
-    assert (close[0] | close[1])[status == Status.UNIQUE].all()
-    assert not (has_root & has_mirror & (status == Status.UNIQUE)).any()
-    assert not (has_root & (status == Status.EMPTY)).any()
-    assert (out_lo[has_root] <= root).all()
-    assert (out_hi[has_root] >= root).all()
-
-    kept_lo, kept_hi, kept = np.empty((50, 2)), np.empty((50, 2)), np.empty(50, dtype=np.int8)
-    low, high, fine = np.array([-2.0, -2.1]), np.array([2.0, 2.0]), np.full(2, 1e-6)
-    count, _, complete = krawczyk_pave(equations, low, high, one, one, fine, 10_000, kept_lo, kept_hi, kept)
-    assert (count, complete) == (2, 1)
-    assert kept[:2].tolist() == [Status.UNIQUE] * 2
-    for found_lo, found_hi in zip(kept_lo[:2], kept_hi[:2]):
-        assert any((found_lo <= r + 1e-15).all() and (found_hi >= r - 1e-15).all() for r in (root, mirror))
-    for budget, room in ((4, 50), (10_000, 1)):  # an exhausted budget keeps its boxes; missing room is admitted
-        count, _, complete = krawczyk_pave(
-            equations, low, high, one, one, fine, budget, kept_lo[:room], kept_hi[:room], kept[:room]
-        )
-        assert complete == (room == 50)
-        covered = [
-            ((kept_lo[:count] <= r).all(axis=1) & (kept_hi[:count] >= r).all(axis=1)).any() for r in (root, mirror)
-        ]
-        assert all(covered) or not complete
-
-
 # -- linear systems ------------------------------------------------------------------------------------------
 
 

@@ -11,18 +11,18 @@ continuous.  It is written with the scalar functions of this package (``arithmet
 """
 
 import numpy as np
-from numba import boolean, float64, int8, int64, njit, types, void
+from numba import boolean, float64, int8, njit, types, void
 
 from graphsynth.compilation import kernel
 from graphsynth.intervals.kernels import arithmetic as ia
 
 EMPTY, UNIQUE, EXISTS, UNDECIDED = 0, 1, 2, 3
 
-_VECTOR, _MATRIX = float64[::1], float64[:, ::1]
-SYSTEM = boolean(*[_VECTOR] * 6, _MATRIX, _MATRIX, boolean)
+VECTOR, MATRIX = float64[::1], float64[:, ::1]
+SYSTEM = boolean(*[VECTOR] * 6, MATRIX, MATRIX, boolean)
 #: Decorator for compiled systems.
 system = njit(SYSTEM, error_model="numpy")
-_TEST = void(types.FunctionType(SYSTEM), _MATRIX, _MATRIX, _VECTOR, _VECTOR, _MATRIX, _MATRIX, int8[::1])
+_TEST = void(types.FunctionType(SYSTEM), MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, int8[::1])
 
 
 @kernel
@@ -64,8 +64,9 @@ def invert(a, y):
 
 @kernel
 def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
-    """Return the status from the image; the intersection replaces ``kl, kh``."""
+    """Write K into ``kl, kh``; return the status and the largest row sum of ``|I - Y L|`` (an estimate)."""
     n = z.size
+    empty = False
     inside, within, norm = True, True, 0.0
     for i in range(n):
         al, ah = z[i], z[i]
@@ -88,21 +89,22 @@ def _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh):
         norm = max(norm, row)
         inside = inside and xl[i] < al and ah < xh[i]
         within = within and xl[i] <= al and ah <= xh[i]
-        if al > xh[i] or ah < xl[i]:
-            return EMPTY
-        kl[i], kh[i] = max(xl[i], al), min(xh[i], ah)
+        empty = empty or al > xh[i] or ah < xl[i]
+        kl[i], kh[i] = al, ah
+    if empty:
+        return EMPTY, norm
     if inside:
-        return UNIQUE
+        return UNIQUE, norm
     # the sum is done to nearest; the margin covers its rounding, so Y is nonsingular
-    return EXISTS if within and norm < 1.0 - 1e-9 else UNDECIDED
+    return EXISTS if within and norm < 1.0 - 1e-9 else UNDECIDED, norm
 
 
 @kernel
-def _test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y):
-    """Status of one box; ``kl, kh`` becomes the intersection with the image; the rest is workspace."""
+def test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y):
+    """Status of one box and the norm; ``kl, kh`` becomes K, the box itself without one; the rest is workspace."""
     n = z.size
     smooth = equations(xl, xh, pl, ph, fl, fh, jl, jh, True)
-    found = UNDECIDED
+    found, norm = UNDECIDED, np.inf
     for i in range(n):
         kl[i], kh[i] = xl[i], xh[i]
         z[i] = 0.5 * (xl[i] + xh[i])
@@ -114,10 +116,8 @@ def _test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y):
     if found != EMPTY and smooth and invert(mid, y):
         smooth = equations(z, z, pl, ph, fl, fh, jl, jh, False)
         if smooth:
-            found = _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh)
-    if found == EMPTY:
-        kl[:], kh[:] = np.inf, -np.inf
-    return found
+            found, norm = _image(xl, xh, z, fl, fh, jl, jh, y, kl, kh)
+    return found, norm
 
 
 @kernel(signature=_TEST)
@@ -127,72 +127,8 @@ def krawczyk_boxes(equations, lo, hi, pl, ph, out_lo, out_hi, status):
     fl, fh, z = np.empty(n), np.empty(n), np.empty(n)
     jl, jh, mid, y = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     for b in range(lo.shape[0]):
-        status[b] = _test(equations, lo[b], hi[b], pl, ph, out_lo[b], out_hi[b], fl, fh, z, jl, jh, mid, y)
-
-
-_PAVE = int64[::1](
-    types.FunctionType(SYSTEM), _VECTOR, _VECTOR, _VECTOR, _VECTOR, _VECTOR, int64, _MATRIX, _MATRIX, int8[::1]
-)
-
-
-@kernel(signature=_PAVE)
-def krawczyk_pave(equations, lo, hi, pl, ph, tolerance, max_boxes, kept_lo, kept_hi, status):
-    """Branch and prune of one box (n,), depth first; returns kept boxes, tested boxes, and 1 if nothing was left out.
-
-    Kept are boxes with a proof, contracted, and undecided ones with all widths at most ``tolerance`` (n,).  Where the
-    budget or the room in ``kept_lo`` ends the search, the waiting boxes are kept undecided while there is room; the
-    third number is 0 if some solution may lie outside all kept boxes.  A solution on a cut stays undecided here;
-    ``graphsynth.intervals.Search`` proves it by inflation.
-    """
-    n, room, depth = lo.size, kept_lo.shape[0], 4096
-    stack_lo, stack_hi = np.empty((depth, n)), np.empty((depth, n))
-    rows = np.empty((7, n))
-    xl, xh, kl, kh, fl, fh, z = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
-    jl, jh, mid, y = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    stack_lo[0], stack_hi[0] = lo, hi
-    waiting, kept, tested, complete = 1, 0, 0, 1
-    while waiting > 0:
-        waiting -= 1
-        xl[:], xh[:] = stack_lo[waiting], stack_hi[waiting]
-        found = UNDECIDED
-        over = tested >= max_boxes
-        for _ in range(12):
-            if over:
-                break
-            result = _test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y)
-            tested += 1
-            if result == EMPTY:
-                found = EMPTY
-                break
-            if result == UNIQUE or (result == EXISTS and found == UNDECIDED):
-                found = result
-            gains = False
-            for i in range(n):
-                gains = gains or kh[i] - kl[i] < 0.9 * (xh[i] - xl[i])
-                xl[i], xh[i] = kl[i], kh[i]
-            if not gains:
-                break
-        if found == EMPTY:
-            continue
-        widest, size = 0, -1.0
-        small = True
+        found, _ = test(equations, lo[b], hi[b], pl, ph, out_lo[b], out_hi[b], fl, fh, z, jl, jh, mid, y)
+        status[b] = found
         for i in range(n):
-            ratio = (xh[i] - xl[i]) / tolerance[i]
-            small = small and ratio <= 1.0
-            if ratio > size:
-                widest, size = i, ratio
-        middle = 0.5 * (xl[widest] + xh[widest])
-        inside = xl[widest] < middle < xh[widest]
-        if found != UNDECIDED or small or over or not inside or waiting + 2 > depth:
-            if kept == room:
-                complete = 0
-                break
-            kept_lo[kept], kept_hi[kept], status[kept] = xl, xh, found
-            kept += 1
-            continue
-        stack_lo[waiting], stack_hi[waiting] = xl, xh
-        stack_lo[waiting + 1], stack_hi[waiting + 1] = xl, xh
-        stack_lo[waiting, widest] = middle
-        stack_hi[waiting + 1, widest] = middle
-        waiting += 2
-    return np.array([kept, tested, complete])
+            out_lo[b, i] = np.inf if found == EMPTY else max(lo[b, i], out_lo[b, i])
+            out_hi[b, i] = -np.inf if found == EMPTY else min(hi[b, i], out_hi[b, i])
