@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import overload
 
@@ -66,16 +67,16 @@ def _coefficients(static: float, kinetic: float, viscous: float) -> tuple[float,
     return static, kinetic, positive("viscous friction coefficient", viscous, or_zero=True)
 
 
-class FrictionLaw:
+class FrictionLaw(ABC):
     """Base of the laws: ``coefficient`` and ``slope`` over the sliding speed ``v >= 0``, ``static`` at rest."""
 
     static: float
     kinetic: float
     viscous: float
 
+    @abstractmethod
     def _weakening(self, v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the part above the kinetic coefficient, and its slope."""
-        raise NotImplementedError
 
     @overload
     def coefficient(self, v: float) -> float: ...
@@ -97,9 +98,9 @@ class FrictionLaw:
         found: NDArray[np.float64] = self._weakening(v)[1] + self.viscous
         return found if found.ndim else float(found)
 
+    @abstractmethod
     def _packed(self) -> tuple[float, float, float, float, float, float]:
         """Return static, kinetic, Stribeck velocity, exponent, viscous, kind: entries 4 to 9 of the kernels' data."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -208,8 +208,9 @@ class _Run:
         size = max(abs(self.v), abs(V1[0]), self.static * self.N / self.k)
         h = end - self.t
         for n in (self.order - 1, self.order):
-            if V[n]:
-                h = min(h, (size * mpf(10) ** (-self.digits) / abs(V[n])) ** (mpf(1) / n))
+            for last in (V[n], V1[n]):  # the series of the drive ends sooner than that of a free oscillation
+                if last:
+                    h = min(h, (size * mpf(10) ** (-self.digits) / abs(last)) ** (mpf(1) / n))
         sliding = [self.state * (a - b) for a, b in zip(V1, V)][::-1]
         while self.power:  # far from rest the series does not know the narrow rise of friction there
             ahead = polyval(sliding, h)

@@ -89,9 +89,9 @@ class Tribometer:
             ("v2", None if self.v2 is None else finite("initial velocity", self.v2)),
         ):
             object.__setattr__(self, name, value)
-        if not isinstance(self.law, FrictionLaw) or type(self.law) is FrictionLaw:
+        if not isinstance(self.law, FrictionLaw):
             raise SpecError(f"The friction law is {self.law!r}; give a TwoCoefficientLaw or a StribeckLaw.")
-        if not isinstance(self.drive, Drive) or type(self.drive) is Drive:
+        if not isinstance(self.drive, Drive):
             raise SpecError(f"The drive is {self.drive!r}; give a CrankDrive, a HarmonicDrive or a BeltDrive.")
         if not self.normal > 0.0:
             raise SpecError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ class DriveMotion(NamedTuple):
     j: Array
 
 
-class Drive:
+class Drive(ABC):
     """Base of the drives: ``motion(t)`` and ``period`` (infinite for a belt)."""
 
     speed: float
@@ -36,13 +37,13 @@ class Drive:
         """Time of one turn of the crank, s."""
         return math.tau / abs(self.speed)
 
+    @abstractmethod
     def motion(self, t: ArrayLike) -> DriveMotion:
         """Motion of the lower platform at the times ``t``."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _packed(self) -> tuple[float, float, float, float]:
         """Return kind, radius, rod, speed: entries 10 to 13 of the kernels' data."""
-        raise NotImplementedError
 
 
 def _turning(speed: float) -> float:
@@ -160,17 +161,18 @@ class CrankDrive(Drive):
 
     def motion(self, t: ArrayLike) -> DriveMotion:
         """Motion of the lower platform at the times ``t``; closed form."""
-        r, w = self.radius, self.speed
+        r, rod, w = self.radius, self.rod, self.speed
         theta = w * np.asarray(t, float)
         C, S = np.cos(theta), np.sin(theta)
-        q = np.sqrt((self.rod - r * S) * (self.rod + r * S))
-        a, b = r * r * S * C / q, r * r * (C - S) * (C + S) / q
-        x = r * C - (r * S) ** 2 / (q + self.rod)
+        gap = (rod - r) * (rod + r)
+        square = gap + (r * C) ** 2  # nothing cancels where the crank stands across a rod hardly longer than itself
+        q = np.sqrt(square)
+        a = r * r * S * C / q
         return DriveMotion(
-            x,
+            r * C - (r * S) ** 2 / (q + rod),
             w * (-r * S - a),
-            w * w * (-r * C - b - a * a / q),
-            w**3 * (r * S + 4.0 * a - 3.0 * a * b / q - 3.0 * a**3 / q**2),
+            w * w * (-r * C + r * r * (gap * S * S / square - C * C) / q),
+            w**3 * (r * S + a * (1.0 + 3.0 * gap * rod * rod / (square * square))),
         )
 
     def _packed(self) -> tuple[float, float, float, float]:

@@ -16,7 +16,7 @@ from graphsynth.kinematics.pointing.legs import Leg, solution_order
 if TYPE_CHECKING:
     from graphsynth.kinematics.pointing.mechanism import PointingMechanism
 
-__all__ = ["Enclosure", "LengthBoxProblem", "NoProof"]
+__all__ = ["Enclosure", "LengthBoxProblem", "NoProof", "middle_of"]
 
 #: Working precision of the interval arithmetic, bits.
 PRECISION = 80
@@ -42,6 +42,14 @@ class NoProof(Exception):  # noqa: N818  (a result that is caught, not an error)
         super().__init__(leg)
         self.leg = leg
         self.spread = spread
+
+
+def middle_of(box: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return a point of the box near its middle, of full precision.
+
+    Rounded to double it could lie outside a narrow box, and the mean-value form does not hold on the way to it.
+    """
+    return tuple(length.mid.a for length in box)
 
 
 class _Terms(NamedTuple):
@@ -82,6 +90,10 @@ class LengthBoxProblem:
         """Sine and ``1 - cos`` of each crank angle, enclosed."""
         angles = {"Y": self.iv.mpf(self.phi_x), "X": self.iv.mpf(self.phi_y)}
         return {name: (self.iv.sin(phi), 2 * self.iv.sin(phi / 2) ** 2) for name, phi in angles.items()}
+
+    def _sign(self, leg: Leg) -> int:
+        """Branch sign of a leg; on its branch the slope of its equation has the opposite sign."""
+        return self.s_y if leg.name == "Y" else self.s_x
 
     def nominal(self, lengths: tuple[float, ...]) -> tuple[float, float]:
         """Return outputs u, v in double precision; NaN where not assembled."""
@@ -140,6 +152,8 @@ class LengthBoxProblem:
                 raise NoProof(leg.name, spread)
             image = centre - residual / slope
             if trial.a < image.a and image.b < trial.b:
+                if (slope.b < 0) != (self._sign(leg) > 0):
+                    raise NoProof(leg.name, spread)  # a root, but of the other branch
                 return image
             low, high = min(trial.a, image.a), max(trial.b, image.b)
             reach = (high - low) * 0.2 + iv.mpf(1e-20)
@@ -172,7 +186,7 @@ class LengthBoxProblem:
             A fold lies in the box, or so near that no proof is found.
         """
         first, second = self.legs
-        middle = tuple(self.iv.mpf(float(length.mid.a)) for length in box)
+        middle = middle_of(box)
         starts = self.nominal(tuple(float(length.a) for length in middle))
         if math.isnan(starts[0]):
             raise NoProof(second.name, math.inf)

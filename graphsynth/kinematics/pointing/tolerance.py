@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import choice, finite, finite_array
-from graphsynth.kinematics.pointing.enclosure import Enclosure, LengthBoxProblem, NoProof
+from graphsynth.kinematics.pointing.enclosure import Enclosure, LengthBoxProblem, NoProof, middle_of
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.pointing.mechanism import PointingMechanism
@@ -136,8 +136,8 @@ def _face_bound(problem: LengthBoxProblem, box: tuple[Any, ...], found: Enclosur
             face.append(iv.mpf(whole.b if (rate.a > 0) == upward else whole.a))
         else:
             face.append(whole)
-    middle = tuple(iv.mpf(float(length.mid.a)) if length.delta.b > 0 else length for length in face)
-    centre = problem.enclose(tuple(middle))
+    middle = middle_of(tuple(face))
+    centre = problem.enclose(middle)
     over = problem.enclose(tuple(face))
     value = centre.v if which else centre.u
     for rate, whole, mid in zip(over.dv if which else over.du, face, middle):

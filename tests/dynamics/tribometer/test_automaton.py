@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -197,3 +199,35 @@ def test_narrow_peak_of_friction_is_not_jumped_over():
     reference = precise_motion(model, 1.0, digits=16)
     assert [event.state for event in motion.events] == [event.state for event in reference.events]
     assert motion.x2[0] == pytest.approx(float(reference.x2), abs=max(motion.error, 1e-14))
+
+
+@pytest.mark.parametrize("law", [PLAIN, StribeckLaw(0.4, 0.25, 0.02)], ids=["two coefficients", "Stribeck"])
+@pytest.mark.parametrize("gap", [1e-2, 1e-4])
+def test_rod_hardly_longer_than_the_crank(law, gap):
+    """cos q -> 0: the lower platform reverses within a time that shrinks with the root of the gap."""
+    model = Tribometer(law=law, drive=CrankDrive(0.03, 0.03 * (1.0 + gap), 2.0))
+    motion, reference = model.event_driven(1.0, times=[1.0]), precise_motion(model, 1.0, digits=16)
+    assert [event.state for event in motion.events] == [event.state for event in reference.events]
+    assert max(abs(float(b.time) - a.time) for a, b in zip(motion.events, reference.events)) < 5e-14
+    assert motion.x2[0] == pytest.approx(float(reference.x2), abs=max(motion.error, 1e-15), rel=0)
+
+
+@pytest.mark.parametrize("gap", [1e-8, 1e-11, 1e-14])
+def test_rod_as_long_as_the_crank_is_passed_in_few_steps(gap):
+    """Steps follow the distance to the dead centre, so their number grows with the logarithm of the gap."""
+    for law in (PLAIN, StribeckLaw(0.4, 0.25, 0.02)):
+        model = Tribometer(law=law, drive=CrankDrive(0.03, 0.03 * (1.0 + gap), 2.0))
+        motion = model.event_driven(3.0, times=[3.0])
+        assert motion.complete
+        assert motion.evaluations < 5000
+        assert motion.energy_residual < 1e-13
+        assert motion.error < math.sqrt(gap)
+        # the limit of a rod of equal length: at rest for half a turn, a harmonic motion for the other half
+        assert len(motion.events) == (7 if law is PLAIN else 9)
+
+
+def test_steps_within_one_piece_are_bounded_too():
+    for model in (HARMONIC, Tribometer(stiffness=1e-3, law=PLAIN, drive=HarmonicDrive(1e-6, 2.0))):
+        motion = model.event_driven(1e4, times=[1.0], guard=EventGuard(steps=200), estimate=False)
+        assert motion.status is RunStatus.STEP_LIMIT
+        assert motion.evaluations <= 1000

@@ -111,3 +111,28 @@ def test_drive_kinematics(drive, t):
     length = getattr(drive, "radius", 1.0)
     for power, (a, b) in enumerate(zip(found, exact)):
         assert abs(a - b) <= 1e-13 * (1.0 + w * t) * max(abs(b), length * w**power / fine**power)
+
+
+@settings(max_examples=60, deadline=None)
+@given(number(-12.0, 0.5), number(0.0, 3.0), number(-6.0, 0.0), st.sampled_from([-1.0, 1.0]))
+def test_drive_beside_the_dead_centre(power, turns, distance, side):
+    """Where crank and rod are nearly equal and at right angles, no digit is lost but those of the angle itself."""
+    from graphsynth.dynamics.friction_kernels.kernels.plant import drive as compiled
+
+    drive = CrankDrive(0.03, 0.03 * (1.0 + 10.0**power), 2.0)
+    t = (np.floor(turns) + 0.25) * np.pi + side * 10.0**distance
+    with mpmath.workdps(60):
+        r, rod, w = map(mpmath.mpf, (drive.radius, drive.rod, drive.speed))
+
+        def displacement(at):
+            return r * mpmath.cos(w * at) + mpmath.sqrt(rod**2 - (r * mpmath.sin(w * at)) ** 2) - rod
+
+        exact = mpmath.diffs(displacement, mpmath.mpf(t), 3)
+        exact = [float(value) for value in exact]
+        scale = float(mpmath.sqrt((rod / r) ** 2 - 1 + mpmath.cos(w * t) ** 2))
+    rounding = 4e-16 * (1.0 + 2.0 * t) / min(scale, 1.0)  # the relative error of the distance to the dead centre
+    model = Tribometer(drive=drive)
+    for found in (drive.motion(t), compiled(model.data(), t)):
+        for order, (a, b) in enumerate(zip(found, exact)):
+            size = max(abs(b), 0.03 * 2.0**order / min(scale, 1.0) ** max(2 * order - 3, 0))
+            assert abs(a - b) <= 20.0 * rounding * size

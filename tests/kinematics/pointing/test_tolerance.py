@@ -8,11 +8,12 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.pointing import PointingMechanism
+from graphsynth.kinematics.pointing.enclosure import LengthBoxProblem, NoProof, middle_of
 from graphsynth.kinematics.pointing.tolerance import ToleranceStatus
 
 ART = PointingMechanism()
@@ -167,3 +168,47 @@ def test_bad_tolerances(widths, words):
         ART.tolerance(0.0, 0.0, widths)
     with pytest.raises(GeometryError, match="method = 'fast'"):
         ART.tolerance(0.0, 0.0, method="fast")
+
+
+@settings(deadline=None, max_examples=12, phases=(Phase.generate,))
+@given(
+    st.tuples(*[st.floats(-0.7, 0.7)] * 5), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.integers(0, 2**32 - 1),
+    st.sampled_from([(1, -1), (1, 1), (-1, -1), (-1, 1)]), st.sampled_from([0.0, 1e-17, 1e-9, 1e-4, 1e-2]),
+    st.sampled_from(["mixed", "mean_value"]),
+)  # fmt: skip
+def test_fifty_digits_lie_inside_without_any_slack(exact, factors, phi_x, phi_y, seed, signs, relative, method):
+    """Proved means proved: no allowance for rounding, corners as they are."""
+    lengths = (np.array([0.1, 0.15, 0.0592, 0.15, 0.0592]) * np.exp(factors)).tolist()
+    widths = [relative * length for length in lengths]
+    mechanism = PointingMechanism(*lengths)
+    found = mechanism.tolerance(phi_x, phi_y, widths, s_y=signs[0], s_x=signs[1], method=method)
+    if found.status is not ToleranceStatus.CERTIFIED:
+        return
+    random = np.random.default_rng(seed)
+    with mp.workdps(50):
+        for ends in [*itertools.product((-1, 1), repeat=5)][:: 1 + seed % 5] + random.uniform(-1, 1, (4, 5)).tolist():
+            member = [mp.mpf(l) + mp.mpf(w) * mp.mpf(e) for l, w, e in zip(lengths, widths, ends)]
+            for value, bounds in zip(
+                exact.angles(mp.mpf(phi_x), mp.mpf(phi_y), member, "YX", *signs), (found.a, found.b)
+            ):
+                turned = value + 2 * mp.pi * mp.nint((bounds.nominal - value) / (2 * mp.pi))
+                assert mp.mpf(bounds.lower) <= turned <= mp.mpf(bounds.upper)
+
+
+def test_the_mean_value_form_starts_inside_of_the_box():
+    """Ends of an interval have more digits than a double: their middle must not be rounded to one."""
+    problem = LengthBoxProblem(ART, PHI, PHI, 1, -1)
+    iv = problem.iv
+    end = iv.mpf(0.1) + iv.mpf(1e-20)
+    box = (end, iv.mpf([0.15, 0.1500001]), iv.mpf((iv.mpf(0.05).a, (iv.mpf(0.05) + iv.mpf(1e-21)).b)), end, end)
+    assert float(end.a) == 0.1  # a double cannot tell it from 0.1
+    for length, middle in zip(box, middle_of(box)):
+        assert middle in length
+
+
+def test_a_root_of_another_branch_is_no_proof(monkeypatch):
+    other = PointingMechanism().poses(PHI, PHI, 1, 1)
+    monkeypatch.setattr(LengthBoxProblem, "nominal", lambda self, lengths: (float(other.b), float(other.a)))
+    problem = LengthBoxProblem(ART, PHI, PHI, 1, -1)
+    with pytest.raises(NoProof):
+        problem.enclose(tuple(problem.iv.mpf(length) for length in ART.lengths))

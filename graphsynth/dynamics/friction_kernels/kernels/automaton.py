@@ -51,38 +51,52 @@ COMPLETE, FULL, STORM, STEP_LIMIT, UNRESOLVED, BROKEN = 0, 1, 2, 3, 4, 5
 #: guards: most events per second, shortest dwell in units of rounding
 RATE, DWELL = 0, 1
 #: steps without a closed form, as parts of the scales of time
-STICK_STEP, GLIDE_STEP, SLIP_STEP = 0.01, 0.05, 0.2
+STICK_STEP, GLIDE_STEP, SLIP_STEP, FIRST_STEP = 0.01, 0.05, 0.2, 0.01
 #: Gauss quadrature with three nodes on [-1, 1]
 GAUSS = ((-math.sqrt(0.6), 5.0 / 9.0), (0.0, 8.0 / 9.0), (math.sqrt(0.6), 5.0 / 9.0))
 
 
 @kernel
-def pace(p):
-    """Step that resolves the drive, in seconds."""
+def pace(p, t):
+    """Step that resolves the drive from the time ``t`` on, in seconds.
+
+    The distance to the nearest time, in the complex plane, where the crank stands across the rod and the rod is no
+    longer than the crank: there the motion has no series.
+    """
     if p[DRIVE] == BELT:
         return math.inf
     fine = 1.0
     if p[DRIVE] == CRANK:
-        ratio = p[RADIUS] / p[ROD]
-        fine = math.sqrt((1.0 - ratio) * (1.0 + ratio))
+        along = math.cos(p[SPEED] * t)
+        fine = min(1.0, math.sqrt((p[ROD] / p[RADIUS] - 1.0) * (p[ROD] / p[RADIUS] + 1.0) + along * along))
     return fine / abs(p[SPEED])
 
 
 @kernel
-def release(p, t, x, end, work):
-    """Time since ``t`` at which a stuck platform is released (infinite if not before ``end``), and the direction."""
+def slip_scale(p, t):
+    """Time that resolves the oscillation of the spring and the drive, in seconds."""
+    return min(math.sqrt(p[MASS] / p[STIFFNESS]), pace(p, t))
+
+
+@kernel
+def release(p, t, x, end, limit, work):
+    """Time since ``t`` at which a stuck platform is released (infinite if not before ``end``), and the direction.
+
+    The third value is the number of steps; the search is given up beyond ``limit``.
+    """
     bound = p[STATIC] * p[NORMAL]
     if p[DRIVE] == BELT:
         force, rate = holding(p, t, 0.0, x)
         if rate == 0.0:
-            return math.inf, 0.0
+            return math.inf, 0.0, 1
         side = 1.0 if rate > 0.0 else -1.0
         span = max(side * bound - force, 0.0) / rate if rate > 0.0 else min(side * bound - force, 0.0) / rate
-        return (span, side) if t + span < end else (math.inf, side)
-    h, low = STICK_STEP * pace(p), 0.0
+        return (span, side, 1) if t + span < end else (math.inf, side, 1)
+    low, count = 0.0, 0
     force, rate = holding(p, t, 0.0, x)
-    while t + low < end:
-        high = min(low + h, end - t)
+    while t + low < end and count <= limit:
+        high = min(low + STICK_STEP * pace(p, t + low), end - t)
+        count += 1
         after, slope = holding(p, t, high, x)
         middle = high
         if rate * slope < 0.0:
@@ -91,16 +105,16 @@ def release(p, t, x, end, work):
             if abs(peak) > bound:
                 side = math.copysign(1.0, peak)
                 if side * force > bound:
-                    return low, side
-                return root(RELEASE, p, side, t, x, 0.0, low, middle, work), side
+                    return low, side, count
+                return root(RELEASE, p, side, t, x, 0.0, low, middle, work), side, count
         if abs(after) > bound:
             side = math.copysign(1.0, after)
             start = low if middle == high else middle
             if value(RELEASE, p, side, t, x, 0.0, start, work) > 0.0:
-                return start, side
-            return root(RELEASE, p, side, t, x, 0.0, start, high, work), side
+                return start, side, count
+            return root(RELEASE, p, side, t, x, 0.0, start, high, work), side, count
         low, force, rate = high, after, slope
-    return math.inf, 0.0
+    return math.inf, 0.0, count
 
 
 @kernel
@@ -110,27 +124,31 @@ def stick_loss(p, t, x, span):
     if p[DRIVE] == BELT:
         force = holding(p, t, 0.5 * span, x)[0]
         return force * p[SPEED] * span, p[DAMPING] * p[SPEED] ** 2 * span
-    count = int(span / (STICK_STEP * pace(p))) + 1
-    h = span / count
-    for i in range(count):
+    low = 0.0
+    while low < span:
+        h = min(STICK_STEP * pace(p, t + low), span - low)
         for place, weight in GAUSS:
-            at = (i + 0.5 * (1.0 + place)) * h
+            at = low + 0.5 * (1.0 + place) * h
             v1 = drive(p, t + at)[1]
             driven += 0.5 * weight * h * holding(p, t, at, x)[0] * v1
             damped += 0.5 * weight * h * p[DAMPING] * v1 * v1
+        low = low + h if h < span - low else span
     return driven, damped
 
 
 @kernel
-def glide_until(p, s, t, x, v, end, work):
-    """Time since ``t`` at which a closed-form slip piece ends (infinite if not before ``end``), damper loss, steps."""
-    full = GLIDE_STEP * min(math.sqrt(p[MASS] / p[STIFFNESS]), pace(p))
+def glide_until(p, s, t, x, v, end, limit, work):
+    """Time since ``t`` at which a closed-form slip piece ends (infinite if not before ``end``), damper loss, steps.
+
+    The search is given up beyond ``limit`` steps.
+    """
+    full = GLIDE_STEP * math.sqrt(p[MASS] / p[STIFFNESS])
     h = min(full, GLIDE_STEP * p[MASS] / p[DAMPING]) if p[DAMPING] > 0.0 else full
     low, loss, count = 0.0, 0.0, 0
     _, v1, a1, _ = drive(p, t)
     u, rate = s * (v1 - v), s * (a1 - glide(p, s, x, v, 0.0)[2])
-    while t + low < end:
-        high = min(low + h, end - t)
+    while t + low < end and count <= limit:
+        high = min(low + min(h, GLIDE_STEP * pace(p, t + low)), end - t)
         after = value(GLIDE, p, s, t, x, v, high, work)
         slope = value(GLIDE_RATE, p, s, t, x, v, high, work)
         if u <= 0.0 and after <= 0.0:
@@ -205,9 +223,8 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
     t, x, v, state = start[TIME], start[POSITION], start[VELOCITY], start[STATE]
     driven, heat, damped = start[DRIVEN], start[HEAT], start[DAMPED]
     closed, bound = parameters_are_closed(p), p[STATIC] * p[NORMAL]
-    largest = SLIP_STEP * min(math.sqrt(p[MASS] / p[STIFFNESS]), pace(p))
     count = steps = 0
-    events, short, h = int(memory[0]), memory[1], memory[2] if memory[2] > 0.0 else 0.05 * largest
+    events, short, h = int(memory[0]), memory[1], memory[2] if memory[2] > 0.0 else FIRST_STEP * slip_scale(p, t)
     while t < end:
         if count + 2 > nodes.shape[0]:
             memory[0], memory[1], memory[2] = events, short, h
@@ -216,7 +233,9 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
             return count, STEP_LIMIT, steps
         event = 0.0
         if state == 0.0:
-            span, side = release(p, t, x, end, work)
+            span, side, taken = release(p, t, x, end, limit - steps, work)
+            if taken > limit - steps:
+                return count, STEP_LIMIT, steps + taken
             steps += 1
             arrive = min(t + span, end)
             span = min(span, end - t)
@@ -224,12 +243,14 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
             driven, damped = driven + work_done, damped + loss
             x, v = x + shift(p, t, span), drive(p, arrive)[1]
             if arrive < end:
-                event, state, h = 1.0, side, 0.05 * largest
+                event, state, h = 1.0, side, FIRST_STEP * slip_scale(p, arrive)
             t = arrive
         else:
             if closed:
-                span, loss, taken = glide_until(p, state, t, x, v, end, work)
+                span, loss, taken = glide_until(p, state, t, x, v, end, limit - steps, work)
                 steps += taken
+                if steps > limit:
+                    return count, STEP_LIMIT, steps
                 if math.isnan(span):
                     return count, UNRESOLVED, steps
                 met = t + span < end
@@ -238,7 +259,7 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
                 new_x, new_v, _ = glide(p, state, x, v, span)
                 driven, heat, damped = driven + force * way, heat + force * (way - (new_x - x)), damped + loss
             else:
-                span, h, code = slip_step(p, state, t, x, v, min(h, largest), end, tolerance, work)
+                span, h, code = slip_step(p, state, t, x, v, min(h, SLIP_STEP * slip_scale(p, t)), end, tolerance, work)
                 steps += 1
                 if code < 0.0:
                     return count, UNRESOLVED if code == -1.0 else BROKEN, steps
@@ -252,7 +273,7 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
                 force = holding(p, t, 0.0, x)[0]
                 after = 0.0 if abs(force) <= bound else math.copysign(1.0, force)
                 event = 0.0 if after == state else 1.0
-                state, h = after, 0.05 * largest
+                state, h = after, FIRST_STEP * slip_scale(p, t)
         nodes[count, 0], nodes[count, 1], nodes[count, 2], nodes[count, 3] = t, x, v, state
         nodes[count, 4], nodes[count, 5], nodes[count, 6], nodes[count, 7] = driven, heat, damped, event
         count += 1

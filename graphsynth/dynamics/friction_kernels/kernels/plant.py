@@ -27,12 +27,14 @@ def drive(p, t):
     if p[DRIVE] == HARMONIC:
         return r * C, -r * w * S, -r * w * w * C, r * w * w * w * S
     rod = p[ROD]
-    q = math.sqrt((rod - r * S) * (rod + r * S))
-    a, b = r * r * S * C / q, r * r * (C - S) * (C + S) / q
+    gap = (rod - r) * (rod + r)
+    square = gap + (r * C) ** 2  # nothing cancels where the crank stands across a rod hardly longer than itself
+    q = math.sqrt(square)
+    a = r * r * S * C / q
     x = r * C - (r * S) ** 2 / (q + rod)
     first = -r * S - a
-    second = -r * C - b - a * a / q
-    third = r * S + 4.0 * a - 3.0 * a * b / q - 3.0 * a * a * a / (q * q)
+    second = -r * C + r * r * (gap * S * S / square - C * C) / q
+    third = r * S + a * (1.0 + 3.0 * gap * rod * rod / (square * square))
     return x, w * first, w * w * second, w * w * w * third
 
 
@@ -48,8 +50,8 @@ def shift(p, start, span):
     cosine = -2.0 * r * math.sin(middle) * s
     if p[DRIVE] == HARMONIC:
         return cosine
-    rod, before, after = p[ROD], r * math.sin(w * start), r * math.sin(w * (start + span))
-    q0, q1 = math.sqrt((rod - before) * (rod + before)), math.sqrt((rod - after) * (rod + after))
+    gap, before, after = (p[ROD] - r) * (p[ROD] + r), r * math.cos(w * start), r * math.cos(w * (start + span))
+    q0, q1 = math.sqrt(gap + before * before), math.sqrt(gap + after * after)
     return cosine - r * r * math.sin(2.0 * middle) * math.sin(2.0 * half) / (q0 + q1)
 
 
