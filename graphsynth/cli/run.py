@@ -3,28 +3,90 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
+
+if TYPE_CHECKING:
+    from graphsynth.scenes.runner import Report
+    from graphsynth.scenes.stages import Progress
 
 __all__ = ["run"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Run a scene and print its summary."""
-    from graphsynth.scenes.report import print_summary
-    from graphsynth.scenes.runner import run as run_scene
+    from graphsynth.scenes.runner import JOURNAL
+    from graphsynth.scenes.scene import load_scene
 
-    report = run_scene(options.scene, out=options.out)
+    scene = load_scene(options.scene)
+    folder = options.out or Path("graphsynth-out") / scene.name
+    try:
+        report = _run(scene, folder, options)
+    except KeyboardInterrupt:
+        if (folder / JOURNAL).exists():
+            console.note(f"what is done is kept in {folder / JOURNAL}; the same command goes on from there")
+        raise
     if options.json:
-        console.put_json(
-            {
-                "scene": report.scene.scene.name,
-                "folder": str(report.folder),
-                "seconds": {time.stage: round(time.import_seconds + time.seconds, 3) for time in report.times},
-            }
-        )
+        console.put_json(_document(report, options.explain))
+        return 0
+    if options.explain:
+        from graphsynth.scenes.explain import explain
+
+        console.put(explain(report))
         return 0
     from rich.console import Console
 
+    from graphsynth.scenes.report import print_summary
+
     print_summary(report, Console())
     return 0
+
+
+def _run(scene: Any, folder: Path, options: argparse.Namespace) -> Report:
+    from graphsynth.scenes.runner import run as run_scene
+
+    with _progress() as progress:
+        if (options.workers or 1) == 1:
+            return run_scene(scene, folder, None, progress, options.fresh)
+        from graphsynth.synthesis.parallel import processes
+
+        with processes(options.workers, prepare=lambda: None) as executor:
+            return run_scene(scene, folder, executor, progress, options.fresh)
+
+
+def _document(report: Report, explained: bool) -> dict[str, Any]:
+    document: dict[str, Any] = {
+        "scene": report.scene.scene.name,
+        "folder": str(report.folder),
+        "seconds": {time.stage: round(time.import_seconds + time.seconds, 3) for time in report.times},
+        "notes": list(report.notes),
+    }
+    if explained:
+        from graphsynth.scenes.explain import explain_json
+
+        document["explain"] = explain_json(report)
+    return document
+
+
+@contextmanager
+def _progress() -> Iterator[Progress | None]:
+    """Show the stage under way while standard error is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=None)
+
+        def show(stage: str, done: int, total: int) -> None:
+            bar.update(task, description=stage, completed=done, total=total)
+
+        yield show

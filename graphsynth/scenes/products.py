@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeVar
 
 __all__ = [
+    "Attempt",
     "Candidate",
+    "Columns",
     "Objective",
     "Outcome",
     "Picture",
@@ -164,6 +166,22 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Columns:
+    """Numbers by the column, for files rather than for the page: curves, a survey of many dimension sets.
+
+    Attributes
+    ----------
+    name : str
+        Of the files: ``<name>.csv``, ``<name>.parquet``.
+    columns : Mapping
+        Header, with its unit as in ``"crank [deg]"``, to a sequence or array; all of the same length.
+    """
+
+    name: str
+    columns: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)

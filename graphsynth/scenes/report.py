@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import os
@@ -11,11 +9,11 @@ import platform
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from graphsynth.errors import SceneError
+from graphsynth.scenes.datafiles import data_files
 from graphsynth.scenes.page import report_html
-from graphsynth.scenes.products import Quantity, Record
 from graphsynth.scenes.summary import summary_tables
 
 if TYPE_CHECKING:
@@ -23,8 +21,9 @@ if TYPE_CHECKING:
 
     from graphsynth.scenes.runner import Report
 
-__all__ = ["loaded_versions", "print_summary", "results_csv", "scene_json", "write_report"]
+__all__ = ["loaded_versions", "print_summary", "scene_json", "write_report"]
 
+_KINDS = {".html", ".csv", ".parquet", ".json", ".jsonl"}
 _PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
 
 
@@ -39,7 +38,7 @@ def loaded_versions() -> dict[str, str]:
 
 
 def write_report(report: Report, folder: Path) -> Path:
-    """Write ``report.html``, ``results.csv`` (if the run kept its records) and ``scene.json``; return the folder.
+    """Write ``report.html``, ``scene.json`` and, of records and columns, CSV and Parquet; return the folder.
 
     Each file appears whole or not at all: it is written beside its place and then moved there.
 
@@ -48,13 +47,12 @@ def write_report(report: Report, folder: Path) -> Path:
     SceneError
         If the folder cannot be written.
     """
-    files = {"report.html": report_html(report), "scene.json": scene_json(report)}
-    if "records" in report.products:
-        files["results.csv"] = results_csv(report.products["records"])
+    files = {"report.html": report_html(report).encode(), "scene.json": scene_json(report).encode()}
+    files |= data_files(report)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, text in files.items():
-            _write_whole(folder / name, text)
+        for name, data in files.items():
+            _write_whole(folder / name, data)
     except OSError as error:
         raise SceneError(
             f"cannot write the report into {folder}: {error.strerror}; choose another folder with --out"
@@ -62,60 +60,17 @@ def write_report(report: Report, folder: Path) -> Path:
     return folder
 
 
-def _write_whole(path: Path, text: str) -> None:
+def _write_whole(path: Path, data: bytes) -> None:
     """Write a file so that nobody ever sees half of it."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
         Path(name).chmod(0o644)
         Path(name).replace(path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-
-
-def results_csv(records: tuple[Record, ...]) -> str:
-    """Return the records as CSV (RFC 4180): one row per candidate, three columns per margin.
-
-    For a margin ``m`` the columns are ``m [unit]``, ``m guarantee`` and ``m error [unit]``; an empty cell means
-    not computed.
-    """
-    margins: dict[str, str] = {}
-    for record in records:
-        for margin in record.margins:
-            margins.setdefault(margin.name, _column(margin.name, margin.unit))
-    head = ["number", "key", "solution", "status", "recognised as", "verdict"]
-    for name, column in margins.items():
-        unit = column[len(name) :]
-        head += [column, f"{name} guarantee", f"{name} error{unit}"]
-    stream = io.StringIO()
-    writer = csv.writer(stream)
-    writer.writerow([*head, "reason"])
-    for record in records:
-        row: list[Any] = [
-            record.number,
-            record.key,
-            record.solution,
-            record.status,
-            record.recognised_as,
-            record.verdict,
-        ]
-        have = {margin.name: margin for margin in record.margins}
-        for name in margins:
-            row += _cells(have.get(name))
-        writer.writerow([*row, record.reason])
-    return stream.getvalue()
-
-
-def _column(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name
-
-
-def _cells(margin: Quantity | None) -> list[str]:
-    if margin is None:
-        return ["", "", ""]
-    return [repr(margin.value), margin.guarantee, "" if margin.error is None else repr(margin.error)]
 
 
 def scene_json(report: Report) -> str:
@@ -162,7 +117,5 @@ def print_summary(report: Report, console: Console) -> None:
             shown.add_row(*map(escape, row))
         console.print(shown)
     if report.folder is not None:
-        names = ["report.html", "results.csv", "results.parquet", "scene.json", "candidates.jsonl"]
-        console.print(
-            f"Report: {escape(str(report.folder))} ({', '.join(n for n in names if (report.folder / n).exists())})"
-        )
+        names = sorted(path.name for path in report.folder.iterdir() if path.suffix in _KINDS)
+        console.print(f"Report: {escape(str(report.folder))} ({', '.join(names)})")

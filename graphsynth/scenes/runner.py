@@ -10,13 +10,14 @@ from types import MappingProxyType
 from typing import Any
 
 from graphsynth.errors import SceneError
+from graphsynth.scenes.datafiles import check_files
 from graphsynth.scenes.measure import StageTime
 from graphsynth.scenes.report import loaded_versions, write_report
 from graphsynth.scenes.running import Running
 from graphsynth.scenes.scene import Scene, load_scene
 from graphsynth.scenes.stages import Context, Progress, Stage, resolve
 
-__all__ = ["Report", "StageTime", "execute", "run"]
+__all__ = ["JOURNAL", "Report", "StageTime", "execute", "run"]
 
 JOURNAL = "candidates.jsonl"
 
@@ -124,6 +125,7 @@ def execute(
     """
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
+    check_files(scene)
     wanted = scene.outputs.products
     stages = resolve(scene.stages(), wanted, scene.place / "outputs")
     done = Running(stages, wanted, Context(scene, executor), progress, journal, fresh)

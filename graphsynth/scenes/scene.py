@@ -17,6 +17,7 @@ from graphsynth.scenes.tables import Place, read_table, require, suggest
 from graphsynth.structure.variables import nearest
 
 __all__ = [
+    "TABLES",
     "BudgetTable",
     "GenerateTable",
     "OutputsTable",
@@ -57,17 +58,27 @@ class GenerateTable:
         Keep mechanisms that have an automorphism of this order that fixes the frame.
     fixed_moving_links : int or None
         Of such an automorphism, the number of moving links that stay in place.
+    planar, fractionated : bool
+        ``planar = true`` leaves out graphs that cannot be drawn without crossings, ``fractionated = false`` those
+        that fall apart at a link or joint.
+    sample : int or None
+        Draw this many mechanisms uniformly, with the seed of the scene, instead of listing all; repeats are dropped.
     limit : int
         Stop with an error when there are more candidates than this.
     """
 
     symmetry: int | None = None
     fixed_moving_links: int | None = None
+    planar: bool = False
+    fractionated: bool = True
+    sample: int | None = None
     limit: int = 10_000
 
     def __post_init__(self) -> None:
         require(self.symmetry in (None, 3), f"has symmetry {self.symmetry}; only 3 is known, or leave it out")
         require(self.limit >= 1, f"has limit {self.limit}; it must be at least 1")
+        require(self.sample is None or self.sample >= 1, f"has sample {self.sample}; it must be at least 1")
+        require(self.sample is None or self.symmetry is None, "has sample and symmetry; only one of them works")
         if self.fixed_moving_links is not None:
             require(self.symmetry is not None, "gives fixed_moving_links without symmetry; add symmetry = 3")
             require(self.fixed_moving_links >= 0, f"has fixed_moving_links {self.fixed_moving_links}; at least 0")
@@ -75,10 +86,21 @@ class GenerateTable:
 
 @dataclass(frozen=True, slots=True)
 class StructureTable:
-    """``[structure]``: the structural question and how candidates are generated from its solutions."""
+    """``[structure]``: the structural question, or graphs by their keys or text forms, and which become candidates."""
 
-    question: Mapping[str, object]
+    question: Mapping[str, object] | None = None
+    graphs: tuple[str, ...] = ()
     generate: GenerateTable = field(default_factory=GenerateTable)
+
+    def __post_init__(self) -> None:
+        require(
+            (self.question is None) != (not self.graphs),
+            "must have either a table question or a list graphs",
+        )
+        if self.graphs:
+            only = "of graphs that are given; it is for a question"
+            require(self.generate.symmetry is None, f"has generate.symmetry {only}")
+            require(self.generate.sample is None, f"has generate.sample {only}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +164,16 @@ class RankingTable:
         require(self.show >= 1, f"has show = {self.show}; it must be at least 1")
 
 
+#: Every table of a scene but ``[mechanism]``, which its family describes.
+TABLES: dict[str, type] = {
+    "scene": SceneTable,
+    "structure": StructureTable,
+    "ranking": RankingTable,
+    "budget": BudgetTable,
+    "outputs": OutputsTable,
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
     """A scene as read: checked, frozen, and with its raw text for the record.
@@ -193,8 +225,7 @@ class Scene:
         place = Place(source, (), text)
         if not isinstance(tables, Mapping):
             raise place.error("must hold tables")
-        known: dict[str, type] = {"scene": SceneTable, "structure": StructureTable, "mechanism": object}
-        known |= {"ranking": RankingTable, "budget": BudgetTable, "outputs": OutputsTable}
+        known: dict[str, type] = {**TABLES, "mechanism": object}
         for key in tables:
             if key not in known:
                 raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}", str(key))

@@ -33,6 +33,7 @@ __all__ = [
     "read_table",
     "require",
     "suggest",
+    "unit_of",
     "unknown",
     "written",
 ]
@@ -153,10 +154,10 @@ def read_table(schema: type[T], table: object, place: Place) -> T:
     values: dict[str, Any] = {}
     for name, field in fields.items():
         if name in keys:
-            unit, key = _unit(name, hints[name]), keys[name]
+            unit, key = unit_of(name, hints[name]), keys[name]
             values[name] = _read(hints[name], table[key], place / key, unit, key != name)
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
-            raise place.error(f"lacks the key {name!r} ({_expected(hints[name], _unit(name, hints[name]))})")
+            raise place.error(f"lacks the key {name!r} ({_expected(hints[name], unit_of(name, hints[name]))})")
     try:
         return schema(**values)
     except SceneError as error:
@@ -198,7 +199,7 @@ def _keys(table: Mapping[str, object], hints: Mapping[str, Any], place: Place) -
     return keys
 
 
-def _unit(name: str, kind: Any) -> Unit:
+def unit_of(name: str, kind: Any) -> Unit:
     """Return the unit of a bare number: as annotated, else as the ending of the key says."""
     if typing.get_origin(kind) is Annotated:
         for note in typing.get_args(kind)[1:]:
@@ -209,7 +210,7 @@ def _unit(name: str, kind: Any) -> Unit:
 
 def _check_together(hints: Mapping[str, Any], table: Mapping[str, object], place: Place) -> None:
     """Refuse lengths "in any one unit" of which some have a written unit and some have none."""
-    names = [name for name, kind in hints.items() if _unit(name, kind) is ANY_LENGTH and name in table]
+    names = [name for name, kind in hints.items() if unit_of(name, kind) is ANY_LENGTH and name in table]
     bare = [name for name in names if not (isinstance(table[name], str) and _has_unit(str(table[name])))]
     if bare and len(bare) < len(names):
         raise place.error(

@@ -69,10 +69,11 @@ def graphs(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[Mecha
 
 
 @contextmanager
-def processes(workers: int) -> Iterator[Executor | None]:
+def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterator[Executor | None]:
     """Give a pool of worker processes, or None for one worker (then everything is done in this process).
 
-    The kernels are compiled here first, so that the workers find them in the cache.  When the block is left by an
+    The kernels of the enumerator are compiled here first (or `prepare` is called), so that the workers find them in
+    the cache.  When the block is left by an
     exception (Ctrl-C), the workers are stopped at once; what was already written stays.
     """
     if workers <= 1:
@@ -81,7 +82,7 @@ def processes(workers: int) -> Iterator[Executor | None]:
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
 
-    _compile_kernels()
+    (prepare or _compile_kernels)()
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
     try:
         yield pool

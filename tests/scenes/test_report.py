@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,14 @@ from typing import Any
 import pytest
 
 from graphsynth.errors import SceneError
+from graphsynth.scenes.datafiles import results_csv
 from graphsynth.scenes.measure import StageTime
 from graphsynth.scenes.page import report_html
-from graphsynth.scenes.products import Attempt, Candidate, Picture, Quantity, Record, Table, each
-from graphsynth.scenes.report import results_csv, scene_json, write_report
+from graphsynth.scenes.products import Attempt, Candidate, Columns, Picture, Quantity, Record, Table, each
+from graphsynth.scenes.report import scene_json, write_report
 from graphsynth.scenes.runner import Report
 from graphsynth.scenes.running import Running
-from graphsynth.scenes.scene import Scene
+from graphsynth.scenes.scene import OutputsTable, Scene
 from graphsynth.scenes.stages import Context, Stage
 
 RECORDS = (
@@ -140,3 +142,29 @@ def one(context: Context) -> int:
 
 def two(context: Context, x: int) -> tuple[str, str]:
     return f"y{x}", f"z{x}"
+
+
+def test_parquet_holds_the_same_as_csv(report: Report, tmp_path: Path) -> None:
+    import numpy as np
+
+    parquet = pytest.importorskip("pyarrow.parquet")
+
+    outputs = OutputsTable(("records",), ("csv", "parquet"))
+    columns = Columns("curve", {"crank [deg]": np.arange(3.0), "mode": ["a", "b", "c"]})
+    products = {**report.products, "curves": (columns,)}
+    folder = write_report(replace(report, scene=replace(report.scene, outputs=outputs), products=products), tmp_path)
+    assert (folder / "curve.csv").read_text(encoding="utf-8").split() == [
+        "crank",
+        "[deg],mode",
+        "0.0,a",
+        "1.0,b",
+        "2.0,c",
+    ]
+    assert parquet.read_table(folder / "curve.parquet").to_pydict() == {
+        "crank [deg]": [0.0, 1.0, 2.0],
+        "mode": list("abc"),
+    }
+    found = parquet.read_table(folder / "results.parquet").to_pylist()
+    rows = list(csv.DictReader(io.StringIO((folder / "results.csv").read_text(encoding="utf-8"), newline="")))
+    assert len(found) == len(rows) == 3 and found[0]["gap [mm]"] == float(rows[0]["gap [mm]"]) == -0.25
+    assert found[1]["gap [mm]"] is None and list(found[0]) == list(rows[0])

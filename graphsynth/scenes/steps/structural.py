@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from graphsynth.errors import FormatError, SceneError, SpecError, TooLargeError
+from graphsynth.errors import FormatError, GraphError, SceneError, SpecError, TooLargeError
 from graphsynth.scenes.products import Candidate
 from graphsynth.scenes.scene import StructureTable
 from graphsynth.scenes.stages import Context
@@ -18,7 +18,19 @@ __all__ = ["generate", "has_threefold_symmetry", "solve"]
 
 
 def solve(context: Context) -> tuple[LinkAssortment, ...]:
-    """Return every integer solution of the scene's structural question (exact)."""
+    """Return every integer solution of the scene's structural question (exact); none if graphs are given instead.
+
+    Raises
+    ------
+    SceneError
+        If graphs are given and the solutions are asked for.
+    """
+    if _structure(context).graphs:
+        if "solutions" in context.scene.outputs.products:
+            raise (context.scene.place / "outputs").error(
+                "asks for 'solutions', but graphs are given and there is no question to solve; remove it"
+            )
+        return ()
     return tuple(_spec(context).solve())
 
 
@@ -33,7 +45,7 @@ def _spec(context: Context) -> StructuralSpec:
 
     place = context.scene.place / "structure" / "question"
     try:
-        return StructuralSpec.from_mapping(_structure(context).question)
+        return StructuralSpec.from_mapping(_structure(context).question or {})
     except (FormatError, SpecError) as error:
         raise place.error(f"cannot be read: {error}") from error
 
@@ -60,18 +72,45 @@ def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterato
         yield Candidate(count, graph, assortment_text(graph))
     if not count:
         raise SceneError(
-            f"{context.scene.place / 'structure'} has {len(solutions)} integer solutions but no mechanism passes the "
-            "filters of [structure.generate]; relax them"
+            f"{context.scene.place / 'structure'} gives no candidate ({len(solutions)} integer solutions): nothing "
+            "passes the filters of [structure.generate]; relax them"
         )
 
 
 def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
-    from graphsynth.synthesis import enumerate_mechanisms
-
     options = _structure(context).generate
-    for graph in enumerate_mechanisms(_spec(context), symmetry=options.symmetry):
-        if options.fixed_moving_links is None or has_threefold_symmetry(graph, options.fixed_moving_links):
-            yield graph
+    fixed = options.fixed_moving_links
+    for graph in _all(context):
+        if fixed is not None and not has_threefold_symmetry(graph, fixed):
+            continue
+        if (options.planar and not graph.is_planar) or (not options.fractionated and graph.is_fractionated):
+            continue
+        yield graph
+
+
+def _all(context: Context) -> Iterator[MechanismGraph]:
+    """Yield the graphs that are given, or drawn, or all that answer the question."""
+    from graphsynth.synthesis import enumerate_mechanisms, sample_mechanisms
+
+    table = _structure(context)
+    if table.graphs:
+        yield from (_read(context, i, text) for i, text in enumerate(table.graphs))
+    elif table.generate.sample is not None:
+        drawn = sample_mechanisms(_spec(context), table.generate.sample, context.scene.scene.seed)
+        yield from {graph.key: graph for graph in drawn}.values()
+    else:
+        yield from enumerate_mechanisms(_spec(context), symmetry=table.generate.symmetry)
+
+
+def _read(context: Context, place: int, text: str) -> MechanismGraph:
+    from graphsynth.structure.graph import MechanismGraph
+
+    try:
+        graph = MechanismGraph.from_key(text) if text.startswith("1") else MechanismGraph.from_text(text)
+    except (FormatError, GraphError) as error:
+        at = context.scene.place / "structure" / "graphs" / str(place)
+        raise at.error(f"is neither a canonical key nor the text form of a graph: {error}") from error
+    return graph
 
 
 def assortment_text(graph: MechanismGraph) -> str:

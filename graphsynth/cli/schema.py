@@ -1,0 +1,17 @@
+"""``graphsynth schema``."""
+
+from __future__ import annotations
+
+import argparse
+
+from graphsynth.cli import console
+
+__all__ = ["run"]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the JSON Schema of scene files."""
+    from graphsynth.scenes.schema import schema_text
+
+    console.put(schema_text().rstrip("\n"))
+    return 0
