@@ -264,26 +264,55 @@ class Braider:
         speed = np.stack([w, s.k2 * w, s.k3 * w], axis=-1)
         return LinkMotion(speed, np.stack([alpha, s.f2 * w * w + s.k2 * alpha, s.f3 * w * w + s.k3 * alpha], axis=-1))
 
-    def steady_range(self, turns: int = 1, rtol: float = 1e-11) -> tuple[float, float]:
-        """Least and largest crank speed over whole turns after the start-up, rad/s; estimated, NaN if a run fails."""
+    def steady_range(self, turns: int = 1, rtol: float = 1e-11, samples: int = 720) -> tuple[float, float]:
+        """Least and largest crank speed over whole turns after the start-up, rad/s; estimated, NaN if a run fails.
+
+        The extremes of ``samples`` output times per turn: their error falls with the square of the number.
+        """
         first = self.simulate([0.0, 2.0], rtol=rtol, estimate=False)
         if not first.complete:
             return math.nan, math.nan
         period = math.tau / float(first.speed[-1])
-        times = np.concatenate([[0.0], 2.0 + np.linspace(0.0, 1.02 * turns * period, 720 * turns + 1)])
+        times = np.concatenate([[0.0], 2.0 + np.linspace(0.0, 1.02 * turns * period, samples * turns + 1)])
         found = self.simulate(times, rtol=rtol, estimate=False)
         speed = found.speed[1:]
         return float(speed.min()), float(speed.max())
 
-    def settling(self, target: float, band: float = 0.02, end: float = 0.5, rtol: float = 1e-11) -> Settling:
+    def largest_current(self, found: DriveRun) -> tuple[float, float]:
+        """Time (s) and value (A) of the largest torque-making current of a run, between its output times; estimated.
+
+        Examples
+        --------
+        >>> braider = Braider()
+        >>> time, current = braider.largest_current(braider.simulate(np.linspace(0.0, 0.1, 51)))
+        >>> round(time, 5), round(current, 4)
+        (0.00206, 0.9915)
+        """
+        if not found.complete or found.currents.shape[1] == 0:
+            return math.nan, math.nan
+        k = int(np.argmax(np.abs(found.currents[:, -1])))
+        if k in (0, found.time.size - 1):
+            return float(found.time[k]), float(found.currents[k, -1])
+        near = np.linspace(found.time[k - 1], found.time[k + 1], 401)[1:]
+        start = tuple(map(float, found.currents[k - 1]))
+        fine = self.simulate(
+            [float(found.time[k - 1]), *near], angle=float(found.angle[k - 1]), speed=float(found.speed[k - 1]),
+            currents=start, reduce=False, rtol=found.rtol, estimate=False,
+        )  # fmt: skip
+        best = int(np.argmax(np.abs(fine.currents[:, -1])))
+        return float(fine.time[best]), float(fine.currents[best, -1])
+
+    def settling(
+        self, target: float, band: float = 0.02, end: float = 0.5, rtol: float = 1e-11, samples: int = 2001
+    ) -> Settling:  # fmt: skip
         """First time after which ``|w / target - 1| <= band`` up to ``end``, from rest.
 
-        The last crossing between samples is solved on the cubic through speeds and accelerations, 2000 samples.
+        The last crossing between samples is solved on the cubic through speeds and accelerations.
         """
         number("band", band, least=0.0, above=True)
         if number("target", target) == 0.0:
             raise SpecError("target = 0 has no relative band; give the speed that is to be reached, rad/s")
-        times = np.linspace(0.0, number("end", end, least=0.0, above=True), 2001)
+        times = np.linspace(0.0, number("end", end, least=0.0, above=True), samples)
         found = self.simulate(times, rtol=rtol, estimate=False)
         outside = np.nonzero(~(np.abs(found.speed / target - 1.0) <= band))[0]
         if not found.complete or outside.size == 0 or outside[-1] == times.size - 1:
