@@ -113,13 +113,29 @@ def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> Cresce
     return CrescentAreas(ell, cir)
 
 
+def _tilts(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
+    """Return sine (without sign) and cosine of the tilt, of one shape."""
+    if bearing.clearance < 0.0:
+        raise GeometryError(
+            f"clearance = {bearing.clearance} is negative: an interference fit has no free position to measure an "
+            "area from"
+        )
+    S, C = np.broadcast_arrays(np.abs(np.asarray(sine, dtype=np.float64)), np.asarray(cosine, dtype=np.float64))
+    return S, C
+
+
 def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> CrescentAreas:
     """Free gap and interference of the centred surrogate ellipse E4 (section 5.1), mm^2.
 
     Ellipse ``a = Rh``, ``b = Rh C - h S`` against the disc of radius R.  Where the tilt is so steep that ``b <= 0`` the
     surrogate is not defined: NaN there (use `lid_area`, which is defined everywhere).
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit.
     """
-    S, C = np.abs(np.asarray(sine, dtype=np.float64)), np.asarray(cosine, dtype=np.float64)
+    S, C = _tilts(bearing, sine, cosine)
     gap = bearing.gap(S, C, "B")
     defined = gap < bearing.Rb
     areas = ellipse_circle_stable(bearing.Rb, bearing.clearance, np.where(defined, gap, 0.0))
@@ -144,9 +160,15 @@ def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, 
 def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     """A_lid: disc of radius R outside one lid of the tilted hole (condition B, section 5.4), mm^2.
 
-    Exact closed form in double precision, including the second crescent at very large tilt.  Zero while ``gB <= 0``.
+    Exact closed form in double precision, including the second crescent at very large tilt.  Zero while ``gB <= 0``;
+    NaN for NaN.
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit.
     """
-    S, C = np.broadcast_arrays(np.abs(np.asarray(sine, dtype=np.float64)), np.asarray(cosine, dtype=np.float64))
+    S, C = _tilts(bearing, sine, cosine)
     R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
     disc, ring = math.pi * R * R, float(bearing._slack)
     gap, p, d = bearing.gap(S, C, "B"), Rh * C, h * S
@@ -155,7 +177,7 @@ def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     for near, side in ((gap, h), (np.asarray(R - d - p), -h)):
         use = (near > 0.0) & ~missed
         area[use] += _lid_side(R, Rh, ring, S[use], C[use], near[use], side)
-    return np.where(missed, disc, np.minimum(area, disc))
+    return np.asarray(np.where(missed, disc, np.minimum(area, disc)) + 0.0 * (S + C))
 
 
 def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -168,8 +190,13 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
     quadrature : ndarray of bool
         True where ``R S > h C``: there the closed form does not hold and the area is an adaptive quadrature
         (estimated relative error 1e-10).
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit.
     """
-    S, C = np.broadcast_arrays(np.abs(np.asarray(sine, dtype=np.float64)), np.asarray(cosine, dtype=np.float64))
+    S, C = _tilts(bearing, sine, cosine)
     R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
     gap, ring = bearing.gap(S, C, "A"), float(bearing._slack)
     steep = h * C < R * S
@@ -184,7 +211,7 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
     for index in np.ndindex(S.shape):
         if quadrature[index]:
             area[index] = _rim_quadrature(R, Rh, float(p[index]), float(d[index]))
-    return area, quadrature
+    return np.asarray(area + 0.0 * (S + C)), quadrature
 
 
 def _rim_side(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, gap: Array) -> Array:

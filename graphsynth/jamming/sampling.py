@@ -14,6 +14,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certify import certify_jamming
 from graphsynth.jamming.parameters import ToleranceBox
@@ -77,6 +78,11 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     seed : int
         Seed of the generator.
 
+    Raises
+    ------
+    GeometryError
+        Unless ``count`` is a positive integer, and what `certify_jamming` raises.
+
     Examples
     --------
     >>> box = ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003")
@@ -84,6 +90,8 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     >>> seen.outside, seen.jamming_fraction, 0 <= seen.overestimation < 1e-15
     (0, 0.0, True)
     """
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise GeometryError(f"count = {count!r} must be a positive integer; 200000 is usual")
     begin = perf_counter()
     bound = certify_jamming(box, condition).largest_gap.hi
     generator = np.random.default_rng(seed)
@@ -125,7 +133,7 @@ def _gaps(box: ToleranceBox, condition: str, v: dict[str, Array], wave: Array) -
 def _corners(box: ToleranceBox, condition: str) -> tuple[float, int]:
     """Largest gap over the corners of the ranges that have a width, at the worst angle."""
     wide = [name for name in box.ranges if not box[name].is_point]
-    signs = np.array(list(product((0, 1), repeat=len(wide)))).reshape(-1, len(wide))
+    signs = np.array(list(product((0, 1), repeat=len(wide)))).reshape(2 ** len(wide), len(wide))
     values = {name: np.full(len(signs), box[name].middle) for name in box.ranges}
     for column, name in enumerate(wide):
         ends = np.array([float(box[name].lower), float(box[name].upper)])
