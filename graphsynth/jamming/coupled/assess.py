@@ -55,7 +55,7 @@ def assess_coupled(
     certify : bool
         Prove the verdict between the samples too (`certify_coupled`), over the tolerance boxes.
     length_tolerance, seconds : float
-        For the proof: relative tolerance of lengths, and the time it may take.
+        For the proof: relative tolerance of lengths, and its time.
 
     Returns
     -------
@@ -70,19 +70,15 @@ def assess_coupled(
 
     Notes
     -----
-    Specification lambda_and_jamming, section 9.  The program stays convex with any number of misaligned axes, because
-    each only shifts the relative tilt of its own joint by a constant.
+    Specification lambda_and_jamming, section 9.
 
     Examples
     --------
     >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
     >>> from graphsynth.jamming import Bearing
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> linkage = Mechanism(graph, [
-    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
-    ...     Revolute(0, 3, (2.0, 0.0)),
-    ... ], [Driver(0, 1)])
-    >>> motion = simulate(linkage, np.radians([0.0, 90.0, 180.0]))
+    >>> joints = Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (2.5, 0), (2.5, 0)), Revolute(0, 3, (2, 0))
+    >>> motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.radians([0.0, 90.0, 180.0]))
     >>> report = assess_coupled(motion, Bearing(), Misalignment(0, 1, 0.012))
     >>> report.verdict.name, [round(float(f), 4) for f in report.factor]
     ('FREE_ESTIMATED', [0.9694, 0.9894, 0.7915])
@@ -90,25 +86,30 @@ def assess_coupled(
     begin = perf_counter()
     check_motion(motion)
     given = problem(motion.mechanism, bearings, tilts, condition)
-    keep = np.flatnonzero(motion.assembled)
-    poses = motion.poses[keep]
-    tilt, scale = given.solve(poses), given.solve(poses, "scale")
-    report = replace(_report(given, motion, keep, (tilt, scale), begin), condition=condition)
-    if not certify or keep.size == 0:
+    report = replace(_report(given, motion, begin), condition=condition)
+    if not certify or not motion.assembled.any():
         return report
-    if keep.size == 1:
-        reason = "a proof needs a range of inputs; the motion has one assembled sample"
-        return replace(report, verdict=Verdict.UNDECIDED, reason=reason, notes=(*report.notes, report.reason))
+    return _with_proof(report, motion, bearings, condition, length_tolerance, seconds)
+
+
+def _with_proof(
+    report: CoupledReport, motion: Motion, bearings: Bearings, condition: Condition, tolerance: float, seconds: float
+) -> CoupledReport:
+    """Replace the verdict at the samples by what is proved between them."""
     from graphsynth.jamming.coupled.turn import certify_coupled
 
+    begin = perf_counter()
+    if int(motion.assembled.sum()) == 1:
+        reason = "a proof needs a range of inputs; the motion has one assembled sample"
+        return replace(report, verdict=Verdict.UNDECIDED, reason=reason, notes=(*report.notes, report.reason))
     proof = certify_coupled(
-        motion, bearings, given.misalignments, condition=condition, length_tolerance=length_tolerance, seconds=seconds
+        motion, bearings, report.misalignments, condition=condition, length_tolerance=tolerance, seconds=seconds
     )
     # where nothing is proved, what the samples say is still worth reading
     notes = (*report.notes, f"at the samples: {report.reason}") if proof.verdict is Verdict.UNDECIDED else report.notes
     return replace(
         report, verdict=proof.verdict, reason=proof.reason, certificate=proof, notes=notes,
-        seconds=perf_counter() - begin,
+        seconds=report.seconds + perf_counter() - begin,
     )  # fmt: skip
 
 
@@ -118,10 +119,9 @@ def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:
     return full
 
 
-def _report(
-    given: Problem, motion: Motion, keep: NDArray[np.intp], found: tuple[PoseSolution, PoseSolution], begin: float
-) -> CoupledReport:
-    tilt, scale = found
+def _report(given: Problem, motion: Motion, begin: float) -> CoupledReport:
+    keep = np.flatnonzero(motion.assembled)
+    tilt, scale = given.solve(motion.poses[keep]), given.solve(motion.poses[keep], "scale")
     layout, count = given.layout, len(motion.inputs)
     with np.errstate(all="ignore"):
         gap = np.where(tilt.upper > tilt.lower, (tilt.upper - tilt.lower) / tilt.upper, 0.0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 from graphsynth.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming.bearing import Bearing
 
-__all__ = ["critical_range"]
+__all__ = ["critical_range", "pushed"]
 
 
 def critical_range(
@@ -34,6 +35,26 @@ def critical_range(
         ends = (_over(radius, height, clearance, "A"), _over(radius, hole, clearance, "B"))
         least, most = (max(pair) for pair in zip(*ends))
     return min(least, nominal), max(most, nominal)
+
+
+def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
+    """Return a bearing with the clearance that is left beside an axis pushed off the middle, rounded down.
+
+    In the direction of the push both rims reach ``offset`` further, so that all three contact conditions hold with the
+    clearance less the offset; in other directions more is left.  Specification, section 9.7, level L2.
+    """
+    if not 0.0 <= offset < math.inf:
+        raise GeometryError(f"radial_offset = {offset} must be a distance of zero or more, in mm; correct the value")
+    if offset == 0.0:
+        return bearing
+    if offset + tolerance > bearing.clearance:
+        raise GeometryError(
+            f"radial_offset = {offset} mm is more than the smallest clearance, "
+            f"{bearing.clearance - tolerance:.9g} mm; the pin cannot be pushed so far"
+        )
+    exact = Fraction(bearing.clearance) - Fraction(offset)
+    left = float(exact)
+    return replace(bearing, clearance=left if Fraction(left) <= exact else math.nextafter(left, 0.0))
 
 
 _Ends = tuple[Fraction, Fraction]

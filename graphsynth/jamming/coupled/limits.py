@@ -180,6 +180,7 @@ def bearing_limits(
     height_tolerance: float = 0.0,
     clearance_tolerance: float = 0.0,
     hole_tolerance: float = 0.0,
+    radial_offset: float = 0.0,
 ) -> JointLimits:
     """Limits of a bearing: its critical tilt, with a range that encloses it for all dimensions within tolerance.
 
@@ -192,6 +193,9 @@ def bearing_limits(
         Axial play, in the length unit of the mechanism.
     radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance : float
         Half widths in millimetres of ``Rb``, ``Hb``, ``clearance`` and ``hole_length``.
+    radial_offset : float
+        Largest distance in millimetres by which a load pushes the axis off the middle (level L2 of the model ladder);
+        the clearance left is smaller by it.
 
     Returns
     -------
@@ -210,19 +214,20 @@ def bearing_limits(
     >>> round(bearing_limits(Bearing()).tilt, 15)
     0.006064396559156
     """
+    from graphsynth.jamming.coupled.critical import critical_range, pushed
+
     choice("condition", condition, ("A", "B", "general"))
+    bearing = pushed(bearing, radial_offset, clearance_tolerance)
     boxes = (radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance)
     for name, value in zip(("radius", "height", "clearance", "hole"), boxes):
         if not 0.0 <= value < math.inf:
             raise GeometryError(f"{name}_tolerance = {value} must be zero or more; correct the value")
     if hole_tolerance and condition != "general":
         raise GeometryError(f'hole_tolerance = {hole_tolerance} needs condition "general"; condition is "{condition}"')
-    critical = bearing.critical_tilt(condition)
     if bearing.clearance < 0.0:
         raise GeometryError(f"clearance = {bearing.clearance} mm is an interference fit; the joint cannot be assembled")
+    critical = bearing.critical_tilt(condition)
     tilt = math.inf if critical.angle is None or critical.reason else critical.angle
-    from graphsynth.jamming.coupled.critical import critical_range
-
     return JointLimits(tilt, play, critical_range(bearing, condition, boxes, tilt))
 
 

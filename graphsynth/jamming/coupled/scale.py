@@ -17,6 +17,7 @@ from graphsynth.jamming.coupled.limits import Misalignment
 from graphsynth.jamming.coupled.pieces import PARTS, Found, Work, check_range, cut
 from graphsynth.jamming.coupled.positions import Unsupported
 from graphsynth.jamming.coupled.problem import Bearings, problem
+from graphsynth.jamming.coupled.search import Budget
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -84,36 +85,40 @@ def largest_scale(
     begin = perf_counter()
     check_range(motion, length_tolerance, relative_gap=relative_gap, max_pieces=max_pieces, seconds=seconds)
     given = problem(motion.mechanism, bearings, tilts, condition)
-    reason = ""
-    best, above = 0.0, 0.0
-    parts: list[Found] = []
     try:
         work = Work(given, motion, length_tolerance)
-        lo, hi = work.first()
-        while lo.size:
-            found = work.evaluate(lo, hi)
-            found = found._replace(lower=_peaks(work, found))
-            best = max(best, float(found.lower.max()))
-            rest = found.upper > best * (1.0 + 0.9 * relative_gap)
-            above = max(above, float(found.upper[~rest].max(initial=0.0)))
-            narrow = hi - lo <= 1e-9 * (work.high - work.low)
-            if (
-                work.evaluated + PARTS * int(rest.sum()) > max_pieces
-                or perf_counter() - begin > seconds
-                or (rest & narrow).any()
-            ):
-                above = max(above, float(found.upper[rest].max(initial=0.0)))
-                reason = f"the limit of work was reached after {work.evaluated} pieces" if rest.any() else ""
-                parts.append(found)
-                break
-            parts.append(found.take(~rest))
-            lo, hi = cut(lo[rest], hi[rest])
-        pieces = Found.join(parts)
-        links = work.links(pieces)
-        own = work.on_branch(pieces, links)
+        budget = Budget(1e-9 * (work.high - work.low), max_pieces, seconds, begin)
+        return _enclosed(work, budget, *_branch_and_bound(work, budget, relative_gap))
     except Unsupported as error:
         return ScaleCertificate(0.0, math.inf, math.nan, 0, str(error), perf_counter() - begin)
-    # only what is proved to belong to the branch of the motion counts
+
+
+def _branch_and_bound(work: Work, budget: Budget, relative_gap: float) -> tuple[Found, float, str]:
+    """Cut what may hold a larger factor than the best found; return the pieces, a bound of them, and what stopped."""
+    best, above, reason = 0.0, 0.0, ""
+    parts: list[Found] = []
+    lo, hi = work.first()
+    while lo.size:
+        found = work.evaluate(lo, hi)
+        found = found._replace(lower=_peaks(work, found))
+        best = max(best, float(found.lower.max()))
+        rest = found.upper > best * (1.0 + 0.9 * relative_gap)
+        above = max(above, float(found.upper[~rest].max(initial=0.0)))
+        narrow = hi - lo <= budget.smallest
+        if work.evaluated + PARTS * int(rest.sum()) > budget.max_pieces or budget.over or (rest & narrow).any():
+            above = max(above, float(found.upper[rest].max(initial=0.0)))
+            reason = f"the limit of work was reached after {work.evaluated} pieces" if rest.any() else ""
+            parts.append(found)
+            break
+        parts.append(found.take(~rest))
+        lo, hi = cut(lo[rest], hi[rest])
+    return Found.join(parts), above, reason
+
+
+def _enclosed(work: Work, budget: Budget, pieces: Found, above: float, reason: str) -> ScaleCertificate:
+    """Turn bounds of the factor into bounds of its inverse; only pieces proved to be on the branch count."""
+    links = work.links(pieces)
+    own = work.on_branch(pieces, links)
     peak = np.where(own, pieces.lower, 0.0)
     top = int(np.argmax(peak))
     best, at = float(peak[top]), float(Interval.from_bounds(pieces.lo[top], pieces.hi[top]).mid)
@@ -124,10 +129,10 @@ def largest_scale(
     low = float((one / Interval.from_bounds(above, above)).lo) if 0.0 < above < math.inf else 0.0
     high = float((one / Interval.from_bounds(best, best)).hi) if best > 0.0 else math.inf
     low = math.inf if above == 0.0 else low
+    if not work.motion.completed:
+        reason = reason or f"the motion ends: {work.motion.reason}"
     at = at if best > 0.0 else math.nan
-    if not motion.completed:
-        reason = reason or f"the motion ends: {motion.reason}"
-    return ScaleCertificate(low, high, at, work.evaluated, reason, perf_counter() - begin)
+    return ScaleCertificate(low, high, at, work.evaluated, reason, perf_counter() - budget.begin)
 
 
 def _peaks(work: Work, found: Found) -> Array:

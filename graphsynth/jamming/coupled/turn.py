@@ -159,11 +159,8 @@ def certify_coupled(
     >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
     >>> from graphsynth.jamming import Bearing
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> linkage = Mechanism(graph, [
-    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
-    ...     Revolute(0, 3, (2.0, 0.0)),
-    ... ], [Driver(0, 1)])
-    >>> motion = simulate(linkage, np.linspace(0.0, 2.0 * np.pi, 37))
+    >>> joints = Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (2.5, 0), (2.5, 0)), Revolute(0, 3, (2, 0))
+    >>> motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.linspace(0.0, 2.0 * np.pi, 37))
     >>> certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.0115)).verdict.name
     'CERTIFIED_FREE'
     """
