@@ -12,9 +12,14 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from graphsynth.dynamics.stepping import Trail
 
-__all__ = ["compiled_stepper"]
+__all__ = ["ONE_STAGE", "Stages", "compiled_stepper"]
 
 Array = NDArray[np.float64]
+
+#: ``(y, h, A, K) -> new state``: fills the rows of K after the first with the rates at ``y + h A[s] K``.
+Stages = Callable[[Array, float, Array, Array], Array]
+#: The table of a "step" that only evaluates the rates at a state.
+ONE_STAGE: Array = np.zeros((1, 1))
 
 # of scipy.integrate's Runge-Kutta methods
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0
@@ -24,12 +29,12 @@ _SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0
 def _stepper_class() -> Any:
     from scipy.integrate import DOP853
 
-    A, B = np.ascontiguousarray(DOP853.A), np.ascontiguousarray(DOP853.B)
+    A = np.vstack([DOP853.A, DOP853.B])  # the last row leads to the new state
 
     class CompiledDOP853(DOP853):  # type: ignore[misc]  # scipy has no types
         """The step of `scipy.integrate.DOP853` with compiled stages."""
 
-        stages: Callable[..., Array]
+        stages: Stages
         trail: Trail
 
         t: float
@@ -48,7 +53,7 @@ def _stepper_class() -> Any:
                 h = fresh_t - t
                 size = abs(h)
                 self.K[0] = self.f
-                fresh = self.stages(y, h, A, B, self.K)
+                fresh = self.stages(y, h, A, self.K)
                 self.trail.evaluations += self.n_stages
                 scale = self.atol + np.maximum(np.abs(y), np.abs(fresh)) * self.rtol
                 error = self._estimate_error_norm(self.K, h, scale)
@@ -65,7 +70,7 @@ def _stepper_class() -> Any:
 
 
 def compiled_stepper(
-    stages: Callable[..., Array], rates: Callable[[float, Array], Array], t: float, y: Array, bound: float, rtol: float,
+    stages: Stages, rates: Callable[[float, Array], Array], t: float, y: Array, bound: float, rtol: float,
     atol: Array | float, first: float | None, trail: Trail,
 ) -> Any:  # fmt: skip
     """Return a stepper like `scipy.integrate.DOP853` for equations that do not depend on time.
@@ -73,7 +78,6 @@ def compiled_stepper(
     Parameters
     ----------
     stages : callable
-        ``(y, h, A, B, K) -> new state``; fills the rows of K after the first.
     rates : callable
         The same right-hand side, for the first step and the interpolant.
     """

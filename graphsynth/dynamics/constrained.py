@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.leap import HermiteLeap
+from graphsynth.dynamics.compiled_steps import ONE_STAGE, Stages
+from graphsynth.dynamics.leap import GaussStep, HermiteLeap, gauss_step
 from graphsynth.dynamics.passing import passed_singular_pose
 from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
@@ -25,12 +26,16 @@ Array = NDArray[np.float64]
 
 #: Pivots below this part of the largest are looked at closely.
 _LOW = 0.3
-#: Pivots below this part of the largest tell a singular pose ahead.
-_AHEAD = 0.6
-#: Pivots below this part of the largest fall linearly enough to tell when.
-_CLOSE = 0.3
-#: Short steps before a leap over a singular pose, and how well it must land (characteristic lengths, radians).
-_NODES, _LANDED = 3, 1e-6
+#: Pivots below this part of the largest: a singular pose may lie ahead; below the second, one does.
+_AHEAD, _SINGULAR = 0.7, 0.02
+#: Where to look for it, in steps.
+_SAMPLES = np.linspace(0.1, 1.3, 9)
+#: Smallest pivot at a stage, and how far a step leads away from a singular start (units).
+_REGULAR, _AWAY = 1e-6, 0.05
+#: How well a step over a singular pose must land (units; relative), and the energy it may gain or lose.
+_LANDED, _KEPT = 1e-9, 1e-11
+#: Lengths of the step in times to the pose, and states that the first guess goes through.
+_LENGTHS, _NODES = (2.0, 1.75, 2.3), 3
 
 
 class ConstrainedForm:
@@ -66,15 +71,15 @@ class ConstrainedForm:
         self._history: list[tuple[float, float]] = []
         self._dense: Any = None
         self._largest = 0.0
-        self._short, self._blocked = 0.0, -np.inf
+        self._due, self._blocked, self._from_singular = 0.0, -np.inf, start.pose_class == "singular"
         self._nodes: list[tuple[float, Array]] = []
-        self._last: tuple[float, Array] | None = None
         self._follows = bool((compiled.tables.slots >= 0).any())
         self.contraction = 0.0
         self.pivot = 1.0
         self._kernels = kernels
         self._fixed = compiled.driven(0.0)
-        self._none = np.zeros(compiled.n)
+        self._none, self._one = np.zeros(compiled.n), np.empty((1, 2 * compiled.n + 1))
+        self._unit = np.tile([compiled.tables.size, compiled.tables.size, 1.0], compiled.n // 3)
         self._begin = np.concatenate([start.q, start.v, [0.0]])
 
     def begin(self) -> Array:
@@ -92,26 +97,22 @@ class ConstrainedForm:
 
     def rates(self, t: float, y: Array) -> Array:
         """Return the derivative of the state; NaN where the friction iteration does not contract."""
-        found, _ = self._kernels.constrained_rates(
-            self.compiled.tables, np.ascontiguousarray(y), self.slots, self.driven(t), self.applied(t, y), self.out
+        self._run(t, np.ascontiguousarray(y), 0.0, ONE_STAGE, self._one, 0, 1, self.applied(t, y))
+        return np.array(self._one[0])
+
+    def _run(self, t: float, y: Array, h: float, A: Array, K: Array, low: int, high: int, applied: Array) -> Array:
+        fresh, _ = self._kernels.constrained_stages(
+            self.compiled.tables, y, h, A, K, low, high, self.slots, self.driven(t), applied, self.out
         )
         self._look()
-        return np.asarray(found)
+        return np.asarray(fresh)
 
     @property
-    def stages(self) -> Callable[..., Array] | None:
+    def stages(self) -> Stages | None:
         """A compiled Runge-Kutta step, if neither loads nor motions are given as functions."""
         if self.compiled.applied or self.compiled.laws:
             return None
-
-        def run(y: Array, h: float, A: Array, B: Array, K: Array) -> Array:
-            fresh = self._kernels.constrained_stages(
-                self.compiled.tables, y, h, A, B, K, self.slots, self._fixed, self._none, self.out
-            )
-            self._look()
-            return np.asarray(fresh)
-
-        return run
+        return lambda y, h, A, K: self._run(0.0, y, h, A, K, 1, len(A), self._none)
 
     def _look(self) -> None:
         """Note what the kernel found wrong."""
@@ -144,8 +145,12 @@ class ConstrainedForm:
         self.loss += loss
         self._history.append((t, self.pivot))
         fresh = np.concatenate([q, v, y[2 * n :]])
-        self._last = (t, fresh)
+        self._note(t, fresh)
         return fresh
+
+    def _note(self, t: float, y: Array) -> None:
+        """Keep a state on the constraints."""
+        self._nodes = [*self._nodes[1 - _NODES :], (t, y)]
 
     def state(self, t: float, y: Array) -> tuple[Array, Array]:
         """Coordinates and velocities of a state between steps, on the constraints."""
@@ -161,67 +166,106 @@ class ConstrainedForm:
         return float(pivot), q
 
     def proposed_step(self, t: float, step: float) -> float:
-        """Short equal steps before a singular pose ahead, as nodes of the leap over it; else the step itself."""
-        self._note(t)
-        if self._short > 0.0:
-            return min(step, self._short)
-        ahead = self._ahead(t)
-        if ahead is None or ahead > 1.5 * step or t <= self._blocked:
+        """Look for a singular pose within the next step, which no step may end next to; see `leap`."""
+        self._due = 0.0
+        if not self._history and self.project:
+            return self._away_from_start(t, step)
+        if t <= self._blocked:
+            return min(step, 1.01 * (self._blocked - t))
+        if len(self._nodes) < 2 or self._nodes[-1][0] != t or self.pivot > _AHEAD * self._largest:
             return step
-        if self._history[-1][1] > _CLOSE * self._largest:
-            return min(step, 0.25 * ahead)  # nearer first, where the extrapolation can be trusted
-        self._short, self._nodes = ahead / (_NODES + 2), []
-        self._note(t)
-        return self._short
+        guess = self._guess()
+        times = t + step * _SAMPLES
+        pivots = [self.pivot_at(at, guess(at))[0] for at in times]
+        k = int(np.argmin(pivots))
+        if k == len(times) - 1 or not pivots[k] < 0.5 * self.pivot:
+            return step
+        from scipy.optimize import minimize_scalar
 
-    def _ahead(self, t: float) -> float | None:
-        """Time until the smallest pivot vanishes, by linear extrapolation; None if it does not fall."""
-        if len(self._history) < 2:
-            return None
-        (t0, p0), (t1, p1) = self._history[-2:]
-        if t1 != t or not p1 < p0 or p1 > _AHEAD * self._largest:
-            return None
-        return p1 * (t1 - t0) / (p0 - p1)
+        low = t if k == 0 else times[k - 1]
+        found = minimize_scalar(
+            lambda at: self.pivot_at(at, guess(at))[0], bounds=(low, times[k + 1]), method="bounded",
+            options={"xatol": 1e-3 * step},
+        )  # fmt: skip
+        if found.fun < _SINGULAR * self._largest:
+            self._due = float(found.x) - t
+        return step
 
-    def _note(self, t: float) -> None:
-        """Keep the state at t as a node of the leap."""
-        if self._short > 0.0 and self._last is not None and self._last[0] == t:
-            self._nodes.append(self._last)
+    def _away_from_start(self, t: float, step: float) -> float:
+        """Prepare a step away from a start at a singular pose, along its velocity."""
+        y = self._begin
+        self.pivot = self.pivot_at(t, y)[0]
+        self._history, self._largest = [(t, self.pivot)], self.pivot
+        self._note(t, y)
+        speed = float(np.abs(y[self.compiled.n : 2 * self.compiled.n] / self._unit).max())
+        if self._from_singular and speed > 0.0:
+            self._due = _AWAY / speed
+        return step
 
-    def leap(self, trail: Trail, bound: float) -> tuple[float, Array, HermiteLeap] | None:
+    def leap(self, trail: Trail, bound: float) -> tuple[float, Array, GaussStep] | None:
         """Time and state beyond a singular pose, and the polynomial that leads there; None if no leap is due."""
-        if len(self._nodes) <= _NODES:
+        ahead, t = self._due, trail.time
+        if not ahead > 0.0:
             return None
-        t, short = self._nodes[-1][0], self._short
-        ahead = self._ahead(t)
-        if ahead is not None and ahead > short and len(self._nodes) < 3 * _NODES:
-            return None  # nearer first
-        nodes, self._short, self._nodes = self._nodes[-_NODES - 1 :], 0.0, []
-        self._blocked = t + 3.0 * (ahead or 0.0)
-        if ahead is None:
+        self._due, starts = 0.0, len(self._nodes) == 1
+        guess = self._guess()
+        for length in _LENGTHS:
+            h = min(0.5 * length * ahead if starts else length * ahead, bound - t)
+            found = self._across(t, h, guess) if h > (0.1 if starts else 1.2) * ahead else None
+            if found is not None:
+                landing, fresh, pivot, path = found
+                event = None if starts else passed_singular_pose(self, t, t + ahead, landing, path, path, self._largest)
+                if event is not None:
+                    trail.events.append(event)
+                self._history, self._dense, self.pivot = [(landing, pivot)], None, pivot
+                self._largest = max(self._largest, pivot)
+                self._note(landing, fresh)
+                return landing, fresh, path
+        # nearer first; next to the pose the ordinary steps must do
+        self._blocked = t + (0.5 if self.pivot > 0.1 * self._largest else 3.0) * ahead
+        return None
+
+    def _guess(self) -> Callable[[float], Array]:
+        """Polynomial through the last states; along the velocity where there is only one."""
+        (t, y), n = self._nodes[-1], self.compiled.n
+        if len(self._nodes) == 1:
+            return lambda at: np.concatenate([y[:n] + (at - t) * y[n : 2 * n], y[n:]])
+        times, states = zip(*self._nodes)
+        return HermiteLeap(list(times), list(states), [self.rates(at, state) for at, state in zip(times, states)])
+
+    def _across(
+        self, t: float, h: float, guess: Callable[[float], Array]
+    ) -> tuple[float, Array, float, GaussStep] | None:
+        """One step of length h over a singular pose; None if it does not land where it should."""
+        y, n = self._nodes[-1][1], self.compiled.n
+
+        def evaluate(at: float, q: Array, v: Array) -> tuple[Array, float]:
+            q, v, _, pivot = self._kernels.project_state(self.compiled.tables, q, v, self.slots, self.driven(at))
+            found = self.rates(at, np.concatenate([q, v, y[2 * n :]]))
+            return found[n : 2 * n] if pivot > _REGULAR else np.full(n, np.nan), float(found[2 * n])
+
+        path = gauss_step(evaluate, t, y, h, guess, self._unit)
+        if path is None:
             return None
-        landing = t + ahead + max(ahead, 0.8 * short)
-        if landing >= bound:
-            return None
-        path = HermiteLeap([node[0] for node in nodes], [node[1] for node in nodes],
-                           [self.rates(node[0], node[1]) for node in nodes])  # fmt: skip
-        y = path(landing)
-        n, unit = self.compiled.n, np.tile([self.compiled.tables.size] * 2 + [1.0], self.compiled.n // 3)
+        raw = path(t + h)
         q, v, loss, pivot = self._kernels.project_state(
-            self.compiled.tables, *self._halves(y), self.slots, self.driven(landing)
+            self.compiled.tables, *self._halves(raw), self.slots, self.driven(t + h)
         )
-        speed = float(np.abs(v / unit).max())
-        missed = max(float(np.abs((q - y[:n]) / unit).max()), float(np.abs((v - y[n : 2 * n]) / unit).max()) / speed)
-        if not missed < _LANDED:
+        fresh = np.concatenate([q, v, raw[2 * n :]])
+        speed = float(np.abs(v / self._unit).max())
+        missed = max(float(np.abs((q - raw[:n]) / self._unit).max()),
+                     float(np.abs((v - raw[n : 2 * n]) / self._unit).max()) / speed)  # fmt: skip
+        kept = abs(self._energy(t + h, fresh) - self._energy(t, y) - float(raw[2 * n] - y[2 * n]))
+        if not missed < _LANDED or not kept <= _KEPT * float(v @ self.compiled.tables.mass @ v):
             return None
         self.loss += loss
-        event = passed_singular_pose(self, t, t + ahead, landing, path, path, self._largest)
-        if event is not None:
-            trail.events.append(event)
-        self._history, self._dense, self.pivot = [(landing, float(pivot))], None, float(pivot)
-        fresh = np.concatenate([q, v, y[2 * n :]])
-        self._last = (landing, fresh)
-        return landing, fresh, path
+        return t + h, fresh, float(pivot), path
+
+    def _energy(self, t: float, y: Array) -> float:
+        q, v = self._halves(y)
+        T = self.compiled.tables
+        _, _, potential, _, _ = self._kernels.load_vector(T, self._kernels.state_rows(T, q, v), self._none)
+        return 0.5 * float(v @ T.mass @ v) + float(potential)
 
     def watch(self, trail: Trail, before: float, solver: Any) -> None:
         """Find singular poses passed: minima of the smallest pivot."""

@@ -39,10 +39,9 @@ def balance_at(compiled: Compiled, t: float, q: Array, v: Array, slots: Array, o
     T = compiled.tables
     driven = compiled.driven(t)
     x = kernels.state_rows(T, q, v)
-    Qc, Qn, V, P, _ = kernels.load_vector(T, x)
-    C, J, gam, vel = kernels.constraint_system(T, x, slots, driven)
     applied = applied_loads(compiled, t, q, v)
-    Q = Qc + Qn + applied
+    Q, Qc, V, P, _ = kernels.load_vector(T, x, applied)
+    C, J, gam, vel = kernels.constraint_system(T, x, slots, driven)
     out = np.zeros(7)
     if T.lower.size:
         a, lam = kernels.accelerate(T, x, J, gam, Q, out)
@@ -53,8 +52,8 @@ def balance_at(compiled: Compiled, t: float, q: Array, v: Array, slots: Array, o
     rubbing = np.zeros_like(Q)
     rubbed = kernels.friction_loads(T, x, J, lam, rubbing) if T.friction.size else 0.0
     inertial = T.mass @ a
-    drivers = -float(lam @ (J @ v))
-    power = float(P + rubbed + applied @ v + drivers)
+    drivers = -float(lam @ vel)
+    power = float(P + rubbed + drivers)
     rate = float(v @ (inertial - Qc))
     residual = inertial + J.T @ lam - Q - rubbing
     forces = max(float(np.abs(Q).max(initial=0.0)), float(np.abs(inertial).max(initial=0.0)),
@@ -73,7 +72,7 @@ def energy_error(times: Array, kinetic: Array, potential: Array, work: Array, po
     """Largest ``|E - E(0) - W|`` over the energies in play.
 
     The scale is the largest of the ranges of kinetic (of all, and of every body), potential and total energy and of
-    the power's integral, and at least a thousandth of the kinetic energy: for a conservative motion the range of
+    the power's integral, and at least a tenth of the kinetic energy: for a conservative motion the range of
     the total energy alone is the error itself.
     """
     good = np.isfinite(kinetic)
@@ -85,7 +84,7 @@ def energy_error(times: Array, kinetic: Array, potential: Array, work: Array, po
         float(np.sum(0.5 * np.diff(t) * (np.abs(power[good][1:]) + np.abs(power[good][:-1])))) if len(t) > 1 else 0.0
     )
     scale = max(float(np.ptp(part)) for part in (kinetic[good], potential[good], E))
-    scale = max(scale, spent, float(np.ptp(bodies[good], axis=0).max(initial=0.0)), 1e-3 * float(kinetic[good].max()))
+    scale = max(scale, spent, float(np.ptp(bodies[good], axis=0).max(initial=0.0)), 0.1 * float(kinetic[good].max()))
     return error / scale if scale > 0.0 else 0.0
 
 

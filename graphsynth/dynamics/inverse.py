@@ -127,8 +127,7 @@ def _multipliers(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> 
 
     T = compiled.tables
     x = kernels.state_rows(T, q, v)
-    Qc, Qn, _, _, _ = kernels.load_vector(T, x)
-    Q = Qc + Qn + applied_loads(compiled, t, q, v)
+    Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v))
     _, J, _, _ = kernels.constraint_system(T, x, initial_slots(compiled, q), np.zeros((max(1, len(compiled.laws)), 3)))
     unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
     inertial = T.mass @ a

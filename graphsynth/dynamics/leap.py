@@ -1,19 +1,91 @@
 """Passing a singular pose: the motion is smooth along its branch although the equations lose their digits there.
 
-Off the constraints the accelerations are singular at a change point, so the stages of a step cannot come near.  States
-on the constraints, accurate to rounding, are interpolated by the polynomial through their positions, velocities and
-accelerations (Hermite), and the polynomial leads over the pose.  The leap counts only if it lands on the constraints:
-where two branches nearly meet and do not cross, it does not.
+Off the constraints the accelerations are singular at a change point, so an explicit step cannot come near.  One step
+of Gauss' collocation method leads over the pose, which lies between its stages: every stage is a state on the
+constraints at a regular pose, and the pose itself, where the accelerations are not determined, is never asked.  A
+polynomial through past states (Hermite) gives the first guess, which also chooses the branch.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HermiteLeap"]
+__all__ = ["STAGES", "GaussStep", "HermiteLeap", "gauss_step"]
 
 Array = NDArray[np.float64]
+
+#: Stages of the step over a pose: an even number keeps the middle free.  The order is twice as high.
+STAGES = 8
+_ROUNDS = 40
+
+
+@cache
+def _tables() -> tuple[Array, Array, Array]:
+    """Nodes in (0, 1), Lagrange polynomials of the nodes (coefficients, ascending), integrals to every node."""
+    nodes = np.asarray(0.5 * (np.polynomial.legendre.leggauss(STAGES)[0] + 1.0), dtype=np.float64)
+    basis = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    powers = nodes[:, None] ** np.arange(1, STAGES + 1) / np.arange(1, STAGES + 1)
+    return nodes, np.asarray(basis), np.asarray(powers @ basis.T)
+
+
+class GaussStep:
+    """The collocation polynomial: accelerations (stages, n) and powers (stages,) over ``[t, t + h]`` from ``y``."""
+
+    def __init__(self, t: float, h: float, y: Array, a: Array, power: Array) -> None:
+        self._t, self._h, self._y = t, h, y
+        _, basis, _ = _tables()
+        self._a, self._power = basis.T @ a, basis.T @ power
+
+    def __call__(self, t: float) -> Array:
+        """State (q, v, work) at time t."""
+        n, x, h = self._a.shape[1], (t - self._t) / self._h, self._h
+        k = np.arange(1, STAGES + 1)
+        once, twice = x**k / k, x ** (k + 1) / (k * (k + 1))
+        q, v = self._y[:n], self._y[n : 2 * n]
+        return np.concatenate([
+            q + x * h * v + h * h * (twice @ self._a), v + h * (once @ self._a),
+            self._y[2 * n :] + h * (once @ self._power),
+        ])  # fmt: skip
+
+
+def gauss_step(
+    evaluate: Callable[[float, Array, Array], tuple[Array, float]], t: float, y: Array, h: float,
+    guess: Callable[[float], Array], unit: Array,
+) -> GaussStep | None:  # fmt: skip
+    """Solve the collocation equations by fixed-point iteration; None if it does not settle.
+
+    Parameters
+    ----------
+    evaluate : callable
+        ``(t, q, v)`` near the constraints to accelerations and power at the nearest state on them.
+    guess : callable
+        State at a time, on the branch wanted.
+    unit : ndarray
+        Units of the coordinates.
+    """
+    nodes, _, A = _tables()
+    n = len(unit)
+    q0, v0 = y[:n], y[n : 2 * n]
+    first = [guess(t + h * c) for c in nodes]
+    Q, V = np.array([s[:n] for s in first]), np.array([s[n : 2 * n] for s in first])
+    last = np.inf
+    for _ in range(_ROUNDS):
+        found = [evaluate(t + h * c, q, v) for c, q, v in zip(nodes, Q, V)]
+        a, power = np.array([part[0] for part in found]), np.array([part[1] for part in found])
+        if not np.isfinite(a).all():
+            return None
+        fresh = q0 + h * nodes[:, None] * v0 + h * h * (A @ (A @ a))
+        V = v0 + h * (A @ a)
+        change = float(np.abs((fresh - Q) / unit).max())
+        Q = fresh
+        if change < 1e-14 or (change < 1e-10 and change > 0.5 * last):
+            return GaussStep(t, h, y, a, power)
+        last = change
+    return None
 
 
 class HermiteLeap:

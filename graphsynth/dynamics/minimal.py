@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.compiled_steps import ONE_STAGE, Stages
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
@@ -52,11 +52,16 @@ class EngineTables(NamedTuple):
     OV: Array
     OW: Array
     OM: Array
+    first: int
     Lc: float
+    derivs: bool
 
 
 class EngineState(NamedTuple):
-    """Two samples of the engine: where it starts, and what is asked for."""
+    """Two samples of the engine: where it starts, and what is asked for.
+
+    ``centres`` (3, n) are the coordinates of the centres of mass and their derivatives by the input.
+    """
 
     u: Array
     q: Array
@@ -68,6 +73,7 @@ class EngineState(NamedTuple):
     M: Array
     done: IntArray
     why: IntArray
+    centres: Array
 
 
 class EffectiveInertia(NamedTuple):
@@ -159,9 +165,10 @@ class MinimalForm:
         )
         self.tracker = Tracker(self.program, _modes(self.program, theta, start.poses))
         self.trace = self.tracker.blank(np.array([theta, theta]))
-        self.E, self.S = engine_tables(self.tracker), engine_buffers(self.trace)
+        self.E, self.S = engine_tables(self.tracker), engine_buffers(self.trace, compiled.n)
         self._seed(theta, start.poses)
         self._begin = np.array([theta, omega, 0.0])
+        self._none, self._out, self._one = np.zeros(compiled.n), np.zeros(4), np.empty((1, 3))
 
     def _seed(self, theta: float, poses: Array) -> None:
         """Start the engine at the start pose, in its sample 0."""
@@ -185,34 +192,41 @@ class MinimalForm:
         """Return the derivative of the state; NaN where the mechanism cannot be assembled."""
         if self.compiled.applied or self.compiled.tables.friction.size:
             return self._loaded_rates(t, y)
-        found, out = self._kernels.minimal_rates(
-            self.compiled.tables, self.E, self.S, self.compiled.centres, np.ascontiguousarray(y)
-        )
-        if not out[0] > 0.0 or out[3] == 0.0:
-            return self._failed(y, out)
+        self._run(y, 0.0, ONE_STAGE, self._one, 0, 1)
+        return self._one[0].copy() if self._good() else self._failed(y)
+
+    def _run(self, y: Array, h: float, A: Array, K: Array, low: int, high: int) -> Array:
+        found = self._kernels.minimal_stages(
+            self.compiled.tables, self.E, self.S, self.compiled.centres, self._none, np.ascontiguousarray(y), h, A, K,
+            low, high, self._out,
+        )  # fmt: skip
         return np.asarray(found)
 
+    def _good(self) -> bool:
+        """Whether the last rates had a value."""
+        return bool(self._out[0] > 0.0 and self._out[3] == 1.0)
+
     @property
-    def stages(self) -> Callable[..., Array] | None:
+    def stages(self) -> Stages | None:
         """A compiled Runge-Kutta step, if no load is given as a function and there is no friction."""
         if self.compiled.applied or self.compiled.tables.friction.size:
             return None
 
-        def run(y: Array, h: float, A: Array, B: Array, K: Array) -> Array:
-            T, centres = self.compiled.tables, self.compiled.centres
-            fresh = self._kernels.minimal_stages(T, self.E, self.S, centres, y, h, A, B, K)
+        def run(y: Array, h: float, A: Array, K: Array) -> Array:
+            fresh = self._run(y, h, A, K, 1, len(A))
             if not np.isfinite(K).all():
-                self.rates(0.0, np.asarray(fresh))  # says why
-            return np.asarray(fresh)
+                self.rates(0.0, fresh)  # says why
+            return fresh
 
         return run
 
-    def _failed(self, y: Array, out: Array) -> Array:
+    def _failed(self, y: Array) -> Array:
         """Say why; the integrator tries a shorter step, and gives up where none is short enough."""
         if self.S.done[0] == 2:
             self.why = (
-                "a spring has length 0, so its direction is not defined" if out[3] == 0.0
-                else f"the effective inertia is {out[0]:.3g} at the input {y[0]:.9g}: give a link on the way some mass"
+                "a spring has length 0, so its direction is not defined" if self._out[3] == 0.0
+                else f"the effective inertia is {self._out[0]:.3g} at the input {y[0]:.9g}: give a link on the way "
+                "some mass"
             )  # fmt: skip
         else:
             self.why = (
@@ -223,36 +237,37 @@ class MinimalForm:
 
     def transmission(self, theta: float) -> tuple[Array, Array, Array]:
         """Coordinates and their first and second derivatives by the input; NaN out of reach."""
-        q, q1, q2 = self._kernels.engine_state(self.compiled.tables, self.E, self.S, self.compiled.centres, theta)
+        self._run(np.array([theta, 0.0, 0.0]), 0.0, ONE_STAGE, self._one, 0, 1)
         if self.S.done[0] < 2:
-            return (np.full_like(q, np.nan),) * 3
+            return (np.full(self.compiled.n, np.nan),) * 3
+        q, q1, q2 = self.S.centres.copy()
         return q, q1, q2
 
     def _loaded_rates(self, t: float, y: Array) -> Array:
         """Rates with loads given as functions, or with friction."""
         q, q1, q2 = self.transmission(float(y[0]))
         if not np.isfinite(q).all():
-            return self._failed(y, np.zeros(4))
-        w = float(y[1])
+            return self._failed(y)
+        w, T = float(y[1]), self.compiled.tables
         v = q1 * w
-        T = self.compiled.tables
-        applied = applied_loads(self.compiled, t, q, v)
         x = self._kernels.state_rows(T, q, v)
-        Qc, Qn, _, P, _ = self._kernels.load_vector(T, x)
+        Q, _, _, P, good = self._kernels.load_vector(T, x, applied_loads(self.compiled, t, q, v))
         Mq = T.mass @ q1
         inertia = float(Mq @ q1)
-        P += float(applied @ v)
-        if not T.friction.size:
-            return np.array([w, ((Qc + Qn + applied) @ q1 - Mq @ q2 * w * w) / inertia, P])
-        slots = np.zeros(max(1, int(T.slots.max(initial=-1)) + 1))
-        _, J, gam, _ = self._kernels.constraint_system(T, x, slots, np.zeros((1, 3)))
-        out = np.zeros(7)
-        a, _ = self._kernels.accelerate(T, x, J, gam, Qc + Qn + applied, out)
-        self.contraction = max(self.contraction, float(out[3]))
-        if out[3] >= 1.0:
-            self.why = "the friction iteration does not contract: there may be no solution or several"
-            return np.full(3, np.nan)
-        return np.array([w, float(Mq @ (a - q2 * w * w)) / inertia, P + out[2]])
+        self._out[0], self._out[3] = inertia, float(good)
+        if T.friction.size:
+            slots = np.zeros(max(1, int(T.slots.max(initial=-1)) + 1))
+            _, J, gam, _ = self._kernels.constraint_system(T, x, slots, np.zeros((1, 3)))
+            out = np.zeros(7)
+            _, lam = self._kernels.accelerate(T, x, J, gam, Q, out)
+            self.contraction = max(self.contraction, float(out[3]))
+            if out[3] >= 1.0:
+                self.why = "the friction iteration does not contract: there may be no solution or several"
+                return np.full(3, np.nan)
+            P += self._kernels.friction_loads(T, x, J, lam, Q)
+        if not self._good():
+            return self._failed(y)
+        return np.array([w, float(Q @ q1 - Mq @ q2 * w * w) / inertia, P])
 
     def refuses(self, t: float, y: Array) -> bool:
         """Whether two assembly modes met within the step: the sign of a mode says nothing of how it goes on there.
@@ -317,14 +332,15 @@ def engine_tables(tracker: Tracker) -> EngineTables:
     return EngineTables(
         p.step_table, p.touched, p.rows, p.row_table, p.core, p.eliminated, p.eliminated_table, p.drives,
         p.drive_table, p.need_angle, np.ones(p.mechanism.graph.links, dtype=np.bool_), tracker.modes, empty3, none,
-        none, empty4, empty4, empty4, empty3, p.Lc,
+        none, empty4, empty4, empty4, empty3, 1, p.Lc, True,
     )  # fmt: skip
 
 
-def engine_buffers(trace: Trace) -> EngineState:
-    """Pack a two-sample trace for the kernel; it shares the trace's memory."""
+def engine_buffers(trace: Trace, n: int) -> EngineState:
+    """Pack a two-sample trace for the kernel; it shares the trace's memory.  ``n`` is the number of coordinates."""
     X, TH, V, W, PHI, M = trace.memory
-    return EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, np.zeros(1, np.int64), np.zeros((1, 2), np.int64))
+    done, why = np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
+    return EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, done, why, np.zeros((3, n)))
 
 
 def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object) -> EffectiveInertia:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,25 +21,20 @@ Array = NDArray[np.float64]
 
 #: Smallest pivot over the largest seen: below the first a pose counts as singular, below the second as nearly so.
 _SINGULAR, _NEARLY = 1e-5, 1e-2
+#: Rounds of sampling; each is ten times finer.
+_ZOOMS = 7
 
 
 def passed_singular_pose(
     form: ConstrainedForm, start: float, middle: float, end: float, first: Any, second: Any, largest: float
 ) -> DynamicEvent | None:
     """Locate the minimum of the smallest pivot over two steps with interpolants ``first`` and ``second``."""
-    from scipy.optimize import minimize_scalar
-
     def pivot(t: float) -> float:
         return form.pivot_at(t, np.asarray((first if t <= middle else second)(t)))[0]
 
     width = end - start
-    coarse = np.linspace(start, end, 41)
-    best = int(np.argmin([pivot(float(t)) for t in coarse]))
-    low, high = float(coarse[max(best - 1, 0)]), float(coarse[min(best + 1, 40)])
-    found = minimize_scalar(
-        pivot, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * max(abs(end), width)}
-    )
-    t, least = float(found.x), float(found.fun) / largest
+    t, least = _lowest(pivot, start, end)
+    least /= largest
     if least > _NEARLY:
         return None
     y = np.asarray((first if t <= middle else second)(t))
@@ -49,6 +45,18 @@ def passed_singular_pose(
         return DynamicEvent("nearly singular pose", t, 1e-9 * width, text)
     text = f"singular pose passed at t = {t:.9g} s"
     return DynamicEvent("singular pose", t, 1e-7 * width, text + _branches(form, t, q, y[n : 2 * n]))
+
+
+def _lowest(pivot: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
+    """Return the minimum of a function with a sharp bend there, kinks elsewhere: by ever finer samples."""
+    t, least, step = low, np.inf, (high - low) / 40.0
+    for _ in range(_ZOOMS):
+        for at in np.arange(low, high + 0.5 * step, step):
+            value = pivot(float(at))
+            if value < least:
+                t, least = float(at), value
+        low, high, step = max(t - step, low), min(t + step, high), 0.1 * step
+    return t, least
 
 
 def _branches(form: ConstrainedForm, t: float, q: Array, v: Array) -> str:

@@ -51,8 +51,6 @@ def second_accelerations(
 
 def _null_space(compiled: Compiled, t: float, q: Array, v: Array) -> Array | None:
     """Solve ``(N^T M N) y = N^T (Q - M a0)`` with N an orthonormal basis of the null space; None at a singular pose."""
-    from graphsynth.dynamics import kernels
-
     values = Values(compiled, t, initial_slots(compiled, q))
     T = compiled.tables
     _, J, gam, _ = values.system(q, v)
@@ -63,8 +61,7 @@ def _null_space(compiled: Compiled, t: float, q: Array, v: Array) -> Array | Non
         return None
     a0 = scale * (Vt[:rank].T @ ((U.T @ (gam / unit))[:rank] / S[:rank]))
     N = scale[:, None] * Vt[rank:].T
-    Qc, Qn, _, _, _ = kernels.load_vector(T, kernels.state_rows(T, q, v))
-    Q = Qc + Qn + applied_loads(compiled, t, q, v)
+    Q = _loads(compiled, t, q, v)
     return np.asarray(a0 + N @ np.linalg.solve(N.T @ T.mass @ N, N.T @ (Q - T.mass @ a0)))
 
 
@@ -111,8 +108,8 @@ def _loads(compiled: Compiled, t: float, q: Array, v: Array) -> Array:
 
     T = compiled.tables
     x = kernels.state_rows(T, q, v)
-    Qc, Qn, _, _, _ = kernels.load_vector(T, x)
-    return np.asarray(Qc + Qn + applied_loads(compiled, t, q, v))
+    Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v))
+    return np.asarray(Q)
 
 
 def _units(compiled: Compiled, joint: object, place: Array) -> tuple[int, int, list[tuple[complex, float, complex]]]:

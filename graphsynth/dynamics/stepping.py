@@ -125,7 +125,7 @@ class _Stepper:
                 while k < len(grid) and grid[k] <= trail.time:
                     output(k, float(grid[k]), path(float(grid[k])))
                     k += 1
-                step, solver = trail.last_step, None
+                step, solver = trail.last_step or None, None
                 continue
             message = solver.step()
             trail.steps += 1

@@ -133,7 +133,15 @@ class Values:
         if not T.lower.size:
             return np.full(len(q), np.nan), np.full(m, np.nan), "; accelerations of massless links: minimal form only"
         out = np.zeros(7)
-        y = np.concatenate([q, v, [0.0]])
-        rates, lam = kernels.constrained_rates(T, y, self.slots, self.driven, applied, out)
+        x = kernels.state_rows(T, q, v)
+        Q, _, _, _, good = kernels.load_vector(T, x, applied)
+        _, J, gam, _ = kernels.constraint_system(T, x, self.slots, self.driven)
+        a, lam = kernels.accelerate(T, x, J, gam, Q, out)
         text = "; the friction iteration does not contract: no or several solutions" if out[3] >= 1.0 else ""
-        return rates[len(q) : 2 * len(q)].copy(), lam, text
+        if not good:
+            return (
+                np.full(len(q), np.nan),
+                np.full(m, np.nan),
+                "; a spring has length 0, so its direction is not defined",
+            )
+        return a, lam, text

@@ -14,6 +14,7 @@ from graphsynth.dynamics import (
     Torque,
     TorqueSource,
     consistent_start,
+    effective_inertia,
     simulate_dynamics,
 )
 from graphsynth.errors import GeometryError
@@ -55,16 +56,70 @@ def test_case_19_sensitivity_to_the_start():
     assert np.abs(ends[0] - ends[1]).max() < 1e-6
 
 
-def test_start_at_a_change_point_is_a_failure_with_a_reason():
-    """Accelerations are not determined there by the equations: said quickly, not after a million steps."""
+def flat_start():
+    """Four-bar of spec 4.8 in its flat pose: two branches cross, the velocity chooses one."""
     bodies = {1: bar(1.0, 0.02), 2: bar(1.0, 0.05), 3: bar(1.0, 0.03)}
     model = DynamicModel(four_bar(0.02, 0.05, 0.03, 0.06), bodies, gravity=(0.0, 0.0))
     pose = [(0.0, 0.0, 0.0), (0.0, 0.0, np.pi), (-0.02, 0.0, 0.0), (0.06, 0.0, np.pi)]
-    first = consistent_start(model, pose=pose)
-    moving = consistent_start(model, pose=pose, rates=5.0 * first.tangents.motions[0])
-    motion = simulate_dynamics(model, np.linspace(0.0, 0.05, 6), start=moving)
+    return model, pose, consistent_start(model, pose=pose).tangents.motions
+
+
+@pytest.mark.parametrize("branch", [0, 1])
+@pytest.mark.parametrize("speed", [5.0, -5.0])
+def test_start_at_a_change_point_follows_the_branch_of_its_velocity(branch, speed):
+    """Time against the quadrature of the effective inertia along the branch (no forces in the plane)."""
+    model, pose, motions = flat_start()
+    start = consistent_start(model, pose=pose, rates=speed * motions[branch])
+    motion = simulate_dynamics(model, np.linspace(0.0, 0.05, 6), start=start)
+    assert motion.form == "constrained" and motion.completed and motion.checks.energy < 1e-10
+    theta, kinetic = motion.poses[:, 1, 2], motion.kinetic[0]
+    assert np.abs(motion.kinetic / kinetic - 1.0).max() < 1e-11
+    middle = 0.5 * (theta[0] + theta[2])
+    x, weights = np.polynomial.legendre.leggauss(24)
+    nodes = middle + 0.5 * (theta[2] - theta[0]) * x
+    order = np.argsort(nodes)
+    times = []
+    for mode in (1, -1):
+        inertia = np.empty(24)
+        inertia[order] = effective_inertia(model, nodes[order], modes={0: mode}).inertia
+        times.append(0.5 * abs(theta[2] - theta[0]) * float(weights @ np.sqrt(inertia / (2.0 * kinetic))))
+    assert min(abs(t - motion.times[2]) for t in times) < 1e-11
+    assert max(abs(t - motion.times[2]) for t in times) > 1e-3  # the other branch is another motion
+
+
+def test_start_at_rest_at_a_change_point_is_a_failure_with_a_reason():
+    """With a load and no velocity nothing tells which branch: said quickly, not after a million steps."""
+    model, pose, _ = flat_start()
+    model = DynamicModel(model.mechanism, model.bodies, [Torque(0, 1, 0.1)], (0.0, 0.0))
+    motion = simulate_dynamics(model, np.linspace(0.0, 0.05, 6), start=consistent_start(model, pose=pose))
     assert motion.form == "constrained" and motion.status == "failed"
-    assert "branches meet" in motion.message and motion.steps < 2000 and np.isnan(motion.poses[-1]).all()
+    assert motion.steps < 2000 and np.isnan(motion.poses[-1]).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_parallelograms_pass_their_flat_poses(seed):
+    """Masses, inertias and speeds at random, with and without gravity: the coupler never turns, energy is kept."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(0.1, 0.4), rng.uniform(0.3, 0.8)
+    bodies = {
+        k: Body(m, m * length**2 / 12.0 * rng.uniform(0.3, 2.0), (length * rng.uniform(0.2, 0.8), 0.0))
+        for k, length, m in zip((1, 2, 3), (a, b, a), rng.uniform(0.2, 3.0, 3))
+    }
+    fast = seed % 2 == 0
+    theta, speed = (
+        rng.uniform(0.3, 2.8),
+        rng.choice([-1.0, 1.0]) * rng.uniform(*((20.0, 40.0) if fast else (1.0, 20.0))),
+    )
+    model = DynamicModel(four_bar(a, b, a, b), bodies, gravity=(0.0, -9.81 if fast else 0.0))
+    pose = [(0, 0, 0), (0, 0, theta), (a * math.cos(theta), a * math.sin(theta), 0), (b, 0, theta)]
+    along = (-a * speed * math.sin(theta), a * speed * math.cos(theta), 0)
+    start = consistent_start(model, pose=pose, rates=[(0, 0, 0), (0, 0, speed), along, (0, 0, speed)])
+    motion = simulate_dynamics(model, np.linspace(0.0, 6.0 / abs(speed), 21), start=start, form="constrained")
+    assert motion.completed and motion.steps < 100 and motion.warnings == ()
+    assert np.abs(motion.poses[:, 2, 2]).max() < 1e-9
+    passed = sum(event.kind == "singular pose" for event in motion.events)
+    low, high = sorted((theta, float(motion.poses[-1, 1, 2])))
+    assert passed == math.floor(high / math.pi) - math.floor(low / math.pi) >= 1
 
 
 def test_fold_of_the_input_is_left_by_the_constrained_form():

@@ -43,14 +43,11 @@ def start_of(name):
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_tables_to_the_printed_digits(name, form):
     make, _, table = PROBLEMS[name]
-    rows = table if form != "reduced" else table[:1]  # the reduced form is not compiled
-    rtol = 2.3e-14 if form != "reduced" else 1e-11
-    motion = simulate_dynamics(
-        make(), [0.0, *(row[0] for row in rows)], start=start_of(name), form=form, rtol=rtol, outputs="exact"
-    )
+    times = [0.0, *(row[0] for row in table)]
+    motion = simulate_dynamics(make(), times, start=start_of(name), form=form, rtol=2.3e-14, outputs="exact")
     assert motion.completed and motion.warnings == ()
-    allowed = 2e-11 if form != "reduced" else 2e-9
-    for k, (_, theta, omega, work) in enumerate(rows, 1):
+    allowed = 2e-11
+    for k, (_, theta, omega, work) in enumerate(table, 1):
         assert abs(motion.poses[k, 1, 2] - theta) < allowed
         assert abs(motion.velocities[k, 1, 2] - omega) < 10.0 * allowed
         assert abs(motion.work[k] - work) < allowed
@@ -94,7 +91,7 @@ def test_reactions_at_the_start(name, forces):
         assert np.abs(found.on(a)[0][0] + force).max() < 3e-13
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained"])
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_checks_at_the_default_tolerance(name, form):
     times = np.linspace(0.0, PROBLEMS[name][2][-1][0], 41)
@@ -135,7 +132,7 @@ SEVEN = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained"])
+@pytest.mark.parametrize("form", FORMS)
 def test_seven_body_mechanism(form):
     model = seven_body()
     start = consistent_start(model, pose=seven_pose())

@@ -1,8 +1,6 @@
-"""The minimal form through the planar engine: rates and stages of a step."""
+"""The minimal form through the planar engine: rates at the stages of a step."""
 
 import math
-
-import numpy as np
 
 from graphsynth.compilation import kernel
 from graphsynth.dynamics.kernels.combining import combined
@@ -11,17 +9,9 @@ from graphsynth.kinematics.engine.kernels.running import run
 
 
 @kernel
-def engine_state(T, E, S, centres, theta):
-    """Coordinates and their derivatives by the input, from the planar engine started at its sample 0."""
-    n = T.mass.shape[0]
-    q, q1, q2 = np.empty(n), np.empty(n), np.empty(n)
-    S.u[1] = theta
-    S.q[0, 0, 1], S.q[0, 1, 1], S.q[0, 2, 1] = theta, 1.0, 0.0
-    S.q[0, 3, 1], S.q[0, 4, 1] = math.cos(theta), math.sin(theta)
-    S.done[0] = 0
-    run(E.steps, E.touched, E.rows, E.RP, E.core, E.elim, E.EP, E.drv, E.DP, E.need, E.wanted, S.q, S.u, E.modes,
-        E.poses, S.X, S.TH, S.V, S.W, S.PHI, S.M, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM, S.done, S.why,
-        1, E.Lc, True)  # fmt: skip
+def centre_motion(T, E, S, centres, theta):
+    """Coordinates and their derivatives by the input into S.centres, from the engine's frames at its sample 1."""
+    q, q1, q2 = S.centres[0], S.centres[1], S.centres[2]
     for link in range(T.column.shape[0]):
         k = T.column[link]
         if k < 0:
@@ -41,36 +31,45 @@ def engine_state(T, E, S, centres, theta):
         q2[k] = S.W[link, 0, 1] - e * uy - w * w * ux
         q2[k + 1] = S.W[link, 1, 1] + e * ux - w * w * uy
         q2[k + 2] = e
-    return q, q1, q2
 
 
 @kernel
-def minimal_rates(T, E, S, centres, y):
-    """Rates of (theta, omega, work) without loads given as functions; NaN where the engine does not reach.
+def minimal_stages(T, E, S, centres, applied, y, h, A, K, low, high, out):
+    """Rates of (theta, omega, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state.
 
-    Also effective inertia, half its derivative, potential energy and whether all springs have a length.
+    Without loads given as functions; NaN where the engine, started at its sample 0, does not reach.  ``out``: effective
+    inertia, half its derivative, potential energy, whether all springs have a length.  What the engine finds stays in
+    S.
     """
-    q, q1, q2 = engine_state(T, E, S, centres, y[0])
-    rates, out = np.empty(3), np.zeros(4)
-    if S.done[0] < 2:
-        rates[:] = math.nan
-        return rates, out
-    w = y[1]
-    x = state_rows(T, q, q1 * w)
-    Qc, Qn, V, P, good = load_vector(T, x)
-    Mq = T.mass @ q1
-    inertia, half = Mq @ q1, Mq @ q2
-    rates[0], rates[1], rates[2] = w, ((Qc + Qn) @ q1 - half * w * w) / inertia, P
-    out[0], out[1], out[2], out[3] = inertia, half, V, 1.0 if good else 0.0
-    return rates, out
-
-
-@kernel
-def minimal_stages(T, E, S, centres, y, h, A, B, K):
-    """Stages of an explicit Runge-Kutta step, K[0] given; K[-1] are the rates at the new state, returned."""
-    count = B.shape[0]
-    for s in range(1, count):
-        K[s] = minimal_rates(T, E, S, centres, combined(y, h, K, A[s], s))[0]
-    fresh = combined(y, h, K, B, count)
-    K[count] = minimal_rates(T, E, S, centres, fresh)[0]
-    return fresh
+    n = T.mass.shape[0]
+    q, q1, q2 = S.centres[0], S.centres[1], S.centres[2]
+    state, v = y, y
+    for s in range(low, high):
+        state = combined(y, h, K, A[s], s)
+        theta, w = state[0], state[1]
+        S.u[1] = theta
+        S.q[0, 0, 1], S.q[0, 1, 1], S.q[0, 2, 1] = theta, 1.0, 0.0
+        S.q[0, 3, 1], S.q[0, 4, 1] = math.cos(theta), math.sin(theta)
+        S.done[0] = 0
+        # E.first and E.derivs are data: literal numbers would make a second copy of the whole engine
+        run(E.steps, E.touched, E.rows, E.RP, E.core, E.elim, E.EP, E.drv, E.DP, E.need, E.wanted, S.q, S.u, E.modes,
+            E.poses, S.X, S.TH, S.V, S.W, S.PHI, S.M, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM, S.done, S.why,
+            E.first, E.Lc, E.derivs)  # fmt: skip
+        K[s, 0] = K[s, 1] = K[s, 2] = math.nan
+        if S.done[0] < 2:
+            out[0] = 0.0
+            continue
+        centre_motion(T, E, S, centres, theta)
+        v = q1.copy()
+        for i in range(n):
+            v[i] *= w
+        Q, _, V, P, good = load_vector(T, state_rows(T, q, v), applied)
+        inertia, half, load = 0.0, 0.0, 0.0
+        for i in range(n):
+            load += Q[i] * q1[i]
+            for j in range(n):
+                inertia += T.mass[i, j] * q1[i] * q1[j]
+                half += T.mass[i, j] * q1[i] * q2[j]
+        K[s, 0], K[s, 1], K[s, 2] = w, (load - half * w * w) / inertia, P
+        out[0], out[1], out[2], out[3] = inertia, half, V, 1.0 if good else 0.0
+    return state

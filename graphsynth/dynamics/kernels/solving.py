@@ -133,10 +133,23 @@ def least_multipliers(B, R, order, size, rank, z):
             else:
                 S[s, c] = value / R[s]
     found = np.zeros(m)
-    tail = np.zeros(extra)
-    if extra > 0:
-        tail = np.linalg.solve(np.eye(extra) + S.T @ S, S.T @ w)
-        w = w - S @ tail
+    # (I + S^T S) tail = S^T w by Cholesky factors: the matrix is never less than the identity
+    G, tail = np.zeros((extra, extra)), np.zeros(extra)
+    for i in range(extra):
+        for j in range(i + 1):
+            value = 1.0 if i == j else 0.0
+            for s in range(rank):
+                value += S[s, i] * S[s, j]
+            for k in range(j):
+                value -= G[i, k] * G[j, k]
+            G[i, j] = math.sqrt(value) if i == j else value / G[j, j]
+        for s in range(rank):
+            tail[i] += S[s, i] * w[s]
+    forth_lower(G, extra == 0, tail)
+    back_lower(G, extra == 0, tail)
+    for s in range(rank):
+        for c in range(extra):
+            w[s] -= S[s, c] * tail[c]
     for s in range(rank):
         found[order[s]] = w[s] / size[order[s]]
     for c in range(extra):
@@ -146,10 +159,10 @@ def least_multipliers(B, R, order, size, rank, z):
 
 @kernel
 def solve_rows(L, diagonal, J, d):
-    """Smallest step in the metric of the mass matrix with ``J x = d``; rank and smallest pivot."""
+    """Smallest step in the metric of the mass matrix with ``J x = d``; smallest pivot."""
     B, R, order, size, rank = factor_rows(L, diagonal, J)
     y, _ = least_step(L, diagonal, B, R, order, size, rank, d)
-    return y, rank, abs(R[rank - 1]) if rank > 0 else 1.0
+    return y, abs(R[rank - 1]) if rank > 0 else 1.0
 
 
 @kernel
@@ -195,18 +208,21 @@ def accelerate(T, x, J, gam, Q, out):
     B, R, order, size, rank = factor_rows(T.lower, T.diagonal, J)
     out[0], out[1] = rank, abs(R[rank - 1]) if rank > 0 else 1.0
     out[2], out[3], out[4] = 0.0, 0.0, 0.0
-    a, lam, before = np.zeros(n), np.zeros(m), 0.0
+    a, lam, d, before = np.zeros(n), np.zeros(m), np.zeros(m), 0.0
     for step in range(ROUNDS):
-        total = Q.copy()
+        free = Q.copy()
         if T.friction.shape[0] > 0 and step > 0:
-            out[2] = friction_loads(T, x, J, lam, total)
-        free = total.copy()
+            out[2] = friction_loads(T, x, J, lam, free)
         forth_lower(T.lower, T.diagonal, free)
         back_lower(T.lower, T.diagonal, free)
-        d = gam - J @ free
+        for k in range(m):
+            d[k] = gam[k]
+            for i in range(n):
+                d[k] -= J[k, i] * free[i]
         y, z = least_step(T.lower, T.diagonal, B, R, order, size, rank, d)
         fresh = least_multipliers(B, R, order, size, rank, z)
-        a = free + y
+        for i in range(n):
+            a[i] = free[i] + y[i]
         change, scale = 0.0, 0.0
         for k in range(m):
             change = max(change, abs(fresh[k] - lam[k]))

@@ -85,11 +85,19 @@ def twist(T, Q, x, a, b, torque):
 
 
 @kernel
-def load_vector(T, x):
-    """Generalised forces: conservative Qc with potential V, others Qn with power P; False if a spring has length 0."""
+def load_vector(T, x, applied):
+    """Generalised forces with potential V and power P of the others; False if a spring has length 0.
+
+    All forces, those given as functions (``applied``, not conservative) among them, and the conservative ones.
+    """
     n = T.mass.shape[0]
-    Qc, Qn = np.zeros(n), np.zeros(n)
+    Qc, Qn = np.zeros(n), applied.copy()
     V, P, good = 0.0, 0.0, True
+    for link in range(T.column.shape[0]):
+        k = T.column[link]
+        if k >= 0:
+            for c in range(3):
+                P += applied[k + c] * x[link, 5 + c]
     for link in range(T.column.shape[0]):
         k = T.column[link]
         if k >= 0:
@@ -133,4 +141,6 @@ def load_vector(T, x):
         torque, eta = T.source_table[s, 0], T.source_table[s, 1]
         torque = torque * eta if torque * (x[b, 7] - x[a, 7]) >= 0.0 else torque / eta
         P += twist(T, Qn, x, a, b, torque)
-    return Qc, Qn, V, P, good
+    for i in range(n):
+        Qn[i] += Qc[i]
+    return Qn, Qc, V, P, good
