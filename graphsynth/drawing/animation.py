@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from hashlib import sha256
 from html import escape
 from importlib.resources import files
 from itertools import groupby
@@ -226,14 +227,17 @@ def animated_svg(
     stage = _Stage(shown, width, height, title)
     moving = sorted({shape.link for shape in stage.sketch.shapes} - {FIXED, shown.mechanism.frame})
     way = "normal" if shown.loops else "alternate"
-    rules = [f"[class^=k],[class^=r]{{animation:{number(seconds)}s linear infinite {way}}}"]
-    for link in moving:
-        track = stage.track(link)
+    tracks = {link: stage.track(link) for link in moving}
+    # styles count for the whole page: names of this picture's own keep several pictures on one page apart
+    mark = sha256(b"".join([repr((title, seconds)).encode(), *map(bytes, tracks.values())])).hexdigest()[:8]
+    every = f"[class^=k{mark}],[class^=r{mark}]"
+    rules = [f"{every}{{animation:{number(seconds)}s linear infinite {way}}}"]
+    for link, track in tracks.items():
         places = [f"translate({x:.1f}px,{y:.1f}px) rotate({a:.2f}deg)" for x, y, a in track]
-        rules.append(_key_frames(f"k{link}", places))
-        rules.append(_key_frames(f"r{link}", [f"rotate({-a:.2f}deg)" for a in track[:, 2]]))
-    rules.append("@media (prefers-reduced-motion:reduce){[class^=k],[class^=r]{animation:none}}")
-    body = stage.groups('class="k{}"', 'class="r{}"', FIXED)
+        rules.append(_key_frames(f"k{mark}-{link}", places))
+        rules.append(_key_frames(f"r{mark}-{link}", [f"rotate({-a:.2f}deg)" for a in track[:, 2]]))
+    rules.append(f"@media (prefers-reduced-motion:reduce){{{every}{{animation:none}}}}")
+    body = stage.groups(f'class="k{mark}-{{}}"', f'class="r{mark}-{{}}"', FIXED)
     lines = wrap(shown.note, max(20, int(stage.sketch.width / 6.6)))
     tall = stage.sketch.height + _LINE * len(lines) + (8.0 if lines else 0.0)
     body += [

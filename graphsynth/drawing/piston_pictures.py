@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "indicator_chart",
+    "piston_animated_svg",
     "piston_animation",
     "piston_motion_chart",
     "piston_sketch",
@@ -353,6 +354,13 @@ def piston_animation(machine: FloatingPiston, *, title: str = "", note: str = ""
     from graphsynth.drawing.animation import animation_html
 
     return animation_html(_run(machine), frames=frames, title=title, note=note, width=720.0)
+
+
+def piston_animated_svg(machine: FloatingPiston, *, title: str = "", frames: int = 90) -> str:
+    """Return one SVG that moves by itself (see :func:`graphsynth.drawing.animation.animated_svg`)."""
+    from graphsynth.drawing.animation import animated_svg
+
+    return animated_svg(_run(machine), frames=frames, title=title, width=720.0, height=320.0)
 
 
 def _run(machine: FloatingPiston) -> Motion:

@@ -83,8 +83,9 @@ class PistonComparison:
     friction_ratio : float
         Work lost with over without; NaN without friction.
     squareness : float
-        Error of the right angle between slot and cylinder, radians, from which on the second group buys nothing, for
-        an axial load alone: the steepest angle of the rod.  NaN for a Scotch yoke, whose plain piston has no side load.
+        Error of the right angle between slot and cylinder, radians, from which on the second group buys nothing
+        whatever the gas force, masses aside: the steepest angle of the rod.  NaN for a Scotch yoke, whose plain piston
+        has no side load.
     """
 
     floating: PistonTurn

@@ -165,11 +165,23 @@ def test_svg_moves_every_link_and_stands_still_on_request(motion: Any) -> None:
     text = animated_svg(motion, frames=12)
     ET.fromstring(text)
     moving = set(range(motion.mechanism.graph.links)) - {motion.mechanism.frame}
+    mark = re.search(r"@keyframes k(\w+)-", text)[1]  # type: ignore[index]
     for link in moving:
-        assert f"@keyframes k{link}{{0%" in text and f'class="k{link}"' in text
-    assert f"@keyframes k{motion.mechanism.frame}{{" not in text
+        assert f"@keyframes k{mark}-{link}{{0%" in text and f'class="k{mark}-{link}"' in text
+    assert f"@keyframes k{mark}-{motion.mechanism.frame}{{" not in text
     assert "prefers-reduced-motion:reduce" in text
     assert ("infinite normal" in text) == motion.closure.closed
+
+
+def test_pictures_on_one_page_do_not_move_each_other(motions: dict[str, Any]) -> None:
+    """A style inside an SVG counts for the whole page, so no two pictures may share the name of a rule."""
+    names = [
+        set(re.findall(r"@keyframes (\S+?)\{", animated_svg(motions[name], frames=12))) for name in ("lambda", "yoke")
+    ]
+    assert names[0] and names[1] and not names[0] & names[1]
+    for name in ("lambda", "yoke"):
+        text = animated_svg(motions[name], frames=12)
+        assert "[class^=k]" not in text and "[class^=r]" not in text  # would catch elements of the page
 
 
 def test_gif_has_the_frames_and_the_time(motions: dict[str, Any], tmp_path: Path) -> None:
