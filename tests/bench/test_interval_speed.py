@@ -1,13 +1,19 @@
-"""How fast interval arithmetic and Krawczyk's test are, beside numpy, mpmath.iv and python-flint.
+"""How fast interval arithmetic and Krawczyk's test are, beside numpy, mpmath.iv, python-flint, IntvalPy and codac.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_interval_speed.py
 --benchmark-enable``.  No time is asserted: machines differ.  Ratios to the plain operation and to the peers on the same
-operands are in the columns of extra information and in ``docs/explanation/intervals.md``.
+operands are in the columns of extra information and in ``docs/explanation/intervals.md``; `test_other_libraries` prints
+a table of ratios, each library in a process of its own (extra ``bench``).
 """
 
 from __future__ import annotations
 
+import importlib.util
+import json
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -198,3 +204,94 @@ def test_paving(benchmark):
     found = timed(benchmark, lambda: pave(f, ["[-3, 3]", "[-3, 3]"]), 1)
     assert found.finished
     assert (found.status == Status.UNIQUE).all()
+
+
+# -- other libraries, each in its own process --------------------------------------------------------------------
+
+PEERS = Path(__file__).with_name("interval_peers.py")
+B = "17.4617879639289313590283215334"
+
+
+def own_times(count, seconds):
+    """The work of ``interval_peers.py`` done here; names of the peers' times to our ways and seconds."""
+    import interval_peers as same
+
+    from graphsynth.intervals import krawczyk, pave_compiled
+    from graphsynth.intervals.kernels import arithmetic as ia
+    from graphsynth.intervals.kernels import elementary, loops
+    from graphsynth.intervals.kernels import krawczyk as compiled
+    from graphsynth.jamming.circle_ellipse import circle_ellipse, krawczyk_boxes
+
+    @compiled.system
+    def crossing(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
+        ul, uh = ia.square(xl[0], xh[0])
+        vl, vh = ia.square(xl[1], xh[1])
+        sl, sh = ia.add(ul, uh, vl, vh)
+        fl[0], fh[0] = ia.subtract(sl, sh, pl[0], ph[0])
+        al, ah = ia.multiply(ul, uh, pl[2], ph[2])
+        bl, bh = ia.multiply(vl, vh, pl[3], ph[3])
+        sl, sh = ia.add(al, ah, bl, bh)
+        fl[1], fh[1] = ia.subtract(sl, sh, pl[1], ph[1])
+        if derivatives:
+            jl[0, 0], jh[0, 0] = 2.0 * xl[0], 2.0 * xh[0]
+            jl[0, 1], jh[0, 1] = 2.0 * xl[1], 2.0 * xh[1]
+            jl[1, 0], jh[1, 0] = ia.multiply(2.0 * xl[0], 2.0 * xh[0], pl[2], ph[2])
+            jl[1, 1], jh[1, 1] = ia.multiply(2.0 * xl[1], 2.0 * xh[1], pl[3], ph[3])
+        return True
+
+    p = Interval.stack([Interval("306.25"), Interval(1), 1 / Interval("17.53").sqr(), 1 / Interval(B).sqr()])
+    general = lambda x, p: [x[0] ** 2 + x[1] ** 2 - p[0], x[0] ** 2 * p[2] + x[1] ** 2 * p[3] - p[1]]  # noqa: E731
+    a, b = operands(count)
+    lo, hi = np.empty(count), np.empty(count)
+    near = Interval(np.array(same.ROOT) - 1e-3, np.array(same.ROOT) + 1e-3)
+    many = max(count // 10, 2)
+    low, high = np.tile(near.lo, (many, 1)), np.tile(near.hi, (many, 1))
+    out_lo, out_hi, status = np.empty_like(low), np.empty_like(low), np.empty(many, dtype=np.int8)
+    boxes = Interval.from_bounds(low, high)
+    pl, ph = p.lo.copy(), p.hi.copy()
+    quadrant = Interval([0.0, 0.0], [same.SIDE, same.SIDE])
+    problem = circle_ellipse("17.5", "17.53", B, eps="0")
+    rows = [
+        ("add", "kernel", lambda: loops.add(*a, *b, lo, hi), count),
+        ("add", "numpy form", lambda: numpy_form.add(*a, *b), count),
+        ("multiply", "kernel", lambda: loops.multiply(*a, *b, lo, hi), count),
+        ("multiply", "numpy form", lambda: numpy_form.multiply(*a, *b), count),
+        ("sin", "kernel", lambda: elementary.sin(*a, lo, hi), count),
+        ("krawczyk", "kernel", lambda: compiled.krawczyk_boxes(
+            crossing, low, high, pl, ph, out_lo, out_hi, status), many),
+        ("krawczyk", "image of many boxes", lambda: image(general, boxes, p), many),
+        ("krawczyk", "krawczyk, one box", lambda: krawczyk(general, near, p), 1),
+        ("crossing", "krawczyk_boxes", lambda: krawczyk_boxes(problem), 1),
+        ("crossing", "pave_compiled", lambda: pave_compiled(crossing, quadrant, p), 1),
+        ("crossing", "pave", lambda: pave(general, quadrant, p), 1),
+    ]  # fmt: skip
+    times = [(work, way, same.shortest(run, seconds) / size) for work, way, run, size in rows]
+    assert (status == Status.UNIQUE).all()
+    assert pave_compiled(crossing, quadrant, p).solutions == 1
+    return times
+
+
+def test_other_libraries(benchmark, capsys, monkeypatch):
+    """Equal work in each library; with ``--benchmark-enable`` prints times and ratios.  Without, python-flint only."""
+    monkeypatch.syspath_prepend(str(PEERS.parent))
+    count, seconds = (COUNT, 1.0) if benchmark.enabled else (200, 0.0)
+    names = ("flint", "intvalpy", "codac") if benchmark.enabled else ("flint",)
+    peers = {}
+    for name in names:
+        if importlib.util.find_spec(name) is not None:
+            command = [sys.executable, "-W", "ignore", str(PEERS), name, str(count), str(seconds)]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+            assert done.returncode == 0, done.stderr
+            peers[name] = json.loads(done.stdout)
+            assert peers[name]["crossing, proved"] == 1
+    if not peers:
+        pytest.skip("none of python-flint, IntvalPy and codac is installed (extra bench)")
+    own = benchmark.pedantic(lambda: own_times(count, seconds), rounds=1)
+    if benchmark.enabled:
+        with capsys.disabled():
+            print(f"\n{'work':<10}{'way':<22}{'here, us':>10}" + "".join(f"{name + ' / here':>18}" for name in peers))
+            for work, way, time_here in own:
+                ratios = "".join(f"{found[work] / time_here:>18.3g}" for found in peers.values())
+                print(f"{work:<10}{way:<22}{time_here * 1e6:>10.3g}{ratios}")
+            if "codac" in peers:
+                print(f"codac's own paving, without proof of existence: {peers['codac']['own paving'] * 1e6:.0f} us")
