@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite, whole
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FullTurn", "full_turn", "straightness"]
 
+Array = NDArray[np.float64]
 _SAMPLES = 1440
 
 
@@ -84,19 +86,24 @@ def _planar_turn(linkage: LambdaLinkage) -> FullTurn:
     return FullTurn(True, "full turn", (), (), "exact", text)
 
 
-def _margin(linkage: LambdaLinkage, f: float) -> float:
+def _margins(linkage: LambdaLinkage, f: Array) -> Array:
     """Smallest of the three quantities that must stay positive, relative to the square of the largest length."""
-    A, _, _, near, far, _ = linkage._closure(np.array([f]))
+    A, _, _, near, far, _ = linkage._closure(f)
     scale = max(linkage.l1, linkage.l2, linkage.l3, linkage.l4) ** 2
-    rod = linkage.l3**2 - float(A[0, 2]) ** 2 if linkage.rod == "rigid" else math.inf
-    return min(float(near[0]), float(far[0]), rod) / scale
+    rod = linkage.l3**2 - A[:, 2] ** 2 if linkage.rod == "rigid" else math.inf
+    return np.asarray(np.minimum(np.minimum(near, far), rod) / scale)
+
+
+def _margin(linkage: LambdaLinkage, f: float) -> float:
+    """Return the margin at one angle."""
+    return float(_margins(linkage, np.array([f]))[0])
 
 
 def _tilted_turn(linkage: LambdaLinkage) -> FullTurn:
     from scipy.optimize import brentq, minimize_scalar
 
     grid = np.linspace(0.0, math.tau, _SAMPLES + 1)
-    values = np.array([_margin(linkage, f) for f in grid])
+    values = _margins(linkage, grid)
     step = math.tau / _SAMPLES
     nodes = list(zip(grid, values))
     for index in range(_SAMPLES):  # a minimum between samples may dip below zero unseen
