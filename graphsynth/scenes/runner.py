@@ -127,7 +127,7 @@ def execute(
         scene = load_scene(scene)
     check_files(scene)
     wanted = scene.outputs.products
-    stages = resolve(scene.stages(), wanted, scene.place / "outputs")
+    stages = resolve(scene.stages(), wanted, scene.place / "outputs" / "products")
     done = Running(stages, wanted, Context(scene, executor), progress, journal, fresh)
     products = done.run()
     return Report(

@@ -111,8 +111,10 @@ class OutputsTable:
     files: tuple[Literal["csv", "parquet"], ...] = ("csv",)
 
     def __post_init__(self) -> None:
-        require(bool(self.products), "has no products; name at least one output")
-        require(len(set(self.products)) == len(self.products), f"names a product twice in {list(self.products)}")
+        require(bool(self.products), "has products = []; name at least one output")
+        require(
+            len(set(self.products)) == len(self.products), f"has products = {list(self.products)}, one of them twice"
+        )
 
 
 @dataclass(frozen=True, slots=True)

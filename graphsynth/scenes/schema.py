@@ -21,7 +21,7 @@ _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 def schema_text() -> str:
     """Return the schema of scene files as JSON text, as shipped in ``docs/reference/scene.schema.json``."""
-    return json.dumps(scene_schema(), indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(scene_schema(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def scene_schema() -> dict[str, Any]:
@@ -83,7 +83,7 @@ def table_schema(schema: type) -> dict[str, Any]:
         unit = unit_of(field.name, hints[field.name]).text
         value = _value(hints[field.name], unit, True)
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-        if field.default is not dataclasses.MISSING and isinstance(field.default, str | int | float):
+        if isinstance(field.default, str | int | float) and str(field.default) not in ("nan", "inf", "-inf"):
             value = {**value, "default": field.default}
         properties[field.name] = value
         alias = short.get(field.name)

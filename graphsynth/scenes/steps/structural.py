@@ -47,7 +47,9 @@ def _spec(context: Context) -> StructuralSpec:
     try:
         return StructuralSpec.from_mapping(_structure(context).question or {})
     except (FormatError, SpecError) as error:
-        raise place.error(f"cannot be read: {error}") from error
+        # a FormatError about a key says which one
+        key = getattr(error, "place", "").removeprefix("key ").strip("'")
+        raise place.error(f"cannot be read: {error}", key) from error
 
 
 def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterator[Candidate]:
