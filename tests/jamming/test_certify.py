@@ -115,7 +115,7 @@ rational = st.fractions(max_denominator=10**6)
 lengths = st.fractions(F(1, 2), 4, max_denominator=1000)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.fractions(F(1, 1000), F(3, 2), max_denominator=10**5),
     st.tuples(*[st.fractions(-1, 1, max_denominator=50)] * 3).filter(any),

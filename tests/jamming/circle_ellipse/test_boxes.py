@@ -287,7 +287,7 @@ def test_bounds_of_quotients_are_the_tightest(top, bottom, shift):
     assert low == high or math.nextafter(low, math.inf) == high
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.lists(st.fractions(F("0.01"), 3, max_denominator=10**6), min_size=4, max_size=4),
     st.fractions(F("0.1"), 3, max_denominator=10**6), st.fractions(F("0.1"), 3, max_denominator=10**6),
@@ -323,7 +323,7 @@ def test_compiled_image_holds_the_exact_one(sides, R1, a, b, eps, power):
                                 assert F(out[2 * row]) <= centre - reach and centre + reach <= F(out[2 * row + 1])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.fractions(F("0.5"), 2, max_denominator=10**4), st.fractions(F("0.5"), 2, max_denominator=10**4),
     st.fractions(F("0.5"), 2, max_denominator=10**4), st.integers(0, 1000), st.integers(0, 1000),

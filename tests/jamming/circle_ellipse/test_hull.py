@@ -134,7 +134,7 @@ small = st.fractions(min_value=0, max_value=Fraction(3, 2), max_denominator=40)
 size = st.fractions(min_value=Fraction(1, 4), max_value=4, max_denominator=24)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(size, size, size, small, small)
 def test_hull_agrees_with_clipping(R1, b, extra, e1, e2):
     a = b + extra
@@ -157,7 +157,7 @@ def unclipped_minimum(R1, a, b, e1, e2):
     return R1**2 - e1 - b**2 * (1 + e2), a**2 * (1 - e2) - R1**2 - e1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(size, size, size, small, small, st.randoms(use_true_random=False))
 def test_ranges_of_the_radii_with_tolerances(R1, b, extra, e1, e2, random):
     """Every solution for parameters inside the ranges lies in the hull; no solution if it is empty."""
