@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from interval_samples import bounds
 
 from graphsynth.intervals import (
     Decoration,
@@ -114,8 +115,40 @@ def test_many_points_against_flint(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_million_points_against_flint(name):
-    count, bad = enclosed(name, 1_000_000, 4)
-    assert count > 700_000
+    count, bad = enclosed(name, 1_600_000, 4)
+    assert count > 1_000_000
+    assert bad == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["atan2", "hypot"])
+def test_a_million_boxes_against_flint(name):
+    """Random points of random boxes, extreme ones included, the signs of all four quadrants."""
+    flint = pytest.importorskip("flint")
+    rng = np.random.default_rng(9)
+    count = 1_300_000
+    y, x = bounds(rng, count, empty=0.0), bounds(rng, count, empty=0.0)
+    result = {"atan2": atan2, "hypot": hypot}[name](Interval.from_bounds(*y), Interval.from_bounds(*x))
+    p, q = (np.where(rng.random(count) < 0.5, *pair) + 0.0 for pair in (y, x))
+    fine = np.isfinite(p) & np.isfinite(q) & ((p != 0.0) | (q != 0.0))
+    bad, before, flint.ctx.prec = [], flint.ctx.prec, 200
+    try:
+        for a, b, lo, hi in zip(*(v[fine].tolist() for v in (p, q, result.lo, result.hi))):
+            u, v = flint.arb(a), flint.arb(b)
+            value = flint.arb.atan2(u, v) if name == "atan2" else (u * u + v * v).sqrt()
+            if a == 0.0 and name == "atan2":
+                value = flint.arb.pi() if b < 0.0 else flint.arb(0)
+            if name == "hypot" and 0.0 in (a, b):
+                value = abs(u) + abs(v)
+            if not (lo <= value and value <= hi):  # not certainly inside: more bits decide
+                flint.ctx.prec = 4400
+                value = flint.arb.atan2(flint.arb(a), flint.arb(b)) if name == "atan2" else (u * u + v * v).sqrt()
+                flint.ctx.prec = 200
+                if lo > value or hi < value:
+                    bad.append((a, b))
+    finally:
+        flint.ctx.prec = before
+    assert fine.sum() > 1_000_000
     assert bad == []
 
 

@@ -1,7 +1,8 @@
 """Sine, cosine and tangent: certified bounds at points and over intervals.
 
-Arguments beyond pi/4 are reduced by exact integer arithmetic with 1344 bits of 2/pi (Payne and Hanek 1983); the rest
-is a Taylor polynomial in double-double arithmetic.  Every error bound is proved in ``docs/explanation/intervals.md``.
+Arguments beyond pi/4 are reduced with pi/2 in exact pieces (Cody and Waite 1980), beyond a million by exact integer
+arithmetic with 1344 bits of 2/pi (Payne and Hanek 1983); the rest is a Taylor polynomial in double-double arithmetic.
+Every error bound is proved in ``docs/explanation/intervals.md``.
 """
 
 from fractions import Fraction
@@ -16,14 +17,37 @@ from graphsynth.intervals.kernels.rounding import INF, down, up
 
 _WORDS = np.array(constants.two_over_pi_words(42), dtype=np.uint64)
 _HALF_PI_H, _HALF_PI_L = constants.split(Fraction(constants.pi_fixed(256), 2**257))
+#: pi/2 cut into three pieces of 33 bits, whose products with integers below 2^20 are exact, and the rest.
+_FIRST, _SECOND, _THIRD = (
+    float(Fraction((constants.pi_fixed(256) >> (225 - 33 * k)) % 2**33, 2 ** (32 + 33 * k))) for k in range(3)
+)
+_REST_H, _REST_L = constants.split(
+    Fraction(constants.pi_fixed(256), 2**257) - Fraction(_FIRST) - Fraction(_SECOND) - Fraction(_THIRD)
+)
+_MODERATE = 1e6
 #: Taylor coefficients by rows: high and low part; the first ones are used in double-double, the others as doubles.
 _SIN = np.array([constants.split(Fraction((-1) ** k, factorial(2 * k + 1))) for k in range(13)])
 _COS = np.array([constants.split(Fraction((-1) ** k, factorial(2 * k))) for k in range(14)])
 _SIN_EXACT, _COS_EXACT = 5, 6
-RELATIVE, ABSOLUTE = 2.0**-68, 2.0**-150
+RELATIVE, ABSOLUTE = 2.0**-68, 2.0**-140
 _SMALL = 2.0**-27
 _MASK = np.uint64(0xFFFFFFFF)
 _32 = np.uint64(32)
+
+
+@kernel
+def reduce_moderate(x):
+    """Do what `reduce` does, for ``|x| <= 1e6``, with pi/2 in pieces (Cody and Waite 1980)."""
+    k = np.floor(x * 0.6366197723675814 + 0.5)
+    h, l = dd.two_sum(x, -k * _FIRST)
+    h, l = dd.add_double(h, l, -k * _SECOND)
+    rh, rl = dd.multiply_double(_REST_H, _REST_L, k)
+    rh, rl = dd.add_double(rh, rl, k * _THIRD)
+    h, l = dd.add(h, l, -rh, -rl)
+    nearest = np.int64(k) & 3
+    if abs(h) < 4.0 * ABSOLUTE:
+        return -1, nearest, h, l
+    return nearest if h > 0.0 else (nearest - 1) & 3, nearest, h, l
 
 
 @kernel
@@ -31,6 +55,8 @@ def reduce(x):
     """Return ``floor(x 2/pi) mod 4`` (-1 if not certain), the nearest integer mod 4, and the rest times pi/2."""
     if x == 0.0:
         return 0, 0, 0.0, 0.0
+    if abs(x) <= _MODERATE:
+        return reduce_moderate(x)
     fraction, exponent = frexp(abs(x))
     m = np.uint64(np.int64(fraction * 9007199254740992.0))
     e = exponent - 53
