@@ -96,12 +96,19 @@ class JammingReport:
     def to_pandas(self) -> pd.DataFrame:
         """Return the table over the crank angles with the columns ``certainly_jams`` and ``certainly_free`` added.
 
-        Both come from the certificate and are False where nothing is proved, or without a certificate.
+        Both come from the certificate and are False where nothing is proved, or without a certificate; "jams" also says
+        that the linkage is proved to be assembled there.
         """
         frame = self.table.to_pandas()
         for name, kind in (("certainly_jams", "inner"), ("certainly_free", "free")):
             spans = getattr(self.certificate.arcs, kind) if self.certificate else ()
             frame[name] = [strictly_inside(spans, angle) for angle in self.table.f]
+        if self.certificate and self.certificate.assembles != "always":
+            from graphsynth.intervals import Interval
+            from graphsynth.jamming.poses import pose
+
+            f = Interval.from_bounds(self.table.f, self.table.f)
+            frame["certainly_jams"] &= pose(self.certificate.box, f).assembled
         return frame
 
     def summary(self) -> dict[str, Any]:
@@ -127,6 +134,7 @@ class JammingReport:
         }
 
 
+# one tilted bearing of a lambda linkage (model L0)
 @overload
 def assess_jamming(
     subject: LambdaLinkage | None = None,
@@ -139,6 +147,7 @@ def assess_jamming(
 ) -> JammingReport: ...
 
 
+# all joints of any mechanism over its motion (model L1)
 @overload
 def assess_jamming(
     subject: Motion,

@@ -342,5 +342,7 @@ def test_what_lies_beyond_a_dead_centre_does_not_count():
     assert report.worst_gap == pytest.approx(seen, rel=1e-4) and report.worst_gap >= seen - 1e-12
     said = float(re.search(r"at least ([-+.e\d]+) mm", report.statement)[1])
     assert said <= report.worst_gap < report.certificate.smallest_worst_gap.lo
+    frame = report.to_pandas()
+    assert frame["certainly_jams"].any() and not frame.loc[frame["status"] != 0, "certainly_jams"].any()
     never = assess_jamming(LambdaLinkage(10, 1, 1, 1), Bearing())
     assert never.verdict is Verdict.CANNOT_ASSEMBLE and math.isnan(never.worst_gap)
