@@ -85,7 +85,7 @@ class PistonMachine:
         return replace(self, mechanism=self.mechanism.without_group(), masses=masses)
 
     def gas_force(self, angle: ArrayLike) -> Array:
-        """Force of the gas on the piston away from the head, N."""
+        """Force of the gas on the piston away from the head, N; a crank at rest counts as about to turn forwards."""
         motion = self.mechanism.motion(angle)
         outer, _ = self.mechanism.dead_centres()
         closing = np.asarray(motion.piston.first * (self.speed or 1.0) > 0.0)

@@ -65,7 +65,8 @@ def wedge(tangent: complex, mu: Array, speed: Array) -> Wedge:
 
 def one_contact(moment: Array, lever: Complex, contact: Wedge) -> Reaction:
     """Solve ``lever x force = moment`` for the contact's normal force; NaN if there is no or no single solution."""
-    candidates = [moment / cross(lever, contact.of(sign)) for sign in (1, -1)]
+    with np.errstate(divide="ignore", invalid="ignore"):  # a contact that cannot carry the moment: no candidate
+        candidates = [moment / cross(lever, contact.of(sign)) for sign in (1, -1)]
     normal = _single([(np.asarray(sign * value >= 0.0), value) for sign, value in zip((1, -1), candidates)])
     return Reaction.of(normal, contact)
 
@@ -76,20 +77,24 @@ def two_contacts(wanted: Complex, first: Wedge, second: Wedge) -> tuple[Reaction
     for s, t in product((1, -1), repeat=2):
         d, e = first.of(s), second.of(t)
         area = cross(d, e)
-        one, other = cross(wanted, e) / area, cross(d, wanted) / area
+        with np.errstate(divide="ignore", invalid="ignore"):  # parallel contacts: no candidate
+            one, other = cross(wanted, e) / area, cross(d, wanted) / area
         good = np.asarray((s * one >= 0.0) & (t * other >= 0.0))
         ones.append((good, one))
         others.append((good, other))
-    return Reaction.of(_single(ones), first), Reaction.of(_single(others), second)
+    size = np.abs(wanted)
+    return Reaction.of(_single(ones, size), first), Reaction.of(_single(others, size), second)
 
 
-def _single(candidates: list[tuple[NDArray[np.bool_], Array]]) -> Array:
-    """Take the value of all candidates that hold, if they agree (they do where a force is 0); NaN otherwise."""
+def _single(candidates: list[tuple[NDArray[np.bool_], Array]], size: Array | float = 0.0) -> Array:
+    """Take the value of all candidates that hold, if they agree (they do where a force is 0); NaN otherwise.
+
+    ``size`` is the load they share: rounding is relative to it.
+    """
     values = np.array([np.where(good, value, np.nan) for good, value in candidates])
     holds = np.isfinite(values)
     low = np.where(holds, values, np.inf).min(axis=0)
     high = np.where(holds, values, -np.inf).max(axis=0)
-    size = np.abs(np.array([value for _, value in candidates])).max(axis=0)
-    with np.errstate(invalid="ignore"):
-        agree = holds.any(axis=0) & (high - low <= 1e-12 * size)
+    with np.errstate(invalid="ignore"):  # inf - inf where nothing holds
+        agree = holds.any(axis=0) & (high - low <= 1e-12 * np.maximum(size, np.maximum(np.abs(low), np.abs(high))))
     return np.asarray(np.where(agree, np.where(np.abs(high) >= np.abs(low), high, low), np.nan))

@@ -246,6 +246,26 @@ def test_where_friction_jams_there_is_no_number():
         piston_turn(machine)
 
 
+def test_contacts_against_all_signs():
+    """Brute force over a grid: the friction law itself, checked for every solution found."""
+    from graphsynth.dynamics.piston_solving import two_contacts, wedge
+
+    rng = np.random.default_rng(5)
+    wanted = rng.normal(size=400) + 1j * rng.normal(size=400)
+    a, b = np.exp(1j * np.array([1.5, 0.1]))
+    first, second = (wedge(t, np.full(400, mu), np.ones(400)) for t, mu in ((a, 0.1), (b, -0.3)))
+    one, other = two_contacts(wanted, first, second)
+    assert np.isfinite(one.normal).all()
+    assert np.abs(one.force + other.force - wanted).max() < 1e-14
+    for found, tangent, mu in ((one, a, 0.1), (other, b, -0.3)):
+        along = (np.conj(tangent) * found.force).real
+        across = (np.conj(1j * tangent) * found.force).real
+        assert np.abs(along + mu * np.abs(across)).max() < 1e-14
+    # parallel contacts carry nothing else: no number, and no warning
+    none, _ = two_contacts(wanted[:3], *(wedge(1.0 + 0j, np.zeros(3), np.ones(3)) for _ in range(2)))
+    assert np.isnan(none.normal).all()
+
+
 def test_static_friction_in_a_slot_that_stands_still():
     square, askew = MACHINES["square"], MACHINES["askew"]
     loads = square.loads(np.linspace(0, 6, 20))

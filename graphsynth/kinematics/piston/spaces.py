@@ -46,7 +46,7 @@ class LoopSpace:
     sub_edges : int
         Total mobility of the fresh joints; ``sub_edges - space`` is what the loop adds to the mobility.
     idle : ndarray, shape (3 - own, 3)
-        Load ``(couple, fx, fy)``, at the origin and over the characteristic length, that can circulate in the loop
+        Loads ``(couple / Lc, fx, fy)`` about the origin, Lc the characteristic length, that can circulate in the loop
         without any balance noticing: one for every direction in which the loop does not move.
     """
 

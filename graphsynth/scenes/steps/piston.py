@@ -208,7 +208,7 @@ def _verdict(found: PistonComparison) -> tuple[str, bool | None]:
     if math.isnan(ratio):
         return "the plain piston has no side load, so there is nothing to gain", None
     worst = ratio + 0.5 * found.floating.peak_held / found.plain.peak_edge
-    words = f"the ends of the piston keep {_percent(ratio)} of the plain one's largest force"
+    words = f"with a crowned slot the ends of the piston keep {_percent(ratio)} of the plain one's largest force"
     if found.floating.peak_held > 0.0:
         words += f", at most {_percent(worst)} with what static friction in the slot may hold"
     return f"{words} (estimated)", worst < 1.0
