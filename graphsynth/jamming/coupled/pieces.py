@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -28,8 +29,8 @@ __all__ = ["PARTS", "Found", "Work", "check_range", "cut"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Pieces of the whole range at first, and parts into which one is cut.
-FIRST, PARTS = 128, 4
+#: Pieces of a whole turn at first, of any range at least, and parts into which one is cut.
+FIRST, FEWEST, PARTS = 128, 16, 4
 
 
 class Found(NamedTuple):
@@ -71,8 +72,9 @@ class Work:
         self.evaluated = 0
 
     def first(self) -> tuple[Array, Array]:
-        """Equal pieces of the whole range."""
-        edges = np.linspace(self.low, self.high, FIRST + 1)
+        """Equal pieces of the whole range; fewer for a short one (an input is mostly an angle)."""
+        count = int(np.clip(math.ceil(FIRST * (self.high - self.low) / math.tau), FEWEST, FIRST))
+        edges = np.linspace(self.low, self.high, count + 1)
         return edges[:-1], edges[1:]
 
     def evaluate(self, lo: Array, hi: Array) -> Found:

@@ -99,14 +99,15 @@ def test_many_boxes_fall_back_to_intervals():
     assert corner_layouts(large) == (large,)
 
 
-def test_any_direction():
+@pytest.mark.parametrize("turn", [np.linspace(0.5, 0.9, 5), pytest.param(TURN, marks=pytest.mark.slow)])
+def test_any_direction(turn):
     """A tilt up to alpha in a direction nobody knows: proved free up to one percent below the worst direction."""
-    motion = simulate(four_bar(), TURN)
+    motion = simulate(four_bar(), turn)
     unknown = Misalignment(0, 1, 0.0085, alpha_range=(0.0, 0.0085), direction_range=(0.0, 2.0 * math.pi))
     # specification 9.6: the worst factor of the grid is 0.699 t_A / alpha, which allows 0.00868
     assert certify_coupled(motion, Bearing(), unknown).verdict.name == "CERTIFIED_FREE"
     more = replace(unknown, alpha=0.0088, alpha_range=(0.0, 0.0088))
-    found = certify_coupled(motion, Bearing(), more, resolution=1e-2)
+    found = certify_coupled(motion, Bearing(), more, resolution=2e-2)
     assert found.verdict.name == "CERTIFIED_JAMMED_FOR_SOME"
     (own,) = found.witness.misalignments
     assert own.alpha == 0.0088 and math.degrees(own.direction) % 180.0 == pytest.approx(135.0, abs=6.0)
@@ -126,7 +127,7 @@ def test_any_direction_of_a_larger_mechanism():
     assert found.low >= table.smallest_scale / 1.04
 
 
-@pytest.mark.parametrize("links", [4, 6])
+@pytest.mark.parametrize("links", [4, pytest.param(6, marks=pytest.mark.slow)])
 def test_upper_bounds_hold_for_members(links):
     """Bounds of pieces against the factor of random members of boxes of alpha and direction."""
     rng = np.random.default_rng(links)

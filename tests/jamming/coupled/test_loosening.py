@@ -27,7 +27,7 @@ from graphsynth.jamming.coupled.error_and_time import error_against_time
 def eight():
     mechanism = embodied(8, 3)
     base, link = driven_pair(mechanism)
-    motion = simulate(mechanism, np.linspace(0.0, 2.0 * math.pi, 37))
+    motion = simulate(mechanism, np.linspace(0.0, 2.0 * math.pi, 13))
     limits = {joint.pair: JointLimits(0.006, 0.002) for joint in mechanism.joints}
     return motion, limits, Misalignment(base, link, 0.012, 0.3)
 
@@ -50,7 +50,7 @@ def test_every_row_solved_again(eight):
         )
         return assess_coupled(motion, {**limits, row.joint: new}, tilt).smallest_scale
 
-    for row in table.rows[:6] + table.rows[-2:]:
+    for row in table.rows[:4] + table.rows[-1:]:
         assert row.scale == pytest.approx(anew(row, 1.1), rel=1e-11)
         assert row.without == pytest.approx(anew(row, math.inf), rel=1e-9)
         assert row.gain <= row.promised + 1e-9 and row.scale <= row.without * (1 + 1e-12)

@@ -1,6 +1,7 @@
 """The convex program against independent answers, its duality and its invariances."""
 
 import math
+from functools import cache
 
 import mpmath
 import numpy as np
@@ -74,16 +75,20 @@ def test_against_a_general_optimiser():
         target = np.concatenate([np.zeros(len(slips[k])), d[k][given_.layout.block_joint][~free].ravel()])
         start = np.linalg.lstsq(fixed, target, rcond=None)[0]
         null = np.linalg.svd(fixed)[2][np.linalg.matrix_rank(fixed) :].T
-        result = minimize(
-            lambda v: v[-1], np.append(np.zeros(null.shape[1]), 3.0), method="SLSQP",
-            jac=lambda v: np.eye(len(v))[-1], options={"maxiter": 500, "ftol": 1e-14},
-            constraints=[{"type": "ineq", "fun": lambda v, A=A, start=start, null=null: (
-                v[-1] ** 2 - ((A @ (start + null @ v[:-1])) ** 2).sum(-1)
-            )}],
-        )  # fmt: skip
-        assert result.success
-        assert found.upper[k] <= result.x[-1] * (1 + 1e-9)
-        assert found.upper[k] == pytest.approx(result.x[-1], rel=2e-6)
+        rng, best = np.random.default_rng(k), math.inf
+        for _ in range(6):
+            result = minimize(
+                lambda v: v[-1], np.append(rng.normal(0.0, 0.1, null.shape[1]), 3.0), method="SLSQP",
+                jac=lambda v: np.eye(len(v))[-1], options={"maxiter": 500, "ftol": 1e-14},
+                bounds=[(None, None)] * null.shape[1] + [(0.0, None)],
+                constraints=[{"type": "ineq", "fun": lambda v, A=A, start=start, null=null: (
+                    v[-1] ** 2 - ((A @ (start + null @ v[:-1])) ** 2).sum(-1)
+                )}],
+            )  # fmt: skip
+            reached = np.sqrt(((A @ (start + null @ result.x[:-1])) ** 2).sum(-1).max())  # whatever it says of itself
+            best = min(best, float(reached))
+        assert found.upper[k] <= best * (1 + 1e-9)
+        assert found.upper[k] == pytest.approx(best, rel=2e-6)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -125,7 +130,7 @@ def test_loop_and_body_form_agree(links, number):
     assert (np.abs(found.zeta) <= given_.layout.play * (1 + 1e-12)).all()
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     st.floats(-9, 9), st.floats(0, 6.28), st.booleans(), st.floats(0, 6.28), st.floats(0, 6.28), st.floats(0.01, 100.0)
 )
@@ -332,13 +337,16 @@ def test_pin_in_slot_with_and_without_guidance():
     assert held.factor.min() > 0.4 and held.gap.max() < 1e-12
 
 
+@cache
+def eight_directions():
+    motion = simulate(four_bar(), np.linspace(0.0, 6.0, 13))
+    return motion, direction_map(motion, JointLimits(0.01, 0.003), Misalignment(0, 1, 0.01, 0.0), directions=8)
+
+
 @settings(max_examples=8, deadline=None)
 @given(st.floats(0.0, 6.28))
 def test_no_direction_is_worse_than_the_bound(angle):
-    mechanism = four_bar()
-    motion = simulate(mechanism, np.linspace(0.0, 6.0, 13))
-    tilt = Misalignment(0, 1, 0.01, 0.0)
-    found = direction_map(motion, JointLimits(0.01, 0.003), tilt, directions=8)
+    motion, found = eight_directions()
     assert found.allowed_scale.shape == (8, 13)
     other = assess_coupled(motion, JointLimits(0.01, 0.003), Misalignment(0, 1, 0.01, angle))
     assert other.smallest_scale >= found.bound * (1 - 1e-12)
