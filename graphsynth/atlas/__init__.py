@@ -1,0 +1,1 @@
+"""The catalogue of chains and mechanisms: store, questions, checks, and the atlas page."""

@@ -1,0 +1,1 @@
+"""Compiled structural facts of chains, block by block, for the catalogue."""
