@@ -20,11 +20,12 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.braider.model import Braider
     from graphsynth.dynamics.braider.reactions import Reactions
     from graphsynth.dynamics.platform_drive.reduction import ReductionStudy
-    from graphsynth.dynamics.platform_drive.resistance import ResistanceEffect
+    from graphsynth.dynamics.platform_drive.resistance import ResistanceEffect, RippleMap
     from graphsynth.dynamics.platform_drive.run import DriveRun
 
 __all__ = [
-    "drive_curves", "reduction_picture", "resistance_picture", "sensor_picture", "start_up_picture", "themed_svg",
+    "drive_curves", "reduction_picture", "resistance_picture", "ripple_map_picture", "ripple_picture", "sensor_picture",
+    "start_up_picture", "themed_svg",
 ]  # fmt: skip
 
 #: Readable in grey and by colour-blind readers (Okabe and Ito 2008).
@@ -149,18 +150,83 @@ def resistance_picture(
     figure = new_figure(size)
     chart, ripples = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     _gain_map(figure, chart)
-    for k, (label, effect) in enumerate(effects.items()):
-        colour = _COLOURS[k % 6]
+    for label, effect in effects.items():
         chart.plot(np.full(effect.damping.size, effect.frequency_ratio), effect.damping, "o-", ms=3, lw=0.8, color="k")
         chart.annotate(label, (effect.frequency_ratio, effect.damping.max()), xytext=(3, 3), fontsize=7,
                        color="white", textcoords="offset points")  # fmt: skip
-        ripples.loglog(effect.resistance, effect.speed, color=colour, ls=_STYLES[k % 6], lw=1.3, label=label)
-        ripples.loglog(effect.resistance, effect.simulated_speed, "o", ms=4, color=colour)
-    _panel(
-        ripples, "speed ripple: linear (lines), simulated (dots)", "armature resistance [ohm]", "peak to peak [rad/s]"
-    )
-    ripples.legend(fontsize=8, frameon=False)
+    _ripples(ripples, effects, "speed")
     return figure
+
+
+def ripple_picture(
+    effects: Mapping[str, ResistanceEffect], of: str = "speed", *, size: tuple[float, float] = (5.4, 3.4)
+) -> Figure:  # fmt: skip
+    """Ripples of the speed or the current over the resistance: linear (lines) and simulated (dots).
+
+    Raises
+    ------
+    SpecError
+        Without any effect, or for another quantity.
+    """
+    if not effects or of not in ("speed", "current"):
+        raise SpecError(f"there is nothing to draw of {of!r}; give effects, and 'speed' or 'current'")
+    figure = new_figure(size)
+    _ripples(figure.add_subplot(), effects, of)
+    return figure
+
+
+def _ripples(axes: Any, effects: Mapping[str, ResistanceEffect], of: str) -> None:
+    for k, (label, effect) in enumerate(effects.items()):
+        colour = _COLOURS[k % 6]
+        axes.loglog(effect.resistance, getattr(effect, of), color=colour, ls=_STYLES[k % 6], lw=1.3, label=label)
+        axes.loglog(effect.resistance, getattr(effect, f"simulated_{of}"), "o", ms=4, color=colour)
+    unit = "rad/s" if of == "speed" else "A"
+    title = f"{of} ripple: linear (lines), simulated (dots)"
+    _panel(axes, title, "armature resistance [ohm]", f"peak to peak [{unit}]")
+    axes.legend(fontsize=8, frameon=False)
+
+
+def ripple_map_picture(found: RippleMap, *, size: tuple[float, float] = (5.4, 4.0)) -> Figure:
+    """Draw the simulated truth of the claim: slope of the speed ripple over the resistance; bar: the linear condition.
+
+    Blue: the ripple falls with a larger resistance; red: it rises; grey: no result.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = new_figure(size)
+    axes = figure.add_subplot()
+    middle = np.sqrt(found.resistance[1:] * found.resistance[:-1])
+    order = np.argsort(found.frequency_ratio)
+    axes.set_facecolor("#999999")
+    drawn = axes.pcolormesh(
+        _edges(middle), _edges(found.frequency_ratio[order]), found.speed_slope[order], cmap="RdBu_r", vmin=-1.0,
+        vmax=1.0, rasterized=True,
+    )  # fmt: skip
+    bar = figure.colorbar(drawn, ax=axes, extend="both")
+    bar.set_label("d ln(speed ripple) / d ln r")
+    axes.axhline(1.0 / math.sqrt(2.0), color="#111111", lw=2.0)
+    axes.text(axes.get_xlim()[0] * 1.1, 0.73, "linear: falls above", fontsize=8, color="#111111")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("armature resistance [ohm]")
+    axes.set_ylabel("Om / w_n")
+    for axis, ticks in ((axes.xaxis, (0.5, 1, 2, 5, 10, 20)), (axes.yaxis, (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2))):
+        low, high = sorted(axis.get_view_interval())
+        shown = [tick for tick in ticks if low <= tick <= high]
+        axis.set_ticks(shown, [f"{tick:g}" for tick in shown])
+        axis.set_ticks([], minor=True)
+    return figure
+
+
+def _edges(centres: Any) -> Any:
+    """Borders of cells around centres, evenly between them in the logarithm."""
+    log = np.log(centres)
+    if log.size == 1:
+        return np.exp([log[0] - 0.3, log[0] + 0.3])
+    inner = 0.5 * (log[1:] + log[:-1])
+    return np.exp(np.concatenate([[2.0 * log[0] - inner[0]], inner, [2.0 * log[-1] - inner[-1]]]))
 
 
 def _gain_map(figure: Figure, axes: Any) -> None:

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.dynamics.motors import DCMotor, number, whole
+from graphsynth.dynamics.motors import DCMotor, number, numbers, whole
 from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
 from graphsynth.errors import SpecError
 
-__all__ = ["ResistanceEffect", "resistance_effect", "ripple_gain", "steady_ripple"]
+__all__ = ["ResistanceEffect", "RippleMap", "resistance_effect", "ripple_gain", "ripple_map", "steady_ripple"]
 
 Array = NDArray[np.float64]
 
@@ -129,6 +129,72 @@ def resistance_effect(
         np.asarray(size * speed), np.asarray(2.0 * force * torque / (ratio * motor.torque_constant)),
         found[:, 0], found[:, 1],
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class RippleMap:
+    """Simulated steady ripples over inductance (rows) and resistance (columns), and where the claim holds.
+
+    ``speed`` (rad/s) and ``current`` (A) are peak to peak, NaN after a failure; ``speed_slope`` and ``current_slope``
+    (n_L, n_r - 1) are ``d ln(ripple) / d ln(r)`` between neighbours: the claim holds where they are negative.
+    ``frequency_ratio`` (n_L,) is ``Om / w_n``; the linear condition is that it exceeds ``1 / sqrt(2)``.
+    """
+
+    resistance: Array
+    inductance: Array
+    frequency_ratio: Array
+    speed: Array
+    current: Array
+    speed_slope: Array
+    current_slope: Array
+
+    @property
+    def agreement(self) -> float:
+        """Share of the map on which the linear condition tells the sign of the simulated slope of the speed ripple."""
+        falls = self.speed_slope < 0.0
+        known = np.isfinite(self.speed_slope)
+        said = np.broadcast_to((self.frequency_ratio > math.sqrt(0.5))[:, None], falls.shape)
+        return float((falls == said)[known].mean()) if known.any() else math.nan
+
+
+def ripple_map(
+    drive: MotorDrivenPlatform,
+    resistances: Sequence[float],
+    inductances: Sequence[float],
+    *,
+    revolutions: int = 40,
+) -> RippleMap:
+    """Simulate the steady ripples over resistances (ohm) and inductances (H): the claim's true condition as a map.
+
+    Raises
+    ------
+    SpecError
+        As `resistance_effect`; fewer than two resistances, or not in increasing order.
+
+    Examples
+    --------
+    >>> drive = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
+    >>> (ripple_map(drive, [5.0, 20.0], [0.2, 0.01]).speed_slope < 0.0).tolist()
+    [[True], [False]]
+    """
+    r, L = numbers("resistances", resistances, "ohm"), numbers("inductances", inductances, "H")
+    if r.ndim != 1 or r.size < 2 or not (np.diff(r) > 0.0).all() or r[0] <= 0.0:
+        raise SpecError(f"resistances of shape {r.shape} must be two or more increasing positive numbers; give ohm")
+    motor = drive.motor
+    if not isinstance(motor, DCMotor):
+        raise SpecError(f"{type(motor).__name__} has no armature; give a DCMotor")
+    effects = [
+        resistance_effect(replace(drive, motor=replace(motor, inductance=float(x))), r.tolist(), simulate=True,
+                          revolutions=revolutions)
+        for x in L
+    ]  # fmt: skip
+    speed, current = (
+        np.array([getattr(e, name) for e in effects]) for name in ("simulated_speed", "simulated_current")
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = [np.diff(np.log(values), axis=1) / np.diff(np.log(r)) for values in (speed, current)]
+    ratio = np.array([effect.frequency_ratio for effect in effects])
+    return RippleMap(r, L, ratio, speed, current, slopes[0], slopes[1])
 
 
 def _harmonic(drive: MotorDrivenPlatform) -> tuple[int, float, float]:

@@ -9,7 +9,7 @@ from graphsynth.errors import GeometryError, SpecError
 from graphsynth.scenes.families.braider import BraiderTable
 from graphsynth.scenes.products import Quantity, Record, Table
 from graphsynth.scenes.stages import Context
-from graphsynth.scenes.steps.platform_drive_common import balance_rows, quantity_table
+from graphsynth.scenes.steps.platform_drive_common import balance_rows, limit_table, quantity_table
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.braider.model import Braider
@@ -117,7 +117,7 @@ def judge(
         tables.append(_along_table(braider, run))
     tables += [_sensor_table(context, braider, turn), _second_way_table(braider, turn)]
     if study is not None:
-        tables.append(_inductance_table(study))
+        tables.append(limit_table(study))
     return (record,), tuple(tables)
 
 
@@ -248,17 +248,6 @@ def _second_way_table(braider: Braider, turn: Reactions) -> Table:
     )
     note = "Nine absolute coordinates with eight multipliers; nothing is shared with Newton and Euler but the data."
     return Table("Reactions had a second way", ("", ""), rows, note)
-
-
-def _inductance_table(study: ReductionStudy) -> Table:
-    orders = ("", *(f"{order:.3f}" for order in study.order))
-    rows = tuple(
-        (f"{L:.0e}", f"{angle:.3e}", f"{speed:.3e}", order, str(steps))
-        for L, angle, speed, order, steps in zip(study.inductance, study.angle, study.speed, orders, study.steps)
-    )
-    columns = ("inductance [H]", "angle [rad]", "speed [rad/s]", "order", "steps")
-    note = "Largest differences from the motor with L = 0 after the electrical transient."
-    return Table("The limit L -> 0", columns, rows, note)
 
 
 def solvers(context: Context) -> tuple[Table, ...]:

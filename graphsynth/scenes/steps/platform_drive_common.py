@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.scenes.products import Quantity, Table
 
 if TYPE_CHECKING:
+    from graphsynth.dynamics.platform_drive.reduction import ReductionStudy
     from graphsynth.dynamics.platform_drive.run import DriveRun
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["balance_rows", "quantity_table", "shown_motion"]
+__all__ = ["balance_rows", "limit_table", "quantity_table", "shown_motion"]
 
 _COLUMNS = ("quantity", "value", "how had", "error")
 
@@ -50,6 +51,18 @@ def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
         ("time of the run", f"{run.seconds * 1e3:.1f} ms, measured once"),
         *(("note", note) for note in run.notes),
     )
+
+
+def limit_table(study: ReductionStudy) -> Table:
+    """Distance from the limit L -> 0 for each inductance."""
+    orders = ("", *(f"{order:.3f}" for order in study.order))
+    rows = tuple(
+        (f"{L:.0e}", f"{angle:.3e}", f"{speed:.3e}", order, str(steps))
+        for L, angle, speed, order, steps in zip(study.inductance, study.angle, study.speed, orders, study.steps)
+    )
+    columns = ("inductance [H]", "angle [rad]", "speed [rad/s]", "order", "steps")
+    note = "Largest differences from the motor with L = 0 after the electrical transient; the order is 1 in the limit."
+    return Table("The limit L -> 0", columns, rows, note)
 
 
 def shown_motion(mechanism: Any, inputs: Any, poses: Any, *, closed: bool) -> Motion:
