@@ -16,6 +16,7 @@ from graphsynth.errors import IntervalError
 from graphsynth.intervals.boxes import Paving
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
+from graphsynth.intervals.proving import read_parameters
 from graphsynth.intervals.status import Status
 
 __all__ = ["compiled_system", "pave_compiled"]
@@ -101,7 +102,7 @@ def pave_compiled(
     check_rounding()
     begin = perf_counter()
     start, sizes = _posed(box, tolerance, scale, max_boxes, max_seconds)
-    p = None if parameters is None else interval(parameters)
+    p = read_parameters(parameters)
     pl, ph = (_NO_PARAMETERS, _NO_PARAMETERS) if p is None else (_row(p.lo), _row(p.hi))
     n = start.size
     stack, kept = np.empty((2, _DEPTH, n)), np.empty((4, _KEPT, n))

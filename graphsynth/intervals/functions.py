@@ -218,7 +218,7 @@ def divide_extended(a: Any, b: Any) -> tuple[Interval, Interval]:
     (Interval([-inf, -0.5]), Interval([0.25, inf]))
     """
     a, b = interval(a), interval(b)
-    split = (b.lo < 0.0) & (b.hi > 0.0) & ((a.lo > 0.0) | (a.hi < 0.0))
+    split = (b.lo < 0.0) & (b.hi > 0.0) & ((a.lo > 0.0) | (a.hi < 0.0)) & ~a.is_empty
     whole = a / b
     left = a / _make(np.where(split, b.lo, 1.0), np.where(split, 0.0, 1.0))
     right = a / _make(np.where(split, 0.0, 1.0), np.where(split, b.hi, 1.0))

@@ -92,6 +92,9 @@ class Interval(Measures):
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         raise AttributeError(f"an Interval does not change; {name} cannot be set")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _make, (self.lo, self.hi, self.flags)
+
     # -- other ways to make one ------------------------------------------------------------------------------------
 
     @classmethod

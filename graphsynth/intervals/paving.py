@@ -20,7 +20,7 @@ from graphsynth.errors import FormatError, IntervalError
 from graphsynth.intervals.boxes import Paving, Progress
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
-from graphsynth.intervals.proving import System, image
+from graphsynth.intervals.proving import System, image, read_parameters
 from graphsynth.intervals.status import Status
 
 __all__ = ["Search", "pave"]
@@ -92,7 +92,7 @@ class Search:
             if not value > 0:
                 raise IntervalError(f"{name} = {value} must be positive")
         self.f, self.start, self.progress = f, start, progress
-        self.parameters = None if parameters is None else interval(parameters)
+        self.parameters = read_parameters(parameters)
         self.tolerance, self.max_boxes, self.max_seconds, self.batch = tolerance, max_boxes, max_seconds, batch
         size = np.asarray(start.width if scale is None else scale, dtype=np.float64)
         if size.shape != start.shape or not np.isfinite(size).all() or (size < 0.0).any():

@@ -126,10 +126,14 @@ def evaluate(f: System, x: Sequence[Any], parameters: Interval | None) -> Sequen
     """Return the equations at ``x``; parameters of shape (m,) or (N, m)."""
     if not callable(f):
         raise IntervalError(f"the system {f!r} cannot be called; give a function that returns equations")
-    if parameters is None:
-        results = f(x)
-    else:
-        results = f(x, [parameters[..., j] for j in range(parameters.shape[-1])])
+    values = () if parameters is None else ([parameters[..., j] for j in range(parameters.shape[-1])],)
+    try:
+        results = f(x, *values)
+    except TypeError as error:
+        raise IntervalError(
+            f"the system cannot be evaluated with intervals ({error}); write it with operators and the functions of "
+            "graphsynth.intervals, as f(x), or f(x, p) if there are parameters"
+        ) from error
     if not isinstance(results, Sequence | np.ndarray | Interval):
         raise IntervalError(f"the system returns {results!r}; it must return a list of equations, one for each unknown")
     if len(results) != len(x):
@@ -275,7 +279,7 @@ def krawczyk(
     """
     check_rounding()
     start = _start(box)
-    parameters = None if parameters is None else interval(parameters)
+    parameters = read_parameters(parameters)
     X, best, tested = start, None, 0
     for _ in range(rounds):
         step = image(f, X.reshape(1, -1), parameters)
@@ -301,6 +305,16 @@ def krawczyk(
     elif not step.guaranteed[0]:
         reason = "the equations or their derivatives are undefined, unbounded or discontinuous somewhere in the box"
     return _report(Status.UNDECIDED, step, X, tested, reason)
+
+
+def read_parameters(parameters: Any) -> Interval | None:
+    """Read a vector of parameters; `IntervalError` for another shape and for empty ones."""
+    if parameters is None:
+        return None
+    p = interval(parameters)
+    if p.ndim != 1 or p.is_empty.any():
+        raise IntervalError(f"the parameters {p!r} are not a vector of nonempty intervals; give a list, shape (m,)")
+    return p
 
 
 def _start(box: Any) -> Interval:

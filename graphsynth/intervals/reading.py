@@ -190,7 +190,7 @@ def shortened(x: float, side: int, digits: int = 6) -> str:
 
 def read_points(value: Any) -> tuple[Array, Array, Flags]:
     """Read numbers, text or nested sequences of them: bounds and decorations."""
-    if not isinstance(value, np.ndarray) and hasattr(value, "flags"):  # an Interval inside a list
+    if not isinstance(value, np.ndarray | np.generic) and hasattr(value, "flags"):  # an Interval inside a list
         return value.lo, value.hi, value.flags
     if isinstance(value, np.ndarray | np.generic) and value.dtype.kind == "f":
         array = np.array(value, dtype=np.float64)
