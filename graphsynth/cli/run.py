@@ -53,9 +53,9 @@ def _run(scene: Any, folder: Path, options: argparse.Namespace) -> Report:
     with _progress() as progress:
         if (options.workers or 1) == 1:
             return run_scene(scene, folder, None, progress, options.fresh)
-        from graphsynth.synthesis.parallel import processes
+        from graphsynth.ordered import processes
 
-        with processes(options.workers, prepare=lambda: None) as executor:
+        with processes(options.workers) as executor:
             return run_scene(scene, folder, executor, progress, options.fresh)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 from graphsynth.errors import SceneError
+from graphsynth.ordered import in_order
 from graphsynth.scenes.codec import decode, encode
 from graphsynth.scenes.journal import Journal
 from graphsynth.scenes.products import Outcome, Rejected
@@ -20,7 +21,7 @@ from graphsynth.scenes.stages import Context, Stage, load
 __all__ = ["Plan", "Streamed", "evaluate", "plan_stream", "stream"]
 
 _LONG = 0.05  # seconds: chunks of candidates grow until they take this long
-_MOST = 256
+_MOST = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,15 +191,13 @@ def stream(
     SceneError
         If the journal was written for other candidates.
     """
-    from graphsynth.synthesis.parallel import in_order
-
     done = Streamed()
     numbered = enumerate(items, 1)
     _skip(numbered, journal.done, done)
     executor: Executor | None = context.executor
     size = [1]
     work = partial(_evaluate_chunk, plan, replace(context, executor=None), shared)
-    with closing(_results(in_order, executor, work, _chunks(numbered, size))) as results:
+    with closing(in_order(executor, work, _chunks(numbered, size))) as results:
         for chunk in results:
             for line, seconds in chunk:
                 journal.append(line)
@@ -215,12 +214,6 @@ def stream(
                 return done
     journal.complete()
     return done
-
-
-def _results(
-    in_order: Callable[..., Iterator[Any]], executor: Executor | None, work: Callable[[Any], Any], chunks: Iterator[Any]
-) -> Generator[list[tuple[str, list[float]]], None, None]:
-    yield from in_order(executor, work, chunks)
 
 
 def _chunks(numbered: Iterator[tuple[int, Any]], size: list[int]) -> Iterator[list[tuple[int, Any]]]:

@@ -94,13 +94,19 @@ def _solutions_table(solutions: tuple[LinkAssortment, ...]) -> Table:
     )
 
 
+#: Rows of the table of candidates; a search with more kinds of outcomes is read in results.csv.
+_MOST = 40
+
+
 def _verdict_table(records: tuple[Record, ...]) -> Table:
+    """Count the candidates by what became of them; reasons of those turned down have a table of their own."""
     counts = Counter(
-        (r.solution, r.status, r.recognised_as, r.verdict, "" if r.status == "assessed" else r.cause or r.reason)
+        (r.solution, r.status, r.recognised_as, r.verdict, r.reason if r.status == "not recognised" else "")
         for r in records
     )
     columns = ("count", "assortment", "status", "recognised as", "verdict", "reason")
     rows = [(str(count), *key) for key, count in counts.items()]
     told = [i for i in range(len(columns)) if any(row[i] for row in rows)]
-    shown = tuple(tuple(row[i] for i in told) for row in rows)
-    return Table(f"Candidates: {len(records)}", tuple(columns[i] for i in told), shown)
+    shown = tuple(tuple(row[i] for i in told) for row in rows[:_MOST])
+    note = f"{len(rows) - _MOST} more kinds of outcomes are in results.csv." if len(rows) > _MOST else ""
+    return Table(f"Candidates: {len(records)}", tuple(columns[i] for i in told), shown, note)

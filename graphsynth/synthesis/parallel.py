@@ -2,41 +2,16 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager
 
+from graphsynth import ordered
+from graphsynth.ordered import AHEAD, in_order
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.problem import Piece, Problem, count_piece, graphs_of_piece, text_of_piece
 
-__all__ = ["counts", "graphs", "in_order", "processes", "texts"]
-
-T = TypeVar("T")
-AHEAD = 16  # pieces under way or waiting to be read: bounds memory whatever the number of pieces
-
-
-def in_order(executor: Executor | None, function: Callable[[Piece], T], pieces: Iterable[Piece]) -> Iterator[T]:
-    """Yield ``function(piece)`` for each piece, in order, whoever computes it.
-
-    At most ``AHEAD`` pieces are submitted before their results are read, so memory stays bounded.  Without an executor
-    the pieces are done here, one by one.
-    """
-    if executor is None:
-        yield from map(function, pieces)
-        return
-    waiting: deque[Future[T]] = deque()
-    try:
-        for piece in pieces:
-            waiting.append(executor.submit(function, piece))
-            if len(waiting) == AHEAD:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
-    finally:
-        for future in waiting:
-            future.cancel()
+__all__ = ["AHEAD", "counts", "graphs", "in_order", "processes", "texts"]
 
 
 def _text(piece: Piece) -> tuple[bytes, int]:
@@ -68,31 +43,13 @@ def graphs(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[Mecha
         yield from block
 
 
-@contextmanager
-def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterator[Executor | None]:
+def processes(workers: int) -> AbstractContextManager[Executor | None]:
     """Give a pool of worker processes, or None for one worker (then everything is done in this process).
 
-    The kernels of the enumerator are compiled here first (or `prepare` is called), so that the workers find them in
-    the cache.  When the block is left by an
+    The kernels are compiled here first, so that the workers find them in the cache.  When the block is left by an
     exception (Ctrl-C), the workers are stopped at once; what was already written stays.
     """
-    if workers <= 1:
-        yield None
-        return
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
-
-    (prepare or _compile_kernels)()
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in active_children():
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    return ordered.processes(workers, _compile_kernels)
 
 
 def _compile_kernels() -> None:
@@ -101,10 +58,3 @@ def _compile_kernels() -> None:
         count_piece(piece)
     for piece in smallest.pieces(listing=True):
         _text(piece)
-
-
-def _ignore_interrupts(*_: Any) -> None:
-    """Leave Ctrl-C to the parent process, which stops the workers."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
