@@ -163,7 +163,7 @@ def test_rule_9_statuses():
     assert overlap.status is Status.UNDECIDED
     assert pave(no_root, ["[0, 0.9]"]).verdict is Status.EMPTY
     # naive: a singular midpoint Jacobian discarded; the two roots lie in such a box
-    roots = pave(lambda x: [x[0] ** 2 - 1], ["[-2, 2]"])
+    roots = pave(lambda x: [x[0] ** 2 - 2], ["[-4, 4]"])
     assert roots.solutions == 2
     # naive: a root on a cut is in neither interior
     assert pave(lambda x: [x[0] - 1], ["[0, 2]"]).solutions == 1
