@@ -212,21 +212,19 @@ def _check(loads: PistonLoads) -> None:
     bad = np.flatnonzero(~np.isfinite(loads.torque))
     if len(bad):
         raise GeometryError(
-            f"friction leaves no single solution at the crank angle {loads.angle[bad[0]]:.6g} rad: the machine jams "
+            f"friction leaves no single solution at the crank angle {loads.angle[bad[0]] % (2.0 * math.pi):.6g} rad: the machine jams "
             "there, or may; reduce the friction coefficients, or make slot and cylinder square"
         )
 
 
 def _nodes(machine: PistonMachine) -> tuple[Array, Array]:
-    """Nodes and weights of a turn: panels end at kinks and shrink towards reversals of the sliding."""
+    """Nodes and weights of a turn: panels end at kinks and shrink towards places where loads change fast."""
     start = machine.mechanism.dead_centres()[0].angle
-    reversals = _reversals(machine)
-    zone = _zone(machine, reversals)
+    narrow = _narrow(machine)
     edges = {start, start + 2.0 * math.pi}
-    for at in (*reversals, *_valves(machine), *_sign_changes(machine)):
+    for at in (*(place for place, _ in narrow), *_valves(machine), *_sign_changes(machine)):
         edges.add(start + (at - start) % (2.0 * math.pi))
-    for at in reversals:
-        offset = zone
+    for at, offset in narrow:
         while offset < _WIDEST:
             edges |= {start + (at + side * offset - start) % (2.0 * math.pi) for side in (1.0, -1.0)}
             offset *= 2.0
@@ -239,12 +237,22 @@ def _nodes(machine: PistonMachine) -> tuple[Array, Array]:
     return (middle[:, None] + half[:, None] * x).ravel(), (half[:, None] * w).ravel()
 
 
-def _reversals(machine: PistonMachine) -> list[float]:
-    """Crank angles where a sliding pair reverses: dead centres, and for a yoke the extremes of its block."""
-    found = [dead.angle for dead in machine.mechanism.dead_centres()]
-    if not isinstance(machine.mechanism.drive, CrankSlider):
-        found += [0.5 * math.pi, 1.5 * math.pi]
-    return found
+def _narrow(machine: PistonMachine) -> list[tuple[float, float]]:
+    """Crank angles where loads change fast, and over which angle.
+
+    Friction changes sides at dead centres, and where the block of a yoke reverses; a rod that is hardly long enough
+    swings fast where it is steepest: ``l - |z|`` has its zeros ``sqrt(2 (l - |z|) / r)`` beside the real axis.
+    """
+    drive = machine.mechanism.drive
+    dead = [dead.angle for dead in machine.mechanism.dead_centres()]
+    sides = (0.5 * math.pi, 1.5 * math.pi)
+    if not isinstance(drive, CrankSlider):
+        zone = _zone(machine, [*dead, *sides])
+        return [(at, zone) for at in (*dead, *sides)]
+    zone = _zone(machine, dead)
+    slack = (drive.rod - drive.crank + drive.offset, drive.rod - drive.crank - drive.offset)
+    steep = [(at, max(0.5 * math.sqrt(2.0 * gap / drive.crank), 1e-9)) for at, gap in zip(sides, slack)]
+    return [*((at, zone) for at in dead), *steep]
 
 
 def _zone(machine: PistonMachine, reversals: list[float]) -> float:

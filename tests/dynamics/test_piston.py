@@ -285,6 +285,17 @@ def test_energy_over_a_turn(machine):
         assert turn.friction > 0.0 or own.friction == PistonFriction()
 
 
+@pytest.mark.parametrize("slack", [1e-2, 1e-4, 1e-6])
+def test_energy_with_a_rod_that_is_hardly_long_enough(slack):
+    mechanism = FloatingPiston.crank_slider(0.05, 0.06 * (1.0 + slack), 0.01, cylinder_angle=0.1)
+    machine = PistonMachine(
+        mechanism, PistonMasses(2.0, 1.0, 1.0, 1.0), AIR, PistonFriction(rings=10.0), speed=30.0
+    )  # fmt: skip
+    turn = piston_turn(machine)
+    assert turn.balance_error < 1e-9
+    assert abs(turn.gas - turn.gas_closed_form) < 1e-9 * turn.gas
+
+
 def test_works_against_another_quadrature():
     """The trapezoidal rule of a periodic function, with a friction law so soft that few points are enough."""
     machine = replace(MACHINES["askew"], friction=replace(RUB, regular_speed=1.0), gas=ConstantForce(500.0))
