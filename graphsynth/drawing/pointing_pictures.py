@@ -22,7 +22,13 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.pointing.mechanism import PointingMechanism
     from graphsynth.kinematics.pointing.results import Poses
 
-__all__ = ["comparison_picture", "fold_map_picture", "pointing_picture", "tolerance_map_picture"]
+__all__ = [
+    "comparison_picture",
+    "difference_map_picture",
+    "fold_map_picture",
+    "pointing_picture",
+    "tolerance_map_picture",
+]
 
 Array = NDArray[np.float64]
 
@@ -51,6 +57,7 @@ def pointing_picture(
     s_y: int = 1,
     s_x: int = -1,
     size: tuple[float, float] = (6.6, 6.0),
+    plain: bool = False,
 ) -> Figure:
     """Draw the mechanism in space in one pose: reflector, gimbal axes, both legs, rest position of the reflector.
 
@@ -63,6 +70,8 @@ def pointing_picture(
         Assembly mode.
     size : tuple of float, optional
         Inches.
+    plain : bool, optional
+        Leave out the legend and the axes, for small pictures.
 
     Returns
     -------
@@ -79,6 +88,8 @@ def pointing_picture(
     >>> pointing_picture(PointingMechanism(), 0.5, 0.3).axes[0].get_zlabel()
     'z'
     """
+    from matplotlib.ticker import MaxNLocator
+
     poses = mechanism.poses(phi_x, phi_y, s_y, s_x)
     if not poses.assembled:
         raise GeometryError(f"no picture at phi_x = {phi_x}, phi_y = {phi_y}: {poses.reasons()[0]}")
@@ -94,14 +105,19 @@ def pointing_picture(
     middle, reach = 0.5 * (low + high), 0.55 * float((high - low).max())
     for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle):
         set_limits(centre - reach, centre + reach)
-    axes.set_box_aspect((1, 1, 1))
+    axes.set_box_aspect((1, 1, 1), zoom=1.3 if plain else 1.08)
     axes.view_init(elev=22, azim=38)
     axes.set(xlabel="x", ylabel="y", zlabel="z")
     axes.tick_params(labelsize=7)
-    axes.legend(loc="upper left", fontsize=8, frameon=False)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    if plain:
+        axes.set_axis_off()
+    else:
+        figure.legend(loc="outside lower center", ncols=2, fontsize=8, frameon=False)
     cranks = f"cranks φx = {math.degrees(phi_x):.4g}°, φy = {math.degrees(phi_y):.4g}°"
     outputs = f"elevation {math.degrees(float(poses.a)):.4f}°, azimuth {math.degrees(float(poses.b)):.4f}°"
-    axes.set_title(f"{cranks}\n{outputs} (order {mechanism.order})", fontsize=10)
+    axes.set_title(outputs if plain else f"{cranks}\n{outputs} (order {mechanism.order})", fontsize=10)
     return figure
 
 
@@ -154,6 +170,7 @@ def comparison_picture(
     other_reading: Reading | None = None,
     largest: float = math.radians(40.0),
     samples: int = 161,
+    working: float = math.radians(15.0),
     size: tuple[float, float] = (11.0, 4.0),
 ) -> Figure:
     """Draw two models over equal crank angles as the source does (Figure 4): each model, then the means.
@@ -171,6 +188,8 @@ def comparison_picture(
     largest : float
         Crank angle at the end of the sweep, radians.
     samples : int
+    working : float
+        Working limit, radians: a dotted line.
     size : tuple of float, optional
         Inches.
 
@@ -194,7 +213,7 @@ def comparison_picture(
         axes.set_title(name, fontsize=10)
     _means(panels[2], degrees, found, (mechanism.order, other.order))
     for axes in panels:
-        axes.axvline(15.0, color=_REST, lw=0.8, ls=":")
+        axes.axvline(math.degrees(working), color=_REST, lw=0.8, ls=":")
         axes.grid(alpha=0.25)
         axes.set_xlabel("crank angle [deg]")
         axes.set_xlim(0.0, degrees[-1])
@@ -223,6 +242,66 @@ def _means(axes: Any, degrees: Array, found: ModelComparison, orders: tuple[str,
         twin.annotate(text, (degrees[-1], difference[-1]), (-6, 8), textcoords="offset points", ha="right", fontsize=9)
     lines = [*own, *twin.get_lines()]
     axes.legend(lines, [line.get_label() for line in lines], loc="upper left", fontsize=8, frameon=False)
+
+
+def difference_map_picture(
+    mechanism: PointingMechanism,
+    other: PointingMechanism | None = None,
+    *,
+    reading: Reading | None = None,
+    other_reading: Reading | None = None,
+    span: float = math.radians(40.0),
+    nodes: int = 81,
+    size: tuple[float, float] = (10.0, 4.4),
+) -> Figure:
+    """Draw the difference of two models over both crank angles, minutes of arc: of the means, and of the beams.
+
+    Parameters
+    ----------
+    mechanism, other, reading, other_reading
+        As for `comparison_picture`.
+    span : float
+        Largest crank angle, radians.
+    nodes : int
+        Grid points along each axis.
+    size : tuple of float, optional
+        Inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Left: difference of the means of elevation and azimuth.  Right: angle between the normals of the reflectors.
+    """
+    from dataclasses import replace
+
+    if nodes < 2:
+        raise GeometryError(f"nodes = {nodes} must be at least 2")
+    if other is None:
+        other = replace(mechanism, order="XY" if mechanism.order == "YX" else "YX")
+    grid = np.linspace(-_span(span), span, nodes)
+    found = mechanism.compare(other, grid[:, None], grid[None, :], reading=reading, other_reading=other_reading)
+    values = (found.arcminutes, _between_beams(found, (mechanism.order, other.order)))
+    figure, degrees = new_figure(size), np.degrees(grid)
+    for axes, drawn, name in zip(figure.subplots(1, 2, sharey=True), values, ("means", "beams")):
+        largest = max(float(np.nanmax(np.abs(drawn), initial=0.0)), 1e-9)
+        low, colours = (-largest, "RdBu_r") if name == "means" else (0.0, "magma_r")
+        axes.set_facecolor("#dddddd")
+        image = axes.pcolormesh(degrees, degrees, drawn.T, cmap=colours, vmin=low, vmax=largest, rasterized=True)
+        figure.colorbar(image, ax=axes, label="arc-minutes")
+        axes.set_title("difference of the means" if name == "means" else "angle between the two beams", fontsize=10)
+        axes.set_xlabel("φx, crank of leg Y [deg]")
+        axes.set_aspect("equal")
+    figure.axes[0].set_ylabel("φy, crank of leg X [deg]")
+    return figure
+
+
+def _between_beams(found: ModelComparison, orders: tuple[str, str]) -> Array:
+    """Angle between the normals of both reflectors, minutes of arc, from half their chord."""
+    from graphsynth.kinematics.pointing.results import orientation
+
+    first, second = (orientation(found.a[k], found.b[k], orders[k])[..., :, 2] for k in (0, 1))
+    chord = np.linalg.norm(first - second, axis=-1)
+    return np.asarray(60.0 * np.degrees(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))))
 
 
 def _span(span: float) -> float:
@@ -351,6 +430,7 @@ def tolerance_map_picture(
         axes.set_xlabel("φx, crank of leg Y [deg]")
         axes.set_aspect("equal")
     figure.axes[0].set_ylabel("φy, crank of leg X [deg]")
-    text = f"{widths:g}" if isinstance(widths, int | float) else ", ".join(f"{w:g}" for w in widths)
+    given = (widths,) if isinstance(widths, int | float) else tuple(dict.fromkeys(widths))
+    text = f"{given[0]:g}" if len(given) == 1 else ", ".join(f"{w:g}" for w in np.ravel(widths))
     figure.suptitle(f"lengths ±{text}; hatched: undecided", fontsize=11)
     return figure
