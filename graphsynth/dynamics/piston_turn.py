@@ -211,9 +211,10 @@ def _ratio(one: float, other: float, least: float) -> float:
 def _check(loads: PistonLoads) -> None:
     bad = np.flatnonzero(~np.isfinite(loads.torque))
     if len(bad):
+        at = loads.angle[bad[0]] % (2.0 * math.pi)
         raise GeometryError(
-            f"friction leaves no single solution at the crank angle {loads.angle[bad[0]] % (2.0 * math.pi):.6g} rad: the machine jams "
-            "there, or may; reduce the friction coefficients, or make slot and cylinder square"
+            f"friction leaves no single solution at the crank angle {at:.6g} rad: the machine jams there, or may; reduce "
+            "the friction coefficients, or make slot and cylinder square"
         )
 
 
