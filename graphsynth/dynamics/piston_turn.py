@@ -213,8 +213,8 @@ def _check(loads: PistonLoads) -> None:
     if len(bad):
         at = loads.angle[bad[0]] % (2.0 * math.pi)
         raise GeometryError(
-            f"friction leaves no single solution at the crank angle {at:.6g} rad: the machine jams there, or may; reduce "
-            "the friction coefficients, or make slot and cylinder square"
+            f"friction leaves no single solution at the crank angle {at:.6g} rad: the machine jams there, or may; "
+            "reduce the friction coefficients, or make slot and cylinder square"
         )
 
 
