@@ -42,6 +42,8 @@ _PUBLIC: dict[str, str] = {
     "ParallelPlatform": "kinematics.parallel_platform",
     "SingleMotorPlatform": "kinematics.single_motor_platform",
     "PointingMechanism": "kinematics.pointing",
+    "FloatingPiston": "kinematics.piston.model",
+    "PistonMachine": "dynamics.piston",
     "Interval": "intervals.interval",
     "krawczyk": "intervals.proving",
     "Status": "intervals.status",

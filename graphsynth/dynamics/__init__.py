@@ -42,6 +42,14 @@ _PUBLIC: dict[str, str] = {
     "Braider": "braider.model",
     "Thread": "braider.model",
     "FourBar": "braider.linkage",
+    "PistonMachine": "piston",
+    "PistonMasses": "piston",
+    "PistonFriction": "piston",
+    "CompressorCycle": "piston_gas",
+    "ConstantForce": "piston_gas",
+    "GivenForce": "piston_gas",
+    "compare_pistons": "piston_turn",
+    "piston_turn": "piston_turn",
 }
 
 __all__ = sorted(_PUBLIC)
