@@ -152,3 +152,30 @@ def test_pictures_of_the_scene(tables: dict[str, Any]) -> None:
     assert "@keyframes" in moving.svg and "5 ohm" in moving.caption
     for picture in (*report["plots"], *report["mechanism_pictures"]):
         assert picture.svg.startswith("<svg") and not re.search(r"\bnan\b", picture.svg)
+
+
+def test_the_real_machine_has_its_motor_in_its_own_scene() -> None:
+    """Of `didenko`: energy, mean speed by the balance of the motor, and the claim that fails for the speed."""
+    from graphsynth.scenes.products import Attempt
+    from graphsynth.scenes.scene import load_scene
+    from graphsynth.scenes.stages import Context
+    from graphsynth.scenes.steps.platform import PlatformMotion, _mechanism
+    from graphsynth.scenes.steps.platform_drive_machine import drive, tables
+
+    scene = load_scene("didenko")
+    assert {"drive_tables", "drive_curves"} <= set(scene.outputs.products)
+    machine = _mechanism(scene.mechanism)
+    moved = PlatformMotion(machine, *[None] * 8)  # type: ignore[arg-type]  # the drive needs the mechanism alone
+    runs = drive(Context(scene), (Attempt(None, moved),))  # type: ignore[arg-type]
+    assert [item.label for item in runs] == ["5 ohm", "20 ohm"]
+    assert runs[0].drive.constant_inertia == pytest.approx(4 * (3e-6 + 2e-7) + 3 * 4e-6, rel=1e-14)
+    for item in runs:
+        assert item.run.complete and item.run.energy_error < 1e-9 and item.run.electric_error < 1e-9
+        late = item.run.time >= 0.5
+        mean = (item.run.angle[-1] - item.run.angle[late][0]) / (item.run.time[-1] - 0.5)
+        assert mean == pytest.approx(0.5 * 60 / 0.55 / 2, rel=5e-3)  # no load: the speed at which the current vanishes
+    ripple = [np.ptp(item.run.speed[item.run.time >= 0.5]) for item in runs]
+    torque = [np.ptp(item.run.motor_torque[item.run.time >= 0.5]) for item in runs]
+    assert ripple[1] > 3 * ripple[0] and torque[1] < torque[0]
+    assert tables(Context(scene), runs)[0].title == "What the motor feels"
+    assert drive(Context(scene), ()) == ()

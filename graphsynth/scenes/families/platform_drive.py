@@ -10,7 +10,15 @@ from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import Stage
 from graphsynth.scenes.tables import require
 
-__all__ = ["FAMILY", "ClaimTable", "DCMotorTable", "LimitTable", "PlatformDriveTable", "WithoutInertiaTable"]
+__all__ = [
+    "FAMILY",
+    "ClaimTable",
+    "DCMotorTable",
+    "LimitTable",
+    "MachineDriveTable",
+    "PlatformDriveTable",
+    "WithoutInertiaTable",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +111,39 @@ class PlatformDriveTable:
     limit: LimitTable = field(default_factory=LimitTable)
 
     def __post_init__(self) -> None:
-        count = len(self.resistances_ohm)
-        require(1 <= count <= 4, f"has {count} resistances_ohm; give one to four, in ohm")
-        require(math.isfinite(self.end_s) and self.end_s > 0, f"has end_s = {self.end_s}; it must be positive")
-        require(20 <= self.samples <= 100_000, f"has samples = {self.samples}; use 20 to 100000 output times")
+        _check_runs(self.resistances_ohm, self.end_s, self.samples)
+
+
+@dataclass(frozen=True, slots=True)
+class MachineDriveTable:
+    """``[mechanism.drive]`` of ``module = "single_motor_platform"``: the motor and the masses of the real machine.
+
+    Efficiency is that of the gears; friction and load are at the crank; inertias of the pinion and of each wheel are
+    about their own axes.
+    """
+
+    motor: DCMotorTable
+    mass_kg: float
+    gyration_mm: float
+    mass_centre_mm: tuple[float, float] = (0.0, 0.0)
+    wheel_inertia_kg_m2: float = 0.0
+    pinion_inertia_kg_m2: float = 0.0
+    efficiency: float = 1.0
+    friction_Nm_s_per_rad: float = 0.0
+    load_Nm: float = 0.0
+    resistances_ohm: tuple[float, ...] = (5.0, 20.0)
+    end_s: float = 2.0
+    samples: int = 1001
+    tolerance: float = 1e-11
+
+    def __post_init__(self) -> None:
+        _check_runs(self.resistances_ohm, self.end_s, self.samples)
+
+
+def _check_runs(resistances: tuple[float, ...], end: float, samples: int) -> None:
+    require(1 <= len(resistances) <= 4, f"has {len(resistances)} resistances_ohm; give one to four, in ohm")
+    require(math.isfinite(end) and end > 0, f"has end_s = {end}; it must be positive")
+    require(20 <= samples <= 100_000, f"has samples = {samples}; use 20 to 100000 output times")
 
 
 _STEPS = "graphsynth.scenes.steps.platform_drive"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from graphsynth.scenes.families.platform_drive import MachineDriveTable
 from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import Stage
 from graphsynth.scenes.tables import check_positions, require
@@ -36,6 +37,7 @@ class PlatformTable:
     drive_branch: Literal[1, -1] = 1
     working_mode: tuple[Literal[1, -1], Literal[1, -1], Literal[1, -1]] = (-1, -1, -1)
     positions: int = 360
+    drive: MachineDriveTable | None = None
 
     def __post_init__(self) -> None:
         for name in ("arm_mm", "intermediate_mm", "rocker_mm", "coupler_mm"):
@@ -56,5 +58,8 @@ FAMILY = Family(
         Stage("judge", f"{_STEPS}.platform:judge", ("recognised", "motions"), ("records", "tables")),
         Stage("sketch mechanism", f"{_STEPS}.platform_pictures:sketches", ("motions",), ("mechanism_pictures",)),
         Stage("plot", f"{_STEPS}.platform_pictures:plots", ("motions",), ("plots",)),
+        Stage("drive", f"{_STEPS}.platform_drive_machine:drive", ("motions",), ("drive",)),
+        Stage("tell the drive", f"{_STEPS}.platform_drive_machine:tables", ("drive",), ("drive_tables",)),
+        Stage("plot the drive", f"{_STEPS}.platform_drive_machine:curves", ("drive",), ("drive_curves",)),
     ),
 )

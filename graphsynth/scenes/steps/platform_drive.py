@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from graphsynth.errors import SpecError
-from graphsynth.scenes.families.platform_drive import PlatformDriveTable
+from graphsynth.scenes.families.platform_drive import DCMotorTable, PlatformDriveTable
 from graphsynth.scenes.products import Table
 from graphsynth.scenes.stages import Context
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.platform_drive.run import DriveRun
 
 __all__ = [
-    "Claim", "LabelledRun", "WithoutInertia", "claim", "drive", "drive_of", "limit", "solvers", "table_of",
+    "Claim", "LabelledRun", "WithoutInertia", "claim", "dc_motor", "drive", "drive_of", "limit", "solvers", "table_of",
     "without_inertia",
 ]  # fmt: skip
 
@@ -62,15 +62,23 @@ def table_of(context: Context) -> PlatformDriveTable:
     return table
 
 
-def _motor(context: Context, resistance: float, inductance: float, speed: float | None = None) -> DCMotor:
+def dc_motor(
+    m: DCMotorTable, resistance: float, inductance: float | None = None, speed: float | None = None
+) -> DCMotor:
+    """Build the motor of a table for an armature resistance (ohm); another inductance or demanded speed if given."""
     from graphsynth.dynamics.motors import DCMotor
 
-    m = table_of(context).motor
     return DCMotor(
-        resistance, inductance, m.torque_constant_Nm_per_A, m.emf_constant_V_per_rad_s, m.gain_V_per_rad_s,
-        m.speed_rad_s if speed is None else speed, math.inf if m.voltage_limit_V is None else m.voltage_limit_V,
-        m.rotor_inertia_kg_m2, m.friction_Nm_s_per_rad,
-    )  # fmt: skip
+        resistance=resistance,
+        inductance=m.inductance_H if inductance is None else inductance,
+        torque_constant=m.torque_constant_Nm_per_A,
+        emf_constant=m.emf_constant_V_per_rad_s,
+        gain=m.gain_V_per_rad_s,
+        speed=m.speed_rad_s if speed is None else speed,
+        voltage_limit=math.inf if m.voltage_limit_V is None else m.voltage_limit_V,
+        rotor_inertia=m.rotor_inertia_kg_m2,
+        friction=m.friction_Nm_s_per_rad,
+    )
 
 
 def drive_of(
@@ -82,7 +90,7 @@ def drive_of(
 
     table = table_of(context)
     moved = table.platform
-    motor = _motor(context, resistance, table.motor.inductance_H if inductance is None else inductance, speed)
+    motor = dc_motor(table.motor, resistance, inductance, speed)
     return MotorDrivenPlatform(
         EffectiveInertia.of_slider(moved.mass_kg, moved.amplitude_mm / 1e3), motor, base_inertia=moved.inertia_kg_m2,
         friction=moved.friction_Nm_s_per_rad, load=moved.load_Nm,
