@@ -58,9 +58,8 @@ class GenerateTable:
         Keep mechanisms that have an automorphism of this order that fixes the frame.
     fixed_moving_links : int or None
         Of such an automorphism, the number of moving links that stay in place.
-    planar, fractionated : bool
-        ``planar = true`` leaves out graphs that cannot be drawn without crossings, ``fractionated = false`` those
-        that fall apart at a link or joint.
+    planar : bool
+        Leave out graphs that cannot be drawn without crossings.
     sample : int or None
         Draw this many mechanisms uniformly, with the seed of the scene, instead of listing all; repeats are dropped.
     limit : int
@@ -70,7 +69,6 @@ class GenerateTable:
     symmetry: int | None = None
     fixed_moving_links: int | None = None
     planar: bool = False
-    fractionated: bool = True
     sample: int | None = None
     limit: int = 10_000
 

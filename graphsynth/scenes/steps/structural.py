@@ -85,9 +85,8 @@ def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
     for graph in _all(context):
         if fixed is not None and not has_threefold_symmetry(graph, fixed):
             continue
-        if (options.planar and not graph.is_planar) or (not options.fractionated and graph.is_fractionated):
-            continue
-        yield graph
+        if not options.planar or graph.is_planar:
+            yield graph
 
 
 def _all(context: Context) -> Iterator[MechanismGraph]:
