@@ -8,7 +8,15 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 
-from graphsynth.jamming import ToleranceBox, Verdict, certify_jamming
+from graphsynth.jamming import (
+    ToleranceBox,
+    Verdict,
+    certified_largest_height,
+    certified_largest_misalignment,
+    certified_smallest_clearance,
+    certify_jamming,
+    sweep_linkage,
+)
 
 F = Fraction
 DIGITS = 60
@@ -155,12 +163,14 @@ def check_witness(found):
     for name, text in found.witness.parameters.items():
         low, _, high = text.strip("[]").partition(", ")
         exact[name] = (F(low), F(high or low))
-    for share in (F(0), F(1, 3), F(1)):
+    ranges = any(low < high for low, high in exact.values())
+    for share in (F(0), F(1, 3), F(1)) if ranges else (F(0),):
         values = {name: low + share * (high - low) for name, (low, high) in exact.items()}
         with mpmath.workdps(DIGITS):
-            point = point_of(found.box, values)
-            off = phase_of(point) - mpmath.mpf(found.arcs.phase.mid)  # each member after its own phase
-            f = found.witness.f.mid + off - mpmath.pi * mpmath.nint(off / mpmath.pi)
+            point, f = point_of(found.box, values), mpmath.mpf(found.witness.f.mid)
+            if ranges:  # each member after its own phase
+                off = phase_of(point) - mpmath.mpf(found.arcs.phase.mid)
+                f += off - mpmath.pi * mpmath.nint(off / mpmath.pi)
             gap, assembled = gap_at(point, f, found.condition)
             assert gap > 0 and assembled >= 0, (found.box, found.condition, gap, assembled)
 
@@ -263,3 +273,35 @@ def _check_angle(found, point, f):
     if assembled:
         assert here is not Verdict.CERTIFIED_FREE or gap < 0, (found.box, found.condition, f)
     assert here is not Verdict.CERTIFIED_JAMMED or (assembled and gap > 0), (found.box, found.condition, f)
+
+
+def check_sweep(rng, box, condition, count=4, angles=12):
+    """Compare the pieces of an interval sweep with members at random angles."""
+    found = sweep_linkage(box, condition, resolution=3e-2)
+    with mpmath.workdps(DIGITS):
+        for values in members(rng, box, count):
+            point = point_of(box, values)
+            for f in map(float, rng.uniform(0.0, 6.283, angles)):
+                gap, factor = gap_at(point, mpmath.mpf(f), condition)
+                for spans, right in (
+                    (found.free, factor < 0 or gap < 0), (found.inner, factor >= 0 and gap > 0),
+                    (found.missing, factor < 0),
+                ):  # fmt: skip
+                    assert right or not any(span.start < f < span.stop for span in spans), (box, condition, f)
+
+
+def check_limits(rng, box, condition, count=6):
+    """Every member of the box must be free at the value that is certified to work."""
+    limits = (
+        ("alpha", certified_largest_misalignment), ("clearance", certified_smallest_clearance),
+        ("Hb", certified_largest_height),
+    )  # fmt: skip
+    for name, question in limits:
+        limit = question(box, condition)
+        assert limit.reason or (limit.works is not None and limit.fails is not None)
+        if limit.works is None:
+            continue
+        with mpmath.workdps(DIGITS):
+            for values in members(rng, box, count):
+                gap, _ = worst_gap(point_of(box, {**values, name: F(limit.works)}), condition)
+                assert gap < 0, (box, condition, name, limit)

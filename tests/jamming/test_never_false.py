@@ -15,7 +15,7 @@ import pytest
 from graphsynth.jamming import Verdict
 
 sys.path.insert(0, str(Path(__file__).parent))  # not a package: the helper lies beside the test
-from known_verdicts import check_box, count_undecided, loosened, random_case, random_lengths
+from known_verdicts import check_box, check_limits, check_sweep, count_undecided, loosened, random_case, random_lengths
 
 KINDS = ("moderate", "extreme", "change point")
 
@@ -31,7 +31,7 @@ def test_margins_below_the_rounding_are_never_decided_wrongly(kind):
     assert count_undecided(15, 3, kind, (-40.0, -9.0)) > 0
 
 
-def boxes(count, seed):
+def drawn(count, seed):
     """Half of them any lengths (dead centres, no assembly), half near touching; half of each with tolerances."""
     rng = np.random.default_rng(seed)
     for k in range(count):
@@ -43,12 +43,32 @@ def boxes(count, seed):
             while case is None:
                 case = random_case(rng, KINDS[k % 3], (-6.0, -0.5))
             box, condition = case.box, case.condition
-        yield check_box(rng, loosened(rng, box) if k % 2 else box, condition)
+        yield rng, loosened(rng, box) if k % 2 else box, condition
+
+
+def boxes(count, seed):
+    for rng, box, condition in drawn(count, seed):
+        yield check_box(rng, box, condition)
 
 
 def test_boxes_hold_their_members():
     found = [one.verdict for one in boxes(40, 4)]
     assert {Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME} <= set(found)
+
+
+def test_sweeps_and_limits_hold_their_members():
+    for k, drawing in enumerate(drawn(8, 8)):
+        check_sweep(*drawing)
+        if k in (1, 6):
+            check_limits(*drawing)
+
+
+@pytest.mark.slow
+def test_many_sweeps_and_limits_hold_their_members():
+    for k, drawing in enumerate(drawn(300, 9)):
+        check_sweep(*drawing)
+        if k % 5 == 0:
+            check_limits(*drawing)
 
 
 @pytest.mark.slow
