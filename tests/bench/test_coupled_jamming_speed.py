@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains, simulate
 from graphsynth.jamming import Bearing
-from graphsynth.jamming.coupled import JointLimits, Misalignment, certify_coupled, largest_scale
+from graphsynth.jamming.coupled import JointLimits, Misalignment, certify_coupled, compare_loosening, largest_scale
 from graphsynth.jamming.coupled.closure import force_rows, joint_places, moment_rows, shifts, work_row
 from graphsynth.jamming.coupled.problem import problem
 from graphsynth.kinematics.embodiment import embody
@@ -93,6 +93,22 @@ def test_certified_turn_of_the_lambda_linkage(benchmark):
     motion = simulate(four_bar(), TURN)
     proof = timed(benchmark, lambda: certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.0115)), 1)
     assert proof.verdict.name == "CERTIFIED_FREE"
+
+
+def test_certified_motion_of_eight_links(benchmark, eight):
+    """The whole turn; part of it without timing."""
+    mechanism, tilt = eight
+    motion = simulate(mechanism, TURN if benchmark.enabled else np.linspace(0.0, 0.6, 5))
+    proof = timed(benchmark, lambda: certify_coupled(motion, JointLimits(0.006, 0.002), tilt), 1)
+    assert proof.verdict.name == "CERTIFIED_FREE"
+
+
+def test_loosening_every_limit_of_eight_links(benchmark, eight):
+    """Every limit by itself, over 360 poses."""
+    mechanism, tilt = eight
+    motion = simulate(mechanism, np.linspace(0.0, 6.28, 360 if benchmark.enabled else 6))
+    table = timed(benchmark, lambda: compare_loosening(motion, JointLimits(0.006, 0.002), tilt), 1)
+    assert len(table.rows) == 2 * (len(mechanism.joints) - 1) and table.rows[0].gain > 0.05
 
 
 def test_largest_misalignment_of_the_lambda_linkage(benchmark):

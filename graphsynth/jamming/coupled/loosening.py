@@ -148,7 +148,7 @@ def compare_loosening(
     rows = []
     for name, one in _each(given):
         promised = float((found.force if name[1] == "play" else found.moment)[worst, one.place])
-        rows.append(_loosened(name, one, here, promised))
+        rows.append(_loosened(name, one, here, promised if math.isfinite(promised) else 0.0))
     rows.sort(key=lambda row: (-round(row.gain, 9), -row.promised, row.joint, row.what))
     return LooseningTable(by, float(allowed[worst]), float(inputs[worst]), tuple(rows))
 

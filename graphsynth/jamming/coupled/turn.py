@@ -138,7 +138,7 @@ def certify_coupled(
     resolution : float
         Width of a piece, over the range, below which it is left undecided.
     max_pieces, seconds : optional
-        Limits of the work; what is not decided within them stays undecided.
+        Limits of the work; what is not decided within them stays undecided.  A member that jams is looked for after it.
 
     Returns
     -------

@@ -218,7 +218,7 @@ def test_tolerances_within_which_all_are_free_or_all_jam():
 @pytest.mark.parametrize(
     ("fit", "alpha", "alpha_range", "tolerance"),
     [
-        (Bearing(), 0.0120, (0.0118, 0.0123), 0.0),
+        pytest.param(Bearing(), 0.0120, (0.0118, 0.0123), 0.0, marks=pytest.mark.slow),
         (Bearing(), 0.0120, (-0.0123, 0.0121), 0.0),
         (bearing_limits(Bearing(), clearance_tolerance=0.003), 0.0120, None, 0.0),
         (Bearing(), 2 * T_A * (1 - 2e-3), None, 5e-3),
@@ -229,7 +229,7 @@ def test_some_members_jam(fit, alpha, alpha_range, tolerance):
     """The witness is a member of the boxes, and jams by the search over points of section 9.4 in many digits."""
     tilt = Misalignment(0, 1, alpha, alpha_range=alpha_range)
     motion = simulate(four_bar(), TURN)
-    found = certify_coupled(motion, fit, tilt, length_tolerance=tolerance, resolution=1e-2)
+    found = certify_coupled(motion, fit, tilt, length_tolerance=tolerance, resolution=2e-2)
     assert found.verdict.name == "CERTIFIED_JAMMED_FOR_SOME" and found.certified, found.reason
     assert not (found.state == -1).any() and found.share(1) > 0.4
     one = found.witness
@@ -251,9 +251,9 @@ def test_some_members_jam(fit, alpha, alpha_range, tolerance):
 
 def test_what_no_member_decides():
     """At the limit itself a member touches: neither free nor a proved jam, whatever the tolerance below it."""
-    motion = simulate(four_bar(), TURN)
+    motion = simulate(four_bar(), np.linspace(1.2, 1.9, 5))
     touching = Misalignment(0, 1, 0.0120, alpha_range=(0.0118, 2 * T_A * (1 - 1e-17)))
-    proof = certify_coupled(motion, Bearing(), touching, resolution=1e-3)
+    proof = certify_coupled(motion, Bearing(), touching, resolution=1e-2)
     assert proof.verdict.name == "UNDECIDED" and "touch" in proof.reason and proof.witness is None
 
 
