@@ -190,9 +190,11 @@ class Search:
         alive = status != Status.EMPTY
         X, domain, status, last = X[alive], domain[alive], status[alive], last[alive]
         if self.inner_by is None:
-            proved = status != Status.UNDECIDED
+            status[self._sharpened(X, status)] = Status.EMPTY  # its solutions are kept one by one
+            proved = (status == Status.UNIQUE) | (status == Status.EXISTS)
             self._keep(X[proved], domain[proved], status[proved], np.zeros(int(proved.sum()), dtype=np.bool_))
-            X, last = X[~proved], last[~proved]
+            left = status == Status.UNDECIDED
+            X, last = X[left], last[left]
             X = X[~self._prove_beyond(X, last)]
         elif len(X):  # a set is wanted, not the hull of a proof: go on cutting
             inside = self._inner(X)
@@ -242,6 +244,22 @@ class Search:
             active = active[gain]
         return _make(lo, hi), _make(dlo, dhi), status, norm
 
+    def _sharpened(self, X: Interval, status: NDArray[np.int8]) -> NDArray[np.intp]:
+        """Try to settle the halves of boxes that are only known to hold a solution; returns those of which both are."""
+        some = np.flatnonzero(status == Status.EXISTS)
+        if some.size == 0:
+            return some
+        boxes = X[some]
+        widest = (boxes.width / self.scale).argmax(axis=1)
+        lo, hi = _halves(boxes, widest, boxes.mid[np.arange(some.size), widest])
+        halves, domain, found, norm = self._contract(_make(lo, hi))
+        unique = found == Status.UNIQUE
+        self._keep(halves[unique], domain[unique], found[unique], np.zeros(int(unique.sum()), dtype=np.bool_))
+        settled = unique | (found == Status.EMPTY)
+        left = np.flatnonzero(~settled)
+        settled[left] = self._prove_beyond(halves[left], norm[left])
+        return np.asarray(some[settled.reshape(-1, 2).all(axis=1)])
+
     def _prove_beyond(self, X: Interval, norm: Array) -> Mask:
         """Epsilon-inflation: prove solutions near faces in enlarged boxes; returns the boxes that are settled."""
         settled = np.zeros(len(norm), dtype=np.bool_)
@@ -252,6 +270,7 @@ class Search:
                 break
             trial = trial.inflate(0.25, 1e-300)
             grow = _make(-0.05, 0.05) * trial.width.max(axis=1, keepdims=True)
+            grow = grow + _make(-4e-16, 4e-16) * trial.mag  # some steps of the numbers themselves
             trial = trial + grow
             step = image(self.f, trial, self.parameters)
             self.tested += near.size
@@ -262,7 +281,7 @@ class Search:
             settled[near[(step.status == Status.EMPTY) | outside | keep]] = True
             if keep.any():
                 self._keep_polished(step.box[keep], trial[keep], step.status[keep])
-            again = (step.status == Status.UNDECIDED) & (step.image.width < 4.0 * trial.width).all(axis=1)
+            again = ~good & (step.status != Status.EMPTY) & (step.image.width < 4.0 * trial.width).all(axis=1)
             near, trial = near[again], trial[again].hull(step.image[again])
         return settled
 
@@ -302,10 +321,7 @@ class Search:
 
     def _cut(self, X: Interval, widest: NDArray[np.intp], middle: Array) -> None:
         """Halve boxes; halves stay neighbours, at the back of the queue."""
-        row = np.arange(len(widest))
-        lo, hi = np.repeat(X.lo, 2, axis=0), np.repeat(X.hi, 2, axis=0)
-        hi[2 * row, widest] = middle
-        lo[2 * row + 1, widest] = middle
+        lo, hi = _halves(X, widest, middle)
         s = self._state
         s["waiting_lo"] = np.concatenate([s["waiting_lo"], lo])
         s["waiting_hi"] = np.concatenate([s["waiting_hi"], hi])
@@ -328,6 +344,15 @@ class Search:
         if dropped.any():
             for key in _ARRAYS[2:]:
                 s[key] = s[key][~dropped]
+
+
+def _halves(X: Interval, side: NDArray[np.intp], middle: Array) -> tuple[Array, Array]:
+    """Bounds of the halves of boxes; halves are neighbours."""
+    row = np.arange(len(side))
+    lo, hi = np.repeat(X.lo, 2, axis=0), np.repeat(X.hi, 2, axis=0)
+    hi[2 * row, side] = middle
+    lo[2 * row + 1, side] = middle
+    return lo, hi
 
 
 def pave(f: System, box: Any, parameters: Any = None, **options: Any) -> Paving:

@@ -179,7 +179,7 @@ def status_is_true(roots, start, width):
     return result.status
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.lists(st.integers(-64, 64), min_size=1, max_size=4), st.integers(-1, 1), st.integers(-1100, 1100),
     st.integers(1, 900), st.integers(0, 52),
@@ -260,7 +260,7 @@ def test_many_boxes_at_once_equal_one_by_one():
 # -- linear systems ------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 5))
 def test_linear_systems_hold_every_solution(seed, n):
     """Exact solutions of random members of the system, by fractions."""

@@ -190,6 +190,18 @@ def test_solutions_on_cuts_and_faces_are_found_once():
     assert border.boxes[0, 0].contains(1)
 
 
+def test_boxes_that_only_hold_a_solution_are_sharpened():
+    """The first halves of [-2, 2] have images equal to themselves: existence; their halves meet at the roots."""
+    roots = pave(lambda x: [x[0] ** 2 - 1], ["[-2, 2]"])
+    assert roots.status.tolist() == [Status.UNIQUE] * 2
+    assert roots.solutions == 2
+    many = pave(lambda x: [abs(x[0]) - x[0]], ["[-1, 2]"])  # every point from 0 on: existence is all there is
+    assert many.verdict is Status.EXISTS
+    assert many.solutions is None
+    triple = pave(lambda x: [x[0] ** 3], ["[-1, 1]"])
+    assert triple.verdict is Status.EXISTS
+
+
 def test_no_solution_and_multiple_solutions():
     assert pave(lambda x: [x[0] ** 2 + x[1] ** 2 + 1, x[0]], ["[-9, 9]", "[-9, 9]"]).verdict is Status.EMPTY
     double = pave(lambda x: [(x[0] - 1) ** 2], ["[0, 3]"], tolerance=1e-6)

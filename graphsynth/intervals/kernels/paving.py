@@ -88,7 +88,7 @@ def _beyond(equations, pl, ph, sl, sh, xl, xh, dl, dh, kl, kh, fl, fh, z, jl, jh
         for i in range(n):
             widest = max(widest, dh[i] - dl[i])
         for i in range(n):
-            grow = 0.125 * (dh[i] - dl[i]) + 0.05 * widest + 1e-300
+            grow = 0.125 * (dh[i] - dl[i]) + 0.05 * widest + 4e-16 * max(-dl[i], dh[i]) + 1e-300
             dl[i], dh[i] = add_down(dl[i], -grow), add_up(dh[i], grow)
         result, norm = test(equations, dl, dh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y)
         if result == UNIQUE:
