@@ -108,7 +108,7 @@ radius = st.fractions(min_value=Fraction(1, 4), max_value=4, max_denominator=24)
 tolerance = st.one_of(st.just(Fraction(0)), st.fractions(0, Fraction(1, 4), max_denominator=10**6))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(radius, radius, radius, tolerance, tolerance)
 def test_methods_agree_on_random_problems(R1, b, extra, e1, e2):
     problem = circle_ellipse(R1, b + extra, b, e1, e2)

@@ -134,7 +134,7 @@ small = st.fractions(min_value=0, max_value=Fraction(3, 2), max_denominator=40)
 size = st.fractions(min_value=Fraction(1, 4), max_value=4, max_denominator=24)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(size, size, size, small, small)
 def test_hull_agrees_with_clipping(R1, b, extra, e1, e2):
     a = b + extra
