@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,14 +13,17 @@ from graphsynth.drawing.drive_pictures import (
     drive_curves,
     reduction_picture,
     resistance_picture,
+    ripple_map_picture,
+    ripple_picture,
     sensor_picture,
     start_up_picture,
+    themed_svg,
 )
 from graphsynth.dynamics.braider.model import Braider
 from graphsynth.dynamics.braider.reactions import reactions
 from graphsynth.dynamics.motors import DCMotor
 from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
-from graphsynth.dynamics.platform_drive.resistance import resistance_effect
+from graphsynth.dynamics.platform_drive.resistance import resistance_effect, ripple_map
 from graphsynth.errors import SpecError
 
 DRIVE = MotorDrivenPlatform.source(DCMotor(5.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
@@ -86,3 +90,33 @@ def test_sensor_picture_shows_four_joints() -> None:
     timed = sensor_picture(braider, found, time=np.linspace(0.0, 1.0, 91))
     assert timed.axes[0].get_xlabel() == "time [s]"
     assert len(drawn(figure)) > 5000
+
+
+def test_map_shows_the_simulated_slopes() -> None:
+    found = ripple_map(DRIVE, [5.0, 10.0, 20.0], [0.2, 0.01], revolutions=20)
+    figure = ripple_map_picture(found)
+    (mesh,) = figure.axes[0].collections
+    order = np.argsort(found.frequency_ratio)  # the slow forcing is drawn below
+    np.testing.assert_array_equal(np.asarray(mesh.get_array()).ravel(), found.speed_slope[order].ravel())
+    assert figure.axes[0].get_ylabel() == "Om / w_n" and drawn(figure)
+
+
+@pytest.mark.parametrize("of", ["speed", "current"])
+def test_ripples_over_the_resistance(of: str) -> None:
+    effect = resistance_effect(DRIVE, [5.0, 20.0], simulate=True, revolutions=20)
+    (axes,) = ripple_picture({"0.2 H": effect}, of).axes
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), getattr(effect, of))
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), getattr(effect, f"simulated_{of}"))
+    with pytest.raises(SpecError, match="nothing to draw of 'torque'"):
+        ripple_picture({"0.2 H": effect}, "torque")
+
+
+def test_themed_svg_follows_the_page() -> None:
+    study = DRIVE.inductance_study([0.0, 0.05], [1e-4, 1e-6])
+    one, two = (themed_svg(reduction_picture(study)) for _ in range(2))
+    assert one == two and one.startswith('<svg class="gs"')
+    assert "var(--a)" in one and "#0072b2" not in one.split("</style>", 1)[1].lower()
+    ids = re.findall(r'id="([^"]+)"', one)
+    assert len(ids) == len(set(ids)) and all(re.match(r"[0-9a-f]{8}-", name) for name in ids)
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', one))
+    assert used <= set(ids)

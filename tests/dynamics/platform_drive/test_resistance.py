@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from graphsynth.dynamics.motors import DCMotor, IdealTorque
 from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
-from graphsynth.dynamics.platform_drive.resistance import resistance_effect, ripple_gain
+from graphsynth.dynamics.platform_drive.resistance import resistance_effect, ripple_gain, ripple_map, steady_ripple
 from graphsynth.errors import SpecError
 
 OHMS = [0.5, 1, 2, 5, 10, 20]
@@ -79,3 +79,49 @@ def test_refusals():
         resistance_effect(MotorDrivenPlatform.source(DCMotor(1.0, 0.1, 0.1, 0.1, 20.0, 20.0), mass=0.0), [1.0])
     with pytest.raises(SpecError, match="resistance = -1"):
         resistance_effect(drive(0.1, 20), [-1.0])
+
+
+def test_map_is_made_of_the_effects():
+    found = ripple_map(drive(0.2, 20), [5.0, 20.0], [0.2, 0.05, 0.01])
+    for k, inductance in enumerate((0.2, 0.05, 0.01)):
+        _, speed, current = TABLE[inductance, 20]
+        assert found.speed[k] == pytest.approx([speed[3], speed[5]], abs=0.0051)
+        assert found.current_slope[k, 0] == pytest.approx(math.log(current[5] / current[3]) / math.log(4.0), abs=0.006)
+    assert (found.speed_slope[:, 0] < 0).tolist() == [True, False, False] and found.agreement == 1.0
+    assert (found.current_slope < 0).all()
+
+
+def test_ripple_between_samples_is_found():
+    """Dense sampling by scipy: the printed 20.46 rad/s is a maximum of samples."""
+    from scipy.integrate import solve_ivp
+
+    def rhs(_t, y):
+        q, w, i = y
+        inertia = 0.002 + 0.005 * math.cos(q) ** 2
+        return [w, (0.1 * i + 0.0025 * math.sin(2 * q) * w * w) / inertia, (20 * (20 - w) - 0.5 * i - 0.1 * w) / 0.2]
+
+    end = 40 * math.tau / (400 / 20.1)
+    dense = solve_ivp(rhs, (0, end), [0, 0, 0], "DOP853", np.linspace(end / 2, end, 20001), rtol=1e-9, atol=1e-9)
+    effect = resistance_effect(drive(0.2, 20), [0.5], simulate=True)
+    assert effect.simulated_speed[0] == pytest.approx(np.ptp(dense.y[1]), abs=2e-3)
+    assert effect.simulated_current[0] == pytest.approx(np.ptp(dense.y[2]), abs=2e-3)
+
+
+MORE_REFUSED = {
+    "two or more increasing": lambda: ripple_map(drive(0.2, 20), [5.0], [0.2]),
+    "has no armature": lambda: ripple_map(MotorDrivenPlatform.source(IdealTorque(1.0)), [1.0, 2.0], [0.2]),
+    "no resistance to try": lambda: resistance_effect(drive(0.2, 20), []),
+    "machine would stand still": lambda: resistance_effect(drive(0.2, 0), [1.0]),
+    "leave the machine at rest": lambda: steady_ripple(drive(0.2, 0)),
+    "revolutions = 0": lambda: steady_ripple(drive(0.2, 20), 0),
+    "unbounded at dead centres": lambda: steady_ripple(
+        MotorDrivenPlatform.source(DCMotor(1.0, 0.2, 0.1, 0.1, 20.0, 20.0), base_inertia=0.0)
+    ),
+}
+
+
+@pytest.mark.parametrize("said", MORE_REFUSED)
+def test_refusals_of_ripples(said):
+    with pytest.raises(SpecError, match=said) as caught:
+        MORE_REFUSED[said]()
+    assert "\n" not in str(caught.value)
