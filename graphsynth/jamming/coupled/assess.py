@@ -46,8 +46,7 @@ def assess_coupled(
     motion : Motion
         Of `graphsynth.simulate`; any planar mechanism.
     bearings : Bearing, JointLimits, SlideLimits, or mapping of (link, link) to one of these
-        Limits of every joint; one value for all, or by joint.  Gear, cam and slot contacts that are not named guide
-        nothing out of the plane.
+        Limits of every joint.  Gear, cam and slot contacts that are not named guide nothing out of the plane.
     tilts : Misalignment or several
         Which axes are tilted; a rigid one (a motor shaft) takes no clearance of its own.
     condition : {"A", "B", "general"}

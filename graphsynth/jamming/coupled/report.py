@@ -25,7 +25,8 @@ class Loosen(NamedTuple):
     """What loosening one joint gains at the worst input.
 
     ``gain`` is the relative growth of the allowed misalignment per relative growth of the joint's limit ``what``
-    ("tilt", "roll", "pitch" or "play"): 0.5 means that one percent more limit allows half a percent more misalignment.
+    ("tilt", "roll", "pitch" or "play"): 0.5 means that one percent more limit allows at most half a percent more
+    misalignment there.  `graphsynth.jamming.coupled.compare_loosening` solves for what it allows over the motion.
     """
 
     joint: tuple[int, int]

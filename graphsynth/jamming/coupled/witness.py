@@ -44,7 +44,7 @@ class Witness:
     factor : float
         Proved lower bound of the factor on limits and plays there; above 1.
     misalignments, limits : tuple
-        Of this member, without tolerance.
+        Of this member, without tolerance; limits in the order of ``mechanism.joints``.
     mechanism : Mechanism
         With the dimensions of this member.
     """
@@ -63,7 +63,7 @@ class Witness:
             "misalignments": [
                 {"base": m.base, "link": m.link, "alpha": m.alpha, "direction": m.direction} for m in self.misalignments
             ],
-            "limits": [_values(own) for own in self.limits],
+            "limits": [{"joint": list(j.pair), **_values(own)} for j, own in zip(self.mechanism.joints, self.limits)],
             "dimensions": [[list(joint.at_a), list(joint.at_b)] for joint in self.mechanism.joints],
         }
 

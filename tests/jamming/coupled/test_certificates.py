@@ -390,3 +390,34 @@ def test_no_work_proves_nothing_and_says_so():
     motion = simulate(four_bar(), [0.0, 0.5])
     found = certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.01), seconds=0.0)
     assert found.verdict.name == "UNDECIDED" and "nothing is proved" in found.reason and "free" not in found.reason
+
+
+@pytest.mark.slow
+def test_members_of_many_boxes():
+    """Slider-crank with boxes of everything: the verdict follows alpha, and every witness jams when solved alone."""
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), Prismatic(0, 3, (0.0, 0.2))]
+    motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.linspace(0.0, 6.2, 13))
+    pins = {
+        (1, 2): JointLimits(0.01, 0.01, (0.009, 0.011)), (2, 3): JointLimits(0.01),
+        (0, 3): SlideLimits(0.01, 0.01, 0.0, (0.008, 0.012)),
+    }  # fmt: skip
+    seen = []
+    for alpha in (0.005, 0.0135, 0.016, 0.03):
+        tilts = [
+            Misalignment(0, 1, alpha, 0.8, direction_range=(0.7, 0.9)),
+            Misalignment(0, 3, 0.001, rigid=False, alpha_range=(-0.002, 0.002)),
+        ]
+        found = certify_coupled(motion, pins, tilts, length_tolerance=1e-3, resolution=2e-2)
+        seen.append(found.verdict.name)
+        one = found.witness
+        if one is None:
+            continue
+        member = {joint.pair: own for joint, own in zip(one.mechanism.joints, one.limits)}
+        assert member[0, 3] == SlideLimits(0.008, 0.01) and member[1, 2] == JointLimits(0.009, 0.01)
+        assert all(low.alpha_range[0] <= own.alpha <= low.alpha_range[1] for own, low in zip(one.misalignments, tilts))
+        near = motion.poses[np.argmin(abs(motion.inputs - one.input))]
+        limits = {pair: own for pair, own in member.items() if pair != (0, 1)}
+        alone = assess_coupled(simulate(one.mechanism, [one.input], start=near), limits, one.misalignments)
+        assert 1.0 < one.factor <= 1.0 / alone.allowed_scale[0] * (1 + 1e-12)
+    assert seen == ["CERTIFIED_FREE", "CERTIFIED_JAMMED_FOR_SOME", "CERTIFIED_JAMMED_FOR_SOME", "CERTIFIED_JAMMED"]
