@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 _SOURCE_NOTE = (
     "The dashed curve is the ordinate of the source: the free gap of the surrogate ellipse, recorded as 0 where "
     "nothing crosses.\nIt jumps to πRc at the onset and falls towards the worst pose; it measures no jamming. "
-    "The shaded windows are details of the source's plot, not jam zones.\nValues of tens or hundreds of mm² that it shows are "
-    "widths of interval sums over many boxes, not areas."
+    "The shaded windows are details of the source's plot, not jam zones.\nValues of tens or hundreds of mm² that "
+    "it shows are widths of interval sums over many boxes, not areas."
 )
 
 
