@@ -184,6 +184,7 @@ def error_picture(
 ) -> Figure:
     """Errors of the methods, log-log: over run time, or over the parameter (regularisation speed, step).
 
+    An error of exactly zero has no place on a logarithmic axis and is left out.
     What failed or is unreliable is a cross in the colour of its method: at its error if it has one, else at the upper
     edge.
 
@@ -203,9 +204,9 @@ def error_picture(
     if over not in ("time", "parameter"):
         raise SpecError(f"The abscissa {over!r} is not known; give 'time' or 'parameter'.")
     rows = [row for study in studies for row in study.rows]
-    good = [row for row in rows if row.status.value == "complete"]
+    good = [row for row in rows if row.status.value == "complete" and row.error > 0.0]
     if not good:
-        raise SpecError("No run of the studies succeeded, so there is nothing to draw.")
+        raise SpecError("No run of the studies succeeded with an error above zero, so there is nothing to draw.")
     figure = new_figure(size)
     axes = figure.subplots()
     _plain(axes)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.events import RunStatus
 from graphsynth.dynamics.stick_slip import StickSlipMotion
+from graphsynth.dynamics.stick_slip_forms import model_error
 from graphsynth.dynamics.stick_slip_precise import PreciseMotion
 from graphsynth.dynamics.tribometer import Tribometer
 from graphsynth.errors import SpecError
@@ -19,7 +20,14 @@ from graphsynth.errors import SpecError
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["AccuracyRow", "AccuracyStudy", "regularisation_study", "step_study", "tolerance_study"]
+__all__ = [
+    "AccuracyRow",
+    "AccuracyStudy",
+    "method_study",
+    "regularisation_study",
+    "step_study",
+    "tolerance_study",
+]
 
 Array = NDArray[np.float64]
 
@@ -98,6 +106,95 @@ def _row(method: str, parameter: float, runs: list[StickSlipMotion], truth: Arra
         method, parameter, gap, late, found.size, motion.evaluations, min(run.seconds for run in runs), motion.status,
         motion.statement,
     )  # fmt: skip
+
+
+def _failed(method: str, parameter: float, sentence: str) -> AccuracyRow:
+    return AccuracyRow(method, parameter, math.nan, math.nan, 0, 0, math.nan, RunStatus.FAILED, sentence)
+
+
+def method_study(
+    model: Tribometer,
+    duration: float = 10.0,
+    *,
+    tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12),
+    steps: Sequence[float] = (1e-3, 1e-4, 1e-5),
+    speeds: Sequence[float] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+    solvers: Sequence[str] = ("LSODA",),
+    rounds: int = 3,
+    most_calls: int = 600_000,
+) -> AccuracyStudy:
+    """Error and run time of all three methods on one tribometer, failures and refusals included.
+
+    The reference is the automaton with the tolerance 1e-14: for its own rows it is itself, for the others a different
+    method.  Rows of the regularised form say "unreliable" if the error is more than three times that of the form with
+    the other solvers at the same speed, or more than ten times `model_error` if there is no other.
+
+    Parameters
+    ----------
+    model : Tribometer
+    duration : float
+        s.
+    tolerances, steps, speeds : sequence of float
+        Of the automaton; of time stepping, s; of the regularised form, m/s.
+    solvers : sequence of str
+    rounds : int
+        Runs for the wall time, of which the shortest counts.
+    most_calls : int
+        A solver that needs more is shown as failed.
+
+    Raises
+    ------
+    SpecError
+        There is no reference: the automaton did not finish.
+
+    Examples
+    --------
+    >>> study = method_study(Tribometer(), 0.5, tolerances=[1e-8], steps=[1e-4], speeds=[1e-3], rounds=1)
+    >>> [row.method for row in study.rows]
+    ['event-driven', 'time stepping', 'LSODA']
+    """
+    times = _times(duration)
+    truth, events, text = _reference(model, duration, times)
+    rows = []
+    for rtol in () if model.closed_form else tolerances:
+        runs = [model.event_driven(duration, times=times, rtol=rtol, estimate=False) for _ in range(rounds)]
+        rows.append(_row("event-driven", rtol, runs, truth, events))
+    for step in steps:
+        runs = [model.time_stepping(duration, step=step, times=times, estimate=False) for _ in range(rounds)]
+        rows.append(_row("time stepping", step, runs, truth, events))
+    smooth = [
+        _regularised_row(model, duration, times, speed, solver, rounds, most_calls, truth, events)
+        for solver in solvers
+        for speed in speeds
+    ]
+    return AccuracyStudy((*rows, *(_doubted(row, smooth) for row in smooth)), text)
+
+
+def _regularised_row(
+    model: Tribometer, duration: float, times: Array, speed: float, solver: str, rounds: int, most_calls: int,
+    truth: Array, events: Array,
+) -> AccuracyRow:  # fmt: skip
+    try:
+        runs = [
+            model.regularised(duration, speed=speed, solver=solver, times=times, check=False, most_calls=most_calls)
+            for _ in range(rounds if solver == "LSODA" else 1)
+        ]
+    except SpecError as refusal:
+        return _failed(solver, speed, str(refusal))
+    return _row(solver, speed, runs, truth, events)
+
+
+def _doubted(row: AccuracyRow, all_rows: list[AccuracyRow]) -> AccuracyRow:
+    """Mark a success whose error is far above that of the form itself."""
+    if row.status is not RunStatus.COMPLETE:
+        return row
+    others = [other.error for other in all_rows if other.parameter == row.parameter and other.method != row.method]
+    others = [error for error in others if not math.isnan(error)]
+    bound = 3.0 * min(others) if others else 10.0 * model_error(row.parameter)
+    if row.error <= bound:
+        return row
+    text = f"{row.method} reports success with an error of {row.error:.1e} m, above that of the form itself."
+    return replace(row, status=RunStatus.UNRELIABLE, statement=text)
 
 
 def _reference(model: Tribometer, duration: float, times: Array) -> tuple[Array, Array, str]:

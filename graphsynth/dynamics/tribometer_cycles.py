@@ -182,7 +182,7 @@ def _describe(model: Tribometer, state: Array, stuck: bool, turns: int, guard: E
     kind = "sliding" if not sticking.any() else "stuck" if not motion.events else "stick-slip"
     factors = (1.0 + 0j,) if kind == "stuck" else _multipliers(model, state, stuck, period, guard)
     stable = all(abs(factor) < 1.0 for factor in factors)
-    statement = f"{kind}: period {period:.12g} s ({turns} turns), {len(motion.events)} events"
+    statement = f"{kind}: period {period:.12g} s ({turns} turn{'s' if turns > 1 else ''}), {len(motion.events)} events"
     statement += (
         "; any nearby state with the platform stuck is periodic too."
         if kind == "stuck"

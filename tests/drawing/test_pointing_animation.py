@@ -49,7 +49,7 @@ def test_what_rests_does_not_move():
 
 def test_refusals():
     with pytest.raises(GeometryError, match="at least two poses"):
-        pointing_animation(PointingMechanism(l3=0.12, l5=0.12), [0.0, 3.0], [0.0, 3.0])
+        pointing_animation(PointingMechanism(l3=0.1, l5=0.1), [0.0, 1.3], [0.0, 1.3])
     with pytest.raises(GeometryError, match="nodes = 1"):
         difference_map_picture(ART, nodes=1)
 
