@@ -84,6 +84,8 @@ class Dual:
     def __pow__(self, exponent: int) -> Dual:
         if exponent == 0:
             return self.chain(self.value**0, Interval(0))
+        if exponent == 2:
+            return self.sqr()
         return self.chain(self.value**exponent, (self.value ** (exponent - 1)) * int(exponent))
 
     def __abs__(self) -> Dual:
@@ -170,5 +172,7 @@ def jacobian(f: Callable[..., Sequence[Any]], box: Any, parameters: Any = None) 
 
 
 def _spread(part: Interval, shape: tuple[int, ...]) -> Interval:
+    if part.shape == shape:
+        return part
     flags = part.flags if part.flags.ndim == 0 else np.broadcast_to(part.flags, shape)
     return _make(np.broadcast_to(part.lo, shape), np.broadcast_to(part.hi, shape), flags)

@@ -177,6 +177,7 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
     >>> [Status(s).name for s in image(lambda x: [x[0] ** 2 - 2], boxes).status]
     ['UNIQUE', 'EMPTY']
     """
+    check_rounding()
     count, n = boxes.shape
     shape = (count,)
     with np.errstate(all="ignore"):
@@ -198,7 +199,9 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
     none = (~over.contains(np.zeros(over.shape))).any(axis=1) | meet.is_empty.any(axis=1) | void
     exact = bool(over.exact_input.all() and slopes.exact_input.all())
     inside = smooth & K.interior(boxes).all(axis=1)
-    within = smooth & K.subset(boxes).all(axis=1) & _regular(Y, slopes)
+    within = smooth & K.subset(boxes).all(axis=1) & ~inside
+    if within.any():  # a preconditioner proved nonsingular is needed for existence alone
+        within = within & _regular(Y, slopes)
     status = np.where(
         none, Status.EMPTY, np.where(inside, Status.UNIQUE, np.where(within, Status.EXISTS, Status.UNDECIDED))
     )

@@ -57,7 +57,9 @@ def test_a_changed_mode_is_refused_at_import_and_at_each_solve(change, word):
 import ctypes, sys
 import numpy as np
 from graphsynth.errors import GraphsynthError
-from graphsynth.intervals import Interval, krawczyk, pave, solve_linear, gauss_seidel, Search
+from graphsynth.intervals import (
+    Interval, Search, gauss_seidel, image, jacobian, krawczyk, pave, pave_cells, pave_compiled, solve_linear,
+)
 box = Interval([1], [2])
 A = Interval([[2]])
 search = Search(lambda x: [x[0] * x[0] - 2], box)
@@ -65,7 +67,8 @@ search = Search(lambda x: [x[0] * x[0] - 2], box)
 f = lambda x: [x[0] * x[0] - 2]
 calls = [
     lambda: krawczyk(f, box), lambda: pave(f, box), lambda: solve_linear(A, box), lambda: gauss_seidel(A, box, box),
-    lambda: next(iter(search)),
+    lambda: next(iter(search)), lambda: image(f, box.reshape(1, 1)), lambda: jacobian(f, box),
+    lambda: pave_cells(lambda x, p: [x[0] - p[0]], box, box), lambda: pave_compiled(f, box),
 ]
 for call in calls:
     try:
