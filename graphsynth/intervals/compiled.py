@@ -97,9 +97,9 @@ def pave_compiled(
     >>> [Status(s).name for s in found.status], found.finished
     (['UNIQUE', 'UNIQUE'], True)
     """
+    check_rounding()
     from graphsynth.intervals.kernels import paving
 
-    check_rounding()
     begin = perf_counter()
     start, sizes = _posed(box, tolerance, scale, max_boxes, max_seconds)
     p = read_parameters(parameters)
