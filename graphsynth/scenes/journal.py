@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -30,20 +31,19 @@ def signature(scene: Scene, stages: Sequence[Stage], kept: Sequence[str]) -> str
 
     Titles, budgets, outputs and the limit on the number of candidates may change between runs.
     """
-    tables: dict[str, Any] = {key: scene.raw[key] for key in ("structure", "mechanism") if key in scene.raw}
-    structure = tables.get("structure")
-    if isinstance(structure, dict) and isinstance(structure.get("generate"), dict):
-        generate = {key: value for key, value in structure["generate"].items() if key != "limit"}
-        tables["structure"] = {**structure, "generate": generate}
+    structure = scene.structure
+    if structure is not None:
+        structure = replace(structure, generate=replace(structure.generate, limit=1))
     content = {
         "version": graphsynth.__version__,
         "seed": scene.scene.seed,
-        "tables": tables,
+        "mechanism": repr(scene.mechanism),
+        "structure": repr(structure),
         "boxes": scene.budget.boxes,
         "stages": [(stage.name, stage.function) for stage in stages],
         "kept": list(kept),
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 class Journal:

@@ -22,7 +22,7 @@ class StageTime:
     peak_mb : float
         Largest resident memory of this process while it ran, in MB; of all stages for each candidate together.
     modules : tuple of str
-        Rooms of graphsynth and third-party packages it was the first to import in this process.
+        Rooms of graphsynth and third-party packages it was the first to import, in the process where it ran.
     runs : int
         How many candidates it looked at; 1 for a stage over all.
     """
@@ -77,10 +77,10 @@ def _usage() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * scale / _MB
 
 
-def new_modules(before: frozenset[str], after: frozenset[str] | None = None) -> tuple[str, ...]:
-    """Return the rooms of graphsynth and the third-party packages imported in between (or until now), sorted."""
-    have = set(sys.modules) if after is None else after
-    return tuple(room for room in rooms(have - before) if room not in rooms(before))
+def new_modules(before: frozenset[str]) -> tuple[str, ...]:
+    """Return the rooms of graphsynth and the third-party packages that were imported since, sorted."""
+    had = rooms(before)
+    return tuple(room for room in rooms(set(sys.modules) - before) if room not in had)
 
 
 def rooms(modules: Iterable[str]) -> tuple[str, ...]:

@@ -11,9 +11,9 @@ from typing import Any
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.journal import Journal, signature
-from graphsynth.scenes.measure import StageTime, memory_in_use, new_modules, peak_memory, reset_peak
+from graphsynth.scenes.measure import StageTime, memory_in_use, new_modules, peak_memory, reset_peak, rooms
 from graphsynth.scenes.stages import Context, Progress, Stage, load
-from graphsynth.scenes.streaming import Plan, Streamed, given_by, plan_stream, stream
+from graphsynth.scenes.streaming import Plan, Spent, Streamed, given_by, plan_stream, stream
 
 __all__ = ["Running"]
 
@@ -125,8 +125,7 @@ class Running:
         for stage in plan.stages:
             before, start = frozenset(sys.modules), time.perf_counter()
             load(stage)
-            loads[stage.name] = (time.perf_counter() - start, before)
-        before = frozenset(sys.modules)
+            loads[stage.name] = StageTime(stage.name, time.perf_counter() - start, 0.0, modules=new_modules(before))
         reset_peak()
         mark = signature(self._context.scene, plan.stages, plan.kept)
         with Journal(self._journal, self._context.scene.name, mark, self._fresh) as journal:
@@ -142,7 +141,7 @@ class Running:
             )
         self._note_stream(found)
         self._products.update({name: tuple(found.outcomes) for name in plan.kept})
-        self._record_times(plan, found, loads, before)
+        self._record_times(plan, found, loads)
 
     def _note_stream(self, found: Streamed) -> None:
         if found.resumed:
@@ -153,23 +152,16 @@ class Running:
                 "with a larger [budget] to go on."
             )
 
-    def _record_times(
-        self, plan: Plan, found: Streamed, loads: dict[str, tuple[float, frozenset[str]]], before: frozenset[str]
-    ) -> None:
+    def _record_times(self, plan: Plan, found: Streamed, loads: dict[str, StageTime]) -> None:
         peak = peak_memory()
         source = next((i for i, t in enumerate(self.times) if t.stage == self._giver(plan.source)), None)
-        if source is not None and self._source_seconds:
-            time_of = self.times[source]
-            self.times[source] = replace(time_of, seconds=time_of.seconds + self._source_seconds)
-        late = new_modules(before)
-        for place, stage in enumerate(plan.stages):
-            seconds, had = loads[stage.name]
-            after = loads[plan.stages[place + 1].name][1] if place + 1 < len(plan.stages) else before
-            own = new_modules(had, after)
-            last = place + 1 == len(plan.stages)
-            modules = tuple(sorted({*own, *late})) if last else own
-            spent, runs = found.seconds.get(stage.name, 0.0), found.runs.get(stage.name, 0)
-            self.times.append(StageTime(stage.name, seconds, spent, peak, modules, runs))
+        if source is not None:
+            made = self.times[source]
+            self.times[source] = replace(made, seconds=made.seconds + self._source_seconds)
+        for stage in plan.stages:
+            loaded, spent = loads[stage.name], found.spent.get(stage.name, Spent())
+            modules = tuple(sorted({*loaded.modules, *rooms(spent.modules)}))
+            self.times.append(replace(loaded, seconds=spent.seconds, peak_mb=peak, modules=modules, runs=spent.runs))
 
     def _giver(self, product: str) -> str:
         return next(stage.name for stage in self.stages if product in stage.gives)

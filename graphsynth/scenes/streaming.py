@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import heapq
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from graphsynth.errors import SceneError
@@ -18,7 +20,7 @@ from graphsynth.scenes.journal import Journal
 from graphsynth.scenes.products import Outcome, Rejected
 from graphsynth.scenes.stages import Context, Stage, load
 
-__all__ = ["Plan", "Streamed", "evaluate", "plan_stream", "stream"]
+__all__ = ["Plan", "Spent", "Streamed", "evaluate", "plan_stream", "stream"]
 
 _LONG = 0.05  # seconds: chunks of candidates grow until they take this long
 _MOST = 32
@@ -97,28 +99,43 @@ def _cheapest_first(each: Sequence[Stage], ready: set[str]) -> tuple[Stage, ...]
     return tuple(order)
 
 
+@dataclass(slots=True)
+class Spent:
+    """What one stage for each candidate cost, summed over candidates; the modules it was the first to import."""
+
+    seconds: float = 0.0
+    runs: int = 0
+    modules: tuple[str, ...] = ()
+
+    def add(self, other: Spent) -> None:
+        """Add what it cost elsewhere."""
+        self.seconds += other.seconds
+        self.runs += other.runs
+        self.modules += other.modules
+
+
 def evaluate(
-    plan: Plan, context: Context, shared: Mapping[str, Any], number: int, item: Any
-) -> tuple[Outcome, list[float]]:
-    """Take one candidate through the stages until one stops it; also the seconds each stage took."""
+    plan: Plan, context: Context, shared: Mapping[str, Any], number: int, item: Any, spent: dict[str, Spent]
+) -> Outcome:
+    """Take one candidate through the stages until one stops it; add what each stage cost to `spent`."""
     have: dict[str, Any] = {**shared, plan.source: item}
     outcome = Outcome(number, str(getattr(item, "key", "")), str(getattr(item, "solution", "")))
-    seconds: list[float] = []
     for stage in plan.stages:
-        start = time.perf_counter()
+        start, imported = time.perf_counter(), len(sys.modules)
         try:
             values = given_by(stage, load(stage)(context, *(have[need] for need in stage.needs)))
         except Rejected as why:
-            return replace(outcome, status="rejected", stage=stage.name, cause=why.cause, reason=str(why)), seconds
+            return replace(outcome, status="rejected", stage=stage.name, cause=why.cause, reason=str(why))
         except Exception as error:
             if _interrupted(error):
                 raise KeyboardInterrupt from error
             cause = type(error).__name__
-            return replace(outcome, status="failed", stage=stage.name, cause=cause, reason=f"{cause}: {error}"), seconds
+            return replace(outcome, status="failed", stage=stage.name, cause=cause, reason=f"{cause}: {error}")
         finally:
-            seconds.append(time.perf_counter() - start)
+            new = tuple(islice(sys.modules, imported, None)) if len(sys.modules) > imported else ()
+            spent.setdefault(stage.name, Spent()).add(Spent(time.perf_counter() - start, 1, new))
         have.update(values)
-    return replace(outcome, products={name: have[name] for name in plan.kept}), seconds
+    return replace(outcome, products={name: have[name] for name in plan.kept})
 
 
 def _interrupted(error: BaseException | None) -> bool:
@@ -144,22 +161,18 @@ def given_by(stage: Stage, result: Any) -> dict[str, Any]:
 
 def _evaluate_chunk(
     plan: Plan, context: Context, shared: Mapping[str, Any], chunk: list[tuple[int, Any]]
-) -> list[tuple[str, list[float]]]:
+) -> tuple[list[str], dict[str, Spent]]:
     """Evaluate some candidates anywhere; outcomes come back as the text that is stored."""
-    lines = []
-    for number, item in chunk:
-        outcome, seconds = evaluate(plan, context, shared, number, item)
-        lines.append((encode(outcome), seconds))
-    return lines
+    spent: dict[str, Spent] = {}
+    return [encode(evaluate(plan, context, shared, number, item, spent)) for number, item in chunk], spent
 
 
 @dataclass(slots=True)
 class Streamed:
-    """What a stream gave: outcomes in the order of candidates, seconds and runs of each stage, why it stopped early."""
+    """What a stream gave: outcomes in the order of candidates, the cost of each stage, why it stopped early."""
 
     outcomes: list[Outcome] = field(default_factory=list)
-    seconds: dict[str, float] = field(default_factory=dict)
-    runs: dict[str, int] = field(default_factory=dict)
+    spent: dict[str, Spent] = field(default_factory=dict)
     stopped: str = ""
     resumed: int = 0
 
@@ -198,14 +211,13 @@ def stream(
     size = [1]
     work = partial(_evaluate_chunk, plan, replace(context, executor=None), shared)
     with closing(in_order(executor, work, _chunks(numbered, size))) as results:
-        for chunk in results:
-            for line, seconds in chunk:
+        for lines, spent in results:
+            for line in lines:
                 journal.append(line)
                 done.outcomes.append(decode(line))
-                for stage, spent in zip(plan.stages, seconds):
-                    done.seconds[stage.name] = done.seconds.get(stage.name, 0.0) + spent
-                    done.runs[stage.name] = done.runs.get(stage.name, 0) + 1
-            if executor is not None and sum(sum(s) for _, s in chunk) < _LONG:
+            for name, cost in spent.items():
+                done.spent.setdefault(name, Spent()).add(cost)
+            if executor is not None and sum(cost.seconds for cost in spent.values()) < _LONG:
                 size[0] = min(_MOST, 2 * size[0])
             if progress:
                 progress(len(done.outcomes))

@@ -38,7 +38,14 @@ def test_every_shipped_scene_has_its_list() -> None:
     assert set(LOADS["scenes"]) == set(available_scenes())
 
 
-@pytest.mark.parametrize("name", sorted(set(LOADS["scenes"]) & set(available_scenes())))
+QUICK = {"lambda"}  # the others take seconds each
+LISTED = [
+    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+    for name in sorted(set(LOADS["scenes"]) & set(available_scenes()))
+]
+
+
+@pytest.mark.parametrize("name", LISTED)
 def test_a_shipped_scene_loads_exactly_what_is_on_its_list(name: str, tmp_path: Path) -> None:
     modules = loaded(name, tmp_path)
     expected = LOADS["scenes"][name]
@@ -124,3 +131,18 @@ def test_help_loads_no_third_party_package(arguments: list[str]) -> None:
 def test_a_stream_without_graphs_loads_no_third_party_package(springs: Path, tmp_path: Path) -> None:
     found = rooms(loaded(str(springs), tmp_path / "out"))
     assert {room for room in found if not room.startswith("graphsynth")} == {"fake_springs"}
+
+
+def test_what_a_stage_for_each_candidate_imports_is_told(springs: Path, tmp_path: Path, fake_site: Path) -> None:
+    (fake_site / "fake_late.py").write_text("", encoding="utf-8")
+    code = (
+        "import sys, fake_springs; from graphsynth.scenes.runner import run\n"
+        "def check(context, spring):\n"
+        "    if spring.number == 5: import fake_late\n"
+        "    return spring.number\n"
+        "fake_springs.check = check\n"
+        "print(*[(t.stage, t.modules) for t in run(sys.argv[1], out=sys.argv[2]).times if 'fake_late' in t.modules])"
+    )
+    command = [sys.executable, "-c", code, str(springs), str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.startswith("('check', ('fake_late',))")

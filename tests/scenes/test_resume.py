@@ -105,6 +105,18 @@ def test_another_question_or_a_strange_file_is_refused_and_fresh_replaces_it(spr
     assert path.read_bytes() == whole
 
 
+def test_a_scene_changed_in_python_is_another_question(springs: Path, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    from graphsynth.scenes.scene import load_scene
+
+    scene = load_scene(springs)
+    run(scene, out=tmp_path)
+    stop_after(tmp_path / "candidates.jsonl", 5)
+    with pytest.raises(SceneError, match="another question"):
+        run(replace(scene, mechanism=replace(scene.mechanism, rest_mm=2.0)), out=tmp_path)
+
+
 def test_other_candidates_behind_the_same_question_are_noticed(springs: Path, tmp_path: Path) -> None:
     run(springs, out=tmp_path)
     path = tmp_path / "candidates.jsonl"
