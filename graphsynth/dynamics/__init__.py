@@ -29,6 +29,7 @@ _PUBLIC: dict[str, str] = {
     "InverseDynamics": "inverse",
     "Reactions": "reactions",
     "effective_inertia": "minimal",
+    "dynamics_work_precision": "mechanism_accuracy",
     "DCMotor": "motors",
     "SynchronousMotor": "motors",
     "LinearCharacteristic": "motors",

@@ -29,7 +29,7 @@ _LOW = 0.3
 #: Pivots below this part of the largest: a singular pose may lie ahead; below the second, one does.
 _AHEAD, _SINGULAR = 0.7, 0.02
 #: Where to look for it, in steps.
-_SAMPLES = np.linspace(0.1, 1.3, 9)
+_SAMPLES, _COARSE = np.linspace(0.1, 1.3, 9), (0.3, 0.6, 0.9, 1.2)
 #: Smallest pivot at a stage, and how far a step leads away from a singular start (units).
 _REGULAR, _AWAY = 1e-6, 0.05
 #: How well a step over a singular pose must land (units; relative), and the energy it may gain or lose.
@@ -174,6 +174,8 @@ class ConstrainedForm:
             return min(step, 1.01 * (self._blocked - t))
         if len(self._nodes) < 2 or self._nodes[-1][0] != t or self.pivot > _AHEAD * self._largest:
             return step
+        if not self._falls(t, step):
+            return step
         guess = self._guess()
         times = t + step * _SAMPLES
         pivots = [self.pivot_at(at, guess(at))[0] for at in times]
@@ -190,6 +192,17 @@ class ConstrainedForm:
         if found.fun < _SINGULAR * self._largest:
             self._due = float(found.x) - t
         return step
+
+    def _falls(self, t: float, step: float) -> bool:
+        """Whether the smallest pivot falls within the next step, by a parabola: cheap, as it is asked at every step."""
+        y, n = self._nodes[-1][1], self.compiled.n
+        f = self.rates(t, y)
+        for part in _COARSE:
+            s = part * step
+            ahead = y[:n] + s * (y[n : 2 * n] + 0.5 * s * f[n : 2 * n])
+            if self.pivot_at(t + s, np.concatenate([ahead, y[n:]]))[0] < 0.6 * self.pivot:
+                return True
+        return False
 
     def _away_from_start(self, t: float, step: float) -> float:
         """Prepare a step away from a start at a singular pose, along its velocity."""

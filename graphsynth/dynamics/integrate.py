@@ -198,7 +198,15 @@ def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, optio
     chosen = name
     if name == "auto":
         chosen = "constrained" if minimal_obstacle(compiled.model) or report.pose_class == "singular" else "minimal"
-    run = _run(compiled, report, grid, chosen, options)
+    try:
+        run = _run(compiled, report, grid, chosen, options)
+    except GeometryError as error:
+        if name != "auto" or chosen != "minimal" or compiled.model.massless:
+            raise
+        other = _run(compiled, report, grid, "constrained", options)
+        text = f"the minimal form does not start here ({error}); constrained form used"
+        other.events.insert(0, DynamicEvent("fold", float(grid[0]), 0.0, text))
+        return other
     if name == "auto" and chosen == "minimal" and run.done < len(grid) and not compiled.model.massless:
         other = _run(compiled, report, grid, "constrained", options)
         why = run.form.why or run.trail.message

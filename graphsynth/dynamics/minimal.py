@@ -237,7 +237,8 @@ class MinimalForm:
 
     def transmission(self, theta: float) -> tuple[Array, Array, Array]:
         """Coordinates and their first and second derivatives by the input; NaN out of reach."""
-        self._run(np.array([theta, 0.0, 0.0]), 0.0, ONE_STAGE, self._one, 0, 1)
+        if self.S.done[0] < 2 or self.S.u[1] != theta:  # else the engine has just been there
+            self._run(np.array([theta, 0.0, 0.0]), 0.0, ONE_STAGE, self._one, 0, 1)
         if self.S.done[0] < 2:
             return (np.full(self.compiled.n, np.nan),) * 3
         q, q1, q2 = self.S.centres.copy()

@@ -29,6 +29,7 @@ def passed_singular_pose(
     form: ConstrainedForm, start: float, middle: float, end: float, first: Any, second: Any, largest: float
 ) -> DynamicEvent | None:
     """Locate the minimum of the smallest pivot over two steps with interpolants ``first`` and ``second``."""
+
     def pivot(t: float) -> float:
         return form.pivot_at(t, np.asarray((first if t <= middle else second)(t)))[0]
 

@@ -1,4 +1,4 @@
-"""How fast planar dynamics is, beside scipy on the plain equations.
+"""How fast planar dynamics is, beside scipy on the plain equations, exudyn and MuJoCo at equal error.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_dynamics_speed.py
 --benchmark-enable``.  No time is asserted: machines differ.  Every benchmark checks its result.  Targets on one core:
@@ -7,9 +7,11 @@ four-bar 2 s at 1e-9 in 30 ms, seven-body mechanism 0.03 s at 1e-8 in the constr
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -27,7 +29,7 @@ def timed(benchmark, run):
     return benchmark.pedantic(run, rounds=5, warmup_rounds=1)
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained"])
+@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
 def test_four_bar(benchmark, form):
     model = g1()
     start = consistent_start(model, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1})
@@ -36,7 +38,7 @@ def test_four_bar(benchmark, form):
     benchmark.extra_info["integration alone, ms"] = round(1e3 * motion.seconds, 1)
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained"])
+@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
 def test_seven_body_mechanism(benchmark, form):
     model = seven_body()
     start = consistent_start(model, pose=seven_pose())
@@ -45,8 +47,8 @@ def test_seven_body_mechanism(benchmark, form):
     benchmark.extra_info["integration alone, ms"] = round(1e3 * motion.seconds, 1)
 
 
-def test_scipy_on_the_plain_equations(benchmark):
-    """The same four-bar, its equation written by hand (spec 4.2, 4.4), Python right-hand side."""
+def plain_equations():
+    """Right-hand side of the four-bar written by hand (spec 4.2, 4.4), in Python."""
     a, b, c, g, gravity = 0.2, 0.6, 0.4, 0.6, 9.81
     m1, m2, m3 = 0.2, 0.6, 0.4
 
@@ -72,7 +74,75 @@ def test_scipy_on_the_plain_equations(benchmark):
                            + m3 * c / 2.0 * k3 * math.cos(p3))  # fmt: skip
         return w, (load - 0.5 * slope * w * w) / J
 
-    found = timed(
-        benchmark, lambda: solve_ivp(rates, (0.0, 2.0), (0.0, 10.0), "DOP853", rtol=1e-9, atol=np.array([1e-11, 1e-10]))
-    )
+    return rates
+
+
+def scipy_run(rtol):
+    return solve_ivp(plain_equations(), (0.0, 2.0), (0.0, 10.0), "DOP853", rtol=rtol, atol=rtol * np.array([0.01, 0.1]))
+
+
+def test_scipy_on_the_plain_equations(benchmark):
+    found = timed(benchmark, lambda: scipy_run(1e-9))
     assert found.success and abs(found.y[0, -1] - G1_END) < 5e-7
+
+
+def best_of(run, rounds=3):
+    """Shortest time and last result."""
+    times = []
+    for _ in range(rounds):
+        begin = perf_counter()
+        found = run()
+        times.append(perf_counter() - begin)
+    return min(times), found
+
+
+def report(capsys, name, ours, theirs):
+    """Print both (error, seconds) and the ratio at equal error: ours is the fastest run that is at least as exact."""
+    rival, seconds = theirs
+    error, own = min((entry for entry in ours if entry[0] <= rival), key=lambda entry: entry[1])
+    with capsys.disabled():
+        print(f"\n  {name}: error {rival:.1e} in {1e3 * seconds:.1f} ms; graphsynth {error:.1e} in {1e3 * own:.1f} ms: "
+              f"{seconds / own:.1f} times as fast")  # fmt: skip
+    assert error <= rival
+
+
+@pytest.fixture(scope="module")
+def four_bar_runs():
+    """Error of theta(2) and time of the minimal and the constrained form over tolerances."""
+    model = g1()
+    start = consistent_start(model, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1})
+    found = []
+    for form in ("minimal", "constrained"):
+        for exponent in range(4, 12):
+            run = functools.partial(simulate_dynamics, model, [0.0, 2.0], start=start, form=form, rtol=10.0**-exponent)
+            seconds, motion = best_of(run)
+            found.append((abs(motion.poses[-1, 1, 2] - G1_END), seconds))
+    return model, start, found
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_four_bar_beside_scipy_at_equal_error(four_bar_runs, capsys, rtol):
+    seconds, found = best_of(lambda: scipy_run(rtol))
+    report(capsys, f"scipy DOP853 {rtol:g}", four_bar_runs[2], (abs(found.y[0, -1] - G1_END), seconds))
+
+
+@pytest.mark.parametrize("step", [1e-3, 1e-4])
+def test_four_bar_beside_exudyn_at_equal_error(four_bar_runs, capsys, step):
+    pytest.importorskip("exudyn")
+    from graphsynth.formats import ExudynSettings, run_exudyn
+
+    model, start, ours = four_bar_runs
+    found = run_exudyn(model, start, [0.0, 2.0], ExudynSettings(step))
+    assert found.completed
+    report(capsys, f"exudyn step {step:g} s", ours, (abs(found.poses[-1, 1, 2] - G1_END), found.seconds))
+
+
+@pytest.mark.parametrize("step", [1e-3, 1e-4])
+def test_four_bar_beside_mujoco_at_equal_error(four_bar_runs, capsys, step):
+    pytest.importorskip("mujoco")
+    from graphsynth.formats import MujocoSettings, run_mujoco
+
+    model, start, ours = four_bar_runs
+    found = run_mujoco(model, start, [0.0, 2.0], MujocoSettings(step))
+    assert found.completed
+    report(capsys, f"MuJoCo RK4 step {step:g} s", ours, (abs(found.poses[-1, 1, 2] - G1_END), found.seconds))

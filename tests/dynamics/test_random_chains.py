@@ -1,4 +1,4 @@
-"""Mechanisms from the enumerator with random dimensions, masses and loads: formulations agree, or the result says why."""
+"""Mechanisms of the enumerator with random dimensions, masses and loads: formulations agree, or the result says why."""
 
 from functools import cache
 from itertools import islice
@@ -99,6 +99,13 @@ def exact_reactions(model, start, points):
                     right[row + axis] += sign * spin[k] ** 2 * arm[axis]
         found = mpmath.lu_solve(K, right)
         return np.array([[float(found[n + 2 * j + axis]) for axis in (0, 1)] for j in range(m // 2)])
+
+
+def test_automatic_form_goes_on_where_the_engine_does_not_start():
+    model, start, _, _ = random_model(8, 8)
+    motion = simulate_dynamics(model, [0.0, 0.01], start=start)
+    assert motion.completed
+    assert motion.form == "minimal" or "constrained form used" in motion.events[0].statement
 
 
 CASES = [*((6, seed) for seed in range(4)), *((8, seed) for seed in range(8))]

@@ -1,0 +1,31 @@
+"""Rows of error against run time."""
+
+import math
+
+import pytest
+from dynamic_models import g1
+
+from graphsynth.dynamics import consistent_start, dynamics_work_precision
+from graphsynth.errors import GeometryError
+
+
+def test_rows_of_the_crank_rocker():
+    model = g1()
+    start = consistent_start(model, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1})
+    rows = dynamics_work_precision(model, start, [0.0, 0.25, 0.5], methods=["DOP853", "BDF"], tolerances=[1e-5, 1e-8],
+                                   rounds=1, max_steps=150)  # fmt: skip
+    assert len(rows) == 3 * 2 * 2 and all(row.seconds > 0.0 for row in rows)
+    explicit = [row for row in rows if row.method.endswith("DOP853")]
+    for rough, fine in zip(explicit[::2], explicit[1::2]):
+        assert fine.error < 1e-6 and fine.error < 0.1 * rough.error
+    failed = [row for row in rows if math.isnan(row.error)]
+    assert failed and all("more than 150 steps" in row.status for row in failed)
+
+
+def test_bad_requests():
+    model = g1()
+    start = consistent_start(model, keep={(0, 1): 0.0}, modes={0: 1})
+    with pytest.raises(GeometryError, match="tolerances = .* must be 1e-12 or more"):
+        dynamics_work_precision(model, start, [0.0, 0.1], tolerances=[1e-13])
+    with pytest.raises(GeometryError, match="rounds = 0"):
+        dynamics_work_precision(model, start, [0.0, 0.1], rounds=0)
