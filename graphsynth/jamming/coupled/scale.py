@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -32,8 +32,9 @@ Array = NDArray[np.float64]
 class ScaleCertificate:
     """Largest factor on all misalignments that leaves the whole range free, between two proved bounds.
 
-    ``low``: with a smaller factor every input is proved free.  ``high``: with a larger one the input ``at`` is proved
-    to jam.  ``relative_gap`` is ``high / low - 1``; ``reason`` says why it is not smaller, or is empty.
+    ``low``: with a smaller factor every input is proved free, for all members of the tolerance boxes.  ``high``: with a
+    larger one the input ``at`` is proved to jam, again for all of them; tolerances keep the two apart.
+    ``relative_gap`` is ``high / low - 1``; ``reason`` says why it is not smaller, or is empty.
     """
 
     low: float
@@ -88,21 +89,29 @@ def largest_scale(
     try:
         work = Work(given, motion, length_tolerance)
         budget = Budget(1e-9 * (work.high - work.low), max_pieces, seconds, begin)
-        return _enclosed(work, budget, *_branch_and_bound(work, budget, relative_gap))
+        found = _enclosed(work, budget, *_branch_and_bound(work, budget, relative_gap))
+        if found.reason or found.relative_gap <= relative_gap or found.high == math.inf == found.low:
+            return found
+        return replace(found, reason="the tolerances leave no smaller gap: high holds for all members, low for any")
     except Unsupported as error:
         return ScaleCertificate(0.0, math.inf, math.nan, 0, str(error), perf_counter() - begin)
 
 
 def _branch_and_bound(work: Work, budget: Budget, relative_gap: float) -> tuple[Found, float, str]:
-    """Cut what may hold a larger factor than the best found; return the pieces, a bound of them, and what stopped."""
-    best, above, reason = 0.0, 0.0, ""
+    """Cut what may hold a larger factor than the best found; return the pieces, a bound of them, and what stopped.
+
+    With tolerances the bound from above at a single input is not reached by the one from below, which holds for all
+    members; pieces are cut against the larger of the two.
+    """
+    best, reach, above, reason = 0.0, 0.0, 0.0, ""
     parts: list[Found] = []
     lo, hi = work.first()
     while lo.size:
         found = work.evaluate(lo, hi)
-        found = found._replace(lower=_peaks(work, found))
-        best = max(best, float(found.lower.max()))
-        rest = found.upper > best * (1.0 + 0.9 * relative_gap)
+        peaks, highest = _peaks(work, found)
+        found = found._replace(lower=peaks)
+        best, reach = max(best, float(peaks.max())), max(reach, highest)
+        rest = found.upper > max(best, reach) * (1.0 + 0.9 * relative_gap)
         above = max(above, float(found.upper[~rest].max(initial=0.0)))
         narrow = hi - lo <= budget.smallest
         if work.evaluated + PARTS * int(rest.sum()) > budget.max_pieces or budget.over or (rest & narrow).any():
@@ -135,10 +144,11 @@ def _enclosed(work: Work, budget: Budget, pieces: Found, above: float, reason: s
     return ScaleCertificate(low, high, at, work.evaluated, reason, perf_counter() - budget.begin)
 
 
-def _peaks(work: Work, found: Found) -> Array:
+def _peaks(work: Work, found: Found) -> tuple[Array, float]:
     """Lower bounds of the largest factor in each piece: over the whole of it, or at its middle for the worst few.
 
-    The middle counts only if its assembly is the one of the piece: it lies in the box that holds exactly one.
+    And the largest bound from above at these middles.  A middle counts only if its assembly is the one of the piece: it
+    lies in the box that holds exactly one.
     """
     peak = found.lower.copy()
     top = np.argsort(-found.upper)[:4]
@@ -147,4 +157,4 @@ def _peaks(work: Work, found: Found) -> Array:
     inside = (points.box_lo >= found.box_lo[top]) & (points.box_hi <= found.box_hi[top])
     same = points.proved & found.proved[top] & inside.all(axis=1)
     peak[top] = np.maximum(peak[top], np.where(same, points.lower, 0.0))
-    return peak
+    return peak, float(points.upper[same & np.isfinite(points.upper)].max(initial=0.0))
