@@ -18,7 +18,7 @@ from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, RunStatus, r
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
 
-__all__ = ["Braider", "LinkMotion", "Settling", "Thread"]
+__all__ = ["Braider", "LinkMotion", "Peak", "Settling", "Thread"]
 
 Array = NDArray[np.float64]
 
@@ -83,6 +83,14 @@ class Settling(NamedTuple):
     time: float
     target: float
     band: float
+
+
+class Peak(NamedTuple):
+    """Time (s) and value of an extreme; ``error``, an estimate from above, is its distance from the nearest sample."""
+
+    time: float
+    value: float
+    error: float
 
 
 def _motor() -> SynchronousMotor:
@@ -278,29 +286,36 @@ class Braider:
         speed = found.speed[1:]
         return float(speed.min()), float(speed.max())
 
-    def largest_current(self, found: DriveRun) -> tuple[float, float]:
-        """Time (s) and value (A) of the largest torque-making current of a run, between its output times; estimated.
+    def largest_current(self, found: DriveRun) -> Peak:
+        """Largest torque-making current of a run, between its output times.
+
+        Estimated: a finer run beside the largest output, the vertex of the parabola through three of its outputs.
 
         Examples
         --------
         >>> braider = Braider()
-        >>> time, current = braider.largest_current(braider.simulate(np.linspace(0.0, 0.1, 51)))
-        >>> round(time, 5), round(current, 4)
+        >>> peak = braider.largest_current(braider.simulate(np.linspace(0.0, 0.1, 51)))
+        >>> round(peak.time, 5), round(peak.value, 4)
         (0.00206, 0.9915)
         """
         if not found.complete or found.currents.shape[1] == 0:
-            return math.nan, math.nan
+            return Peak(math.nan, math.nan, math.nan)
         k = int(np.argmax(np.abs(found.currents[:, -1])))
         if k in (0, found.time.size - 1):
-            return float(found.time[k]), float(found.currents[k, -1])
+            return Peak(float(found.time[k]), float(found.currents[k, -1]), math.nan)
         near = np.linspace(found.time[k - 1], found.time[k + 1], 401)[1:]
         start = tuple(map(float, found.currents[k - 1]))
         fine = self.simulate(
             [float(found.time[k - 1]), *near], angle=float(found.angle[k - 1]), speed=float(found.speed[k - 1]),
             currents=start, reduce=False, rtol=found.rtol, estimate=False,
         )  # fmt: skip
-        best = int(np.argmax(np.abs(fine.currents[:, -1])))
-        return float(fine.time[best]), float(fine.currents[best, -1])
+        best = min(max(int(np.argmax(np.abs(fine.currents[:, -1]))), 1), near.size - 1)
+        left, middle, right = fine.currents[best - 1 : best + 2, -1]
+        bend = left - 2.0 * middle + right
+        shift = 0.5 * (left - right) / bend if bend != 0.0 else 0.0
+        lift = -0.125 * (right - left) ** 2 / bend if bend != 0.0 else 0.0
+        time = fine.time[best] + shift * (fine.time[best + 1] - fine.time[best])
+        return Peak(float(time), float(middle + lift), abs(float(lift)))
 
     def settling(
         self, target: float, band: float = 0.02, end: float = 0.5, rtol: float = 1e-11, samples: int = 2001

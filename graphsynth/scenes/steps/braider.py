@@ -141,7 +141,7 @@ def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantit
         for n in (2001, 1001)
     )
     steady, rough = (braider.steady_range(samples=n) for n in (720, 500))
-    peak_time, peak = braider.largest_current(run)
+    peak = braider.largest_current(run)
     spacing = float(np.diff(run.time).max())
     moment = float(np.nanmax(np.abs(braider.load_moment(np.linspace(0.0, math.tau, 361)))))
     settled = [
@@ -154,8 +154,8 @@ def _margins(context: Context, braider: Braider, run: DriveRun) -> tuple[Quantit
         Quantity(f"crank angle at {start.end_s:g} s", float(run.angle[-1]), "rad", "estimated", float(run.error[0])),
         Quantity("least speed of the steady motion", steady[0], "rad/s", "estimated", abs(steady[0] - rough[0])),
         Quantity("largest speed of the steady motion", steady[1], "rad/s", "estimated", abs(steady[1] - rough[1])),
-        Quantity("largest current i_q", peak, "A", "estimated", float(run.error[-1])),
-        Quantity("time of the largest current", peak_time, "s", "estimated", spacing / 200.0),
+        Quantity("largest current i_q", peak.value, "A", "estimated", peak.error + float(run.error[-1])),
+        Quantity("time of the largest current", peak.time, "s", "estimated", spacing / 200.0),
         Quantity("largest moment of the thread about O2", 0.0 if moment < 1e-15 else moment, "N m", "estimated", 1e-15),
         Quantity("inertia of rotor and train at the crank", inertia, "kg m^2", "exact", 4.0 * math.ulp(inertia)),
         Quantity("ratio of the train", ratio, "", "exact", 4.0 * math.ulp(ratio)),

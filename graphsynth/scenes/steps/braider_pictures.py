@@ -71,8 +71,8 @@ def _sketch(braider: Braider, angle: float, reached: NDArray[np.float64], width:
     )  # fmt: skip
     sketch.trace(list(paths[1]), "c", 1.4)
     sketch.trace(list(paths[2]), "a", 1.8)
-    sketch.trace([C, guide], "b", 1.6, dash=(5.0, 4.0))
     sketch.plate((far, B, C))
+    sketch.trace([C, guide], "b", 2.4, dash=(6.0, 5.0))
     sketch.ground(0j)
     sketch.ground(far)
     sketch.bar(0j, A, width=5)

@@ -179,6 +179,15 @@ def test_reversal_is_an_event():
     assert found.energy_error < 1e-12
 
 
+@pytest.mark.parametrize("count", [11, 321, 1281])
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5, 1e-8])
+def test_error_is_estimated_from_above_however_dense_the_outputs(count, rtol):
+    """Outputs that limit the steps of both runs must not hide the error."""
+    found = SOURCE(motor()).simulate(np.linspace(0.0, 1.0, count), rtol=rtol)
+    actual = np.abs(rows(found)[[(count - 1) // 2 - 1, -1]] - [row[1:] for row in TABLE[1:]]).max(axis=0)
+    assert (actual <= found.error + 2e-13 * np.array([20.0, 30.0, 50.0])).all()
+
+
 def test_rest_at_a_dead_centre_says_so():
     """The kinetic energy dies exactly where J vanishes: model S has no continuation there, and the reason says why."""
     drive = MotorDrivenPlatform(
