@@ -32,7 +32,7 @@ class Moving:
     Examples
     --------
     >>> drawing = Moving(100.0, 50.0, 2.0)
-    >>> drawing.circle([[10.0, 20.0], [90.0, 20.0]], 4.0, 'fill="var(--a)"')
+    >>> drawing.circle([[10.0, 20.0], [90.0, 30.0]], 4.0, 'fill="var(--a)"')
     >>> drawing.svg("A dot").count("<animate ")
     2
     """
