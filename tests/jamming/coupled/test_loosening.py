@@ -94,7 +94,6 @@ def test_pictures(eight, tmp_path):
     assert len(uses.get_yticklabels()) == used.shape[0] == 9  # the motor's joint has no clearance to use
     picture = loosening_picture(compare_loosening(motion, limits, tilt))
     assert "other limits gain nothing" in picture.axes[0].get_xlabel()
-    picture.savefig(tmp_path / "loosening.png")
     figure.savefig(tmp_path / "clearance.png")
     proof = assess_coupled(simulate(four_bar(), [0.0, 0.5, 1.0]), Bearing(), Misalignment(0, 1, 0.01), certify=True)
     labels = clearance_picture(proof).axes[0].get_legend_handles_labels()[1]
