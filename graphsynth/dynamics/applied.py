@@ -68,7 +68,12 @@ def _force(compiled: Compiled, element: Force, k: int, t: float, q: Array, v: Ar
 
 
 def _number(value: Any, element: Any) -> float:
-    number = float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(
+            f"a {type(element).__name__} gave {value!r}; return a finite number at every state"
+        ) from error
     if not math.isfinite(number):
         raise GeometryError(f"a {type(element).__name__} gave {number}; return a finite number at every state")
     return number

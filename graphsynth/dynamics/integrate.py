@@ -18,6 +18,7 @@ from graphsynth.dynamics.start import StartReport, start_compiled
 from graphsynth.dynamics.stepping import Trail, integrate
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import finite
 
 __all__ = ["simulate_dynamics"]
 
@@ -98,7 +99,8 @@ def simulate_dynamics(
     report = start or start_compiled(compiled, pose, rates, keep or {}, keep_rates or {}, modes, float(grid[0]))
     if not report.consistent:
         raise GeometryError(report.message)
-    options = _Options(method, float(rtol), atol, outputs == "exact", project, max_steps)
+    _check_start(report, model)
+    options = _options(method, rtol, atol, outputs, project, max_steps)
     _check_options(form, outputs, options)
     run = _once(compiled, report, grid, form, options)
     estimate = None
@@ -111,7 +113,10 @@ def simulate_dynamics(
 
 
 def _times(times: ArrayLike) -> Array:
-    grid = np.asarray(times, dtype=np.float64)
+    try:
+        grid = np.asarray(times, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"times = {times!r} are not numbers; give a list of seconds that increase") from error
     if grid.ndim != 1 or grid.size < 1 or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
         raise GeometryError("times must be one list of finite numbers that increase; sort them and remove duplicates")
     return grid
@@ -125,6 +130,27 @@ class _Options:
     exact: bool
     project: bool
     max_steps: int
+
+
+def _options(
+    method: str, rtol: float, atol: float | None, outputs: str, project: bool, max_steps: int
+) -> _Options:  # fmt: skip
+    if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
+        raise GeometryError(f"max_steps = {max_steps!r} is not a number of steps; give an integer of at least 1")
+    absolute = None if atol is None else finite("atol", atol)
+    return _Options(method, finite("rtol", rtol), absolute, outputs == "exact", project, max_steps)
+
+
+def _check_start(report: StartReport, model: DynamicModel) -> None:
+    """Refuse a start of another mechanism: its coordinates would be taken for those of this one."""
+    own = report.model
+    if own is model:
+        return
+    for name in ("mechanism", "bodies", "additional", "prescribed"):
+        if getattr(own, name) != getattr(model, name):
+            raise GeometryError(
+                f"the start belongs to a model with another {name}; call consistent_start with this model"
+            )
 
 
 def _check_options(form: str, outputs: str, options: _Options) -> None:

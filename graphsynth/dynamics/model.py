@@ -147,6 +147,11 @@ class DynamicModel:
     def __post_init__(self) -> None:
         if not isinstance(self.mechanism, Mechanism):
             raise GeometryError(f"mechanism = {self.mechanism!r} is not a Mechanism")
+        if not isinstance(self.bodies, Mapping):
+            raise GeometryError(f"bodies = {self.bodies!r} is not a mapping; give {{link: Body(...)}}")
+        for name in ("elements", "prescribed", "additional"):
+            if not isinstance(getattr(self, name), Iterable):
+                raise GeometryError(f"{name} = {getattr(self, name)!r} is not a list; leave it out or give ()")
         object.__setattr__(self, "bodies", self._checked_bodies(self.bodies))
         object.__setattr__(self, "elements", tuple(self._checked(element) for element in self.elements))
         object.__setattr__(self, "gravity", point("gravity", self.gravity))

@@ -16,6 +16,7 @@ from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pos
 from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
 from graphsynth.dynamics.values import Values, initial_slots
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import finite
 
 __all__ = ["StartReport", "consistent_start"]
 
@@ -205,6 +206,7 @@ def _guess(
     }
     for key, value in keep.items():
         coordinate_row(compiled, key, 0)  # a key that names nothing is refused
+        finite(f"kept {key}", value)
         if not isinstance(key[1], str):
             wanted[(min(key), max(key))] = (key, value)
     if drivers and all(pair in wanted for pair in drivers):
@@ -220,7 +222,7 @@ def _guess(
 def _kept(values: Values, keep: Mapping[Any, float]) -> tuple[list[Any], Array]:
     """Rows that hold kept coordinates, in the form of `Values.extra`."""
     rows = [coordinate_row(values.compiled, key, k) for k, key in enumerate(keep)]
-    return rows, np.array([float(value) for value in keep.values()])
+    return rows, np.array([finite(f"kept {key}", value) for key, value in keep.items()])
 
 
 def _units(values: Values, kept: tuple[list[Any], Array]) -> Array:

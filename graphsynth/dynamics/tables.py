@@ -143,6 +143,8 @@ def compile_model(model: DynamicModel) -> Compiled:
     GeometryError
         If a mass or an inertia is too small to be told from zero beside the others.
     """
+    if not isinstance(model, DynamicModel):
+        raise GeometryError(f"model = {model!r} is not a DynamicModel; build one from a mechanism and its bodies")
     mechanism = model.mechanism
     links = mechanism.graph.links
     centres = np.zeros((links, 2))
