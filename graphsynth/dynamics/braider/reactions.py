@@ -79,15 +79,7 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
     >>> round(float(found.torque[0]), 15)
     -7.9020145597e-05
     """
-    given = [
-        numbers(name, value, finite=False)  # rows of a run that ended early are NaN
-        for name, value in (("theta", theta), ("speed", speed), ("acceleration", acceleration))
-    ]
-    try:
-        theta, w, alpha = (x.copy() for x in np.broadcast_arrays(*map(np.atleast_1d, given)))
-    except ValueError:
-        shapes = ", ".join(str(x.shape) for x in given)
-        raise SpecError(f"theta, speed and acceleration of shapes {shapes} do not fit; give equal lengths") from None
+    theta, w, alpha = _together(theta, speed, acceleration)
     s = braider.linkage.motion(theta)
     m1, m2 = braider.masses[:2]
     _, i2, i3 = braider.moments
@@ -116,6 +108,20 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
         theta, w, alpha, _plane(F01), _plane(F12), _plane(F23), _plane(F03), torque,
         _power_error(torque * w, moment * w3, gained),
     )  # fmt: skip
+
+
+def _together(theta: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) -> tuple[Array, Array, Array]:
+    """Three arrays of one length."""
+    given = [
+        numbers(name, value, finite=False)  # rows of a run that ended early are NaN
+        for name, value in (("theta", theta), ("speed", speed), ("acceleration", acceleration))
+    ]
+    try:
+        theta, speed, acceleration = (x.copy() for x in np.broadcast_arrays(*map(np.atleast_1d, given)))
+    except ValueError:
+        shapes = ", ".join(str(x.shape) for x in given)
+        raise SpecError(f"theta, speed and acceleration of shapes {shapes} do not fit; give equal lengths") from None
+    return theta, speed, acceleration
 
 
 def run_reactions(braider: Braider, found: DriveRun) -> Reactions:

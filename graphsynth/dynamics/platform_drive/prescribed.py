@@ -66,24 +66,27 @@ def prescribed_run(
     required = slope * w * w + friction * w - load
     eta = np.where(required * w >= 0.0, train.efficiency, 1.0 / train.efficiency)
     work = np.concatenate([[0.0], np.cumsum(_net_work(plant, motor, train, out, q, w))])
-    bad = np.flatnonzero(~np.isfinite(J))
-    reached = int(bad[0]) if bad.size else out.size
+    reached = int(np.isfinite(J).cumprod().sum())
     fields = {
         "angle": q, "speed": np.full(out.size, w), "momentum": np.sqrt(J) * w,
         "motor_torque": required / (train.ratio * eta), "kinetic_energy": 0.5 * J * w * w, "work": work,
     }  # fmt: skip
-    for name, values in fields.items():
-        fields[name] = np.where(np.arange(out.size) < reached, values, np.nan)
-    turns = np.where(np.arange(out.size) < reached, np.round(q / math.tau), 0.0).astype(np.int64)
-    reason = "" if reached == out.size else f"the mechanism cannot be assembled at t = {out[reached]:.6g} s"
+    there = np.arange(out.size) < reached
+    fields = {name: np.where(there, values, np.nan) for name, values in fields.items()}
+    turns = np.where(there, np.round(q / math.tau), 0.0).astype(np.int64)
     return DriveRun(
         time=out, currents=np.zeros((out.size, 0)), reduced_angle=fields["angle"] - math.tau * turns, turns=turns,
         energy_error=_defect(fields["kinetic_energy"], fields["work"], reached), electric_error=0.0,
         error=np.array([2.0**-52 * float(np.abs(q).max()), 0.0]), events=(),
-        status=RunStatus.NOT_FINITE if reason else RunStatus.DONE, reached=reached, reason=reason,
+        status=RunStatus.DONE if reached == out.size else RunStatus.NOT_FINITE, reached=reached,
+        reason=_reason(out, reached),
         model="ideal speed (motion given, torque by inverse dynamics)", steps=0, rejected=0, rtol=math.nan,
         seconds=perf_counter() - begin, **fields,
     )  # fmt: skip
+
+
+def _reason(out: Array, reached: int) -> str:
+    return "" if reached == out.size else f"the mechanism cannot be assembled at t = {out[reached]:.6g} s"
 
 
 def _terms(plant: Plant, motor: IdealSpeed, train: Train, out: Array, q: Array) -> tuple[Array, Array, Array, float]:

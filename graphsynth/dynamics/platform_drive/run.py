@@ -41,6 +41,7 @@ class RunStatus(IntEnum):
 
 #: status, states, turns, balances, marks of events, counts, last state
 _Raw = tuple[RunStatus, Array, NDArray[np.int64], Array, Array, NDArray[np.int64], Array]
+_NO_ESTIMATE = "no error estimate: the second run, at a hundred times the tolerance, did not get there"
 #: relative defect of the energy above which a result carries a warning
 _WARN = 1e-9
 _REASONS = {
@@ -159,11 +160,7 @@ def run(
     """
     begin = perf_counter()
     out = output_times(times)
-    number("rtol", rtol)
-    max_steps = whole("max_steps", max_steps, "raise it for long runs")
-    max_events = whole("max_events", max_events, "raise it for many events")
-    if not 1e-13 <= rtol <= 1e-3:
-        raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
+    _check_guards(rtol, max_steps, max_events)
     ready = prepare(plant, motor, train, out, angle, speed, currents, regular)
     found = _integrate(ready, out, rtol, max_steps, max_events)
     error = np.full(ready.start.size - regular, np.nan)
@@ -171,11 +168,16 @@ def run(
         # every other output: where the outputs limit the steps, the same outputs would hide the error
         shared = np.unique(np.concatenate([[0], np.arange(out.size - 1, 0, -2)]))
         second = _integrate(ready, out[shared], min(100.0 * rtol, 1e-2), max_steps, max_events)
-        if second[0] is RunStatus.DONE:
-            error = _difference(found, second, shared, ready, plant, regular)
-        else:
-            notes = (*notes, "no error estimate: the second run, at a hundred times the tolerance, did not get there")
+        error = _difference(found, second, shared, ready, plant, regular)
+        notes = notes if second[0] is RunStatus.DONE else (*notes, _NO_ESTIMATE)
     return _result(ready, plant, motor, train, out, found, error, regular, rtol, perf_counter() - begin, notes)
+
+
+def _check_guards(rtol: float, max_steps: int, max_events: int) -> None:
+    whole("max_steps", max_steps, "raise it for long runs")
+    whole("max_events", max_events, "raise it for many events")
+    if not 1e-13 <= number("rtol", rtol) <= 1e-3:
+        raise SpecError(f"rtol = {rtol:g} must be from 1e-13 to 1e-3; double precision gives no more")
 
 
 def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_events: int) -> _Raw:
@@ -185,7 +187,7 @@ def _integrate(ready: Prepared, out: Array, rtol: float, max_steps: int, max_eve
     n = ready.start.size
     state, values, setup = ready.start.copy(), ready.values.copy(), ready.setup.copy()
     Y, turns = np.full((out.size, n), np.nan), np.zeros(out.size, np.int64)
-    balance, marks = np.full((out.size, 6), np.nan), np.full((max_events, 3 + n), np.nan)
+    balance, marks = np.full((out.size, 6), np.nan), np.full((int(max_events), 3 + n), np.nan)
     counts = np.zeros(4, np.int64)
     status = radau.integrate(
         setup, values, ready.rows, ready.zeros, state, out, rtol, ready.scale, ready.first, int(max_steps),
@@ -213,6 +215,8 @@ def _difference(
 ) -> Array:
     """Largest differences of angle, sqrt(J) w over the largest sqrt(J), and currents at the shared outputs."""
     n = ready.start.size - int(regular)
+    if second[0] is not RunStatus.DONE:
+        return np.full(n, np.nan)
     states, turns = found[1][shared], found[2][shared]
     gap = np.abs(states[:, :n] - second[1][:, :n])
     gap[:, 0] = np.abs(states[:, 0] - second[1][:, 0] + math.tau * (turns - second[2]))
