@@ -1,0 +1,43 @@
+"""Sphinx configuration: ``sphinx-build -W -b html docs build/site``."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+
+project = META["name"]
+author = "The graphsynth developers"
+project_copyright = author
+version = release = META["version"]
+
+extensions = ["myst_parser"]
+myst_enable_extensions = ["deflist"]
+myst_heading_anchors = 4
+exclude_patterns = ["pictures/*.py"]
+html_theme = "furo"
+html_title = f"graphsynth {version}"
+
+
+def _toctrees(text: str) -> str:
+    """Add a hidden toctree of the linked pages under every section of the index, which stays the only list."""
+    sections = re.split(r"(?m)^(?=## )", text)
+    for k, section in enumerate(sections[1:], 1):
+        pages = list(dict.fromkeys(re.findall(r"\]\(([\w./-]+)\.md\)", section)))
+        title = section.partition("\n")[0].removeprefix("## ")
+        sections[k] = section + "\n```{toctree}\n:hidden:\n:caption: " + title + "\n\n" + "\n".join(pages) + "\n```\n\n"
+    return "".join(sections)
+
+
+def _read(app: object, page: str, source: list[str]) -> None:
+    if page == "index":
+        source[0] = _toctrees(source[0])
+
+
+def setup(app: object) -> dict[str, bool]:
+    """Register with Sphinx."""
+    app.connect("source-read", _read)  # type: ignore[attr-defined]
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
