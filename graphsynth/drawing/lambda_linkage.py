@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.drawing.sketch import Sketch, degrees
 from graphsynth.errors import GeometryError
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from graphsynth.drawing.plots import Band, Chart, Line
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage, LambdaPositions
 
-__all__ = ["lambda_sketch", "lambda_sketch_3d", "lambda_tilt_chart"]
+__all__ = ["lambda_animation", "lambda_sketch", "lambda_sketch_3d", "lambda_tilt_chart"]
 
 Array = NDArray[np.float64]
 
@@ -63,21 +63,9 @@ def lambda_sketch(
     Sketch
         An angle at which the linkage cannot be assembled shows the frame, the path and a word.
     """
-    turn, here = _turn(linkage), linkage.positions(f)
-    A, B, M = (_plane(points) for points in (turn.A, turn.B, turn.M))
+    here = linkage.positions(f)
+    sketch, lower, upper = _background(linkage, width, f"Lambda linkage, crank at {degrees(f)}", labels, stroke)
     O, C = 0j, complex(linkage.l1, 0.0)
-    every = [p for p in (O, C, *A, *B, *M) if cmath.isfinite(p)]
-    lower = complex(min(p.real for p in every), min(p.imag for p in every))
-    upper = complex(max(p.real for p in every), max(p.imag for p in every))
-    # a linkage that cannot be assembled anywhere has no height
-    upper += 1j * max(0.0, 0.3 * linkage.l1 - (upper - lower).imag)
-    sketch = Sketch(lower, upper, width, title=f"Lambda linkage, crank at {degrees(f)}")
-    sketch.circle(O, linkage.l2, dash=(4.0, 4.0))
-    sketch.ground(O)
-    sketch.ground(C)
-    sketch.trace(M, "a", 2.2, closed=True)
-    if stroke is not None and labels:
-        sketch.trace(_plane(linkage.positions(np.linspace(*stroke, 121)).M), "c", 4.2)
     if not here.assembled:
         sketch.label((lower + upper) / 2, "cannot be assembled")
         return sketch
@@ -94,6 +82,80 @@ def lambda_sketch(
         for name, (point, offset) in names.items():
             sketch.label(point, name, offset)
     return sketch
+
+
+def _background(
+    linkage: LambdaLinkage, width: float, title: str, stroke_too: bool, stroke: tuple[float, float] | None = STROKE
+) -> tuple[Sketch, complex, complex]:
+    """Draw what does not move: ground, crank circle, path of M; return the corners of the picture too."""
+    turn = _turn(linkage)
+    A, B, M = (_plane(points) for points in (turn.A, turn.B, turn.M))
+    O, C = 0j, complex(linkage.l1, 0.0)
+    every = [p for p in (O, C, *A, *B, *M) if cmath.isfinite(p)]
+    lower = complex(min(p.real for p in every), min(p.imag for p in every))
+    upper = complex(max(p.real for p in every), max(p.imag for p in every))
+    # a linkage that cannot be assembled anywhere has no height
+    upper += 1j * max(0.0, 0.3 * linkage.l1 - (upper - lower).imag)
+    sketch = Sketch(lower, upper, width, title=title)
+    sketch.circle(O, linkage.l2, dash=(4.0, 4.0))
+    sketch.ground(O)
+    sketch.ground(C)
+    sketch.trace(M, "a", 2.2, closed=True)
+    if stroke is not None and stroke_too:
+        sketch.trace(_plane(linkage.positions(np.linspace(*stroke, 121)).M), "c", 4.2)
+    return sketch, lower, upper
+
+
+def lambda_animation(
+    linkage: LambdaLinkage,
+    jams: Callable[[float], bool] | None = None,
+    *,
+    frames: int = 90,
+    width: float = 420.0,
+    seconds: float = 6.0,
+) -> str:
+    """Return a turn of the crank as one ``<svg>`` that moves by itself; it says where the bearing at B jams.
+
+    Parameters
+    ----------
+    linkage : LambdaLinkage
+    jams : callable, optional
+        Tells of a crank angle whether the bearing jams there.
+    frames : int
+        Crank angles shown; of a linkage without a full turn those at which it is assembled.
+    width : float
+        Pixels.
+    seconds : float
+        Time of a turn.
+
+    Raises
+    ------
+    GeometryError
+        If the linkage cannot be assembled at any of them.
+    """
+    from graphsynth.drawing.linkage_animation import Bar, linkage_animation
+
+    f = np.linspace(0.0, math.tau, frames + 1)
+    turn = linkage.positions(f)
+    good = np.asarray(turn.assembled, dtype=bool)
+    if not good.any():
+        raise GeometryError("the linkage cannot be assembled at any crank angle: nothing moves; change its lengths")
+    f = f[good]
+    tracks: dict[str, ArrayLike] = {
+        name: (points[good, 0] + 1j * points[good, 1]) for name, points in (("A", turn.A), ("B", turn.B), ("M", turn.M))
+    }
+    stuck = [jams is not None and jams(float(angle)) for angle in f]
+    notes = {"B jams": stuck, "B is free": [not s for s in stuck]} if jams is not None else {}
+    return linkage_animation(
+        _background(linkage, width, "Lambda linkage in motion", True)[0],
+        {"O": 0j, "C": complex(linkage.l1, 0.0), **tracks},
+        bars=(Bar("O", "A", "b"), Bar("C", "B"), Bar("A", "M")),
+        joints=("O", "C", "A", "B"),
+        dots=("M",),
+        notes=notes,
+        seconds=seconds,
+        title="Lambda linkage in motion",
+    )
 
 
 def _plane(points: Array) -> list[complex]:

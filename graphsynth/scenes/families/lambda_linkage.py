@@ -86,6 +86,7 @@ FAMILY = Family(
             ("motions", "assessments"),
             ("mechanism_pictures",),
         ),
+        Stage("animate", f"{_STEPS}.four_bar_pictures:animations", ("motions", "assessments"), ("animations",)),
         Stage("plot", f"{_STEPS}.four_bar_pictures:plots", ("motions", "assessments"), ("plots",)),
     ),
 )

@@ -57,6 +57,7 @@ FAMILY = Family(
         Stage("kinematics", f"{_STEPS}.platform:kinematics", ("recognised",), ("motions",)),
         Stage("judge", f"{_STEPS}.platform:judge", ("recognised", "motions"), ("records", "tables")),
         Stage("sketch mechanism", f"{_STEPS}.platform_pictures:sketches", ("motions",), ("mechanism_pictures",)),
+        Stage("animate", f"{_STEPS}.platform_pictures:animations", ("motions",), ("animations",)),
         Stage("plot", f"{_STEPS}.platform_pictures:plots", ("motions",), ("plots",)),
         Stage("drive", f"{_STEPS}.platform_drive_machine:drive", ("motions",), ("drive",)),
         Stage("tell the drive", f"{_STEPS}.platform_drive_machine:tables", ("drive",), ("drive_tables",)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from graphsynth.drawing.lambda_linkage import lambda_sketch, lambda_sketch_3d
+from graphsynth.drawing.lambda_linkage import lambda_animation, lambda_sketch, lambda_sketch_3d
 from graphsynth.drawing.sketch import degrees
 from graphsynth.scenes.families.lambda_linkage import LambdaTable
 from graphsynth.scenes.products import Attempt, Picture
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from graphsynth.jamming.tilt_arcs import Arc
     from graphsynth.scenes.steps.four_bar import LambdaMotion
 
-__all__ = ["plots", "sketches"]
+__all__ = ["animations", "plots", "sketches"]
 
 _SHOWN = 6  # crank angles drawn one by one
 
@@ -48,6 +48,16 @@ def sketches(context: Context, motions: tuple[Attempt, ...], assessments: tuple[
         sketch = _sketch(motion, i, 250, arcs, False)
         pictures.append(Picture(f"Crank at {degrees(angle)}", sketch, caption, "small"))
     return tuple(pictures)
+
+
+def animations(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]) -> tuple[Picture, ...]:
+    """Show one turn of the crank; words say where the bearing jams."""
+    moved, assessed = _first(motions), _first(assessments)
+    if moved is None:
+        return ()
+    arcs = assessed.value[_condition(context)].arcs.arcs if assessed else ()
+    svg = lambda_animation(moved.value.linkage, lambda angle: _jams(arcs, angle))
+    return (Picture("One turn of the crank", svg, "Blue: the path of M; green: its nearly straight part.", "wide"),)
 
 
 def _in_space(motion: LambdaMotion, i: int) -> list[Picture]:

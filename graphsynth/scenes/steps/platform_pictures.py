@@ -9,11 +9,14 @@ from graphsynth.scenes.products import Attempt, Picture
 from graphsynth.scenes.stages import Context
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from graphsynth.scenes.steps.platform import PlatformMotion
 
-__all__ = ["plots", "sketches"]
+__all__ = ["animations", "plots", "sketches"]
 
 _SHOWN = 6  # wheel angles drawn one by one
+_FRAMES = 90  # of the animation
 _LEG_COLOURS = ("a", "b", "c")
 
 
@@ -59,13 +62,8 @@ def _sketch(motion: PlatformMotion, i: int, width: float, labelled: int | None) 
     sketch.plate(list(F), width=4)
     for k in range(3):
         sketch.plate((C[k], D[k], A[k]))
-        sketch.circle(O[k], motion.wheel_radius)
-        sketch.ground(D[k], direction=D[k])
-        sketch.ground(O[k], 12)
-    sketch.circle(0j, min(abs(O)) - motion.wheel_radius)
-    sketch.ground(0j, 12)
+    _surroundings(sketch, motion, 1.6 if large else 1.0)
     for k, colour in enumerate(_LEG_COLOURS):
-        sketch.trace(list(motion.F[:, k]), colour, 1.6 if large else 1.0, closed=True)
         sketch.bar(O[k], B[k], width=5)
         sketch.bar(B[k], C[k], colour=colour, width=3)
         sketch.bar(A[k], F[k], colour=colour, width=3)
@@ -74,6 +72,50 @@ def _sketch(motion: PlatformMotion, i: int, width: float, labelled: int | None) 
     if labelled is not None:
         _label_leg(sketch, *(points[labelled] for points in (O, B, C, D, A, F)))
     return sketch.svg()
+
+
+def _surroundings(sketch: Sketch, motion: PlatformMotion, width: float) -> None:
+    """Draw what does not move: wheels, pinion, ground, and the paths of the platform's corners."""
+    O, D = motion.O, motion.D
+    for k in range(3):
+        sketch.circle(O[k], motion.wheel_radius)
+        sketch.ground(D[k], direction=D[k])
+        sketch.ground(O[k], 12)
+    sketch.circle(0j, min(abs(O)) - motion.wheel_radius)
+    sketch.ground(0j, 12)
+    for k, colour in enumerate(_LEG_COLOURS):
+        sketch.trace(list(motion.F[:, k]), colour, width, closed=True)
+
+
+def animations(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, ...]:
+    """Show one turn of the wheels."""
+    motion = _first(motions)
+    if motion is None:
+        return ()
+    from graphsynth.drawing.linkage_animation import Bar, linkage_animation
+
+    steps = slice(None, None, max(1, len(motion.F) // _FRAMES))
+    tracks: dict[str, ArrayLike] = {}
+    for name, points in {"B": motion.B, "C": motion.C, "A": motion.A, "F": motion.F}.items():
+        tracks |= {f"{name}{k}": points[steps, k] for k in range(3)}
+    for name, places in {"O": motion.O, "D": motion.D}.items():
+        tracks |= {f"{name}{k}": complex(places[k]) for k in range(3)}
+    bars = [
+        bar
+        for k, colour in enumerate(_LEG_COLOURS)
+        for bar in (Bar(f"O{k}", f"B{k}", width=5), Bar(f"B{k}", f"C{k}", colour, 3), Bar(f"A{k}", f"F{k}", colour, 3))
+    ]
+    sketch = Sketch(*_box(motion), 620, 40, "Single-motor platform in motion")
+    _surroundings(sketch, motion, 1.6)
+    svg = linkage_animation(
+        sketch,
+        tracks,
+        bars=bars,
+        plates=[("F0", "F1", "F2"), *((f"C{k}", f"D{k}", f"A{k}") for k in range(3))],
+        joints=list(tracks),
+        title="Single-motor platform in motion",
+    )
+    return (Picture("One turn of the wheels", svg, "The motor turns them; the curves are the corners' paths.", "wide"),)
 
 
 def _label_leg(sketch: Sketch, O: complex, B: complex, C: complex, D: complex, A: complex, F: complex) -> None:
