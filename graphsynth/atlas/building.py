@@ -3,171 +3,230 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterable
-from concurrent.futures import Executor
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from graphsynth.atlas.schema import INDEXES
 from graphsynth.errors import GraphsynthError
 
 if TYPE_CHECKING:
-    from graphsynth.atlas.facts import ChainFacts, GroupForm
-    from graphsynth.synthesis.problem import Piece
+    from graphsynth.atlas.facts import GroupRow, Rows
 
-__all__ = ["build_family", "facts_of_piece", "finish_family"]
-
-#: Told ``(chains written, share of the family done)`` after every piece.
-Watch = Callable[[int, float], None]
+__all__ = ["BuildStep", "Writer", "build_family", "finish_family", "open_family", "transaction"]
 
 
-def facts_of_piece(piece: Piece, mobility: int) -> list[tuple[ChainFacts, bool]]:
-    """Return the facts of all chains of a piece, and whether each is planar (computed in the worker)."""
-    from graphsynth.atlas.facts import analyse_block, chain_facts
-    from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.synthesis.problem import graphs_of_piece
+@dataclass(frozen=True, slots=True)
+class BuildStep:
+    """How far a build is: the family, the chains written of it and the share of its work done."""
 
-    graphs = list(graphs_of_piece(piece))
-    if not graphs:
-        return []
-    links = graphs[0].links
-    packed = np.frombuffer(b"".join(graph.packed for graph in graphs), np.uint8).reshape(len(graphs), -1)
-    found = chain_facts(analyse_block(links, packed), mobility)
-    return [(facts, MechanismGraph.is_planar.fget(graph)) for facts, graph in zip(found, graphs)]  # type: ignore[attr-defined]
+    mobility: int
+    links: int
+    chains: int
+    done: float
 
 
-class _Ids:
-    """Numbers of contracted graphs and groups in the file: given in the order of first appearance."""
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """All or nothing; what the disk or another process prevents becomes one sentence.
+
+    Raises
+    ------
+    GraphsynthError
+        If SQLite cannot write: a full disk, a read-only file, another writer.
+    """
+    try:
+        connection.execute("BEGIN IMMEDIATE")
+        yield
+        connection.execute("COMMIT")
+    except BaseException as error:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        if isinstance(error, sqlite3.OperationalError):
+            raise GraphsynthError(
+                f"the catalogue cannot be written ({error}); what is there stays: make room or wait for the other "
+                "writer, then give the same command to go on"
+            ) from None
+        raise
+
+
+class Writer:
+    """Writes rows and numbers what they refer to, in the order of first appearance in the file."""
 
     def __init__(self, connection: sqlite3.Connection) -> None:
         self.connection = connection
-        self.contracted: dict[tuple[int, bytes], int] = {}
-        self.groups: dict[GroupForm, tuple[int, int]] = {}
+        self._contracted: dict[str, int] = {}
+        self._groups: dict[str, int] = {}
+        self._structures: dict[str, int] = {}
 
-    def of_contracted(self, shape: tuple[int, bytes]) -> int:
-        if shape not in self.contracted:
-            self.contracted[shape] = self._insert(
-                "contracted", "contracted_id", {"edges": _edges(*shape), "vertices": shape[0]}
-            )
-        return self.contracted[shape]
+    def write(self, family_id: int, mobility: int, piece: int, rows: Rows) -> None:
+        """Write a piece, inside a transaction.
 
-    def of_group(self, form: GroupForm, order: int) -> tuple[int, int]:
-        """Return (number, class) of a group."""
-        if form not in self.groups:
-            from graphsynth.atlas.facts import group_graph
-            from graphsynth.structure.contours import contour_class
-
-            graph = group_graph(form)
-            own = contour_class((a, b, f) if a else (b, -1, f) for a, b, f in graph.joints)
-            number = self._insert(
-                "groups", "group_id", {"key": graph.key, "links": form[0], '"order"': order, "class": own}
-            )
-            self.groups[form] = number, own
-        return self.groups[form]
-
-    def _insert(self, table: str, column: str, values: dict[str, Any]) -> int:
-        name, known = next(iter(values.items()))
-        row = self.connection.execute(f"SELECT {column} FROM {table} WHERE {name} = ?", (known,)).fetchone()
-        if row:
-            return int(row[0])
-        marks = ", ".join("?" * len(values))
-        cursor = self.connection.execute(
-            f"INSERT INTO {table} ({', '.join(values)}) VALUES ({marks})", tuple(values.values())
+        Raises
+        ------
+        GraphsynthError
+            If the piece is there already: somebody else is writing the file.
+        """
+        execute = self.connection.execute
+        if execute("SELECT 1 FROM pieces WHERE (family_id, piece) = (?, ?)", (family_id, piece)).fetchone():
+            raise GraphsynthError("another process writes this catalogue: wait for it, or name another file")
+        start = execute("SELECT COALESCE(MAX(chain_id), 0) + 1 FROM chains").fetchone()[0]
+        contracted = [self.of_contracted(*shape) for shape in rows.contracted]
+        structures = self._of_structures(rows)
+        many = self.connection.executemany
+        many(
+            "INSERT INTO chains VALUES (?, ?, ?, NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            (
+                (number, family_id, chain[0], chain[1], mobility, *chain[2:9], contracted[chain[11]][1], *chain[9:11],
+                 contracted[chain[11]][0])
+                for number, chain in enumerate(rows.chains, start)
+            ),
+        )  # fmt: skip
+        many("INSERT INTO dyads VALUES (?, ?)", ((start + at, parent) for at, parent in rows.dyads))
+        many("INSERT INTO inversions VALUES (?, ?, ?, ?)", ((start + at, *rest) for at, *rest in rows.inversions))
+        many(
+            "INSERT INTO driven VALUES (?, ?, ?, ?)",
+            ((start + at, frame, driver, structures[own]) for at, frame, driver, own in rows.mechanisms),
         )
-        return int(cursor.lastrowid or 0)
+        execute("INSERT INTO pieces VALUES (?, ?, ?, ?)", (family_id, piece, start, len(rows.chains)))
+
+    def of_contracted(self, vertices: int, edges: str) -> tuple[int, int]:
+        """Return (number, whether it is planar) of a contracted graph; the chain is planar exactly when it is."""
+        planar = int(_planar(edges)) if edges not in self._contracted else 0
+        number = self._number(
+            "contracted",
+            "contracted_id",
+            self._contracted,
+            edges,
+            {"vertices": vertices, "edges": edges, "planar": planar},
+        )
+        row = self.connection.execute("SELECT planar FROM contracted WHERE contracted_id = ?", (number,)).fetchone()
+        return number, int(row[0])
+
+    def of_group(self, group: GroupRow) -> int:
+        """Return the number of a group."""
+        values = {"key": group.key, "links": group.links, '"order"': group.order, "class": group.group_class}
+        return self._number("groups", "group_id", self._groups, group.key, values)
+
+    def _of_structures(self, rows: Rows) -> list[int]:
+        found = []
+        for own in rows.structures:
+            groups = [rows.groups[at] for at in own]
+            text = " ".join(str(self.of_group(group)) for group in groups)
+            values = {
+                "groups": text,
+                "class": max((group.group_class for group in groups), default=1),
+                '"order"': max((group.order for group in groups), default=0),
+            }
+            found.append(self._number("structures", "structure_id", self._structures, text, values))
+        return found
+
+    def _number(self, table: str, column: str, known: dict[str, int], name: str, values: dict[str, Any]) -> int:
+        """Return the number of a row, written if it is new."""
+        if name not in known:
+            unique = {"contracted": "edges", "groups": "key", "structures": "groups"}[table]
+            row = self.connection.execute(f"SELECT {column} FROM {table} WHERE {unique} = ?", (name,)).fetchone()
+            if row is None:
+                marks = ", ".join("?" * len(values))
+                text = f"INSERT INTO {table} ({', '.join(values)}) VALUES ({marks}) RETURNING {column}"
+                row = self.connection.execute(text, tuple(values.values())).fetchone()
+            known[name] = int(row[0])
+        return known[name]
 
 
-def _edges(vertices: int, rows: bytes) -> str:
-    """Write a contracted graph as text: '0-1x2 0-2'."""
-    found = []
-    for p in range(vertices):
-        for q in range(p + 1, vertices):
-            times = rows[p * vertices + q]
-            if times:
-                found.append(f"{p}-{q}" + (f"x{times}" if times > 1 else ""))
-    return " ".join(found)
+def _planar(edges: str) -> bool:
+    """Whether a contracted graph is planar: a chain is a subdivision of it, which changes nothing."""
+    import networkx
+
+    pairs = [edge.partition("x")[0].split("-") for edge in edges.split()]
+    return bool(networkx.check_planarity(networkx.Graph(pairs))[0])
 
 
-def _assortment(counts: dict[int, int]) -> str:
-    return "-".join(str(counts.get(a, 0)) for a in range(2, max(counts) + 1))
+def open_family(
+    connection: sqlite3.Connection, question: tuple[int, int, int], row: tuple[Any, ...]
+) -> tuple[int, bool]:
+    """Return (number, whether it is complete) of a family, begun if it is not there.
+
+    Parameters
+    ----------
+    connection : sqlite3.Connection
+    question : (mobility, links, fractionated)
+    row : (pieces, cut, shard, expected)
+
+    Raises
+    ------
+    GraphsynthError
+        If the file holds the family in another way: with or without fractionated chains, another part, another cut.
+    """
+    mobility, links, fractionated = question
+    select = "SELECT family_id, complete, fractionated, cut, shard FROM families WHERE (mobility, links) = (?, ?)"
+    found = connection.execute(select, (mobility, links)).fetchone()
+    if found is None:
+        with transaction(connection):
+            connection.execute(
+                "INSERT INTO families (mobility, links, fractionated, pieces, cut, shard, expected, complete) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?, 0)",
+                (*question, *row),
+            )
+        return open_family(connection, question, row)
+    name = f"the chains of mobility {mobility} with {links} links"
+    if found[2] != fractionated:
+        ways = ("without", "with")
+        raise GraphsynthError(
+            f"the file holds {name} {ways[found[2]]} fractionated ones, not {ways[fractionated]}: name another file"
+        )
+    if found[4] != row[2]:
+        raise GraphsynthError(f"the file holds part {found[4]} of {name}, not {row[2]}: name another file")
+    if not found[1] and found[3] != row[1]:
+        raise GraphsynthError(f"{name} were begun by another version of graphsynth: delete the file and build it anew")
+    return found[0], bool(found[1])
 
 
 def build_family(
     connection: sqlite3.Connection,
     family_id: int,
     mobility: int,
-    pieces: list[tuple[int, Piece]],
-    executor: Executor | None = None,
-    watch: Watch | None = None,
+    pieces: list[tuple[int, float]],
+    results: Callable[[list[int]], Iterator[Rows]],
+    watch: Callable[[int, float], None] | None = None,
 ) -> None:
-    """Write the pieces of a family that are not there yet."""
-    from functools import partial
+    """Write the pieces of a family that are not there yet.
 
-    from graphsynth.synthesis.parallel import in_order
-
-    ids = _Ids(connection)
+    Parameters
+    ----------
+    connection : sqlite3.Connection
+    family_id, mobility : int
+    pieces : list of (number, weight)
+    results : callable
+        Gives the rows of the pieces at some places of ``pieces``, in their order.
+    watch : callable, optional
+        Told ``(chains written, share of the work done)`` after every piece.
+    """
+    writer = Writer(connection)
     done = {row[0] for row in connection.execute("SELECT piece FROM pieces WHERE family_id = ?", (family_id,))}
-    rest = [(number, piece) for number, piece in pieces if number not in done]
-    total = sum(piece.weight for _, piece in pieces) or 1.0
-    share = sum(piece.weight for number, piece in pieces if number in done)
+    rest = [at for at, (number, _) in enumerate(pieces) if number not in done]
+    total = sum(weight for _, weight in pieces) or 1.0
+    share = sum(weight for number, weight in pieces if number in done)
     written = connection.execute("SELECT COUNT(*) FROM chains WHERE family_id = ?", (family_id,)).fetchone()[0]
-    results = in_order(executor, partial(facts_of_piece, mobility=mobility), [piece for _, piece in rest])
-    for (number, piece), facts in zip(rest, results):
-        connection.execute("BEGIN IMMEDIATE")
-        try:
-            _write(connection, ids, family_id, mobility, facts)
-            connection.execute("INSERT INTO pieces VALUES (?, ?, ?)", (family_id, number, len(facts)))
-            connection.execute("COMMIT")
-        except BaseException:
-            connection.execute("ROLLBACK")
-            raise
-        written += len(facts)
-        share += piece.weight
+    for at, rows in zip(rest, results(rest)):
+        number, weight = pieces[at]
+        with transaction(connection):
+            writer.write(family_id, mobility, number, rows)
+        written += len(rows.chains)
+        share += weight
         if watch:
             watch(written, share / total)
 
 
-def _write(
-    connection: sqlite3.Connection,
-    ids: _Ids,
-    family_id: int,
-    mobility: int,
-    chains: Iterable[tuple[ChainFacts, bool]],
-) -> None:
-    start = connection.execute("SELECT COALESCE(MAX(chain_id), 0) FROM chains").fetchone()[0]
-    rows: dict[str, list[tuple[Any, ...]]] = {"chains": [], "dyads": [], "inversions": [], "mechanisms": []}
-    for chain_id, (facts, planar) in enumerate(chains, start + 1):
-        rows["chains"].append(
-            (
-                chain_id, family_id, facts.key, None, facts.graph6, mobility, facts.links, facts.joints,
-                facts.joints - facts.links + 1, _assortment(facts.assortment), facts.automorphisms,
-                " ".join(",".join(map(str, orbit)) for orbit in facts.orbits), len(facts.orbits), int(planar),
-                facts.girth, int(bool(facts.cut_links)), ids.of_contracted(facts.contracted),
-            )
-        )  # fmt: skip
-        rows["dyads"] += [(chain_id, parent) for parent in facts.parents]
-        rows["inversions"] += [
-            (chain_id, frame, sizes[1], "-".join(map(str, sizes))) for frame, sizes in facts.levels.items()
-        ]
-        rows["mechanisms"] += [
-            (chain_id, frame, driver, *_described(ids, groups)) for frame, driver, groups in facts.mechanisms
-        ]
-    for table, values in rows.items():
-        if values:
-            connection.executemany(f"INSERT INTO {table} VALUES ({', '.join('?' * len(values[0]))})", values)
-
-
-def _described(ids: _Ids, groups: Any) -> tuple[int | None, int | None, str | None]:
-    """Class, order and groups of a mechanism, or three times NULL."""
-    if groups is None:
-        return None, None, None
-    found = [ids.of_group(form, order) for form, order in groups]
-    return max(own for _, own in found), max(order for _, order in groups), " ".join(str(number) for number, _ in found)
-
-
 def finish_family(connection: sqlite3.Connection, family_id: int) -> None:
-    """Give the chains of a family their labels: rank by key within an assortment."""
+    """Give the chains of a family their labels, rank by key within an assortment, and mark it complete.
+
+    Raises
+    ------
+    GraphsynthError
+        If the number of chains is not what counting without listing gives.
+    """
     held, expected = connection.execute(
         "SELECT (SELECT COUNT(*) FROM chains c WHERE c.family_id = f.family_id), expected FROM families f "
         "WHERE family_id = ?",
@@ -175,13 +234,13 @@ def finish_family(connection: sqlite3.Connection, family_id: int) -> None:
     ).fetchone()
     if held != expected:
         raise GraphsynthError(f"the family holds {held} chains, but counting gives {expected}: build it anew")
-    connection.execute("BEGIN IMMEDIATE")
-    connection.execute(
-        "UPDATE chains SET label = ranked.label FROM (SELECT chain_id, mobility || '.' || links || '.' || assortment "
-        "|| '.' || ROW_NUMBER() OVER (PARTITION BY assortment ORDER BY key) AS label FROM chains WHERE family_id = ?) "
-        "AS ranked WHERE chains.chain_id = ranked.chain_id",
-        (family_id,),
-    )
-    connection.execute("UPDATE families SET complete = 1 WHERE family_id = ?", (family_id,))
-    connection.execute("COMMIT")
-    connection.executescript(INDEXES)
+    with transaction(connection):
+        connection.execute(
+            "UPDATE chains SET label = ranked.label FROM (SELECT chain_id, mobility || '.' || links || '.' || "
+            "assortment || '.' || ROW_NUMBER() OVER (PARTITION BY assortment ORDER BY key) AS label FROM chains "
+            "WHERE family_id = ?) AS ranked WHERE chains.chain_id = ranked.chain_id",
+            (family_id,),
+        )
+        connection.execute("UPDATE families SET complete = 1 WHERE family_id = ?", (family_id,))
+        for statement in INDEXES.split(";"):
+            connection.execute(statement)

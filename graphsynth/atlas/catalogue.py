@@ -1,36 +1,30 @@
-"""A catalogue of kinematic chains in one file: build, open, ask."""
+"""A catalogue of kinematic chains in one file: build, open, ask, check, hand on."""
 
 from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.atlas.building import build_family, finish_family
+from graphsynth.atlas.building import BuildStep
 from graphsynth.atlas.schema import connect
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.errors import FormatError, SpecError
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from graphsynth.atlas.evaluations import Evaluation
+    from graphsynth.atlas.verifying import Verification
     from graphsynth.structure.graph import MechanismGraph
 
 __all__ = ["BuildStep", "Catalogue"]
 
-_TABLES = ("chains", "inversions", "mechanisms", "groups", "contracted", "dyads", "evaluations", "families")
-
-
-@dataclass(frozen=True, slots=True)
-class BuildStep:
-    """How far a build is: the family, the chains written of it and the share of its work done."""
-
-    mobility: int
-    links: int
-    chains: int
-    done: float
+_TABLES = (
+    "chains", "inversions", "mechanisms", "groups", "structures", "contracted", "dyads", "relatives", "evaluations",
+    "families",
+)  # fmt: skip
 
 
 class Catalogue:
@@ -79,7 +73,7 @@ class Catalogue:
         path : str or Path
             Made if it does not exist; a family that is there is not made again, an interrupted one is continued.
         links : iterable of int
-            Numbers of links; those without a chain of this mobility are passed over.
+            Numbers of links, 17 at most; those without a chain of this mobility are passed over.
         mobility : int
         fractionated : bool
             For mobility >= 2: include chains that fall apart at a link or a joint.
@@ -96,21 +90,51 @@ class Catalogue:
             For numbers out of their bounds.
         FormatError
             If the file is no catalogue.
+        GraphsynthError
+            If the file cannot be written, or holds a family in another way.
         """
-        from graphsynth.synthesis.problem import Problem
+        from graphsynth.atlas.making import make
 
-        problems = [
-            (count, Problem.chains(count, mobility, 3, None, fractionated, None)) for count in sorted(set(links))
-        ]
-        if not problems:
-            raise SpecError("no number of links given; name at least one, for example links=range(4, 11)")
-        connection = connect(Path(path), create=True)
-        try:
-            for count, problem in problems:
-                _build(connection, problem, mobility, count, fractionated, executor, shard, watch)
-        finally:
-            connection.close()
+        make(Path(path), links, mobility, fractionated, executor, shard, watch)
         return cls(path)
+
+    @classmethod
+    def merge(cls, path: str | Path, parts: Iterable[str | Path]) -> Catalogue:
+        """Make one catalogue of its shards; the same rows, numbers and labels as built in one piece.
+
+        Parameters
+        ----------
+        path : str or Path
+            A new file.
+        parts : iterable of str or Path
+            Files built with ``shard=(i, m)``: every part of every family, once.
+
+        Raises
+        ------
+        GraphsynthError
+            If a piece is missing or twice there, or the file exists; the message names the shard.
+        """
+        from graphsynth.atlas.merging import merge
+
+        merge(Path(path), [Path(part) for part in parts])
+        return cls(path)
+
+    @classmethod
+    def shipped(cls) -> Catalogue:
+        """Open the catalogue that comes with the project: all planar chains of mobility 1 to 4 with up to ten links.
+
+        Raises
+        ------
+        FormatError
+            If it is not installed.
+        """
+        own = Path(__file__).parent
+        for path in (own / "shipped.sqlite", own.parents[1] / "catalog" / "up-to-10-links.sqlite"):
+            if path.is_file():
+                return cls(path)
+        raise FormatError(
+            "the shipped catalogue is not installed; build one with 'graphsynth catalog build'", "shipped"
+        )
 
     def __enter__(self) -> Catalogue:
         return self
@@ -124,7 +148,18 @@ class Catalogue:
 
     def __len__(self) -> int:
         """Return the number of chains."""
-        return int(self.connection.execute("SELECT COUNT(*) FROM chains").fetchone()[0])
+        return int(self._rows("SELECT COUNT(*) FROM chains", ())[1][0][0])
+
+    def _rows(self, text: str, parameters: Sequence[Any]) -> tuple[list[str], list[tuple[Any, ...]]]:
+        try:
+            cursor = self.connection.execute(text, tuple(parameters))
+            return [column[0] for column in cursor.description or ()], cursor.fetchall()
+        except sqlite3.DatabaseError as error:
+            if isinstance(error, sqlite3.OperationalError | sqlite3.ProgrammingError):
+                raise SpecError(f"SQLite refuses {text!r}: {error}") from None
+            raise FormatError(f"the file is damaged ({error}): build it anew", str(self.path)) from None
+        except (sqlite3.Error, sqlite3.Warning, ValueError) as error:
+            raise SpecError(f"SQLite refuses {text!r}: {error}") from None
 
     def query(self, table: str = "chains", where: str = "1", parameters: Sequence[Any] = ()) -> pd.DataFrame:
         """Return the rows of a table that fulfil an SQL condition.
@@ -157,11 +192,8 @@ class Catalogue:
         """
         import pandas as pd
 
-        try:
-            cursor = self.connection.execute(text, tuple(parameters))
-        except sqlite3.Error as error:
-            raise SpecError(f"SQLite refuses {text!r}: {error}") from None
-        return pd.DataFrame(cursor.fetchall(), columns=[column[0] for column in cursor.description or ()])
+        columns, rows = self._rows(text, parameters)
+        return pd.DataFrame(rows, columns=columns)
 
     def chain(self, name: str) -> MechanismGraph:
         """Return a chain by its key or its label.
@@ -173,50 +205,105 @@ class Catalogue:
         """
         from graphsynth.structure.graph import MechanismGraph
 
-        row = self.connection.execute("SELECT key FROM chains WHERE key = ? OR label = ?", (name, name)).fetchone()
-        if row is None:
+        return MechanismGraph.from_key(self._fetch(name)["key"])
+
+    def _fetch(self, name: str) -> dict[str, Any]:
+        columns, rows = self._rows("SELECT * FROM chains WHERE key = ? OR label = ?", (name, name))
+        if not rows:
             raise SpecError(f"no chain {name!r} in {self.path.name}; give a key or a label such as 1.8.4-4.1")
-        return MechanismGraph.from_key(row[0])
+        return dict(zip(columns, rows[0]))
 
+    def entry(self, name: str) -> dict[str, Any]:
+        """Return everything the catalogue knows of a chain, given by key or label, ready for JSON.
 
-def _build(
-    connection: sqlite3.Connection,
-    problem: Any,
-    mobility: int,
-    links: int,
-    fractionated: bool,
-    executor: Executor | None,
-    shard: tuple[int, int] | None,
-    watch: Callable[[BuildStep], None] | None,
-) -> None:
-    """Make or continue one family."""
-    from graphsynth.synthesis.parallel import counts
-    from graphsynth.synthesis.writing import shard_of
+        Mechanisms list their evaluations; kinds that nobody evaluated say ``"not computed"``.
 
-    whole = list(problem.pieces(listing=True))
-    number = {id(piece): k for k, piece in enumerate(whole)}
-    pieces = [(number[id(piece)], piece) for piece in shard_of(whole, shard)]
-    part = f"{shard[0]}/{shard[1]}" if shard else "1/1"
-    question = (mobility, links, int(fractionated))
-    select = "SELECT family_id, complete, shard FROM families WHERE (mobility, links, fractionated) = (?, ?, ?)"
-    row = connection.execute(select, question).fetchone()
-    if row is None:
-        expected = None if shard else sum(counts(problem.pieces(listing=False), None))
-        connection.execute(
-            "INSERT INTO families (mobility, links, fractionated, pieces, shard, expected, complete) "
-            "VALUES (?, ?, ?, ?, ?, ?, 0)",
-            (*question, len(whole), part, expected),
-        )
-        row = connection.execute(select, question).fetchone()
-    if row[2] != part:
-        raise GraphsynthError(f"the file holds part {row[2]} of this family, not {part}: name another file")
-    if row[1]:
-        return
+        Raises
+        ------
+        SpecError
+            If the catalogue does not hold it.
+        """
+        from graphsynth.atlas.entry import entry
 
-    def told(chains: int, done: float) -> None:
-        if watch:
-            watch(BuildStep(mobility, links, chains, done))
+        return entry(self.connection, self._fetch(name))
 
-    build_family(connection, row[0], mobility, pieces, executor, told)
-    if not shard:
-        finish_family(connection, row[0])
+    def record(self, evaluations: Iterable[Evaluation]) -> int:
+        """Store evaluations of mechanisms, one for each mechanism and kind (a new one replaces the old).
+
+        Returns
+        -------
+        int
+            How many were stored.
+
+        Raises
+        ------
+        SpecError
+            For a mechanism that the catalogue does not hold, or a value that is not a number or None.
+        GraphsynthError
+            If the file cannot be written.
+        """
+        from graphsynth.atlas.evaluations import record
+
+        return record(self.path, evaluations)
+
+    def completeness(self) -> pd.DataFrame:
+        """Return the statement of completeness, one row for each family.
+
+        Columns: ``mobility``, ``links``, ``fractionated``; ``listed``, chains in the file, every one with another key;
+        ``counted``, by orbit counting without listing; ``published`` with its ``source`` (empty where nothing is);
+        ``complete``, whether all that is there agrees.
+        """
+        from graphsynth.atlas.statement import completeness
+
+        return completeness(self.connection)
+
+    def verify(self, *, chains: int | None = None, seed: int = 0) -> Verification:
+        """Recompute every stored field by another route and compare (exact).
+
+        Parameters
+        ----------
+        chains : int, optional
+            Only so many chains of each family, drawn at random; default all.
+        seed : int
+
+        Returns
+        -------
+        Verification
+            How often each field was compared, and every difference.
+        """
+        from graphsynth.atlas.verifying import verify
+
+        return verify(self.connection, chains, seed)
+
+    def digest(self) -> str:
+        """Return a SHA-256 of the whole structural content, without internal numbers.
+
+        Equal for two catalogues of the same families however they were built: at once, resumed, by any executor,
+        or merged.  Evaluations are left out.
+        """
+        from graphsynth.atlas.exporting import digest
+
+        return digest(self.connection)
+
+    def export(self, folder: str | Path, form: str = "parquet") -> list[Path]:
+        """Write the tables to a folder, one file each; equal catalogues give equal bytes.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Made if it does not exist; files of the same name are replaced.
+        form : {"parquet", "csv", "jsonl"}
+            Parquet needs the extra ``parquet``.
+
+        Returns
+        -------
+        list of Path
+
+        Raises
+        ------
+        SpecError
+            For another form, or a missing extra.
+        """
+        from graphsynth.atlas.exporting import export
+
+        return export(self.connection, Path(folder), form)

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from graphsynth.errors import FormatError
 
-__all__ = ["APPLICATION_ID", "SCHEMA", "SCHEMA_VERSION", "connect"]
+__all__ = ["APPLICATION_ID", "INDEXES", "SCHEMA", "SCHEMA_VERSION", "connect", "settle"]
 
 #: In the header of every catalogue file ("GSyn"), so that another SQLite file is not taken for one.
 APPLICATION_ID = 0x4753796E
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 SCHEMA = """
 CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -20,20 +20,26 @@ CREATE TABLE families (
   family_id INTEGER PRIMARY KEY,
   mobility INTEGER NOT NULL, links INTEGER NOT NULL, fractionated INTEGER NOT NULL,
   pieces INTEGER NOT NULL,      -- units of work
+  cut TEXT NOT NULL,            -- fingerprint of the question and of its cut into pieces
   shard TEXT NOT NULL,          -- 'i/m': the part of the family this file holds
-  expected INTEGER,             -- chains by counting without listing; NULL for a part
+  expected INTEGER NOT NULL,             -- chains of the whole family by counting without listing
   complete INTEGER NOT NULL,    -- 1 when every piece is there and labels are given
-  UNIQUE (mobility, links, fractionated));
--- a piece that is written stands here, in the same transaction as its chains
+  UNIQUE (mobility, links));
+-- a piece that is written stands here, in the same transaction as its chains, which have consecutive numbers
 CREATE TABLE pieces (
-  family_id INTEGER NOT NULL REFERENCES families, piece INTEGER NOT NULL, chains INTEGER NOT NULL,
-  PRIMARY KEY (family_id, piece)) WITHOUT ROWID;
+  family_id INTEGER NOT NULL REFERENCES families, piece INTEGER NOT NULL, first_chain INTEGER NOT NULL,
+  chains INTEGER NOT NULL, PRIMARY KEY (family_id, piece)) WITHOUT ROWID;
 CREATE TABLE contracted (
   contracted_id INTEGER PRIMARY KEY, vertices INTEGER NOT NULL,
-  edges TEXT NOT NULL UNIQUE);  -- 'a-b' or 'a-bxm' for m parallel paths
+  edges TEXT NOT NULL UNIQUE,   -- 'a-b', or 'a-bxm' for m parallel paths
+  planar INTEGER NOT NULL);
 CREATE TABLE groups (
   group_id INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, -- canonical key, the base as frame
   links INTEGER NOT NULL, "order" INTEGER NOT NULL, class INTEGER NOT NULL);
+-- how a mechanism is assembled: the groups, and the highest class and order among them
+CREATE TABLE structures (
+  structure_id INTEGER PRIMARY KEY, groups TEXT NOT NULL UNIQUE, -- group_id of each group in the order of assembly
+  class INTEGER NOT NULL, "order" INTEGER NOT NULL);
 CREATE TABLE chains (
   chain_id INTEGER PRIMARY KEY, family_id INTEGER NOT NULL REFERENCES families,
   key TEXT NOT NULL UNIQUE, label TEXT UNIQUE, -- F.links.assortment.rank, given when the family is complete
@@ -50,15 +56,21 @@ CREATE TABLE inversions (
   chain_id INTEGER NOT NULL REFERENCES chains, frame INTEGER NOT NULL,
   frame_joints INTEGER NOT NULL, levels TEXT NOT NULL, -- links on each adjacency level: '1-2-3'
   PRIMARY KEY (chain_id, frame)) WITHOUT ROWID;
--- one row for each orbit of (frame, driven link jointed to it)
-CREATE TABLE mechanisms (
-  chain_id INTEGER NOT NULL, frame INTEGER NOT NULL, driver INTEGER NOT NULL,
-  class INTEGER, -- highest class of a group; NULL: not computed
-  "order" INTEGER, groups TEXT, -- group_id of the groups in the order of assembly: '1 1 3'
+-- one row for each orbit of (frame, as many driven links jointed to it as the mobility) that can be moved so
+CREATE TABLE driven (
+  chain_id INTEGER NOT NULL, frame INTEGER NOT NULL,
+  driver NOT NULL,              -- driven link; text such as '1,3' for several
+  structure_id INTEGER NOT NULL REFERENCES structures,
   PRIMARY KEY (chain_id, frame, driver)) WITHOUT ROWID;
--- what somebody evaluated: dimensions, transmission, jamming; absent means not computed
+CREATE VIEW mechanisms AS
+  SELECT d.chain_id, d.frame, d.driver, s.class, s."order", s.groups, i.levels
+  FROM driven d JOIN structures s USING (structure_id) JOIN inversions i USING (chain_id, frame);
+CREATE VIEW relatives AS
+  SELECT p.chain_id AS parent_id, d.chain_id AS child_id, d.parent_key, c.key AS child_key
+  FROM dyads d JOIN chains c USING (chain_id) LEFT JOIN chains p ON p.key = d.parent_key;
+-- what somebody evaluated: 'dimensions', 'transmission', 'jamming', ...; a row that is absent was not computed
 CREATE TABLE evaluations (
-  chain_id INTEGER NOT NULL REFERENCES chains, frame INTEGER NOT NULL, driver INTEGER NOT NULL,
+  chain_id INTEGER NOT NULL REFERENCES chains, frame INTEGER NOT NULL, driver NOT NULL,
   kind TEXT NOT NULL, status TEXT NOT NULL, value REAL, unit TEXT, guarantee TEXT, data TEXT,
   PRIMARY KEY (chain_id, frame, driver, kind)) WITHOUT ROWID;
 """
@@ -76,32 +88,59 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
     Raises
     ------
     FormatError
-        If the file is missing, is no catalogue, or was written by a later version.
+        If the file is missing, is no catalogue, or was written by another version.
     """
     if not create and not path.is_file():
         raise FormatError("there is no such catalogue: build one with 'graphsynth catalog build'", str(path))
-    fresh = create and (not path.exists() or path.stat().st_size == 0)
+    if create and not path.absolute().parent.is_dir():
+        raise FormatError("the folder of the catalogue does not exist: make it, or name another file", str(path))
     mode = "ro" if readonly else "rwc" if create else "rw"
+    connection = None
     try:
         connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None)
+        _check(connection, path, create)
         if not readonly:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
-        if fresh:
-            connection.executescript(
-                f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; "
-                f"BEGIN; {SCHEMA} COMMIT;"
-            )
-        owner = connection.execute("PRAGMA application_id").fetchone()[0]
-        version = connection.execute("PRAGMA user_version").fetchone()[0]
-    except sqlite3.DatabaseError as error:
+    except sqlite3.Error as error:
+        if connection:
+            connection.close()
         raise FormatError(f"cannot be opened as a catalogue ({error})", str(path)) from None
+    except FormatError:
+        if connection:
+            connection.close()
+        raise
+    return connection
+
+
+def _check(connection: sqlite3.Connection, path: Path, create: bool) -> None:
+    """Make the tables of an empty file; refuse one that is no catalogue, or of another version."""
+    if create:
+        # in one transaction, so that a file is never half a catalogue
+        connection.execute("BEGIN IMMEDIATE")
+        if not connection.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]:
+            for statement in (f"PRAGMA application_id = {APPLICATION_ID}", f"PRAGMA user_version = {SCHEMA_VERSION}"):
+                connection.execute(statement)
+            for statement in SCHEMA.split(";\n"):
+                if statement.strip():
+                    connection.execute(statement)
+        connection.execute("COMMIT")
+    owner = connection.execute("PRAGMA application_id").fetchone()[0]
+    version = connection.execute("PRAGMA user_version").fetchone()[0]
     if owner != APPLICATION_ID:
-        connection.close()
         raise FormatError("is a database, but not a catalogue of graphsynth; name another file", str(path))
     if version != SCHEMA_VERSION:
-        connection.close()
         raise FormatError(
             f"has schema version {version}, this graphsynth reads {SCHEMA_VERSION}: build it anew", str(path)
         )
-    return connection
+
+
+def settle(connection: sqlite3.Connection) -> None:
+    """Leave one plain file that can be read from anywhere: no write-ahead log beside it (unless others read it now)."""
+    try:
+        connection.execute("PRAGMA busy_timeout = 200")
+        connection.execute("PRAGMA journal_mode = DELETE")
+    except sqlite3.OperationalError:
+        pass
+    finally:
+        connection.execute("PRAGMA busy_timeout = 5000")

@@ -88,34 +88,54 @@ def connected_without(n, masks, gone):
 
 
 @kernel
-def arc_orbits(n, joints, arc_of, gens, count, out):
-    """Smallest arc (frame, driver) of the orbit of every arc; arc 2 j is a -> b of joint j, arc 2 j + 1 is b -> a."""
-    arcs = out.shape[0]
-    for k in range(arcs):
-        out[k] = k
+def list_drives(n, mobility, masks, frames, drives):
+    """Write every frame with every set of driven links jointed to it; returns their number."""
+    count = 0
+    for v in range(n):
+        chosen = ZERO
+        while True:
+            if popcount(chosen) == np.uint64(mobility):
+                frames[count], drives[count] = v, chosen
+                count += 1
+            chosen = (chosen - masks[v]) & masks[v]  # the next subset
+            if chosen == ZERO:
+                break
+    return count
+
+
+@kernel
+def drive_orbits(count, frames, drives, gens, generators, first, low):
+    """Smallest member of the orbit of every (frame, driven links); ``first`` is where the sets of a frame begin."""
+    for k in range(count - 1, -1, -1):
+        low[k], first[frames[k]] = k, k
     changed = True
     while changed:
         changed = False
-        for g in range(count):
-            for k in range(arcs):
-                j, back = k >> 1, k & 1
-                image = arc_of[gens[g, joints[j, back]], gens[g, joints[j, 1 - back]]]
-                low = min(out[k], out[image])
-                if out[k] != low or out[image] != low:
-                    out[k] = out[image] = low
+        for g in range(generators):
+            for k in range(count):
+                moved, left = ZERO, drives[k]
+                while left != ZERO:
+                    moved |= ONE << np.uint64(gens[g, np.int64(lowest_bit(left))])
+                    left &= left - ONE
+                image = first[gens[g, frames[k]]]
+                while drives[image] != moved:
+                    image += 1
+                least = min(low[k], low[image])
+                if low[k] != least or low[image] != least:
+                    low[k] = low[image] = least
                     changed = True
 
 
 @kernel
 def lay_out_group(group, known, masks, local, small, colours):
-    """Adjacency of a group and its base (vertex 0, a colour of its own); returns (vertices, outer joints)."""
+    """Adjacency of a group and its base (vertex 0), coloured by adjacency level; returns (vertices, outer joints)."""
     size, left = 1, group
     while left != ZERO:
         local[np.int64(lowest_bit(left))] = size
         left &= left - ONE
         size += 1
     for v in range(size):
-        small[0, v], colours[v] = ZERO, min(v, 1)
+        small[0, v] = ZERO
     outer, left = 0, group
     while left != ZERO:
         link = np.int64(lowest_bit(left))
@@ -130,6 +150,18 @@ def lay_out_group(group, known, masks, local, small, colours):
             outer += np.int64(popcount(outside))
             small[0, near] |= ONE
             small[0, 0] |= bit
+    seen = level = ONE
+    number = 0
+    while level != ZERO:
+        following = ZERO
+        while level != ZERO:
+            at = np.int64(lowest_bit(level))
+            level &= level - ONE
+            colours[at] = number
+            following |= small[0, at]
+        level = following & ~seen
+        seen |= level
+        number += 1
     return size, outer
 
 
@@ -170,8 +202,11 @@ def without_dyad(n, masks, u, w, local, small):
 
 
 @kernel
-def contract(n, masks, local, small):
-    """Contracted multigraph as layers of an adjacency, layer m - 1 for m parallel paths; returns its vertices."""
+def contract(n, masks, local, small, colours):
+    """Contracted multigraph as layers of an adjacency, layer m - 1 for m parallel paths; returns its vertices.
+
+    The colour of a vertex is its number of paths back to itself (in fractionated chains only).
+    """
     size = 0
     for v in range(n):
         if popcount(masks[v]) > np.uint64(2):
@@ -191,6 +226,7 @@ def contract(n, masks, local, small):
             times[local[v], local[at]] += 1
     small[:] = ZERO
     for p in range(size):
+        colours[p] = times[p, p] // 2
         for q in range(size):
             if p != q and times[p, q]:
                 small[times[p, q] - 1, p] |= ONE << np.uint64(q)
@@ -198,36 +234,180 @@ def contract(n, masks, local, small):
 
 
 @kernel
+def independent_loops(n, rows, edge_of, most, basis, distance, before, queue):
+    """Rank of the loops of at most ``most`` links; ``n`` vertices, vertex 0 left out.
+
+    Loops are vectors over the joints.  Those of a breadth-first tree from every vertex are enough: each edge of a loop
+    of length L closes, with the tree of a vertex of that loop, a loop no longer than L, and these add up to it.
+    """
+    rank = 0
+    for start in range(1, n):
+        for v in range(1, n):
+            distance[v] = -1
+        distance[start], queue[0], before[start] = 0, start, start
+        head, tail = 0, 1
+        while head < tail:
+            at = queue[head]
+            head += 1
+            for w in range(1, n):
+                if rows[at] >> np.uint64(w) & ONE != ZERO and distance[w] < 0:
+                    distance[w], before[w], queue[tail] = distance[at] + 1, at, w
+                    tail += 1
+        for a in range(1, n):
+            for b in range(1, a):
+                if rows[a] >> np.uint64(b) & ONE == ZERO or distance[a] < 0:
+                    continue
+                if before[a] == b or before[b] == a or distance[a] + distance[b] + 1 > most:
+                    continue
+                vector = ONE << np.uint64(edge_of[a, b])
+                for end in (a, b):
+                    at = end
+                    while at != start:
+                        vector ^= ONE << np.uint64(edge_of[at, before[at]])
+                        at = before[at]
+                for k in range(rank):
+                    vector = min(vector, vector ^ basis[k])
+                if vector != ZERO:
+                    basis[rank] = vector
+                    rank += 1
+    return rank
+
+
+@kernel
+def classes_of(vertices, forms, out):
+    """Class of each group: most joints of a link, or links of the longest loop of a minimum basis, at least 2.
+
+    ``vertices`` int64[groups] with the base, ``forms`` uint64[groups, 2] as :func:`packed_bits` gives them.
+    """
+    rows, edge_of = np.zeros(16, np.uint64), np.zeros((16, 16), np.int64)
+    basis, distance = np.zeros(128, np.uint64), np.zeros(16, np.int64)
+    before, queue = np.zeros(16, np.int64), np.zeros(16, np.int64)
+    for g in range(vertices.shape[0]):
+        n, bit, edges = vertices[g], 0, 0
+        rows[:] = ZERO
+        for b in range(1, n):
+            for a in range(b):
+                word = forms[g, 1] >> np.uint64(bit) if bit < 64 else forms[g, 0] >> np.uint64(bit - 64)
+                if word & ONE != ZERO:
+                    rows[a] |= ONE << np.uint64(b)
+                    rows[b] |= ONE << np.uint64(a)
+                    if a > 0:
+                        edge_of[a, b] = edge_of[b, a] = edges
+                        edges += 1
+                bit += 1
+        highest = 2
+        for v in range(1, n):
+            highest = max(highest, np.int64(popcount(rows[v])))
+        # the inner joints connect the group: one loop for each joint beyond those of a tree
+        loops, most = edges - (n - 2), 2
+        while loops > 0 and independent_loops(n, rows, edge_of, most, basis, distance, before, queue) < loops:
+            most += 1
+        out[g] = max(highest, most) if loops > 0 else highest
+
+
+@kernel
+def fresh_parents(n, joints, rows, local, small, plain, space, parents):
+    """Write the chains left when one dyad of two binary links is removed."""
+    lab, form, gens, index, orbits, wi, wu = space
+    found = 0
+    for j in range(joints.shape[0]):
+        u, w = np.int64(joints[j, 0]), np.int64(joints[j, 1])
+        if popcount(rows[u]) == popcount(rows[w]) == np.uint64(2) and without_dyad(n, rows, u, w, local, small):
+            canon(n - 2, np.int64(1), small, plain, lab, form, gens, index, orbits, wi, wu)
+            spell(n - 2, form[0], parents[found, 1:])
+            parents[found, 0] = 1
+            found += 1
+    for k in range(found, parents.shape[0]):
+        parents[k, 0] = 0
+
+
+@kernel
+def canonical_contracted(n, rows, local, small, colours, space, out):
+    """Write the canonical contracted multigraph: vertices, then its matrix of multiplicities."""
+    lab, form, gens, index, orbits, wi, wu = space
+    size = contract(n, rows, local, small, colours)
+    out[0] = size
+    if size > 0:
+        canon(size, np.int64(8), small, colours, lab, form, gens, index, orbits, wi, wu)
+    for p in range(size):
+        for q in range(size):
+            times = colours[lab[p]] if p == q else 0
+            for m in range(8):
+                if form[m, p] >> np.uint64(q) & ONE != ZERO:
+                    times = m + 1
+            out[1 + p * size + q] = times
+
+
+@kernel
+def grouped(n, joints, rows, placed, scratch, local, small, colours, space, sizes, outers, forms):
+    """Write the groups of one mechanism; returns False if these drivers cannot move it."""
+    ends, owner, free, came, stack, reach, groups = scratch
+    lab, form, gens, index, orbits, wi, wu = space
+    found = groups_of(n, joints, placed, ends, owner, free, came, stack, reach, groups)
+    sizes[:] = 0
+    known = placed
+    for g in range(found):
+        size, outer = lay_out_group(groups[g], known, rows, local, small, colours)
+        known |= groups[g]
+        sizes[g], outers[g] = size - 1, outer
+        if size > 3:
+            canon(size, np.int64(1), small, colours, lab, form, gens, index, orbits, wi, wu)
+            forms[g, 0], forms[g, 1] = packed_bits(size, form)
+        else:
+            forms[g, 0], forms[g, 1] = ZERO, np.uint64(7)
+    return found >= 0
+
+
+@kernel
 def analyse(
-    n, packed, joints, keys, order, orbit, girth, cuts, levels, arcs, sizes, outers, forms, parents, contracted
+    n,
+    mobility,
+    packed,
+    joints,
+    keys,
+    order,
+    orbit,
+    girth,
+    cuts,
+    levels,
+    count,
+    frames,
+    drives,
+    sizes,
+    outers,
+    forms,
+    parents,
+    contracted,
 ):
     """Facts of a block of chains; see :func:`graphsynth.atlas.facts.analyse_block` for the arrays.
 
     ``packed`` uint8[chains, 3 joints]; the rest is output.  ``joints`` uint8[chains, joints, 2], ``keys`` uint8[chains,
     bytes], ``order`` int64[chains], ``orbit`` uint8[chains, n], ``girth`` uint8[chains], ``cuts`` uint64[chains],
-    ``levels`` uint8[chains, n, n], ``arcs`` int16[chains, 2 joints], ``sizes``, ``outers`` uint8[chains, joints, n // 2]
-    (0 beyond the last group and for joints that do not represent their orbit), ``forms`` uint64[chains, joints, n // 2, 2],
-    ``parents`` uint8[chains, n // 2, bytes + 1] (first byte 1 where there is one), ``contracted`` uint8[chains, 1 + n n].
-    """  # noqa: E501
-    count = packed.shape[1] // 3
-    most = max(n, 16)
-    layers = np.int64(1)
-    lab, form, gens, index, orbits, wi, wu = canon_workspace(most, 8)
+    ``levels`` uint8[chains, n, n].  Of mechanisms ``count`` int64[chains], ``frames`` uint8[chains, K], ``drives``
+    uint64[chains, K], ``sizes``, ``outers`` uint8[chains, K, n // 2] (sizes 0 beyond the last group), ``forms``
+    uint64[chains, K, n // 2, 2]; K at least the number of all (frame, driven links).  ``parents`` uint8[chains,
+    n // 2, bytes + 1] (first byte 1 where there is one), ``contracted`` uint8[chains, 1 + n n].
+    """
+    most, joint_count, room = max(n, 16), packed.shape[1] // 3, frames.shape[1]
+    space = canon_workspace(most, 8)
+    lab, form, gens, index, orbits, wi, wu = space
     masks, small = np.zeros((1, most), np.uint64), np.zeros((8, most), np.uint64)
     plain, colours, local = np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most, np.int64)
-    rows, arc_of, image = np.zeros(n, np.uint64), np.zeros((n, n), np.int64), np.zeros((2 * n, n), np.int64)
-    distance, queue = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    ends, owner = np.zeros((2 * count, 2), np.int64), np.zeros(2 * count, np.int64)
-    free, came, stack = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n + 1, np.int64)
-    reach, groups = np.zeros(n, np.uint64), np.zeros(n, np.uint64)
+    rows, image = np.zeros(n, np.uint64), np.zeros((2 * n, n), np.int64)
+    distance, queue, first = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
+    all_frames, all_drives, low = np.zeros(room, np.int64), np.zeros(room, np.uint64), np.zeros(room, np.int64)
+    scratch = (
+        np.zeros((2 * joint_count, 2), np.int64), np.zeros(2 * joint_count, np.int64), np.zeros(n, np.int64),
+        np.zeros(n, np.int64), np.zeros(n + 1, np.int64), np.zeros(n, np.uint64), np.zeros(n, np.uint64),
+    )  # fmt: skip
     for c in range(packed.shape[0]):
         for v in range(n):
             masks[0, v] = ZERO
-        for j in range(count):
+        for j in range(joint_count):
             a, b = np.int64(packed[c, 3 * j]), np.int64(packed[c, 3 * j + 1])
             masks[0, a] |= ONE << np.uint64(b)
             masks[0, b] |= ONE << np.uint64(a)
-        generators = canon(n, layers, masks, plain, lab, form, gens, index, orbits, wi, wu)
+        generators = canon(n, np.int64(1), masks, plain, lab, form, gens, index, orbits, wi, wu)
         order[c] = 1
         for i in range(n):
             order[c] *= index[i]
@@ -237,18 +417,16 @@ def analyse(
             for v in range(n):
                 image[g, local[v]] = local[gens[g, v]]
         for i in range(n):
-            low = n
+            orbit[c, i] = n
             for v in range(n):
                 if orbits[v] == orbits[lab[i]]:
-                    low = min(low, local[v])
-            orbit[c, i] = low
+                    orbit[c, i] = min(orbit[c, i], local[v])
         spell(n, rows, keys[c])
         at = 0
         for a in range(n):
             for b in range(a + 1, n):
                 if rows[a] >> np.uint64(b) & ONE != ZERO:
                     joints[c, at, 0], joints[c, at, 1] = a, b
-                    arc_of[a, b], arc_of[b, a] = 2 * at, 2 * at + 1
                     at += 1
         girth[c] = girth_of(n, rows, distance, queue)
         cuts[c] = ZERO
@@ -256,43 +434,36 @@ def analyse(
             if not connected_without(n, rows, ONE << np.uint64(v)):
                 cuts[c] |= ONE << np.uint64(v)
             level_sizes(n, rows, v, levels[c, v])
-        arc_orbits(n, joints[c], arc_of, image, generators, arcs[c])
-        sizes[c, :, :] = 0
-        for k in range(2 * count):
-            j = k >> 1
-            if arcs[c, k] != k or (k & 1 and arcs[c, k - 1] == k - 1):
-                continue  # not the first of its orbit, or the two links have just been driven against each other
-            placed = ONE << np.uint64(joints[c, j, 0]) | ONE << np.uint64(joints[c, j, 1])
-            found = groups_of(n, joints[c], placed, ends, owner, free, came, stack, reach, groups)
-            known = placed
-            for g in range(found):
-                size, outer = lay_out_group(groups[g], known, rows, local, small, colours)
-                known |= groups[g]
-                sizes[c, j, g], outers[c, j, g] = size - 1, outer
-                if size > 3:
-                    canon(size, layers, small, colours, lab, form, gens, index, orbits, wi, wu)
-                    high, low = packed_bits(size, form)
-                    forms[c, j, g, 0], forms[c, j, g, 1] = high, low
-                else:
-                    forms[c, j, g, 0], forms[c, j, g, 1] = ZERO, np.uint64(7)
-        found = 0
-        for j in range(count):
-            u, w = np.int64(joints[c, j, 0]), np.int64(joints[c, j, 1])
-            if popcount(rows[u]) == popcount(rows[w]) == np.uint64(2) and without_dyad(n, rows, u, w, local, small):
-                canon(n - 2, layers, small, plain, lab, form, gens, index, orbits, wi, wu)
-                spell(n - 2, form[0], parents[c, found, 1:])
-                parents[c, found, 0] = 1
-                found += 1
-        for k in range(found, parents.shape[1]):
-            parents[c, k, 0] = 0
-        size = contract(n, rows, local, small)
-        contracted[c, 0] = size
-        if size > 0:
-            canon(size, np.int64(8), small, plain, lab, form, gens, index, orbits, wi, wu)
-            for p in range(size):
-                for q in range(size):
-                    times = 0
-                    for m in range(8):
-                        if form[m, p] >> np.uint64(q) & ONE != ZERO:
-                            times = m + 1
-                    contracted[c, 1 + p * size + q] = times
+        found = list_drives(n, mobility, rows, all_frames, all_drives)
+        drive_orbits(found, all_frames, all_drives, image, generators, first, low)
+        at = 0
+        for k in range(found):
+            if low[k] != k:
+                continue
+            placed = ONE << np.uint64(all_frames[k]) | all_drives[k]
+            frames[c, at], drives[c, at] = all_frames[k], all_drives[k]
+            known = -1  # a mechanism with the same links placed has the same groups
+            for i in range(at):
+                if ONE << np.uint64(frames[c, i]) | drives[c, i] == placed:
+                    known = i
+            if known >= 0:
+                sizes[c, at], outers[c, at], forms[c, at] = sizes[c, known], outers[c, known], forms[c, known]
+                at += 1
+            elif grouped(
+                n,
+                joints[c],
+                rows,
+                placed,
+                scratch,
+                local,
+                small,
+                colours,
+                space,
+                sizes[c, at],
+                outers[c, at],
+                forms[c, at],
+            ):
+                at += 1
+        count[c] = at
+        fresh_parents(n, joints[c], rows, local, small, plain, space, parents[c])
+        canonical_contracted(n, rows, local, small, colours, space, contracted[c])

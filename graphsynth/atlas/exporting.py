@@ -1,0 +1,146 @@
+"""Tables of a catalogue in files, and a digest of its content; neither shows numbers internal to the file."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sqlite3
+from collections.abc import Callable, Iterator
+from hashlib import sha256
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from graphsynth.errors import GraphsynthError, SpecError
+
+__all__ = ["FORMS", "TABLES", "digest", "export"]
+
+_CHAIN = "c.mobility, c.links, c.key"
+
+#: Rows of each table in an order that depends on the content alone.  A number of a group is its rank by size and key.
+TABLES = {
+    "families": "SELECT mobility, links, fractionated, expected, complete FROM families ORDER BY mobility, links",
+    "groups": 'SELECT rank AS "group", key, links, "order", class FROM temp.ranked_groups ORDER BY rank',
+    "chains": (
+        "SELECT c.key, c.label, c.graph6, c.mobility, c.links, c.joints, c.loops, c.assortment, c.automorphisms, "
+        "c.link_orbits, c.inversions, c.planar, c.girth, c.fractionated, h.vertices AS contracted_vertices, "
+        f"h.edges AS contracted FROM chains c JOIN contracted h USING (contracted_id) ORDER BY {_CHAIN}"
+    ),
+    "dyads": f"SELECT c.key, d.parent_key FROM chains c JOIN dyads d USING (chain_id) ORDER BY {_CHAIN}, d.parent_key",
+    "inversions": (
+        "SELECT c.key, i.frame, i.frame_joints, i.levels FROM chains c JOIN inversions i USING (chain_id) "
+        f"ORDER BY {_CHAIN}, i.frame"
+    ),
+    "mechanisms": (
+        'SELECT c.key, d.frame, CAST(d.driver AS TEXT) AS driver, s.class, s."order", s.ranks AS groups '
+        "FROM chains c JOIN driven d USING (chain_id) JOIN temp.ranked_structures s USING (structure_id) "
+        f"ORDER BY {_CHAIN}, d.frame, CAST(d.driver AS TEXT)"
+    ),
+    "evaluations": (
+        "SELECT c.key, e.frame, CAST(e.driver AS TEXT) AS driver, e.kind, e.status, e.value, e.unit, e.guarantee, "
+        f"e.data FROM chains c JOIN evaluations e USING (chain_id) ORDER BY {_CHAIN}, e.frame, e.driver, e.kind"
+    ),
+}
+FORMS = ("parquet", "csv", "jsonl")
+_ROWS = 100_000
+
+_RANKS = """
+CREATE TEMP TABLE IF NOT EXISTS ranked_groups AS
+  SELECT group_id, ROW_NUMBER() OVER (ORDER BY links, key) AS rank, key, links, "order", class FROM main.groups;
+CREATE TEMP TABLE IF NOT EXISTS ranked_structures (
+  structure_id INTEGER PRIMARY KEY, ranks TEXT, class INTEGER, "order" INTEGER);
+DELETE FROM temp.ranked_structures;
+"""
+
+
+def _prepare(connection: sqlite3.Connection) -> None:
+    """Give groups numbers that follow from their content."""
+    connection.executescript(_RANKS)
+    rank = dict(connection.execute("SELECT group_id, rank FROM temp.ranked_groups"))
+    found = connection.execute('SELECT structure_id, groups, class, "order" FROM structures').fetchall()
+    connection.execute("BEGIN")
+    connection.executemany(
+        "INSERT INTO temp.ranked_structures VALUES (?, ?, ?, ?)",
+        (
+            (number, " ".join(str(rank[int(group)]) for group in groups.split()), *rest)
+            for number, groups, *rest in found
+        ),
+    )
+    connection.execute("COMMIT")
+
+
+def _blocks(cursor: sqlite3.Cursor) -> Iterator[list[tuple[Any, ...]]]:
+    while block := list(islice(cursor, _ROWS)):
+        yield block
+
+
+def digest(connection: sqlite3.Connection) -> str:
+    """Return a SHA-256 of the structural content; see :meth:`graphsynth.atlas.catalogue.Catalogue.digest`."""
+    _prepare(connection)
+    sha = sha256()
+    for table, select in TABLES.items():
+        if table == "evaluations":
+            continue
+        sha.update(f"{table}\n".encode())
+        for block in _blocks(connection.execute(select)):
+            sha.update("".join(json.dumps(row, separators=(",", ":")) + "\n" for row in block).encode())
+    return sha.hexdigest()
+
+
+def export(connection: sqlite3.Connection, folder: Path, form: str) -> list[Path]:
+    """Write every table to a file; see :meth:`graphsynth.atlas.catalogue.Catalogue.export`."""
+    if form not in FORMS:
+        raise SpecError(f"there is no form {form!r}; choose one of {', '.join(FORMS)}")
+    write = {"parquet": _write_parquet, "csv": _write_csv, "jsonl": _write_jsonl}[form]
+    _prepare(connection)
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for table, select in TABLES.items():
+            path = folder / f"{table}.{form}"
+            unfinished = path.with_name(path.name + ".new")
+            cursor = connection.execute(select)
+            write(unfinished, [column[0] for column in cursor.description], _blocks(cursor))
+            unfinished.replace(path)
+            written.append(path)
+    except OSError as error:
+        raise GraphsynthError(
+            f"{error.filename or folder} cannot be written ({error.strerror or error}): make room or take another"
+        ) from None
+    return written
+
+
+_Write = Callable[[Path, list[str], Iterator[list[tuple[Any, ...]]]], None]
+
+
+def _write_csv(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for block in blocks:
+            writer.writerows(block)
+
+
+def _write_jsonl(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
+    with path.open("w", encoding="utf-8") as file:
+        for block in blocks:
+            file.writelines(json.dumps(dict(zip(columns, row))) + "\n" for row in block)
+
+
+_INTEGERS = (
+    "mobility", "links", "fractionated", "expected", "complete", "group", "order", "class", "joints", "loops",
+    "automorphisms", "inversions", "planar", "girth", "contracted_vertices", "frame", "frame_joints",
+)  # fmt: skip
+
+
+def _write_parquet(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise SpecError("Parquet needs the extra: pip install 'graphsynth[parquet]', or choose csv or jsonl") from None
+    kinds = {"value": pyarrow.float64()} | dict.fromkeys(_INTEGERS, pyarrow.int64())
+    schema = pyarrow.schema([(name, kinds.get(name, pyarrow.string())) for name in columns])
+    with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
+        for block in blocks:
+            writer.write_table(pyarrow.table([list(column) for column in zip(*block)], schema=schema))

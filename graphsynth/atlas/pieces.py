@@ -1,0 +1,112 @@
+"""The work of a catalogue in pieces that can be done anywhere, and that depend on the question alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.atlas.facts import Rows, analyse_block, rows_of
+
+if TYPE_CHECKING:
+    from graphsynth.synthesis.problem import Piece, Problem
+
+__all__ = ["Task", "fingerprint", "problem_of", "rows_of_task", "share_of", "tasks_of"]
+
+#: Bound on the labellings of a piece; about a quarter of them are chains.  A piece takes a second at most.
+PIECE = 8000.0
+_CHAINS_AT_ONCE = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One piece of a family: its number, and what to list."""
+
+    number: int
+    links: int
+    mobility: int
+    piece: Piece
+
+    @property
+    def weight(self) -> float:
+        """Bound on the work."""
+        return self.piece.weight
+
+
+def problem_of(links: int, mobility: int, fractionated: bool) -> Problem:
+    """State the enumeration of a family.
+
+    Raises
+    ------
+    SpecError, TooLargeError
+        For numbers out of their bounds.
+    """
+    from graphsynth.synthesis.problem import Problem
+
+    return Problem.chains(links, mobility, 3, None, fractionated, None)
+
+
+def tasks_of(links: int, mobility: int, fractionated: bool) -> list[Task]:
+    """Cut a family; the cut depends on the family alone."""
+    problem = problem_of(links, mobility, fractionated)
+    pieces = [part for piece in problem.pieces(listing=True) for part in _finer(piece)]
+    return [Task(number, links, mobility, piece) for number, piece in enumerate(pieces)]
+
+
+def _finer(piece: Piece) -> Iterator[Piece]:
+    """Cut a piece of many contracted graphs at their bounds."""
+    from graphsynth.synthesis.units import Unit, estimates
+
+    if not isinstance(piece, Unit) or piece.parts > 1 or piece.weight <= PIECE:
+        yield piece
+        return
+    bounds = estimates(piece.family)[piece.start : piece.stop]
+    at = 0
+    while at < len(bounds):
+        sums = np.cumsum(bounds[at:])
+        size = min(int(np.searchsorted(sums, PIECE)) + 1, len(sums))
+        yield replace(piece, start=piece.start + at, stop=piece.start + at + size, weight=float(sums[size - 1]))
+        at += size
+
+
+def fingerprint(problem: Problem, tasks: list[Task]) -> str:
+    """Short text that differs when the question or its cut differ: pieces of two cuts are never mixed."""
+    return sha256(f"{problem.signature} {len(tasks)} {[task.weight for task in tasks]}".encode()).hexdigest()[:16]
+
+
+def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
+    """Return the tasks of shard i of m, a run of consecutive ones.
+
+    Raises
+    ------
+    SpecError
+        For i out of 1..m.
+    """
+    from graphsynth.synthesis.writing import shard_of
+
+    own = {id(piece) for piece in shard_of([task.piece for task in tasks], shard)}
+    return [task for task in tasks if id(task.piece) in own]
+
+
+def rows_of_task(task: Task) -> Rows:
+    """Return the rows of all chains of a piece (computed in the worker)."""
+    rows = Rows()
+    for packed in _packed(task.piece):
+        for at in range(0, len(packed), _CHAINS_AT_ONCE):
+            rows_of(analyse_block(task.links, task.mobility, packed[at : at + _CHAINS_AT_ONCE]), rows)
+    return rows
+
+
+def _packed(piece: Piece) -> Iterator[NDArray[np.uint8]]:
+    from graphsynth.synthesis.units import Unit, packed_of
+
+    if isinstance(piece, Unit):
+        yield from packed_of(piece)
+        return
+    graphs = [graph.packed for graph in piece.graphs()]
+    if graphs:
+        yield np.frombuffer(b"".join(graphs), np.uint8).reshape(len(graphs), -1)

@@ -1,0 +1,277 @@
+"""Checking a catalogue: every stored field recomputed by another route and compared."""
+
+from __future__ import annotations
+
+import json
+import random
+import sqlite3
+import time
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from graphsynth.atlas.evaluations import GUARANTEES
+from graphsynth.atlas.references import Reference, wanted_class
+from graphsynth.structure.assur import is_assur_group
+
+__all__ = ["Verification", "verify"]
+
+_SHOWN = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """Result of checking a catalogue.
+
+    Parameters
+    ----------
+    compared : dict of str to int
+        How many values of each field were recomputed and compared.
+    differences : tuple of str
+        One sentence for each difference (the first thousand).
+    seconds : float
+    """
+
+    compared: dict[str, int]
+    differences: tuple[str, ...]
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether something was compared and nothing differs."""
+        return bool(self.compared) and not self.differences
+
+    @property
+    def statement(self) -> str:
+        """One sentence."""
+        total = sum(self.compared.values())
+        what = f"{total} values of {len(self.compared)} fields recomputed in {self.seconds:.1f} s"
+        return f"{what}: all agree" if self.passed else f"{what}: {len(self.differences)} differences"
+
+
+class _Checks:
+    """Counts comparisons and keeps differences."""
+
+    def __init__(self) -> None:
+        self.compared: Counter[str] = Counter()
+        self.differences: list[str] = []
+
+    def same(self, field: str, where: str, stored: Any, wanted: Any) -> None:
+        self.compared[field] += 1
+        if (stored != wanted or type(stored) is not type(wanted)) and len(self.differences) < _SHOWN:
+            self.differences.append(f"{where}: {field} is {stored!r}, recomputed {wanted!r}")
+
+
+def verify(connection: sqlite3.Connection, chains: int | None, seed: int) -> Verification:
+    """Check a catalogue; see :meth:`graphsynth.atlas.catalogue.Catalogue.verify`."""
+    begin = time.perf_counter()
+    checks = _Checks()
+    try:
+        _check_file(connection, checks)
+        _check_families(connection, checks)
+        _check_labels(connection, checks)
+        groups = _check_groups(connection, checks)
+        shapes = _check_contracted(connection, checks)
+        _check_evaluations(connection, checks)
+        for number in _chosen(connection, chains, seed):
+            _check_chain(connection, checks, number, groups, shapes)
+    except sqlite3.DatabaseError as error:
+        checks.differences.append(f"the file is damaged: {error}")
+    return Verification(dict(checks.compared), tuple(checks.differences), time.perf_counter() - begin)
+
+
+def _check_file(connection: sqlite3.Connection, checks: _Checks) -> None:
+    checks.same("file", "integrity", connection.execute("PRAGMA integrity_check").fetchone()[0], "ok")
+    checks.same("file", "references", connection.execute("PRAGMA foreign_key_check").fetchall(), [])
+    for table in ("inversions", "driven", "dyads"):
+        loose = f"SELECT COUNT(*) FROM {table} WHERE chain_id NOT IN (SELECT chain_id FROM chains)"
+        checks.same("file", f"rows of {table} without a chain", connection.execute(loose).fetchone()[0], 0)
+
+
+def _check_families(connection: sqlite3.Connection, checks: _Checks) -> None:
+    from graphsynth.atlas.statement import PUBLISHED
+    from graphsynth.synthesis import count_chains
+
+    for number, mobility, links, fractionated, pieces, shard, expected, complete in connection.execute(
+        "SELECT family_id, mobility, links, fractionated, pieces, shard, expected, complete FROM families"
+    ).fetchall():
+        where = f"family {mobility}.{links}"
+        listed, keys = connection.execute(
+            "SELECT COUNT(*), COUNT(DISTINCT key) FROM chains WHERE (family_id, mobility, links) = (?, ?, ?)",
+            (number, mobility, links),
+        ).fetchone()
+        written, by_piece = connection.execute(
+            "SELECT COUNT(*), TOTAL(chains) FROM pieces WHERE family_id = ?", (number,)
+        ).fetchone()
+        checks.same("distinct keys", where, keys, listed)
+        checks.same("pieces.chains", where, int(by_piece), listed)
+        if shard != "1/1":
+            continue
+        checks.same(
+            "families.expected", where, expected, count_chains(links, mobility, fractionated=bool(fractionated))
+        )
+        checks.same("families.complete", where, complete, 1)
+        checks.same("chains listed", where, listed, expected)
+        checks.same("pieces", where, written, pieces)
+        if (mobility, links) in PUBLISHED:
+            checks.same("published count", where, listed, PUBLISHED[mobility, links][fractionated])
+
+
+def _check_labels(connection: sqlite3.Connection, checks: _Checks) -> None:
+    rank: Counter[str] = Counter()
+    rows = connection.execute(
+        "SELECT label, mobility, links, assortment FROM chains JOIN families USING (family_id, mobility, links) "
+        "WHERE complete = 1"
+    )
+    held = {row[0] for row in rows.fetchall()}
+    for key, label, mobility, links, assortment in connection.execute(
+        "SELECT key, label, mobility, links, assortment FROM chains JOIN families USING (family_id, mobility, links) "
+        "WHERE complete = 1 ORDER BY CAST(key AS BLOB)"
+    ):
+        stem = f"{mobility}.{links}.{assortment}"
+        rank[stem] += 1
+        checks.same("chains.label", key, label, f"{stem}.{rank[stem]}")
+    checks.same("distinct labels", "chains", len(held), sum(rank.values()))
+
+
+def _check_groups(connection: sqlite3.Connection, checks: _Checks) -> dict[int, str]:
+    """Check groups and structures; return the keys of the groups of each structure, as text."""
+    from graphsynth.structure.graph import MechanismGraph
+
+    keys, facts = {}, {}
+    for number, key, links, order, own in connection.execute('SELECT group_id, key, links, "order", class FROM groups'):
+        graph = MechanismGraph.from_key(key)
+        pairs = [(a, b) for a, b, _ in graph.joints]
+        checks.same("groups.key", key, is_assur_group(graph), True)
+        checks.same("groups.links", key, links, graph.links - 1)
+        checks.same("groups.order", key, order, sum(1 for a, _ in pairs if a == 0))
+        checks.same("groups.class", key, own, wanted_class(pairs))
+        keys[number], facts[number] = key, (own, order)
+    found = {}
+    for number, groups, own, order in connection.execute('SELECT structure_id, groups, class, "order" FROM structures'):
+        members = [int(group) for group in groups.split()]
+        checks.same("structures.class", groups, own, max((facts[group][0] for group in members), default=1))
+        checks.same("structures.order", groups, order, max((facts[group][1] for group in members), default=0))
+        found[number] = " ".join(keys[group] for group in members)
+    return found
+
+
+def _check_contracted(connection: sqlite3.Connection, checks: _Checks) -> dict[int, Any]:
+    """Check that no two contracted graphs are the same; return them with their multiplicities."""
+    import networkx
+
+    shapes = {}
+    alike: dict[tuple[Any, ...], list[int]] = {}
+    for number, vertices, edges, planar in connection.execute(
+        "SELECT contracted_id, vertices, edges, planar FROM contracted"
+    ):
+        shape = networkx.Graph()
+        shape.add_nodes_from(range(vertices))
+        for edge in edges.split():
+            pair, _, times = edge.partition("x")
+            a, b = map(int, pair.split("-"))
+            shape.add_edge(a, b, times=int(times or 1))
+        checks.same("contracted.vertices", edges, vertices, len(shape))
+        checks.same("contracted.planar", edges, planar, int(networkx.check_planarity(shape)[0]))
+        alike.setdefault(_invariant(shape), []).append(number)
+        shapes[number] = shape
+    for numbers in alike.values():
+        for at, one in enumerate(numbers):
+            twins = [other for other in numbers[:at] if _same_shape(shapes[one], shapes[other])]
+            checks.same("contracted.edges", f"contracted graph {one}", twins, [])
+    return shapes
+
+
+def _invariant(shape: Any) -> tuple[Any, ...]:
+    return tuple(sorted(tuple(sorted(data["times"] for _, _, data in shape.edges(v, data=True))) for v in shape))
+
+
+def _same_shape(one: Any, other: Any) -> bool:
+    import networkx
+
+    if _invariant(one) != _invariant(other):
+        return False
+    match = networkx.isomorphism.numerical_edge_match("times", 0)
+    return bool(networkx.is_isomorphic(one, other, edge_match=match))
+
+
+def _check_evaluations(connection: sqlite3.Connection, checks: _Checks) -> None:
+    for number, frame, driver, kind, status, guarantee, data, known in connection.execute(
+        "SELECT e.chain_id, e.frame, e.driver, kind, status, guarantee, data, d.structure_id FROM evaluations e "
+        "LEFT JOIN driven d USING (chain_id, frame, driver)"
+    ):
+        where = f"evaluation {kind} of chain {number}, frame {frame}, driver {driver}"
+        checks.same("evaluations: mechanism", where, known is not None, True)
+        checks.same("evaluations.status", where, bool(kind and status), True)
+        checks.same("evaluations.guarantee", where, guarantee is None or guarantee in GUARANTEES, True)
+        checks.same("evaluations.data", where, data is None or _is_json(data), True)
+
+
+def _is_json(text: str) -> bool:
+    try:
+        json.loads(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _chosen(connection: sqlite3.Connection, count: int | None, seed: int) -> Iterable[int]:
+    """Numbers of the chains to check: all, or some of each family."""
+    families = [row[0] for row in connection.execute("SELECT family_id FROM families ORDER BY mobility, links")]
+    for family in families:
+        select = "SELECT chain_id FROM chains WHERE family_id = ? ORDER BY key"
+        numbers = [row[0] for row in connection.execute(select, (family,))]
+        if count is not None and count < len(numbers):
+            numbers = random.Random(seed).sample(numbers, count)
+        yield from numbers
+
+
+def _check_chain(
+    connection: sqlite3.Connection, checks: _Checks, number: int, structures: dict[int, str], shapes: dict[int, Any]
+) -> None:
+    cursor = connection.execute("SELECT * FROM chains WHERE chain_id = ?", (number,))
+    row = dict(zip((column[0] for column in cursor.description), cursor.fetchone()))
+    where = f"chain {row['label'] or row['key']}"
+    try:
+        reference = Reference(row["graph6"], row["mobility"])
+        facts = reference.facts()
+    except Exception as error:
+        checks.differences.append(f"{where}: graph6 {row['graph6']!r} is not a chain ({error})")
+        return
+    for field, wanted in facts.items():
+        checks.same(f"chains.{field}", where, row[field], wanted)
+    checks.same("no rigid sub-chain", where, reference.no_rigid_subchain(), True)
+    shape = shapes.get(row["contracted_id"])
+    checks.same("chains.contracted_id", where, shape is not None and _same_shape(shape, _simple(reference)), True)
+
+    def rows(select: str) -> list[tuple[Any, ...]]:
+        return connection.execute(select, (number,)).fetchall()
+
+    parents = [parent for (parent,) in rows("SELECT parent_key FROM dyads WHERE chain_id = ? ORDER BY parent_key")]
+    checks.same("dyads", where, parents, reference.parents())
+    inversions = rows("SELECT frame, frame_joints, levels FROM inversions WHERE chain_id = ? ORDER BY frame")
+    _same_rows(checks, "inversions", where, inversions, reference.inversions())
+    stored = [
+        (frame, tuple(int(link) for link in str(driver).split(",")), structures.get(structure, ""))
+        for frame, driver, structure in rows("SELECT frame, driver, structure_id FROM driven WHERE chain_id = ?")
+    ]
+    wanted_rows = [(frame, drivers, " ".join(groups)) for frame, drivers, groups in reference.mechanisms()]
+    _same_rows(checks, "mechanisms", where, sorted(stored), sorted(wanted_rows))
+
+
+def _same_rows(checks: _Checks, field: str, where: str, stored: list[Any], wanted: list[Any]) -> None:
+    checks.same(f"{field}: number", where, len(stored), len(wanted))
+    for own, right in zip(stored, wanted):
+        checks.same(field, where, own, right)
+
+
+def _simple(reference: Reference) -> Any:
+    """Contracted multigraph of a chain as a graph with multiplicities."""
+    import networkx
+
+    whole = reference.contracted()
+    shape = networkx.Graph()
+    shape.add_nodes_from(whole.nodes)
+    shape.add_edges_from((a, b, {"times": whole.number_of_edges(a, b)}) for a, b in set(whole.edges()))
+    return shape
