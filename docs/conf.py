@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import public_api
 
 ROOT = Path(__file__).resolve().parents[1]
 META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -35,6 +40,8 @@ def _toctrees(text: str) -> str:
 def _read(app: object, page: str, source: list[str]) -> None:
     if page == "index":
         source[0] = _toctrees(source[0])
+    elif page == "reference/api":
+        source[0] = source[0].replace("<!-- docstrings -->", public_api.reference())
 
 
 def setup(app: object) -> dict[str, bool]:

@@ -1,10 +1,18 @@
-"""Every example of the documentation runs, every relative link leads somewhere, every command line parses."""
+"""The documentation is true of the code.
 
+Every example runs, every link leads somewhere, every command line parses, and every public name, verb and option is documented.
+"""
+
+import argparse
 import contextlib
 import doctest
+import importlib.util
 import io
 import re
 import shlex
+import subprocess
+import sys
+from importlib import import_module
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -114,6 +122,77 @@ def test_every_page_can_be_reached_from_the_index():
     assert [name_of(page) for page in PAGES if "docs" in page.parts and page not in seen] == []
 
 
+def test_every_page_is_in_the_navigation():
+    """The site's navigation is made from the links of the index alone."""
+    linked = {target.partition("#")[0] for target in links(ROOT / "docs" / "index.md")}
+    pages = {page.relative_to(ROOT / "docs").as_posix() for page in (ROOT / "docs").rglob("*.md")} - {"index.md"}
+    assert pages - linked == set()
+
+
+def test_every_page_has_one_title():
+    for page in PAGES:
+        text = FENCE.sub("", page.read_text(encoding="utf-8"))
+        if name_of(page) != "docs/changes.md":  # it includes the changelog
+            assert len(re.findall(r"^# ", text, re.MULTILINE)) == 1, name_of(page)
+            assert text.lstrip().startswith("# "), name_of(page)
+
+
+def reference_text():
+    return "\n".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs" / "reference").glob("*.md"))
+
+
+def explained_names():
+    """Words in code font in the reference; runnable examples alone explain nothing."""
+    text = FENCE.sub("", reference_text())
+    return set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]+)`", text))))
+
+
+def public_api():
+    spec = importlib.util.spec_from_file_location("public_api", ROOT / "docs" / "public_api.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+API = public_api()
+
+
+@pytest.mark.parametrize("room", API.rooms())
+def test_public_names_are_explained_in_the_reference(room):
+    assert set(API.public_names(room)) - explained_names() == set()
+
+
+def test_docstrings_of_all_public_names_are_in_the_site():
+    text = API.reference()
+    missing = [
+        f"{room}.{name}"
+        for room in API.rooms()
+        for name in API.public_names(room)
+        if f"### `{name}`" not in text and f"### `{getattr(import_module(room), name).__name__}`" not in text
+    ]
+    assert missing == []
+    assert "<!-- docstrings -->" in (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+
+
+def test_pictures_are_drawn_by_documented_modules():
+    """Every public module of `graphsynth.drawing` that draws something is named in the reference."""
+    text = reference_text()
+    helpers = {"bodies", "figures", "lettering", "moving", "palette", "shapes", "svg", "symbols"}
+    drawing = {path.stem for path in (ROOT / "graphsynth" / "drawing").glob("*.py")} - {"__init__"}
+    assert [name for name in sorted(drawing - helpers) if f"{name}." not in text and f"`{name}`" not in text] == []
+
+
+def test_architecture_names_every_room():
+    text = (ROOT / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
+    rooms = [path.parent.name for path in (ROOT / "graphsynth").glob("*/__init__.py")]
+    assert len(rooms) > 5
+    assert [room for room in rooms if f"`{room}/`" not in text] == []
+    named = re.findall(r"`(\w+)/`", text)
+    assert [room for room in named if not any((ROOT / place / room).is_dir() for place in ("", "graphsynth", *[
+        f"graphsynth/{outer}" for outer in rooms
+    ]))] == []  # fmt: skip
+
+
 def commands():
     """Yield (page, words after ``graphsynth``, the number a count is said to print or None)."""
     for page in PAGES:
@@ -130,6 +209,52 @@ def commands():
                     continue
                 said = re.search(r"# (\d+)\b", line) or re.fullmatch(r"(\d+)", after)
                 yield page, words, int(said[1]) if said else None
+
+
+def verbs():
+    """Yield (verb or pair of verbs, its parser)."""
+    from graphsynth.cli.main import _parser
+
+    def inside(parser, words):
+        nested = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+        if words and not nested:
+            yield " ".join(words), parser
+        for action in nested:
+            for word, child in action.choices.items():
+                yield from inside(child, (*words, word))
+
+    yield from inside(_parser(), ())
+
+
+def section_of(page, verb):
+    """Return the text under the heading of a verb; for two words also the text under the first one."""
+    text = page.read_text(encoding="utf-8")
+    sections = re.split(r"(?m)^(?=#{2,4} )", text)
+    wanted = {f"`{verb}`", f"`{verb.split()[0]}`"}
+    return "".join(part for part in sections if wanted & set(re.findall(r"`[^`]+`", part.partition("\n")[0])))
+
+
+@pytest.mark.parametrize("verb", [verb for verb, _ in verbs()])
+def test_every_option_is_documented(verb):
+    page = ROOT / "docs" / "reference" / "command-line.md"
+    text = page.read_text(encoding="utf-8")
+    parser = dict(verbs())[verb]
+    assert re.search(rf"^graphsynth {re.escape(verb)}\b", text, re.MULTILINE), "no line in the synopsis"
+    section = section_of(page, verb)
+    assert section, "no section of its own"
+    shared = "".join(part for part in re.split(r"(?m)^(?=## )", text) if re.match(r"## (QUESTION|WORK)", part))
+    if verb in ("solve", "count", "enumerate"):
+        section += shared
+    ranges = {f"--{letter}{k}" for letter in "np" for k in range(10)}  # `--n2 X` .. `--n9 X`
+    options = {option for action in parser._actions for option in action.option_strings} - ranges - {"-h", "--help"}
+    known = set(re.findall(r"(?<![\w-])--?[A-Za-z][\w-]*", section)) | {"--json"}  # every verb has it, says the top
+    assert options - known == set()
+
+
+def test_documented_options_exist():
+    text = (ROOT / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")
+    options = {option for _, parser in verbs() for action in parser._actions for option in action.option_strings}
+    assert set(re.findall(r"`(--[a-z][\w-]*)", text)) - options - {"--version"} == set()
 
 
 def title(page, words):
@@ -153,3 +278,17 @@ def test_documented_counts(words, said, capsys, monkeypatch):
     assert words[0] == "count"
     assert main(words) == 0
     assert capsys.readouterr().out.splitlines()[-1] == str(said)
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_warnings(tmp_path):
+    pytest.importorskip("sphinx")
+    pytest.importorskip("myst_parser")
+    pytest.importorskip("furo")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "-b", "html", str(ROOT / "docs"), str(tmp_path / "site")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    front = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
+    assert all(
+        f'href="{page}.html"' in front for page in ("explanation/errata", "reference/api", "tutorial/first-mechanism")
+    )

@@ -1,0 +1,82 @@
+"""Turns the docstrings of all public names into Markdown, for `docs/reference/api.md` of the built site."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from importlib import import_module
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[1] / "graphsynth"
+
+#: Modules that are public beside the packages with an ``__all__``.
+MODULES = (
+    "graphsynth.errors",
+    "graphsynth.structure.assur",
+    "graphsynth.mechanism.joints",
+    "graphsynth.mechanism.laws",
+    "graphsynth.mechanism.files",
+)
+
+
+def rooms() -> list[str]:
+    """Public modules, and every package whose ``__init__`` has an ``__all__``; deeper ones first."""
+    found = list(MODULES)
+    for init in PACKAGE.rglob("__init__.py"):
+        name = ".".join(init.parent.relative_to(PACKAGE.parent).parts)
+        public = re.search(r"^__all__\b", init.read_text("utf-8"), re.MULTILINE)
+        if public and not {"kernels", "cli"} & set(name.split(".")):
+            found.append(name)
+    return sorted(found, key=lambda name: (-name.count("."), name))
+
+
+def public_names(room: str) -> list[str]:
+    """Names of ``__all__`` without dunder names."""
+    return [name for name in import_module(room).__all__ if not name.startswith("__")]
+
+
+def signature_of(name: str, thing: object) -> str:
+    """Call signature as text; empty for what is not called."""
+    if not callable(thing):
+        return ""
+    try:
+        signature = inspect.signature(thing)
+    except (TypeError, ValueError):
+        return ""
+    bare = [p.replace(annotation=p.empty) for p in signature.parameters.values()]
+    text = f"{name}{signature.replace(parameters=bare, return_annotation=signature.empty)}"
+    return re.sub(r"<([\w.]+)[^<>]*>", r"\1", text)
+
+
+def entry(name: str, thing: object) -> str:
+    """Markdown of one name: signature, docstring, examples."""
+    parts = [f"### `{name}`\n"]
+    call = signature_of(name, thing)
+    if call:
+        parts.append(f"```python\n{call}\n```\n")
+    documented = inspect.isclass(thing) or inspect.isroutine(thing) or inspect.ismodule(thing)
+    text = (inspect.getdoc(thing) or "") if documented else ""
+    body, _, examples = text.partition("\nExamples\n--------\n")
+    if body:
+        parts.append(f"````text\n{body.strip()}\n````\n")
+    if examples:
+        parts.append(f"````pycon\n{examples.strip()}\n````\n")
+    if not documented:
+        parts.append(f"`{thing}`\n" if len(str(thing)) < 200 else f"A value of type `{type(thing).__name__}`.\n")
+    return "\n".join(parts)
+
+
+def reference() -> str:
+    """Markdown of all rooms; a name that a package lends from another is shown once, in the deepest one."""
+    sections, seen = {}, set[int]()
+    for room in rooms():
+        module = import_module(room)
+        entries = []
+        for name in sorted(public_names(room)):
+            thing = getattr(module, name)
+            if id(thing) not in seen:
+                seen.add(id(thing))
+                entries.append(entry(name, thing))
+        if entries:
+            sections[room] = f"## `{room}`\n\n" + "\n".join(entries)
+    return "\n".join(text for _, text in sorted(sections.items()))
