@@ -42,26 +42,45 @@ class LegSolution:
         End point relative to the pivot.
     S, C : ndarray
         ``2 l1 rho sin(gamma)`` and ``2 l1 rho cos(gamma)`` with gamma the angle between end point and arm; S is NaN
-        out of reach.
+        out of reach.  They overflow for lengths above 1e154 and underflow below 1e-154; the angles do not.
     status : ndarray of int8
         `LegStatus`.
     deficit : ndarray
         Signed distance missing: positive out of reach, negative is the margin left.
+    scaled : tuple of 2 ndarrays
+        ``S`` and ``C`` divided by ``4^exponent``.
+    exponent : ndarray of int
+        Exponent of the largest of the four given numbers.
     """
 
     u: Array
     v: Array
-    S: Array
-    C: Array
     status: NDArray[np.int8]
     deficit: Array
+    scaled: tuple[Array, Array]
+    exponent: NDArray[np.int32]
+
+    @property
+    def S(self) -> Array:
+        """``2 l1 rho sin(gamma)``, squared length."""
+        return _unscaled(self.scaled[0], self.exponent)
+
+    @property
+    def C(self) -> Array:
+        """``2 l1 rho cos(gamma)``, squared length."""
+        return _unscaled(self.scaled[1], self.exponent)
 
     def angle(self, sigma: ArrayLike) -> Array:
         """Angle of the arm (radians, in (-pi, pi]) on branch ``sigma`` = +1 or -1; NaN if out of reach or free."""
         sigma = np.asarray(sigma, dtype=np.float64)
-        (u, v), (C, S) = _normalised(self.u, self.v), _normalised(self.C, self.S)
+        (u, v), (C, S) = _normalised(self.u, self.v), _normalised(self.scaled[1], self.scaled[0])
         y, x = _dot2(v, C, sigma * u, S), _dot2(u, C, -sigma * v, S)
         return np.where(self.status == LegStatus.FREE, np.nan, np.arctan2(y, x))
+
+
+def _unscaled(value: Array, exponent: NDArray[np.int32]) -> Array:
+    with np.errstate(over="ignore", under="ignore"):
+        return np.asarray(np.ldexp(value, 2 * exponent))
 
 
 def _normalised(a: Array, b: Array) -> tuple[Array, Array]:
@@ -137,22 +156,16 @@ def _solve_scaled(u: Array, v: Array, l1: Array, l2: Array, exponent: NDArray[np
     C, P1, P2 = _discriminants(u, v, l1, l2)
     rho = np.hypot(u, v)
     far, near = _quotient(-P1, rho + (l1 + l2)), _quotient(-P2, rho + np.abs(l1 - l2))
+    root = np.where(l1 == l2, rho, np.sqrt(np.maximum(P2, 0.0)))  # P2 is rho^2 there, which may underflow
     status = np.zeros(u.shape, dtype=np.int8)
-    status[(P1 == 0.0) | (P2 == 0.0)] = LegStatus.BOUNDARY
+    status[(P1 == 0.0) | (root == 0.0)] = LegStatus.BOUNDARY
     status[((rho == 0.0) & (l1 == l2)) | ((l1 == 0.0) & (P1 == 0.0))] = LegStatus.FREE
     status[P2 < 0.0] = LegStatus.TOO_NEAR
     status[P1 < 0.0] = LegStatus.TOO_FAR
     inside = (P1 >= 0.0) & (P2 >= 0.0)
-    S = np.where(inside, np.sqrt(np.where(inside, P1, 0.0)) * np.sqrt(np.where(inside, P2, 0.0)), np.nan)
+    S = np.where(inside, np.sqrt(np.where(inside, P1, 0.0)) * root, np.nan)
     deficit = np.ldexp(np.maximum(far, near), exponent)
-    return LegSolution(
-        np.ldexp(u, exponent),
-        np.ldexp(v, exponent),
-        np.ldexp(S, 2 * exponent),
-        np.ldexp(C, 2 * exponent),
-        status,
-        deficit,
-    )
+    return LegSolution(np.ldexp(u, exponent), np.ldexp(v, exponent), status, deficit, (S, C), exponent)
 
 
 def _quotient(a: Array, b: Array) -> Array:

@@ -462,3 +462,22 @@ def test_shapes_that_do_not_fit_are_refused(wrong: object) -> None:
             other(wrong, [0.0, 0.0, 0.0])
         with pytest.raises(GeometryError, match="shape"):
             other([0.0, 0.0, 0.0], wrong)
+
+
+@pytest.mark.parametrize("sigma", [1, -1])
+@pytest.mark.parametrize("unit", [2.0**-900, 2.0**-500, 2.0**500, 2.0**900])
+def test_angles_of_legs_whose_squares_are_no_doubles(unit: float, sigma: int) -> None:
+    """Squared lengths overflow and underflow; the angle is that of the leg of ordinary size."""
+    for l1, l2, u, v in EXTREME_LEGS[:4]:
+        leg = solve_leg(u * unit, v * unit, l1 * unit, l2 * unit)
+        assert leg.status == LegStatus.REACHABLE
+        assert float(turn_difference(float(leg.angle(sigma)), float(_reference_leg(l1, l2, u, v, sigma)))) <= 4.5e-16
+
+
+@pytest.mark.parametrize("rho", [1e-10, 1e-150, 1e-200, 1e-300, 1e-307])
+def test_vertex_almost_on_the_pivot(rho: float) -> None:
+    """Equal lengths: the arm stands across the direction of the vertex however near that is."""
+    leg = solve_leg(rho, 0.0, 1.0, 1.0)
+    assert leg.status == LegStatus.REACHABLE
+    for sigma in (1, -1):
+        assert float(leg.angle(sigma)) == pytest.approx(sigma * math.acos(rho / 2.0), rel=3e-16)
