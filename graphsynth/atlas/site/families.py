@@ -1,0 +1,155 @@
+"""The data of the page: families of chains as scripts, since a page opened from a file may not fetch its data."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["Family", "contents", "families", "family_script", "groups_script", "relatives_script", "script"]
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """All chains of one mobility and number of links, in the order of the page: by assortment, then by rank.
+
+    Parameters
+    ----------
+    name : str
+        Part of file names: "1-12".
+    mobility, links, joints : int
+    expected : int or None
+        Number of chains by counting without listing.
+    rows : tuple of sqlite3.Row
+        The chains.
+    """
+
+    name: str
+    mobility: int
+    links: int
+    joints: int
+    expected: int | None
+    rows: tuple[sqlite3.Row, ...]
+
+
+_CHAINS = """
+SELECT c.*, k.low, k.high FROM chains c LEFT JOIN (
+  SELECT chain_id, MIN(class) AS low, MAX(class) AS high FROM mechanisms GROUP BY chain_id) k USING (chain_id)
+WHERE family_id = ? AND label IS NOT NULL
+"""
+
+
+def _rank(label: str) -> int:
+    return int(label.rsplit(".", 1)[1])
+
+
+def _order(row: sqlite3.Row) -> tuple[list[int], int]:
+    return [-int(count) for count in row["assortment"].split("-")], _rank(row["label"])
+
+
+def families(connection: sqlite3.Connection) -> list[Family]:
+    """Return the finished families of a catalogue that hold a chain, by mobility and links."""
+    found = []
+    for family in _rows(connection, "SELECT * FROM families ORDER BY mobility, links"):
+        rows = sorted(_rows(connection, _CHAINS, (family["family_id"],)), key=_order)
+        if rows:
+            mobility, links = family["mobility"], family["links"]
+            expected = family["expected"] if family["complete"] else None
+            found.append(Family(f"{mobility}-{links}", mobility, links, rows[0]["joints"], expected, tuple(rows)))
+    return found
+
+
+def _rows(connection: sqlite3.Connection, query: str, parameters: tuple[Any, ...] = ()) -> list[sqlite3.Row]:
+    """Return rows with names, without changing the connection for others."""
+    cursor = connection.cursor()
+    cursor.row_factory = sqlite3.Row
+    return cursor.execute(query, parameters).fetchall()
+
+
+def script(call: str, *arguments: Any) -> str:
+    """Write a script that hands data to the page."""
+    texts = (json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False) for value in arguments)
+    return f"Atlas.{call}({','.join(texts)});\n"
+
+
+def _runs(family: Family) -> list[list[Any]]:
+    """Assortments with the number of their chains, in order."""
+    found: list[list[Any]] = []
+    for row in family.rows:
+        if not found or found[-1][0] != row["assortment"]:
+            found.append([row["assortment"], 0])
+        found[-1][1] += 1
+    return found
+
+
+def family_script(family: Family) -> str:
+    """Write what browsing needs: columns over the chains of a family.
+
+    Keys of one family have one length and are joined without a separator; the label follows from the place: the k-th
+    chain of an assortment has rank k.
+    """
+    rows = family.rows
+    runs = _runs(family)
+    ranks = [rank for _, count in runs for rank in range(1, count + 1)]
+    data = {
+        "keys": "".join(row["key"] for row in rows),
+        "assortments": runs,
+        "ranks": None if ranks == [_rank(row["label"]) for row in rows] else [_rank(row["label"]) for row in rows],
+        "symmetry": [row["automorphisms"] for row in rows],
+        "inversions": [row["inversions"] for row in rows],
+        "girth": "".join(_digit(row["girth"]) for row in rows),
+        "planar": "".join(str(row["planar"]) for row in rows),
+        "fractionated": "".join(str(row["fractionated"]) for row in rows),
+        "low": "".join(_digit(row["low"] or 0) for row in rows),
+        "high": "".join(_digit(row["high"] or 0) for row in rows),
+        "contracted": [row["contracted_id"] for row in rows],
+    }
+    return script("take", family.name, data)
+
+
+def _digit(value: int) -> str:
+    """Write a small number as one character, base 36."""
+    return "0123456789abcdefghijklmnopqrstuvwxyz"[min(value, 35)]
+
+
+def relatives_script(connection: sqlite3.Connection, family: Family, places: dict[str, tuple[str, int]]) -> str:
+    """Write the parents and children of each chain: the place in the family of two links fewer or more, else the key."""
+    smaller, larger = (f"{family.mobility}-{family.links + step}" for step in (-2, 2))
+
+    def short(key: str, name: str) -> int | str:
+        held, place = places.get(key, ("", 0))
+        return place if held == name else key
+
+    def listed(query: str, value: Any, name: str) -> list[int | str]:
+        found = [short(row[0], name) for row in connection.execute(query, (value,))]
+        return sorted(found, key=lambda one: (isinstance(one, str), one))
+
+    upwards = "SELECT parent_key FROM dyads WHERE chain_id = ?"
+    downwards = "SELECT key FROM dyads JOIN chains USING (chain_id) WHERE parent_key = ?"
+    parents = [listed(upwards, row["chain_id"], smaller) for row in family.rows]
+    children = [listed(downwards, row["key"], larger) for row in family.rows]
+    return script("takeRelatives", family.name, {"parents": parents, "children": children})
+
+
+def groups_script(connection: sqlite3.Connection) -> str:
+    """Write the class of every structural group by its key."""
+    rows = connection.execute('SELECT key, class FROM groups ORDER BY links, "order", key').fetchall()
+    return script("takeGroups", dict(rows))
+
+
+def contents(connection: sqlite3.Connection, found: list[Family], **more: Any) -> str:
+    """Write the table of contents: the families with their counts, contracted graphs, and what else is given."""
+    listed = [
+        {
+            "name": family.name,
+            "mobility": family.mobility,
+            "links": family.links,
+            "joints": family.joints,
+            "chains": len(family.rows),
+            "expected": family.expected,
+        }
+        for family in found
+    ]
+    contracted = dict(connection.execute("SELECT contracted_id, edges FROM contracted").fetchall())
+    return script("open", {"families": listed, "contracted": contracted, **more})

@@ -1,0 +1,77 @@
+// "Find my mechanism": pasted or drawn, to its entry.
+"use strict";
+
+(function () {
+  const $ = id => document.getElementById(id);
+  let built = false, asked = 0;
+
+  function build() {
+    $("find").innerHTML = `<h1 tabindex="-1">Find my mechanism</h1>
+<p class="lead">Paste it or draw it; the numbering does not matter.</p>
+<div class="answer" id="answer" aria-live="polite"><p class="soft">What is found appears here.</p></div>
+<div class="columns"><section><h2>Paste</h2>
+<label for="pasted">Adjacency ${Atlas.term("adjacency", "matrix")}, list of joints, ${Atlas.term("graph6")}, ${Atlas.term("key")} or ${Atlas.term("label")}</label>
+<textarea id="pasted" rows="9" spellcheck="false" autocomplete="off" placeholder="0-1, 1-2, 2-3, 0-3"></textarea>
+<p class="soft">Examples: <button type="button" data-example="0 1 0 1 0 0&#10;1 0 1 0 0 0&#10;0 1 0 1 0 1&#10;1 0 1 0 1 0&#10;0 0 0 1 0 1&#10;0 0 1 0 1 0">matrix</button>
+<button type="button" data-example="1-2, 2-3, 3-4, 4-1, 4-5, 5-6, 6-1">joints</button> <button type="button" data-example="G@Q?~C">graph6</button></p></section>
+<section><h2>Draw</h2><div id="editor"></div></section></div>`;
+    $("pasted").addEventListener("input", () => fromText());
+    $("find").addEventListener("click", event => {
+      const example = event.target.dataset.example;
+      if (example) { $("pasted").value = example; fromText(); }
+    });
+    built = true;
+    new Atlas.Editor($("editor"), found => {
+      if (found.graph) tell(found.graph, `Drawn. ${found.words}`);
+      else if (found.words) say(found.words);
+    });
+  }
+
+  const say = words => { asked++; $("answer").innerHTML = `<p>${Atlas.plain(words)}</p>`; };
+
+  async function fromText() {
+    const text = $("pasted").value;
+    if (!text.trim()) { say("Nothing is pasted yet."); return; }
+    try {
+      const read = Atlas.read(text);
+      if (read.label) {
+        const row = await Atlas.find(read.label);
+        if (row) tell(Atlas.decodeKey(row.key), "Read as a label.", null); else say(`No chain here has the label ${read.label}.`);
+      } else await tell(read.graph, `Read as ${read.form}.`, read.names);
+    } catch (fault) {
+      if (!(fault instanceof Atlas.Fault)) throw fault;
+      say(fault.message);
+    }
+  }
+
+  /** Links of the reader and of the entry side by side. */
+  function numbering(graph, to, names) {
+    const own = [...Array(graph.links).keys()];
+    const same = own.every(link => to[link] === (names ? names[link] : link));
+    if (same) return "";
+    return `<div class="scroll"><table class="matrix"><tbody><tr><th scope="row">your link</th>${own.map(link => `<td>${names ? names[link] : link}</td>`).join("")}</tr>` +
+      `<tr><th scope="row">here</th>${own.map(link => `<td>${to[link]}</td>`).join("")}</tr></tbody></table></div>`;
+  }
+
+  async function tell(graph, how, names) {
+    const mine = ++asked;
+    const head = `${how} ${graph.links} links, ${graph.joints.length} joints${graph.frame === null ? "" : `, frame ${names ? names[graph.frame] : graph.frame}`}.`;
+    const fault = Atlas.judge(graph);
+    const label = Atlas.label({...graph, frame: null}), row = await Atlas.find(label.key);
+    if (mine !== asked) return;
+    if (!row) {
+      const mobility = Atlas.mobility(graph), held = Atlas.familiesOf(mobility, graph.links).length;
+      const why = fault || (held ? "It is fractionated, or the catalogue is not complete: chains that fall apart at a link are not listed here."
+        : `This atlas does not reach chains of mobility ${mobility} with ${graph.links} links.`);
+      $("answer").innerHTML = `<p>${Atlas.plain(head)} <strong>Not in this atlas.</strong> ${Atlas.plain(why)}</p><p>${Atlas.term("key")} <code>${label.key}</code></p>`;
+      return;
+    }
+    const address = `#/${row.key}${graph.frame === null ? "" : `?frame=${label.to[graph.frame]}`}`;
+    $("answer").innerHTML = `<div class="hit"><a class="thumb" href="${address}" tabindex="-1" aria-hidden="true" style="width:132px;height:106px"></a><div><p>${Atlas.plain(head)}</p>` +
+      `<p>It is <a class="found" href="${address}"><b>${row.label}</b></a>, ${Atlas.term("key")} <code>${row.key}</code>.</p>${numbering(graph, label.to, names)}</div></div>`;
+    const places = await Atlas.loadPlaces(row), box = $("answer").querySelector(".thumb");
+    if (mine === asked && places && box) box.innerHTML = Atlas.sketch(label.canonical, places, {width: 132, height: 106, small: true});
+  }
+
+  Atlas.openFind = function () { if (!built) build(); return "Find my mechanism"; };
+})();

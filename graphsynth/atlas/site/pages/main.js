@@ -1,0 +1,48 @@
+// Addresses, colours, and small things that several pages use.
+"use strict";
+
+(function () {
+  const ROMAN = ["", "I", "II", "III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII"];
+  Atlas.roman = own => (own === undefined ? "not computed" : ROMAN[own] || String(own));
+  Atlas.count = value => String(value).replace(/\B(?=(\d{3})+$)/g, "\u202f");
+  Atlas.classes = row => (!row.low ? "not computed" : row.low === row.high ? Atlas.roman(row.low) : `${Atlas.roman(row.low)}–${Atlas.roman(row.high)}`);
+  Atlas.plain = text => text.replace(/[&<>"]/g, c => `&#${c.charCodeAt(0)};`);
+
+  let first = true;
+
+  async function route() {
+    const [path, words = ""] = location.hash.replace(/^#\/?/, "").split("?");
+    const name = decodeURIComponent(path), parameters = new URLSearchParams(words);
+    const page = name === "" ? "browse" : name === "find" || name === "about" ? name : "entry";
+    const scroll = Atlas.scrolled;
+    if (!document.getElementById("browse").hidden) Atlas.scrolled = scrollY;
+    for (const section of document.querySelectorAll("main > section")) section.hidden = section.id !== page;
+    for (const link of document.querySelectorAll("nav a"))
+      if (link.dataset.page === page) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
+    let title = "";
+    if (page === "browse") scrollTo(0, (await Atlas.browse(parameters)) ? scroll || 0 : 0);
+    else if (page === "entry") title = await Atlas.entry(name, parameters);
+    else title = page === "find" ? Atlas.openFind() : Atlas.about();
+    if (title === null) return;
+    document.title = title ? `${title} · Atlas of kinematic chains` : "Atlas of kinematic chains";
+    if (page !== "browse") {
+      if (!first) scrollTo(0, 0);
+      const head = document.querySelector(`#${page} h1`);
+      if (head && !first) head.focus({preventScroll: true});
+    }
+    first = false;
+  }
+
+  Atlas.start = function () {
+    const theme = document.getElementById("theme"), root = document.documentElement;
+    theme.value = root.dataset.theme || "auto";
+    theme.addEventListener("change", () => {
+      root.dataset.theme = theme.value;
+      try { localStorage.setItem("atlas-theme", theme.value); } catch { /* no storage: for this visit only */ }
+    });
+    history.scrollRestoration = "manual";
+    Atlas.startGlossary();
+    addEventListener("hashchange", route);
+    route();
+  };
+})();
