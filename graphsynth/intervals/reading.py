@@ -28,6 +28,7 @@ __all__ = [
     "read_one",
     "read_points",
     "shortened",
+    "text_ends",
     "upper_bound",
 ]  # fmt: skip
 
@@ -41,6 +42,7 @@ _FLOAT: Flags = np.asarray(FLOAT_INPUT)
 
 _PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
 _SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")
+_EXPONENT = re.compile(r"[eE]([+-]?[0-9][0-9_]*)\s*$")
 _LONGEST = 10_000
 
 
@@ -78,12 +80,27 @@ def enclose(value: Fraction) -> tuple[float, float]:
     return lower_bound(value), upper_bound(value)
 
 
+def text_ends(text: str) -> tuple[str, str, bool]:
+    """Split text that gives a range: both parts and whether the second is a radius; a single number is both ends.
+
+    Examples
+    --------
+    >>> text_ends("[1, 2]"), text_ends("17.5 +- 0.005"), text_ends("1/30")
+    (('1', '2', False), ('17.5', '0.005', True), ('1/30', '1/30', False))
+    """
+    if pair := _PAIR.fullmatch(text):
+        return pair[1], pair[2], False
+    if spread := _SPREAD.fullmatch(text):
+        return spread[1], spread[2], True
+    return text.strip(), text.strip(), False
+
+
 def fraction(text: str) -> Fraction:
     """Read text as a rational number; `FormatError` if it is none."""
     if len(text) > _LONGEST:
         raise FormatError(f"a number of {len(text)} characters; at most {_LONGEST} are read: shorten it")
-    exponent = re.search(r"[eE]([+-]?\d+)\s*$", text)
-    if exponent and abs(int(exponent[1])) > _LONGEST:
+    exponent = _EXPONENT.search(text)
+    if exponent and abs(int(exponent[1].replace("_", ""))) > _LONGEST:
         raise FormatError(
             f"{text.strip()[:60]!r} has an exponent beyond +-{_LONGEST}: bring it into the range of doubles"
         )
@@ -102,21 +119,20 @@ def _text(text: str) -> tuple[float, float]:
         return math.inf, -math.inf
     if word in ("[entire]", "entire"):
         return -math.inf, math.inf
-    pair = _PAIR.fullmatch(text)
-    if pair:
-        lo = -math.inf if pair[1].lower() in ("-inf", "-infinity") else fraction(pair[1])
-        hi = math.inf if pair[2].lower() in ("inf", "+inf", "infinity") else fraction(pair[2])
-        if lo > hi:
-            raise IntervalError(f"{text.strip()!r} has its lower bound above its upper bound; exchange them")
-        low = lo if isinstance(lo, float) else lower_bound(lo)
-        return low, hi if isinstance(hi, float) else upper_bound(hi)
-    spread = _SPREAD.fullmatch(text)
+    first, last, spread = text_ends(text)
     if spread:
-        mid, rad = fraction(spread[1]), fraction(spread[2])
+        mid, rad = fraction(first), fraction(last)
         if rad < 0:
             raise IntervalError(f"{text.strip()!r} has a negative radius; give a radius of at least 0")
         return lower_bound(mid - rad), upper_bound(mid + rad)
-    return enclose(fraction(text))
+    if first == last:
+        return enclose(fraction(first))
+    lo = -math.inf if first.lower() in ("-inf", "-infinity") else fraction(first)
+    hi = math.inf if last.lower() in ("inf", "+inf", "infinity") else fraction(last)
+    if lo > hi:
+        raise IntervalError(f"{text.strip()!r} has its lower bound above its upper bound; exchange them")
+    low = lo if isinstance(lo, float) else lower_bound(lo)
+    return low, hi if isinstance(hi, float) else upper_bound(hi)
 
 
 def read_one(value: Any) -> tuple[float, float, bool]:
@@ -139,10 +155,9 @@ def read_one(value: Any) -> tuple[float, float, bool]:
     if isinstance(value, str):
         return *_text(value), True
     if isinstance(value, float | np.floating):
-        number = float(value)
-        if not math.isfinite(number):
-            raise IntervalError(f"{number} is not a point; give a finite number, or bounds that may be infinite")
-        return number, number, False
+        if not np.isfinite(value):
+            raise IntervalError(f"{value} is not a point; give a finite number, or bounds that may be infinite")
+        return *enclose(Fraction(*value.as_integer_ratio())), False  # one double, but for extended precision
     if isinstance(value, Decimal) and not value.is_finite():
         raise IntervalError(f"{value} is not a point; give a finite number, or bounds that may be infinite")
     if isinstance(value, int | np.integer | Fraction | Decimal):
@@ -192,7 +207,7 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
     """Read numbers, text or nested sequences of them: bounds and decorations."""
     if not isinstance(value, np.ndarray | np.generic) and hasattr(value, "flags"):  # an Interval inside a list
         return value.lo, value.hi, value.flags
-    if isinstance(value, np.ndarray | np.generic) and value.dtype.kind == "f":
+    if _is_double(value):
         array = np.array(value, dtype=np.float64)
         _finite(array)
         return array, array.copy(), _FLOAT
@@ -211,6 +226,11 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
     return np.asarray(lo), np.asarray(hi), flag
 
 
+def _is_double(value: Any) -> bool:
+    """Whether numpy floats are doubles or shorter: extended precision is enclosed number by number."""
+    return isinstance(value, np.ndarray | np.generic) and value.dtype.kind == "f" and value.dtype.itemsize <= 8
+
+
 def _finite(array: Array) -> None:
     if not np.isfinite(array).all():
         bad = array[~np.isfinite(array)].ravel()[0]
@@ -218,11 +238,11 @@ def _finite(array: Array) -> None:
 
 
 def _bound(value: Any, side: int) -> Array:
-    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+    if isinstance(value, float) or _is_double(value):
         return np.array(value, dtype=np.float64)
-    if isinstance(value, float | np.floating):
+    if isinstance(value, np.floating) and not np.isfinite(value):
         return np.asarray(float(value))
-    if isinstance(value, Sequence) and not isinstance(value, str):
+    if (isinstance(value, Sequence) and not isinstance(value, str)) or (isinstance(value, np.ndarray) and value.ndim):
         return np.array([_bound(item, side) for item in value], dtype=np.float64)
     lo, hi, _ = read_points(value)
     return hi if side else lo

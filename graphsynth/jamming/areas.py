@@ -15,7 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Bearing
 
-__all__ = ["CrescentAreas", "ellipse_circle", "ellipse_circle_stable", "lid_area", "rim_area", "surrogate_areas"]
+__all__ = [
+    "CrescentAreas", "ellipse_circle", "ellipse_circle_stable", "lid_area", "lid_crossing", "rim_area", "rim_crossing",
+    "surrogate_areas",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -142,15 +145,20 @@ def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Cre
     return CrescentAreas(*(np.where(defined, area, np.nan) for area in areas))
 
 
-def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, h: float) -> Array:
-    """Crescent of the disc of radius R outside the lid ellipse, on the side with ``gap > 0``; h < 0 is the far side.
+def _lid_crossing(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, h: float) -> tuple[Array, Array]:
+    """Distances of the crossing points of disc and lid ellipse from the centre, against the tilt and across it.
 
     The discriminant of section 5.4 simplifies: ``H^2 - k G = (S wB / (C q^2))^2`` with ``wB`` of section 4.7, so that
     the crossing point needs neither a division by C nor a subtraction.
     """
+    m = gap * (R + h * S + Rh * C) / (S * (R * S + h + C * math.sqrt(h * h + ring)))
+    return R - m, np.sqrt(np.maximum(m * (2.0 * R - m), 0.0))
+
+
+def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, h: float) -> Array:
+    """Crescent of the disc of radius R outside the lid ellipse, on the side with ``gap > 0``; h < 0 is the far side."""
     p, q, d = Rh * C, Rh, h * S
-    m = gap * (R + d + p) / (S * (R * S + h + C * math.sqrt(h * h + ring)))
-    X, y = R - m, np.sqrt(np.maximum(m * (2.0 * R - m), 0.0))
+    X, y = _lid_crossing(R, Rh, ring, S, C, gap, h)
     s1, s2 = np.arctan2(y, X), np.arctan2(y / q, (d + X) / p)
     thin = q * S * S / (1.0 + C)  # q - p
     dl = np.arctan2((y / R) * (d / p + X * thin / (p * q)), X * (d + X) / (p * R) + y * y / (q * R))
@@ -214,11 +222,66 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
     return np.asarray(area + 0.0 * (S + C)), quadrature
 
 
+def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
+    """Crossing point of the disc of radius R and the near side of one lid (condition B, section 5.4), mm.
+
+    Returns
+    -------
+    u, v : ndarray
+        Along the tilt and across it; the other one is ``(u, -v)``.  NaN without a crossing.
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit.
+
+    Examples
+    --------
+    >>> u, v = lid_crossing(Bearing(), 0.01333086429801, 0.99991114008)
+    >>> round(float(u), 6), round(float(v), 6)
+    (-7.76804, 15.68144)
+    """
+    S, C = _tilts(bearing, sine, cosine)
+    R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
+    gap = bearing.gap(S, C, "B")
+    there = (gap > 0.0) & (h * S - Rh * C < R) & (C > 0.0)
+    with np.errstate(all="ignore"):
+        X, y = _lid_crossing(R, Rh, float(bearing._slack), S, C, gap, h)
+    return np.where(there, -X, np.nan), np.where(there, y, np.nan)
+
+
+def rim_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
+    """Crossing point of the rim of the tilted bearing and the hole (condition A, section 5.4), mm.
+
+    Returns
+    -------
+    u, v : ndarray
+        Along the tilt and across it; the other one is ``(u, -v)``.  NaN without a crossing, and where ``R S > h C``.
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit.
+    """
+    S, C = _tilts(bearing, sine, cosine)
+    R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
+    gap = bearing.gap(S, C, "A")
+    there = (gap > 0.0) & (h * C >= R * S) & (h * S - R * C < Rh)
+    with np.errstate(all="ignore"):
+        x, y = _rim_crossing(R, Rh, h, float(bearing._slack), S, C, gap)
+    return np.where(there, x, np.nan), np.where(there, y, np.nan)
+
+
+def _rim_crossing(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, gap: Array) -> tuple[Array, Array]:
+    """Crossing point of rim and hole; the discriminant of section 5.4 is ``(S wA / C)^2``."""
+    m = gap * (R * C + Rh - h * S) / (S * (h - Rh * S + C * math.sqrt(max(h * h - ring, 0.0))))
+    return Rh - m, np.sqrt(np.maximum(m * (2.0 * Rh - m), 0.0))
+
+
 def _rim_side(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, gap: Array) -> Array:
-    """Crescent of the rim outside the hole; the discriminant of section 5.4 is ``(S wA / C)^2``."""
+    """Crescent of the rim outside the hole."""
     p, d = R * C, h * S
-    m = gap * (p + Rh - d) / (S * (h - Rh * S + C * math.sqrt(max(h * h - ring, 0.0))))
-    x, y = Rh - m, np.sqrt(np.maximum(m * (2.0 * Rh - m), 0.0))
+    x, y = _rim_crossing(R, Rh, h, ring, S, C, gap)
     s1, s2 = np.arctan2(y, x), np.arctan2(y / R, (x - d) / p)
     bend = S * S / (1.0 + C)
     dl = np.arctan2(y * (d - x * bend) / (p * Rh), (x - d) * x / (p * Rh) + y * y / (R * Rh))

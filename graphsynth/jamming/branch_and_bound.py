@@ -66,6 +66,7 @@ def maximise(
     decide_sign: bool = False,
     max_boxes: int = 200_000,
     max_seconds: float = math.inf,
+    tried: Interval | None = None,
 ) -> Supremum:
     """Enclose the largest value of a function over a box.
 
@@ -82,6 +83,9 @@ def maximise(
         Stop as soon as the largest value is proved negative or positive.
     max_boxes, max_seconds : budgets
         Exhausted: the bounds found so far, ``finished`` False.
+    tried : Interval, shape (n,), optional
+        Where points are tried, if ``box`` is a box of doubles around exact ranges: the doubles inside each range, or
+        the doubles around it where there is none (then ``lower`` holds for every value between them).
 
     Returns
     -------
@@ -106,7 +110,7 @@ def maximise(
     check_rounding()
     if not bool(box.is_bounded.all()):
         raise GeometryError("the box of a search must be bounded and not empty; give finite bounds")
-    search = _Search(function, box)
+    search = _Search(function, box, box if tried is None else tried)
     while search.waiting() and search.boxes < max_boxes and perf_counter() - begin < max_seconds:
         if search.settled(tolerance, decide_sign):
             break
@@ -120,8 +124,8 @@ def maximise(
 class _Search:
     """Boxes with their upper bounds, largest first."""
 
-    def __init__(self, function: Callable[[Sequence[Dual]], Dual], box: Interval) -> None:
-        self.function = function
+    def __init__(self, function: Callable[[Sequence[Dual]], Dual], box: Interval, tried: Interval) -> None:
+        self.function, self.tried = function, tried
         self.lo, self.hi = box.lo[None, :].copy(), box.hi[None, :].copy()
         self.bound = np.array([math.inf])
         self.best, self.point, self.boxes = -math.inf, box.mid, 0
@@ -187,7 +191,10 @@ class _Search:
     def _points(self, points: Array) -> None:
         from graphsynth.intervals import Interval, variables
 
-        found = self.function(variables(Interval.from_bounds(points, points)))
+        points = np.clip(points, self.tried.lo, self.tried.hi)
+        around = self.tried.width <= 2.0 * np.spacing(self.tried.mag)  # neighbouring doubles: the range lies between
+        lo, hi = np.where(around, self.tried.lo, points), np.where(around, self.tried.hi, points)
+        found = self.function(variables(Interval.from_bounds(lo, hi)))
         value: Any = found.value if hasattr(found, "grad") else found
         low = np.where(value.is_empty | ~value.guaranteed, -np.inf, value.lo)
         low = np.broadcast_to(low, (len(points),))
@@ -297,4 +304,5 @@ def largest_gap(box: ToleranceBox, condition: Condition = "general", **options: 
         raise GeometryError("branch and bound needs a fixed axis and a rigid rod; use certify_jamming for this box")
     names = GAP_VARIABLES[: 7 if condition == "general" else 6]
     start = Interval.stack([box.outer(name) for name in names])
-    return maximise(gap_function(condition, (axis[0].lower, axis[1].lower, axis[2].lower)), start, **options)
+    function = gap_function(condition, (axis[0].lower, axis[1].lower, axis[2].lower))
+    return maximise(function, start, tried=Interval.stack([box[name].doubles for name in names]), **options)

@@ -43,6 +43,11 @@ def _is_full(span: Span) -> bool:
     return span.stop - span.start >= TURN_LOW
 
 
+def _certainly_full(span: Span) -> bool:
+    """Whether no angle is left out, for sets that must not be enlarged."""
+    return span == FULL_TURN or span.stop - span.start > TURN_HIGH  # a rounded difference above a double is above it
+
+
 def merge_outer(spans: Iterable[Span]) -> tuple[Span, ...]:
     """Join spans that overlap or touch, also across the turn; the union is never smaller.
 
@@ -119,7 +124,7 @@ def strictly_inside(spans: Iterable[Span], f: float) -> bool:
 def covers(spans: Iterable[Span], start: float, stop: float) -> bool:
     """Whether one of the spans certainly holds the piece from ``start`` to ``stop`` in its inside."""
     for span in spans:
-        if _is_full(span):
+        if _certainly_full(span):
             return True
         for turn in _TURNS:
             if span.start < _shifted(start, turn)[0] and _shifted(stop, turn)[1] < span.stop:
@@ -130,7 +135,7 @@ def covers(spans: Iterable[Span], start: float, stop: float) -> bool:
 def meets(spans: Iterable[Span], start: float, stop: float) -> bool:
     """Whether the piece from ``start`` to ``stop`` certainly has points inside one of the spans."""
     for span in spans:
-        if _is_full(span):
+        if _certainly_full(span):
             return True
         for turn in _TURNS:
             first, last = max(span.start, _shifted(start, turn)[1]), min(span.stop, _shifted(stop, turn)[0])

@@ -18,6 +18,7 @@ from graphsynth.errors import GeometryError
 from graphsynth.intervals import Interval, asin, atan2, cos, hypot, sin
 from graphsynth.jamming.bearing import CONDITIONS, Condition
 from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.jamming.ranges import Range, bounds_of
 from graphsynth.kinematics._checks import choice
 
 __all__ = [
@@ -65,19 +66,17 @@ def sine_of(amplitude: Interval, rod: str) -> Interval:
 
 
 def _inclination(box: ToleranceBox) -> Interval:
-    """Pair of ``1 - n3^2`` for the normalised axis: grows with n1^2 + n2^2, falls with n3^2."""
-    n = [box.outer(f"n{i}") for i in (1, 2, 3)]
-    if box["n3"].is_point and box["n3"].lower == 0:
-        return Interval.from_bounds([1.0, 1.0], [1.0, 1.0])
-    if all(box[name].is_point and box[name].lower == 0 for name in ("n1", "n2")):
-        return Interval.zeros(2)
-    scale = 2.0 ** -math.frexp(max(float(part.mag) for part in n))[1]
-    flat = (n[0] * scale).sqr() + (n[1] * scale).sqr()
-    steep = (n[2] * scale).sqr()
-    r = Interval.from_bounds([flat.lo, flat.hi], [flat.lo, flat.hi])
-    z = Interval.from_bounds([steep.hi, steep.lo], [steep.hi, steep.lo])
-    ratio = r / (r + z)
-    return Interval.from_bounds(np.clip(ratio.lo, 0.0, 1.0), np.clip(ratio.hi, 0.0, 1.0))
+    """Pair of ``1 - n3^2`` for the normalised axis: grows with n1^2 + n2^2, falls with n3^2; rational, so exact."""
+    squares = [_squares(box[f"n{i}"]) for i in (1, 2, 3)]
+    flat = [squares[0][k] + squares[1][k] for k in (0, 1)]
+    pairs = [bounds_of(flat[k] / (flat[k] + squares[2][1 - k])) for k in (0, 1)]
+    return Interval.from_bounds([low for low, _ in pairs], [high for _, high in pairs])
+
+
+def _squares(value: Range) -> tuple[Fraction, Fraction]:
+    """Return the smallest and the largest square of a range."""
+    low, high = value.lower**2, value.upper**2
+    return (Fraction(0) if value.lower <= 0 <= value.upper else min(low, high)), max(low, high)
 
 
 def _height(box: ToleranceBox) -> Interval:
@@ -87,7 +86,7 @@ def _height(box: ToleranceBox) -> Interval:
     large = max(abs(low), abs(high))
     if large > 3:  # beyond pi the sine of alpha/2 falls again
         wave = sin(box.outer("alpha") / 2).sqr()
-        halves = Interval.from_bounds([wave.lo, wave.lo], [wave.hi, wave.hi])
+        halves = Interval.from_bounds([wave.lo, wave.lo], [wave.hi, wave.hi])  # both corners: the whole range
     else:
         a, b = (Interval(abs(end)) for end in (small, large))
         halves = sin(Interval.from_bounds([a.lo, b.lo], [a.hi, b.hi]) / 2).sqr()
@@ -270,6 +269,7 @@ def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, flo
     s = Interval.from_bounds(np.minimum(critical.lo, 1.0), np.minimum(critical.hi, 1.0))
     if box.rod == "deck":  # tan theta = A_z / l3
         s = s / cosine(s)
+        s = Interval.from_bounds(np.where(s.is_empty, big, s.lo), np.where(s.is_empty, np.inf, s.hi))
     low, high = float(s.lo[0]), float(s.hi[1])
     a, b = float(tilt.amplitude.lo[0]), float(tilt.amplitude.hi[1])
     if low == 0.0:
@@ -280,7 +280,7 @@ def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, flo
         first = float((Interval.from_bounds(low, low) / Interval.from_bounds(b, b)).lo)
     if high == 0.0 and a > 0.0:
         last = 0.0
-    elif a == 0.0 or not math.isfinite(float(critical.hi[1])):
+    elif a == 0.0 or not math.isfinite(high) or not math.isfinite(float(critical.hi[1])):
         last = math.inf
     else:
         last = float((Interval.from_bounds(high, high) / Interval.from_bounds(a, a)).hi)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -13,14 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.errors import GeometryError
+from graphsynth.intervals.reading import fraction, text_ends
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
 
 __all__ = ["Given", "Range", "bounds_of", "exact_text", "spread"]
-
-_PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
-_SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")
 
 
 def bounds_of(value: Fraction) -> tuple[float, float]:
@@ -91,16 +88,13 @@ class Range:
 
     @classmethod
     def _text(cls, name: str, text: str) -> Range:
-        pair, spread_ = _PAIR.fullmatch(text), _SPREAD.fullmatch(text)
-        if pair:
-            return cls._ordered(name, _number(name, pair[1]), _number(name, pair[2]), True)
-        if spread_:
-            middle, radius = _number(name, spread_[1]), _number(name, spread_[2])
-            if radius < 0:
-                raise GeometryError(f"{name} = {text.strip()!r} has a negative tolerance; give 0 or more")
-            return cls._ordered(name, middle - radius, middle + radius, True)
-        number = _number(name, text)
-        return cls(number, number)
+        first, last, is_spread = text_ends(text)
+        low, high = _number(name, first), _number(name, last)
+        if not is_spread:
+            return cls._ordered(name, low, high, True)
+        if high < 0:
+            raise GeometryError(f"{name} = {text.strip()!r} has a negative tolerance; give 0 or more")
+        return cls(low - high, low + high)
 
     @classmethod
     def _ordered(cls, name: str, lower: Fraction, upper: Fraction, exact: bool) -> Range:
@@ -133,6 +127,14 @@ class Range:
         low, high = self.ends
         return Interval.from_bounds(low[0], high[1])
 
+    @cached_property
+    def doubles(self) -> Interval:
+        """The doubles inside the range; the two around it if there is none."""
+        from graphsynth.intervals import Interval
+
+        (below, first), (last, above) = self.ends
+        return Interval.from_bounds(first, last) if first <= last else Interval.from_bounds(below, above)
+
     def __str__(self) -> str:
         low, high = (_short(end) for end in (self.lower, self.upper))
         return low if self.is_point else f"[{low}, {high}]"
@@ -161,13 +163,14 @@ def _number(name: str, value: Any) -> Fraction:
     try:
         if isinstance(value, bool | bytes | bytearray | np.bool_):
             raise ValueError
-        if isinstance(value, str | int | Fraction | Decimal):
-            exponent = re.search(r"[eE]([+-]?\d+)\s*$", value) if isinstance(value, str) else None
-            if exponent and len(exponent[1]) > 5:
-                raise ValueError
-            number = Fraction(value.strip() if isinstance(value, str) else value)
-        elif isinstance(value, np.integer):
+        if isinstance(value, str):
+            number = fraction(value)
+        elif isinstance(value, Decimal) and value.is_finite() and abs(value.adjusted()) > 10_000:
+            raise ValueError
+        elif isinstance(value, int | np.integer):
             number = Fraction(int(value))
+        elif isinstance(value, Fraction | Decimal | np.floating):
+            number = Fraction(*value.as_integer_ratio())
         else:
             number = Fraction(float(value))
         float(number)

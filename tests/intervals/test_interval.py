@@ -168,3 +168,24 @@ def test_shapes():
 def test_contains_refuses_what_is_no_number():
     with pytest.raises(FormatError, match="not a number"):
         Interval(1, 2).contains("one")
+
+
+def test_bounds_in_extended_precision_are_rounded_outward():
+    low, high = 1 - np.longdouble(2) ** -60, 1 + np.longdouble(2) ** -60
+    for made in (Interval(low, high), Interval(np.array([low]), np.array([high]))[0], Interval([low, high])[0]):
+        assert made.lo <= low
+    for made in (
+        Interval(low, high),
+        Interval(np.array([low]), np.array([high]))[0],
+        Interval(np.array([low, high]))[1],
+    ):
+        assert made.hi >= high
+    assert not Interval(np.array([low])).exact_input.any()
+    assert Interval(-np.longdouble(np.inf), low).lo == -INF
+
+
+def test_exponents_with_underscores_do_not_hang():
+    with pytest.raises(FormatError, match="exponent"):
+        Interval("1e9_999_999_999")
+    with pytest.raises(FormatError, match="not a number"):
+        Interval("1e+_9")

@@ -42,10 +42,10 @@ def box(**changes):
     [
         (lambda: box(clearance="[0.1, 0.03]"), "clearance has its lower bound 0.1 above its upper bound 0.03"),
         (lambda: box(clearance=(0.1, 0.03)), "exchange them"),
-        (lambda: circle_ellipse("[6, 5]", 7, 4), "R1 has its lower bound 6.0 above its upper bound 5.0"),
+        (lambda: circle_ellipse("[6, 5]", 7, 4), "R1 has its lower bound 6 above its upper bound 5"),
         (lambda: circle_ellipse(5, 4, 6), "a = 4.0 is below b = 6.0"),
         (lambda: circle_ellipse(5, 6, 4, eps=-1), "e1 = -1.0 must be zero or more"),
-        (lambda: circle_ellipse(math.nan, 6, 4), "R1 = nan is not finite"),
+        (lambda: circle_ellipse(math.nan, 6, 4), "R1 = nan is not a finite number"),
         (lambda: box(Rb=math.nan), "Rb = nan is not a finite number"),
         (lambda: Bearing(Rb=math.nan), "Rb = nan is not finite"),
         (lambda: Bearing(clearance=math.inf), "clearance = inf is not finite"),

@@ -11,7 +11,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming.areas import ellipse_circle, ellipse_circle_stable, lid_area, rim_area, surrogate_areas
+from graphsynth.jamming.areas import (
+    ellipse_circle,
+    ellipse_circle_stable,
+    lid_area,
+    lid_crossing,
+    rim_area,
+    rim_crossing,
+    surrogate_areas,
+)
 from graphsynth.jamming.bearing import Bearing
 
 DECK = Bearing()
@@ -312,3 +320,30 @@ def test_zero_clearance():
         [0, 0.06398060445516362539956021991, 3.750005989749518033035104254],
         rtol=1e-14,
     )
+
+
+def test_crossing_points_at_the_worst_pose():
+    """Specification 14.2, below the table: f = 90 degrees of the deck's motion."""
+    sine = 0.4 * math.sin(1.0 / 30.0)
+    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
+    u, v = lid_crossing(DECK, sine, cosine)
+    assert float(u) == pytest.approx(-7.768039976301275745374382, rel=1e-14)
+    assert float(v) == pytest.approx(15.68143982313439467532102, rel=1e-14)
+    u, v = rim_crossing(DECK, sine, cosine)
+    assert float(u) == pytest.approx(8.000463409123589289808929, rel=1e-14)
+    assert float(v) == pytest.approx(15.59786797095277876096664, rel=1e-14)
+
+
+def test_crossing_points_lie_on_both_outlines_or_are_nan():
+    t = np.linspace(0.0, 0.25, 41)
+    S, C = np.sin(t), np.cos(t)
+    for found, ellipse, disc in (
+        (lid_crossing(DECK, S, C), (DECK.h * S, DECK.Rh * C, DECK.Rh), DECK.Rb),
+        (rim_crossing(DECK, S, C), (DECK.h * S, DECK.Rb * C, DECK.Rb), DECK.Rh),
+    ):
+        u, v = found
+        there = np.isfinite(u)
+        assert there.any() and not there[0] and (np.isfinite(v) == there).all()
+        assert np.abs(np.hypot(u, v)[there] / disc - 1.0).max() < 1e-14
+        centre, along, across = ellipse
+        assert np.abs((((u - centre) / along) ** 2 + (v / across) ** 2)[there] - 1.0).max() < 1e-12

@@ -260,6 +260,15 @@ def test_branch_and_bound_agrees_with_the_corners(condition, axis):
     assert found.boxes <= 20
 
 
+def test_the_lower_bound_of_the_search_belongs_to_the_exact_box():
+    """Its points are doubles, but 0.03 and 1/3 are none: the values beside them belong to other bearings."""
+    for clearance in ("0.03", "1/3", "[0.1, 0.3]"):
+        found = largest_gap(ToleranceBox(clearance=clearance), "A", max_boxes=100)  # no tilt: the gap is -c
+        exact = -ToleranceBox(clearance=clearance)["clearance"].lower
+        assert F(found.lower) <= exact <= F(found.upper)
+        assert found.upper - found.lower < 1e-16
+
+
 def test_general_pin_with_a_range_of_radii():
     # wide radii: neither end is the worst, gA falls and gB / C rises with the radius
     box = ToleranceBox(l2=1, l3=2, alpha="0.5", Rb="[5, 40]", Hb=20, hole_length=6, clearance="0.5 +- 0.1")

@@ -443,3 +443,18 @@ def test_what_is_no_tolerance_box_or_no_number_is_refused():
         with pytest.raises(GeometryError, match=text):
             deck(clearance=value)
     assert deck(Hb=np.int64(10)).exact_input and not deck(Hb=np.float32(10)).exact_input
+
+
+def test_numbers_at_the_ends_of_the_range_of_doubles():
+    tiny = certify_jamming(deck(axis=(1e-320, 0, 0)))
+    assert tiny.verdict is certify_jamming(deck()).verdict and tiny.largest_gap == certify_jamming(deck()).largest_gap
+    wide = certify_jamming(ToleranceBox(alpha="1/30", rod="deck", Hb=0, clearance="1e20"), "B")
+    assert wide.verdict is Verdict.CERTIFIED_FREE
+
+
+def test_extended_precision_is_not_rounded_on_the_way_in():
+    value = np.longdouble(3) / 100
+    found = ToleranceBox(clearance=value)["clearance"]
+    assert found.lower == found.upper == F(*value.as_integer_ratio()) and not found.exact
+    between = ToleranceBox(clearance=(value, value))["clearance"].outer
+    assert F(float(between.lo)) <= F(*value.as_integer_ratio()) <= F(float(between.hi))

@@ -111,6 +111,13 @@ def test_general_axis():
     got = linkage.positions([row[0] * DEG for row in expected])
     np.testing.assert_allclose(got.B[:, :2], [row[1] for row in expected], rtol=0, atol=1e-15)
     np.testing.assert_allclose(got.theta, [row[2] for row in expected], rtol=1e-14)
+    pins = [
+        (0.9996913866015936127633669594, 0.02209466186513985602939740811, 0.01135594433097631525133174464),
+        (0.4804973412031838807854716646, 0.8766451074482594878328246820, 0.02481251062872653974907909100),
+        (-0.02234155258386496581870384058, 0.9995062185625497804213871351, 0.02209466186513985602939740811),
+        (-0.9317613580358987801235153715, -0.3626134508410921921946471994, -0.01822791650772133350586769819),
+    ]
+    np.testing.assert_allclose(got.A, pins, rtol=1e-15, atol=4e-16)
 
 
 @pytest.mark.parametrize(

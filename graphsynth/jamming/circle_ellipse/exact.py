@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
-from decimal import Decimal
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from graphsynth.errors import GeometryError
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.reading import lower_bound, upper_bound
+from graphsynth.jamming import ranges
 
 __all__ = ["Range", "exact_range", "outward", "root_bounds"]
-
-_PAIR = re.compile(r"\s*\[\s*([^,\]]+?)\s*,\s*([^,\]]+?)\s*\]\s*")
-_SPREAD = re.compile(r"\s*(\S+)\s*(?:\+-|\+/-|±)\s*(\S+)\s*")
-_NUMBER = re.compile(r"\s*[+-]?[0-9.]{1,400}(?:[eE][+-]?[0-9]{1,3})?(?:/[0-9]{1,400})?\s*")
 
 
 class Range(NamedTuple):
@@ -42,43 +34,6 @@ def outward(lo: Fraction, hi: Fraction) -> Interval:
     return Interval.from_bounds(lower_bound(lo) + 0.0, upper_bound(hi) + 0.0)  # no negative zero
 
 
-def _rational(name: str, text: str) -> Fraction:
-    if _NUMBER.fullmatch(text):
-        try:
-            return Fraction(text.strip())
-        except (ValueError, ZeroDivisionError):
-            pass
-    raise GeometryError(
-        f"{name} = {text[:60]!r} is not a number; write a decimal such as 0.03, a fraction such as 1/30, "
-        "a pair [17.4, 17.6] or a spread 17.5 +- 0.005"
-    )
-
-
-def _ends(name: str, value: Any) -> tuple[Fraction, Fraction]:
-    if isinstance(value, Range):
-        return value
-    if isinstance(value, Interval):
-        if value.ndim or not value.is_bounded.all():
-            raise GeometryError(f"{name} = {value!r} is not one bounded interval; give one")
-        return Fraction(value.lo.item()), Fraction(value.hi.item())
-    if isinstance(value, str):
-        if pair := _PAIR.fullmatch(value):
-            return _rational(name, pair[1]), _rational(name, pair[2])
-        if spread := _SPREAD.fullmatch(value):
-            middle, radius = _rational(name, spread[1]), _rational(name, spread[2])
-            return middle - radius, middle + radius
-        point = _rational(name, value)
-        return point, point
-    if isinstance(value, tuple | list) and len(value) == 2:
-        return _ends(name, value[0])[0], _ends(name, value[1])[1]
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | Fraction | Decimal | np.number):
-        raise GeometryError(f"{name} = {value!r} is not a real number; give a number, text or a pair of bounds")
-    number = value.item() if isinstance(value, np.number) else value
-    if isinstance(number, complex) or (not isinstance(number, int | Fraction) and not math.isfinite(number)):
-        raise GeometryError(f"{name} = {number} is not finite; give a finite real number")
-    return Fraction(number), Fraction(number)
-
-
 def exact_range(name: str, value: Any) -> Range:
     """Read a number or a range without rounding.
 
@@ -99,10 +54,12 @@ def exact_range(name: str, value: Any) -> Range:
     >>> exact_range("c", "0.03").lo
     Fraction(3, 100)
     """
-    lo, hi = _ends(name, value)
-    if lo > hi:
-        raise GeometryError(f"{name} has its lower bound {float(lo)} above its upper bound {float(hi)}; exchange them")
-    return Range(lo, hi)
+    if isinstance(value, Range):
+        return value
+    if isinstance(value, Fraction):  # also beyond the range of doubles: units far from 1
+        return Range(value, value)
+    found = ranges.Range.read(name, value)
+    return Range(found.lower, found.upper)
 
 
 def root_bounds(value: Fraction, bits: int = 64) -> Range:

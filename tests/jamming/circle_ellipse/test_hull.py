@@ -1,5 +1,6 @@
 """The exact hull: reference values, brute-force clipping, samples, extreme cases."""
 
+from decimal import Decimal
 from fractions import Fraction
 
 import mpmath
@@ -107,6 +108,16 @@ def test_surrogate_of_the_bearing_at_the_worst_pose():
     problem = surrogate_problem(Bearing(), sine)
     assert abs(problem.b.lo - Fraction(B90)) < Fraction(1, 10**27)
     close(exact_hull(problem).hull, [("13.11490802879096276551727",) * 2, ("11.58659515976778845911871",) * 2])
+
+
+def test_amplification_of_the_tolerance():
+    """Half widths in the squares (6.2), and the factor a^2 / (a^2 - b^2) at the worst pose."""
+    eps, b = Fraction(1, 10**6), Fraction(B90)
+    found = exact_hull(circle_ellipse("17.5", "17.53", b, eps=eps)).squares[0]
+    half = (Fraction(float(found.hi)) - Fraction(float(found.lo))) / 2
+    assert float(half / (eps * (1 + b * b))) == pytest.approx(128.7468716303685825185188, rel=1e-9)
+    a = Fraction("17.53")
+    assert float(a * a / (a * a - b * b)) == pytest.approx(128.7468716303685825185188, rel=1e-15)
 
 
 def clipped_hull(R1, a, b, e1, e2):
@@ -242,18 +253,21 @@ def test_touching_by_one_part_in_1e30_is_decided():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("x", 2, 1), "R1 = 'x' is not a number"),
-        ((float("nan"), 2, 1), "not finite"),
+        (("x", 2, 1), "R1 = 'x' is not a finite number"),
+        ((float("nan"), 2, 1), "not a finite number"),
         ((0, 2, 1), "R1 = 0.0 must be positive"),
         ((1, 2, 0), "b = 0.0 must be positive"),
         ((1, 1, 2), "exchange them"),
         ((1, 2, 1, -1), "e1 = -1.0 must be zero or more"),
         (("[2, 1]", 2, 1), "exchange them"),
-        ((None, 2, 1), "not a real number"),
-        (("1e999999999", 2, 1), "not a number"),
-        (("1/0", 2, 1), "not a number"),
-        ((True, 2, 1), "not a real number"),
-        ((Interval("[1, 2]").hull(Interval.entire()), 2, 1), "bounded"),
+        ((None, 2, 1), "not a finite number"),
+        ((1j, 2, 1), "not a finite number"),
+        (("1e999999999", 2, 1), "not a finite number"),
+        (("1e9_999_999_999", 2, 1), "not a finite number"),
+        ((Decimal("1e999999999"), 2, 1), "not a finite number"),
+        (("1/0", 2, 1), "not a finite number"),
+        ((True, 2, 1), "not a finite number"),
+        ((Interval("[1, 2]").hull(Interval.entire()), 2, 1), "not a finite number"),
     ],
 )
 def test_bad_input_gets_a_sentence(arguments, words):

@@ -8,6 +8,7 @@ import pytest
 from graphsynth import simulate
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.coupled import RIGID, SPHERICAL, JointLimits, Misalignment, assess_coupled
+from graphsynth.jamming.coupled.problem import problem
 
 T_A = 0.006064396559156420060266102798724801172486
 T_B = 0.005938219994357610895366507614303110074863
@@ -33,6 +34,15 @@ def test_table_of_least_tilts(lambda_mechanism):
     expected = np.array([value for value, _ in FACTORS.values()])
     assert np.abs(report.factor / expected - 1.0).max() < 1e-14
     assert report.gap.max() < 1e-13
+
+
+def test_points_of_the_dual_certificates(lambda_mechanism):
+    """The wrench of the loop is a force through p: p = (-M_y, M_x) / f (14.6)."""
+    motion = simulate(lambda_mechanism, np.radians(np.array(list(FACTORS), dtype=float)))
+    found = problem(lambda_mechanism, JointLimits(1.0), Misalignment(0, 1, 1 / 30)).solve(motion.poses)
+    p = found.units.centre + found.units.length * np.column_stack([-found.y[:, 1], found.y[:, 0]]) / found.y[:, 2:]
+    expected = np.array([point for _, point in FACTORS.values()])
+    assert np.abs(p - expected).max() < 2e-7  # flat around a smooth maximum: half of the digits
 
 
 def test_bearings_give_the_ratio_to_the_critical_tilt(lambda_mechanism):
