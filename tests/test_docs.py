@@ -1,6 +1,7 @@
 """The documentation is true of the code.
 
-Every example runs, every link leads somewhere, every command line parses, and every public name, verb and option is documented.
+Every example runs, every link leads somewhere, every command line parses; every public name,
+verb and option is documented.
 """
 
 import argparse

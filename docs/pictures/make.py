@@ -1,0 +1,69 @@
+"""Draw the three pictures of the README anew: ``python docs/pictures/make.py [FOLDER]``."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import graphsynth as gs
+from graphsynth.drawing.animation import animated_svg
+from graphsynth.drawing.coupled_pictures import clearance_picture
+from graphsynth.drawing.frames import with_trace_points
+from graphsynth.drawing.graphs import graph_sketch
+from graphsynth.jamming.coupled import JointLimits, Misalignment
+
+CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
+CELL, GAP, COLUMNS = 150, 10, 8
+
+
+def chains_picture(chains: list[gs.MechanismGraph]) -> str:
+    """All chains of eight links side by side, the chosen one framed."""
+    rows = -(-len(chains) // COLUMNS)
+    width, height = COLUMNS * (CELL + GAP) + GAP, rows * (CELL + GAP) + GAP
+    parts, style = [], ""
+    for k, chain in enumerate(chains):
+        x, y = GAP + k % COLUMNS * (CELL + GAP), GAP + k // COLUMNS * (CELL + GAP)
+        sketch, pose = graph_sketch(chain, width=480.0, height=480.0, numbers=False)
+        found = re.fullmatch(r"<svg [^>]*viewBox=\"([^\"]*)\"[^>]*>(.*)</svg>", sketch.svg(pose), re.DOTALL)
+        assert found is not None
+        body = re.sub(r"<title>.*?</title>", "", found[2])
+        style = style or re.search(r"<style>.*?</style>", body, re.DOTALL)[0]  # type: ignore[index]
+        body = re.sub(r"<style>.*?</style>", "", body, flags=re.DOTALL)
+        if k == CHOSEN:
+            parts.append(
+                f'<rect x="{x}" y="{y}" width="{CELL}" height="{CELL}" rx="8" fill="none" stroke="var(--b)" '
+                'stroke-width="3"/>'
+            )
+        parts.append(f'<svg x="{x}" y="{y}" width="{CELL}" height="{CELL}" viewBox="{found[1]}">{body}</svg>')
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" class="gs" viewBox="0 0 {width} {height}" role="img">'
+    return f"{head}<title>The sixteen chains of eight links with mobility 1</title>{style}{''.join(parts)}</svg>\n"
+
+
+def make(folder: Path) -> list[Path]:
+    """Write the pictures; return their paths."""
+    chains = list(gs.enumerate_chains(8))
+    found = gs.embody(chains[CHOSEN], seed=0)
+    assert found.accepted, found.statement
+    motion = with_trace_points(gs.simulate(found.mechanism, np.linspace(0.0, 2.0 * np.pi, 181)), 2)
+    driver = found.mechanism.drivers[0]
+    tilt = Misalignment(driver.base, driver.link, alpha=0.01)
+    report = gs.assess_jamming(motion, JointLimits(0.004), tilts=tilt)
+    pictures = {
+        "readme-chains.svg": chains_picture(chains),
+        "readme-motion.svg": animated_svg(motion, frames=60, title="One of them, with dimensions, turning"),
+    }
+    written = [folder / "readme-verdict.png"]
+    clearance_picture(report).savefig(written[0], dpi=110, metadata={"Software": None})
+    for name, text in pictures.items():
+        path = folder / name
+        path.write_text(text, encoding="utf-8")
+        written.append(path)
+    print(found.statement, report.statement, sep="\n")  # noqa: T201
+    return written
+
+
+if __name__ == "__main__":
+    make(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
