@@ -13,6 +13,7 @@ from pathlib import Path
 from types import FrameType
 
 import graphsynth
+from graphsynth.cli.catalog_options import add_catalog
 from graphsynth.cli.console import note
 from graphsynth.cli.question import add_question
 from graphsynth.compilation import announce
@@ -87,6 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_animate(verbs)
     _add_run(verbs)
     _add_schema(verbs)
+    add_catalog(verbs, _shard, _workers)
     return parser
 
 

@@ -1,0 +1,199 @@
+"""``graphsynth catalog``: build, query, verify, export, merge."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.cli import console
+from graphsynth.cli.workers import workers_for
+from graphsynth.errors import SpecError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    import pandas as pd
+
+    from graphsynth.atlas.building import BuildStep
+    from graphsynth.atlas.catalogue import Catalogue
+
+__all__ = ["run"]
+
+DIFFERENT = 1
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do one action of the verb."""
+    actions = {"build": _build, "query": _query, "verify": _verify, "export": _export, "merge": _merge}
+    return actions[options.action](options)
+
+
+def _build(options: argparse.Namespace) -> int:
+    from graphsynth.atlas.catalogue import Catalogue
+
+    if (options.executor == "dask") != (options.scheduler is not None):
+        raise SpecError("--executor dask and --scheduler ADDRESS go together; give both, or neither")
+    if options.scheduler and options.workers:
+        raise SpecError("--workers is for processes of this machine; a dask cluster has its own")
+    begin = time.perf_counter()
+    try:
+        with _executor(options) as executor, _progress() as watch:
+            for mobility in options.mobility:
+                Catalogue.build(
+                    options.output, options.links, mobility, fractionated=options.fractionated, executor=executor,
+                    shard=options.shard, watch=watch,
+                ).close()  # fmt: skip
+    except KeyboardInterrupt:
+        console.note(f"{options.output} keeps what is written: give the same command to go on")
+        raise
+    return _summary(options, begin)
+
+
+def _executor(options: argparse.Namespace) -> AbstractContextManager[Executor | None]:
+    """Worker processes; all cores when there is more than a second of work."""
+    if options.executor == "dask":
+        from graphsynth.atlas.cluster import dask_executor
+
+        return dask_executor(options.scheduler)
+    from graphsynth.atlas.making import processes
+
+    return processes(workers_for(options.workers, max(options.links) > 10 + min(options.mobility)))
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[BuildStep], None] | None]:
+    """Show how far the family under way is."""
+    from graphsynth.synthesis.writing import Step
+
+    with console.progress("building") as watch:
+        yield None if watch is None else lambda step: watch(Step(step.chains, step.done))
+
+
+def _summary(options: argparse.Namespace, begin: float) -> int:
+    """Say what the catalogue now holds."""
+    from graphsynth.atlas.catalogue import Catalogue
+
+    seconds = round(time.perf_counter() - begin, 3)
+    with Catalogue(options.output) as catalogue:
+        families = catalogue.completeness()
+        chains = len(catalogue)
+        size = options.output.stat().st_size
+    if options.json:
+        console.put_json(
+            {"file": str(options.output), "chains": chains, "bytes": size, "seconds": seconds,
+             "families": _records(families)}
+        )  # fmt: skip
+        return 0
+    _put_frame(families)
+    console.put(f"{options.output}: {chains} chains, {size / 1e6:.1f} MB ({seconds:.1f} s)")
+    return 0
+
+
+def _query(options: argparse.Namespace) -> int:
+    from graphsynth.atlas.catalogue import Catalogue
+
+    if sum((options.sql is not None, options.entry is not None, options.where != "1")) > 1:
+        raise SpecError("give one of CONDITION, --sql and --entry")
+    with Catalogue(options.file) as catalogue:
+        if options.entry is not None:
+            _put_entry(catalogue, options)
+            return 0
+        if options.sql is not None:
+            frame = catalogue.sql(options.sql)
+        else:
+            frame = catalogue.query(options.table, options.where)
+    shown = frame.head(options.limit) if options.limit else frame
+    if options.json:
+        console.put_json({"rows": len(frame), "shown": _records(shown)})
+        return 0
+    _put_frame(shown)
+    more = f", {len(shown)} shown: --limit 0 shows all" if len(shown) < len(frame) else ""
+    console.put(f"{len(frame)} row{'s' * (len(frame) != 1)}{more}")
+    return 0
+
+
+def _put_entry(catalogue: Catalogue, options: argparse.Namespace) -> None:
+    entry = catalogue.entry(options.entry)
+    if options.json:
+        console.put_json(entry)
+        return
+    plain = {name: value for name, value in entry.items() if not isinstance(value, list | dict)}
+    plain["contracted graph"] = entry["contracted"]["edges"] or "none (a ring)"
+    for relation in ("parents", "children"):
+        plain[relation] = " ".join(entry[relation]) or "none in this catalogue"
+    width = max(map(len, plain))
+    for name, value in plain.items():
+        console.put(f"{name:{width}}  {value}")
+    for inversion in entry["inversions"]:
+        console.put(f"frame {inversion['frame']}: {inversion['frame_joints']} joints, levels {inversion['levels']}")
+        for own in entry["mechanisms"]:
+            if own["frame"] == inversion["frame"]:
+                groups = ", ".join(f"{g['links']} links class {g['class']} order {g['order']}" for g in own["groups"])
+                known = "; ".join(f"{kind} {_evaluated(value)}" for kind, value in own["evaluations"].items())
+                console.put(f"  driver {own['driver']}: class {own['class']}, order {own['order']}: {groups}; {known}")
+
+
+def _evaluated(value: Any) -> str:
+    """Say an evaluation in a few words."""
+    if isinstance(value, str):
+        return value
+    number = "" if value["value"] is None else f" {value['value']:.6g} {value['unit'] or ''}".rstrip()
+    return f"{value['status']}{number}" + (f" ({value['guarantee']})" if value["guarantee"] else "")
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from graphsynth.atlas.catalogue import Catalogue
+
+    with Catalogue(options.file) as catalogue:
+        found = catalogue.verify(chains=options.chains, seed=options.seed)
+    if options.json:
+        console.put_json(
+            {"passed": found.passed, "compared": found.compared, "differences": list(found.differences),
+             "seconds": round(found.seconds, 3)}
+        )  # fmt: skip
+    else:
+        for difference in found.differences:
+            console.put(difference)
+        console.put(f"{options.file}: {found.statement}")
+    return 0 if found.passed else DIFFERENT
+
+
+def _export(options: argparse.Namespace) -> int:
+    from graphsynth.atlas.catalogue import Catalogue
+
+    with Catalogue(options.file) as catalogue:
+        files = catalogue.export(options.output, options.form)
+        digest = catalogue.digest()
+    sizes = {str(path): path.stat().st_size for path in files}
+    if options.json:
+        console.put_json({"digest": digest, "files": sizes})
+        return 0
+    for name, size in sizes.items():
+        console.put(f"{name}  {size} bytes")
+    console.put(f"content {digest}")
+    return 0
+
+
+def _merge(options: argparse.Namespace) -> int:
+    from graphsynth.atlas.catalogue import Catalogue
+
+    begin = time.perf_counter()
+    Catalogue.merge(options.output, options.parts).close()
+    return _summary(options, begin)
+
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows as plain values for JSON."""
+    import json
+
+    records: list[dict[str, Any]] = json.loads(frame.to_json(orient="records", double_precision=15))
+    return records
+
+
+def _put_frame(frame: pd.DataFrame) -> None:
+    """Print a table as text that scripts can cut, whatever the width of the terminal."""
+    if len(frame.columns) and len(frame):
+        console.put(frame.to_string(index=False, max_colwidth=60))

@@ -1,0 +1,111 @@
+"""Options of ``graphsynth catalog``; imports nothing that computes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from graphsynth.cli.catalog_site import add_site
+
+__all__ = ["add_catalog"]
+
+Parsers = argparse._SubParsersAction  # argparse has no public name for it
+_MOST_NUMBERS = 300
+
+
+def add_catalog(
+    verbs: Parsers[argparse.ArgumentParser],
+    shard: Callable[[str], tuple[int, int]],
+    workers: Callable[[str], int],
+) -> None:
+    """Add the verb with its own verbs; ``shard`` and ``workers`` read I/M and a number of processes."""
+    summary = "Build, ask, check, export and merge catalogues of chains and mechanisms."
+    parser = verbs.add_parser("catalog", help=summary, description=summary, allow_abbrev=False)
+    own = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    _add_build(own, shard, workers)
+    _add_query(own)
+    _add_verify(own)
+    _add_export(own)
+    _add_merge(own)
+    add_site(own, workers)
+
+
+def _action(own: Parsers[argparse.ArgumentParser], name: str, summary: str) -> argparse.ArgumentParser:
+    parser = own.add_parser(name, help=summary, description=summary, allow_abbrev=False)
+    parser.set_defaults(module="catalog")
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+    return parser
+
+
+def _add_build(
+    own: Parsers[argparse.ArgumentParser],
+    shard: Callable[[str], tuple[int, int]],
+    workers: Callable[[str], int],
+) -> None:
+    parser = _action(own, "build", "Make a catalogue file, or go on with one.")
+    parser.add_argument("--links", type=_numbers, required=True, metavar="N..M", help="numbers of links, 17 at most")
+    parser.add_argument("--mobility", type=_numbers, default=[1], metavar="W", help="mobility, or W..V (default 1)")
+    parser.add_argument(
+        "--fractionated", action="store_true", help="for W >= 2: include chains that fall apart at a link or a joint"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("catalogue.sqlite"), metavar="FILE",
+        help="the catalogue (default catalogue.sqlite)",
+    )  # fmt: skip
+    parser.add_argument("--shard", type=shard, metavar="I/M", help="do only shard I of M (1 <= I <= M)")
+    parser.add_argument("--workers", type=workers, metavar="K", help="worker processes (default: all cores)")
+    parser.add_argument(
+        "--executor", choices=("processes", "dask"), default="processes", help="who computes (default processes)"
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="dask scheduler, for example tcp://node1:8786")
+
+
+def _add_query(own: Parsers[argparse.ArgumentParser]) -> None:
+    parser = _action(own, "query", "Ask a catalogue.")
+    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
+    parser.add_argument(
+        "where", nargs="?", default="1", metavar="CONDITION", help="SQL condition on the rows of a table"
+    )
+    parser.add_argument("--table", default="chains", metavar="NAME", help="table (default chains)")
+    parser.add_argument("--sql", metavar="TEXT", help="any SQL question instead")
+    parser.add_argument("--entry", metavar="KEY|LABEL", help="everything about one chain instead")
+    parser.add_argument("--limit", type=_limit, default=20, metavar="N", help="rows shown (default 20; 0: all)")
+
+
+def _add_verify(own: Parsers[argparse.ArgumentParser]) -> None:
+    parser = _action(own, "verify", "Recompute every stored field by another route; status 1 if something differs.")
+    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
+    parser.add_argument("--chains", type=_limit, metavar="N", help="only N chains of each family, drawn at random")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the draw (default 0)")
+
+
+def _add_export(own: Parsers[argparse.ArgumentParser]) -> None:
+    parser = _action(own, "export", "Write the tables to files, the same bytes for the same content.")
+    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for the files")
+    parser.add_argument("--form", choices=("parquet", "csv", "jsonl"), default="parquet", help="default parquet")
+
+
+def _add_merge(own: Parsers[argparse.ArgumentParser]) -> None:
+    parser = _action(own, "merge", "Make one catalogue of its shards.")
+    parser.add_argument("parts", type=Path, nargs="+", metavar="PART", help="files built with --shard I/M, all of them")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="the catalogue")
+
+
+def _numbers(text: str) -> list[int]:
+    """Read '8' or '4..12'."""
+    low, dots, high = text.partition("..")
+    try:
+        first, last = int(low), int(high if dots else low)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number or N..M, for example 4..12") from None
+    if not 1 <= first <= last < _MOST_NUMBERS:
+        raise argparse.ArgumentTypeError(f"{text!r} must be N..M with 1 <= N <= M < {_MOST_NUMBERS}")
+    return list(range(first, last + 1))
+
+
+def _limit(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number, 0 or more")
+    return int(text)
