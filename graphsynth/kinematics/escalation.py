@@ -122,6 +122,8 @@ def _roots(mp: Any, g: list[Any]) -> list[tuple[Any, bool]] | None:
                 roots.append((_bracketed(value, slope, low, high, at_low >= 0), False))
         elif width < _MERGED:
             roots.append((middle, True))
+        elif max(abs(value(middle)), abs(slope(middle)) / 3, abs(derivative(2, middle)) * width**2 / 8) <= eta:
+            return None  # too flat for these digits: no smaller interval decides either
         else:
             stack += [(low, middle), (middle, high)]
     if stack:

@@ -481,3 +481,10 @@ def test_vertex_almost_on_the_pivot(rho: float) -> None:
     assert leg.status == LegStatus.REACHABLE
     for sigma in (1, -1):
         assert float(leg.angle(sigma)) == pytest.approx(sigma * math.acos(rho / 2.0), rel=3e-16)
+
+
+def test_fourfold_root_is_said_to_be_undecided() -> None:
+    """Similar collinear triangles: more digits do not help, so the search stops at once; certificates decide it."""
+    modes = assembly_modes([0, 12, 6], [0, 6, 3], [5, 5, 4])
+    assert len(modes) == 0 and modes.near_double_root and modes.escalated and not modes.consistent
+    assert "not decided" in modes.self_motion
