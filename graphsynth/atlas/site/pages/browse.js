@@ -3,7 +3,7 @@
 
 (function () {
   const $ = id => document.getElementById(id);
-  const PLATE = {wide: 148, tall: 168, sketch: [132, 106]}, LINE = {tall: 56, sketch: [56, 46]};
+  const PLATE = {wide: 148, tall: 176, sketch: [132, 106]}, LINE = {tall: 56, sketch: [56, 46]};
   const shown = new Map();
   let question = {}, found = [], columns = 1, ready = false;
 
@@ -146,10 +146,10 @@
     item.style.cssText = `top:${Math.floor(k / columns) * tall()}px;left:${k % columns * share}%;width:${share}%;height:${tall()}px`;
     item.setAttribute("aria-posinset", k + 1);
     item.setAttribute("aria-setsize", found.length);
-    const marks = `${row.symmetry > 1 ? ` · symmetry ${row.symmetry}` : ""}${row.planar ? "" : " · not planar"}`;
+    const marks = [row.symmetry > 1 ? `symmetry ${row.symmetry}` : "", row.planar ? "" : "not planar"].filter(Boolean).join(", ");
     item.innerHTML = `<a href="#/${row.key}"><span class="thumb" style="width:${size[0]}px;height:${size[1]}px"></span>` +
       `<span class="words"><b>${row.label}</b> <small class="key">${row.key}</small>` +
-      `<small>${row.inversions} inversion${row.inversions > 1 ? "s" : ""}${marks}</small>` +
+      `<small>${row.inversions} inversion${row.inversions > 1 ? "s" : ""}</small><small>${marks}</small>` +
       `<small class="more">shortest loop ${row.girth}</small><small class="more">class ${Atlas.classes(row)}</small></span></a>`;
     shown.set(k, item);
     // in the order of the list, for the tab key

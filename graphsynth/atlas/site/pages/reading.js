@@ -6,6 +6,14 @@
   const LONGEST = 20000;
 
   Atlas.read = function (text) {
+    const {held, ...found} = readPlain(text);
+    // files of graphsynth say the frame in a remark: "# frame 2"
+    if (held === undefined || !found.graph) return found;
+    const {links, joints, space} = found.graph, own = found.names ? found.names.indexOf(held) : held;
+    return {...found, graph: Atlas.graph(links, joints, own, space, found.names)};
+  };
+
+  function readPlain(text) {
     text = text.trim();
     if (!text) throw new Atlas.Fault("Nothing is pasted yet.");
     if (text.length > LONGEST) throw new Atlas.Fault(`${text.length} characters: at most ${LONGEST} are read.`);
@@ -14,11 +22,13 @@
       try { return {form: "key", graph: Atlas.decodeKey(text)}; } catch (fault) { if (!/^[\d-]+$/.test(text)) throw fault; }
     }
     if (/^\s*\{/.test(text)) return {form: "JSON", graph: fromJson(text)};
+    const frame = /^#\s*frame\s+(\d+)/m.exec(text);
+    if (/^#/m.test(text)) return {...readPlain(text.replace(/^#.*$/gm, "")), ...(frame && {held: +frame[1]})};
     if (/[^\d\s,;:.()[\]{}<>|-]/.test(text)) return {form: "graph6", graph: fromText(text)};
     const rows = matrixRows(text);
     if (rows) return {form: "adjacency matrix", graph: fromMatrix(rows)};
     return {form: "list of joints", ...fromList(text)};
-  };
+  }
 
   function fromJson(text) {
     let found;
