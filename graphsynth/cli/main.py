@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
@@ -16,6 +17,7 @@ import graphsynth
 from graphsynth.cli.catalog_options import add_catalog
 from graphsynth.cli.console import note
 from graphsynth.cli.question import add_question
+from graphsynth.cli.stress import add_stress
 from graphsynth.compilation import announce
 from graphsynth.errors import GraphsynthError
 
@@ -88,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_animate(verbs)
     _add_run(verbs)
     _add_schema(verbs)
+    add_stress(partial(_verb, verbs))
     add_catalog(verbs, _shard, _workers)
     return parser
 

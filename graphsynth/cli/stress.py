@@ -1,0 +1,113 @@
+"""``graphsynth stress``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.cli import console
+
+if TYPE_CHECKING:
+    from graphsynth.accuracy.stress import Case, StressReport
+
+__all__ = ["add_stress", "run"]
+
+WRONG = 1
+
+
+def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+    """Add the arguments; ``verb`` makes the parser of a name, a module and a summary."""
+    parser = verb("stress", "stress", "Run the stiff and extreme cases: what is right, what the library gives.")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="platform-12.5, or all of platform-12, or of platform (default: all)"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write stress.html and stress.csv there")
+    parser.add_argument("--fast", action="store_true", help="leave out cases that take more than about two seconds")
+    parser.add_argument("--list", action="store_true", help="list the cases, run none")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the cases; exit status 1 if one of them is WRONG."""
+    from graphsynth.accuracy.stress import run_stress
+
+    if options.list:
+        return _list(options)
+    with _progress() as progress:
+        report = run_stress(options.names, slow=not options.fast, progress=progress)
+    if options.out:
+        from graphsynth.accuracy.stress.page import write_report
+
+        files = [str(path) for path in write_report(report, options.out)]
+    else:
+        files = []
+    if options.json:
+        console.put_json({**report.summary(), "files": files})
+    else:
+        _show(report)
+        for path in files:
+            console.put(path)
+    return WRONG if report.wrong else 0
+
+
+def _list(options: argparse.Namespace) -> int:
+    from graphsynth.accuracy.stress import cases
+
+    chosen = cases(options.names, slow=not options.fast)
+    if options.json:
+        console.put_json([{"name": case.name, "title": case.title, "slow": case.slow} for case in chosen])
+        return 0
+    for case in chosen:
+        console.put(f"{case.name:17} {case.title}{' (slow)' if case.slow else ''}")
+    return 0
+
+
+def _show(report: StressReport) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title="Stress cases", title_justify="left")
+    for name in ("case", "what", "status", "checks", "largest error", "allowed", "s"):
+        table.add_column(name, justify="left" if name in ("case", "what", "status") else "right")
+    colours = {"ok": "green", "flagged": "cyan", "WRONG": "bold red", "not run": "yellow"}
+    for outcome in report.outcomes:
+        worst, status = outcome.worst, outcome.status.value
+        number = worst is not None and worst.error == worst.error
+        table.add_row(
+            outcome.case.name, escape(outcome.case.title), f"[{colours[status]}]{status}[/]", str(len(outcome.checks)),
+            f"{worst.error:.1e}" if worst and number else "", f"{worst.bound:.1e}" if worst and number else "",
+            f"{outcome.seconds:.2f}",
+        )  # fmt: skip
+    Console().print(table)
+    for outcome in report.outcomes:
+        if outcome.reason:
+            console.put(f"{outcome.case.name}: {outcome.reason}")
+        for check in outcome.checks:
+            if check.status.value == "WRONG":
+                console.put(f"{outcome.case.name}: {check.what}: right is {check.right}, given is {check.given}")
+    console.put(report.statement)
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Case, int, int], None] | None]:
+    """Show the case under way while standard error is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns: tuple[Any, ...] = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=None)
+
+        def show(case: Case, number: int, total: int) -> None:
+            bar.update(task, description=f"{case.name} {case.title}", completed=number, total=total)
+
+        yield show
