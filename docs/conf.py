@@ -25,6 +25,8 @@ myst_heading_anchors = 4
 exclude_patterns = ["pictures/*.py"]
 html_theme = "furo"
 html_title = f"graphsynth {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 
 
 def _toctrees(text: str) -> str:
