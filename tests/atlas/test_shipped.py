@@ -1,0 +1,56 @@
+"""The catalogue in catalog/: verified, complete, and what the builder makes today."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from graphsynth.atlas.catalogue import Catalogue
+
+CATALOG = Path(__file__).parents[2] / "catalog"
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    with Catalogue(CATALOG / "up-to-10-links.sqlite") as catalogue:
+        yield catalogue
+
+
+@pytest.fixture(scope="module")
+def script():
+    spec = importlib.util.spec_from_file_location("build_shipped", CATALOG / "build_shipped.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_verification_passes(shipped):
+    """Every field of every chain with up to ten links, against networkx and brute force."""
+    found = shipped.verify()
+    assert found.differences == ()
+    assert found.passed
+    chains = len(shipped)
+    per_chain = [field for field, count in found.compared.items() if count == chains]
+    assert len(per_chain) >= 18
+    assert found.compared["mechanisms"] == len(shipped.query("mechanisms"))
+    assert found.compared["inversions"] == len(shipped.query("inversions"))
+
+
+def test_it_is_complete_and_small(shipped):
+    statement = shipped.completeness()
+    assert statement["complete"].all()
+    assert statement["published"].notna().all()
+    assert statement["listed"].sum() == len(shipped) == 411
+    assert shipped.path.stat().st_size < 1_000_000
+
+
+def test_the_builder_makes_the_same_today(shipped, script, tmp_path):
+    script.build(tmp_path / "x.sqlite")
+    with Catalogue(tmp_path / "x.sqlite") as fresh:
+        assert fresh.digest() == shipped.digest()
+        assert script.statement(fresh) == (CATALOG / "up-to-10-links.toml").read_text()
+
+
+def test_it_is_found_by_name(shipped):
+    with Catalogue.shipped() as catalogue:
+        assert catalogue.digest() == shipped.digest()
