@@ -200,6 +200,16 @@ def test_architecture_is_that_of_the_code():
         assert [name for name in names if not any(module.endswith(f"kernels/{name}.py") for module in modules)] == []
 
 
+def test_notation_names_what_exists():
+    text = (ROOT / "docs" / "explanation" / "notation.md").read_text(encoding="utf-8")
+    words = set()
+    for path in (ROOT / "graphsynth").rglob("*.py"):
+        words.update(re.findall(r"\w+", path.read_text(encoding="utf-8")))
+    named = set(re.findall(r"[A-Za-z_]\w{2,}", " ".join(re.findall(r"`([^`]+)`", text))))
+    assert len(named) > 100
+    assert named - words == set()
+
+
 def commands():
     """Yield (page, words after ``graphsynth``, the number a count is said to print or None)."""
     for page in PAGES:
