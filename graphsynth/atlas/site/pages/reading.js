@@ -79,7 +79,8 @@
 
   /** Pairs of link numbers; numbering may start anywhere and have gaps. */
   function fromList(text) {
-    const numbers = text.match(/\d+/g).map(Number);
+    const numbers = (text.match(/\d+/g) || []).map(Number);
+    if (!numbers.length) throw new Atlas.Fault("There is no number in this: a joint is written 0-1.");
     if (numbers.length % 2) throw new Atlas.Fault(`${numbers.length} numbers make no pairs of links: a joint is written 0-1.`);
     const names = [...new Set(numbers)].sort((x, y) => x - y), place = new Map(names.map((name, k) => [name, k]));
     const joints = [];
