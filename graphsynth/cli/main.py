@@ -185,6 +185,14 @@ def _add_run(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     )
 
 
+def _add_accuracy(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "accuracy", "accuracy", "Measure error against run time of every numerical method in a scene.")
+    parser.add_argument("scene", metavar="SCENE", help="name of a shipped scene, or a TOML file")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="report folder (default graphsynth-out/SCENE-accuracy)")
+    parser.add_argument("--rounds", type=int, default=3, metavar="N", help="timed runs of each row (default 3)")
+    parser.add_argument("--quick", action="store_true", help="fewer and easier settings, to try the command")
+
+
 def _add_schema(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     _verb(verbs, "schema", "schema", "Print the JSON Schema of scene files, for editors.")
 

@@ -1,0 +1,121 @@
+"""Motors with mechanisms: the integrator of drives beside scipy's solvers, and the limit of a small inductance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from inspect import signature
+from typing import Any
+
+import numpy as np
+
+from graphsynth.accuracy.rows import Effort, Problem, Row, RowStatus, best_of
+
+__all__ = ["drive_problem", "reduction_problem", "work_rows"]
+
+_KIND = "largest error of speed and currents over their largest values"
+#: A scipy solver that needs more calls of the right-hand side is a failure here.
+_MOST_CALLS = 30_000
+
+
+def drive_problem(plant: Any, motor: Any, train: Any, end: float, effort: Effort | None = None) -> Problem:
+    """Run a drive up from rest with every integrator and several tolerances.
+
+    Parameters
+    ----------
+    plant, motor, train
+        As for `graphsynth.dynamics.platform_drive.accuracy.work_precision`; without events on the way.
+    end : float
+        Final time, s.
+    effort : Effort, optional
+
+    Raises
+    ------
+    SpecError
+        A motor with events (ideal speed, voltage limit) or a train that loses power.
+    """
+    from graphsynth.dynamics.platform_drive.accuracy import work_precision
+    from graphsynth.dynamics.platform_drive.run import run
+
+    effort = effort or Effort()
+    default = signature(run).parameters["rtol"].default
+    times = np.linspace(0.0, end, 11)
+    tolerances = (
+        (1e-4, 1e-8, default)
+        if effort.quick
+        else tuple(sorted({1e-4, 1e-6, 1e-8, 1e-10, 1e-12, default}, reverse=True))
+    )
+    options = {"rounds": effort.rounds, "most_calls": _MOST_CALLS}
+    found = work_precision(plant, motor, train, times, tolerances=tolerances, solvers=("LSODA",), **options)
+    rows, reference = list(found.rows), found.reference
+    slow = (1e-4, 1e-6, 1e-8)
+    for solver in () if effort.quick else ("DOP853", "BDF", "Radau"):
+        rows += work_precision(
+            plant, motor, train, times, tolerances=slow if solver != "DOP853" else tolerances, solvers=(solver,),
+            **{**options, "rounds": 1},
+        ).rows[-len(slow if solver != "DOP853" else tolerances) :]  # fmt: skip
+    note = f"Reference: {reference}. scipy's DOP853 is that method itself at a looser tolerance."
+    question = f"Speed and currents of the drive from rest to {end:g} s, at eleven times"
+    return Problem("drive", question, "relative", work_rows(rows, reference, effort, default), "run", note)
+
+
+def work_rows(rows: Sequence[Any], reference: str, effort: Effort, default: float) -> tuple[Row, ...]:
+    """Turn rows of the room of dynamics into ours; what is not done is a failure, with its error if it has one."""
+    found = []
+    for r in rows:
+        done = r.status == "done" and math.isfinite(r.error)
+        missed = not done and math.isfinite(r.error)
+        status = RowStatus.OK if done else RowStatus.UNRELIABLE if missed else RowStatus.FAILED
+        own = r.method == "graphsynth"
+        same = "DOP853" in r.method and "DOP853" in reference
+        found.append(
+            Row(
+                r.method, f"rtol {r.setting:.0e}", r.error, r.seconds,
+                effort.rounds if own or "LSODA" in r.method else 1, _KIND, reference + (" (the same method)" if same else ""), status, "" if done else r.status,
+                own and r.setting == default, more={"steps or calls": float(r.steps)},
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], effort: Effort | None = None) -> Problem:
+    """Leave the inductance out: what the limit L -> 0 costs in accuracy, and what keeping it costs in time.
+
+    Parameters
+    ----------
+    machine : MotorDrivenPlatform or Braider
+        Has ``inductance_study``.
+    times : array_like
+        Output times, s.
+    inductances : sequence of float
+        H, at least three.
+    effort : Effort, optional
+    """
+    effort = effort or Effort()
+    chosen = effort.some(inductances)
+    found, _, rounds = best_of(lambda: machine.inductance_study(times, chosen), Effort(rounds=1), warm=False)
+    rows = []
+    for k, L in enumerate(found.inductance.tolist()):
+        wrong = float(found.speed[k])
+        rows.append(
+            Row(
+                "model without inductance", f"L = {L:g} H", wrong, found.limit.seconds, rounds,
+                "largest error of the speed behind the electrical transient", "run with the inductance",
+                more={"steps": float(found.limit.steps)},
+            )
+        )  # fmt: skip
+    for L in found.inductance.tolist():
+        kept = replace(machine, motor=replace(machine.motor, inductance=L))
+        run, _, rounds = best_of(lambda k=kept: k.simulate(times, reduce=False), effort)  # type: ignore[misc]
+        rows.append(
+            Row(
+                "model with inductance", f"L = {L:g} H", float(run.error[1]) if run.complete else math.nan, run.seconds,
+                rounds, "estimated error of the speed", "the same integrator at a tighter tolerance",
+                RowStatus.OK if run.complete else RowStatus.FAILED, run.reason, more={"steps": float(run.steps)},
+            )
+        )  # fmt: skip
+    question = "The motor without its inductance: error of the speed after the electrical transient"
+    return Problem(
+        "small-inductance", question, "rad/s", tuple(rows), "run", "Seconds are those of one run of a study."
+    )

@@ -1,0 +1,44 @@
+"""``module = "braider"``: what is measured of the braiding mechanism."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from graphsynth.accuracy.registry import build
+from graphsynth.accuracy.rows import Effort, Problem
+
+__all__ = ["linkage_dynamics", "positions", "start_up"]
+
+
+def _braider(context: Any) -> Any:
+    return build("graphsynth.scenes.steps.braider:braider_of", context)
+
+
+def start_up(context: Any, effort: Effort) -> Problem:
+    """Start from rest with all currents."""
+    from graphsynth.accuracy.drives import drive_problem
+
+    b = _braider(context)
+    return replace(
+        drive_problem(b.plant(), b.motor, b.train, context.scene.mechanism.start.end_s, effort), name="start-up"
+    )
+
+
+def linkage_dynamics(context: Any, effort: Effort) -> Problem:
+    """Measure the linkage without motor and thread, free to move from the speed of the scene."""
+    from graphsynth.accuracy.dynamics import braider_model, dynamics_problem
+
+    model, start = braider_model(_braider(context), context.scene.mechanism.speed_rad_s)
+    return dynamics_problem(model, start, 1.0 if effort.quick else 3.5, "the braider's linkage, free", effort)
+
+
+def positions(context: Any, effort: Effort) -> Problem:
+    """Measure positions of the linkage over a turn."""
+    from graphsynth.accuracy.position import four_bar, position_problem
+    from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+
+    bar = _braider(context).linkage
+    linkage = LambdaLinkage(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch)
+    mechanism, closed = four_bar(linkage)
+    return position_problem(mechanism, "the braider's linkage", closed, effort=effort)

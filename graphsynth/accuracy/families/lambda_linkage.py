@@ -1,0 +1,65 @@
+"""``module = "lambda_linkage"``: what is measured of a tilted four-bar linkage and its bearing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from graphsynth.accuracy.registry import build
+from graphsynth.accuracy.rows import Effort, Problem
+
+__all__ = ["arc_ends", "areas", "coupled_joints", "crossing", "dimensions", "positions"]
+
+
+def _box(context: Any) -> Any:
+    return build("graphsynth.scenes.steps.four_bar:tolerance_box", context, False)
+
+
+def _worst(context: Any) -> tuple[Any, str]:
+    """Bearing of the scene, and the sine of the largest tilt of a turn."""
+    linkage, bearing = _box(context).nominal()
+    return bearing, repr(linkage.largest_tilt[1])
+
+
+def crossing(context: Any, effort: Effort) -> Problem:
+    """Measure circle and ellipse at the worst pose."""
+    from graphsynth.accuracy.jamming import crossing_problem
+
+    return crossing_problem(*_worst(context), effort)
+
+
+def areas(context: Any, effort: Effort) -> Problem:
+    """Measure the area of the gap at the worst pose."""
+    from graphsynth.accuracy.jamming import area_problem
+
+    return area_problem(*_worst(context), effort)
+
+
+def arc_ends(context: Any, effort: Effort) -> Problem:
+    """Measure the ends of the jam arcs, without tolerances."""
+    from graphsynth.accuracy.jamming import arc_problem
+
+    return arc_problem(_box(context), context.scene.mechanism.bearing.condition, effort)
+
+
+def coupled_joints(context: Any, effort: Effort) -> Problem:
+    """Measure three bearings that share a misalignment, on the linkage of the source."""
+    from graphsynth.accuracy.jamming import coupled_problem
+
+    return coupled_problem(effort)
+
+
+def positions(context: Any, effort: Effort) -> Problem:
+    """Measure the planar linkage over a turn, by closed form, engine and proof."""
+    from graphsynth.accuracy.position import four_bar, position_problem
+
+    linkage, _ = _box(context).nominal()
+    mechanism, closed = four_bar(replace(linkage, alpha=0.0))
+    return position_problem(mechanism, "the four-bar linkage of the scene", closed, effort=effort)
+
+
+def dimensions(context: Any, effort: Effort) -> Problem:
+    """Search for the source's proportions from the wish alone."""
+    from graphsynth.accuracy.embodiment import line_problem
+
+    return line_problem(effort)

@@ -1,0 +1,60 @@
+"""``module = "single_motor_platform"``: what is measured of the platform with one motor."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from graphsynth.accuracy.registry import build
+from graphsynth.accuracy.rows import Effort, Problem
+from graphsynth.errors import GeometryError
+
+__all__ = ["assembly_modes", "double_root", "drive", "turn"]
+
+
+def _mechanism(context: Any) -> Any:
+    return build("graphsynth.scenes.steps.platform:_mechanism", context.scene.mechanism)
+
+
+def assembly_modes(context: Any, effort: Effort) -> Problem:
+    """Measure all modes at angles that the drives reach during the turn."""
+    import numpy as np
+
+    from graphsynth.accuracy.direct import mode_problem
+
+    mechanism = _mechanism(context)
+    psi = np.linspace(0.1, 0.1 + math.tau, 4 if effort.quick else 24, endpoint=False)
+    theta = mechanism.drive(psi).theta
+    return mode_problem(mechanism.platform, theta, mechanism.Lc, "the platform of the scene", effort)
+
+
+def double_root(context: Any, effort: Effort) -> Problem:
+    """Measure two modes that nearly merge."""
+    from graphsynth.accuracy.double_root import double_root_problem
+
+    return double_root_problem(effort)
+
+
+def turn(context: Any, effort: Effort) -> Problem:
+    """Measure one branch followed over the turn."""
+    from graphsynth.accuracy.continuation import turn_problem
+
+    return turn_problem(_mechanism(context), effort)
+
+
+def drive(context: Any, effort: Effort) -> Problem:
+    """Measure the motor that runs the platform up from rest, with the inertia of the real motion."""
+    from graphsynth.accuracy.drives import drive_problem
+    from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
+
+    table = getattr(context.scene.mechanism, "drive", None)
+    if table is None:
+        raise GeometryError("the scene has no table [mechanism.drive], so no motor")
+    motor = build("graphsynth.scenes.steps.platform_drive:dc_motor", table.motor, table.resistances_ohm[0])
+    model = MotorDrivenPlatform.of_machine(
+        _mechanism(context), motor, mass=table.mass_kg, gyration=table.gyration_mm / 1e3,
+        mass_centre=complex(*table.mass_centre_mm) / 1e3, wheel_inertia=table.wheel_inertia_kg_m2,
+        pinion_inertia=table.pinion_inertia_kg_m2, efficiency=table.efficiency, friction=table.friction_Nm_s_per_rad,
+        load=table.load_Nm,
+    )  # fmt: skip
+    return drive_problem(model.plant(), model.motor, model.train, table.end_s, effort)

@@ -1,0 +1,134 @@
+"""Error against run time, log-log: one picture for each problem, failures drawn as failures."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.accuracy.rows import FLOOR, Problem, Row, RowStatus
+from graphsynth.errors import SpecError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["work_precision_picture"]
+
+#: Okabe and Ito's colours, told apart by colour-blind readers, and markers.
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9", "#b8860b", "#1b2733", "#7f7f7f", "#e66fb0")
+_MARKERS = "osD^vPXp*"
+_SOFT = "#8794a1"
+
+
+def work_precision_picture(problem: Problem) -> Figure:
+    """Draw every row of a problem: time to the right, error upwards; a cross at the upper edge is a failure.
+
+    Filled markers are proved results.  A circle around a marker is the library's default.  Unreliable results are
+    crosses at their error.  Errors of rounding size are drawn on one line.
+
+    Parameters
+    ----------
+    problem : Problem
+        With ``count``, time is drawn against that column instead.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    SpecError
+        A problem without rows.
+
+    Examples
+    --------
+    >>> row = Row("sweep", "0.1 rad", 0.1, 0.002, 3, "proved width", "")
+    >>> len(work_precision_picture(Problem("arcs", "where it jams", "rad", (row,))).axes)
+    1
+    """
+    if not problem.rows:
+        raise SpecError(f"problem {problem.name!r} has no rows, so there is nothing to draw")
+    from graphsynth.drawing.figures import new_figure
+
+    figure = new_figure((8.6, 5.2))
+    axes = figure.subplots()
+    top = _top(problem)
+    for k, method in enumerate(problem.methods):
+        style = {"color": _COLOURS[k % len(_COLOURS)], "marker": _MARKERS[k % len(_MARKERS)]}
+        _method(axes, problem, problem.of(method), top, style)
+    if any(row.status is not RowStatus.OK for row in problem.rows):
+        axes.plot([], [], "x", color=_SOFT, ms=8, mew=2, label="failed (upper edge) or unreliable")
+    if any(row.default for row in problem.rows):
+        axes.plot([], [], "o", ms=11, mfc="none", mec=_SOFT, label="default of the library")
+    _dress(axes, problem, top)
+    return figure
+
+
+def _top(problem: Problem) -> float:
+    """Height at which failures are drawn: a decade above the largest error."""
+    return 10.0 * max((_height(row) for row in problem.rows if math.isfinite(row.error)), default=1.0)
+
+
+def _height(row: Row) -> float:
+    return max(row.error, FLOOR)
+
+
+def _place(problem: Problem, row: Row, top: float) -> tuple[float, float]:
+    if problem.count:
+        return row.more.get(problem.count, math.nan), row.seconds
+    height = _height(row) if math.isfinite(row.error) else top
+    return row.seconds, height
+
+
+def _method(axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, style: dict[str, str]) -> None:
+    good = [row for row in rows if row.good]
+    places = [_place(problem, row, top) for row in good]
+    colour = style["color"]
+    if places:
+        filled = all(row.proved for row in good)
+        axes.plot(
+            *zip(*places), **style, ms=6, lw=1.3, mfc=colour if filled else "white", mew=1.4,
+            label=rows[0].method + (" (proved)" if filled else ""),
+        )  # fmt: skip
+        axes.plot(
+            *(zip(*[p for p, row in zip(places, good) if row.default]) if any(r.default for r in good) else ((), ())),
+            "o", ms=12, mfc="none", mec=colour, mew=1.0,
+        )  # fmt: skip
+    else:
+        axes.plot([], [], **style, ms=6, lw=1.3, mfc="white", label=rows[0].method)
+    times = [row.seconds for row in problem.rows if math.isfinite(row.seconds)]
+    for row in rows:
+        if row.status is not RowStatus.OK:
+            x, y = _place(problem, row, top)
+            axes.plot(x if math.isfinite(x) else max(times, default=1.0), y, "x", color=colour, ms=8, mew=2)
+    _name_ends(axes, rows, good, places, colour)
+
+
+def _name_ends(axes: Any, rows: tuple[Row, ...], good: list[Row], places: list[Any], colour: str) -> None:
+    """Write the settings at the first and the last point of a line."""
+    for k in sorted({0, len(good) - 1} - {-1}):
+        if not good[k].setting:
+            continue
+        below = k > 0 or len(rows) == 1
+        axes.annotate(
+            good[k].setting, places[k], textcoords="offset points", xytext=(5, -10 if below else 6), fontsize=7,
+            color=colour, ha="left",
+        )  # fmt: skip
+
+
+def _dress(axes: Any, problem: Problem, top: float) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    if problem.count:
+        axes.set(xlabel=problem.count, ylabel=f"time of one {problem.per} [s]")
+    else:
+        unit = "" if problem.unit == "relative" else f" [{problem.unit}]"
+        axes.set(xlabel=f"time of one {problem.per} [s]", ylabel=f"error{unit}")
+        if any(not math.isfinite(row.error) for row in problem.rows):
+            axes.axhline(top, color=_SOFT, lw=0.8, ls=":")
+    axes.set_title(problem.question, fontsize=9, loc="left")
+    axes.margins(0.12, 0.1)
+    axes.grid(which="major", color="#e8ebef", lw=0.8)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))

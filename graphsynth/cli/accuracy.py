@@ -1,0 +1,58 @@
+"""``graphsynth accuracy``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from graphsynth.cli import console
+from graphsynth.errors import SceneError
+
+__all__ = ["run"]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure error against run time of every method of a scene; print what to choose."""
+    from graphsynth.accuracy.registry import plans_of
+    from graphsynth.accuracy.report import measure, summary, write_report
+    from graphsynth.accuracy.rows import Effort
+    from graphsynth.scenes.scene import load_scene
+    from graphsynth.scenes.stages import Context
+
+    scene = load_scene(options.scene)
+    plans = plans_of(scene.mechanism.module, structure=scene.structure is not None)
+    if not plans:
+        raise SceneError(
+            f"{scene.place}: no numerical method is known for module = {scene.mechanism.module!r}; other packages add "
+            "some through the entry points graphsynth.accuracy"
+        )
+    effort = Effort(rounds=options.rounds, quick=options.quick)
+    with _progress() as progress:
+        report = measure(Context(scene), plans, effort, progress)
+    folder = options.out or Path("graphsynth-out") / f"{scene.name}-accuracy"
+    files = write_report(report, folder)
+    if options.json:
+        console.put_json({**report.document(), "folder": str(folder), "files": [file.name for file in files]})
+        return 0
+    for line in summary(report):
+        console.put(line)
+    console.put(f"{len(report.to_pandas())} rows in {report.seconds:.0f} s: {folder / 'accuracy.html'}")
+    return 0
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, int, int], None] | None]:
+    """Show the problem under way while standard error is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=None)
+        yield lambda name, done, total: bar.update(task, description=name, completed=done, total=total)
