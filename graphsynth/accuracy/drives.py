@@ -72,7 +72,8 @@ def work_rows(rows: Sequence[Any], reference: str, effort: Effort, default: floa
         found.append(
             Row(
                 r.method, f"rtol {r.setting:.0e}", r.error, r.seconds,
-                effort.rounds if own or "LSODA" in r.method else 1, _KIND, reference + (" (the same method)" if same else ""), status, "" if done else r.status,
+                effort.rounds if own or "LSODA" in r.method else 1, _KIND,
+                reference + (" (the same method)" if same else ""), status, "" if done else r.status,
                 own and r.setting == default, more={"steps or calls": float(r.steps)},
             )
         )  # fmt: skip

@@ -89,6 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_show(verbs)
     _add_animate(verbs)
     _add_run(verbs)
+    _add_accuracy(verbs)
     _add_schema(verbs)
     add_stress(partial(_verb, verbs))
     add_catalog(verbs, _shard, _workers)
@@ -186,7 +187,7 @@ def _add_run(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
 
 
 def _add_accuracy(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = _verb(verbs, "accuracy", "accuracy", "Measure error against run time of every numerical method in a scene.")
+    parser = _verb(verbs, "accuracy", "accuracy", "Measure error against run time of the methods in a scene.")
     parser.add_argument("scene", metavar="SCENE", help="name of a shipped scene, or a TOML file")
     parser.add_argument("--out", type=Path, metavar="DIR", help="report folder (default graphsynth-out/SCENE-accuracy)")
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="timed runs of each row (default 3)")
