@@ -1,4 +1,4 @@
-"""Models for other engines, and the certificate that they mean the same: MuJoCo, exudyn.
+"""Files of graphs and mechanisms: graph6, JSON, GraphML, DOT, CSV, edge lists, matrices; models for other engines.
 
 Every public name is resolved on first use, so that ``import graphsynth.formats`` is free.
 """
@@ -10,6 +10,18 @@ from typing import Any
 from graphsynth.lazy import resolve
 
 _PUBLIC: dict[str, str] = {
+    "FORMATS": "registry",
+    "Format": "registry",
+    "format_of": "registry",
+    "read": "registry",
+    "read_all": "registry",
+    "read_text": "registry",
+    "write": "registry",
+    "write_text": "registry",
+    "adjacency_matrix": "matrices",
+    "graph_from_adjacency": "matrices",
+    "graph_from_incidence": "matrices",
+    "incidence_matrix": "matrices",
     "EngineRun": "engine_run",
     "SpanningTree": "trees",
     "spanning_tree": "trees",

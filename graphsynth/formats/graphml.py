@@ -1,0 +1,211 @@
+"""GraphML, read and written.
+
+The reader takes what networkx, yEd, igraph and Gephi write of simple undirected graphs.  A document type declaration is
+refused, so there are no entities to expand and nothing outside the file is read; depth is limited.
+
+Source: U. Brandes et al., *GraphML Progress Report*, GD 2001, and the GraphML primer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from xml.sax.saxutils import escape, quoteattr
+
+from graphsynth.errors import FormatError
+from graphsynth.formats.attributes import Edge, Item, attributes_of, item_from
+from graphsynth.structure.text import LINKS_MAX
+
+__all__ = ["compose", "parse"]
+
+_SPACE = "http://graphml.graphdrawing.org/xmlns"
+_KEYS = [
+    *(("graph", name, kind) for name, kind in (("frame", "int"), ("space", "int"), ("drivers", "string"))),
+    *(("graph", name, "string") for name in ("points", "pose")),
+    *(("edge", name, kind) for name, kind in (("mobility", "int"), ("kind", "string"), ("joint", "string"))),
+]
+_DEPTH = 32
+_EDGES = LINKS_MAX * (LINKS_MAX - 1) // 2
+
+
+def compose(items: Iterable[Item]) -> Iterator[str]:
+    """Write graphs and mechanisms, each as one ``<graph>``."""
+    yield f'<?xml version="1.0" encoding="UTF-8"?>\n<graphml xmlns="{_SPACE}">\n'
+    for of, name, kind in _KEYS:
+        yield f' <key id="{name}" for="{of}" attr.name="{name}" attr.type="{kind}"/>\n'
+    for place, item in enumerate(items):
+        yield _graph(item, place)
+    yield "</graphml>\n"
+
+
+def _graph(item: Item, place: int) -> str:
+    graph, own, edges = attributes_of(item)
+    lines = [f' <graph id="G{place}" edgedefault="undirected">']
+    lines += [f"  {_data(name, value)}" for name, value in own.items()]
+    lines += [f'  <node id="{link}"/>' for link in range(graph.links)]
+    for joint, attributes in zip(graph.joints, edges):
+        data = "".join(_data(name, value) for name, value in attributes.items())
+        lines.append(f'  <edge source="{joint.a}" target="{joint.b}">{data}</edge>')
+    return "\n".join([*lines, " </graph>\n"])
+
+
+def _data(name: str, value: str) -> str:
+    return f"<data key={quoteattr(name)}>{escape(value)}</data>"
+
+
+@dataclass
+class _Graph:
+    """A ``<graph>`` being read."""
+
+    place: str
+    nodes: dict[str, None] = field(default_factory=dict)
+    edges: list[Edge] = field(default_factory=list)
+    own: dict[str, str] = field(default_factory=dict)
+
+
+class _Reader:
+    """What expat calls; keeps the stack of open elements."""
+
+    def __init__(self, parser: Any) -> None:
+        self.parser = parser
+        self.stack: list[str] = []
+        self.keys: dict[str, tuple[str, str]] = {}  # id: (for, name)
+        self.defaults: dict[str, dict[str, str]] = {"graph": {}, "edge": {}, "all": {}}
+        self.graph: _Graph | None = None
+        self.found: list[Item] = []
+        self.into: tuple[dict[str, str], str] | None = None  # where the text of the open element goes
+        self.attributes: dict[str, str] = {}
+        self.key = ""
+        self.text: list[str] = []
+
+    @property
+    def place(self) -> str:
+        return f"line {self.parser.CurrentLineNumber}"
+
+    def start(self, full: str, given: dict[str, str]) -> None:
+        name, outer = full.rpartition(" ")[2], self.stack[-1] if self.stack else ""
+        self.stack.append(name)
+        if len(self.stack) > _DEPTH:
+            raise FormatError(f"elements are nested deeper than {_DEPTH}", self.place)
+        if len(self.stack) == 1 and name != "graphml":
+            raise FormatError(f"<{name[:24]}> is not the root of GraphML; expected <graphml>", self.place)
+        handler = getattr(self, f"start_{name}", None) if name in _HANDLED else None
+        if handler:
+            handler(given, outer)
+
+    def start_key(self, given: dict[str, str], outer: str) -> None:
+        name = self._needed(given, "id", "key")
+        self.keys[name] = given.get("for", "all"), given.get("attr.name", name)
+        self.key = name
+
+    def start_default(self, given: dict[str, str], outer: str) -> None:
+        if outer == "key":
+            of, name = self.keys[self.key]
+            self.into, self.text = (self.defaults.setdefault(of, {}), name), []
+
+    def start_graph(self, given: dict[str, str], outer: str) -> None:
+        if self.graph is not None or outer != "graphml":
+            raise FormatError("a graph within a graph is not read", self.place)
+        if given.get("edgedefault", "undirected") != "undirected":
+            raise FormatError("the graph is directed; a mechanism graph is undirected", self.place)
+        self.graph = _Graph(self.place, own={**self.defaults["all"], **self.defaults["graph"]})
+
+    def start_node(self, given: dict[str, str], outer: str) -> None:
+        graph, name = self._open("node"), self._needed(given, "id", "node")
+        if name in graph.nodes:
+            raise FormatError(f"the vertex {name[:24]!r} is there twice", self.place)
+        if len(graph.nodes) >= LINKS_MAX:
+            raise FormatError(f"more than {LINKS_MAX} vertices; a mechanism graph has at most so many", self.place)
+        graph.nodes[name] = None
+        self.attributes = {}
+
+    def start_edge(self, given: dict[str, str], outer: str) -> None:
+        graph = self._open("edge")
+        if given.get("directed", "false") != "false":
+            raise FormatError("the edge is directed; a mechanism graph is undirected", self.place)
+        if len(graph.edges) >= _EDGES:
+            raise FormatError(f"more than {_EDGES} edges; no simple graph of {LINKS_MAX} links has so many", self.place)
+        ends = [self._needed(given, name, "edge").strip() for name in ("source", "target")]
+        self.attributes = {**self.defaults["all"], **self.defaults["edge"]}
+        graph.edges.append(Edge(ends[0], ends[1], self.attributes, self.place))
+
+    def start_hyperedge(self, given: dict[str, str], outer: str) -> None:
+        raise FormatError("a hyperedge is not a joint of two links", self.place)
+
+    def start_data(self, given: dict[str, str], outer: str) -> None:
+        key = self._needed(given, "key", "data")
+        name = self.keys.get(key, ("all", key))[1]
+        if outer == "graph":
+            self.into = self._open("data").own, name
+        elif outer in ("edge", "node"):
+            self.into = self.attributes, name
+        self.text = []
+
+    def end(self, full: str) -> None:
+        name = self.stack.pop()
+        if name in ("data", "default") and self.into is not None:
+            table, key = self.into
+            table[key] = "".join(self.text)
+            self.into = None
+        elif name == "graph" and self.graph is not None and len(self.stack) == 1:
+            self._close(self.graph)
+            self.graph = None
+
+    def characters(self, text: str) -> None:
+        if self.into is not None:
+            self.text.append(text)
+
+    def _close(self, graph: _Graph) -> None:
+        for edge in graph.edges:
+            for name in (edge.source, edge.target):
+                if name not in graph.nodes:
+                    raise FormatError(f"the edge ends at {name[:24]!r}, which is not a vertex", edge.place)
+        self.found.append(item_from(list(graph.nodes), graph.edges, graph.own, graph.place))
+
+    def _open(self, name: str) -> _Graph:
+        if self.graph is None:
+            raise FormatError(f"<{name}> stands outside a graph", self.place)
+        return self.graph
+
+    def _needed(self, given: dict[str, str], name: str, element: str) -> str:
+        if name not in given:
+            raise FormatError(f"<{element}> needs the attribute {name!r}", self.place)
+        return given[name]
+
+    def doctype(self, *_: object) -> None:
+        raise FormatError("a document type declaration is not read; remove it", self.place)
+
+
+_HANDLED = {"key", "default", "graph", "node", "edge", "hyperedge", "data"}
+
+
+def parse(text: str) -> list[Item]:
+    """Read every ``<graph>``.
+
+    Raises
+    ------
+    FormatError
+        For anything that is not GraphML of simple undirected graphs, with the line.
+    """
+    from xml.parsers import expat
+
+    parser = expat.ParserCreate(namespace_separator=" ")
+    parser.buffer_text = True
+    reader = _Reader(parser)
+    parser.StartElementHandler = reader.start
+    parser.EndElementHandler = reader.end
+    parser.CharacterDataHandler = reader.characters
+    parser.StartDoctypeDeclHandler = reader.doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        what = expat.errors.messages.get(error.code, "not well-formed")
+        raise FormatError(f"not XML ({what})", f"line {error.lineno}, column {error.offset + 1}") from None
+    except FormatError:
+        raise
+    except ValueError as error:  # characters that no encoding holds
+        raise FormatError(f"not XML ({error})", reader.place) from None
+    if not reader.found:
+        raise FormatError("the file holds no <graph>", "end")
+    return reader.found

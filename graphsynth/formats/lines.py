@@ -1,0 +1,73 @@
+"""Plain text with a head of ``# name value`` lines and rows of small whole numbers: edge lists and matrices."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from graphsynth.errors import FormatError, GraphError
+from graphsynth.structure.graph import MechanismGraph
+
+__all__ = ["Row", "head_of", "read_rows", "within"]
+
+#: Characters of a text; larger graphs need a sparse format.
+LENGTH_MAX = 4_000_000
+_HEAD = re.compile(r"#\s*(links|frame|space)\s*[=:]?\s*([0-9]{1,4})\s*", re.ASCII)
+_NUMBER = re.compile(r"[0-9]{1,4}", re.ASCII)
+
+
+class Row(NamedTuple):
+    """The numbers of a line, and which line it is."""
+
+    numbers: list[int]
+    place: str
+
+
+def head_of(graph: MechanismGraph) -> str:
+    """Lines that say what rows of numbers cannot."""
+    frame = "" if graph.frame is None else f"# frame {graph.frame}\n"
+    return f"# links {graph.links}\n{frame}# space {graph.space}\n"
+
+
+def read_rows(text: str, opening: str = "") -> tuple[dict[str, int], list[Row]]:
+    """Return the head and the rows.
+
+    Parameters
+    ----------
+    text : str
+    opening : str
+        Characters that are read as spaces, besides commas and semicolons.
+
+    Raises
+    ------
+    FormatError
+        A text too long, a word that is not a whole number, something said twice.
+    """
+    if len(text) > LENGTH_MAX:
+        raise FormatError(f"{len(text)} characters; at most {LENGTH_MAX} are read", "length")
+    spaces = str.maketrans(dict.fromkeys(",;" + opening, " "))
+    head: dict[str, int] = {}
+    rows = []
+    for number, line in enumerate(text.split("\n"), 1):
+        place = f"line {number}"
+        if line.lstrip().startswith("#"):
+            match = _HEAD.fullmatch(line.strip())
+            if match and match[1] in head:
+                raise FormatError(f"{match[1]} is given twice", place)
+            if match:
+                head[match[1]] = int(match[2])
+            continue
+        words = line.translate(spaces).split()
+        for word in words:
+            if not _NUMBER.fullmatch(word):
+                raise FormatError(f"{word[:24]!r} is not a whole number", place)
+        if words:
+            rows.append(Row([int(word) for word in words], place))
+    return head, rows
+
+
+def within(text: str, what: str) -> str:
+    """Return a text if a reader will take it."""
+    if len(text) > LENGTH_MAX:
+        raise GraphError(f"the {what} of this graph has {len(text)} characters, at most {LENGTH_MAX}; use graphml")
+    return text
