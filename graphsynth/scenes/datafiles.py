@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from graphsynth.scenes.runner import Report
     from graphsynth.scenes.scene import Scene
 
-__all__ = ["check_files", "data_files", "results_csv", "results_table"]
+__all__ = ["check_files", "column_files", "data_files", "results_csv", "results_table"]
 
 
 def check_files(scene: Scene) -> None:
@@ -40,13 +40,14 @@ def data_files(report: Report) -> dict[str, bytes]:
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, Columns):
                 found[item.name] = item.columns
-    files: dict[str, bytes] = {}
-    for name, columns in found.items():
-        if "csv" in report.scene.outputs.files:
-            files[f"{name}.csv"] = _csv(columns).encode()
-        if "parquet" in report.scene.outputs.files:
-            files[f"{name}.parquet"] = _parquet(columns)
-    return files
+    kinds = report.scene.outputs.files
+    return {file: data for name, columns in found.items() for file, data in column_files(name, columns, kinds).items()}
+
+
+def column_files(name: str, columns: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, bytes]:
+    """Return columns as files of the kinds asked for: name with its ending, to the content."""
+    made = {"csv": lambda: _csv(columns).encode(), "parquet": lambda: _parquet(columns)}
+    return {f"{name}.{kind}": made[kind]() for kind in kinds}
 
 
 def results_csv(records: Sequence[Record]) -> str:

@@ -6,9 +6,10 @@ installed entry points of the group ``graphsynth.families``; a family is importe
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Literal
+from typing import Any, Literal
 
 from graphsynth.scenes.stages import Stage
 from graphsynth.scenes.tables import Place, suggest
@@ -27,7 +28,7 @@ FAMILIES: dict[str, str] = {
     "platform_drive": f"{_ROOM}.platform_drive",
     "floating_piston": f"{_ROOM}.floating_piston",
     "planar": f"{_ROOM}.planar",
-    "four_bar_survey": f"{_ROOM}.four_bar_survey",
+    "four_bar_survey": f"{_ROOM}.survey",
 }
 
 #: Entry points of this group name further families: ``name = "package.module"`` or ``"package.module:FAMILY"``.
@@ -46,11 +47,18 @@ class Family:
         What can be computed, besides the stages of ``[structure]``.
     structure : {"required", "optional", "none"}
         Whether a scene must, may or must not have a table ``[structure]``.
+    more : callable, optional
+        Further stages for a table as read: those of parts that only some scenes have.
     """
 
     table: type
     stages: tuple[Stage, ...]
     structure: Literal["required", "optional", "none"] = "optional"
+    more: Callable[[Any], tuple[Stage, ...]] | None = None
+
+    def stages_for(self, table: object) -> tuple[Stage, ...]:
+        """Return all stages for a scene with this table ``[mechanism]``."""
+        return (*self.stages, *(self.more(table) if self.more else ()))
 
 
 def family_names() -> tuple[str, ...]:

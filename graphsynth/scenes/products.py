@@ -12,6 +12,7 @@ __all__ = [
     "Columns",
     "Objective",
     "Outcome",
+    "Part",
     "Picture",
     "Quantity",
     "Ranking",
@@ -178,10 +179,33 @@ class Columns:
         Of the files: ``<name>.csv``, ``<name>.parquet``.
     columns : Mapping
         Header, with its unit as in ``"crank [deg]"``, to a sequence or array; all of the same length.
+
+    Notes
+    -----
+    What a stage for each candidate gives as `Columns` is written at once, as ``<name>/part-<number>.csv``, and a `Part`
+    stands for it from then on: memory does not grow with the number of rows.
     """
 
     name: str
     columns: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Columns of one candidate that are in files.
+
+    Attributes
+    ----------
+    name : str
+        Of the columns, and of the folder beside the report.
+    rows : int
+    files : tuple of (str, str)
+        Path below the report folder, and SHA-256 of the content.
+    """
+
+    name: str
+    rows: int
+    files: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import platform
 import sys
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.datafiles import data_files
 from graphsynth.scenes.page import report_html
+from graphsynth.scenes.parts import write_whole
 from graphsynth.scenes.summary import summary_tables
 
 if TYPE_CHECKING:
@@ -52,25 +51,12 @@ def write_report(report: Report, folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
-            _write_whole(folder / name, data)
+            write_whole(folder / name, data)
     except OSError as error:
         raise SceneError(
             f"cannot write the report into {folder}: {error.strerror}; choose another folder with --out"
         ) from error
     return folder
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that nobody ever sees half of it."""
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def scene_json(report: Report) -> str:

@@ -247,7 +247,7 @@ class Scene:
         """Return every stage this scene can use; most are not needed for its outputs."""
         common = STRUCTURE if self.structure is not None else ()
         ranking = (RANK,) if self.ranking is not None else ()
-        return (*common, *ranking, *family(self.mechanism.module).stages)
+        return (*common, *ranking, *family(self.mechanism.module).stages_for(self.mechanism))
 
 
 def _family(table: object, place: Place) -> Family:

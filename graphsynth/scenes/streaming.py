@@ -17,6 +17,7 @@ from graphsynth.errors import SceneError
 from graphsynth.ordered import in_order
 from graphsynth.scenes.codec import decode, encode
 from graphsynth.scenes.journal import Journal
+from graphsynth.scenes.parts import PartFolder, split_parts
 from graphsynth.scenes.products import Outcome, Rejected
 from graphsynth.scenes.stages import Context, Stage, load
 
@@ -161,10 +162,14 @@ def given_by(stage: Stage, result: Any) -> dict[str, Any]:
 
 def _evaluate_chunk(
     plan: Plan, context: Context, shared: Mapping[str, Any], chunk: list[tuple[int, Any]]
-) -> tuple[list[str], dict[str, Spent]]:
-    """Evaluate some candidates anywhere; outcomes come back as the text that is stored."""
+) -> tuple[list[tuple[str, dict[str, bytes]]], dict[str, Spent]]:
+    """Evaluate some candidates anywhere; outcomes come back as the text that is stored, with the files they gave."""
     spent: dict[str, Spent] = {}
-    return [encode(evaluate(plan, context, shared, number, item, spent)) for number, item in chunk], spent
+    results = []
+    for number, item in chunk:
+        outcome, files = split_parts(evaluate(plan, context, shared, number, item, spent), context.scene.outputs.files)
+        results.append((encode(outcome), files))
+    return results, spent
 
 
 @dataclass(slots=True)
@@ -207,12 +212,14 @@ def stream(
     done = Streamed()
     numbered = enumerate(items, 1)
     _skip(numbered, journal.done, done)
+    parts = PartFolder(journal.path.parent if journal.path else None, journal.done)
     executor: Executor | None = context.executor
     size = [1]
     work = partial(_evaluate_chunk, plan, replace(context, executor=None), shared)
     with closing(in_order(executor, work, _chunks(numbered, size))) as results:
-        for lines, spent in results:
-            for line in lines:
+        for evaluated, spent in results:
+            for line, files in evaluated:
+                parts.write(files)
                 journal.append(line)
                 done.outcomes.append(decode(line))
             for name, cost in spent.items():

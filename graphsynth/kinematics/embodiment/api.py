@@ -90,6 +90,7 @@ def embody(
     joints: Mapping[tuple[int, int], str] | None = None,
     tries: int = 12,
     seconds: float = math.inf,
+    effort: float = 1.0,
 ) -> Embodiment:
     """Find dimensions with which a mechanism moves as wanted.
 
@@ -111,6 +112,9 @@ def embody(
         :func:`graphsynth.kinematics.embodiment.choice.choices`, and starts anew from another sketch.
     seconds : float
         Time limit; not exceeded by more than one generation and a verification.
+    effort : float
+        Share of the usual work of each search, for a quick look at many graphs: unlike a time limit it does not change
+        the result from run to run.
 
     Returns
     -------
@@ -133,8 +137,9 @@ def embody(
     """
     begin, wanted = perf_counter(), Goals() if goals is None else goals
     _check(graph, wanted, seed, tries, seconds)
+    positive("effort", effort)
     order = choices(graph, driver)
-    run = _Run(wanted, seed, begin, seconds)
+    run = _Run(wanted, seed, begin, seconds, effort)
     for attempt in range(tries):
         inversion, drivers = order[attempt % len(order)]
         run.start(Design(inversion, drivers, _kinds(graph, inversion, joints)), attempt, attempt // len(order))
@@ -146,8 +151,9 @@ def embody(
 class _Run:
     """Searches of one call, and what they came to."""
 
-    def __init__(self, goals: Goals, seed: int, begin: float, seconds: float) -> None:
+    def __init__(self, goals: Goals, seed: int, begin: float, seconds: float, effort: float) -> None:
         self.goals, self.seed, self.begin, self.deadline = goals, seed, begin, begin + seconds
+        self.effort = effort
         self.reasons: Counter[str] = Counter()
         self.history: list[HistoryRow] = []
         self.found: list[tuple[Search, Problem, int]] = []
@@ -158,7 +164,7 @@ class _Run:
         """Search once; without a target an accepted result ends the run."""
         random = np.random.default_rng([self.seed, attempt])
         problem = Problem(design, self.goals, random, round_ if self.goals.target is not None else 0)
-        found = search(problem, attempt, random, self.deadline)
+        found = search(problem, attempt, random, self.deadline, effort=self.effort)
         every, complete, inside = found.start
         self.reasons["first population: the range is not completed"] += every - complete
         self.reasons["first population: a bound is not kept"] += complete - inside
@@ -177,7 +183,7 @@ class _Run:
             random = np.random.default_rng([self.seed, attempt, 1])
             final = found
             if perf_counter() < self.deadline and found.cost > EXACT:
-                final = search(problem, attempt, random, self.deadline, found)
+                final = search(problem, attempt, random, self.deadline, found, self.effort)
                 self.history += final.history
             self.judge(problem, final)
             if final.cost <= EXACT and self.best is not None and self.best[1].accepted:

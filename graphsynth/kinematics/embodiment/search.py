@@ -55,19 +55,25 @@ class Search:
 
 
 def search(
-    problem: Problem, attempt: int, random: np.random.Generator, deadline: float, before: Search | None = None
+    problem: Problem,
+    attempt: int,
+    random: np.random.Generator,
+    deadline: float,
+    before: Search | None = None,
+    effort: float = 1.0,
 ) -> Search:
     """Run one search, or go on with one; it ends early only when ``perf_counter`` passes the deadline.
 
-    With a target the first search is short: it tells the promising starts, which are then continued.
+    With a target the first search is short: it tells the promising starts, which are then continued.  `effort` is the
+    share of the usual number of first candidates and of generations.
     """
-    begun = _begin(problem, random) if before is None else before
+    begun = _begin(problem, random, effort) if before is None else before
     history = [HistoryRow(attempt, 0, problem.evaluations, begun.cost)]
     start = begun.start if before is None else (0, 0, 0)
     if problem.unknowns.size == 0:
         return replace(begun, history=tuple(history), start=start)
     best, value, population = _evolve(
-        problem, begun.population, _generations(problem, before), history, deadline, random
+        problem, begun.population, _generations(problem, before, effort), history, deadline, random
     )
     smooth = problem.fit is None or problem.fit.smooth
     if not smooth and before is not None:
@@ -75,7 +81,7 @@ def search(
         around = np.clip(best + random.normal(0.0, _AROUND, population.shape), box[:, 0], box[:, 1])
         around[0] = best
         best, value, population = _evolve(
-            problem, around, _generations(problem, before) // 2, history, deadline, random
+            problem, around, _generations(problem, before, effort) // 2, history, deadline, random
         )
     if problem.fit is not None and smooth and EXACT < value < OUTSIDE:
         polished = _polish(problem, best)
@@ -86,18 +92,18 @@ def search(
     return Search(best, value, tuple(history), start, population)
 
 
-def _begin(problem: Problem, random: np.random.Generator) -> Search:
+def _begin(problem: Problem, random: np.random.Generator, effort: float) -> Search:
     """Make many candidates and keep the best as the first population."""
     aimed, size = problem.fit is not None, problem.unknowns.size
     width = min(120, 15 * size) if aimed else min(60, 6 * size)
-    first = problem.population(max(1, (20 if aimed else 4) * width), random)
+    first = problem.population(max(width, round(effort * (20 if aimed else 4) * width), 1), random)
     outcome = problem.evaluate(first)
     order = np.argsort(outcome.cost, kind="stable")[: max(width, 8)]
     start = (len(first), int((outcome.cost < 0.5 * INCOMPLETE).sum()), int((outcome.merit >= 1.0).sum()))
     return Search(first[order[0]], float(outcome.cost[order[0]]), (), start, first[order])
 
 
-def _generations(problem: Problem, before: Search | None) -> int:
+def _generations(problem: Problem, before: Search | None, effort: float) -> int:
     """Return the largest number of generations: fewer where a motion costs more."""
     if problem.fit is None:
         count = 60
@@ -105,7 +111,7 @@ def _generations(problem: Problem, before: Search | None) -> int:
         count = 120
     else:
         count = 400 if problem.fit.warped else 600
-    return count // 3 if problem.iterative else count
+    return max(2, round(effort * (count // 3 if problem.iterative else count)))
 
 
 def _evolve(

@@ -1,0 +1,128 @@
+"""``module = "four_bar_survey"``: all four-bars of a lattice of lengths moved, judged, ranked; the best certified."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from graphsynth.scenes.families.lambda_linkage import BearingTable, Tilt
+from graphsynth.scenes.family import Family
+from graphsynth.scenes.stages import Stage
+from graphsynth.scenes.tables import require
+
+__all__ = ["FAMILY", "Grashof", "RangeTable", "SurveyLengths", "SurveyLimits", "SurveyTable", "SurveyTolerances"]
+
+Grashof = Literal["crank-rocker", "double crank"]
+Column = Literal[
+    "frame", "coupler", "rocker", "type", "kind", "transmission angle", "rocker swing", "size", "largest tilt",
+    "largest axis tilt", "smallest clearance", "jammed part", "passes",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class RangeTable:
+    """Lengths from `first` to `last` in steps of `step`."""
+
+    first: float
+    last: float
+    step: float
+
+    def __post_init__(self) -> None:
+        require(self.first > 0, f"has first = {self.first}; a length must be positive")
+        require(self.step > 0, f"has step = {self.step}; it must be positive")
+        require(self.last >= self.first, f"has last = {self.last}, less than first = {self.first}; exchange them")
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyLengths:
+    """Lengths in any one unit, exact decimals: one crank, and a range of each other link."""
+
+    frame: RangeTable
+    coupler: RangeTable
+    rocker: RangeTable
+    crank: float = 1.0
+
+    def __post_init__(self) -> None:
+        require(self.crank > 0, f"has crank = {self.crank}; a length must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyLimits:
+    """What a set must keep to be ranked; only sets whose crank turns fully are."""
+
+    types: tuple[Grashof, ...] = ("crank-rocker",)
+    transmission_deg: float = 30.0
+    free: bool = True
+
+    def __post_init__(self) -> None:
+        require(bool(self.types), "has no types; name crank-rocker, double crank or both")
+        require(
+            0 <= self.transmission_deg < 90,
+            f"has transmission_deg = {self.transmission_deg}; an angle of 0 or more and less than 90 degrees is asked",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyTolerances:
+    """Plus or minus, for the certificates: of all four lengths, the tilt and its azimuth, the bearing."""
+
+    lengths_percent: float = 0.0
+    alpha_rad: float = 0.0
+    azimuth_rad: float = 0.0
+    radius_mm: float = 0.0
+    height_mm: float = 0.0
+    clearance_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            require(value >= 0, f"has {name} = {value}; a tolerance is zero or more")
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyTable:
+    """``[mechanism]`` with ``module = "four_bar_survey"``."""
+
+    module: Literal["four_bar_survey"]
+    lengths: SurveyLengths
+    tilt: Tilt
+    bearing: BearingTable
+    limits: SurveyLimits = field(default_factory=SurveyLimits)
+    tolerances: SurveyTolerances = field(default_factory=SurveyTolerances)
+    positions: int = 72
+    shard: int = 20_000
+    certify: int = 1000
+    rows: Literal["all", "passing"] = "passing"
+    columns: tuple[Column, ...] = (
+        "frame", "coupler", "rocker", "type", "transmission angle", "rocker swing", "size", "largest axis tilt",
+    )  # fmt: skip
+    slices: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        require(
+            8 <= self.positions <= 3600 and self.positions % 2 == 0,
+            f"has positions = {self.positions}; give an even number from 8 to 3600, so that both dead centres are met",
+        )
+        require(100 <= self.shard <= 1_000_000, f"has shard = {self.shard}; use 100 to 1000000 sets")
+        require(1 <= self.certify <= 1_000_000, f"has certify = {self.certify}; use 1 to 1000000 sets")
+        require(bool(self.columns), "has columns = []; name at least one")
+        require(abs(self.tilt.alpha_rad) < math.pi / 4, "has a tilt of 45 degrees or more; no bearing is meant for it")
+
+
+_STEPS = "graphsynth.scenes.steps"
+FAMILY = Family(
+    table=SurveyTable,
+    structure="none",
+    stages=(
+        Stage("shards", f"{_STEPS}.survey:shards", (), ("shards",), stream=True),
+        Stage("evaluate", f"{_STEPS}.survey:evaluate", ("shards",), ("evaluated", "surveyed"), each=True),
+        Stage("store rows", f"{_STEPS}.survey:store", ("evaluated",), ("rows",), each=True),
+        Stage("gather", f"{_STEPS}.survey_results:gather", ("surveyed",), ("survey",)),
+        Stage("certify", f"{_STEPS}.survey_results:certify", ("survey",), ("certificates",)),
+        Stage("judge", f"{_STEPS}.survey_results:judge", ("survey", "certificates"), ("records", "tables")),
+        Stage("maps", f"{_STEPS}.survey_pictures:maps", ("survey",), ("plots",)),
+        Stage("sketch best", f"{_STEPS}.survey_pictures:sketches", ("records", "ranking"), ("mechanism_pictures",)),
+        Stage("animate best", f"{_STEPS}.survey_pictures:animations", ("records", "ranking"), ("animations",)),
+    ),
+)
