@@ -105,7 +105,7 @@ def knees(problem: Problem) -> tuple[Knee, ...]:
     for method in problem.methods:
         rows = problem.of(method)
         at = knee(rows)
-        if at is None or len(rows) < 3 or problem.count:
+        if at is None or len(rows) < 3 or problem.count or problem.over:
             continue
         default = next((row for row in rows if row.default), None)
         found.append(Knee(method, at, default, _verdict(at, default)))

@@ -25,7 +25,8 @@ def precise_modes(anchors: Sequence[Any], vertices: Sequence[complex], lengths: 
     """Return all assembly modes (x, y, alpha) of one problem (3-RPR), found with 50 digits; shape (m, 3), by alpha.
 
     For a rotation ``z = exp(i alpha)`` two differences of the closure equations are linear in the position; put into
-    the third they give a trigonometric polynomial of degree three, sampled at eight angles and interpolated.  Its roots on the unit circle are the modes.
+    the third they give a trigonometric polynomial of degree three, sampled at eight angles and interpolated.  Its roots
+    on the unit circle are the modes.
 
     Parameters
     ----------

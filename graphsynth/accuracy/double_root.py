@@ -10,12 +10,15 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.accuracy.choice import seconds_text
 from graphsynth.accuracy.direct import Proved, judged, proof_row
 from graphsynth.accuracy.direct_reference import precise_modes
 from graphsynth.accuracy.eigenvalues import eigenvalue_modes
 from graphsynth.accuracy.rows import Effort, Problem, Row, RowStatus, best_of
 
 __all__ = ["double_root_problem"]
+
+_AWAY = "distance from the singularity"
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,21 +42,38 @@ def double_root_problem(effort: Effort | None = None) -> Problem:
         for method, escalate in (("sextic and Newton", True), ("the same, doubles only", False)):
             run = partial(assembly_modes_batch, anchors, corner, lengths, escalate=escalate)
             batch, seconds, rounds = best_of(run, effort)
-            row = judged(method, setting, [batch.poses], truth, 1.0, seconds, rounds)
+            row = judged(method, setting, [batch.poses], truth, 1.0, seconds, rounds, more={_AWAY: d})
             if not escalate and bool(batch.near_double_root[0]):
                 row = _flagged(row)
             rows.append(row)
         for band in (1e-6, 1e-9):
             way = partial(eigenvalue_modes, anchors[None], corner, lengths, polish=2, band=band)
             modes, seconds, rounds = best_of(way, effort)
-            rows.append(judged(f"companion eigenvalues, band {band:g}", setting, modes, truth, 1.0, seconds, rounds))
-        rows.append(_certified_near(anchors, corner, lengths, truth, setting, effort))
+            name = f"companion eigenvalues, band {band:g}"
+            rows.append(judged(name, setting, modes, truth, 1.0, seconds, rounds, more={_AWAY: d}))
+        proved = _certified_near(anchors, corner, lengths, truth, setting, effort)
+        rows.append(replace(proved, more={_AWAY: d}))
     question = "Two assembly modes that nearly merge, at distances from the singularity (similar triangles)"
     note = (
         "The settings are distances from the singularity, not accuracies: the condition of the modes is one over the "
         "square root of the distance."
     )
-    return Problem("double-root", question, "relative", tuple(rows), "problem", note)
+    found = Problem("double-root", question, "relative", tuple(rows), "problem", note, over=_AWAY)
+    return replace(found, sentences={method: _sentence(method, found.of(method)) for method in found.methods})
+
+
+def _sentence(method: str, rows: Sequence[Row]) -> str:
+    """Say how near to the singularity a method stays right, and what that costs."""
+    right = [row for row in rows if row.good]
+    if not right:
+        return f"{method}: do not choose it here; it is right at none of the distances."
+    near, far = right[-1], right[0]
+    text = (
+        f"{method}: right down to a {near.setting}, with errors up to {max(row.error for row in right):.1g}; "
+        f"{seconds_text(near.seconds)} there, {seconds_text(far.seconds)} at {far.setting}"
+    )
+    lost = [row for row in rows if row.status is not RowStatus.OK]
+    return text + (f"; {lost[0].reason} at {', '.join(row.setting.split()[1] for row in lost)}." if lost else ".")
 
 
 def _flagged(row: Row) -> Row:

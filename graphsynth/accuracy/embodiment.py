@@ -88,7 +88,7 @@ def line_problem(effort: Effort | None = None) -> Problem:
     goals = Goals(
         target=LineGoal(length=4.0, on_bar=True), max_length_ratio=5.0, min_transmission_angle=math.radians(20)
     )
-    limits, seeds = ((0.1, 0.3, 1.0), 1) if effort.quick else ((0.2, 0.5, 1.0, 2.0, 4.0), 3)
+    limits, seeds = ((0.1, 0.3, 1.0), 1) if effort.quick else ((0.3, 1.0, 3.0), 3)
 
     def error(found: Any) -> float:
         return float(abs(found.figures.goal_error - precise_strip()))
@@ -115,7 +115,7 @@ def path_problem(effort: Effort | None = None) -> Problem:
     M = LambdaLinkage(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M
     points = tuple((float(x), float(y)) for x, y, _ in M)
     goals = Goals(target=PathGoal(points, tuple(inputs.tolist())), min_transmission_angle=math.radians(15))
-    limits, seeds = ((0.1, 0.3, 1.0), 1) if effort.quick else ((0.1, 0.2, 0.5, 1.0, 2.0), 3)
+    limits, seeds = ((0.1, 0.3, 1.0), 1) if effort.quick else ((0.1, 0.3, 1.0, 2.0), 3)
     rows = _rows(
         goals, limits, seeds, lambda found: found.figures.goal_error,
         f"largest distance from a point over the size of the set, median of {seeds} seeds",

@@ -76,7 +76,7 @@ def _place(problem: Problem, row: Row, top: float) -> tuple[float, float]:
     if problem.count:
         return row.more.get(problem.count, math.nan), row.seconds
     height = _height(row) if math.isfinite(row.error) else top
-    return row.seconds, height
+    return (row.more.get(problem.over, math.nan) if problem.over else row.seconds), height
 
 
 def _method(axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, style: dict[str, str]) -> None:
@@ -105,7 +105,7 @@ def _method(axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, styl
 
 def _name_ends(axes: Any, rows: tuple[Row, ...], good: list[Row], places: list[Any], colour: str) -> None:
     """Write the settings at the first and the last point of a line."""
-    for k in sorted({0, len(good) - 1} - {-1}):
+    for k in sorted({0, len(good) - 1}) if good else ():
         if not good[k].setting:
             continue
         below = k > 0 or len(rows) == 1
@@ -122,9 +122,11 @@ def _dress(axes: Any, problem: Problem, top: float) -> None:
         axes.set(xlabel=problem.count, ylabel=f"time of one {problem.per} [s]")
     else:
         unit = "" if problem.unit == "relative" else f" [{problem.unit}]"
-        axes.set(xlabel=f"time of one {problem.per} [s]", ylabel=f"error{unit}")
+        axes.set(xlabel=problem.over or f"time of one {problem.per} [s]", ylabel=f"error{unit}")
         if any(not math.isfinite(row.error) for row in problem.rows):
             axes.axhline(top, color=_SOFT, lw=0.8, ls=":")
+    if problem.over:
+        axes.invert_xaxis()  # harder to the right
     axes.set_title(problem.question, fontsize=9, loc="left")
     axes.margins(0.12, 0.1)
     axes.grid(which="major", color="#e8ebef", lw=0.8)

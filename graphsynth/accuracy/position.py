@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["four_bar", "position_problem", "precise_poses"]
+__all__ = ["NODES", "Closed", "eight_link", "four_bar", "position_problem", "precise_points", "precise_poses"]
 
 Array = NDArray[np.float64]
 #: Name of a closed form, and what it gives at inputs (n,): the position (n,) of the watched point, complex.
 Closed = tuple[str, Callable[[Array], NDArray[np.complex128]]]
 _DIGITS = 50
-_NODES = 12  # the reference is computed at these intervals of the range
+NODES = 12  # the reference is computed at these intervals of the range
 
 
 def four_bar(linkage: LambdaLinkage) -> tuple[Mechanism, Closed]:
@@ -78,6 +78,27 @@ def _point(poses: Array, watched: tuple[int, tuple[float, float]]) -> NDArray[np
     link, at = watched
     place = poses[..., link, :]
     return np.asarray(place[..., 0] + 1j * place[..., 1] + np.exp(1j * place[..., 2]) * complex(*at))
+
+
+def eight_link() -> Mechanism:
+    """Return an eight-link mechanism with an Assur group of more than two links that turns fully; always the same.
+
+    Examples
+    --------
+    >>> eight_link().graph.links
+    8
+    """
+    from graphsynth.kinematics.embodiment.api import embody
+    from graphsynth.structure.assur import decompose
+    from graphsynth.synthesis import enumerate_chains
+
+    for chain in enumerate_chains(8):
+        found = embody(chain, tries=2)
+        if found.accepted and found.mechanism is not None:
+            parts = decompose(found.mechanism.graph, found.drivers)
+            if max(len(group.links) for group in parts.groups) > 2:
+                return found.mechanism
+    raise GeometryError("no eight-link chain could be given dimensions")
 
 
 def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any]]:
@@ -200,14 +221,12 @@ def position_problem(
     from graphsynth.kinematics.simulation import simulate
 
     effort = effort or Effort()
-    nodes = np.linspace(*inputs, _NODES + 1)
+    nodes = np.linspace(*inputs, NODES + 1)
     motion = simulate(mechanism, nodes)
     if not motion.completed:
         raise GeometryError(f"the motion ends: {motion.reason}")
     watched = _watched(mechanism)
-    truth = np.array(
-        [_precise_point(precise_poses(mechanism, float(u), p), watched) for u, p in zip(nodes, motion.poses)]
-    )
+    truth = precise_points(mechanism, nodes)
     counts = (13, 37, 73) if effort.quick else (13, 73, 361, 3601)
     grids = [np.linspace(*inputs, n) for n in counts]
     rows: list[Row] = []
@@ -219,6 +238,18 @@ def position_problem(
     rows += [_root_row(mechanism, nodes, truth, watched, motion, tol, effort) for tol in (1e-4, 1e-8, 1e-12)]
     rows += [_proof_row(mechanism, grid, truth, watched, motion.Lc, effort) for grid in grids[:3]]
     return Problem("positions", f"Positions of {name} over the range of its input", "relative", tuple(rows), "position")
+
+
+def precise_points(mechanism: Mechanism, inputs: Array) -> NDArray[np.complex128]:
+    """Watched point at inputs (n,) with 50 digits, rounded once, shape (n,); the branch is that of `simulate`."""
+    from graphsynth.kinematics.simulation import simulate
+
+    motion, watched = simulate(mechanism, inputs), _watched(mechanism)
+    if not motion.completed:
+        raise GeometryError(f"the motion ends: {motion.reason}")
+    return np.array(
+        [_precise_point(precise_poses(mechanism, float(u), p), watched) for u, p in zip(inputs, motion.poses)]
+    )
 
 
 def _precise_point(pose: list[list[Any]], watched: tuple[int, tuple[float, float]]) -> complex:
@@ -237,7 +268,7 @@ _KIND = "distance from the reference"
 
 def _gap(found: NDArray[np.complex128], truth: NDArray[np.complex128], Lc: float) -> float:
     """Largest distance at the nodes, which every grid contains."""
-    step = (len(found) - 1) // _NODES
+    step = (len(found) - 1) // NODES
     return float(np.abs(found[::step] - truth).max()) / Lc
 
 
@@ -270,7 +301,7 @@ def _root_row(
 
     from graphsynth.mechanism.constraints import residual
 
-    fine = np.linspace(nodes[0], nodes[-1], 6 * _NODES + 1)
+    fine = np.linspace(nodes[0], nodes[-1], 6 * NODES + 1)
     free = [k for k in range(mechanism.graph.links) if k != mechanism.frame]
     driver = mechanism.drivers[0].link
     size = np.array([motion.Lc, motion.Lc, 1.0])

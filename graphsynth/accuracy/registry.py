@@ -58,7 +58,7 @@ PLANS: dict[str, tuple[Plan, ...]] = {
     "platform_drive": _plans("platform_drive", "drive", "small-inductance"),
     "floating_piston": _plans("floating_piston", "positions", "loads", "work"),
     "planar": _plans("planar", "positions", "dimensions", "path-dimensions"),
-    "four_bar_survey": _plans("planar", "positions", "crossing", "dimensions"),
+    "four_bar_survey": _plans("survey", "many-sets", "arc-ends", "crossing", "dimensions"),
 }
 
 

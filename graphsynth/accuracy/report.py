@@ -7,8 +7,8 @@ import math
 import os
 import platform
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -42,6 +42,8 @@ class AccuracyReport:
         Wall time of the whole.
     machine : str
         Processor, threads and versions, in one line.
+    times : mapping of str to float
+        Wall time of each measurement, reference, loading and compiling included.
     """
 
     scene: str
@@ -49,6 +51,7 @@ class AccuracyReport:
     left_out: tuple[tuple[str, str], ...]
     seconds: float
     machine: str
+    times: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def advice(self) -> dict[str, dict[str, str]]:
@@ -81,7 +84,8 @@ class AccuracyReport:
                 }
             )  # fmt: skip
         return {
-            "scene": self.scene, "machine": self.machine, "seconds": round(self.seconds, 3), "problems": problems,
+            "scene": self.scene, "machine": self.machine, "seconds": round(self.seconds, 3),
+            "measured in": {name: round(value, 3) for name, value in self.times.items()}, "problems": problems,
             "left_out": [list(pair) for pair in self.left_out],
         }  # fmt: skip
 
@@ -115,20 +119,24 @@ def measure(
     SceneError
         If the scene cannot be built, or none of its problems exists.
     """
-    begin, found, left_out = perf_counter(), [], []
+    begin, found, left_out, times = perf_counter(), [], [], {}
     effort = effort or Effort()
     for done, plan in enumerate(plans):
         if progress:
             progress(plan.name, done, len(plans))
+        start = perf_counter()
         try:
-            found.append(load(plan)(context, effort))
+            found.append(replace(load(plan)(context, effort), name=plan.name))
         except SceneError:
             raise
         except GraphsynthError as error:
             left_out.append((plan.name, " ".join(str(error).split())))
+        times[plan.name] = perf_counter() - start
     if progress:
         progress("done", len(plans), len(plans))
-    return AccuracyReport(context.scene.name, tuple(found), tuple(left_out), perf_counter() - begin, _machine())
+    return AccuracyReport(
+        context.scene.name, tuple(found), tuple(left_out), perf_counter() - begin, _machine(), times
+    )  # fmt: skip
 
 
 def _machine() -> str:
@@ -187,7 +195,7 @@ def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
 def summary(report: AccuracyReport) -> Iterable[str]:
     """Return the lines for a terminal: each problem, a sentence for each method, the defaults."""
     for problem in report.problems:
-        yield f"{problem.name}: {problem.question}"
+        yield f"{problem.name}: {problem.question} (measured in {report.times.get(problem.name, 0.0):.1f} s)"
         yield from (f"  {sentence}" for sentence in report.advice[problem.name].values())
         yield from (f"  default: {k.sentence}" for k in report.knees[problem.name] if k.default)
         if problem.note:

@@ -106,6 +106,8 @@ class Problem:
         What else a reader must know.
     count : str
         Name of a column of ``more`` that the plot takes as abscissa, against the time; "" for error against time.
+    over : str
+        Name of a column of ``more`` that the plot takes as abscissa of the error: how hard the problem is.
     sentences : mapping of str to str
         What the rows say by method, where it is no choice of a setting; made from the rows by who made them.
     """
@@ -117,6 +119,7 @@ class Problem:
     per: str = "run"
     note: str = ""
     count: str = ""
+    over: str = ""
     sentences: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from graphsynth.accuracy.registry import build
@@ -20,9 +19,7 @@ def start_up(context: Any, effort: Effort) -> Problem:
     from graphsynth.accuracy.drives import drive_problem
 
     b = _braider(context)
-    return replace(
-        drive_problem(b.plant(), b.motor, b.train, context.scene.mechanism.start.end_s, effort), name="start-up"
-    )
+    return drive_problem(b.plant(), b.motor, b.train, context.scene.mechanism.start.end_s, effort)
 
 
 def linkage_dynamics(context: Any, effort: Effort) -> Problem:
