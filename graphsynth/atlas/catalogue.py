@@ -73,7 +73,7 @@ class Catalogue:
         path : str or Path
             Made if it does not exist; a family that is there is not made again, an interrupted one is continued.
         links : iterable of int
-            Numbers of links, 17 at most; those without a chain of this mobility are passed over.
+            Numbers of links, 18 at most; those without a chain of this mobility are passed over.
         mobility : int
         fractionated : bool
             For mobility >= 2: include chains that fall apart at a link or a joint.

@@ -52,8 +52,8 @@ def dask_executor(address: str, timeout: float = 20.0) -> Iterator[Executor]:
             ) from None
         except (CommClosedError, CancelledError) as error:
             raise GraphsynthError(
-                f"the scheduler {address} was lost ({type(error).__name__}): start it again, then give the same command "
-                "to go on"
+                f"the scheduler {address} was lost ({type(error).__name__}): start it again, then give the same "
+                "command to go on"
             ) from None
 
 

@@ -107,7 +107,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
     TooLargeError
         For more links than the kernels are laid out for.
     """
-    from graphsynth.atlas.kernels.facts import MOST_LINKS, analyse
+    from graphsynth.atlas.kernels.facts import MOST_LINKS, WORDS, analyse
 
     if links > MOST_LINKS:
         raise TooLargeError(f"a catalogue holds chains of at most {MOST_LINKS} links, not {links}: count or list them")
@@ -130,7 +130,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
         drives=np.zeros((chains, room), np.uint64),
         sizes=np.zeros((chains, room, half), np.uint8),
         outers=np.zeros((chains, room, half), np.uint8),
-        forms=np.zeros((chains, room, half, 2), np.uint64),
+        forms=np.zeros((chains, room, half, WORDS), np.uint64),
         parents=np.zeros((chains, half, _stream(links) + 1), np.uint8),
         contracted=np.zeros((chains, 1 + links * links), np.uint8),
     )
@@ -254,7 +254,7 @@ def _mechanisms(block: Block, start: int, rows: Rows) -> None:
     frames, drives = block.frames[filled].tolist(), block.drives[filled]
     sizes, forms = block.sizes[filled], block.forms[filled]
     # a mechanism is described by the sizes and forms of its groups: distinct descriptions, numbered by appearance
-    whole = np.zeros((*sizes.shape, 3), np.uint64)
+    whole = np.zeros((*sizes.shape, 1 + forms.shape[2]), np.uint64)
     whole[:, :, 0] = sizes
     whole[:, :, 1:] = np.where(sizes[:, :, None] > 0, forms, np.uint64(0))
     _, first, which = np.unique(_as_words(whole.reshape(len(whole), -1)), return_index=True, return_inverse=True)
@@ -289,7 +289,11 @@ def _structures(block: Block, rows: Rows, where: tuple[NDArray[Any], ...], wante
     lists = []
     for size, outer, form in zip(sizes.tolist(), outers.tolist(), forms.tolist()):
         lists.append(
-            [(links, high << 64 | low, order) for links, order, (high, low) in zip(size, outer, form) if links]
+            [
+                (links, sum(word << 64 * at for at, word in enumerate(words)), order)
+                for links, order, words in zip(size, outer, form)
+                if links
+            ]
         )
     known = _groups(rows, dict.fromkeys(group for groups in lists for group in groups))
     place = {groups: number for number, groups in enumerate(rows.structures)}
@@ -305,10 +309,12 @@ def _structures(block: Block, rows: Rows, where: tuple[NDArray[Any], ...], wante
 
 def _groups(rows: Rows, forms: Iterable[tuple[int, int, int]]) -> dict[tuple[int, int, int], int]:
     """Index in ``rows.groups`` of groups ``(links, form, order)``, appended where they are new."""
-    from graphsynth.atlas.kernels.facts import classes_of
+    from graphsynth.atlas.kernels.facts import WORDS, classes_of
 
     forms = list(forms)
-    words = np.array([(bits >> 64, bits & (1 << 64) - 1) for _, bits, _ in forms], np.uint64).reshape(-1, 2)
+    words = np.array(
+        [[bits >> 64 * at & (1 << 64) - 1 for at in range(WORDS)] for _, bits, _ in forms], np.uint64
+    ).reshape(-1, WORDS)
     classes = np.zeros(len(forms), np.int64)
     classes_of(np.array([links + 1 for links, _, _ in forms], np.int64), words, classes)
     place = {group.key: number for number, group in enumerate(rows.groups)}

@@ -21,7 +21,7 @@ __all__ = ["make", "processes"]
 Watch = Callable[[BuildStep], None]
 
 #: What the kernels are laid out for, see :mod:`graphsynth.atlas.kernels.facts`.
-MOST_LINKS = 17
+MOST_LINKS = 18
 
 
 def make(

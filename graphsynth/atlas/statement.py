@@ -24,6 +24,7 @@ PUBLISHED: dict[tuple[int, int], tuple[int, int, str]] = {
     (1, 12): (6856, 6856, _OEIS),
     (1, 14): (318162, 318162, "Butcher and Hartman (2005)"),
     (1, 16): (19819281, 19819281, "Sunkari and Schmidt (2006)"),
+    (1, 18): (1535380884, 1535380884, _OEIS),
     (2, 5): (1, 1, _PAIR),
     (2, 7): (3, 4, _PAIR),
     (2, 9): (35, 40, _PAIR),

@@ -44,7 +44,7 @@ def _add_build(
     workers: Callable[[str], int],
 ) -> None:
     parser = _action(own, "build", "Make a catalogue file, or go on with one.")
-    parser.add_argument("--links", type=_numbers, required=True, metavar="N..M", help="numbers of links, 17 at most")
+    parser.add_argument("--links", type=_numbers, required=True, metavar="N..M", help="numbers of links, 18 at most")
     parser.add_argument("--mobility", type=_numbers, default=[1], metavar="W", help="mobility, or W..V (default 1)")
     parser.add_argument(
         "--fractionated", action="store_true", help="for W >= 2: include chains that fall apart at a link or a joint"

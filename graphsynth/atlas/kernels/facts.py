@@ -10,8 +10,11 @@ from graphsynth.atlas.kernels.grouping import groups_of
 from graphsynth.compilation import kernel
 from graphsynth.structure.kernels import ONE, ZERO, canon, canon_workspace, lowest_bit, popcount
 
-#: A group with its base has at most 16 vertices, and 120 pairs of them: they fit into two words.
-MOST_LINKS = 17
+#: A group with its base has at most 17 vertices, and 136 pairs of them: they fit into three words.
+MOST_LINKS = 18
+WORDS = 3
+#: 18 links make 8 loops at most, and so 9 parallel paths.
+MOST_PATHS = 9
 
 
 @kernel
@@ -166,18 +169,15 @@ def lay_out_group(group, known, masks, local, small, colours):
 
 
 @kernel
-def packed_bits(size, form):
-    """Upper triangle of a canonical adjacency of at most 16 vertices in two words."""
-    high, low, bit = ZERO, ZERO, 0
+def pack_bits(size, form, out):
+    """Write the upper triangle of a canonical adjacency into words, the first pair in the lowest bit of the first."""
+    out[:] = ZERO
+    bit = 0
     for b in range(1, size):
         for a in range(b):
             if form[0, b] >> np.uint64(a) & ONE != ZERO:
-                if bit < 64:
-                    low |= ONE << np.uint64(bit)
-                else:
-                    high |= ONE << np.uint64(bit - 64)
+                out[bit >> 6] |= ONE << np.uint64(bit & 63)
             bit += 1
-    return high, low
 
 
 @kernel
@@ -277,18 +277,17 @@ def independent_loops(n, rows, edge_of, most, basis, distance, before, queue):
 def classes_of(vertices, forms, out):
     """Class of each group: most joints of a link, or links of the longest loop of a minimum basis, at least 2.
 
-    ``vertices`` int64[groups] with the base, ``forms`` uint64[groups, 2] as :func:`packed_bits` gives them.
+    ``vertices`` int64[groups] with the base, ``forms`` uint64[groups, WORDS] as :func:`pack_bits` gives them.
     """
-    rows, edge_of = np.zeros(16, np.uint64), np.zeros((16, 16), np.int64)
-    basis, distance = np.zeros(128, np.uint64), np.zeros(16, np.int64)
-    before, queue = np.zeros(16, np.int64), np.zeros(16, np.int64)
+    rows, edge_of = np.zeros(MOST_LINKS, np.uint64), np.zeros((MOST_LINKS, MOST_LINKS), np.int64)
+    basis, distance = np.zeros(64, np.uint64), np.zeros(MOST_LINKS, np.int64)
+    before, queue = np.zeros(MOST_LINKS, np.int64), np.zeros(MOST_LINKS, np.int64)
     for g in range(vertices.shape[0]):
         n, bit, edges = vertices[g], 0, 0
         rows[:] = ZERO
         for b in range(1, n):
             for a in range(b):
-                word = forms[g, 1] >> np.uint64(bit) if bit < 64 else forms[g, 0] >> np.uint64(bit - 64)
-                if word & ONE != ZERO:
+                if forms[g, bit >> 6] >> np.uint64(bit & 63) & ONE != ZERO:
                     rows[a] |= ONE << np.uint64(b)
                     rows[b] |= ONE << np.uint64(a)
                     if a > 0:
@@ -328,11 +327,11 @@ def canonical_contracted(n, rows, local, small, colours, space, out):
     size = contract(n, rows, local, small, colours)
     out[0] = size
     if size > 0:
-        canon(size, np.int64(8), small, colours, lab, form, gens, index, orbits, wi, wu)
+        canon(size, np.int64(MOST_PATHS), small, colours, lab, form, gens, index, orbits, wi, wu)
     for p in range(size):
         for q in range(size):
             times = colours[lab[p]] if p == q else 0
-            for m in range(8):
+            for m in range(MOST_PATHS):
                 if form[m, p] >> np.uint64(q) & ONE != ZERO:
                     times = m + 1
             out[1 + p * size + q] = times
@@ -352,9 +351,10 @@ def grouped(n, joints, rows, placed, scratch, local, small, colours, space, size
         sizes[g], outers[g] = size - 1, outer
         if size > 3:
             canon(size, np.int64(1), small, colours, lab, form, gens, index, orbits, wi, wu)
-            forms[g, 0], forms[g, 1] = packed_bits(size, form)
+            pack_bits(size, form, forms[g])
         else:
-            forms[g, 0], forms[g, 1] = ZERO, np.uint64(7)
+            forms[g, :] = ZERO
+            forms[g, 0] = np.uint64(7)
     return found >= 0
 
 
@@ -385,13 +385,13 @@ def analyse(
     bytes], ``order`` int64[chains], ``orbit`` uint8[chains, n], ``girth`` uint8[chains], ``cuts`` uint64[chains],
     ``levels`` uint8[chains, n, n].  Of mechanisms ``count`` int64[chains], ``frames`` uint8[chains, K], ``drives``
     uint64[chains, K], ``sizes``, ``outers`` uint8[chains, K, n // 2] (sizes 0 beyond the last group), ``forms``
-    uint64[chains, K, n // 2, 2]; K at least the number of all (frame, driven links).  ``parents`` uint8[chains,
+    uint64[chains, K, n // 2, WORDS]; K at least the number of all (frame, driven links).  ``parents`` uint8[chains,
     n // 2, bytes + 1] (first byte 1 where there is one), ``contracted`` uint8[chains, 1 + n n].
     """
     most, joint_count, room = max(n, 16), packed.shape[1] // 3, frames.shape[1]
-    space = canon_workspace(most, 8)
+    space = canon_workspace(most, MOST_PATHS)
     lab, form, gens, index, orbits, wi, wu = space
-    masks, small = np.zeros((1, most), np.uint64), np.zeros((8, most), np.uint64)
+    masks, small = np.zeros((1, most), np.uint64), np.zeros((MOST_PATHS, most), np.uint64)
     plain, colours, local = np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most, np.int64)
     rows, image = np.zeros(n, np.uint64), np.zeros((2 * n, n), np.int64)
     distance, queue, first = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
