@@ -61,7 +61,9 @@ def _force(compiled: Compiled, element: Force, k: int, t: float, q: Array, v: Ar
     try:
         fx, fy = (_number(part, element) for part in found)
     except (TypeError, ValueError) as error:
-        raise GeometryError(f"the force on link {element.link} gave {found!r}; return (fx, fy)") from error
+        raise GeometryError(
+            f"the force on link {element.link} gave {found!r}; return two finite numbers (fx, fy)"
+        ) from error
     Q[k] += fx
     Q[k + 1] += fy
     Q[k + 2] += ux * fy - uy * fx

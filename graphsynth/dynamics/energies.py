@@ -117,6 +117,9 @@ def checks_of(
 def warnings_of(checks: Checks, rtol: float) -> tuple[str, ...]:
     """Say which checks are worse than expected, each in a sentence."""
     found = []
+    unknown = [name for name in ("position_drift", "energy", "power", "dalembert") if np.isnan(getattr(checks, name))]
+    if unknown:
+        found.append(f"no value of {', '.join(unknown)}: a state reached has no accelerations, or none was reached")
     if checks.energy > max(1e-9, 100.0 * rtol):
         found.append(
             f"the energy balance is off by {checks.energy:.2g} of the energies in play, at a relative tolerance of "

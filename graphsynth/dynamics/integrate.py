@@ -266,6 +266,12 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
             options.exact, options.max_steps, output,
         )  # fmt: skip
     run.seconds = perf_counter() - begin
+    lost = np.flatnonzero(~np.isfinite(run.q[: run.done]).all(axis=1) | ~np.isfinite(run.v[: run.done]).all(axis=1))
+    if lost.size:  # an interpolated state that the formulation cannot place is a failure, not a gap
+        run.done = int(lost[0])
+        run.trail.time = min(run.trail.time, float(grid[run.done]))
+        run.trail.message = f"the state at the output time {float(grid[run.done]):.9g} s has no pose"
+        run.q[run.done :], run.v[run.done :], run.work[run.done :] = np.nan, np.nan, np.nan
     run.events += run.trail.events
     run.events += [DynamicEvent("change of coordinates", t, 0.0, text) for t, text in form.changes]
     return run

@@ -78,7 +78,7 @@ class _Stepper:
         at_break: bool,
     ) -> None:  # fmt: skip
         self.form, self.trail, self.method, self.rtol, self.atol = form, trail, method, rtol, atol
-        self.longest, self.stalled = 0.0, 0
+        self.longest, self.stalled, self.lost = 0.0, 0, False
         self.exact = exact or method not in (*_RUNGE_KUTTA, "Radau")
         self.end = end
         self.latest = float(np.nextafter(end, -np.inf)) if at_break else np.inf
@@ -86,7 +86,9 @@ class _Stepper:
     def rates(self, t: float, y: Array) -> Array:
         """Rates of the form, seen from this side of the next break."""
         self.trail.evaluations += 1
-        return self.form.rates(min(t, self.latest), y)
+        found = self.form.rates(min(t, self.latest), y)
+        self.lost = self.lost or not np.isfinite(found).all()
+        return found
 
     def _solver(self, t: float, y: Array, bound: float, first: float | None) -> Any:
         from scipy import integrate as scipy_integrate
@@ -127,7 +129,7 @@ class _Stepper:
                     k += 1
                 step, solver = trail.last_step or None, None
                 continue
-            message = solver.step()
+            message = self._step(solver)
             trail.steps += 1
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 trail.message = str(message or "the solver gave no finite state")
@@ -147,6 +149,16 @@ class _Stepper:
             self._watch(before, solver)
             solver = solver if keep else None
         return y
+
+    def _step(self, solver: Any) -> str | None:
+        """One step; an implicit solver that meets rates without a value raises, and that is a failure like others."""
+        try:
+            message: str | None = solver.step()
+        except (ValueError, np.linalg.LinAlgError):
+            if not self.lost:
+                raise
+            solver.status, message = "failed", "the equations of motion have no value on the way"
+        return message
 
     def _stalls(self, step: float, span: float) -> bool:
         """Whether steps have become hopelessly short next to a singular pose."""

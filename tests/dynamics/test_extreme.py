@@ -17,6 +17,9 @@ from graphsynth.dynamics import (
     effective_inertia,
     simulate_dynamics,
 )
+from graphsynth.dynamics.energies import warnings_of
+from graphsynth.dynamics.minimal import MinimalForm
+from graphsynth.dynamics.result import Checks
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -137,6 +140,59 @@ def test_fold_of_the_input_is_left_by_the_constrained_form():
     assert reduced.completed
     assert any(event.kind == "change of coordinates" for event in reduced.events)
     assert np.abs(reduced.poses - motion.poses).max() < 1e-5
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau", "BDF", "LSODA"])
+def test_every_solver_reports_the_fold_as_a_failure(method):
+    """Rates have no value beyond the fold: implicit solvers of scipy raise there, which is no way to fail."""
+    bodies = {1: bar(0.4, 0.4), 2: bar(0.35, 0.35), 3: bar(0.5, 0.5)}
+    model = DynamicModel(four_bar(0.4, 0.35, 0.5, 0.7), bodies, gravity=(0.0, 0.0))
+    start = consistent_start(model, keep={(0, 1): 0.5}, keep_rates={(0, 1): 4.0}, modes={0: 1})
+    times = np.linspace(0.0, 2.0, 201)
+    motion = simulate_dynamics(model, times, start=start, form="minimal", method=method, rtol=1e-8)
+    assert motion.status == "failed" and 0.3 < motion.reached < 0.5
+    known = np.isfinite(motion.poses).all(axis=(1, 2))
+    assert known[times < motion.reached - 0.02].all() and not known[times > motion.reached].any()
+
+
+def test_wrong_equations_fail_the_checks(monkeypatch):
+    """A slope of the transmission that is off by a thousandth: energy and second formulation say so."""
+    right = MinimalForm.transmission
+
+    def wrong(self, theta):
+        q, q1, q2 = right(self, theta)
+        return q, q1, 1.001 * q2
+
+    def run():
+        torque = Torque(0, 1, lambda t, angle, speed: 0.5)  # given as a function: the uncompiled rates
+        return simulate_dynamics(g1(elements=[torque]), [0.0, 0.5, 1.0], keep={(0, 1): 0.3}, form="minimal", rtol=1e-9)
+
+    assert run().warnings == ()
+    monkeypatch.setattr(MinimalForm, "transmission", wrong)
+    motion = run()
+    assert motion.checks.energy > 1e-5 and motion.checks.second_form > 1e-5
+    assert "energy balance" in motion.warnings[0] and "formulations" in motion.warnings[-1]
+
+
+def test_an_output_without_a_pose_is_a_failure(monkeypatch):
+    """Interpolated states that cannot be placed are no gaps in a motion that is called completed."""
+    right = MinimalForm.state
+
+    def lost(self, t, y):
+        q, v = right(self, t, y)
+        return (q * np.nan if 0.5 < t < 0.6 else q), v
+
+    monkeypatch.setattr(MinimalForm, "state", lost)
+    motion = simulate_dynamics(g1(), np.linspace(0.0, 1.0, 21), keep={(0, 1): 0.3}, form="minimal")
+    assert motion.status == "failed" and "no pose" in motion.message and motion.reached <= 0.55
+    assert np.isnan(motion.poses[11:]).all() and np.isfinite(motion.poses[:11]).all()
+    assert motion.warnings == ()
+
+
+def test_a_check_without_a_value_is_a_warning():
+    good = Checks(*[0.0] * 9)
+    assert warnings_of(good, 1e-9) == ()
+    assert "no value of energy" in warnings_of(good._replace(energy=math.nan), 1e-9)[0]
 
 
 def test_case_20_nearly_massless_link():
