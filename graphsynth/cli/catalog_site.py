@@ -33,7 +33,9 @@ def add_site(own: argparse._SubParsersAction[argparse.ArgumentParser], workers: 
         "--motion-links", type=int, default=10, metavar="N",
         help="show chains of at most N links in motion (default 10; 0: none)",
     )  # fmt: skip
-    parser.add_argument("--workers", type=workers, metavar="K", help="worker processes (default: one; all for big work)")
+    parser.add_argument(
+        "--workers", type=workers, metavar="K", help="worker processes (default: one; all for big work)"
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -21,7 +21,7 @@ from graphsynth.atlas.site.families import (
 )
 from graphsynth.atlas.site.motions import motion_of
 from graphsynth.atlas.site.sketches import PER_FILE, sketch_scripts
-from graphsynth.errors import GraphsynthError
+from graphsynth.errors import GraphsynthError, SpecError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
@@ -93,9 +93,13 @@ def build_site(
 
     Raises
     ------
+    SpecError
+        If ``motion_links`` is negative.
     GraphsynthError
         If the catalogue has no finished family, or the folder holds something else.
     """
+    if motion_links < 0:
+        raise SpecError(f"motion_links = {motion_links} must be 0 (no motions) or more")
     target = Path(folder)
     _check_place(target)
     found = families(catalogue.connection)
@@ -156,7 +160,9 @@ def _write(
         size += (data / f"family-{family.name}.js").stat().st_size
         if size <= _FIRST_LOAD:
             first.append(family.name)
-    known = contents(connection, found, first=first, sketchesPerFile=PER_FILE, motions=motions, motionLinks=motion_links)
+    known = contents(
+        connection, found, first=first, sketchesPerFile=PER_FILE, motions=motions, motionLinks=motion_links
+    )
     _put(data / "contents.js", known)
     _put(data / "groups.js", groups_script(connection))
     loaded = [*_write_pages(folder, first), data / "contents.js", *(data / f"family-{name}.js" for name in first)]
@@ -203,7 +209,9 @@ def _write_pages(folder: Path, first: list[str]) -> list[Path]:
     style = source.joinpath("style.css").read_text("utf-8")
     _put(folder / "style.css", style)
     _put(folder / "atlas.js", "".join(source.joinpath(f"{name}.js").read_text("utf-8") for name in SCRIPTS))
-    data = "".join(f'<script src="data/{name}.js"></script>\n' for name in ("contents", *(f"family-{n}" for n in first)))
+    data = "".join(
+        f'<script src="data/{name}.js"></script>\n' for name in ("contents", *(f"family-{n}" for n in first))
+    )
     _put(folder / "index.html", source.joinpath("index.html").read_text("utf-8").replace("@DATA@", data))
     return [folder / name for name in ("index.html", "style.css", "atlas.js")]
 

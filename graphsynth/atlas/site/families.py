@@ -114,7 +114,7 @@ def _digit(value: int) -> str:
 
 
 def relatives_script(connection: sqlite3.Connection, family: Family, places: dict[str, tuple[str, int]]) -> str:
-    """Write the parents and children of each chain: the place in the family of two links fewer or more, else the key."""
+    """Write parents and children of each chain: places in the families of two links fewer and more, or keys."""
     smaller, larger = (f"{family.mobility}-{family.links + step}" for step in (-2, 2))
 
     def short(key: str, name: str) -> int | str:

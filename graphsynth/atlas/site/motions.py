@@ -88,8 +88,7 @@ def motion_of(task: tuple[str, str]) -> ShownMotion:
         statement = statement or found.statement
         if not found.accepted or found.motion is None or found.mechanism is None or found.figures is None:
             continue
-        note = f"{found.statement[:1].upper()}{found.statement[1:]}."
-        page = animation_html(with_trace_points(found.motion), frames=90, title=f"Chain {label}", note=note)
+        page = animation_html(with_trace_points(found.motion), frames=90, title=f"Chain {label}")
         facts = {
             "frame": frame,
             "drivers": drivers,

@@ -53,5 +53,9 @@ def sketch_scripts(family: Family, executor: Executor | None) -> Iterator[tuple[
         done += len(places)
         if len(held) == PER_FILE or done == len(keys):
             number = (done - 1) // PER_FILE
-            yield f"sketches-{family.name}-{number}.js", script("takeSketches", family.name, number, "".join(held)), len(held)
+            yield (
+                f"sketches-{family.name}-{number}.js",
+                script("takeSketches", family.name, number, "".join(held)),
+                len(held),
+            )
             held = []

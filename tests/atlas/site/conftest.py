@@ -22,10 +22,10 @@ def catalogue(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def report(catalogue, tmp_path_factory):
-    return build_site(catalogue, tmp_path_factory.mktemp("page") / "atlas", motion_links=6)
+    return build_site(catalogue, tmp_path_factory.mktemp("page") / "atlas", motion_links=4)
 
 
-def start(width=1280, height=900, downloads=None):
+def start(downloads):
     """Chromium with its driver, or a skipped test."""
     webdriver = pytest.importorskip("selenium.webdriver")
     from selenium.webdriver.chrome.service import Service
@@ -41,10 +41,9 @@ def start(width=1280, height=900, downloads=None):
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     found = webdriver.Chrome(options=options, service=Service(driver))
     found.set_script_timeout(60)
-    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
+    size = {"width": 1280, "height": 900, "deviceScaleFactor": 1, "mobile": False}
     found.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-    if downloads:
-        found.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(downloads)})
+    found.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(downloads)})
     return found
 
 
@@ -56,7 +55,7 @@ def downloads(tmp_path_factory):
 @pytest.fixture(scope="session")
 def window(downloads):
     """One window for all tests of the session."""
-    found = start(downloads=downloads)
+    found = start(downloads)
     yield found
     found.quit()
 

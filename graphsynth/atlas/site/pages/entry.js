@@ -27,12 +27,12 @@
     const orbits = orbitsOf(label).filter(orbit => orbit.length > 1);
     const items = [
       ["symmetry", `${row.symmetry === 1 ? "none" : `order ${row.symmetry}`}${orbits.length ? `; ${Atlas.term("orbit", "orbits")} ${orbits.map(orbit => `{${listed(orbit)}}`).join(" ")}` : ""}`],
-      ["inversion", `${row.inversions}`], ["planar", row.planar ? "yes" : "no"], ["girth", `${row.girth} links`],
+      ["inversion", `${row.inversions}`, "inversions"], ["planar", row.planar ? "yes" : "no"], ["girth", `${row.girth} links`],
       ["fractionated", row.fractionated ? "yes" : "no"], ["class", `${Atlas.classes(row)} over all frames and drivers`],
       ["contracted", `<span class="shape">${(Atlas.contents.contracted[row.contracted] || "not computed").replace(/x/g, "×")}</span> <a href="#/?contracted=${row.contracted}">all with it</a>`],
       ["graph6", `<code>${Atlas.toGraph6(Atlas.decodeKey(row.key)).replace(/[&<>]/g, c => `&#${c.charCodeAt(0)};`)}</code>`],
     ];
-    return `<dl>${items.map(([term, words]) => `<div><dt>${Atlas.term(term)}</dt><dd>${words}</dd></div>`).join("")}</dl>`;
+    return `<dl>${items.map(([term, words, shown]) => `<div><dt>${Atlas.term(term, shown)}</dt><dd>${words}</dd></div>`).join("")}</dl>`;
   }
 
   function orbitsOf(label) {

@@ -1,0 +1,185 @@
+"""Writing the page: what is written, what is refused, and that it does not depend on who works."""
+
+import json
+import re
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from graphsynth import MechanismGraph
+from graphsynth.atlas.catalogue import Catalogue
+from graphsynth.atlas.site import build_site
+from graphsynth.atlas.site.motions import choice_of
+from graphsynth.atlas.site.sketches import places_of
+from graphsynth.cli import main
+from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.kinematics.embodiment.sketch import layout
+from graphsynth.structure.assur import find_fault
+
+DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
+
+
+def handed(path):
+    """What a script of the data folder hands to the page."""
+    call = re.fullmatch(r"Atlas\.\w+\((.*)\);\n", path.read_text("utf-8"))
+    return json.loads(f"[{call[1]}]")
+
+
+def test_the_report_tells_what_is_written(report):
+    folder = report.page.parent
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    assert (report.chains, report.motions) == (1 + 2 + 16, 1)
+    assert (report.files, report.size) == (len(files), sum(path.stat().st_size for path in files))
+    assert report.first_load < 200_000
+    assert not list(folder.parent.glob("*.building"))
+
+
+def test_every_chain_stands_in_the_data_under_its_label(report, catalogue):
+    data = report.page.parent / "data"
+    found = {}
+    for links in (4, 6, 8):
+        name, family = handed(data / f"family-1-{links}.js")
+        place, length = 0, len(family["keys"]) // sum(count for _, count in family["assortments"])
+        for assortment, count in family["assortments"]:
+            for rank in range(1, count + 1):
+                found[f"1.{links}.{assortment}.{rank}"] = family["keys"][place * length : (place + 1) * length]
+                place += 1
+        assert name == f"1-{links}" and family["ranks"] is None
+    assert found == dict(catalogue.connection.execute("SELECT label, key FROM chains").fetchall())
+
+
+def test_relatives_point_to_one_another(report, catalogue):
+    data = report.page.parent / "data"
+    keys = {}
+    for links in (4, 6, 8):
+        family = handed(data / f"family-1-{links}.js")[1]
+        length = len(family["keys"]) // sum(count for _, count in family["assortments"])
+        keys[links] = re.findall("." * length, family["keys"])
+    pairs = set()
+    for links in (6, 8):
+        parents = handed(data / f"relatives-1-{links}.js")[1]["parents"]
+        children = handed(data / f"relatives-1-{links - 2}.js")[1]["children"]
+        upwards = {(keys[links][k], keys[links - 2][p]) for k, own in enumerate(parents) for p in own}
+        downwards = {(keys[links][c], keys[links - 2][k]) for k, own in enumerate(children) for c in own}
+        assert upwards == downwards
+        pairs |= upwards
+    stored = catalogue.connection.execute("SELECT key, parent_key FROM dyads JOIN chains USING (chain_id)").fetchall()
+    assert pairs == set(stored)
+
+
+def test_places_are_those_of_the_sketch():
+    graph = MechanismGraph.from_key("1CAMBmSzA")
+    digits = [DIGITS.index(letter) for letter in places_of([graph.key])[0]]
+    units = np.array([64 * high + low for high, low in zip(digits[::2], digits[1::2], strict=True)]).reshape(-1, 2)
+    drawn = layout(graph).positions
+    moved = drawn - drawn.min(axis=0)
+    assert units.max() == 4095
+    assert np.abs(units / 4095 - moved / moved.max()).max() <= 0.5001 / 4095
+
+
+@pytest.mark.parametrize("links", [4, 6, 8])
+def test_the_frame_and_driver_shown_are_numbers_of_the_chain(links, catalogue):
+    for (key,) in catalogue.connection.execute("SELECT key FROM chains WHERE links = ?", (links,)):
+        chain = MechanismGraph.from_key(key)
+        for frame, drivers in choice_of(chain, 3):
+            assert all(chain.neighbours[frame] >> driver & 1 for driver in drivers)
+            assert find_fault(MechanismGraph(links, chain.joints, frame=frame), drivers) is None
+
+
+def test_the_motion_moves_the_chain_of_its_label(report):
+    from graphsynth import Mechanism
+
+    contents = handed(report.page.parent / "data" / "contents.js")[0]
+    assert [label for label, facts in contents["motions"].items() if "drivers" in facts] == ["1.4.4.1"]
+    facts = contents["motions"]["1.4.4.1"]
+    mechanism = Mechanism.from_toml((report.page.parent / "motions" / "1.4.4.1.toml").read_text("utf-8"))
+    assert mechanism.graph.without_frame().key == "1BAN4"
+    assert (mechanism.graph.frame, [driver.link for driver in mechanism.drivers]) == (facts["frame"], facts["drivers"])
+    assert facts["transmission"] > np.radians(25)
+
+
+def test_the_page_is_the_same_whoever_works(report, catalogue, tmp_path):
+    with ThreadPoolExecutor(2) as executor:
+        again = build_site(catalogue, tmp_path / "again", motion_links=4, executor=executor)
+    for path in report.page.parent.rglob("*"):
+        twin = again.page.parent / path.relative_to(report.page.parent)
+        assert path.is_dir() or path.read_bytes() == twin.read_bytes(), path.name
+
+
+def test_nothing_comes_from_elsewhere(report):
+    for path in report.page.parent.rglob("*.*"):
+        if path.suffix in (".html", ".js", ".css"):
+            text = path.read_text("utf-8")
+            addresses = set(re.findall(r"(?:https?:)?//[a-z][\w.-]+\.[a-z]{2,}[\w./-]*", text))
+            assert addresses <= {"http://www.w3.org/2000/svg", "http://graphml.graphdrawing.org/xmlns"}, path.name
+            assert not re.search(r"\bfetch\(|XMLHttpRequest|type=.?module|\bimport\(", text), path.name
+
+
+def test_large_families_are_not_in_the_first_load(catalogue, tmp_path, monkeypatch):
+    from graphsynth.atlas.site import building
+
+    monkeypatch.setattr(building, "_FIRST_LOAD", 500)
+    small = build_site(catalogue, tmp_path / "small", motion_links=0)
+    text = small.page.read_text("utf-8")
+    assert "data/family-1-6.js" in text and "data/family-1-8.js" not in text
+    assert (small.page.parent / "data" / "family-1-8.js").is_file()
+
+
+def test_an_old_page_is_replaced_and_anything_else_is_refused(catalogue, tmp_path):
+    place = tmp_path / "page"
+    build_site(catalogue, place, motion_links=0)
+    (place / "leftover.js").write_text("")
+    build_site(catalogue, place, motion_links=0)
+    assert not (place / "leftover.js").exists()
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "thesis.tex").write_text("years of work")
+    with pytest.raises(GraphsynthError, match="holds other files"):
+        build_site(catalogue, other)
+    assert (other / "thesis.tex").read_text() == "years of work"
+    with pytest.raises(GraphsynthError, match="is a file"):
+        build_site(catalogue, other / "thesis.tex")
+    with pytest.raises(GraphsynthError, match="does not exist"):
+        build_site(catalogue, tmp_path / "no" / "such" / "folder")
+    with pytest.raises(SpecError, match="motion_links = -1"):
+        build_site(catalogue, place, motion_links=-1)
+
+
+def test_a_failed_build_leaves_the_old_page(catalogue, tmp_path, monkeypatch):
+    from graphsynth.atlas.site import building
+
+    place = tmp_path / "page"
+    build_site(catalogue, place, motion_links=0)
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(building, "sketch_scripts", fail)
+    with pytest.raises(OSError, match="No space"):
+        build_site(catalogue, place, motion_links=0)
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["page"]
+
+
+def test_unfinished_catalogues_are_refused(tmp_path):
+    with (
+        Catalogue.build(tmp_path / "part.sqlite", links=[8], shard=(1, 2)) as part,
+        pytest.raises(GraphsynthError, match="no finished family"),
+    ):
+        build_site(part, tmp_path / "page")
+    assert not (tmp_path / "page").exists()
+
+
+def test_the_command_writes_the_page(catalogue, tmp_path, capsys):
+    assert (
+        main(["catalog", "site", str(catalogue.path), "-o", str(tmp_path / "a"), "--motion-links", "0", "--json"]) == 0
+    )
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["chains"], facts["motions"]) == (19, 0)
+    assert (tmp_path / "a" / "index.html").is_file()
+    assert main(["catalog", "site", str(tmp_path / "none.sqlite"), "-o", str(tmp_path / "b")]) == 2
+    assert "there is no such catalogue" in capsys.readouterr().err
+    shutil.rmtree(tmp_path / "a")
