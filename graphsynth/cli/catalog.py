@@ -96,7 +96,7 @@ def _query(options: argparse.Namespace) -> int:
     from graphsynth.atlas.catalogue import Catalogue
 
     if sum((options.sql is not None, options.entry is not None, options.where != "1")) > 1:
-        raise SpecError("give one of CONDITION, --sql and --entry")
+        raise SpecError("give one of --where, --sql and --entry")
     with Catalogue(options.file) as catalogue:
         if options.entry is not None:
             _put_entry(catalogue, options)

@@ -64,9 +64,7 @@ def _add_build(
 def _add_query(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "query", "Ask a catalogue.")
     parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
-    parser.add_argument(
-        "where", nargs="?", default="1", metavar="CONDITION", help="SQL condition on the rows of a table"
-    )
+    parser.add_argument("--where", default="1", metavar="CONDITION", help="SQL condition on the rows of the table")
     parser.add_argument("--table", default="chains", metavar="NAME", help="table (default chains)")
     parser.add_argument("--sql", metavar="TEXT", help="any SQL question instead")
     parser.add_argument("--entry", metavar="KEY|LABEL", help="everything about one chain instead")

@@ -33,13 +33,13 @@ def test_build_says_what_is_there(file, capsys):
 
 
 def test_query(file, capsys):
-    assert main(["catalog", "query", str(file), "links = 8 AND girth = 4", "--limit", "2"]) == 0
+    assert main(["catalog", "query", str(file), "--where", "links = 8 AND girth = 4", "--limit", "2"]) == 0
     assert "2 shown: --limit 0 shows all" in told(capsys)[-1]
-    assert main(["catalog", "query", str(file), "links = 6", "--json"]) == 0
+    assert main(["catalog", "query", str(file), "--where", "links = 6", "--json"]) == 0
     assert [row["key"] for row in json.loads(capsys.readouterr().out)["shown"]] == ["1BgMw8g", "1BgOB7A"]
     assert main(["catalog", "query", str(file), "--sql", "SELECT COUNT(*) AS n FROM chains", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["shown"] == [{"n": 22}]
-    assert main(["catalog", "query", str(file), "class > 99", "--table", "mechanisms"]) == 0
+    assert main(["catalog", "query", str(file), "--where", "class > 99", "--table", "mechanisms"]) == 0
     assert told(capsys) == ["0 rows"]
 
 
@@ -88,10 +88,10 @@ def test_shards_and_merge(file, tmp_path, capsys):
         (["build", "--links", "20"], "at most 18 links"),
         (["build", "--links", "6", "--executor", "dask"], "go together"),
         (["build", "--links", "6", "--scheduler", "tcp://x:1"], "go together"),
-        (["query", "FILE", "nonsense = 1"], "SQLite refuses"),
+        (["query", "FILE", "--where", "nonsense = 1"], "SQLite refuses"),
         (["query", "FILE", "--table", "nothing"], "there is no table"),
         (["query", "FILE", "--entry", "nothing"], "no chain 'nothing'"),
-        (["query", "FILE", "links = 6", "--sql", "SELECT 1"], "give one of"),
+        (["query", "FILE", "--where", "links = 6", "--sql", "SELECT 1"], "give one of"),
         (["query", "missing.sqlite"], "there is no such catalogue"),
         (["merge", "missing.sqlite", "-o", "x.sqlite"], "there is no such catalogue"),
     ],
