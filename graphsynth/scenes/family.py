@@ -48,7 +48,7 @@ class Family:
     structure : {"required", "optional", "none"}
         Whether a scene must, may or must not have a table ``[structure]``.
     more : callable, optional
-        Further stages for a table as read: those of parts that only some scenes have.
+        Further stages for a scene as read: those of parts that only some scenes have.
     """
 
     table: type
@@ -56,9 +56,9 @@ class Family:
     structure: Literal["required", "optional", "none"] = "optional"
     more: Callable[[Any], tuple[Stage, ...]] | None = None
 
-    def stages_for(self, table: object) -> tuple[Stage, ...]:
-        """Return all stages for a scene with this table ``[mechanism]``."""
-        return (*self.stages, *(self.more(table) if self.more else ()))
+    def stages_for(self, scene: object) -> tuple[Stage, ...]:
+        """Return all stages that a scene of this family can use."""
+        return (*self.stages, *(self.more(scene) if self.more else ()))
 
 
 def family_names() -> tuple[str, ...]:

@@ -60,6 +60,8 @@ class PartFolder:
         The report folder.
     done : sequence of Outcome
         Taken over from an interrupted run; their files must be there and unchanged.
+    kinds : sequence of str
+        "csv", "parquet", as asked for now.
 
     Raises
     ------
@@ -67,14 +69,25 @@ class PartFolder:
         If one is not.
     """
 
-    def __init__(self, folder: Path | None, done: Sequence[Outcome]) -> None:
+    def __init__(self, folder: Path | None, done: Sequence[Outcome], kinds: Sequence[str] = ()) -> None:
         self._folder = folder
+        self._kinds = tuple(kinds)
         self._kept: set[str] = set()
         self._begun: set[Path] = set()
         for outcome in done if folder is not None else ():
             for part in outcome.products.values():
-                for path, digest in part.files if isinstance(part, Part) else ():
-                    self._check(path, digest)
+                if isinstance(part, Part):
+                    self._check_kinds(part)
+                    for path, digest in part.files:
+                        self._check(path, digest)
+
+    def _check_kinds(self, part: Part) -> None:
+        had = {path.rpartition(".")[2] for path, _ in part.files}
+        if self._kinds and had != set(self._kinds):
+            raise SceneError(
+                f"the interrupted run in {self._folder} wrote {part.name} as {', '.join(sorted(had))}, and now files = "
+                f"{list(self._kinds)} are asked for; add --fresh to start anew"
+            )
 
     def _check(self, path: str, digest: str) -> None:
         assert self._folder is not None

@@ -6,7 +6,7 @@ import hashlib
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -190,6 +190,8 @@ class Scene:
         SHA-256 of the file's bytes, empty for a mapping.
     text : str
         The file, for the line numbers of messages; empty for a mapping.
+    folder : Path
+        Of the file: where paths in it begin; the working directory for a mapping.
     """
 
     scene: SceneTable
@@ -202,6 +204,7 @@ class Scene:
     raw: Mapping[str, object] = field(default_factory=dict, compare=False, repr=False)
     digest: str = ""
     text: str = field(default="", compare=False, repr=False)
+    folder: Path = field(default=Path(), compare=False, repr=False)
 
     @property
     def name(self) -> str:
@@ -247,7 +250,7 @@ class Scene:
         """Return every stage this scene can use; most are not needed for its outputs."""
         common = STRUCTURE if self.structure is not None else ()
         ranking = (RANK,) if self.ranking is not None else ()
-        return (*common, *ranking, *family(self.mechanism.module).stages_for(self.mechanism))
+        return (*common, *ranking, *family(self.mechanism.module).stages_for(self))
 
 
 def _family(table: object, place: Place) -> Family:
@@ -343,4 +346,5 @@ def load_scene(name_or_path: str | Path) -> Scene:
         raise FormatError("not UTF-8 text; save the scene as UTF-8", f"{path.name}, byte {error.start}") from None
     except (ValueError, RecursionError) as error:  # ValueError: TOMLDecodeError, and integers of thousands of digits
         raise FormatError(f"not TOML: {error}", path.name) from None
-    return Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest(), text)
+    scene = Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest(), text)
+    return replace(scene, folder=path.parent)

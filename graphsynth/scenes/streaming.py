@@ -212,7 +212,7 @@ def stream(
     done = Streamed()
     numbered = enumerate(items, 1)
     _skip(numbered, journal.done, done)
-    parts = PartFolder(journal.path.parent if journal.path else None, journal.done)
+    parts = PartFolder(journal.path.parent if journal.path else None, journal.done, context.scene.outputs.files)
     executor: Executor | None = context.executor
     size = [1]
     work = partial(_evaluate_chunk, plan, replace(context, executor=None), shared)

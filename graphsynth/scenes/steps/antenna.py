@@ -192,7 +192,7 @@ def tolerances(context: Context) -> tuple[tuple[float, Tolerance], ...]:
     for degrees in table_of(context).tolerances.at_deg:
         phi = math.radians(degrees)
         try:
-            found.append((degrees, antenna.tolerance(phi, phi, widths)))
+            found.append((degrees, antenna.tolerance(phi, phi, widths, converted=True)))
         except GeometryError as error:
             raise (context.scene.place / "mechanism" / "tolerances").error(f"cannot be used: {error}") from error
     return tuple(found)

@@ -139,8 +139,10 @@ def _verdict(
     if undecided:
         words += f"; tolerances undecided at {', '.join(f'{x:g}°' for x in undecided)}"
     elif bounds:
+        from graphsynth.kinematics.pointing.tolerance import outward_text
+
         worst = max(max(map(abs, side.deviation)) for _, found in bounds for side in (found.a, found.b))
-        words += f"; tolerances move the beam by at most {worst:.2f}″ about either axis (certified)"
+        words += f"; tolerances move the beam by at most {outward_text(worst, 1, 2)[1:]}″ about either axis (certified)"
     return Record(recognised_as="pointing mechanism", verdict=words, good=not undecided, margins=margins)
 
 
@@ -224,6 +226,8 @@ def _sizes(antenna: PointingMechanism, phi: NDArray[np.float64], reading: Readin
 
 
 def _tolerance_table(context: Context, bounds: tuple[tuple[float, Tolerance], ...]) -> Table:
+    from graphsynth.kinematics.pointing.tolerance import outward_text
+
     rows = []
     for degrees, found in bounds:
         for name, side in (("elevation", found.a), ("azimuth", found.b)):
@@ -236,7 +240,7 @@ def _tolerance_table(context: Context, bounds: tuple[tuple[float, Tolerance], ..
             rows.append(
                 (
                     f"{degrees:g}", name, _fixed(side.nominal),
-                    _seconds(certified), _seconds(corners),
+                    " .. ".join(outward_text(value, end) for value, end in zip(certified, (-1, 1))), _seconds(corners),
                     f"±{first:.4f}", excess,
                 )
             )  # fmt: skip
