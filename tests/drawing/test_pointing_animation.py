@@ -11,7 +11,7 @@ import pytest
 
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.pointing_animation import pointing_animation, project
-from graphsynth.drawing.pointing_pictures import difference_map_picture
+from graphsynth.drawing.pointing_maps import difference_map_picture
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.pointing import PointingMechanism
 

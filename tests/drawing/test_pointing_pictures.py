@@ -8,12 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from graphsynth.drawing.pointing_pictures import (
-    comparison_picture,
-    fold_map_picture,
-    pointing_picture,
-    tolerance_map_picture,
-)
+from graphsynth.drawing.pointing_maps import fold_map_picture, tolerance_map_picture
+from graphsynth.drawing.pointing_pictures import comparison_picture, pointing_picture
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.pointing import PointingMechanism, Reading
 

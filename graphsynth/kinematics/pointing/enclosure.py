@@ -1,7 +1,7 @@
 """Proved enclosures of both outputs over a box of lengths: interval Newton, then the mean-value form (section 2.10).
 
-Interval arithmetic with outward rounding is that of mpmath.  No inverse function is enclosed: only sines, cosines
-and the four operations occur.
+The four operations with outward rounding are those of mpmath.  No inverse function is enclosed; sines and cosines,
+which mpmath computes with guard digits but does not prove, are widened by thirty times their last place.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ __all__ = ["Enclosure", "LengthBoxProblem", "NoProof", "middle_of"]
 
 #: Working precision of the interval arithmetic, bits.
 PRECISION = 80
+#: What sines and cosines are widened by, far above their last place and far below that of a double.
+WIDENING = 2.0**-75
 #: Rounds of inflation before a proof is given up, and of shrinking afterwards.
 INFLATIONS, SHRINKS = 40, 8
 #: Places of l1, crank and rod of each leg among the five lengths.
@@ -63,13 +65,17 @@ class _Terms(NamedTuple):
 
 @dataclass(frozen=True)
 class LengthBoxProblem:
-    """Both outputs at fixed crank angles as functions of the lengths, on one assembly mode."""
+    """Both outputs at fixed crank angles as functions of the lengths, on one assembly mode.
+
+    ``slack`` is a relative error of the crank angles, for angles that were rounded on the way.
+    """
 
     mechanism: PointingMechanism
     phi_x: float
     phi_y: float
     s_y: int
     s_x: int
+    slack: float = 0.0
 
     @cached_property
     def iv(self) -> Any:
@@ -88,8 +94,17 @@ class LengthBoxProblem:
     @cached_property
     def _crank(self) -> dict[str, tuple[Any, Any]]:
         """Sine and ``1 - cos`` of each crank angle, enclosed."""
-        angles = {"Y": self.iv.mpf(self.phi_x), "X": self.iv.mpf(self.phi_y)}
-        return {name: (self.iv.sin(phi), 2 * self.iv.sin(phi / 2) ** 2) for name, phi in angles.items()}
+        around = self.iv.mpf([1.0 - self.slack, 1.0 + self.slack])
+        angles = {"Y": self.iv.mpf(self.phi_x) * around, "X": self.iv.mpf(self.phi_y) * around}
+        return {name: (self._sine(phi), 2 * self._sine(phi / 2) ** 2) for name, phi in angles.items()}
+
+    def _sine(self, angle: Any) -> Any:
+        """Sine, widened."""
+        return self.iv.sin(angle) + self.iv.mpf([-WIDENING, WIDENING])
+
+    def _cosine(self, angle: Any) -> Any:
+        """Cosine, widened."""
+        return self.iv.cos(angle) + self.iv.mpf([-WIDENING, WIDENING])
 
     def _sign(self, leg: Leg) -> int:
         """Branch sign of a leg; on its branch the slope of its equation has the opposite sign."""
@@ -107,14 +122,13 @@ class LengthBoxProblem:
 
     def terms(self, leg: Leg, lengths: tuple[Any, ...], output: Any, u: Any) -> _Terms:
         """Equation ``P (cos y - 1) + Q cos u sin y - lift / l1 = 0`` of a leg; ``u`` is None for the first leg."""
-        iv = self.iv
         sine, bend = self._crank[leg.name]
         l1, crank, rod = (lengths[i] for i in PLACES[leg.name])
         side = int(leg.side)
         p, q = l1 - crank * bend, side * rod + crank * sine
         lift = crank * (crank * bend + side * rod * sine)
-        factor = 1 if u is None else iv.cos(u)
-        s, c, versine = iv.sin(output), iv.cos(output), 2 * iv.sin(output / 2) ** 2
+        factor = 1 if u is None else self._cosine(u)
+        s, c, versine = self._sine(output), self._cosine(output), 2 * self._sine(output / 2) ** 2
         return _Terms(
             -versine * p + q * factor * s - lift / l1,
             -p * s + q * factor * c,
@@ -123,7 +137,7 @@ class LengthBoxProblem:
                 bend * versine + sine * factor * s - (2 * crank * bend + side * rod * sine) / l1,
                 side * (factor * s - crank * sine / l1),
             ),
-            0 if u is None else -q * iv.sin(u) * s,
+            0 if u is None else -q * self._sine(u) * s,
         )
 
     def _gradient(self, leg: Leg, terms: _Terms, du: tuple[Any, ...] | None) -> tuple[Any, ...]:

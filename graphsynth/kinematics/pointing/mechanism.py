@@ -339,6 +339,7 @@ class PointingMechanism(PointingDimensions):
         s_y: int = 1,
         s_x: int = -1,
         method: str = "mixed",
+        converted: bool = False,
     ) -> Tolerance:
         """Certified bounds of elevation and azimuth if every length may deviate by plus or minus its width.
 
@@ -353,6 +354,9 @@ class PointingMechanism(PointingDimensions):
         method : {"mixed", "mean_value"}
             "mixed" puts every length with a proved sign of the derivative to the ends of its interval (section 2.10,
             step 3); "mean_value" is faster and some per cent wider.
+        converted : bool
+            The doubles given stand for decimals or degrees: the bounds then hold for the numbers before they were
+            converted to metres and radians and rounded (up to three roundings each).
 
         Returns
         -------
@@ -371,9 +375,9 @@ class PointingMechanism(PointingDimensions):
         >>> found = PointingMechanism().tolerance(np.radians(15), np.radians(15))
         >>> print(found.report())
         certified: one pose of this mode for all lengths in the box
-        elevation 8.907526593 deg: certified -44.3762 .. +44.4259, corners -44.3762 .. +44.4259, first order 44.4010
-        azimuth 8.814978215 deg: certified -42.9740 .. +43.0184, corners -42.9740 .. +43.0184, first order 42.9962
+        elevation 8.907526593 deg: certified -44.3763 .. +44.4260, corners -44.3762 .. +44.4259, first order 44.4010
+        azimuth 8.814978215 deg: certified -42.9741 .. +43.0184, corners -42.9740 .. +43.0184, first order 42.9962
         """
         from graphsynth.kinematics.pointing.tolerance import tolerance
 
-        return tolerance(self, phi_x, phi_y, widths, s_y, s_x, method)
+        return tolerance(self, phi_x, phi_y, widths, s_y, s_x, method, converted)

@@ -18,10 +18,12 @@ from graphsynth.kinematics.pointing.enclosure import Enclosure, LengthBoxProblem
 if TYPE_CHECKING:
     from graphsynth.kinematics.pointing.mechanism import PointingMechanism
 
-__all__ = ["AngleBounds", "Tolerance", "ToleranceStatus", "tolerance"]
+__all__ = ["AngleBounds", "Tolerance", "ToleranceStatus", "outward_text", "tolerance"]
 
 NAMES = ("l1", "l2", "l3", "l4", "l5")
 _ARCSECOND = math.pi / 648000.0
+#: Relative rounding of lengths and angles that were decimals or degrees: at most three operations to nearest.
+_CONVERTED = 2.0**-51
 
 
 class ToleranceStatus(IntEnum):
@@ -62,8 +64,10 @@ class AngleBounds:
 
     @property
     def deviation(self) -> tuple[float, float]:
-        """Certified deviations from the nominal value, seconds of arc."""
-        return (self.lower - self.nominal) / _ARCSECOND, (self.upper - self.nominal) / _ARCSECOND
+        """Certified deviations from the nominal value, seconds of arc, rounded outward."""
+        low, high = (self.lower - self.nominal) / _ARCSECOND, (self.upper - self.nominal) / _ARCSECOND
+        # three operations to nearest, the constant included
+        return math.nextafter(low - 4e-16 * abs(low), -math.inf), math.nextafter(high + 4e-16 * abs(high), math.inf)
 
     @property
     def corner_deviation(self) -> tuple[float, float]:
@@ -103,17 +107,35 @@ class Tolerance:
         """Certified bounds, corner values and first-order estimate of both outputs in seconds of arc."""
         lines = [self.reason]
         for name, bounds in (("elevation", self.a), ("azimuth", self.b)):
-            certified, corners = bounds.deviation, bounds.corner_deviation
+            corners = bounds.corner_deviation
+            certified = [outward_text(value, side) for value, side in zip(bounds.deviation, (-1, 1))]
             lines.append(
-                f"{name} {math.degrees(bounds.nominal):.9f} deg: certified {certified[0]:+.4f} .. {certified[1]:+.4f}, "
+                f"{name} {math.degrees(bounds.nominal):.9f} deg: certified {certified[0]} .. {certified[1]}, "
                 f"corners {corners[0]:+.4f} .. {corners[1]:+.4f}, first order {bounds.first_order / _ARCSECOND:.4f}"
             )
         return "\n".join(lines)
 
 
+def outward_text(value: float, side: int, places: int = 4) -> str:
+    """Write a bound with a sign and so many decimals, rounded down (side -1) or up (+1) so that it stays one.
+
+    Examples
+    --------
+    >>> outward_text(-0.12341, -1), outward_text(0.12341, 1), outward_text(math.nan, 1)
+    ('-0.1235', '+0.1235', 'nan')
+    """
+    if not math.isfinite(value):
+        return str(value)
+    from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+
+    digits = Decimal(value).quantize(Decimal(1).scaleb(-places), ROUND_FLOOR if side < 0 else ROUND_CEILING)
+    return f"{digits:+f}"
+
+
 def _box(problem: LengthBoxProblem, widths: tuple[float, ...]) -> tuple[Any, ...]:
     iv = problem.iv
-    return tuple(iv.mpf(l) + iv.mpf([-w, w]) for l, w in zip(problem.mechanism.lengths, widths))
+    around = iv.mpf([1.0 - problem.slack, 1.0 + problem.slack])
+    return tuple((iv.mpf(l) + iv.mpf([-w, w])) * around for l, w in zip(problem.mechanism.lengths, widths))
 
 
 def _floor(x: Any) -> float:
@@ -146,8 +168,9 @@ def _face_bound(problem: LengthBoxProblem, box: tuple[Any, ...], found: Enclosur
 
 
 def tolerance(
-    mechanism: PointingMechanism, phi_x: float, phi_y: float, widths: ArrayLike, s_y: int, s_x: int, method: str
-) -> Tolerance:
+    mechanism: PointingMechanism, phi_x: float, phi_y: float, widths: ArrayLike, s_y: int, s_x: int, method: str,
+    converted: bool = False,
+) -> Tolerance:  # fmt: skip
     """Bound both outputs; see `PointingMechanism.tolerance`."""
     choice("method", method, ("mixed", "mean_value"))
     given = finite_array("widths", widths)
@@ -157,7 +180,8 @@ def tolerance(
     for name, length, width in zip(NAMES, mechanism.lengths, box_widths):
         if not 0.0 <= width < length:
             raise GeometryError(f"the tolerance {width} of {name} must be at least 0 and below the length {length}")
-    problem = LengthBoxProblem(mechanism, finite("phi_x", phi_x), finite("phi_y", phi_y), s_y, s_x)
+    slack = _CONVERTED if converted else 0.0
+    problem = LengthBoxProblem(mechanism, finite("phi_x", phi_x), finite("phi_y", phi_y), s_y, s_x, slack)
     box = _box(problem, box_widths)
     estimates = _estimates(problem, box_widths)
     try:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.pointing import PointingMechanism
 from graphsynth.kinematics.pointing.enclosure import LengthBoxProblem, NoProof, middle_of
-from graphsynth.kinematics.pointing.tolerance import ToleranceStatus
+from graphsynth.kinematics.pointing.tolerance import ToleranceStatus, outward_text
 
 ART = PointingMechanism()
 PARALLELOGRAM = PointingMechanism(l3=0.1, l5=0.1)
@@ -108,6 +108,35 @@ def test_exact_lengths_give_a_point():
     with mp.workdps(40):
         want = mp.radians(mp.mpf("8.814978214868563808162"))
         assert abs(found.b.lower - want) < 1e-15
+
+
+def test_degrees_and_decimals_are_inside_only_if_their_rounding_is(exact):
+    """Lengths in millimetres and degrees, converted to nearest: bounds for the doubles are not bounds for them."""
+    lost = 0
+    with mp.workdps(50):
+        lengths = [mp.mpf(x) for x in ("0.1", "0.15", "0.0592", "0.15", "0.0592")]
+        antenna = PointingMechanism(*(x / 1e3 for x in (100.0, 150.0, 59.2, 150.0, 59.2)))
+        for degrees in range(1, 41, 3):
+            want = exact.angles(mp.radians(degrees), mp.radians(degrees), lengths)
+            phi = math.radians(degrees)
+            for converted in (True, False):
+                found = antenna.tolerance(phi, phi, 0.0, method="mean_value", converted=converted)
+                held = all(mp.mpf(b.lower) <= x <= mp.mpf(b.upper) for x, b in zip(want, (found.a, found.b)))
+                assert held or not converted
+                lost += not held
+    assert lost > 0
+
+
+def test_what_is_printed_as_certified_is_a_bound():
+    found = ART.tolerance(PHI, PHI)
+    for bounds, line in zip((found.a, found.b), found.report().splitlines()[1:]):
+        low, high = (float(text) for text in line.split("certified ")[1].split(",")[0].split(" .. "))
+        assert low <= bounds.deviation[0] < low + 1e-4 and high >= bounds.deviation[1] > high - 1e-4
+        with mp.workdps(40):  # the deviations themselves are rounded outward
+            second = mp.pi / 648000
+            assert mp.mpf(bounds.deviation[0]) * second <= mp.mpf(bounds.lower) - mp.mpf(bounds.nominal)
+            assert mp.mpf(bounds.deviation[1]) * second >= mp.mpf(bounds.upper) - mp.mpf(bounds.nominal)
+    assert outward_text(44.424, 1, 2) == "+44.43" and outward_text(-44.424, -1, 2) == "-44.43"
 
 
 def test_a_box_that_touches_a_fold_is_undecided():
