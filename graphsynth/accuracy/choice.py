@@ -21,12 +21,22 @@ _NOISE = 1.25
 _SMALLER = 0.5
 
 
-def _size(row: Row) -> float:
-    return max(row.error, FLOOR)
+#: Errors below this are rounding where the error is relative or an angle; they count as equal.
+_ROUNDING = 1e-15
 
 
-def front(rows: Iterable[Row]) -> tuple[Row, ...]:
+def _size(row: Row, floor: float = FLOOR) -> float:
+    return max(row.error, floor)
+
+
+def _floor(problem: Problem) -> float:
+    return _ROUNDING if problem.unit in ("relative", "rad") else FLOOR
+
+
+def front(rows: Iterable[Row], floor: float = FLOOR) -> tuple[Row, ...]:
     """Return the good rows that no other beats in both time and error, fastest first.
+
+    Errors count as smaller only below half of another, and as ``floor`` if they are below it.
 
     Examples
     --------
@@ -35,8 +45,8 @@ def front(rows: Iterable[Row]) -> tuple[Row, ...]:
     ['0', '1']
     """
     found: list[Row] = []
-    for row in sorted((row for row in rows if row.good), key=lambda row: (row.seconds, _size(row))):
-        if not found or _size(row) < _SMALLER * _size(found[-1]):
+    for row in sorted((row for row in rows if row.good), key=lambda row: (row.seconds, _size(row, floor))):
+        if not found or _size(row, floor) < _SMALLER * _size(found[-1], floor):
             found.append(row)
     return tuple(found)
 
@@ -76,7 +86,7 @@ class Knee:
         return f"{self.method}: {own} is {self.verdict} than the knee; {at}"
 
 
-def knee(rows: Sequence[Row]) -> Row | None:
+def knee(rows: Sequence[Row], floor: float = FLOOR) -> Row | None:
     """Return the finest row up to which each further decade of accuracy costs at most `DECADE_COST` times as much.
 
     From the fastest row of the method's own front on, a step is taken as long as it pays.  None without a good row.
@@ -87,7 +97,7 @@ def knee(rows: Sequence[Row]) -> Row | None:
     >>> knee(rows).setting
     '2'
     """
-    own = front(rows)
+    own = front(rows, floor)
     if not own:
         return None
     at = own[0]
@@ -104,7 +114,7 @@ def knees(problem: Problem) -> tuple[Knee, ...]:
     found = []
     for method in problem.methods:
         rows = problem.of(method)
-        at = knee(rows)
+        at = knee(rows, _floor(problem))
         if at is None or len(rows) < 3 or problem.count or problem.over:
             continue
         default = next((row for row in rows if row.default), None)
@@ -155,12 +165,13 @@ def advice(problem: Problem) -> dict[str, str]:
     """
     if problem.sentences:
         return dict(problem.sentences)
-    best = front(problem.rows)
-    proved = front(row for row in problem.rows if row.proved)
-    return {method: _sentence(problem, method, best, proved) for method in problem.methods}
+    floor = _floor(problem)
+    best = front(problem.rows, floor)
+    proved = front((row for row in problem.rows if row.proved), floor)
+    return {method: _sentence(problem, method, best, proved, floor) for method in problem.methods}
 
 
-def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tuple[Row, ...]) -> str:
+def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tuple[Row, ...], floor: float) -> str:
     rows = problem.of(method)
     good = [row for row in rows if row.good]
     if not good:
@@ -173,7 +184,7 @@ def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tupl
         own = [row for row in proved if row.method == method]
         text = f"choose it where a proof is wanted, {_range(own, proved, problem.unit)}"
     else:
-        text = _beaten(good, best, problem.unit)
+        text = _beaten(good, best, problem.unit, floor)
     lost = [row for row in rows if row.status is not RowStatus.OK]
     tail = ""
     if lost:
@@ -199,9 +210,9 @@ def _range(mine: list[Row], best: tuple[Row, ...], unit: str) -> str:
     return text
 
 
-def _beaten(good: list[Row], best: tuple[Row, ...], unit: str) -> str:
-    own = min(good, key=lambda row: (_size(row), row.seconds))
-    other = next((row for row in best if _SMALLER * _size(row) <= _size(own)), best[-1])
+def _beaten(good: list[Row], best: tuple[Row, ...], unit: str, floor: float) -> str:
+    own = min(good, key=lambda row: (_size(row, floor), row.seconds))
+    other = next((row for row in best if _SMALLER * _size(row, floor) <= _size(own, floor)), best[-1])
     times = own.seconds / other.seconds
     than = f"{_error(other.error, unit)} in {seconds_text(other.seconds)}"
     if times < _NOISE:

@@ -104,7 +104,7 @@ def turn_problem(mechanism: SingleMotorPlatform, effort: Effort | None = None) -
         grid = np.linspace(0.0, math.tau, count)
         rows.append(_row(
             mechanism, "continuation, all modes compared, events", count, truth, effort,
-            partial(_turned, mechanism, grid), default=count == 361,
+            partial(_turned, mechanism, grid),
         ))  # fmt: skip
     rows += [_proof(mechanism, boxes, truth, psi, effort) for boxes in (40, 400, 100_000)]
     question = "The home branch of the platform of the scene over a turn of the wheels"
@@ -120,8 +120,7 @@ def _turned(mechanism: SingleMotorPlatform, psi: Array) -> Array:
 
 
 def _row(
-    mechanism: SingleMotorPlatform, method: str, count: int, truth: Array, effort: Effort, run: Any, *,
-    default: bool = False,
+    mechanism: SingleMotorPlatform, method: str, count: int, truth: Array, effort: Effort, run: Any
 ) -> Row:  # fmt: skip
     found, seconds, rounds = best_of(run, effort)
     nodes = found[:: (count - 1) // _NODES]
@@ -129,7 +128,7 @@ def _row(
     error = float(_apart(nodes, truth, mechanism.Lc).max()) if whole else math.nan
     return Row(
         method, f"{count} positions", error, seconds / count, rounds, _KIND, _REFERENCE,
-        RowStatus.OK if whole else RowStatus.FAILED, "" if whole else "the branch is lost", default,
+        RowStatus.OK if whole else RowStatus.FAILED, "" if whole else "the branch is lost",
     )  # fmt: skip
 
 

@@ -115,7 +115,7 @@ def _one_mode(
     """Let scipy's ``fsolve`` find one mode from a guess a hundredth away."""
     which = [k for k, modes in enumerate(truth) if len(modes)][:8]
     rows = []
-    for tol in (1e-4, 1e-8, 1e-12):
+    for tol in (1e-4, 1e-8, 1e-12) if which else ():
         run = partial(_fsolve, platform, [(theta[k], truth[k][0]) for k in which], size, tol)
         found, seconds, rounds = best_of(run, effort)
         worst = max(_away(X[None], truth[k][:1], size) for X, k in zip(found, which))

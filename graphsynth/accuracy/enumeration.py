@@ -93,7 +93,7 @@ def enumeration_problem(effort: Effort | None = None) -> Problem:
         laws[method] = _law(method, own)
     return Problem(
         "enumeration", "Kinematic chains of mobility 1: time against their number", "graphs", tuple(rows),
-        "enumeration", "Extrapolated times are for one process and assume that the law holds on.", _GRAPHS, laws,
+        "enumeration", "Extrapolated: one process, and the law holds on.", _GRAPHS, sentences=laws,
     )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ def pose_problem(mechanism: PointingMechanism, largest: float, effort: Effort | 
     from graphsynth.kinematics.pointing.accuracy import pointing_errors
 
     effort = effort or Effort()
-    found = pointing_errors(mechanism, largest, poses=5 if effort.quick else 41, rounds=effort.rounds)
+    found = pointing_errors(mechanism, largest, poses=3 if effort.quick else 9, rounds=effort.rounds)
     rows = []
     for r in found:
         wrong = not math.isfinite(r.error) or r.error > 0.01

@@ -38,8 +38,8 @@ def four_bar(linkage: LambdaLinkage) -> tuple[Mechanism, Closed]:
     --------
     >>> from graphsynth import LambdaLinkage
     >>> mechanism, closed = four_bar(LambdaLinkage())
-    >>> mechanism.graph.links, closed[1](np.array([0.0])).round(12).tolist()
-    (4, [(1.5+2.44948974278j)])
+    >>> mechanism.graph.links, closed[1](np.array([0.0])).round(9).tolist()
+    (4, [(1.5+2.449489743j)])
     """
     from graphsynth.mechanism.joints import Revolute
     from graphsynth.mechanism.model import Driver, Mechanism
@@ -81,13 +81,7 @@ def _point(poses: Array, watched: tuple[int, tuple[float, float]]) -> NDArray[np
 
 
 def eight_link() -> Mechanism:
-    """Return an eight-link mechanism with an Assur group of more than two links that turns fully; always the same.
-
-    Examples
-    --------
-    >>> eight_link().graph.links
-    8
-    """
+    """Return an eight-link mechanism with an Assur group of more than two links that turns fully; always the same."""
     from graphsynth.kinematics.embodiment.api import embody
     from graphsynth.structure.assur import decompose
     from graphsynth.synthesis import enumerate_chains

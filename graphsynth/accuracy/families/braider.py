@@ -27,7 +27,7 @@ def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     from graphsynth.accuracy.dynamics import braider_model, dynamics_problem
 
     model, start = braider_model(_braider(context), context.scene.mechanism.speed_rad_s)
-    return dynamics_problem(model, start, 1.0 if effort.quick else 3.5, "the braider's linkage, free", effort)
+    return dynamics_problem(model, start, 1.0 if effort.quick else 2.0, "the braider's linkage, free", effort)
 
 
 def positions(context: Any, effort: Effort) -> Problem:

@@ -1,0 +1,247 @@
+"""Tables, pictures, page and command line."""
+
+import json
+import math
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from graphsynth.accuracy import Effort, Problem, Row, RowStatus, measure, table, work_precision_picture, write_report
+from graphsynth.accuracy.registry import PLANS, Plan, load, plans_of
+from graphsynth.accuracy.rows import best_of
+from graphsynth.cli import main
+from graphsynth.errors import GeometryError, SceneError, SpecError
+from graphsynth.scenes.family import FAMILIES
+from graphsynth.scenes.scene import available_scenes, load_scene
+from graphsynth.scenes.stages import Context
+
+PROBLEM = Problem(
+    "sums", "How to add <numbers> & more", "mm",
+    (
+        Row("a", "coarse", 1e-2, 1e-3, 3, "distance", "50 digits", default=True),
+        Row("a", "fine", 1e-6, 2e-3, 3, "distance", "50 digits", more={"calls": 7.0}),
+        Row("a", "exact", 0.0, 4e-3, 3, "distance", "50 digits"),
+        Row("b", "any", math.nan, 2.0, 1, "distance", "50 digits", RowStatus.FAILED, "it loops"),
+        Row("b", "never run", math.nan, math.nan, 0, "distance", "50 digits", RowStatus.FAILED, "refused"),
+        Row("c", "one", 0.5, 1e-4, 3, "distance", "50 digits", RowStatus.UNRELIABLE, "a lie", proved=True),
+    ),
+)  # fmt: skip
+
+
+def problem_of_test(context, effort):
+    return PROBLEM
+
+
+def problem_that_is_not(context, effort):
+    raise GeometryError("the curves do\nnot cross")
+
+
+def scene_that_is_wrong(context, effort):
+    raise SceneError("lengths make no sense")
+
+
+def plan(function):
+    return Plan("sums", f"{__name__}:{function.__name__}")
+
+
+def _measured():
+    context = SimpleNamespace(scene=SimpleNamespace(name="test"))
+    plans = [plan(problem_of_test), Plan("gap", f"{__name__}:problem_that_is_not")]
+    return measure(context, plans, Effort(rounds=1))
+
+
+@pytest.fixture(scope="module")
+def report():
+    return _measured()
+
+
+@pytest.fixture(scope="module")
+def folder(report, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report")
+    write_report(report, path)
+    return path
+
+
+def test_what_a_scene_does_not_pose_is_left_out_with_its_reason(report):
+    assert report.left_out == (("gap", "the curves do not cross"),)
+    assert [problem.name for problem in report.problems] == ["sums"]
+    assert set(report.times) == {"sums", "gap"}
+
+
+def test_an_error_of_the_scene_stops_the_measurement():
+    with pytest.raises(SceneError, match="no sense"):
+        measure(SimpleNamespace(scene=SimpleNamespace(name="x")), [plan(scene_that_is_wrong)])
+
+
+def test_table_holds_every_row_and_column(folder):
+    read = pd.read_csv(folder / "accuracy.csv")
+    assert len(read) == len(PROBLEM.rows)
+    wanted = {
+        "problem",
+        "method",
+        "setting",
+        "error",
+        "unit",
+        "kind",
+        "reference",
+        "seconds",
+        "rounds",
+        "status",
+        "reason",
+    }
+    assert wanted <= set(read.columns)
+    assert read.status.tolist() == ["ok", "ok", "ok", "failed", "failed", "unreliable"]
+    assert np.isnan(read.calls[0]) and read.calls[1] == 7.0
+    assert list(table([]).columns)[:2] == ["problem", "method"]
+
+
+def test_document_is_json_without_nan(folder):
+    text = (folder / "accuracy.json").read_text(encoding="utf-8")
+    document = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in the document"))
+    assert document["problems"][0]["rows"][3]["error"] is None
+    assert document["problems"][0]["advice"].keys() == {"a", "b", "c"}
+
+
+class Page(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.ids, self.links, self.open, self.text = [], [], [], ""
+
+    def handle_starttag(self, tag, attributes):
+        given = dict(attributes)
+        self.ids += [given["id"]] if "id" in given else []
+        self.links += [v for k, v in given.items() if k in ("src", "href", "xlink:href") and v]
+        if tag not in ("meta", "br", "link", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        self.open.pop()
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_page_stands_alone(folder):
+    text = (folder / "accuracy.html").read_text(encoding="utf-8")
+    page = Page()
+    page.feed(text)
+    assert not page.open and len(page.ids) == len(set(page.ids))
+    assert all(link.startswith("#") for link in page.links)
+    assert {link[1:] for link in page.links} <= set(page.ids)
+    assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(page.ids)
+    assert "How to add <numbers> & more" in page.text and "it loops" in page.text
+    assert "<numbers>" not in text
+
+
+def test_failures_are_drawn_above_everything_that_has_an_error():
+    axes = work_precision_picture(PROBLEM).axes[0]
+    crosses = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
+    heights = sorted(float(np.asarray(line.get_ydata())[0]) for line in crosses)
+    assert heights == [0.5, 5.0, 5.0]  # the lie at its error, the failures a decade above the largest
+    assert axes.get_xscale() == axes.get_yscale() == "log"
+    lines = [line for line in axes.lines if line.get_label().startswith("a")]
+    assert np.asarray(lines[0].get_ydata()).min() > 0.0  # an error of zero is drawn at rounding size
+
+
+def test_nothing_to_draw():
+    with pytest.raises(SpecError, match="no rows"):
+        work_precision_picture(Problem("p", "q", "mm", ()))
+
+
+def test_effort():
+    calls = []
+    _, seconds, rounds = best_of(lambda: calls.append(1), Effort(rounds=4))
+    assert (len(calls), rounds) == (5, 4) and seconds >= 0.0
+    with pytest.raises(SpecError, match="whole number"):
+        Effort(rounds=0)
+    with pytest.raises(SpecError, match="patience"):
+        Effort(patience=0.0)
+
+
+def test_patience_ends_the_rounds_but_never_before_one():
+    import time
+
+    _, _, rounds = best_of(lambda: time.sleep(0.02), Effort(rounds=50, patience=0.03))
+    assert 1 <= rounds <= 3
+
+
+def test_every_family_has_problems_and_every_plan_a_function():
+    assert set(PLANS) == set(FAMILIES)
+    for name in PLANS:
+        plans = plans_of(name, structure=True)
+        assert len({plan.name for plan in plans}) == len(plans) >= 2
+        for each in plans:
+            assert callable(load(each))
+    assert plans_of("nobody knows") == ()
+
+
+def test_a_plan_that_names_nothing():
+    with pytest.raises(SceneError, match="cannot be imported"):
+        load(Plan("x", "graphsynth.accuracy:nothing_of_that_name"))
+
+
+def test_only_the_methods_of_the_scene_are_loaded():
+    code = (
+        "import sys\n"
+        "from graphsynth.accuracy.registry import plans_of, load\n"
+        "[load(plan) for plan in plans_of('tribometer')]\n"
+        "import graphsynth.accuracy.report\n"
+        "heavy = ('graphsynth.', 'numba', 'matplotlib', 'scipy')\n"
+        "print(*sorted(name for name in sys.modules if name.startswith(heavy)))\n"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    rooms = {".".join(name.split(".")[:2]) for name in found}
+    assert rooms == {"graphsynth.accuracy", "graphsynth.errors", "graphsynth.lazy"}
+    assert not any("families" in name and name.split(".")[-1] not in ("families", "tribometer") for name in found)
+
+
+@pytest.fixture
+def small(monkeypatch):
+    every = PLANS["lambda_linkage"]
+    monkeypatch.setitem(PLANS, "lambda_linkage", tuple(p for p in every if p.name == "arc-ends"))
+    monkeypatch.setattr("graphsynth.accuracy.registry.plans_of", lambda family, structure: PLANS[family])
+
+
+def test_command_line(small, tmp_path, capsys):
+    given = ["accuracy", "lambda", "--quick", "--rounds", "1", "--out"]
+    assert main([*given, str(tmp_path / "text")]) == 0
+    out = capsys.readouterr().out
+    assert "arc-ends: At which crank angles" in out and "interval sweep: " in out and "default: interval sweep" in out
+    names = {path.name for path in (tmp_path / "text").iterdir()}
+    assert {"accuracy.csv", "accuracy.json", "accuracy.html", "arc-ends.svg", "arc-ends.png"} <= names
+    assert main([*given, str(tmp_path / "json"), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["scene"] == "lambda" and "accuracy.html" in document["files"]
+
+
+@pytest.mark.parametrize("given", [["no-such-scene"], ["lambda", "--rounds", "0"]])
+def test_bad_input_is_one_sentence(given, capsys):
+    assert main(["accuracy", *given]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", available_scenes())
+def test_every_shipped_scene(name, tmp_path):
+    scene = load_scene(name)
+    plans = plans_of(scene.mechanism.module, structure=scene.structure is not None)
+    report = measure(Context(scene), plans, Effort(rounds=1, quick=True))
+    write_report(report, tmp_path)
+    assert len(report.problems) + len(report.left_out) == len(plans)
+    allowed = {("four_bar_survey", "arc-ends")}  # its best sets do not jam
+    assert {(name, left) for left, _ in report.left_out} <= allowed
+    for problem in report.problems:
+        assert any(row.good for row in problem.rows), problem.name
+        assert all(row.reference for row in problem.rows if row.good), problem.name
+        wrong = [row for row in problem.rows if "outside of what is proved" in row.reason or "beyond" in row.reason]
+        assert not wrong
