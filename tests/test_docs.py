@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import doctest
 import importlib.util
+import inspect
 import io
 import re
 import shlex
@@ -173,6 +174,62 @@ def test_docstrings_of_all_public_names_are_in_the_site():
     ]
     assert missing == []
     assert "<!-- docstrings -->" in (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+
+
+def callables():
+    """Public functions, classes and methods of the library by their last name."""
+    found = {}
+    for path in (ROOT / "graphsynth").rglob("*.py"):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        if {"cli", "__main__", "kernels", "stress", "steps"} & set(parts):
+            continue
+        module = import_module(".".join(parts).removesuffix(".__init__"))
+        for name, thing in list(vars(module).items()):
+            if inspect.isfunction(thing) or (inspect.isclass(thing) and thing.__module__.startswith("graphsynth")):
+                found.setdefault(name, set()).add(thing)
+            if inspect.isclass(thing):
+                for inner, method in vars(thing).items():
+                    method = getattr(method, "__func__", method)
+                    if inspect.isfunction(method):
+                        found.setdefault(inner, set()).add(method)
+    return found
+
+
+def takes(thing, names):
+    try:
+        parameters = inspect.signature(thing).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    return any(p.kind is p.VAR_KEYWORD for p in parameters) or names <= {p.name for p in parameters}
+
+
+def test_documented_parameters_exist():
+    """A parameter that a signature in the reference names can be given by that name."""
+    known, wrong, checked = callables(), [], 0
+    for page in (ROOT / "docs" / "reference").glob("*.md"):
+        for code in re.findall(r"`([^`]+)`", FENCE.sub("", page.read_text(encoding="utf-8"))):
+            match = re.fullmatch(r"[\w.]*?(\w+)\(([^()]*(?:\([^()]*\)[^()]*)*)\)(?: -> .*)?", code)
+            if match is None or match[1] not in known or code.startswith("kernels."):
+                continue
+            checked += 1
+            plain = re.sub(r"\([^()]*\)|\[[^\]]*\]", "", match[2])
+            said = set(filter(str.isidentifier, (part.partition("=")[0].strip(" *") for part in plain.split(","))))
+            if not any(takes(thing, said) for thing in known[match[1]]):
+                wrong.append((page.name, code))
+    assert checked > 300
+    assert wrong == []
+
+
+def test_dotted_names_exist():
+    groups = {"graphsynth.families", "graphsynth.stages", "graphsynth.accuracy"}  # of entry points
+    for page in PAGES:
+        for dotted in set(re.findall(r"\bgraphsynth(?:\.\w+)+", page.read_text(encoding="utf-8"))) - groups:
+            parts = dotted.split(".")
+            thing, rest = import_module(parts[0]), parts[1:]
+            while rest:
+                if not hasattr(thing, rest[0]):
+                    import_module(".".join(parts[: len(parts) - len(rest) + 1]))
+                thing = getattr(thing, rest.pop(0))
 
 
 def test_pictures_are_drawn_by_documented_modules():
