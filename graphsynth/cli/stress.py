@@ -54,9 +54,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
-    from graphsynth.accuracy.stress import cases
+    from graphsynth.accuracy.stress import stress_cases
 
-    chosen = cases(options.names, slow=not options.fast)
+    chosen = stress_cases(options.names, slow=not options.fast)
     if options.json:
         console.put_json([{"name": case.name, "title": case.title, "slow": case.slow} for case in chosen])
         return 0
@@ -71,8 +71,9 @@ def _show(report: StressReport) -> None:
     from rich.table import Table
 
     table = Table(title="Stress cases", title_justify="left")
-    for name in ("case", "what", "status", "checks", "largest error", "allowed", "s"):
-        table.add_column(name, justify="left" if name in ("case", "what", "status") else "right")
+    for name in ("case", "what", "status", "checks", "error", "allowed", "s"):
+        left = name in ("case", "what", "status")
+        table.add_column(name, justify="left" if left else "right", no_wrap=name != "what")
     colours = {"ok": "green", "flagged": "cyan", "WRONG": "bold red", "not run": "yellow"}
     for outcome in report.outcomes:
         worst, status = outcome.worst, outcome.status.value

@@ -16,9 +16,9 @@ _PUBLIC = {
     "Outcome": "running",
     "Status": "checks",
     "StressReport": "running",
-    "cases": "catalogue",
     "run_case": "running",
     "run_stress": "running",
+    "stress_cases": "catalogue",
 }
 
 __all__ = sorted(_PUBLIC)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from graphsynth.accuracy.stress.checks import Checks
 
-__all__ = ["PAGES", "Case", "cases"]
+__all__ = ["PAGES", "Case", "stress_cases"]
 
 #: First word of a name -> title of the page.
 PAGES = {
@@ -188,7 +188,7 @@ _STRUCTURE = _rows(
 CASES = (*_LAMBDA, *_PLATFORM, *_INSTRUMENTS, *_STRUCTURE)
 
 
-def cases(names: Iterable[str] = (), *, slow: bool = True) -> tuple[Case, ...]:
+def stress_cases(names: Iterable[str] = (), *, slow: bool = True) -> tuple[Case, ...]:
     """Return the cases whose names are given, or that lie under a given page or section, in the order of the list.
 
     Parameters
@@ -206,13 +206,13 @@ def cases(names: Iterable[str] = (), *, slow: bool = True) -> tuple[Case, ...]:
 
     Examples
     --------
-    >>> [case.name for case in cases(["structure-2"])]
+    >>> [case.name for case in stress_cases(["structure-2"])]
     ['structure-2.1', 'structure-2.2', 'structure-2.3']
     """
     wanted = list(names)
     for name in wanted:
         if not any(_under(case.name, name) for case in CASES):
-            near = get_close_matches(name, [case.name for case in CASES], n=3, cutoff=0.4)
+            near = get_close_matches(name, [*PAGES, *(case.name for case in CASES)], n=2)
             advice = f"did you mean {' or '.join(near)}?" if near else f"pages are {', '.join(PAGES)}"
             raise SpecError(f"no stress case is called {name!r}; {advice} (`graphsynth stress --list` shows all)")
     return tuple(

@@ -153,7 +153,11 @@ class Checks:
         for k, (found, wanted) in enumerate(zip_longest(given, right, fillvalue=missing)):
             name = f"{what} [{k}]"
             if found is missing or wanted is missing:
-                self.says(name, "missing" if found is missing else _text(found), "nothing" if wanted is missing else _text(wanted))
+                self.says(
+                    name,
+                    "missing" if found is missing else _text(found),
+                    "nothing" if wanted is missing else _text(wanted),
+                )
             else:
                 self.value(name, found, wanted, relative=relative, absolute=absolute, source=source)
 
@@ -165,9 +169,7 @@ class Checks:
         """Require a report: a status, a verdict, a count, a flag, equal to what is right."""
         good = bool(given == right)
         status = Status.FLAGGED if good else Status.WRONG
-        self.rows.append(
-            Check(what, _text(right), _text(given), source or self.source, math.nan, math.nan, status)
-        )
+        self.rows.append(Check(what, _text(right), _text(given), source or self.source, math.nan, math.nan, status))
 
     def agrees(self, what: str, good: object, given: Any = "", right: str = "yes", *, source: str = "") -> None:
         """Require a statement to hold; ``given`` shows what was found."""
@@ -194,9 +196,7 @@ class Checks:
             self.mentions(what, text, *words, source=source)
         else:
             given = f"no refusal but {type(found).__name__}"
-            self.rows.append(
-                Check(what, "a refusal", given, source or self.source, math.nan, math.nan, Status.WRONG)
-            )
+            self.rows.append(Check(what, "a refusal", given, source or self.source, math.nan, math.nan, Status.WRONG))
 
 
 def _as_float(value: Any) -> float:

@@ -22,14 +22,16 @@ _CSS = """
 @media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#9aa7b4;--paper:#12181f;--card:#1a222b;--rule:#323d48;
 --good:#3ecf9f;--told:#69b3ff;--bad:#ff8a80;--none:#e0b050}}
 *{box-sizing:border-box}
-body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+body{margin:0;background:var(--paper);color:var(--ink)}
+body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
 main{max-width:66rem;margin:0 auto;padding:1.25rem 1rem 3rem}
 h1{font-size:1.65rem;margin:.4rem 0}h2{font-size:1.2rem;margin:2rem 0 .5rem}
 p{margin:.4rem 0 .8rem;max-width:46rem}.soft{color:var(--soft);font-size:.875rem}
 .facts{display:flex;flex-wrap:wrap;gap:.6rem;margin:1rem 0;padding:0;list-style:none}
 .facts li{background:var(--card);border-radius:.5rem;padding:.5rem .9rem}.facts b{display:block;font-size:1.3rem}
 details{border-bottom:1px solid var(--rule);padding:.3rem 0}
-summary{display:grid;grid-template-columns:9.5rem 1fr 5rem 9rem 4rem;gap:.2rem .8rem;cursor:pointer;align-items:baseline}
+summary{display:grid;grid-template-columns:9.5rem 1fr 5rem 9rem 4rem;gap:.2rem .8rem;align-items:baseline}
+summary{cursor:pointer}
 summary::-webkit-details-marker{display:none}summary{list-style:none}
 summary span:nth-child(n+4){text-align:right;font-variant-numeric:tabular-nums;color:var(--soft);font-size:.875rem}
 .ok{color:var(--good)}.flagged{color:var(--told)}.WRONG{color:var(--bad);font-weight:700}.not-run{color:var(--none)}
@@ -61,9 +63,9 @@ def stress_html(report: StressReport) -> str:
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
         f"<title>Stress cases</title><style>{_CSS}</style></head><body><main><h1>Stress cases</h1>"
         f"<p>{escape(report.statement)}</p>"
-        + "<p>Each case compares what the library gives with what is right: a printed value, a closed form, many digits."
-        " <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: the situation is extreme, and the library"
-        " reports it as it must. <b>WRONG</b>: neither. Open a case to see its comparisons.</p>"
+        + "<p>Each case compares what the library gives with what is right: a printed value, a closed form, many "
+        "digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: the situation is extreme, and "
+        "the library reports it as it must. <b>WRONG</b>: neither. Open a case to see its comparisons.</p>"
         + (f"<p>Left out because they are slow: {escape(left)}.</p>" if left else "")
         + f'<ul class="facts">{facts}<li><b>{report.seconds:.0f} s</b>run time</li></ul>'
         + "".join(pages)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.accuracy.stress.catalogue import PAGES, Case, cases
+from graphsynth.accuracy.stress.catalogue import PAGES, Case, stress_cases
 from graphsynth.accuracy.stress.checks import SEVERITY, Check, Checks, Status
 from graphsynth.errors import GraphsynthError
 
@@ -33,6 +33,8 @@ class Outcome:
         Wall time, with imports and compilation if they came first here.
     reason : str
         Why the case did not end, or did not run; empty if it ended.
+    missing : bool
+        It did not end because an extra of the package is not installed.
     """
 
     case: Case
@@ -43,12 +45,11 @@ class Outcome:
 
     @property
     def status(self) -> Status:
-        """The worst status of the checks; WRONG if there are none or the case did not end."""
-        if self.missing:
+        """The worst status of the checks; WRONG if there are none or the case did not end, unless an extra is missing."""
+        worst = max((check.status for check in self.checks), key=SEVERITY.index, default=Status.OK)
+        if self.missing and worst is not Status.WRONG:
             return Status.NOT_RUN
-        if self.reason or not self.checks:
-            return Status.WRONG
-        return max((check.status for check in self.checks), key=SEVERITY.index)
+        return Status.WRONG if self.reason or not self.checks else worst
 
     @property
     def worst(self) -> Check | None:
@@ -126,9 +127,7 @@ class StressReport:
             head = [o.case.name, o.case.title, o.status.value, o.seconds]
             if o.reason:
                 rows.append([*head, "the case itself", "it ends", o.reason, "", math.nan, math.nan, o.status.value])
-            rows += [
-                [*head, c.what, c.right, c.given, c.source, c.error, c.bound, c.status.value] for c in o.checks
-            ]
+            rows += [[*head, c.what, c.right, c.given, c.source, c.error, c.bound, c.status.value] for c in o.checks]
         return pd.DataFrame(rows, columns=columns)
 
     def summary(self) -> dict[str, Any]:
@@ -161,7 +160,7 @@ def run_case(case: Case) -> Outcome:
             warnings.simplefilter("ignore")
             case.load()(checks)
     except GraphsynthError as error:
-        missing = "pip install" in str(error) and not checks.rows
+        missing = "pip install" in str(error)
         reason = f"{type(error).__name__}: {error}"
     except Exception as error:  # a defect of the library is a result of a stress run, not its end
         reason = f"{type(error).__name__}: {error}"
@@ -176,7 +175,7 @@ def run_stress(
     Parameters
     ----------
     names : iterable of str
-        See `cases`; none: all.
+        See `stress_cases`; none: all.
     slow : bool
         With False, slow cases are left out, and listed in ``left_out``.
     progress : callable, optional
@@ -199,8 +198,8 @@ def run_stress(
     '1 stress cases with 8 checks: 0 ok, 1 flagged, 0 WRONG.'
     """
     names = list(names)
-    chosen = cases(names, slow=slow)
-    left_out = tuple(case for case in cases(names) if case not in chosen)
+    chosen = stress_cases(names, slow=slow)
+    left_out = tuple(case for case in stress_cases(names) if case not in chosen)
     start, outcomes = perf_counter(), []
     for k, case in enumerate(chosen):
         if progress is not None:

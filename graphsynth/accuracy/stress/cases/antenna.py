@@ -23,10 +23,12 @@ def _antenna(**lengths: Any) -> Any:
 
 
 def singular_chart(check: Checks) -> None:
-    """The printed equations at rest: rank 11 of 12, the coordinates are named, the regular ones are used."""
+    """Equations as printed, at rest: rank 11 of 12, the coordinates are named, the regular ones are used."""
     art = _antenna()
     report = art.check_chart(0.0, 0.0, "printed")
-    check.says("rank of the printed chart, and of the other", (report.rank, report.other_rank), (11, 12), source="section 2.4")
+    check.says(
+        "rank of the printed chart, and of the other", (report.rank, report.other_rank), (11, 12), source="section 2.4"
+    )
     check.says("verdict", report.verdict, "coordinates singular, mechanism regular")
     check.says("chart to use", report.use, "corrected")
     for chart, scaled, largest, smallest in (
@@ -50,7 +52,11 @@ def false_roots(check: Checks) -> None:
     survey = art.survey_roots(0.3, -0.2, starts=80, seed=1)
     total = survey.failed + survey.false + survey.genuine
     check.says("failed, false and genuine ones together", total, 80)
-    check.agrees("false roots are met and rejected", survey.false > 4 * survey.genuine > 0, f"{survey.false} false, {survey.genuine} genuine")
+    check.agrees(
+        "false roots are met and rejected",
+        survey.false > 4 * survey.genuine > 0,
+        f"{survey.false} false, {survey.genuine} genuine",
+    )
     for a, b in survey.modes:
         gap = min(_gap(art, float(a), float(b), 0.3, -0.2))
         check.below("a genuine root closes both legs", gap, 1e-10, source="distances of the rods")
@@ -75,7 +81,12 @@ def all_modes(check: Checks) -> None:
         lengths, (phi_x, phi_y) = random.uniform(0.3, 1.5, 5), random.uniform(-np.pi, np.pi, 2)
         mechanism = _antenna(**dict(zip(("l1", "l2", "l3", "l4", "l5"), lengths.tolist())))
         modes = mechanism.solve(phi_x, phi_y)
-        check.says(f"random pose {k}: modes", int(modes.count), _count(lengths, phi_x, phi_y, grid), source="grid of both loops")
+        check.says(
+            f"random pose {k}: modes",
+            int(modes.count),
+            _count(lengths, phi_x, phi_y, grid),
+            source="grid of both loops",
+        )
         for a, b in zip(modes.a, modes.b):
             if math.isfinite(a):
                 check.below(f"random pose {k}: rods", _gap(mechanism, float(a), float(b), phi_x, phi_y)[0], 2e-14)
@@ -109,7 +120,9 @@ def fold(check: Checks) -> None:
         check.says("fold", None, "one")
         return
     source = "section 2.9"
-    check.value("fold, degrees", math.degrees(met.parameter), "69.3946276048996534091046747766", absolute=3e-14, source=source)
+    check.value(
+        "fold, degrees", math.degrees(met.parameter), "69.3946276048996534091046747766", absolute=3e-14, source=source
+    )
     check.value("output there, degrees", math.degrees(met.a), "150.57815542480929740846", absolute=2e-13, source=source)
     check.value("square-root coefficient", met.coefficient, "2.8694330080943580814", relative=1e-14, source=source)
     check.says("leg and modes that merge", (met.leg, met.merging), ("Y", ((1, -1), (-1, -1))))
@@ -148,7 +161,9 @@ def approach(check: Checks) -> None:
                 angle = mp.atan2(B, A) + side * mp.acos(C / mp.hypot(A, B))
                 right.append(angle - 2 * mp.pi * mp.nint(angle / (2 * mp.pi)))
         right.sort()
-    check.values("their crank angles", sorted(f.phi_y for f in folds), right, absolute=2e-15, source="closed form of 2.7")
+    check.values(
+        "their crank angles", sorted(f.phi_y for f in folds), right, absolute=2e-15, source="closed form of 2.7"
+    )
     distances = 10.0 ** -np.arange(3.0, 21.0)
     for k, one in enumerate(folds):
         inside = one.phi_y + 0.001 * one.side
@@ -158,10 +173,14 @@ def approach(check: Checks) -> None:
             continue
         own = stretched.folds("X", other)[k]
         found = stretched.approach(own, distances)
-        check.below(f"fold {k}: error of the compensated form", float(found.compensated_error.max()), 4e-15, source="60 digits")
+        check.below(
+            f"fold {k}: error of the compensated form", float(found.compensated_error.max()), 4e-15, source="60 digits"
+        )
         seen = np.isfinite(found.plain_error)
         explained = bool((found.plain_error[seen] <= found.predicted_error[seen]).all())
-        check.agrees(f"fold {k}: plain error within the square-root law", explained, f"{found.plain_error[seen].max():.1e}")
+        check.agrees(
+            f"fold {k}: plain error within the square-root law", explained, f"{found.plain_error[seen].max():.1e}"
+        )
         near = np.abs(found.series / found.exact - 1.0)
         check.agrees(f"fold {k}: series of first order", bool((near < 5.0 * np.sqrt(distances) + 1e-14).all()))
 
@@ -195,7 +214,7 @@ def _bend(mechanism: Any, leg: str, p: Any) -> float:
 
 
 def tolerance_at_fold(check: Checks) -> None:
-    """A box of lengths that touches a fold: undecided, with the length; never certified when a corner fails."""
+    """Box of lengths that touches a fold: undecided, with the length; never certified when a corner fails."""
     parallelogram = _antenna(l3=0.1, l5=0.1)
     near = parallelogram.tolerance(math.radians(69.3), math.radians(69.3))
     check.says("status", near.status.name, "UNDECIDED")

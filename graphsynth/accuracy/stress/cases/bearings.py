@@ -1,4 +1,4 @@
-"""Bearings at the end of their range: no clearance, press fit, disc, never critical, steep (lambda page, 12.6 to 12.10)."""
+"""Bearings at the end of their range: no clearance, press fit, disc, steep tilt (lambda page, 12.6 to 12.10)."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def never_critical(check: Checks) -> None:
 
 
 def disc(check: Checks) -> None:
-    """A plate without height: A never jams, B at ``arccos(R/Rh)``."""
+    """Plate without height: A never jams, B at ``arccos(R/Rh)``."""
     import mpmath as mp
 
     from graphsynth.jamming import Bearing, assess_jamming
@@ -101,7 +101,7 @@ def disc(check: Checks) -> None:
 
 
 def steep_lid(check: Checks) -> None:
-    """The ellipse E4 vanishes: it is a jam, E4 is refused, the areas stay right up to the whole disc."""
+    """Ellipse E4 vanishes: it is a jam, E4 is refused, the areas stay right up to the whole disc."""
     import mpmath as mp
 
     from graphsynth.jamming import Bearing

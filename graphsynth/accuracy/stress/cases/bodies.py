@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from graphsynth.accuracy.stress.cases.linkages import four_bar
+from graphsynth.accuracy.stress.cases.linkages import built, four_bar, wheel
 
 if TYPE_CHECKING:
     from graphsynth.accuracy.stress.checks import Checks
@@ -33,7 +33,6 @@ def _slider_crank(shift: float | None = None) -> Any:
     """G3 of section 5.9, with a second guide shifted sideways if asked for."""
     from graphsynth.dynamics import Body, DynamicModel, Spring
     from graphsynth.mechanism.joints import Prismatic, Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
@@ -41,7 +40,7 @@ def _slider_crank(shift: float | None = None) -> Any:
     spring = Spring(0, 3, (0.0, 0.02), stiffness=300.0, free_length=0.35, damping=4.0)
     more = {} if shift is None else {"additional": [Prismatic(0, 3, (0.0, 0.02 + shift))]}
     bodies = {1: _bar(0.2, 0.1), 2: _bar(0.5, 0.3), 3: Body(0.8, 1e-3)}
-    return DynamicModel(Mechanism(graph, joints, [Driver(0, 1)]), bodies, [spring], **more)
+    return DynamicModel(built(graph, joints), bodies, [spring], **more)
 
 
 #: Flat pose of the four-bar of section 4.8.
@@ -56,7 +55,7 @@ def _flat_model() -> Any:
 
 
 def starts(check: Checks) -> None:
-    """The table of section 5.6: redundant, violated, singular, contradicting."""
+    """Table of section 5.6: redundant, violated, singular, contradicting."""
     from graphsynth.dynamics import consistent_start, simulate_dynamics
 
     at = {"keep": {(0, 1): 0.5}, "keep_rates": {(0, 1): 15.0}, "modes": {0: 1}}
@@ -68,23 +67,35 @@ def starts(check: Checks) -> None:
         simulate_dynamics(m, [0.0, 0.25], start=consistent_start(m, **at), form="constrained", rtol=1e-12)
         for m in (_slider_crank(), _slider_crank(0.0))
     ]
-    check.value("second guide: theta(0.25)", ends[1].poses[-1, 1, 2], "0.9331749819915449920", absolute=1e-10, source="section 5.9")
+    check.value(
+        "second guide: theta(0.25)",
+        ends[1].poses[-1, 1, 2],
+        "0.9331749819915449920",
+        absolute=1e-10,
+        source="section 5.9",
+    )
     check.below("second guide: same motion", float(np.abs(ends[0].poses - ends[1].poses).max()), 1e-10)
     shifted = consistent_start(_slider_crank(1e-4), **at)
     check.says("shifted by 0.1 mm: status", shifted.status, "violated")
     residuals = sorted(abs(v) for name, v in shifted.violated.items() if "normal" in name)
     check.values("shifted: residuals, m", residuals, ["5e-5", "5e-5"], relative=1e-9)
-    check.refused("shifted: no motion", lambda: simulate_dynamics(_slider_crank(1e-4), [0.0, 1.0], **at), "do not close")
+    check.refused(
+        "shifted: no motion", lambda: simulate_dynamics(_slider_crank(1e-4), [0.0, 1.0], **at), "do not close"
+    )
     flat = consistent_start(_flat_model(), pose=FLAT)
-    given = (flat.rank, flat.nearby_rank, flat.freedom, flat.pose_class, flat.tangents.kind)
-    check.says("flat four-bar", given, (7, 8, 2, "singular", "change point"))
+    found = (flat.rank, flat.nearby_rank, flat.freedom, flat.pose_class, flat.tangents.kind)
+    check.says("flat four-bar", found, (7, 8, 2, "singular", "change point"))
     ratios = sorted((m[2, 2] / m[1, 2], m[3, 2] / m[1, 2]) for m in flat.tangents.motions)
     root = math.sqrt(5.0)
     right = sorted([((5 - 3 * root) / 20, (1 + root) / 4), ((5 + 3 * root) / 20, (1 - root) / 4)])
-    check.values("flat: ratios of both branches", [v for r in ratios for v in r], [v for r in right for v in r], absolute=1e-9)
+    check.values(
+        "flat: ratios of both branches", [v for r in ratios for v in r], [v for r in right for v in r], absolute=1e-9
+    )
     bad = consistent_start(_g1(), keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0, (0, 3): 5.0}, modes={0: 1})
     check.says("contradicting rates: status, rank", (bad.status, bad.rank), ("contradicting rates", 8))
-    check.agrees("contradicting rates: rows named", {"kept (0, 1)", "kept (0, 3)"} <= set(bad.violated), str(list(bad.violated)))
+    check.agrees(
+        "contradicting rates: rows named", {"kept (0, 1)", "kept (0, 3)"} <= set(bad.violated), str(list(bad.violated))
+    )
 
 
 def singular_passage(check: Checks) -> None:
@@ -104,11 +115,18 @@ def singular_passage(check: Checks) -> None:
         ends.append(motion)
     motion = ends[0]
     passed = [event for event in motion.events if event.kind == "singular pose"]
-    check.values("times of the flat poses", [e.time for e in passed], [(k * math.pi - 1.0) / 3.0 for k in (1, 2, 3)], absolute=1e-6)
+    check.values(
+        "times of the flat poses",
+        [e.time for e in passed],
+        [(k * math.pi - 1.0) / 3.0 for k in (1, 2, 3)],
+        absolute=1e-6,
+    )
     check.agrees("both branches are named", all("two branches meet" in e.statement for e in passed))
     # no force in the plane: the crank turns at constant speed, the coupler does not turn
     check.below("angle of the coupler", float(np.abs(motion.poses[:, 2, 2]).max()), 1e-7, source="closed form")
-    check.below("crank", float(np.abs(motion.poses[:, 1, 2] - (1.0 + 3.0 * motion.times)).max()), 1e-7, source="closed form")
+    check.below(
+        "crank", float(np.abs(motion.poses[:, 1, 2] - (1.0 + 3.0 * motion.times)).max()), 1e-7, source="closed form"
+    )
     apart = float(np.abs(ends[1].poses[:, 1:, 2] - motion.poses[:, 1:, 2]).max())
     check.below("1e-9 at the start changes the end by", apart, 1e-6)
     _rest_at_a_change_point(check)
@@ -123,7 +141,9 @@ def _rest_at_a_change_point(check: Checks) -> None:
     motion = simulate_dynamics(model, np.linspace(0.0, 0.05, 6), start=consistent_start(model, pose=FLAT))
     check.says("rest at a change point: status", motion.status, "failed")
     check.agrees("its reason", bool(motion.message), motion.message)
-    check.agrees("no pose beyond, few steps", bool(np.isnan(motion.poses[-1]).all()) and motion.steps < 2000, str(motion.steps))
+    check.agrees(
+        "no pose beyond, few steps", bool(np.isnan(motion.poses[-1]).all()) and motion.steps < 2000, str(motion.steps)
+    )
 
 
 def massless(check: Checks) -> None:
@@ -135,7 +155,11 @@ def massless(check: Checks) -> None:
     at = {"keep": {(0, 1): 0.0}, "keep_rates": {(0, 1): 10.0}, "modes": {0: 1}}
     limit = simulate_dynamics(_g1(bodies=none), [0.0, 1.0], form="minimal", **at)
     near = simulate_dynamics(_g1(bodies=light), [0.0, 1.0], form="constrained", **at)
-    check.agrees("completed, with its condition number", near.completed and near.start.condition < 1e3, f"{near.start.condition:.3g}")
+    check.agrees(
+        "completed, with its condition number",
+        near.completed and near.start.condition < 1e3,
+        f"{near.start.condition:.3g}",
+    )
     gap = float(np.abs(near.poses[-1] - limit.poses[-1]).max())
     check.below("distance to the massless limit", gap, 1e-7, source="minimal form")
     check.below("d'Alembert", near.checks.dalembert, 1e-9)
@@ -146,19 +170,19 @@ def massless(check: Checks) -> None:
 
 
 def train_ratio(check: Checks) -> None:
-    """A ratio of 1000: reflected inertia, both formulations, energy."""
+    """Ratio of 1000: reflected inertia, both formulations, energy."""
     from graphsynth.dynamics import TorqueSource, effective_inertia, simulate_dynamics
 
     G, Jm = 1e3, 8.2e-6
     model = _g1(elements=[TorqueSource(0, 1, 1e-3, G, rotor_inertia=Jm)])
     at = {"keep": {(0, 1): 0.0}, "modes": {0: 1}}
     one, two = (simulate_dynamics(model, np.linspace(0.0, 1.0, 5), form=f, **at) for f in ("constrained", "minimal"))
-    check.below("two formulations, poses", float(np.abs(one.poses - two.poses).max()), 1e-8, source="second formulation")
+    check.below(
+        "two formulations, poses", float(np.abs(one.poses - two.poses).max()), 1e-8, source="second formulation"
+    )
     check.below("energy", one.checks.energy, 1e-9)
     check.below("accelerations of the second form", one.checks.second_form, 1e-9)
-    plain, geared = (
-        effective_inertia(m, np.linspace(0.0, 6.0, 7), modes={0: 1}).inertia for m in (_g1(), model)
-    )
+    plain, geared = (effective_inertia(m, np.linspace(0.0, 6.0, 7), modes={0: 1}).inertia for m in (_g1(), model))
     # a sum: the smaller term keeps its absolute accuracy
     check.values("J with the train, less J without", geared - plain, ["8.2"] * 7, absolute=4e-15, source="G^2 Jm")
 
@@ -180,19 +204,17 @@ def long_run(check: Checks) -> None:
 
 
 def pulse(check: Checks) -> None:
-    """A torque of a microsecond: the impulse arrives whole, and its edges are events."""
+    """Torque of a microsecond: the impulse arrives whole, and its edges are events."""
     from graphsynth.dynamics import Body, DynamicModel, Pulse, Torque, simulate_dynamics
-    from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism
-    from graphsynth.structure.graph import MechanismGraph
 
-    wheel = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     shock = Torque(0, 1, Pulse(0.1, 1e-6, 5e4))
-    model = DynamicModel(wheel, {1: Body(1.0, 0.2)}, [shock], (0.0, 0.0))
+    model = DynamicModel(wheel(), {1: Body(1.0, 0.2)}, [shock], (0.0, 0.0))
     motion = simulate_dynamics(model, [0.0, 0.05, 0.2], keep={(0, 1): 0.0})
     # the double nearest to 0.1 + 1e-6 gives a pulse that is longer by up to 1.4e-17 s
     right = [0, 0, "0.25"]
-    check.values("speed before, before and after", motion.velocities[:, 1, 2], right, relative=1e-9, source="impulse / inertia")
+    check.values(
+        "speed before, before and after", motion.velocities[:, 1, 2], right, relative=1e-9, source="impulse / inertia"
+    )
     check.says("events", [event.kind for event in motion.events], ["break", "break"])
     check.below("energy", motion.checks.energy, 1e-9)
     hit = simulate_dynamics(_g1(elements=[shock]), [0.0, 0.05, 0.15], keep={(0, 1): 0.0}, modes={0: 1}, rtol=1e-11)
@@ -200,15 +222,11 @@ def pulse(check: Checks) -> None:
 
 
 def rotor(check: Checks) -> None:
-    """A coordinate that grows without bound under implicit solvers: no NaN, the closed form to tolerance."""
+    """Coordinate that grows without bound under implicit solvers: no NaN, the closed form to tolerance."""
     from graphsynth.dynamics import Body, DynamicModel, Torque, simulate_dynamics
-    from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism
-    from graphsynth.structure.graph import MechanismGraph
 
-    wheel = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     drag = Torque(0, 1, lambda t, angle, speed: 1.0 - 0.01 * speed)
-    model = DynamicModel(wheel, {1: Body(1.0, 0.1)}, [drag], (0.0, 0.0))
+    model = DynamicModel(wheel(), {1: Body(1.0, 0.1)}, [drag], (0.0, 0.0))
     # J w' = 1 - 0.01 w
     speed = 100.0 * (1.0 - math.exp(-0.1 * 50.0))
     angle = 100.0 * 50.0 - 1000.0 * (1.0 - math.exp(-0.1 * 50.0))

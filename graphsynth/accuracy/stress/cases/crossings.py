@@ -15,7 +15,7 @@ B90 = "17.4617879639289313590283215334"
 
 
 def _hull(check: Checks, what: str, problem: object, expected: str) -> None:
-    """The bounds lie outside of the printed ones, by two units in the last place at most."""
+    """Bounds lie outside of the printed ones, by two units in the last place at most."""
     from graphsynth.jamming.circle_ellipse import exact_hull
 
     found = exact_hull(problem)  # type: ignore[arg-type]
@@ -30,7 +30,7 @@ def _hull(check: Checks, what: str, problem: object, expected: str) -> None:
 
 
 def coincident(check: Checks) -> None:
-    """The whole circle solves: hull ``[0, R1]^2``, UNDECIDED, with the reason."""
+    """Whole circle solves: hull ``[0, R1]^2``, UNDECIDED, with the reason."""
     from graphsynth.intervals import Status
     from graphsynth.jamming.circle_ellipse import Reason, circle_ellipse, exact_hull, krawczyk_boxes
 
@@ -117,7 +117,10 @@ def near_circular(check: Checks) -> None:
         check.value(f"1e-{power}: crescent", given, area, relative=8e-15, source="80 digits")
         proved = enclose_crescents("1", f"1e-{power}", f"1e-{power}")
         low, high = float(proved.ellipse_only.lo), float(proved.ellipse_only.hi)
-        check.agrees(f"1e-{power}: crescent enclosed", low <= area * (1 + mp.mpf(10) ** -15) and high >= area * (1 - mp.mpf(10) ** -15))
+        check.agrees(
+            f"1e-{power}: crescent enclosed",
+            low <= area * (1 + mp.mpf(10) ** -15) and high >= area * (1 - mp.mpf(10) ** -15),
+        )
         check.below(f"1e-{power}: width of the enclosure", (high - low) / high, 1e-10)
 
 
@@ -135,7 +138,7 @@ def clipped(check: Checks) -> None:
 
 
 def wide_tolerances(check: Checks) -> None:
-    """The lower bounds of level or circle vanish: the parallelogram is clipped, by exact fractions here."""
+    """Lower bounds of level or circle vanish: the parallelogram is clipped, by exact fractions here."""
     from graphsynth.intervals import Status
     from graphsynth.jamming.circle_ellipse import circle_ellipse, exact_hull
 
@@ -169,7 +172,7 @@ def _clip(R1: Fraction, a: Fraction, b: Fraction, e1: Fraction, e2: Fraction) ->
 
 
 def printed_hulls(check: Checks) -> None:
-    """The table of section 14.5, and the second problem there."""
+    """Table of section 14.5, and the second problem there."""
     from graphsynth.jamming.circle_ellipse import circle_ellipse
 
     x0, y0 = "13.11490802879096276551727", "11.58659515976778845911871"
@@ -211,7 +214,9 @@ def _parabola(check: Checks) -> None:
     )
     for name, k, low, high in exact_range:
         lo, hi = Fraction(float(found.box.lo[k])), Fraction(float(found.box.hi[k]))
-        check.agrees(f"{name} is enclosed", lo <= Fraction(low) and hi >= Fraction(high), f"[{float(lo):.6f}, {float(hi):.6f}]")
+        check.agrees(
+            f"{name} is enclosed", lo <= Fraction(low) and hi >= Fraction(high), f"[{float(lo):.6f}, {float(hi):.6f}]"
+        )
     point = krawczyk(system, ["[0.5, 0.75]", "[0.7, 0.87]"], ["0"], rounds=30)
     for k, right in enumerate(("0.6180339887498948482045868", "0.7861513777574232860695586")):
         check.value(f"d = 0: unknown {k}", float(point.box.mid[k]), right, absolute=1e-14)

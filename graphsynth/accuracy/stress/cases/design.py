@@ -1,6 +1,7 @@
 """Inverse design at its ends: too large, equal distances, identical poses (platform page, 12.21 to 12.23)."""
 
 from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,7 +38,7 @@ def equal_distances(check: Checks) -> None:
     machine = SingleMotorPlatform()
     platform, first = machine.platform, np.array([1.0, 0.5, 0.01])
     theta = platform.inverse(first, (-1, -1, -1)).theta
-    modes = platform.direct(theta + [0.0, 0.03, -0.02]).poses
+    modes = platform.direct(theta + np.array([0.0, 0.03, -0.02])).poses
     second = modes[np.linalg.norm(modes * [1, 1, 45] - first * [1, 1, 45], axis=1).argmin()]
     found = two_pose_design(machine, first, second)
     check.agrees("a mechanism is designed", found.mechanism is not None, found.reason or "yes")
@@ -45,8 +46,12 @@ def equal_distances(check: Checks) -> None:
         return
     # two inverse problems leave some units in the last place of the 45 mm coupler
     check.below("crank of leg 1, mm", found.mechanism.crank[0], 3e-14)
-    check.agrees("cranks of legs 2 and 3 are not zero", min(found.mechanism.crank[1:]) > 0.1, str(found.mechanism.crank))
-    check.says("leg 1 is noted where its crank is 0", any("leg 1" in n for n in found.notes), found.mechanism.crank[0] == 0)
+    check.agrees(
+        "cranks of legs 2 and 3 are not zero", min(found.mechanism.crank[1:]) > 0.1, str(found.mechanism.crank)
+    )
+    check.says(
+        "leg 1 is noted where its crank is 0", any("leg 1" in n for n in found.notes), found.mechanism.crank[0] == 0
+    )
     check.below("first pose", found.first_error, 1e-12)
     exact = two_pose_design(machine, first, first)
     check.mentions("distances exactly equal", "; ".join(exact.notes), "leg 1", "leg 2", "leg 3", "crank length is 0")

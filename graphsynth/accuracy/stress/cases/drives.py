@@ -1,4 +1,4 @@
-"""Drives of the platform: limited, change point, zero cranks, singular turn, open path (platform page, 12.16 to 12.20)."""
+"""Drives of the platform: limited, change point, zero cranks, singular turn (platform page, 12.16 to 12.20)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SINGULAR_CRANK = 26.31476703290850701359410874596422888417
 
 
 def limited(check: Checks) -> None:
-    """A crank that cannot turn: intervals of psi from the reach condition, an event, nothing beyond."""
+    """Crank that cannot turn: intervals of psi from the reach condition, an event, nothing beyond."""
     import mpmath as mp
 
     from graphsynth.kinematics.drive import FourBarDrive
@@ -39,7 +39,9 @@ def limited(check: Checks) -> None:
     start, stop = turn.admissible[0]
     check.value("length of the interval", stop - start, ends[1] - ends[0], absolute=4e-15, source="closed form of 7.4")
     with mp.workdps(30):
-        check.below("its start", abs(float(mp.arg(mp.expj(mp.mpf(start) - ends[0])))), 4e-15, source="closed form of 7.4")
+        check.below(
+            "its start", abs(float(mp.arg(mp.expj(mp.mpf(start) - ends[0])))), 4e-15, source="closed form of 7.4"
+        )
     motion = SingleMotorPlatform(crank=(31,) * 3).full_turn(samples=73)
     check.says("full turn complete", motion.complete, False)
     event = motion.events[-1]
@@ -103,7 +105,10 @@ def singular_turn(check: Checks) -> None:
         start = float(machine.drives[0].motion(event.psi).phi)
         home = float(SingleMotorPlatform(crank=(0, 0, 0)).drives[0].motion(0.0).phi)
         check.value(
-            f"{offset:g} above: rocker rotation", start - home, "-0.4772186450164019269814725994157600429792", absolute=1e-9
+            f"{offset:g} above: rocker rotation",
+            start - home,
+            "-0.4772186450164019269814725994157600429792",
+            absolute=1e-9,
         )
         check.mentions(f"{offset:g} above: sentence", motion.stop_reason(), "merge")
         check.agrees(f"{offset:g} above: nothing beyond", motion.psi[-1] < event.psi)
@@ -113,7 +118,7 @@ def singular_turn(check: Checks) -> None:
 
 
 def _cusped() -> SingleMotorPlatform:
-    """A platform two of whose modes change places in a turn, without a singularity."""
+    """Platform two of whose modes change places in a turn, without a singularity."""
     from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 
     twelfth, pivot = math.pi / 6, (-0.5 + 1.5j, -0.6 + 0.4j, 1.4 - 0.2j)

@@ -31,10 +31,15 @@ def change_point(check: Checks) -> None:
             what = f"1e-{power} before, branch {branch:+d}"
             check.value(f"{what}: k2", float(state.k2), k2, relative=5e-15, source="50 digits")
             check.value(f"{what}: k3", float(state.k3), k3, relative=5e-15, source="50 digits")
-    printed = (("1e-2", "-0.0854119493071495", "0.809013005595906"), ("1e-9", "-0.0854101966249685", "0.809016994374947"))
+    printed = (
+        ("1e-2", "-0.0854119493071495", "0.809013005595906"),
+        ("1e-9", "-0.0854101966249685", "0.809016994374947"),
+    )
     for distance, k2_text, k3_text in printed:
         state = bar.motion(math.pi - float(distance))
-        check.value(f"{distance}: k2 printed", float(state.k2), k2_text, absolute=6e-17, relative=1e-15, source="section 4.8")
+        check.value(
+            f"{distance}: k2 printed", float(state.k2), k2_text, absolute=6e-17, relative=1e-15, source="section 4.8"
+        )
         check.value(f"{distance}: k3 printed", float(state.k3), k3_text, relative=1e-15, source="section 4.8")
     points = bar.change_points()
     check.says("change points", len(points), 1)
@@ -43,8 +48,12 @@ def change_point(check: Checks) -> None:
         root = mp.sqrt(5)
         for branch in (1, -1):
             right = ((5 - branch * 3 * root) / 20, (1 + branch * root) / 4)
-            check.values(f"ratios of mode {branch:+d}", points[0].ratios[branch], right, relative=1e-14, source="section 4.8")
-    check.agrees("the tolerance of equality is stated", 0.0 < points[0].tolerance < 1e-15, f"{points[0].tolerance:.1e} m")
+            check.values(
+                f"ratios of mode {branch:+d}", points[0].ratios[branch], right, relative=1e-14, source="section 4.8"
+            )
+    check.agrees(
+        "the tolerance of equality is stated", 0.0 < points[0].tolerance < 1e-15, f"{points[0].tolerance:.1e} m"
+    )
     driven = Braider(linkage=bar).simulate(np.linspace(0.0, 0.6, 61), angle=2.5)
     check.says("driven through: status", driven.status.name, "CHANGE_POINT")
     check.mentions("driven through: reason", driven.reason, "choose the branch")
@@ -71,7 +80,7 @@ def _ratios(theta: float, branch: int) -> tuple[Any, Any]:
 
 
 def limited(check: Checks) -> None:
-    """A full turn asked of a crank that cannot: the arc with its ends, by every way in; no clipping."""
+    """Full turn asked of a crank that cannot: the arc with its ends, by every way in; no clipping."""
     import mpmath as mp
 
     from graphsynth.accuracy.stress.cases.linkages import four_bar
@@ -102,5 +111,7 @@ def limited(check: Checks) -> None:
     check.agrees("simulate: reason", bool(motion.reason), motion.reason)
     proof = certify_four_bar("0.06", "0.03", "0.03", "0.04")
     check.says("exact class", proof.kind, "limited")
-    held = any(float(limit.low) <= float(end) + 1e-15 and float(limit.high) >= float(end) - 1e-15 for limit in proof.limits)
+    held = any(
+        float(limit.low) <= float(end) + 1e-15 and float(limit.high) >= float(end) - 1e-15 for limit in proof.limits
+    )
     check.agrees("its end is enclosed", held, str(proof.limits[0]))

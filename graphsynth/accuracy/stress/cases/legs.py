@@ -1,8 +1,9 @@
-"""Legs of the platform: reach, boundary, degenerate lengths, ratios, units (platform page, 12.1 to 12.7, 12.31, 14.2)."""
+"""Legs of the platform: reach, boundary, lengths of zero, ratios, units (platform page, 12.1 to 12.7, 12.31, 14.2)."""
 
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,7 +67,7 @@ def printed_legs(check: Checks) -> None:
 
 
 def out_of_reach(check: Checks) -> None:
-    """A pose that some legs do not reach: NaN, status and deficit there, the others solved."""
+    """Pose that some legs do not reach: NaN, status and deficit there, the others solved."""
     from graphsynth.kinematics.leg import LegStatus
     from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
@@ -185,7 +186,8 @@ def half_turn(check: Checks) -> None:
             _compare(check, f"({l1}, {l2}, {u}, {v:.11g}), branch {sigma:+d}", found, _angle(l1, l2, u, v, sigma))
     g1 = ParallelPlatform.g1()
     # the same mechanism with the platform's frame turned by pi and back: vertices -b, orientation alpha + pi
-    turned = ParallelPlatform(g1.D, tuple(-b for b in g1.b), g1.l1, g1.l2)
+    one, two, three = g1.b
+    turned = ParallelPlatform(g1.D, (-one, -two, -three), g1.l1, g1.l2)
     alpha = 0.15
     theta = g1.inverse([1.2, 0.9, alpha], (1, 1, 1)).theta
     modes = turned.direct(theta)
@@ -208,12 +210,13 @@ def bad_lengths(check: Checks) -> None:
     from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
     g1 = ParallelPlatform.g1()
-    good = {"D": g1.D, "b": g1.b, "l1": g1.l1, "l2": g1.l2}
+    change: dict[str, Any]
+    good: dict[str, Any] = {"D": g1.D, "b": g1.b, "l1": g1.l1, "l2": g1.l2}
     for change, words in (
         ({"l1": (1, -1, 1)}, ("l1", "leg 2")), ({"l2": (1, 1, math.nan)}, ("l2", "leg 3")),
         ({"l1": (math.inf, 1, 1)}, ("l1", "leg 1")), ({"D": (0, math.inf, 1)}, ("leg 2",)), ({"b": (0, 1)}, ("three",)),
     ):  # fmt: skip
-        check.refused(f"{change}", lambda c=change: ParallelPlatform(**{**good, **c}), *words)
+        check.refused(f"{change}", partial(ParallelPlatform, **{**good, **change}), *words)
     check.refused("pose with NaN", lambda: g1.inverse([math.nan, 0, 0]), "nan")
 
 

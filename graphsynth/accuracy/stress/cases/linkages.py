@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["four_bar"]
+__all__ = ["built", "four_bar", "wheel"]
+
+
+def built(graph: MechanismGraph, joints: Iterable[Any], pose: Iterable[Any] | None = None) -> Mechanism:
+    """Mechanism with link 1 driven."""
+    from graphsynth.mechanism.model import Driver, Mechanism
+
+    placed = None if pose is None else tuple((float(x), float(y), float(theta)) for x, y, theta in pose)
+    return Mechanism(graph, tuple(joints), (Driver(0, 1),), pose=placed)
 
 
 def four_bar(crank: float, coupler: float, rocker: float, frame: float) -> Mechanism:
     """Four turning pairs, link 1 driven, the frame's second joint on +x."""
     from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
@@ -21,4 +30,12 @@ def four_bar(crank: float, coupler: float, rocker: float, frame: float) -> Mecha
         Revolute(0, 1), Revolute(1, 2, (crank, 0.0)), Revolute(2, 3, (coupler, 0.0), (rocker, 0.0)),
         Revolute(0, 3, (frame, 0.0)),
     ]  # fmt: skip
-    return Mechanism(graph, joints, [Driver(0, 1)])
+    return built(graph, joints)
+
+
+def wheel() -> Mechanism:
+    """One link that turns on the frame."""
+    from graphsynth.mechanism.joints import Revolute
+    from graphsynth.structure.graph import MechanismGraph
+
+    return built(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)])

@@ -55,7 +55,7 @@ def none(check: Checks) -> None:
 
 
 def type_two(check: Checks) -> None:
-    """Printed near-singular problems: both modes and a flag, in double precision and as proof."""
+    """Near-singular printed problems: both modes and a flag, in double precision and as proof."""
     from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
     g1 = ParallelPlatform.g1()
@@ -121,7 +121,7 @@ def _proved(check: Checks, eps: str, theta: tuple[str, ...], twin: str) -> None:
 
 
 def _count_for_doubles(theta: list[float]) -> int:
-    """Number of modes near the singular pose: closure of two legs, the third left over, extreme value at 60 digits."""
+    """Count the modes near the singular pose: closure of two legs, the third left over, extreme value at 60 digits."""
     import mpmath as mp
 
     from graphsynth.kinematics.parallel_platform import ParallelPlatform
@@ -156,8 +156,10 @@ def _exactly_singular(check: Checks) -> None:
 
     vertices, anchors = [(3, 4), (-5, 0), (4, -3)], [(6, 8), (-10, 0), (8, -6)]
     for name, shift, count in (
-        ("exactly", Fraction(0), 1), ("1e-30 shorter", Fraction(-1, 10**30), 0), ("1e-30 longer", Fraction(1, 10**30), 2),
-    ):  # fmt: skip
+        ("exactly", Fraction(0), 1),
+        ("1e-30 shorter", Fraction(-1, 10**30), 0),
+        ("1e-30 longer", Fraction(1, 10**30), 2),
+    ):
         proof = certify_assembly_modes(anchors, vertices, [5 + shift] * 3, cross_check=False)
         check.says(f"singular {name}: modes proved", (proof.certified, len(proof)), (True, count))
         if name == "exactly":
@@ -272,12 +274,13 @@ def collinear(check: Checks) -> None:
         check.below(f"{lengths}: closure", _opening(modes.poses, A, b, lengths), 1e-12)
         # a mirror image in the line is a mode too
         mirrored = np.sort(-modes.poses[:, 1])
-        check.below(f"{lengths}: mirror image", float(np.abs(mirrored - np.sort(modes.poses[:, 1])).max(initial=0.0)), 1e-11)
+        check.below(
+            f"{lengths}: mirror image", float(np.abs(mirrored - np.sort(modes.poses[:, 1])).max(initial=0.0)), 1e-11
+        )
     proof = certify_assembly_modes([(0, 0), (2, 0), (5, 0)], [(0, 0), (1, 0), ("1.8", 0)], [2, "1.5", "2.5"])
     check.says("proved", (proof.certified, len(proof)), (True, _count_by_grid(A, b, [2.0, 1.5, 2.5])))
     random = np.random.default_rng(5)
-    lengths = random.uniform(0.5, 4.0, (500, 3))
-    batch = assembly_modes_batch([A] * 500, b, lengths)
+    batch = assembly_modes_batch([A] * 500, b, random.uniform(0.5, 4.0, (500, 3)))
     check.agrees("500 random problems: at most four", batch.counts.max() <= 4, str(batch.counts.max()))
 
 

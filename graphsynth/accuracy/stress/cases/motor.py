@@ -1,4 +1,4 @@
-"""Motor of the platform: no inertia, reversal, stiff limits, closed form, long runs (platform page, 12.24 to 12.30, 14.8)."""
+"""Motor of the platform: no inertia, reversal, stiff limits, long runs (platform page, 12.24 to 12.30, 14.8)."""
 
 from __future__ import annotations
 
@@ -66,9 +66,7 @@ def small_inertia(check: Checks) -> None:
     """``J_0`` down to 1e-8 against printed states, to 1e-14 by the energy balance and the distance to model S."""
     for base, right in SMALL.items():
         found = _source(_motor(10.0, 1.0), base_inertia=base).simulate([0.0, 0.1, 0.2, 0.5], speed=1.0, rtol=1e-13)
-        for k, (name, given) in enumerate(
-            (("q", found.angle), ("w", found.speed), ("I", found.currents[:, 0]))
-        ):
+        for k, (name, given) in enumerate((("q", found.angle), ("w", found.speed), ("I", found.currents[:, 0]))):
             column = [row[k] for row in right]
             check.values(f"J_0 = {base:g}: {name}", given[1:], column, relative=3e-13)
         check.below(f"J_0 = {base:g}: energy balance", found.energy_error, 1e-13)
@@ -109,7 +107,7 @@ def no_inertia(check: Checks) -> None:
 
 
 def reversal(check: Checks) -> None:
-    """The kinetic energy reaches zero: events with time and angle, and the motion goes on through the reversal."""
+    """Kinetic energy reaches zero: events with time and angle, and the motion goes on through the reversal."""
     found = _source(_motor(1.0, 0.1), base_inertia=0.0).simulate(np.linspace(0.0, 1.0, 101), speed=1.0)
     stalls = [event for event in found.events if event.kind == "stall"]
     check.agrees("there are stalls", bool(stalls), str(len(stalls)))
@@ -145,7 +143,9 @@ def no_inductance(check: Checks) -> None:
     check.mentions("note", " ".join(found.notes), "reduced model, exact")
     check.says("currents kept", found.currents.shape[1], 0)
     near = _source(_motor(1.0, 1e-12)).simulate([0.0, 0.05], reduce=False, rtol=1e-12)
-    check.value("angle against L_a = 1e-12", found.angle[1], near.angle[1], absolute=1e-9, source="limit of the full model")
+    check.value(
+        "angle against L_a = 1e-12", found.angle[1], near.angle[1], absolute=1e-9, source="limit of the full model"
+    )
     free = _source(_motor(1.0, 0.0), mass=0.0).simulate([0.0, 0.001, 0.01])
     # J w' = K_m (K (w_d - w) - c_e w) / r
     import mpmath as mp
@@ -210,5 +210,7 @@ def long_run(check: Checks) -> None:
             right = mp.mpf(2 * math.pi) * turns
             given = mp.mpf(int(found.turns[-1])) * 2 * mp.pi + mp.mpf(float(found.reduced_angle[-1]))
             check.value(f"{turns:g} turns: angle", given, right, relative=2.3e-16, source="constant speed")
-        check.agrees(f"{turns:g} turns: reduced", abs(found.reduced_angle[-1]) <= 4 * math.pi, str(found.reduced_angle[-1]))
+        check.agrees(
+            f"{turns:g} turns: reduced", abs(found.reduced_angle[-1]) <= 4 * math.pi, str(found.reduced_angle[-1])
+        )
         check.agrees(f"{turns:g} turns: counted", abs(int(found.turns[-1]) - turns) <= 1, str(int(found.turns[-1])))

@@ -1,4 +1,4 @@
-"""The tribometer: exact events, refusal, regularisation, stiff springs, storms, belts (instruments page, 9.10 to 9.15)."""
+"""The tribometer: exact events, refusals, stiff springs, storms, belts (instruments page, 9.10 to 9.15)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,9 @@ def exact_events(check: Checks) -> None:
     motion = _belt(0.02).event_driven(10.0)
     times = np.array([event.time for event in motion.events])
     period = "0.551496439575209089144194976858"
-    check.values("belt: periods", times[2:] - times[:-2], [period] * (len(times) - 2), absolute=1e-14, source="section 3.7")
+    check.values(
+        "belt: periods", times[2:] - times[:-2], [period] * (len(times) - 2), absolute=1e-14, source="section 3.7"
+    )
     check.says("belt: states", [event.state for event in motion.events], [1, 0] * 17 + [1])
     check.says("belt: guarantee", motion.guarantee, "exact")
     found = _harmonic().event_driven(10.0, times=[0.0, 10.0])
@@ -65,20 +67,24 @@ def exact_events(check: Checks) -> None:
         check.says(f"event {k + 1}: state", event.state, state, source="section 3.8")
         check.value(f"event {k + 1}: time", event.time, t, absolute=1e-14, source="section 3.8")
         check.value(f"event {k + 1}: position", event.position, x, absolute=1e-16, source="section 3.8")
-        check.agrees(f"event {k + 1}: its own error estimate holds", abs(event.time - float(t)) <= max(4 * event.error, 2e-15))
+        check.agrees(
+            f"event {k + 1}: its own error estimate holds", abs(event.time - float(t)) <= max(4 * event.error, 2e-15)
+        )
     check.value("x2(10)", found.x2[-1], "-0.0088337024489276769888214220566", absolute=1e-16, source="section 3.8")
     check.value("v2(10)", found.v2[-1], "0.0595451435333351571993796554312", absolute=3e-15, source="section 3.8")
     check.below("energy", found.energy_residual, 1e-13)
 
 
 def refusal(check: Checks) -> None:
-    """The regularised form cannot hold two coefficients: refused with the reason; Coulomb's law is taken."""
+    """Regularised form cannot hold two coefficients: refused with the reason; Coulomb's law is taken."""
     from graphsynth.dynamics.friction import TwoCoefficientLaw
     from graphsynth.dynamics.tribometer import Tribometer
 
     check.refused("two coefficients", lambda: _harmonic().regularised(), "cannot represent the two-coefficient law")
     check.refused(
-        "regularisation above the Stribeck velocity", lambda: Tribometer().regularised(1.0, speed=0.5), "Stribeck velocity"
+        "regularisation above the Stribeck velocity",
+        lambda: Tribometer().regularised(1.0, speed=0.5),
+        "Stribeck velocity",
     )
     model = Tribometer(law=TwoCoefficientLaw(0.3, 0.3))
     same = model.regularised(1.0, speed=1e-5, solver="BDF", times=[0.5, 1.0])
@@ -120,7 +126,9 @@ def stiff_spring(check: Checks) -> None:
         check.values(f"factor {factor:g}: k x2 / N", given, values, absolute=2e-11, source="section 3.11")
         check.says(f"factor {factor:g}: events", len(found.events), count, source="section 3.11")
         gaps.append(float(np.abs(given - base.limit_force(times)).max()))
-    check.agrees("distance to the limit shrinks", gaps[0] > gaps[1] > gaps[2], f"{gaps[0]:.1e}, {gaps[1]:.1e}, {gaps[2]:.1e}")
+    check.agrees(
+        "distance to the limit shrinks", gaps[0] > gaps[1] > gaps[2], f"{gaps[0]:.1e}, {gaps[1]:.1e}, {gaps[2]:.1e}"
+    )
 
 
 def storm(check: Checks) -> None:
@@ -139,8 +147,12 @@ def storm(check: Checks) -> None:
     stopped = severe.event_driven(2.0, estimate=False)
     check.says("factor 1e6: status", stopped.status.name, "STORM")
     check.mentions("factor 1e6: sentence", stopped.statement, "Event storm", "time_stepping")
-    kept = bool(np.isnan(stopped.x2[stopped.t > stopped.end]).all() and np.isfinite(stopped.x2[stopped.t <= stopped.end]).all())
-    check.agrees("factor 1e6: the motion so far is kept", kept and 0.0 < stopped.end < 2.0, f"up to {stopped.end:.4f} s")
+    kept = bool(
+        np.isnan(stopped.x2[stopped.t > stopped.end]).all() and np.isfinite(stopped.x2[stopped.t <= stopped.end]).all()
+    )
+    check.agrees(
+        "factor 1e6: the motion so far is kept", kept and 0.0 < stopped.end < 2.0, f"up to {stopped.end:.4f} s"
+    )
     limited = base.stiffened(1e4, scaled_damping=False).event_driven(1.0, guard=EventGuard(rate=300.0))
     check.says("own bound of the event rate", limited.status.name, "STORM")
     # the fallback: the averaged motion survives
@@ -163,7 +175,9 @@ def belt_limits(check: Checks) -> None:
             slip = 2 / w0 * (mp.pi - mp.atan(fall * N * w0 / (k * v)))
         found = limit_cycle(model)
         check.value(f"{speed:g} m/s: period", found.period, stick + slip, relative=1e-13, source="section 3.7")
-        check.value(f"{speed:g} m/s: closed form", belt_cycle(model).period, stick + slip, relative=4e-15, source="section 3.7")
+        check.value(
+            f"{speed:g} m/s: closed form", belt_cycle(model).period, stick + slip, relative=4e-15, source="section 3.7"
+        )
         motion = model.event_driven(4.5 * float(stick + slip), estimate=False)
         states = [event.state for event in motion.events]
         in_turn = states == [1, 0] * (len(states) // 2) + [1] * (len(states) % 2)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def no_tilt(check: Checks) -> None:
 
 
 def tiny_tilt(check: Checks) -> None:
-    """A tilt of 1e-8: the printed digits, and no division by ``a^2 - b^2``."""
+    """Tilt of 1e-8: the printed digits, and no division by ``a^2 - b^2``."""
     from graphsynth.intervals import Status
     from graphsynth.jamming import Bearing, assess_jamming
     from graphsynth.jamming.circle_ellipse import exact_hull, surrogate_problem
@@ -60,7 +61,7 @@ def tiny_tilt(check: Checks) -> None:
 
 
 def steep_tilt(check: Checks) -> None:
-    """Second branch of the farthest point, existence first, areas while ``b > 0``, the rim by quadrature and said so."""
+    """Second branch of the farthest point, existence first, areas while ``b > 0``, the rim by quadrature, said so."""
     import mpmath as mp
 
     from graphsynth.jamming import Bearing
@@ -106,7 +107,7 @@ def not_assembled(check: Checks) -> None:
     ):
         found = linkage.positions(f)
         check.says(name, AssemblyStatus(int(found.status)).name, status)
-        check.mentions(f"{name}: sentence", " ".join(found.reasons()), found.status and AssemblyStatus[status].message)
+        check.mentions(f"{name}: sentence", " ".join(found.reasons()), AssemblyStatus[status].message)
         check.agrees(f"{name}: no number is shown", np.isnan(found.B).all() and np.isnan(found.theta))
     turn = LambdaLinkage(2, 1, 1, 1).positions(np.linspace(-4, 4, 801))
     agree = np.array_equal(np.isnan(turn.B).any(axis=-1), ~turn.assembled)
@@ -123,15 +124,16 @@ def bad_input(check: Checks) -> None:
     from graphsynth.jamming import Bearing, ToleranceBox
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
+    arguments: dict[str, Any]
     for arguments in (
         {"axis": (0, 0, 0)}, {"axis": (math.nan, 0, 1)}, {"alpha": math.nan}, {"alpha": math.inf}, {"l1": 0},
         {"l2": -1}, {"l3": math.nan}, {"l4": math.inf},
     ):  # fmt: skip
         name, value = next(iter(arguments.items()))
-        check.refused(f"{name} = {value}", lambda a=arguments: LambdaLinkage(**a), name)
+        check.refused(f"{name} = {value}", partial(LambdaLinkage, **arguments), name)
     for arguments in ({"Rb": 0}, {"Rb": math.nan}, {"Hb": -1}, {"clearance": math.nan}, {"clearance": math.inf}):
         name, value = next(iter(arguments.items()))
-        check.refused(f"{name} = {value}", lambda a=arguments: Bearing(**a), name)
+        check.refused(f"{name} = {value}", partial(Bearing, **arguments), name)
     check.refused("box with Rb = NaN", lambda: ToleranceBox(alpha="1/30", Rb=math.nan), "Rb")
     check.refused("f = NaN", lambda: LambdaLinkage().positions([math.nan]), "f holds nan")
 
@@ -172,5 +174,7 @@ def printed_extremes(check: Checks) -> None:
         check.value(f"ellipse outside of the circle, a - R1 = {pa:g}", found.ellipse_only, ellipse, relative=3e-15)
         check.value(f"circle outside of the ellipse, R1 - b = {qb:g}", found.circle_only, circle, relative=3e-15)
     thick = ellipse_circle(17.53, 17.5 / math.cos(0.06), 17.5)
-    check.value("thin crescent by the direct form", thick.ellipse_only, "0.01607824197607069187615058061", relative=1e-11)
+    check.value(
+        "thin crescent by the direct form", thick.ellipse_only, "0.01607824197607069187615058061", relative=1e-11
+    )
     check.value("thick crescent by the direct form", thick.circle_only, "1.583173498318460594385361309", relative=1e-12)

@@ -17,7 +17,7 @@ ZONE_A = ("27.0592203251509475645179736478", "152.940779674849052435482026352")
 
 
 def touching(check: Checks) -> None:
-    """The largest tilt is the critical tilt: zone of length zero, "touching", no certificate of either."""
+    """Largest tilt is the critical tilt: zone of length zero, "touching", no certificate of either."""
     from graphsynth.jamming import Bearing, assess_jamming
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
@@ -88,7 +88,7 @@ def change_points(check: Checks) -> None:
 
 
 def _through_a_change_point(check: Checks) -> None:
-    """A crank driven across the change point: no branch is chosen silently, nothing is certified there."""
+    """Crank driven across the change point: no branch is chosen silently, nothing is certified there."""
     from graphsynth.accuracy.stress.cases.linkages import four_bar
     from graphsynth.kinematics.certified import certify_four_bar
     from graphsynth.kinematics.simulation import simulate
@@ -122,7 +122,7 @@ def long_crank(check: Checks) -> None:
 
 
 def reversed_axis(check: Checks) -> None:
-    """The same zones for ``n3 = 0``; the sign of the tilt changes."""
+    """Zones stay the same for ``n3 = 0``; the sign of the tilt changes."""
     from graphsynth.jamming import Bearing, assess_jamming, jam_arcs
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 

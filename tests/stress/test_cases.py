@@ -1,0 +1,20 @@
+"""Every stress case: none is WRONG.  Slow ones run with -m slow."""
+
+from __future__ import annotations
+
+import pytest
+
+from graphsynth.accuracy.stress import Status, run_case, stress_cases
+
+CASES = [pytest.param(c, id=c.name, marks=pytest.mark.slow if c.slow else ()) for c in stress_cases()]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_case(case):
+    outcome = run_case(case)
+    if outcome.status is Status.NOT_RUN:
+        pytest.skip(outcome.reason)
+    wrong = [c for c in outcome.checks if c.status is Status.WRONG]
+    assert not outcome.reason
+    assert not wrong
+    assert outcome.status in (Status.OK, Status.FLAGGED) and outcome.checks
