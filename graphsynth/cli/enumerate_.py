@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
 from graphsynth.cli.workers import workers_for
-from graphsynth.errors import SpecError, TooLargeError
+from graphsynth.errors import GraphsynthError, SpecError, TooLargeError
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+    from pathlib import Path
+
     from graphsynth.synthesis.problem import Problem
 
 __all__ = ["run"]
@@ -40,10 +43,20 @@ def run(options: argparse.Namespace) -> int:
             for data, _ in texts(shard_of(problem.pieces(listing=True), options.shard), executor):
                 sys.stdout.buffer.write(data)
             return 0
+        entry = _other_format(options.output)
+        if entry is not None and (options.resume or options.json):
+            raise SpecError(
+                f"{options.output.suffix} is written in one piece: use .g6 or .jsonl with --resume or --json"
+            )
         if not options.force:
             _check_disk(problem, options, weight)
         from graphsynth.synthesis.writing import write_listing
 
+        if entry is not None:
+            graphs = _write_whole(problem, options, executor)
+            seconds = time.perf_counter() - begin
+            console.note(f"{problem.title}: {graphs} graphs written to {options.output} ({seconds:.2f} s)")
+            return 0
         try:
             with console.progress("listing") as watch:
                 graphs = write_listing(
@@ -66,6 +79,30 @@ def run(options: argparse.Namespace) -> int:
     else:
         console.note(f"{problem.title}: {graphs} graphs written to {options.output} ({seconds:.2f} s)")
     return 0
+
+
+def _other_format(path: Path) -> str | None:
+    """Return the name of a format that is not written line by line, None for lines of text or JSON."""
+    from graphsynth.formats.registry import FORMATS
+
+    for entry in FORMATS.values():
+        if path.suffix.lower() in entry.suffixes and not entry.line:
+            if not entry.many:
+                raise SpecError(f"{path.suffix} holds one graph; use .g6, .jsonl, .json, .graphml, .dot or .csv")
+            return entry.name
+    return None
+
+
+def _write_whole(problem: Problem, options: argparse.Namespace, executor: Executor | None) -> int:
+    """Write all graphs in another format; the file appears when it is complete."""
+    from graphsynth.formats.registry import read_text, write
+    from graphsynth.synthesis.parallel import texts
+    from graphsynth.synthesis.writing import shard_of
+
+    if options.output.exists() and not options.force:
+        raise GraphsynthError(f"{options.output} exists; choose another name, or replace it with --force")
+    blocks = texts(shard_of(problem.pieces(listing=True), options.shard), executor)
+    return write((graph for data, _ in blocks for graph in read_text(data, "text")), options.output)
 
 
 def _check_disk(problem: Problem, options: argparse.Namespace, weight: float) -> None:

@@ -12,6 +12,9 @@ from graphsynth.errors import FormatError, GraphError, GraphsynthError, SpecErro
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
+#: Suffixes of pictures; see graphsynth.drawing.sketching.pictures.
+PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
+
 __all__ = ["check_place", "read_graph", "run"]
 
 
@@ -19,7 +22,7 @@ def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""
     graph = read_graph(options.graph, options.line)
     if options.output:
-        check_place(options.output, (".svg", ".png", ".pdf"))
+        check_place(options.output, (*PICTURES, *_data_suffixes()))
     facts = _facts(graph, options.driver)
     if options.json:
         console.put_json(facts)
@@ -29,9 +32,19 @@ def run(options: argparse.Namespace) -> int:
             lines = value if isinstance(value, list) and value and isinstance(value[0], str) else [value]
             for i, line in enumerate(lines):
                 console.put(f"{name if i == 0 else '':{width}}  {_plain(line)}")
-    if options.output:
+    if options.output and options.output.suffix.lower() in PICTURES:
         _draw(graph, options.output, options.view, options.driver)
+    elif options.output:
+        from graphsynth.formats.registry import write
+
+        write(graph, options.output)
     return 0
+
+
+def _data_suffixes() -> list[str]:
+    from graphsynth.formats.registry import FORMATS
+
+    return [suffix for entry in FORMATS.values() if entry.name != "toml" for suffix in entry.suffixes]
 
 
 def check_place(path: Path, suffixes: tuple[str, ...]) -> None:
@@ -45,11 +58,19 @@ def check_place(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def read_graph(text: str, line: int = 1) -> MechanismGraph:
-    """Read a canonical key, a text form, or line ``line`` of a file of either (or of JSON lines)."""
+    """Read a canonical key, a text form, or graph ``line`` of a file of any format.
+
+    Files of an unknown suffix hold a key, a text form or a JSON record on each line.
+    """
     from graphsynth.structure.graph import MechanismGraph
 
     path = Path(text)
     if len(text) < 1000 and path.is_file():
+        from graphsynth.formats.registry import FORMATS, read
+
+        if any(path.suffix.lower() in entry.suffixes for entry in FORMATS.values() if not entry.line):
+            item = read(path, number=line)
+            return item if isinstance(item, MechanismGraph) else item.graph
         lines = path.read_text(errors="replace").splitlines()
         if not 1 <= line <= len(lines):
             raise FormatError(f"line {line} does not exist, the file has {len(lines)}: choose another --line", text)
@@ -65,23 +86,15 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
 
 
 def _one(text: str, place: str) -> MechanismGraph:
+    from graphsynth.formats.graph_json import parse_line
     from graphsynth.structure.graph import MechanismGraph
 
+    if text.startswith("{"):
+        return parse_line(text, place)
     try:
-        if text.startswith("{"):
-            import json
-
-            record = json.loads(text)
-            return MechanismGraph(
-                record["links"], map(tuple, record["joints"]), frame=record.get("frame"), space=record.get("space", 3)
-            )
         return MechanismGraph.from_key(text) if text.startswith("1") else MechanismGraph.from_text(text)
     except FormatError as error:
         raise FormatError(str(error), place) from None
-    except KeyError as error:
-        raise FormatError(f"the JSON record of a graph needs the key {error}", place) from None
-    except (ValueError, TypeError, AttributeError) as error:
-        raise FormatError(f"not a JSON record of a graph ({error})", place) from None
 
 
 def _facts(graph: MechanismGraph, driver: int | None) -> dict[str, Any]:
@@ -143,10 +156,10 @@ def _plain(value: Any) -> str:
 
 def _draw(graph: MechanismGraph, path: Path, view: str | None, driver: int | None) -> None:
     """Draw the kinematic diagram, the graph by levels, or both side by side."""
-    from graphsynth.drawing.canvas import save
     from graphsynth.drawing.graphs import graph_sketch
     from graphsynth.drawing.levels import levels_sketch
     from graphsynth.drawing.sketch import Sketch
+    from graphsynth.drawing.sketching.pictures import save
 
     sketches: list[Sketch] = []
     poses: list[list[tuple[float, float, float]] | None] = []

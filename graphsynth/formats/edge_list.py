@@ -8,9 +8,11 @@ from collections.abc import Iterable, Iterator
 from graphsynth.errors import FormatError
 from graphsynth.formats.lines import head_of, read_rows
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.text import LINKS_MAX
 
 __all__ = ["compose", "parse"]
 
+_MOST = LINKS_MAX * (LINKS_MAX - 1) // 2
 _DICTIONARY = re.compile(r"\{(?:'mobility': ([0-9]))?\}", re.ASCII)  # what networkx.write_edgelist puts behind an edge
 
 
@@ -34,7 +36,7 @@ def parse(text: str) -> list[MechanismGraph]:
     >>> parse("0 1\n1 2\n0 2 2\n")[0].to_text()
     'Bw 2:0-2'
     """
-    head, rows = read_rows(_DICTIONARY.sub(lambda match: match[1] or "", text))
+    head, rows = read_rows(_DICTIONARY.sub(lambda match: match[1] or "", text), _MOST)
     for row in rows:
         if len(row.numbers) not in (2, 3):
             raise FormatError(f"a joint is 'a b' or 'a b mobility', not {len(row.numbers)} numbers", row.place)

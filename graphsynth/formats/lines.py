@@ -8,7 +8,7 @@ from typing import NamedTuple
 from graphsynth.errors import FormatError, GraphError
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["Row", "head_of", "read_rows", "within"]
+__all__ = ["LENGTH_MAX", "Row", "head_of", "read_rows", "within"]
 
 #: Characters of a text; larger graphs need a sparse format.
 LENGTH_MAX = 4_000_000
@@ -29,25 +29,27 @@ def head_of(graph: MechanismGraph) -> str:
     return f"# links {graph.links}\n{frame}# space {graph.space}\n"
 
 
-def read_rows(text: str, opening: str = "") -> tuple[dict[str, int], list[Row]]:
+def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], list[Row]]:
     """Return the head and the rows.
 
     Parameters
     ----------
     text : str
+    most : int
+        Rows that a graph can have.
     opening : str
         Characters that are read as spaces, besides commas and semicolons.
 
     Raises
     ------
     FormatError
-        A text too long, a word that is not a whole number, something said twice.
+        A text too long, too many rows, a word that is not a whole number, something said twice.
     """
     if len(text) > LENGTH_MAX:
         raise FormatError(f"{len(text)} characters; at most {LENGTH_MAX} are read", "length")
     spaces = str.maketrans(dict.fromkeys(",;" + opening, " "))
     head: dict[str, int] = {}
-    rows = []
+    rows: list[Row] = []
     for number, line in enumerate(text.split("\n"), 1):
         place = f"line {number}"
         if line.lstrip().startswith("#"):
@@ -61,6 +63,8 @@ def read_rows(text: str, opening: str = "") -> tuple[dict[str, int], list[Row]]:
         for word in words:
             if not _NUMBER.fullmatch(word):
                 raise FormatError(f"{word[:24]!r} is not a whole number", place)
+        if words and len(rows) >= most:
+            raise FormatError(f"more than {most} rows; no mechanism graph needs so many", place)
         if words:
             rows.append(Row([int(word) for word in words], place))
     return head, rows

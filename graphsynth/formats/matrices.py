@@ -148,11 +148,9 @@ def parse_incidence(text: str) -> list[MechanismGraph]:
 
 def _matrix(text: str) -> tuple[dict[str, int], list[Row]]:
     """Return the head and rows of equal length; a bracket that closes ends a row."""
-    head, rows = read_rows(text.replace("]", "\n") if "]" in text else text, "[()")
+    head, rows = read_rows(text.replace("]", "\n") if "]" in text else text, LINKS_MAX, "[()")
     if not rows and "links" not in head:
         raise FormatError("no row of numbers", "end")
-    if len(rows) > LINKS_MAX:
-        raise FormatError(f"{len(rows)} rows; a mechanism graph has at most {LINKS_MAX} links", rows[-1].place)
     if rows and head.get("links", len(rows)) != len(rows):
         raise FormatError(f"{len(rows)} rows, but the head says {head['links']} links", "head")
     for row in rows:

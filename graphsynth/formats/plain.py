@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 
 from graphsynth.errors import FormatError, GraphError
@@ -11,6 +12,9 @@ from graphsynth.structure.canonical import decode_key
 from graphsynth.structure.graph import MechanismGraph
 
 __all__ = ["compose_graph6", "compose_text", "compose_toml", "graph_of_key", "parse_graph6", "parse_text", "parse_toml"]
+
+_STRING = re.compile(r'"(?:[^"\\\n]|\\.)*+"' "|'[^'\n]*+'")
+_LONG_KEY = re.compile(r'(?<![\w"-])(?:[\w"-]++[ \t]*+\.[ \t]*+){12}', re.ASCII)
 
 
 def parse_text(line: str, place: str) -> MechanismGraph:
@@ -48,7 +52,12 @@ def compose_graph6(graphs: Iterable[MechanismGraph]) -> Iterator[str]:
 
 
 def parse_toml(text: str) -> list[Mechanism]:
-    """Read a mechanism."""
+    """Read a mechanism.
+
+    A key of many parts is refused: the time of the parser grows with the square of their number.
+    """
+    if match := _LONG_KEY.search(_STRING.sub('""', text)):
+        raise FormatError(f"the key {match[0][:24]!r}... has too many parts", "text")
     return [Mechanism.from_toml(text)]
 
 

@@ -253,7 +253,7 @@ def write_text(items: Item | Iterable[Item], format: str) -> str:
     Examples
     --------
     >>> write_text(MechanismGraph(3, [(0, 1), (0, 2), (1, 2)], frame=0), "text")
-    'Bw f0\\n'
+    'Bw f0\n'
     """
     return "".join(_pieces(items, format_of("", format)))
 

@@ -74,7 +74,7 @@ def test_show_falls_back_to_levels_and_says_so(tmp_path: Path, capsys: pytest.Ca
 
 def test_show_refuses_another_suffix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", EIGHT[0].key, "-o", str(tmp_path / "x.bmp")]) == 2
-    assert "must end in .svg, .png or .pdf" in capsys.readouterr().err
+    assert "must end in .svg, .png, .pdf, .tikz, .tex, .dxf, .g6" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -249,7 +249,8 @@ def test_what_a_format_cannot_hold_is_said() -> None:
 WRONG = [
     ("graphml", '<!DOCTYPE lolz [<!ENTITY lol "lol">]><graphml/>', "document type declaration", "line 1"),
     ("graphml", "<graphml><graph edgedefault='directed'/></graphml>", "directed", "line 1"),
-    ("graphml", "<graphml>\n<graph><node id='a'/>\n<edge source='a' target='b'/></graph></graphml>", "not a vertex", "3"),
+    ("graphml", "<graphml>\n<graph><node id='a'/>\n<edge source='a' target='b'/></graph></graphml>", "not a vertex",
+     "line 3"),
     ("graphml", "<graphml><graph><node id='a'/><node id='a'/></graph></graphml>", "twice", "line 1"),
     ("graphml", "<graphml>", "not XML", "line 1, column 10"),
     ("graphml", "<a>" * 40, "expected <graphml>", "line 1"),

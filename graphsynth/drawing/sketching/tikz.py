@@ -1,0 +1,112 @@
+"""A sketch as TikZ: for papers in LaTeX.
+
+Shapes are written in centimetres, one pixel being 1/96 inch, with colours defined by name in the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from graphsynth.drawing.palette import LIGHT
+from graphsynth.drawing.shapes import Circle, Path, Placement, Point, Shape, Style, Text, placement
+from graphsynth.drawing.sketch import Sketch
+
+__all__ = ["document", "tikz"]
+
+_CM = 2.54 / 96.0
+_PT = 72.27 / 96.0
+_ANCHOR = {"middle": "center", "start": "west", "end": "east"}
+#: Characters that TeX reads otherwise.
+_ESCAPE = str.maketrans(
+    {
+        "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_",
+        "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "°": r"\textdegree{}",
+    }
+)  # fmt: skip
+
+
+def tikz(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None) -> str:
+    r"""Write a sketch as a ``tikzpicture``.
+
+    Parameters
+    ----------
+    sketch : Sketch
+    pose : sequence of (x, y, theta), optional
+        Where every link is; needed if any shape is fixed to a link.
+
+    Returns
+    -------
+    str
+        Needs nothing but ``\usepackage{tikz}``.
+
+    Examples
+    --------
+    >>> s = Sketch(0j, 2 + 1j, width=200)
+    >>> s.joint(1 + 0.5j)
+    >>> tikz(s).count("circle")
+    1
+    """
+    place = placement(pose)
+    body = [_element(shape, sketch, place) for shape in sketch.ordered()]
+    title = [f"% {' '.join(sketch.title.split())}"] if sketch.title else []
+    lines = [*title, r"\begin{tikzpicture}[line join=round]"]
+    lines += [rf"\definecolor{{gs-{name}}}{{HTML}}{{{value[1:].upper()}}}" for name, value in LIGHT.items()]
+    lines += [*body, r"\end{tikzpicture}", ""]
+    return "\n".join(lines)
+
+
+def document(pictures: Sequence[str]) -> str:
+    """Put pictures side by side in a ``standalone`` document of LaTeX."""
+    head = "\\documentclass[border=2pt]{standalone}\n\\usepackage{tikz}\n\\begin{document}\n"
+    return head + "\\quad\n".join(pictures) + "\\end{document}\n"
+
+
+def _number(value: float) -> str:
+    text = f"{value:.4f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def _element(shape: Shape, sketch: Sketch, place: Placement) -> str:
+    def at(point: Point, offset: Point = 0j) -> str:
+        x, y = sketch.xy(place(shape.link, point))
+        return f"({_number((x + offset.real) * _CM)},{_number((sketch.height - y + offset.imag) * _CM)})"
+
+    note = f" % {shape.part}" if shape.part else ""
+    if isinstance(shape, Text):
+        size = _number(shape.size * _PT)
+        font = rf"\fontsize{{{size}}}{{{size}}}\selectfont\sffamily" + (r"\bfseries" if shape.weight else "")
+        options = f"anchor={_ANCHOR[shape.anchor]}, text=gs-{shape.colour}, inner sep=0pt, font={{{font}}}"
+        return rf"\node[{options}] at {at(shape.at, shape.offset)} {{{shape.text.translate(_ESCAPE)}}};{note}"
+    options = _options(shape.style, sketch.symbol)
+    if isinstance(shape, Circle):
+        radius = _number(shape.radius * sketch.scale * _CM)
+        return rf"\path[{options}] {at(shape.centre)} circle[radius={radius}];{note}"
+    return rf"\path[{options}] {_runs(shape, at)};{note}"
+
+
+def _runs(path: Path, at: Callable[[Point], str]) -> str:
+    pieces = []
+    for run in path.runs:
+        points = [at(point) for point in run]
+        if path.curved:  # a quadratic curve as a cubic one
+            p, q, r = run
+            pieces.append(f"{points[0]} .. controls {at((p + 2 * q) / 3)} and {at((r + 2 * q) / 3)} .. {points[2]}")
+        else:
+            pieces.append(" -- ".join([*points, "cycle"] if path.closed else points))
+    return " ".join(pieces)
+
+
+def _options(style: Style, symbol: float) -> str:
+    found = []
+    if style.fill:
+        found.append(f"fill=gs-{style.fill}")
+        if style.fill_opacity < 1.0:
+            found.append(f"fill opacity={_number(style.fill_opacity)}")
+    if style.stroke and style.width:
+        found += [f"draw=gs-{style.stroke}", f"line width={_number(style.width * symbol * _PT)}pt"]
+        if style.round_ends:
+            found.append("line cap=round")
+        if style.dash:
+            words = [f"{'off' if k % 2 else 'on'} {_number(length * _PT)}pt" for k, length in enumerate(style.dash)]
+            found.append(f"dash pattern={' '.join(words)}")
+    return ", ".join(found)
