@@ -29,8 +29,9 @@ def _rows(found: Sequence[Any], effort: Effort, kinds: dict[str, str], reference
     """Turn rows (method, setting, error, seconds) of other rooms into ours."""
     return [
         Row(
-            r.method, r.setting, float(r.error), r.seconds, effort.rounds, kinds.get(r.method, kinds[""]),
-            references.get(r.method, references[""]), proved=r.method in _PROVED,
+            r.method, r.setting, float(r.error), r.seconds, 1 if r.method == "general solver" else effort.rounds,
+            kinds.get(r.method, kinds[""]), references.get(r.method, references[""]),
+            proved=r.method in _PROVED,
         )
         for r in found
     ]  # fmt: skip

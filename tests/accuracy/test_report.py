@@ -185,6 +185,19 @@ def test_every_family_has_problems_and_every_plan_a_function():
     assert plans_of("nobody knows") == ()
 
 
+def test_builders_named_by_strings_exist():
+    from pathlib import Path
+
+    import graphsynth.accuracy.families as families
+
+    named = set()
+    for path in Path(families.__file__).parent.glob("*.py"):
+        named |= set(re.findall(r'"(graphsynth\.[\w.]+:\w+)"', path.read_text(encoding="utf-8")))
+    assert len(named) >= 7
+    for text in named:
+        assert callable(load(Plan("builder", text)))
+
+
 def test_a_plan_that_names_nothing():
     with pytest.raises(SceneError, match="cannot be imported"):
         load(Plan("x", "graphsynth.accuracy:nothing_of_that_name"))
