@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from graphsynth.drawing.figures import new_figure
+from graphsynth.drawing.figures import legend_place, new_figure
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -117,7 +117,8 @@ def drive_curves(runs: Mapping[str, DriveRun], *, size: tuple[float, float] = (7
                 axes.axvline(run.time[max(run.reached - 1, 0)], color=_COLOURS[k % 6], lw=0.8)
     _panel(torque, "motor torque", "", "torque [N m]")
     _panel(speed, "crank speed", "time [s]", "crank speed [rad/s]")
-    torque.legend(fontsize=8, frameon=False, ncols=min(len(runs), 4))
+    place = legend_place(sum(run.time.size for run in runs.values()))
+    torque.legend(fontsize=8, frameon=False, ncols=min(len(runs), 4), loc=place)
     return figure
 
 
@@ -301,12 +302,12 @@ def start_up_picture(
         current.plot(run.time, run.currents[:, k], color=_COLOURS[k], ls=_STYLES[k], lw=1.4, label=name)
     _panel(current, "motor currents", "", "[A]")
     if run.currents.shape[1]:
-        current.legend(fontsize=8, frameon=False)
+        current.legend(fontsize=8, frameon=False, loc=legend_place(run.currents.size))
     motion = braider.link_motion(run).speed
     for k, name in enumerate(("crank", "coupler", "rocker and switch")):
         links.plot(run.time, motion[:, k], color=_COLOURS[k], ls=_STYLES[k], lw=1.4, label=name)
     _panel(links, "angular velocities", "time [s]", "[rad/s]")
-    links.legend(fontsize=8, frameon=False, ncols=3)
+    links.legend(fontsize=8, frameon=False, ncols=3, loc=legend_place(motion.size))
     return figure
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.drawing.figures import new_figure
+from graphsynth.drawing.figures import legend_place, new_figure
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 _LOWER, _UPPER, _THIRD, _FOURTH = "#0072B2", "#D55E00", "#009E73", "#AA4499"
 _STICK, _FAIL, _SOFT = "#E3E7EC", "#AA0044", "#8794A1"
 _COLOURS = (_LOWER, _UPPER, _THIRD, _FOURTH, "#56B4E9", "#E69F00", "#555555")
+#: Points of a path drawn at most.
+_MOST_NODES = 20_000
 _MARKERS = "osD^vP*"
 
 
@@ -131,9 +133,9 @@ def phase_picture(
     figure = new_figure(size)
     axes = figure.subplots()
     _plain(axes)
-    # points of the events too, so that no corner is cut
+    # points of the events too, so that no corner is cut; those of an event storm cannot be told apart anyway
     t, x, v, state = motion.t, motion.x2, motion.v2, motion.state
-    if motion.path is not None:
+    if motion.path is not None and len(motion.path.nodes) <= _MOST_NODES:
         t = np.unique(np.concatenate([t, motion.path.nodes[:, 0]]))
         x, v, state = motion.at(t)[:, :3].T
     for now, colour, label in ((True, _LOWER, "stick"), (False, _UPPER, "slip")):
@@ -147,7 +149,7 @@ def phase_picture(
             axes.plot(1e3 * np.where(chosen, x, np.nan), 1e3 * np.where(chosen, v, np.nan), color=colour, lw=width,
                       alpha=alpha, label=name)  # fmt: skip
     axes.set(xlabel="displacement of the upper platform [mm]", ylabel="velocity [mm/s]")
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc=legend_place(t.size))
     return figure
 
 
@@ -175,7 +177,7 @@ def friction_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (6.
     axes.plot(1e3 * motion.sliding[~stick], motion.friction[~stick], ".", ms=3, color=_UPPER, label="slip")
     axes.plot(1e3 * motion.sliding[stick], motion.friction[stick], ".", ms=3, color=_LOWER, label="stick")
     axes.set(xlabel="sliding velocity [mm/s]", ylabel="friction force [N]")
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc=legend_place(stick.size))
     return figure
 
 

@@ -25,7 +25,7 @@ def test_rows_of_the_crank_rocker():
 def test_bad_requests():
     model = g1()
     start = consistent_start(model, keep={(0, 1): 0.0}, modes={0: 1})
-    with pytest.raises(GeometryError, match="tolerances = .* must be 1e-12 or more"):
+    with pytest.raises(GeometryError, match=r"tolerances = .* must be 1e-12 or more"):
         dynamics_work_precision(model, start, [0.0, 0.1], tolerances=[1e-13])
     with pytest.raises(GeometryError, match="rounds = 0"):
         dynamics_work_precision(model, start, [0.0, 0.1], rounds=0)

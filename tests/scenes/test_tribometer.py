@@ -121,7 +121,9 @@ def test_event_storm_is_said() -> None:
     "drive", [{"kind": "harmonic", "radius_mm": 30, "speed_rad_s": 2}, {"kind": "belt", "belt_m_s": 0}]
 )
 def test_other_drives_are_drawn(drive: Any) -> None:
-    report = execute(changed(*SAID, "mechanism_pictures", "animations", "plots", drive=drive, run={"duration_s": 2}))
+    report = execute(
+        changed(*SAID, "mechanism_pictures", "animations", "plots", drive=drive, run={"duration_s": 1, "samples": 201})
+    )
     assert report["plots"] and report["animations"] and report["mechanism_pictures"]
 
 

@@ -104,11 +104,11 @@ FAMILY = Family(
     stages=(
         Stage("run", f"{_STEPS}.tribometer:move", (), ("motion",)),
         Stage("find limit cycle", f"{_STEPS}.tribometer:cycle", (), ("cycle",)),
-        Stage("compare methods", f"{_STEPS}.tribometer:methods", (), ("methods",)),
+        Stage("compare methods", f"{_STEPS}.tribometer:methods", ("motion",), ("methods",)),
         Stage("judge", f"{_STEPS}.tribometer_tables:judge", ("motion", "cycle", "methods"), ("records", "tables")),
         Stage("draw mechanism", f"{_STEPS}.tribometer_pictures:sketches", ("motion",), ("mechanism_pictures",)),
         Stage("animate", f"{_STEPS}.tribometer_pictures:animations", ("motion",), ("animations",)),
         Stage("plot", f"{_STEPS}.tribometer_pictures:plots", ("motion", "cycle", "methods"), ("plots",)),
-        Stage("compare solvers", f"{_STEPS}.tribometer:solvers", (), ("solvers",)),
+        Stage("compare solvers", f"{_STEPS}.tribometer:solvers", ("motion",), ("solvers",)),
     ),
 )

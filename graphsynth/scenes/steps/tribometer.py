@@ -78,22 +78,22 @@ def cycle(context: Context) -> LimitCycle:
     return limit_cycle(tribometer_of(context), most_turns=table_of(context).run.most_turns)
 
 
-def methods(context: Context) -> AccuracyStudy | None:
+def methods(context: Context, motion: StickSlipMotion) -> AccuracyStudy | None:
     """Compare the methods with the event-driven run; None if that one did not finish."""
-    return _study(context, table_of(context).methods.solvers, 3)
+    return _study(context, motion, table_of(context).methods.solvers)
 
 
-def _study(context: Context, solvers: tuple[str, ...], rounds: int) -> AccuracyStudy | None:
+def _study(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...]) -> AccuracyStudy | None:
     from graphsynth.dynamics.tribometer_accuracy import method_study
 
     table, model = table_of(context), tribometer_of(context)
-    if not model.event_driven(table.run.duration_s, times=[0.0]).complete:
+    if not motion.complete:
         return None
     m = table.methods
     try:
         return method_study(
             model, table.run.duration_s, tolerances=m.tolerances, steps=m.steps_s, speeds=m.speeds_m_s,
-            solvers=solvers, rounds=rounds,
+            solvers=solvers, rounds=3,
         )  # fmt: skip
     except SpecError as error:
         raise (context.scene.place / "mechanism" / "methods").error(f"cannot be used: {error}") from error
@@ -123,9 +123,9 @@ METHOD_COLUMNS = (
 )  # fmt: skip
 
 
-def solvers(context: Context) -> tuple[Table, ...]:
+def solvers(context: Context, motion: StickSlipMotion) -> tuple[Table, ...]:
     """Error against run time with every solver; some minutes, not part of the shipped outputs."""
-    study = _study(context, ("LSODA", "BDF", "Radau"), 3)
+    study = _study(context, motion, ("LSODA", "BDF", "Radau"))
     if study is None:
         return ()
     return (Table("Error against run time", METHOD_COLUMNS, method_rows(study), study.reference),)

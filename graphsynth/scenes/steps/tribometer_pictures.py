@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["animations", "plots", "sketches"]
 
+_MOST_NODES = 4000
+
 
 def _svg(figure: Any) -> str:
     from graphsynth.drawing.drive_pictures import themed_svg
@@ -129,6 +131,8 @@ def _curves(motion: StickSlipMotion) -> list[Picture]:
     if motion.path is None:
         return pictures
     nodes = motion.path.nodes
+    if len(nodes) > _MOST_NODES:  # an event storm has hundreds of thousands
+        nodes = nodes[np.linspace(0, len(nodes) - 1, _MOST_NODES).astype(int)]
     stored = 0.5 * model.mass * nodes[:, 2] ** 2 + 0.5 * model.stiffness * nodes[:, 1] ** 2
     at = nodes[:, 0]
     energy = line_plot(

@@ -3,10 +3,10 @@
 The angle is kept within a few turns beside a count of turns in the form with inertia, and every update is compensated,
 so that roundings do not add up over a long run.
 
-General integrators are scipy's business, and this one exists only because scipy's were measured and do not do: with the
-same compiled equations, Jacobian and output times, LSODA stays above 4e-12 at its tightest tolerance where this reaches
-3e-15, and Radau and BDF take hundreds of times as long at equal error (docs/explanation/decisions.md, "One integrator of
-our own").
+General integrators are scipy's business, and this one exists only because scipy's were measured and do not do: with
+the same compiled equations, Jacobian and output times, LSODA stays above 4e-12 at its tightest tolerance where this
+reaches 3e-15, and Radau and BDF take hundreds of times as long at equal error (docs/explanation/decisions.md, "One
+integrator of our own").
 """
 
 import math
