@@ -155,10 +155,11 @@ def _write(
     progress = _Progress(chains + 10 * len(tasks), watch)
     motions = dict(_motions(folder, tasks, executor, progress))
     _write_families(connection, found, data, executor, progress)
-    first, size = [], 0
+    first, room = [], _FIRST_LOAD
     for family in found:
-        size += (data / f"family-{family.name}.js").stat().st_size
-        if size <= _FIRST_LOAD:
+        size = (data / f"family-{family.name}.js").stat().st_size
+        if size <= room:
+            room -= size
             first.append(family.name)
     known = contents(
         connection, found, first=first, sketchesPerFile=PER_FILE, motions=motions, motionLinks=motion_links

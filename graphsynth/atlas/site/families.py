@@ -114,7 +114,10 @@ def _digit(value: int) -> str:
 
 
 def relatives_script(connection: sqlite3.Connection, family: Family, places: dict[str, tuple[str, int]]) -> str:
-    """Write parents and children of each chain: places in the families of two links fewer and more, or keys."""
+    """Write parents and children of each chain, and what was evaluated.
+
+    Relatives are places in the families of two links fewer and more, or keys.
+    """
     smaller, larger = (f"{family.mobility}-{family.links + step}" for step in (-2, 2))
 
     def short(key: str, name: str) -> int | str:
@@ -129,7 +132,16 @@ def relatives_script(connection: sqlite3.Connection, family: Family, places: dic
     downwards = "SELECT key FROM dyads JOIN chains USING (chain_id) WHERE parent_key = ?"
     parents = [listed(upwards, row["chain_id"], smaller) for row in family.rows]
     children = [listed(downwards, row["key"], larger) for row in family.rows]
-    return script("takeRelatives", family.name, {"parents": parents, "children": children})
+    data = {"parents": parents, "children": children, "evaluations": _evaluations(connection, family)}
+    return script("takeRelatives", family.name, data)
+
+
+def _evaluations(connection: sqlite3.Connection, family: Family) -> dict[int, list[list[Any]]]:
+    """Return what the catalogue has evaluated: by place, [frame, drivers, kind, status, value, unit, guarantee]."""
+    query = """SELECT frame, driver, kind, status, value, unit, guarantee FROM evaluations WHERE chain_id = ?
+               ORDER BY frame, driver, kind"""
+    found = {k: connection.execute(query, (row["chain_id"],)).fetchall() for k, row in enumerate(family.rows)}
+    return {k: [[frame, str(driver), *rest] for frame, driver, *rest in rows] for k, rows in found.items() if rows}
 
 
 def groups_script(connection: sqlite3.Connection) -> str:

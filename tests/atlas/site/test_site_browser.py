@@ -388,6 +388,32 @@ def test_controls_have_names(page):
         assert len(window.find_elements(by.CSS_SELECTOR, "main")) == 1
 
 
+def test_nothing_jumps(page):
+    for address in ("", "#/1BAN4", "#/1CAMBmSzA", "#/find"):
+        window = page(address)
+        until(window, "document.querySelector('main > section:not([hidden])')?.offsetHeight > 200")
+        time.sleep(0.4)
+        shift = window.execute_async_script(
+            """const done = arguments[0]; let sum = 0;
+               new PerformanceObserver(list => { for (const one of list.getEntries()) sum += one.value; })
+                 .observe({type: "layout-shift", buffered: true});
+               setTimeout(() => done(sum), 100);"""
+        )
+        assert shift < 0.02, address
+
+
+def test_the_way_past_the_header_and_broken_addresses(page):
+    window = page("#/1BAN4")
+    until(window, "document.querySelector('#entry h1')?.textContent === '1.4.4.1'")
+    window.execute_script("document.querySelector('.skip').click()")
+    assert window.switch_to.active_element.get_attribute("id") == "page"
+    assert window.current_url.endswith("#/1BAN4")
+    for broken in ("#/%E0%A4%A", "#/<img src=x onerror=alert(1)>", "#/1.4.4.2", "#/1BAN4?frame=77&driver=x"):
+        page(broken)
+        until(window, "document.querySelector('#entry h1')")
+        assert not window.find_elements(by.CSS_SELECTOR, "#entry img")
+
+
 def test_the_page_asks_no_network(page):
     window = page("#/1BAN4")
     until(window, "document.querySelector('#entry iframe')")

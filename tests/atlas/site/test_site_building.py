@@ -10,6 +10,7 @@ import pytest
 
 from graphsynth import MechanismGraph
 from graphsynth.atlas.catalogue import Catalogue
+from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.site import build_site
 from graphsynth.atlas.site.motions import choice_of
 from graphsynth.atlas.site.sketches import places_of
@@ -183,3 +184,36 @@ def test_the_command_writes_the_page(catalogue, tmp_path, capsys):
     assert main(["catalog", "site", str(tmp_path / "none.sqlite"), "-o", str(tmp_path / "b")]) == 2
     assert "there is no such catalogue" in capsys.readouterr().err
     shutil.rmtree(tmp_path / "a")
+
+
+def test_evaluations_of_the_catalogue_are_handed_over(tmp_path):
+    path = tmp_path / "own.sqlite"
+    with Catalogue.build(path, links=[4]) as own:
+        frame, driver = own.connection.execute("SELECT frame, driver FROM mechanisms").fetchone()
+        own.record([Evaluation("1.4.4.1", frame, driver, "jamming", "free", 0.25, "rad", "certified")])
+        page = build_site(own, tmp_path / "page", motion_links=0)
+    data = handed(page.page.parent / "data" / "relatives-1-4.js")[1]
+    assert data["evaluations"] == {"0": [[frame, str(driver), "jamming", "free", 0.25, "rad", "certified"]]}
+
+
+def test_other_mobilities_and_fractionated_chains(tmp_path):
+    with Catalogue.build(tmp_path / "two.sqlite", links=[5, 7], mobility=2, fractionated=True) as own:
+        page = build_site(own, tmp_path / "page", motion_links=5)
+    assert (page.chains, page.motions) == (5, 1)
+    columns = handed(page.page.parent / "data" / "family-2-7.js")[1]
+    assert columns["fractionated"].count("1") == 1  # two four-bars on one link
+
+
+@pytest.mark.slow
+def test_the_page_of_twelve_links(tmp_path):
+    """All 7105 chains: within three minutes of two cores, less than 1 MB to begin with."""
+    import resource
+
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    with Catalogue.build(tmp_path / "twelve.sqlite", links=range(4, 13)) as whole:
+        page = build_site(whole, tmp_path / "page")
+    now = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    seconds = sum(b.ru_utime + b.ru_stime - a.ru_utime - a.ru_stime for a, b in zip(used, now, strict=True))
+    assert (page.chains, page.motions) == (7105, 249)
+    assert page.first_load < 1_000_000
+    assert seconds < 2 * 180

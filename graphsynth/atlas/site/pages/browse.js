@@ -101,8 +101,9 @@
     Atlas.lastChoice = performance.now() - start;
     const all = Atlas.rows.length;
     $("count").textContent = found.length === all ? `${Atlas.count(all)} chains` : `${Atlas.count(found.length)} of ${Atlas.count(all)} chains`;
-    $("chosen").innerHTML = question.contracted
-      ? `with the contracted graph ${Atlas.contents.contracted[question.contracted] || "?"} <button type="button" id="anyshape">any</button>` : "";
+    const rest = Atlas.contents.families.filter(family => !Atlas.families.get(family.name).rows);
+    $("chosen").innerHTML = (rest.length ? `Chosen by their number of links, and loaded then: ${rest.map(f => `${Atlas.count(f.chains)} chains with ${f.links} links`).join(", ")}. ` : "") + (question.contracted
+      ? `with the contracted graph ${Atlas.contents.contracted[question.contracted] || "?"} <button type="button" id="anyshape">any</button>` : "");
     if (question.contracted) $("anyshape").addEventListener("click", () => { $("question").contracted.value = ""; changed(); });
   }
 

@@ -206,6 +206,15 @@
     $("relatives").querySelectorAll(".thumb").forEach(box => seen.observe(box));
   }
 
+  async function evaluations(row) {
+    const rows = await Atlas.evaluationsOf(row);
+    if (state.row !== row || !rows.length) return;
+    const heads = ["frame", "driver", "what", "result", "value", "guarantee"].map(words => `<th scope="col">${words}</th>`).join("");
+    const line = ([frame, drivers, kind, status, value, unit, guarantee]) => [frame, drivers, kind, status,
+      value === null ? "" : `${+value.toPrecision(6)} ${unit || ""}`, guarantee || ""].map(words => `<td>${Atlas.plain(String(words))}</td>`).join("");
+    $("evaluations").innerHTML = `<div class="scroll"><table class="inversions"><thead><tr>${heads}</tr></thead><tbody>${rows.map(one => `<tr>${line(one)}</tr>`).join("")}</tbody></table></div>`;
+  }
+
   function choiceIn(parameters, row, graph, label) {
     const frame = parameters.get("frame");
     if (frame === "none") return {frame: null, drivers: []};
@@ -235,6 +244,7 @@
       `<div class="columns"><section><h2>${Atlas.term("group", "Structural groups")}</h2><div id="groups"></div></section><section><h2>Properties</h2>${properties(row, label)}</section></div>` +
       `<h2>${Atlas.term("inversion", "Inversions")} and drivers</h2>${inversions(graph, label)}` +
       `<h2>Motion</h2>${motion(row)}` +
+      `<h2>Evaluations</h2><div id="evaluations"><p class="soft">Transmission, jamming: not computed in this catalogue.</p></div>` +
       `<h2>Matrices</h2><div class="columns">${matrixTable(Atlas.matrix(graph), Atlas.term("adjacency"), [...Array(graph.links).keys()])}` +
       `${matrixTable(Atlas.incidence(graph), Atlas.term("incidence"), joints)}</div>` +
       `<h2>${Atlas.term("parent", "Parents and children")}</h2><div id="relatives" class="relatives"></div>` +
@@ -242,6 +252,7 @@
     listen();
     showChoice();
     relatives(row);
+    evaluations(row);
     return `${row.label} · chain`;
   };
 })();

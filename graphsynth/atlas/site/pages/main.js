@@ -10,9 +10,13 @@
 
   let first = true;
 
+  function decoded(text) {
+    try { return decodeURIComponent(text); } catch { return text; }
+  }
+
   async function route() {
     const [path, words = ""] = location.hash.replace(/^#\/?/, "").split("?");
-    const name = decodeURIComponent(path), parameters = new URLSearchParams(words);
+    const name = decoded(path), parameters = new URLSearchParams(words);
     const page = name === "" ? "browse" : name === "find" || name === "about" ? name : "entry";
     const scroll = Atlas.scrolled;
     if (!document.getElementById("browse").hidden) Atlas.scrolled = scrollY;
@@ -39,6 +43,10 @@
     theme.addEventListener("change", () => {
       root.dataset.theme = theme.value;
       try { localStorage.setItem("atlas-theme", theme.value); } catch { /* no storage: for this visit only */ }
+    });
+    document.querySelector(".skip").addEventListener("click", event => {
+      event.preventDefault(); // the part after # is the address of a chain
+      document.getElementById("page").focus();
     });
     history.scrollRestoration = "manual";
     Atlas.startGlossary();

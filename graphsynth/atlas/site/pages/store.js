@@ -98,6 +98,12 @@
     return {parents: await resolve(own.parents[row.place], -2), children: await resolve(own.children[row.place], 2)};
   };
 
+  /** What the catalogue has evaluated of a chain: [frame, drivers, kind, status, value, unit, guarantee] each. */
+  Atlas.evaluationsOf = async function (row) {
+    await load(`relatives-${row.family}`);
+    return relatives.get(row.family)?.evaluations[row.place] || [];
+  };
+
   /** Class of a structural group by its key, or undefined. */
   Atlas.loadClasses = async () => { await load("groups"); };
   Atlas.classOf = key => (classes ? classes[key] : undefined);
