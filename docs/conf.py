@@ -39,7 +39,19 @@ def _toctrees(text: str) -> str:
     return "".join(sections)
 
 
+def _plain_links(text: str, page: str) -> str:
+    """Name files outside of the documentation instead of linking them; the site does not hold them."""
+    docs = Path(__file__).resolve().parent
+
+    def name(match: re.Match[str]) -> str:
+        target = (docs / page).parent.joinpath(match[2]).resolve()
+        return match[0] if target.is_relative_to(docs) else f"{match[1]} (`{target.relative_to(ROOT).as_posix()}`)"
+
+    return re.sub(r"\[([^\]]*)\]\((\.\.[^)#\s]*)\)", name, text)
+
+
 def _read(app: object, page: str, source: list[str]) -> None:
+    source[0] = _plain_links(source[0], page)
     if page == "index":
         source[0] = _toctrees(source[0])
     elif page == "reference/api":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import inspect
 import re
 from importlib import import_module
@@ -48,6 +49,22 @@ def signature_of(name: str, thing: object) -> str:
     return re.sub(r"<([\w.]+)[^<>]*>", r"\1", text)
 
 
+def members(thing: type) -> str:
+    """Public methods and properties of a class with the first line of their docstrings; values of an enumeration."""
+    if issubclass(thing, enum.Enum):
+        return "\n".join(f"{member.name} = {member.value!r}" for member in thing)
+    lines = []
+    for name, raw in sorted(vars(thing).items()):
+        member = raw.__func__ if isinstance(raw, classmethod | staticmethod) else raw
+        told = inspect.getdoc(member) if inspect.isfunction(member) or hasattr(member, "__get__") else None
+        if name.startswith("_") or not told or inspect.ismemberdescriptor(member):
+            continue
+        call = signature_of(name, member) if inspect.isfunction(member) else name
+        first = " ".join(told.partition("\n\n")[0].split()).replace("``", "`")
+        lines.append(f".{re.sub(r'[(](self|cls)(, )?', '(', call)}\n    {first}")
+    return "\n".join(lines)
+
+
 def entry(name: str, thing: object) -> str:
     """Markdown of one name: signature, docstring, examples."""
     parts = [f"### `{name}`\n"]
@@ -59,6 +76,9 @@ def entry(name: str, thing: object) -> str:
     body, _, examples = text.replace("``", "`").partition("\nExamples\n--------\n")
     if body:
         parts.append(f"````text\n{body.strip()}\n````\n")
+    inner = members(thing) if isinstance(thing, type) else ""
+    if inner:
+        parts.append(f"````text\n{inner}\n````\n")
     if examples:
         parts.append(f"````pycon\n{examples.strip()}\n````\n")
     if not documented:
