@@ -216,10 +216,11 @@ def _extent(motion: Motion) -> float:
 def judge(context: Context, moved: Moved, *parts: Jammed | Driven) -> Record:
     """Give the record of a candidate: what its motion, its bearings and its loads say."""
     words = ["moves over the whole range", *(part.words for part in parts if part.words)]
-    good = [part.good for part in parts if part.good is not None]
+    verdicts = [part.good for part in parts if part.words]
     margins = (*moved.margins, *(margin for part in parts for margin in part.margins))
     reason = "; ".join(part.reason for part in parts if part.reason)
-    return Record(verdict=", ".join(words), good=all(good), margins=margins, recognised_as="", reason=reason)
+    good = False if False in verdicts else None if None in verdicts else True
+    return Record(verdict=", ".join(words), good=good, margins=margins, reason=reason)
 
 
 def write(context: Context, moved: Moved) -> dict[str, Any]:

@@ -93,7 +93,7 @@ def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
 
     driver = mechanism.drivers[0]
     alpha, spread = math.radians(table.alpha_deg), math.radians(table.alpha_tolerance_deg)
-    tilt: Misalignment = Misalignment(
+    found: Misalignment = Misalignment(
         driver.base,
         driver.link,
         alpha,
@@ -101,7 +101,7 @@ def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
         alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
         direction_range=(0.0, math.tau) if table.any_direction else None,
     )
-    return tilt
+    return found
 
 
 def dynamics(context: Context, moved: Moved) -> Driven:

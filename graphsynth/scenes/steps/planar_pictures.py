@@ -75,13 +75,13 @@ def animations(
 
 
 def plots(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> tuple[Picture, ...]:
-    """Plot the paths of the tracing points of the best candidates, or their transmission angles without one."""
-    from graphsynth.drawing.motion_charts import coupler_curves, transmission_chart
+    """Plot the paths of the tracing points of the best candidates, or how far their assembly modes are apart."""
+    from graphsynth.drawing.motion_charts import coupler_curves, margin_chart
 
     pictures = []
     for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
         named = bool(motion.mechanism.points)
-        chart = coupler_curves(motion) if named else transmission_chart(motion)
-        what = "path of the point" if named else "transmission angles"
+        chart = coupler_curves(motion) if named else margin_chart(motion)
+        what = "path of the point" if named else "margins of the groups: 0 where two assembly modes meet"
         pictures.append(Picture(f"Place {place}: candidate {number}", chart.svg(), f"The {what}."))
     return tuple(pictures)
