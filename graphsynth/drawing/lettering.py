@@ -34,18 +34,22 @@ class _Room:
         """Keep letters away from points of a link; those of link ``own`` may come near."""
         self.taken += [(world(self.poses, link, point), own) for point in points]
 
-    def clearance(self, link: int, point: complex) -> float:
-        """Distance to the nearest thing, capped at 22 pixels: the worst pose and the mean count half each."""
+    def clearances(self, link: int, points: Sequence[complex]) -> list[float]:
+        """Distances of points to the nearest thing, at most 22 pixels: the worst pose and the mean count half each."""
         others = [z for z, own in self.taken if own != link]
         if not others:
-            return 22.0
-        near = np.min(np.abs(np.stack(others) - world(self.poses, link, point)), axis=0) / self.pixel
-        capped = np.minimum(near, 22.0)
-        return float(0.5 * capped.min() + 0.5 * capped.mean())
+            return [22.0] * len(points)
+        around = np.stack(others)
+        found = []
+        for point in points:
+            near = np.abs(around - world(self.poses, link, point)).min(axis=0) / self.pixel
+            capped = np.minimum(near, 22.0)
+            found.append(float(0.5 * capped.min() + 0.5 * capped.mean()))
+        return found
 
     def best(self, link: int, candidates: Sequence[complex]) -> complex:
         """Choose the first of the freest candidates, and take it."""
-        scores = [self.clearance(link, point) - 0.4 * k for k, point in enumerate(candidates)]
+        scores = [clear - 0.4 * k for k, clear in enumerate(self.clearances(link, candidates))]
         chosen = candidates[scores.index(max(scores))]
         self.add(link, [chosen])
         return chosen

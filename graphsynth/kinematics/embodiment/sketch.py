@@ -6,22 +6,22 @@ polygon; a hub is put into every other loop and joined to its joints.  The graph
 barycentric drawing of Tutte (1963, "How to draw a graph", Proc. London Math. Soc. 13, 743-767) has no crossings and
 every link polygon is strictly convex.  Forces then even out the distances; no step may turn a face over.
 
-A graph that is not planar (11 of the 230 ten-link chains) or has a cut link is drawn by forces alone.
+A graph that is not planar (11 of the 230 ten-link chains) is drawn with the fewest crossings found, see
+:mod:`graphsynth.kinematics.embodiment.crossings`; one with a cut link by forces.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GraphError
-
-if TYPE_CHECKING:
-    from graphsynth.structure.graph import MechanismGraph
+from graphsynth.kinematics.embodiment.crossings import crossing_pairs, fewest_crossings, merged
+from graphsynth.structure.graph import MechanismGraph
 
 __all__ = ["JointLayout", "layout"]
 
@@ -60,13 +60,16 @@ class JointLayout:
     polygons : tuple of tuple of int
         For each link its joints (indices into ``graph.joints``) in the order of its outline.
     planar : bool
-        Whether the drawing is without crossings.
+        Whether the drawing was made without crossings.
+    crossings : int
+        Crossings of sides of links, 0 if planar.
     """
 
     graph: MechanismGraph
     positions: Array
     polygons: tuple[tuple[int, ...], ...]
     planar: bool
+    crossings: int = 0
 
     def outline(self, link: int) -> Array:
         """Corners of a link, shape (its joints, 2)."""
@@ -103,7 +106,7 @@ def layout(graph: MechanismGraph) -> JointLayout:
         raise GraphError("a sketch needs a connected graph with at least one joint")
     found = _embedding(graph)
     if found is None:
-        return _by_forces(graph)
+        return _with_crossings(graph)
     loops, polygons = found
     places = _circle(graph, loops[0]) if len(loops) == 2 else _best_outer(graph, loops, polygons)
     return JointLayout(graph, places, polygons, True)
@@ -224,7 +227,8 @@ class _Drawing:
         least = apart[np.triu_indices(len(z), 1)].min()
         longest = apart[self.corners, np.roll(self.corners, 1, axis=1)].max(axis=1, initial=1e-300)
         heights = np.abs(_areas(z, self.corners)) / longest
-        return float(min(least, heights.min(initial=np.inf)) / apart.max())
+        bars = self.springs.clearances(z).min(initial=np.inf)
+        return float(min(least, heights.min(initial=np.inf), 2.0 * bars) / apart.max())
 
 
 class _Springs:
@@ -246,12 +250,21 @@ class _Springs:
         """Vectors along the sides."""
         return np.asarray(z[self.second] - z[self.first])
 
-    def clearing(self, z: Complex) -> Complex:
-        """Force that drives joints away from sides they are not on."""
+    def clearances(self, z: Complex) -> Array:
+        """Distances of joints from the sides they are not on."""
+        return np.abs(self._gaps(z)[0])
+
+    def _gaps(self, z: Complex) -> tuple[Complex, Array]:
+        """Ways from the nearest point of a side to a joint, and where on the side (0 to 1) that point is."""
         k, p, q = self.foreign.T
         side, way = z[q] - z[p], z[k] - z[p]
-        at = np.clip((way * np.conj(side)).real / np.maximum(np.abs(side) ** 2, 1e-12), 0.0, 1.0)
-        gap = way - at * side
+        share = (way.real * side.real + way.imag * side.imag) / np.maximum(side.real**2 + side.imag**2, 1e-12)
+        at = np.minimum(np.maximum(share, 0.0), 1.0)
+        return way - at * side, at
+
+    def clearing(self, z: Complex) -> Complex:
+        """Force that drives joints away from sides they are not on."""
+        gap, at = self._gaps(z)
         distance = np.maximum(np.abs(gap), 1e-9)
         push = gap * (_CLEARING * np.maximum(0.0, _CLEAR - distance) / distance)
         shares = np.concatenate([push, (at - 1.0) * push, -at * push])
@@ -334,29 +347,34 @@ def _circle(graph: MechanismGraph, loop: list[int]) -> Array:
     return _upright(graph, z, loop)
 
 
+def _with_crossings(graph: MechanismGraph) -> JointLayout:
+    """Let binary links cross as diagonals of a quadrilateral; by forces where that is not enough."""
+    if not graph.is_planar and (pairs := crossing_pairs(graph)):
+        number = merged(graph, pairs)
+        joints = [(number[a], number[b]) for a, b, _ in graph.joints]
+        frame = None if graph.frame is None else number[graph.frame]
+        simple = MechanismGraph(max(number) + 1, joints, frame=frame)
+        if _embedding(simple) is not None:
+            drawn = layout(simple)
+            index = {(a, b): k for k, (a, b, _) in enumerate(simple.joints)}
+            places = drawn.positions[[index[min(pair), max(pair)] for pair in joints]]
+            polygons = tuple(_around(places, own) for own in _own_joints(graph))
+            return JointLayout(graph, places, polygons, False, len(pairs))
+    return _by_forces(graph)
+
+
+def _own_joints(graph: MechanismGraph) -> list[list[int]]:
+    return [[k for k, joint in enumerate(graph.joints) if link in (joint.a, joint.b)] for link in range(graph.links)]
+
+
 def _by_forces(graph: MechanismGraph) -> JointLayout:
-    """Spectral start, then springs between all joints of a link and repulsion."""
-    count = len(graph.joints)
-    own = [[k for k, joint in enumerate(graph.joints) if link in (joint.a, joint.b)] for link in range(graph.links)]
-    sides = sorted({(p, q) for joints in own for p in joints for q in joints if p < q})
-    if not sides:
-        return JointLayout(graph, np.zeros((count, 2)), tuple(map(tuple, own)), True)
-    pairs = np.array(sides)
-    A = np.zeros((count, count))
-    A[pairs[:, 0], pairs[:, 1]] = A[pairs[:, 1], pairs[:, 0]] = 1.0
-    _, vectors = np.linalg.eigh(np.diag(A.sum(axis=1)) - A)
-    z = np.zeros(count, dtype=np.complex128)
-    if count > 2:
-        z = (vectors[:, 1] + 1j * vectors[:, 2]) * math.sqrt(count)
-    # symmetric graphs leave joints in one place: part them by a fixed small shift
-    z = z + 0.1 * np.exp(2.4j * np.arange(count))
-    springs = _Springs(pairs, [1.0] * len(pairs), count, 0)
-    for k in range(4 * _STEPS):
-        move = springs.force(z)
-        z = z + move * min(0.15, 0.2 * (1.0 - k / (4 * _STEPS)) / max(float(np.abs(move).max()), 1e-9))
+    """Springs between all joints of a link and repulsion, the best of many starts."""
+    own = _own_joints(graph)
+    if max(map(len, own)) < 2:
+        return JointLayout(graph, np.zeros((len(graph.joints), 2)), tuple(map(tuple, own)), True)
+    z, crossings = fewest_crossings(own, len(graph.joints))
     places = _upright(graph, z, [])
-    polygons = tuple(_around(places, joints) for joints in own)
-    return JointLayout(graph, places, polygons, False)
+    return JointLayout(graph, places, tuple(_around(places, joints) for joints in own), False, crossings)
 
 
 def _around(places: Array, joints: list[int]) -> tuple[int, ...]:
