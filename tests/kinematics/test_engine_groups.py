@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -210,7 +211,17 @@ def test_rrr_batch() -> None:
 @pytest.mark.parametrize("index", range(0, 16, 2))
 def test_branch_does_not_depend_on_the_samples(index: int) -> None:
     """Fine, coarse and reversed inputs find the same branch, the same end and the same reason."""
-    for graph in chains()[index].inversions():
+    branch_of_samples(chains()[index].inversions()[::3])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", range(16))
+def test_branch_does_not_depend_on_the_samples_in_any_inversion(index: int) -> None:
+    branch_of_samples(chains()[index].inversions())
+
+
+def branch_of_samples(inversions: Iterable[MechanismGraph]) -> None:
+    for graph in inversions:
         for link in sorted(j.b for j in graph.joints if j.a == 0):
             mechanism = drawn(graph, (0, link), 1, {})
             u = np.linspace(0.0, 1.0, 101)
