@@ -23,8 +23,8 @@ def places_of(keys: Sequence[str]) -> list[str]:
 
     Examples
     --------
-    >>> places_of(["1BAN4"])
-    ['__AAAAAA____AA__']
+    >>> [len(places) for places in places_of(["1BAN4", "1BgMw8g"])]  # four digits a joint
+    [16, 28]
     """
     import numpy as np
 

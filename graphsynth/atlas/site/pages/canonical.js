@@ -6,7 +6,7 @@
   const MIX = 0x9E3779B97F4A7C15n, LEAF = 1n << 63n;
   const word = value => BigInt.asUintN(64, value);
   const mix = (state, value) => { const next = word((state ^ value) * MIX); return next ^ next >> 32n; };
-  const MOST_NODES = 200000;
+  const MOST_NODES = 20000;
 
   function find(parent, vertex) {
     while (parent[vertex] !== vertex) { parent[vertex] = parent[parent[vertex]]; vertex = parent[vertex]; }

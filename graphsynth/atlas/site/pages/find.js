@@ -22,7 +22,7 @@
     });
     built = true;
     new Atlas.Editor($("editor"), found => {
-      if (found.graph) tell(found.graph, `Drawn. ${found.words}`);
+      if (found.graph) tell(found.graph, `Drawn. ${found.words}`).catch(excuse);
       else if (found.words) say(found.words);
     });
   }
@@ -38,10 +38,12 @@
         const row = await Atlas.find(read.label);
         if (row) tell(Atlas.decodeKey(row.key), "Read as a label.", null); else say(`No chain here has the label ${read.label}.`);
       } else await tell(read.graph, `Read as ${read.form}.`, read.names);
-    } catch (fault) {
-      if (!(fault instanceof Atlas.Fault)) throw fault;
-      say(fault.message);
-    }
+    } catch (fault) { excuse(fault); }
+  }
+
+  function excuse(fault) {
+    if (!(fault instanceof Atlas.Fault)) throw fault;
+    say(fault.message);
   }
 
   /** Links of the reader and of the entry side by side. */
