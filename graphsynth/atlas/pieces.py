@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from hashlib import sha256
+from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +15,16 @@ from numpy.typing import NDArray
 from graphsynth.atlas.facts import Rows, analyse_block, rows_of
 
 if TYPE_CHECKING:
+    from graphsynth.synthesis.families import Family
     from graphsynth.synthesis.problem import Piece, Problem
+    from graphsynth.synthesis.units import Unit
 
 __all__ = ["Task", "fingerprint", "problem_of", "rows_of_task", "share_of", "tasks_of"]
 
 #: Bound on the labellings of a piece; about a quarter of them are chains.  A piece takes a second at most.
 PIECE = 8000.0
+#: A family of very many chains is cut into so many pieces, of more work each.
+MOST_PIECES = 100_000
 _CHAINS_AT_ONCE = 1024
 
 
@@ -52,25 +58,47 @@ def problem_of(links: int, mobility: int, fractionated: bool) -> Problem:
 
 def tasks_of(links: int, mobility: int, fractionated: bool) -> list[Task]:
     """Cut a family; the cut depends on the family alone."""
-    problem = problem_of(links, mobility, fractionated)
-    pieces = [part for piece in problem.pieces(listing=True) for part in _finer(piece)]
+    whole = problem_of(links, mobility, fractionated).pieces(listing=True)
+    size = max(PIECE, sum(piece.weight for piece in whole) / MOST_PIECES)
+    pieces = [part for piece in whole for part in _finer(piece, size)]
     return [Task(number, links, mobility, piece) for number, piece in enumerate(pieces)]
 
 
-def _finer(piece: Piece) -> Iterator[Piece]:
-    """Cut a piece of many contracted graphs at their bounds."""
-    from graphsynth.synthesis.units import Unit, estimates
+def _finer(piece: Piece, size: float) -> Iterator[Piece]:
+    """Cut a piece of many contracted graphs at their bounds, and that of a single one by its search prefixes."""
+    from graphsynth.synthesis.units import Unit
 
-    if not isinstance(piece, Unit) or piece.parts > 1 or piece.weight <= PIECE:
+    if not isinstance(piece, Unit) or piece.weight <= size:
         yield piece
         return
-    bounds = estimates(piece.family)[piece.start : piece.stop]
+    if piece.stop - piece.start == 1:
+        yield from _parts(piece, size)
+        return
+    bounds = _bounds(piece.family)[piece.start : piece.stop]
     at = 0
     while at < len(bounds):
         sums = np.cumsum(bounds[at:])
-        size = min(int(np.searchsorted(sums, PIECE)) + 1, len(sums))
-        yield replace(piece, start=piece.start + at, stop=piece.start + at + size, weight=float(sums[size - 1]))
-        at += size
+        count = min(int(np.searchsorted(sums, size)) + 1, len(sums))
+        count -= count > 1 and bool(bounds[at + count - 1] > size)  # a big one alone
+        part = replace(piece, start=piece.start + at, stop=piece.start + at + count, weight=float(sums[count - 1]))
+        yield from _parts(part, size) if count == 1 else (part,)
+        at += count
+
+
+@lru_cache(maxsize=2)
+def _bounds(family: Family) -> NDArray[np.float64]:
+    """Bounds on the chains of each contracted graph, computed once for all pieces of a family."""
+    from graphsynth.synthesis.units import estimates
+
+    return estimates(family)
+
+
+def _parts(piece: Unit, size: float) -> Iterator[Unit]:
+    """Cut a single contracted graph that is far too big: part p of P becomes p, p + P, ... of a multiple of P."""
+    times = ceil(piece.weight / size / 2) if piece.weight > 4 * size else 1
+    for k in range(times):
+        part = piece.part + piece.parts * k
+        yield replace(piece, part=part, parts=piece.parts * times, weight=piece.weight / times)
 
 
 def fingerprint(problem: Problem, tasks: list[Task]) -> str:

@@ -207,6 +207,17 @@ def test_the_parquet_export_holds_what_the_catalogue_holds(small, tmp_path):
     assert classes == mechanisms["class"].tolist()
 
 
+@pytest.mark.parametrize(("piece", "most"), [(3.0, 100_000), (0.5, 100_000), (3.0, 10)])
+def test_however_small_the_pieces_each_chain_comes_once(piece, most, monkeypatch):
+    """Also when single contracted graphs are cut by their search prefixes."""
+    monkeypatch.setattr(pieces, "PIECE", piece)
+    monkeypatch.setattr(pieces, "MOST_PIECES", most)
+    tasks = pieces.tasks_of(10, 1, False)
+    assert most == 10 or max(getattr(task.piece, "parts", 1) for task in tasks) > 10
+    keys = [chain[0] for task in tasks for chain in pieces.rows_of_task(task).chains]
+    assert len(keys) == len(set(keys)) == 230
+
+
 # --- interrupted, killed, refused
 
 
