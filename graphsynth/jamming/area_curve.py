@@ -109,7 +109,9 @@ def enclose_tilt_sine(linkage: LambdaLinkage, f: ArrayLike | Interval) -> Interv
         raise GeometryError('enclose_tilt_sine holds for rod="rigid" only; the deck rod is not a rigid body')
     check_rounding()
     angle = f if isinstance(f, Interval) else _points(f)
-    n1, n2, n3 = (Interval.from_bounds(n, n) for n in linkage.axis)
+    axis = [Interval.from_bounds(n, n) for n in linkage.axis]  # of length 1 up to rounding only
+    length = (axis[0].sqr() + axis[1].sqr() + axis[2].sqr()).sqrt()
+    n1, n2, n3 = (part / length for part in axis)
     alpha = Interval.from_bounds(linkage._angle, linkage._angle)
     s, v = functions.sin(alpha), 2 * functions.sin(alpha / 2).sqr()
     height = (n1 * n3 * v - n2 * s) * functions.cos(angle) + (n2 * n3 * v + n1 * s) * functions.sin(angle)

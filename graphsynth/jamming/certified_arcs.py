@@ -81,8 +81,10 @@ class CertifiedArcs:
 
     @property
     def jammed_part(self) -> Enclosure:
-        """Part of the turn that jams, between its proved bounds (rounded in the last place)."""
-        return Enclosure(total_length(self.inner) / math.tau, min(1.0, total_length(self.outer) / math.tau))
+        """Part of the turn that jams, between its proved bounds; rounded outward."""
+        low, high = total_length(self.inner) / math.tau, total_length(self.outer) / math.tau
+        # at most two spans: differences, a sum and a quotient to nearest are off by less than 5e-16
+        return Enclosure(max(0.0, low - 2e-15), min(1.0, high + 2e-15 if self.outer else 0.0))
 
 
 def no_arcs(kappa: Enclosure, phase: Enclosure, reason: str) -> CertifiedArcs:

@@ -2,6 +2,7 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -160,3 +161,20 @@ def test_problems_of_the_readings():
 def test_lids_are_mirror_images():
     up, down = (reading_ellipse(BEARING, 0.1, math.sqrt(0.99), Reading.LID, lid) for lid in (1, -1))
     assert up.centre == -down.centre == 0.5
+
+
+@pytest.mark.parametrize("axis", [(2, -1, 2), (1, 1, 0), (3, 1, -7), (1, 2, 3)])
+def test_the_axis_is_a_unit_vector_up_to_rounding_only(axis):
+    """Its doubles, made exact and normalised in 50 digits: the sine lies inside without any allowance."""
+    linkage = LambdaLinkage(alpha=0.9, axis=axis)
+    angles = np.linspace(0.1, 6.2, 60)
+    found = enclose_tilt_sine(linkage, angles)
+    with mpmath.workdps(50):
+        n = [mpmath.mpf(part) for part in linkage.axis]
+        n1, n2, n3 = (part / mpmath.sqrt(sum(x * x for x in n)) for part in n)
+        alpha, ratio = mpmath.mpf(0.9), mpmath.mpf(linkage.l2) / mpmath.mpf(linkage.l3)
+        s, k = mpmath.sin(alpha), 1 - mpmath.cos(alpha)
+        for f, low, high in zip(angles.tolist(), found.lo.tolist(), found.hi.tolist()):
+            f = mpmath.mpf(f)
+            sine = ratio * ((n1 * n3 * k - n2 * s) * mpmath.cos(f) + (n2 * n3 * k + n1 * s) * mpmath.sin(f))
+            assert low <= sine <= high
