@@ -49,6 +49,7 @@ _PUBLIC: dict[str, str] = {
     "Status": "intervals.status",
     "assess_jamming": "jamming.assess",
     "JammingReport": "jamming.assess",
+    "Catalogue": "atlas.catalogue",
     "run": "scenes.runner",
 }
 
