@@ -15,7 +15,7 @@
 
   /** The places of joints, in units of the drawing, from two base64url digits for each coordinate. */
   Atlas.places = function (text) {
-    const bytes = [...text].map(c => "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_".indexOf(c));
+    const bytes = [...text].map(c => Atlas.DIGITS.indexOf(c));
     const found = [];
     for (let k = 0; k < bytes.length; k += 4) found.push([bytes[k] << 6 | bytes[k + 1], bytes[k + 2] << 6 | bytes[k + 3]]);
     return found;
@@ -49,6 +49,12 @@
     return path;
   }
 
+  /** Name of the colour of a link: the driver's, that of its group, or ink. */
+  const colours = (drivers, groups) => link => {
+    const k = groups.findIndex(group => group.links.includes(link));
+    return drivers.includes(link) ? "drive" : k < 0 ? "ink" : `g${k % 4 + 1}`;
+  };
+
   /**
    * The kinematic diagram as SVG text.  Options: width, height, frame, drivers, groups (as from Atlas.groups), numbers,
    * title, file (colours inside, for a file of its own), small.
@@ -58,10 +64,7 @@
     const at = fit(places, width, height, small ? 7 : 26), outlines = Atlas.outlines(graph, places);
     const middle = [at.reduce((s, p) => s + p[0], 0) / at.length, at.reduce((s, p) => s + p[1], 0) / at.length];
     const wide = small ? 1.6 : 3.2, radius = small ? 2 : 5, hatch = `hatch${++pictures}`;
-    const colour = link => {
-      const k = groups.findIndex(group => group.links.includes(link));
-      return drivers.includes(link) ? "drive" : k < 0 ? "ink" : `g${k % 4 + 1}`;
-    };
+    const colour = colours(drivers, groups);
     const plates = [], bars = [], letters = [];
     outlines.forEach((own, link) => {
       const points = own.map(k => at[k]), data = "M" + points.map(p => p.map(short).join(" ")).join("L");
@@ -143,10 +146,7 @@
     levels.forEach((level, k) => level.forEach((link, i) => {
       where.set(link, [width / 2 + (i - (level.length - 1) / 2) * step * (level.length < 3 ? 1.25 : 1), 2 * radius + 8 + row * k]);
     }));
-    const colour = link => {
-      const k = groups.findIndex(group => group.links.includes(link));
-      return drivers.includes(link) ? "drive" : k < 0 ? "ink" : `g${k % 4 + 1}`;
-    };
+    const colour = colours(drivers, groups);
     const edges = graph.joints.map(([a, b]) => {
       const [x, y] = where.get(a), [u, v] = where.get(b), bend = y === v ? 18 + .16 * Math.abs(u - x) : 0;
       return `<path d="M${short(x)} ${short(y)}Q${short((x + u) / 2)} ${short((y + v) / 2 + bend)} ${short(u)} ${short(v)}" fill="none" stroke="var(--ink)" stroke-width="1.5"/>`;

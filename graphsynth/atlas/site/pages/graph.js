@@ -120,13 +120,13 @@ Atlas.fromGraph6 = function (text) {
 
 Atlas.KEY_VERSION = "1";
 
-const DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+Atlas.DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
 
 Atlas.fromBase64 = function (text) {
   const bytes = [];
   let held = 0, bits = 0;
   for (const letter of text) {
-    const digit = DIGITS.indexOf(letter);
+    const digit = Atlas.DIGITS.indexOf(letter);
     if (digit < 0) throw new Atlas.Fault("A key is base64url text.");
     held = (held << 6 | digit) & 0xffff;
     bits += 6;
@@ -140,9 +140,9 @@ Atlas.toBase64 = function (bytes) {
   for (const byte of bytes) {
     held = (held << 8 | byte) & 0xffff;
     bits += 8;
-    while (bits >= 6) { bits -= 6; text += DIGITS[held >> bits & 63]; }
+    while (bits >= 6) { bits -= 6; text += Atlas.DIGITS[held >> bits & 63]; }
   }
-  return bits ? text + DIGITS[held << 6 - bits & 63] : text;
+  return bits ? text + Atlas.DIGITS[held << 6 - bits & 63] : text;
 };
 
 /** The bytes of a graph whose links are in canonical order. */
