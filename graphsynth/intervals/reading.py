@@ -207,6 +207,8 @@ def read_points(value: Any) -> tuple[Array, Array, Flags]:
     """Read numbers, text or nested sequences of them: bounds and decorations."""
     if not isinstance(value, np.ndarray | np.generic) and hasattr(value, "flags"):  # an Interval inside a list
         return value.lo, value.hi, value.flags
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
     if _is_double(value):
         array = np.array(value, dtype=np.float64)
         _finite(array)

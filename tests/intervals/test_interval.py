@@ -181,6 +181,7 @@ def test_bounds_in_extended_precision_are_rounded_outward():
     ):
         assert made.hi >= high
     assert not Interval(np.array([low])).exact_input.any()
+    assert Interval(np.array(low)).lo < low and Interval(np.array(3)).contains(3) and Interval(np.array(0.5)).rad == 0.0
     assert Interval(-np.longdouble(np.inf), low).lo == -INF
 
 

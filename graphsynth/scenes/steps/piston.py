@@ -327,7 +327,7 @@ def _trust_table(turns: tuple[Turn, ...]) -> Table:
     for own in turns:
         for name, one in (("floating", own.found.floating), ("plain", own.found.plain)):
             gas = abs(one.gas - one.gas_closed_form) / max(abs(one.gas_closed_form), 1e-300)
-            warned = " (WARNING)" if one.balance_error > 1e-9 else ""
+            warned = "" if one.balance_error <= 1e-9 else " (WARNING)"
             rows.append(
                 (
                     f"{words_of(own.kind)}, {name}", f"{one.balance_error:.1e}{warned}",

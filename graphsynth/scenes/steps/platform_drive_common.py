@@ -40,7 +40,7 @@ def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
     names = ("angle", "speed", *(f"current {k}" for k in range(1, run.currents.shape[1] + 1)))
     units = ("rad", "rad/s", *("A",) * run.currents.shape[1])
     errors = ", ".join(f"{name} {value:.1e} {unit}" for name, value, unit in zip(names, run.error, units))
-    warned = run.energy_error > 1e-9 or run.electric_error > 1e-9
+    warned = run.complete and not (run.energy_error <= 1e-9 and run.electric_error <= 1e-9)
     return (
         ("status", run.reason or "reached the last output time"),
         ("model", run.model),
