@@ -166,7 +166,8 @@ def _starts(count: int) -> Complex:
     """Random places, the same every time."""
     random = np.random.default_rng(_SEED)
     shape = (_STARTS, count)
-    return np.asarray(random.normal(size=shape) + 1j * random.normal(size=shape)) * math.sqrt(count) / 2.5
+    z: Complex = (random.normal(size=shape) + 1j * random.normal(size=shape)) * (math.sqrt(count) / 2.5)
+    return z
 
 
 def _force(z: Complex, links: _Links) -> Complex:
@@ -174,7 +175,7 @@ def _force(z: Complex, links: _Links) -> Complex:
     gap = z[:, :, None] - z[:, None, :]
     square = gap.real**2 + gap.imag**2
     square[:, range(z.shape[1]), range(z.shape[1])] = 1.0
-    total = np.asarray((gap * (_REPEL / square**1.5)).sum(axis=2))
+    total: Complex = np.asarray((gap * (_REPEL / square**1.5)).sum(axis=2))
     first, second = links.pairs[:, 0], links.pairs[:, 1]
     d = z[:, second] - z[:, first]
     pull = d * (1.0 - 1.0 / np.maximum(np.abs(d), 1e-9))

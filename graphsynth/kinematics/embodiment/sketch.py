@@ -31,7 +31,9 @@ Polygons = tuple[tuple[int, ...], ...]
 IntArray = NDArray[np.intp]
 
 #: Steps of forces: for the comparison of outer faces, and for the picture.
-_ROUGH, _STEPS = 20, 60
+_ROUGH, _STEPS = 15, 60
+#: Outer faces compared, the longest first.
+_OUTER = 4
 #: Springs of polygons over those of bars: plates are to be nearly regular.
 _STIFF = 3.0
 #: Height of a plate's corner over the line of its neighbours below which it is pushed out, in mean sides.
@@ -148,7 +150,8 @@ def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygon
     frame_joints = {k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)}
     allowed = [k for k, loop in enumerate(loops) if graph.frame is None or len(frame_joints & set(loop)) >= 2]
     longest = max(len(loops[k]) for k in allowed)
-    drawings = [_Drawing(graph, loops, k, polygons) for k in allowed if len(loops[k]) >= longest - 1]
+    near = sorted((k for k in allowed if len(loops[k]) >= longest - 1), key=lambda k: -len(loops[k]))
+    drawings = [_Drawing(graph, loops, k, polygons) for k in near[:_OUTER]]
     for drawing in drawings:
         drawing.even_out(_ROUGH)
     best = max(drawings, key=_Drawing.room)  # the first of equals
