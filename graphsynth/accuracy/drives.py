@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from graphsynth.accuracy.choice import seconds_text
 from graphsynth.accuracy.rows import Effort, Problem, Row, RowStatus, best_of
 
 __all__ = ["drive_problem", "reduction_problem", "work_rows"]
 
+_L = "inductance [H]"
 _KIND = "largest error of speed and currents over their largest values"
 #: A scipy solver that needs more calls of the right-hand side is a failure here.
 _MOST_CALLS = 30_000
@@ -95,15 +97,17 @@ def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], ef
     """
     effort = effort or Effort()
     chosen = effort.some(inductances)
-    found, _, rounds = best_of(lambda: machine.inductance_study(times, chosen), Effort(rounds=1), warm=False)
+    found = machine.inductance_study(times, chosen)
+    least = replace(machine, motor=replace(machine.motor, inductance=float(found.inductance.min())))
+    limit, _, rounds = best_of(lambda: least.simulate(times, reduce=True), effort)
     rows = []
     for k, L in enumerate(found.inductance.tolist()):
         wrong = float(found.speed[k])
         rows.append(
             Row(
-                "model without inductance", f"L = {L:g} H", wrong, found.limit.seconds, rounds,
+                "model without inductance", f"L = {L:g} H", wrong, limit.seconds, rounds,
                 "largest error of the speed behind the electrical transient", "run with the inductance",
-                more={"steps": float(found.limit.steps)},
+                more={"steps": float(limit.steps)},
             )
         )  # fmt: skip
     for L in found.inductance.tolist():
@@ -117,6 +121,27 @@ def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], ef
             )
         )  # fmt: skip
     question = "The motor without its inductance: error of the speed after the electrical transient"
-    return Problem(
-        "small-inductance", question, "rad/s", tuple(rows), "run", "Seconds are those of one run of a study."
-    )
+    note = "The settings are inductances, not accuracies."
+    found_rows = tuple(replace(row, more={**row.more, _L: float(row.setting.split()[2])}) for row in rows)
+    problem = Problem("small-inductance", question, "rad/s", found_rows, "run", note, over=_L)
+    return replace(problem, sentences=_limit_sentences(problem))
+
+
+def _limit_sentences(problem: Problem) -> dict[str, str]:
+    """Say how the error of the limit falls with the inductance, and what keeping it costs."""
+    bare, full = (problem.of(method) for method in problem.methods)
+    small, large = min(bare, key=lambda row: row.more[_L]), max(bare, key=lambda row: row.more[_L])
+    share = small.error / small.more[_L]
+    times = max(row.seconds for row in full) / small.seconds
+    worst = max((row.error for row in full if row.good), default=math.nan)
+    return {
+        bare[0].method: (
+            f"{bare[0].method}: errors from {large.error:.1g} rad/s ({large.setting}) down to {small.error:.1g} rad/s "
+            f"({small.setting}), {share:.2g} rad/s per henry in the limit, in {seconds_text(small.seconds)}; choose it "
+            "where that error is small enough."
+        ),
+        full[0].method: (
+            f"{full[0].method}: errors up to {worst:.1g} rad/s whatever the inductance, in up to {times:.2g} times the "
+            "time; choose it otherwise."
+        ),
+    }

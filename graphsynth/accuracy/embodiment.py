@@ -19,9 +19,6 @@ from graphsynth.accuracy.rows import Effort, Problem, Row, RowStatus
 if TYPE_CHECKING:
     from graphsynth.kinematics.embodiment.goals import Goals
 
-#: Searches of one run where the effort is varied.
-_TRIES = 2
-
 __all__ = ["line_problem", "path_problem", "precise_strip"]
 
 
@@ -51,23 +48,21 @@ def precise_strip() -> float:
 
 
 def _rows(
-    goals: Goals, knob: str, values: tuple[float, ...], seeds: int, error: Any, kind: str, reference: str
+    goals: Goals, settings: tuple[tuple[float, int], ...], seeds: int, error: Any, kind: str, reference: str
 ) -> tuple[Row, ...]:  # fmt: skip
-    """One row for each time limit (``seconds``) or ``effort``; a seed without a result is infinitely wrong."""
+    """One row for each effort and number of tries; a seed without an acceptable result is infinitely wrong."""
     from graphsynth.kinematics.embodiment.api import embody
     from graphsynth.structure.graph import MechanismGraph
 
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     embody(graph)  # compiled and loaded
-    default = signature(embody).parameters[knob].default
+    default = signature(embody).parameters["effort"].default
     rows = []
-    for value in values:
-        limited = knob == "seconds"
-        options: dict[str, Any] = {knob: value} if limited else {knob: value, "tries": _TRIES}
+    for effort, tries in settings:
         errors, times, lost = [], [], ""
         for seed in range(seeds):
             begin = perf_counter()
-            found = embody(graph, goals, seed, driver=1, **options)
+            found = embody(graph, goals, seed, driver=1, tries=tries, effort=effort)
             times.append(perf_counter() - begin)
             errors.append(error(found) if found.accepted else math.inf)
             lost = lost if found.accepted else found.statement
@@ -75,10 +70,10 @@ def _rows(
         missed = not math.isfinite(middle)
         rows.append(
             Row(
-                "search", f"limit {value:g} s" if limited else f"{knob} {value:g}",
+                "search", f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}",
                 math.nan if missed else middle, median(times), seeds, kind, reference,
                 RowStatus.FAILED if missed else RowStatus.OK, lost if missed else "",
-                default=value == default, more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
+                default=effort == default, more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
             )
         )  # fmt: skip
     return tuple(rows)
@@ -96,20 +91,21 @@ def line_problem(effort: Effort | None = None) -> Problem:
     goals = Goals(
         target=LineGoal(length=4.0, on_bar=True), max_length_ratio=5.0, min_transmission_angle=math.radians(20)
     )
-    limits, seeds = ((0.3, 1.0, 4.0), 1) if effort.quick else ((0.3, 1.0, 3.0), 3)
+    settings = ((0.15, 1), (0.15, 3), (0.3, 3))
+    seeds = 1 if effort.quick else 3
 
     def error(found: Any) -> float:
         return float(abs(found.figures.goal_error - precise_strip()))
 
     kind = f"width of the strip over its length against the best, median of {seeds} seeds"
-    rows = _rows(goals, "seconds", limits, seeds, error, kind, "closed form with 50 digits")
+    rows = _rows(goals, settings, seeds, error, kind, "closed form with 50 digits")
     question = "Dimensions of a four-bar linkage from the wish for a straight line of four cranks (Chebyshev's lambda)"
     return Problem("dimensions", question, "relative", rows, "search", _NOTE)
 
 
 _NOTE = (
-    "A search draws lots and proves nothing; times and errors are medians over seeds. By default there is no time "
-    "limit, and there are 12 tries, or fewer when the target is met exactly."
+    "A search draws lots and proves nothing; times and errors are medians over seeds. By default the effort is 1, with "
+    "up to 12 tries, fewer when the target is met exactly."
 )
 
 
@@ -124,8 +120,9 @@ def path_problem(effort: Effort | None = None) -> Problem:
     points = tuple((float(x), float(y)) for x, y, _ in M)
     goals = Goals(target=PathGoal(points, tuple(inputs.tolist())), min_transmission_angle=math.radians(15))
     efforts, seeds = ((0.02, 0.05, 0.1), 1) if effort.quick else ((0.02, 0.1, 0.3, 1.0), 3)
+    settings = tuple((share, 2) for share in efforts)
     rows = _rows(
-        goals, "effort", efforts, seeds, lambda found: found.figures.goal_error,
+        goals, settings, seeds, lambda found: found.figures.goal_error,
         f"largest distance from a point over the size of the set, median of {seeds} seeds",
         "exact: the points are those of a linkage",
     )  # fmt: skip

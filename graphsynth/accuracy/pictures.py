@@ -127,6 +127,8 @@ def _dress(axes: Any, problem: Problem, top: float) -> None:
             axes.axhline(top, color=_SOFT, lw=0.8, ls=":")
     if problem.over:
         axes.invert_xaxis()  # harder to the right
+    if not any(row.good for row in problem.rows):
+        axes.set_ylim(0.1 * top, 10.0 * top)
     axes.set_title(problem.question, fontsize=9, loc="left")
     axes.margins(0.12, 0.1)
     axes.grid(which="major", color="#e8ebef", lw=0.8)

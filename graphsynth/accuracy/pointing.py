@@ -28,13 +28,14 @@ def pose_problem(mechanism: PointingMechanism, largest: float, effort: Effort | 
     found = pointing_errors(mechanism, largest, poses=3 if effort.quick else 9, rounds=effort.rounds)
     rows = []
     for r in found:
+        reference = "closed form with 50 digits" + (" (the same formula)" if r.method == "closed form" else "")
         wrong = not math.isfinite(r.error) or r.error > 0.01
         why = "it converges to another assembly, or to none" if wrong else ""
         status = RowStatus.UNRELIABLE if wrong else RowStatus.OK
         rows.append(
             Row(
                 r.method, r.setting, r.error, r.seconds, effort.rounds, "largest distance from the reference",
-                "Newton's method with 50 digits on the twelve equations", status, why,
+                reference, status, why,
             )
         )  # fmt: skip
     question = f"Elevation and azimuth of the reflector, both cranks from 0 to {math.degrees(largest):g} degrees"

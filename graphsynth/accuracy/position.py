@@ -175,12 +175,15 @@ def _driven(mechanism: Mechanism, u: Any, pose: list[list[Any]]) -> tuple[Any, d
     from graphsynth.mechanism.laws import Linear
 
     driver = mechanism.drivers[0]
-    known = len(mechanism.drivers) == 1 and driver.base == mechanism.frame and driver.law == Linear()
-    joint = next((j for j in mechanism.joints if j.pair == tuple(sorted((driver.base, driver.link)))), None)
-    if not known or joint is None or joint.kind != "R":
-        raise GeometryError("the 50-digit reference needs one driver that turns on the frame and follows the input")
-    angle = pose[driver.link][2] - u
-    return angle - 2 * mpmath.pi * mpmath.nint(angle / (2 * mpmath.pi)), {(driver.link, 2): mpmath.mpf(1)}
+    joint = next((j for j in mechanism.joints if j.pair == driver.pair), None)
+    if len(mechanism.drivers) != 1 or not isinstance(driver.law, Linear) or joint is None or joint.kind != "R":
+        raise GeometryError(
+            "the 50-digit reference needs one driver, of a turning pair, that follows the input linearly"
+        )
+    wanted = mpmath.mpf(driver.law.offset) + mpmath.mpf(driver.law.rate) * u
+    angle = pose[driver.link][2] - pose[driver.base][2] - wanted
+    one = mpmath.mpf(1)
+    return angle - 2 * mpmath.pi * mpmath.nint(angle / (2 * mpmath.pi)), {(driver.link, 2): one, (driver.base, 2): -one}
 
 
 def position_problem(
@@ -297,7 +300,7 @@ def _root_row(
 
     fine = np.linspace(nodes[0], nodes[-1], 6 * NODES + 1)
     free = [k for k in range(mechanism.graph.links) if k != mechanism.frame]
-    driver = mechanism.drivers[0].link
+    driver = mechanism.drivers[0]
     size = np.array([motion.Lc, motion.Lc, 1.0])
 
     def full(x: Array) -> Array:
@@ -305,12 +308,16 @@ def _root_row(
         pose[free] = x.reshape(-1, 3) * size
         return pose
 
+    def driven(pose: Array, u: float) -> float:
+        (angle, _, _) = driver.law(np.array([u]))
+        return float(pose[driver.link, 2] - pose[driver.base, 2] - angle[0])
+
     def run() -> tuple[list[Array], str]:
         x = (motion.poses[0][free] / size).ravel()
         found: list[Array] = []
         for u in fine:
             answer = root(
-                lambda y, u=u: np.append(residual(mechanism.joints, full(y)) / motion.Lc, full(y)[driver, 2] - u), x,
+                lambda y, u=u: np.append(residual(mechanism.joints, full(y)) / motion.Lc, driven(full(y), u)), x,
                 tol=tol,
             )  # fmt: skip
             if not answer.success:
