@@ -52,7 +52,7 @@ def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterat
 
     if prepare:
         prepare()
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
     try:
         yield pool
     except BaseException:
@@ -84,8 +84,22 @@ def _quiet_cancelling() -> Iterator[None]:
         threading.excepthook = usual
 
 
-def _ignore_interrupts(*_: Any) -> None:
-    """Leave Ctrl-C to the parent process, which stops the workers."""
+def _begin_worker(*_: Any) -> None:
+    """Leave Ctrl-C to the parent process, which stops the workers; end with it if it is killed."""
     import signal
+    from threading import Thread
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Wait for the end of the parent process: a killed one cannot tell its workers, and they would wait for ever."""
+    import os
+    from multiprocessing import parent_process
+    from multiprocessing.connection import wait
+
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

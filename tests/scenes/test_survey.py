@@ -349,3 +349,34 @@ def independent_counts() -> dict[tuple[str, str], int]:
         ("change point", "limited"): (excess == 0) & ((g + 20 > b + c) | (abs(g - 20) < abs(b - c))),
     }
     return {name: int(np.sum(mask)) for name, mask in counts.items()}
+
+
+@pytest.mark.slow
+def test_kill_9_leaves_no_workers_and_the_rerun_gives_the_same_bytes(tmp_path: Path) -> None:
+    import os
+    import signal
+    import subprocess
+    import sys
+    import time
+
+    out = tmp_path / "killed"
+    command = [sys.executable, "-m", "graphsynth", "run", "four_bar_survey", "--out", str(out), "--workers", "2"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    start, journal = time.monotonic(), out / "candidates.jsonl"
+    while not (journal.exists() and journal.read_bytes().count(b"\n") > 3):
+        assert process.poll() is None and time.monotonic() - start < 120
+        time.sleep(0.1)
+    listed = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True, check=True
+    )
+    workers = [int(line) for line in listed.stdout.split()]
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    deadline = time.monotonic() + 30
+    while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < deadline:
+        time.sleep(0.2)
+    assert workers and not any(Path(f"/proc/{pid}").exists() for pid in workers)
+    report = run("four_bar_survey", out=out)
+    assert "were taken over from an interrupted run" in report.notes[0]
+    run("four_bar_survey", out=tmp_path / "whole")
+    assert outputs(out) == outputs(tmp_path / "whole")

@@ -89,11 +89,11 @@ def _limits(table: BearingsTable) -> JointLimits:
 
 
 def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
-    from graphsynth.jamming.coupled import Misalignment
+    from graphsynth.jamming.coupled.limits import Misalignment
 
     driver = mechanism.drivers[0]
     alpha, spread = math.radians(table.alpha_deg), math.radians(table.alpha_tolerance_deg)
-    found: Misalignment = Misalignment(
+    return Misalignment(
         driver.base,
         driver.link,
         alpha,
@@ -101,7 +101,6 @@ def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
         alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
         direction_range=(0.0, math.tau) if table.any_direction else None,
     )
-    return found
 
 
 def dynamics(context: Context, moved: Moved) -> Driven:
