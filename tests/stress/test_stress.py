@@ -175,7 +175,8 @@ def test_page_and_table(tmp_path):
     text = " ".join(parser.text)
     assert not parser.open and "x <of> A" in text and "WRONG" in text and CASES[-1].name in text
     assert "<details open" in html.read_text(encoding="utf-8")  # the wrong case is shown at once
-    rows = list(csv.DictReader(table.open(encoding="utf-8", newline="")))
+    with table.open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
     assert [row["case_status"] for row in rows] == ["WRONG", "WRONG", "ok"]
     assert float(rows[0]["error"]) == 1.0 and float(rows[0]["bound"]) == pytest.approx(0.2)
 

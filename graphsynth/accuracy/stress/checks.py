@@ -191,9 +191,9 @@ class Checks:
         except GraphsynthError as error:
             text = str(error)
             if "\n" in text:
-                text = f"more than one line: {text!r}"
-                words = (*words, "one line")
-            self.mentions(what, text, *words, source=source)
+                self.agrees(what, False, repr(text), "a refusal in one line", source=source)
+            else:
+                self.mentions(what, text, *words, source=source)
         else:
             given = f"no refusal but {type(found).__name__}"
             self.rows.append(Check(what, "a refusal", given, source or self.source, math.nan, math.nan, Status.WRONG))

@@ -45,7 +45,7 @@ class Outcome:
 
     @property
     def status(self) -> Status:
-        """The worst status of the checks; WRONG if there are none or the case did not end, unless an extra is missing."""
+        """The worst status of the checks; WRONG if there are none, or if the case did not end for want of no extra."""
         worst = max((check.status for check in self.checks), key=SEVERITY.index, default=Status.OK)
         if self.missing and worst is not Status.WRONG:
             return Status.NOT_RUN
@@ -195,7 +195,7 @@ def run_stress(
     --------
     >>> report = run_stress(["structure-2.1"])
     >>> report.statement
-    '1 stress cases with 8 checks: 0 ok, 1 flagged, 0 WRONG.'
+    '1 stress cases with 7 checks: 0 ok, 1 flagged, 0 WRONG.'
     """
     names = list(names)
     chosen = stress_cases(names, slow=slow)

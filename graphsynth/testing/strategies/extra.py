@@ -1,0 +1,29 @@
+"""hypothesis, or one sentence that says it is missing."""
+
+from __future__ import annotations
+
+from graphsynth.errors import GraphsynthError, SpecError
+
+__all__ = ["assume", "check_range", "st"]
+
+try:
+    from hypothesis import assume
+    from hypothesis import strategies as st
+except ImportError as error:  # pragma: no cover - tested in a process of its own
+    raise GraphsynthError(
+        "graphsynth.testing draws its examples with hypothesis, which is not installed; pip install hypothesis"
+    ) from error
+
+
+def check_range(name: str, low: int, high: int, least: int, most: int) -> None:
+    """Refuse sizes that are not ordered or beyond what the strategy can draw.
+
+    Examples
+    --------
+    >>> check_range("links", 4, 8, 4, 10)
+    """
+    for word, value in (("smallest", low), ("largest", high)):
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise SpecError(f"{word} number of {name} is {value!r}; give a whole number from {least} to {most}")
+    if low > high:
+        raise SpecError(f"smallest number of {name} is {low}, above the largest, {high}; exchange them")

@@ -1,0 +1,147 @@
+"""Strategies for graphs: any labelled graph, admissible kinematic chains, mechanisms."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from graphsynth.errors import SpecError
+from graphsynth.structure.graph import MechanismGraph
+from graphsynth.testing.strategies.extra import check_range, st
+
+__all__ = ["chains", "graphs", "mechanism_graphs"]
+
+#: Largest chains that are listed in a moment: 230 of one degree of freedom.
+MOST_LINKS = 10
+
+
+@st.composite
+def _graphs(draw: st.DrawFn, least: int, largest: int, space: int | None, connected: bool) -> MechanismGraph:
+    links = draw(st.integers(least, largest))
+    of = draw(st.sampled_from((3, 2, 4, 5, 6))) if space is None else space
+    pairs = [(a, b) for b in range(links) for a in range(b)]
+    chosen = set(draw(st.lists(st.sampled_from(pairs), unique=True))) if pairs else set()
+    if connected:
+        chosen |= {(draw(st.integers(0, b - 1)), b) for b in range(1, links)}
+    joints = [(a, b, draw(st.integers(1, of - 1))) for a, b in sorted(chosen)]
+    frame = draw(st.none() | st.integers(0, links - 1))
+    return MechanismGraph(links, joints, frame=frame, space=of)
+
+
+def graphs(
+    min_links: int = 1, max_links: int = 12, *, space: int | None = None, connected: bool = False
+) -> st.SearchStrategy[MechanismGraph]:
+    """Any labelled graph: of one part or several, with or without joints, frame or none, joints of any mobility.
+
+    For code that must take every graph.  For chains that move, see `chains`.
+
+    Parameters
+    ----------
+    min_links, max_links : int
+        Sizes, 1 to 60.
+    space : int, optional
+        Mobility of a free link, 2 to 6; any of them by default.
+    connected : bool
+        Only graphs of one part.
+
+    Returns
+    -------
+    SearchStrategy
+        Shrinks to a single link.
+
+    Raises
+    ------
+    SpecError
+        Sizes or a space out of range.
+
+    Examples
+    --------
+    >>> from hypothesis import find
+    >>> find(graphs(), lambda g: g.frame is not None and len(g.joints) > 0).to_text()
+    'A_ f0'
+    """
+    check_range("links", min_links, max_links, 1, 60)
+    if space is not None and space not in range(2, 7):
+        raise SpecError(f"space = {space!r}; the mobility of a free link is 2 to 6")
+    return _graphs(min_links, max_links, space, connected)
+
+
+@cache
+def _listed(links: int, mobility: int, fractionated: bool) -> tuple[MechanismGraph, ...]:
+    from graphsynth.synthesis.api import enumerate_chains
+
+    return tuple(enumerate_chains(links, mobility, fractionated=fractionated))
+
+
+@st.composite
+def _chains(
+    draw: st.DrawFn, sizes: tuple[int, ...], mobility: int, fractionated: bool, relabel: bool
+) -> MechanismGraph:
+    chain = draw(st.sampled_from(_listed(draw(st.sampled_from(sizes)), mobility, fractionated)))
+    return chain.relabelled(draw(st.permutations(range(chain.links)))) if relabel else chain
+
+
+def chains(
+    min_links: int = 4, max_links: int = 8, *, mobility: int = 1, fractionated: bool = False, relabel: bool = True
+) -> st.SearchStrategy[MechanismGraph]:
+    """Planar kinematic chains of simple turning pairs without rigid sub-chain: every one of them, with any labels.
+
+    Parameters
+    ----------
+    min_links, max_links : int
+        Sizes, 4 to 10; those of the wrong parity are left out.
+    mobility : int
+        Degrees of freedom W, 1 to 4.
+    fractionated : bool
+        Also chains that a link or joint cuts into parts.
+    relabel : bool
+        Number the links at random; otherwise as the enumeration lists them.
+
+    Returns
+    -------
+    SearchStrategy
+        Shrinks to the first chain of the smallest size.  Exact: drawn from the complete list.
+
+    Raises
+    ------
+    SpecError
+        Sizes out of range, or no chain between them.
+
+    Examples
+    --------
+    >>> from hypothesis import find
+    >>> find(chains(), lambda c: c.links > 4).links
+    6
+    """
+    check_range("links", min_links, max_links, 4, MOST_LINKS)
+    if mobility not in range(1, 5):
+        raise SpecError(f"mobility = {mobility!r}; chains of 1 to 4 degrees of freedom are drawn")
+    sizes = tuple(n for n in range(min_links, max_links + 1) if (3 * (n - 1) - mobility) % 2 == 0 and n >= mobility + 3)
+    if not sizes:
+        raise SpecError(
+            f"no chain of mobility {mobility} has {min_links} to {max_links} links; "
+            f"give sizes from {mobility + 3}, every other one"
+        )
+    return _chains(sizes, mobility, fractionated, relabel)
+
+
+@st.composite
+def _mechanism_graphs(draw: st.DrawFn, of: st.SearchStrategy[MechanismGraph]) -> MechanismGraph:
+    chain = draw(of)
+    return MechanismGraph(chain.links, chain.joints, frame=draw(st.integers(0, chain.links - 1)), space=chain.space)
+
+
+def mechanism_graphs(min_links: int = 4, max_links: int = 8, *, mobility: int = 1) -> st.SearchStrategy[MechanismGraph]:
+    """Chains of `chains` with one link chosen as frame, any of them.
+
+    Parameters
+    ----------
+    min_links, max_links, mobility
+        As for `chains`.
+
+    Examples
+    --------
+    >>> from hypothesis import find
+    >>> find(mechanism_graphs(), lambda g: g.degrees[g.frame] == 3).links
+    6
+    """
+    return _mechanism_graphs(chains(min_links, max_links, mobility=mobility))
