@@ -166,8 +166,8 @@ def _starts(count: int) -> Complex:
     """Random places, the same every time."""
     random = np.random.default_rng(_SEED)
     shape = (_STARTS, count)
-    z: Complex = (random.normal(size=shape) + 1j * random.normal(size=shape)) * (math.sqrt(count) / 2.5)
-    return z
+    x, y = random.normal(size=shape), random.normal(size=shape)
+    return np.asarray((x + 1j * y) * (math.sqrt(count) / 2.5), dtype=np.complex128)
 
 
 def _force(z: Complex, links: _Links) -> Complex:

@@ -43,7 +43,7 @@ _RETRIES = 4
 #: Share of the area of a triangle that a step must leave.
 _KEPT = 0.4
 #: Distance of joints from sides they are not on below which a force acts, in mean sides, and its strength.
-_CLEAR, _CLEARING = 0.5, 3.0
+_CLEAR, _CLEARING = 0.5, 5.0
 #: Distance of two joints below which a further force acts, in mean sides.
 _APART = 0.6
 #: Strength of the force that keeps triangles from becoming flat.
@@ -220,7 +220,7 @@ class _Drawing:
         side = self.z[c] - self.z[a]
         length = np.maximum(np.abs(side), 1e-9)
         heights = _areas(self.z, self.corners) * self.turned / length
-        push = -2.0 * np.maximum(0.0, _HEIGHT - heights) * self.turned * 1j * side / length
+        push = -4.0 * np.maximum(0.0, _HEIGHT - heights) * self.turned * 1j * side / length
         move += _gathered(len(self.z), self.corners_on, np.concatenate([-0.5 * push, push, -0.5 * push]))
 
     def room(self) -> float:
