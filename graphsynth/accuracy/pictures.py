@@ -49,7 +49,7 @@ def work_precision_picture(problem: Problem) -> Figure:
         raise SpecError(f"problem {problem.name!r} has no rows, so there is nothing to draw")
     from graphsynth.drawing.figures import new_figure
 
-    figure = new_figure((8.6, 5.2))
+    figure = new_figure((7.2, 5.8))
     axes = figure.subplots()
     top = _top(problem)
     for k, method in enumerate(problem.methods):
@@ -135,4 +135,4 @@ def _dress(axes: Any, problem: Problem, top: float) -> None:
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)

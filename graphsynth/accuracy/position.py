@@ -101,7 +101,7 @@ def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any
     Parameters
     ----------
     mechanism : Mechanism
-        With turning and sliding pairs and pins in slots, and one driver on the frame that turns and follows the input.
+        With turning and sliding pairs and pins in slots, and one driver of a turning pair that follows the input.
     u : float
         Input, taken as the double it is.
     guess : ndarray, shape (links, 3)
