@@ -181,7 +181,7 @@ def callables():
     found = {}
     for path in (ROOT / "graphsynth").rglob("*.py"):
         parts = path.relative_to(ROOT).with_suffix("").parts
-        if {"cli", "__main__", "kernels", "stress", "steps"} & set(parts):
+        if {"cli", "__main__", "kernels", "cases", "steps"} & set(parts):
             continue
         module = import_module(".".join(parts).removesuffix(".__init__"))
         for name, thing in list(vars(module).items()):
