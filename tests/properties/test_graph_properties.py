@@ -5,17 +5,7 @@ from hypothesis import strategies as st
 
 from graphsynth.errors import FormatError
 from graphsynth.structure.graph import MechanismGraph
-
-
-@st.composite
-def graphs(draw, largest=12):
-    links = draw(st.integers(1, largest))
-    space = draw(st.integers(2, 6))
-    pairs = [(a, b) for b in range(links) for a in range(b)]
-    chosen = draw(st.lists(st.sampled_from(pairs), unique=True)) if pairs else []
-    joints = [(a, b, draw(st.integers(1, space - 1))) for a, b in chosen]
-    frame = draw(st.none() | st.integers(0, links - 1))
-    return MechanismGraph(links, joints, frame=frame, space=space)
+from graphsynth.testing import graphs
 
 
 @st.composite

@@ -349,6 +349,15 @@ def test_platforms_reach(corner):
 
 
 @MANY
+@given(testing.platform_poses(reached=True))
+def test_reached_poses_are_reached(found):
+    platform, pose, sigma = found
+    solution = platform.inverse(pose, sigma)
+    assert solution.reachable and (solution.deficit < 0).all()
+    assert np.abs(platform.closure(pose, solution.theta)).max() < 1e-11
+
+
+@MANY
 @given(testing.platform_poses())
 def test_one_leg_at_least_reaches_its_vertex(found):
     platform, pose, sigma = found

@@ -6,7 +6,7 @@ import cmath
 import math
 
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.testing.strategies.extra import st
+from graphsynth.testing.strategies.extra import assume, st
 
 __all__ = ["platform_poses", "platforms"]
 
@@ -74,26 +74,39 @@ def _platform_poses(draw: st.DrawFn, degenerate: bool) -> tuple[ParallelPlatform
     return platform, (centre.real, centre.imag, alpha), sigma
 
 
+@st.composite
+def _reached(draw: st.DrawFn, degenerate: bool) -> tuple[ParallelPlatform, Pose, tuple[int, int, int]]:
+    platform = draw(_platforms(degenerate))
+    x, y = draw(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)))
+    alpha = draw(st.sampled_from((0.0, math.pi, -math.pi / 2)) | st.floats(-math.pi, math.pi))
+    links = []
+    for pivot, vertex, arm in zip(platform.D, platform.b, platform.l1):
+        far = abs(complex(x, y) + cmath.exp(1j * alpha) * vertex - pivot)
+        share = draw(st.floats(0.05, 0.95))
+        links.append(abs(far - arm) + share * (far + arm - abs(far - arm)))  # any length between folded and stretched
+    sign = st.sampled_from((1, -1))
+    fitted = ParallelPlatform(platform.D, platform.b, platform.l1, (links[0], links[1], links[2]))
+    assume(fitted.inverse((x, y, alpha)).reachable)  # a vertex on its pivot leaves the angle open
+    return fitted, (x, y, alpha), (draw(sign), draw(sign), draw(sign))
+
+
 def platform_poses(
-    *, degenerate: bool = True
+    *, reached: bool = False, degenerate: bool = True
 ) -> st.SearchStrategy[tuple[ParallelPlatform, Pose, tuple[int, int, int]]]:
     """Platform, pose ``(x, y, alpha)`` and working mode: within reach of all legs, of some, or on their boundary.
 
     Parameters
     ----------
+    reached : bool
+        Only poses that all legs reach, away from their boundary: the links are then made to fit.
     degenerate : bool
         As for `platforms`.
-
-    Returns
-    -------
-    SearchStrategy
-        Use ``assume(platform.inverse(pose, sigma).reachable)`` for poses that all legs reach.
 
     Examples
     --------
     >>> from hypothesis import find
-    >>> platform, pose, sigma = find(platform_poses(), lambda found: bool(found[0].inverse(found[1]).reachable))
+    >>> platform, pose, sigma = find(platform_poses(reached=True), lambda found: True)
     >>> bool(platform.inverse(pose, sigma).reachable)
     True
     """
-    return _platform_poses(degenerate)
+    return _reached(degenerate) if reached else _platform_poses(degenerate)
