@@ -48,7 +48,7 @@ summary span:nth-child(n+4){display:none}}
 def stress_html(report: StressReport) -> str:
     """Return the page of a run as one string; values are escaped, nothing is loaded from elsewhere."""
     facts = "".join(
-        f'<li><b class="{_class(status)}">{report.count(status)}</b>{status.value}</li>'
+        f'<li><b class="{_class(status) if report.count(status) else "ok"}">{report.count(status)}</b>{status.value}</li>'
         for status in SEVERITY
         if report.count(status) or status is Status.WRONG
     )

@@ -88,7 +88,7 @@ def change_points(check: Checks) -> None:
 
 
 def _through_a_change_point(check: Checks) -> None:
-    """Crank driven across the change point: no branch is chosen silently, nothing is certified there."""
+    """Crank driven across the change point: no branch is chosen silently."""
     from graphsynth.accuracy.stress.cases.linkages import four_bar
     from graphsynth.kinematics.certified import certify_four_bar
     from graphsynth.kinematics.simulation import simulate
