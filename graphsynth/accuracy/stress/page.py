@@ -48,9 +48,9 @@ summary span:nth-child(n+4){display:none}}
 def stress_html(report: StressReport) -> str:
     """Return the page of a run as one string; values are escaped, nothing is loaded from elsewhere."""
     facts = "".join(
-        f'<li><b class="{_class(status) if report.count(status) else "ok"}">{report.count(status)}</b>{status.value}</li>'
+        f'<li><b class="{_class(status) if number else "ok"}">{number}</b>{status.value}</li>'
         for status in SEVERITY
-        if report.count(status) or status is Status.WRONG
+        if (number := report.count(status)) or status is Status.WRONG
     )
     pages = [
         f"<h2>{escape(title)}</h2>" + "".join(map(_case, chosen))
