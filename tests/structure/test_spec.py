@@ -325,7 +325,7 @@ BAD += [
 ]
 
 
-@pytest.mark.parametrize("value", BAD, ids=repr)
+@pytest.mark.parametrize("value", BAD, ids=lambda value: repr(value).split(" at 0x")[0])
 @pytest.mark.parametrize("name", ["W", "links", "p2", "n3", "v_ct"])
 def test_a_value_that_is_not_an_integer_or_a_pair(name, value):
     with pytest.raises(SpecError):
