@@ -27,7 +27,7 @@ _TOKEN = re.compile(
     r"|(?P<mark>--|->|[][{}=;,:<+])",
     re.DOTALL,
 )
-_TOKENS_MAX = 600_000
+_TOKENS_MAX = 400_000
 _EDGES = LINKS_MAX * (LINKS_MAX - 1) // 2
 _KEYWORDS = {"graph", "digraph", "node", "edge", "subgraph", "strict"}
 

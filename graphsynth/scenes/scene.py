@@ -248,9 +248,11 @@ class Scene:
 
     def stages(self) -> tuple[Stage, ...]:
         """Return every stage this scene can use; most are not needed for its outputs."""
-        common = STRUCTURE if self.structure is not None else ()
+        own = family(self.mechanism.module).stages_for(self)
+        given = {product for stage in (*STRUCTURE, *own) for product in stage.gives}
+        common = tuple(stage for stage in STRUCTURE if given.issuperset(stage.needs)) if self.structure else ()
         ranking = (RANK,) if self.ranking is not None else ()
-        return (*common, *ranking, *family(self.mechanism.module).stages_for(self))
+        return (*common, *ranking, *own)
 
 
 def _family(table: object, place: Place) -> Family:
