@@ -1,7 +1,7 @@
 """How fast circle and ellipse are solved and their areas enclosed, beside python-flint and mpmath on the same formulas.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_circle_ellipse_speed.py
---benchmark-enable``.  No time is asserted: machines differ.  Every benchmark checks its result; measured times are in
+--benchmark-enable -n0``. No time is asserted: machines differ. Every benchmark checks its result; measured times are in
 ``docs/explanation/circle-and-ellipse.md``.
 """
 

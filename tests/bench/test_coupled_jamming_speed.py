@@ -1,7 +1,7 @@
 """How fast the coupled jamming model is, beside scipy's HiGHS on a polygonal form of the same program.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_coupled_jamming_speed.py
---benchmark-enable``.  No time is asserted: machines differ.  Every benchmark checks its result.
+--benchmark-enable -n0``. No time is asserted: machines differ.  Every benchmark checks its result.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How fast the drives are; ``docs/explanation/motors-and-drives.md`` holds what was measured.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_drives_speed.py
---benchmark-enable``.  No time is asserted: machines differ.  Every benchmark checks its result against the
+--benchmark-enable -n0``. No time is asserted: machines differ.  Every benchmark checks its result against the
 specification, and the scipy rows integrate the same equations at about the same error.
 """
 

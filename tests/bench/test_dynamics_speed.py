@@ -1,7 +1,7 @@
 """How fast planar dynamics is, beside scipy on the plain equations, exudyn and MuJoCo at equal error.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_dynamics_speed.py
---benchmark-enable``.  No time is asserted: machines differ.  Every benchmark checks its result.  Targets on one core:
+--benchmark-enable -n0``. No time is asserted: machines differ. Every benchmark checks its result.  Targets on one core:
 four-bar 2 s at 1e-9 in 30 ms, seven-body mechanism 0.03 s at 1e-8 in the constrained form in 300 ms.
 """
 

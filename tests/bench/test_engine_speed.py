@@ -1,7 +1,7 @@
 """How fast the planar engine is, beside scipy and pylinkage on the same problem.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_engine_speed.py
---benchmark-enable``.  No time is asserted: machines differ.  Every benchmark checks its result; positions per second
+--benchmark-enable -n0``. No time is asserted: machines differ. Every benchmark checks its result; positions per second
 are in the column of extra information and in ``docs/explanation/planar-engine.md``.
 """
 

@@ -1,7 +1,7 @@
 """How fast the enumerator is; ``docs/explanation/speed.md`` says how to run this and what was measured.
 
 Run by the normal suite once each, without timing; with times:
-``pytest tests/bench --benchmark-enable`` (add ``-m ""`` for the slow ones).
+``pytest tests/bench --benchmark-enable -n 0`` (add ``-m ""`` for the slow ones).
 No time is asserted: machines differ.  Every benchmark checks its result.
 """
 

@@ -1,7 +1,7 @@
 """How fast interval arithmetic and Krawczyk's test are, beside numpy, mpmath.iv, python-flint, IntvalPy and codac.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_interval_speed.py
---benchmark-enable``.  No time is asserted: machines differ.  Ratios to the plain operation and to the peers on the same
+--benchmark-enable -n0``. No time is asserted: machines differ. Ratios to the plain operation and to the peers on the same
 operands are in the columns of extra information and in ``docs/explanation/intervals.md``; `test_other_libraries` prints
 a table of ratios, each library in a process of its own (extra ``bench``).
 """
@@ -272,7 +272,7 @@ def own_times(count, seconds):
 
 
 def test_other_libraries(benchmark, capsys, monkeypatch):
-    """Equal work in each library; with ``--benchmark-enable`` prints times and ratios.  Without, python-flint only."""
+    """Equal work in each library; ``--benchmark-enable -n 0`` prints times and ratios.  Without, python-flint only."""
     monkeypatch.syspath_prepend(str(PEERS.parent))
     count, seconds = (COUNT, 1.0) if benchmark.enabled else (200, 0.0)
     names = ("flint", "intvalpy", "codac") if benchmark.enabled else ("flint",)

@@ -1,6 +1,6 @@
 """How fast the parallel platform is; ``docs/explanation/parallel-platform.md`` holds what was measured.
 
-Run by the normal suite once each, without timing; with times: ``pytest tests/bench --benchmark-enable``.
+Run by the normal suite once each, without timing; with times: ``pytest tests/bench --benchmark-enable -n 0``.
 ``pytest tests/bench/test_platform_speed.py -k ratio -s`` prints rates beside numpy and scipy on the same problems.
 No time is asserted: machines differ.  Every benchmark checks its result.
 """

@@ -1,7 +1,7 @@
 """How fast the closed form of the pointing mechanism is, beside scipy on its twelve loop equations.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_pointing_speed.py
---benchmark-enable``.  No time is asserted: machines differ.  Poses per second are in the columns of extra information
+--benchmark-enable -n0``. No time is asserted: machines differ. Poses per second are in the columns of extra information
 and in ``docs/explanation/pointing-mechanism.md``.
 """
 
