@@ -1,7 +1,7 @@
 """How fast interval arithmetic and Krawczyk's test are, beside numpy, mpmath.iv, python-flint, IntvalPy and codac.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_interval_speed.py
---benchmark-enable -n0``. No time is asserted: machines differ. Ratios to the plain operation and to the peers on the same
+--benchmark-enable -n0``. No time is asserted: machines differ. Ratios to the plain operation and peers on the same
 operands are in the columns of extra information and in ``docs/explanation/intervals.md``; `test_other_libraries` prints
 a table of ratios, each library in a process of its own (extra ``bench``).
 """
