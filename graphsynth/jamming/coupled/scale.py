@@ -57,7 +57,7 @@ def largest_scale(
     *,
     condition: Condition = "A",
     length_tolerance: float = 0.0,
-    relative_gap: float = 1e-3,
+    relative_gap: float = 1e-4,
     max_pieces: int = 20_000,
     seconds: float = 20.0,
 ) -> ScaleCertificate:
