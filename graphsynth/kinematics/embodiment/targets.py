@@ -7,6 +7,7 @@ s, q, t.  So these are not searched but solved for (variable projection: Golub a
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +61,7 @@ def target_link(design: Design, target: Target) -> int:
     return link
 
 
-class Fit:
+class Fit(ABC):
     """Base: where to sample, how many more unknowns, and the errors."""
 
     #: Inputs at which the target is sampled, relative to the first.
@@ -76,9 +77,9 @@ class Fit:
     #: Whether the target reads the motion at other inputs by set.
     warped = False
 
+    @abstractmethod
     def errors(self, sampled: Sampled, extras: Array, crank: Array) -> tuple[Complex, Placed]:
         """Errors (sets, m) whose largest size is in the unit of the tolerance, and the placement."""
-        raise NotImplementedError
 
 
 class PathFit(Fit):
