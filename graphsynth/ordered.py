@@ -53,17 +53,16 @@ def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterat
     if prepare:
         prepare()
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
-    try:
-        yield pool
-    except BaseException:
-        with _quiet_cancelling():
+    with _quiet_cancelling():  # all along: a worker stopped while it starts breaks the pool before this process knows
+        try:
+            yield pool
+        except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for child in active_children():
                 child.terminate()
+            raise
+        finally:
             pool.shutdown(wait=True, cancel_futures=True)
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager

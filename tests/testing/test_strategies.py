@@ -27,7 +27,12 @@ from graphsynth.testing.strategies.specs import _values
 MANY = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 #: find() may look long for a corner that is drawn seldom
 LOOK = settings(
-    max_examples=1500, deadline=None, phases=(Phase.generate,), suppress_health_check=list(HealthCheck), database=None
+    derandomize=False,
+    max_examples=20_000,
+    deadline=None,
+    phases=(Phase.generate,),
+    suppress_health_check=list(HealthCheck),
+    database=None,
 )
 
 
