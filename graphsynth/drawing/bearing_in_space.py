@@ -21,13 +21,28 @@ if TYPE_CHECKING:
 
     from graphsynth.jamming.bearing import Bearing
 
-__all__ = ["space_picture"]
+__all__ = ["check_panels", "panel_title", "space_picture"]
 
 Array = NDArray[np.float64]
 
 _AROUND, _ALONG = 217, 45
 _SIDE = -52.0  # degrees: the view, with the side towards which the upper lid leans in front
 _ABOVE = 24.0
+
+
+def check_panels(tilts: tuple[float, ...], exaggeration: float) -> None:
+    """Refuse pictures of a tilted bearing without a tilt, or with an exaggeration that is not positive."""
+    if not 0.0 < exaggeration < math.inf:
+        raise GeometryError(f"exaggeration = {exaggeration} must be positive; 1 draws to scale")
+    if not tilts:
+        raise GeometryError("tilts is empty; give at least one tilt in radians")
+
+
+def panel_title(bearing: Bearing, tilt: float, title: str) -> str:
+    """Return the heading of a panel: its title, the tilt, and by how much the bearing jams or is free."""
+    gap = float(bearing.gap(abs(math.sin(tilt)), math.cos(tilt), "A"))
+    verdict = f"jams: {gap:.4f} mm too much" if gap > 0 else f"free: {-gap:.4f} mm left"
+    return f"{title}\ntilt {tilt:.6f} rad, {verdict}".strip()
 
 
 def space_picture(
@@ -60,10 +75,7 @@ def space_picture(
     >>> len(space_picture(Bearing(), (0.003, 0.0133)).axes)
     2
     """
-    if not 0.0 < exaggeration < math.inf:
-        raise GeometryError(f"exaggeration = {exaggeration} must be positive; 1 draws to scale")
-    if not tilts:
-        raise GeometryError("tilts is empty; give at least one tilt in radians")
+    check_panels(tilts, exaggeration)
     if bearing.clearance < 0.0:
         raise GeometryError(f"clearance = {bearing.clearance} mm is an interference fit, which has no hole to turn in")
     for tilt in tilts:
@@ -73,9 +85,7 @@ def space_picture(
     for k, (tilt, title) in enumerate(zip(tilts, (*titles, *[""] * len(tilts)))):
         axes: Any = figure.add_subplot(1, len(tilts), k + 1, projection="3d", computed_zorder=False)
         _panel(axes, bearing, tilt, exaggeration)
-        gap = float(bearing.gap(abs(math.sin(tilt)), math.cos(tilt), "A"))
-        verdict = f"jams: {gap:.4f} mm too much" if gap > 0 else f"free: {-gap:.4f} mm left"
-        axes.set_title(f"{title}\ntilt {tilt:.6f} rad, {verdict}".strip(), fontsize=10, color=LIGHT["ink"])
+        axes.set_title(panel_title(bearing, tilt, title), fontsize=10, color=LIGHT["ink"])
     figure.suptitle(
         f"radial distances from the wall of the untilted bearing × {exaggeration:g}, heights to scale; "
         "half of the hole is cut away; orange: beyond its wall",

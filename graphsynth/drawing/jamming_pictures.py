@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.drawing.bearing_in_space import space_picture
+from graphsynth.drawing.bearing_in_space import check_panels, panel_title, space_picture
 from graphsynth.drawing.crossing_pictures import crossing_picture, dress, region_picture
 from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
@@ -77,17 +77,12 @@ def section_picture(
     >>> len(section_picture(Bearing(), (0.003, 0.0133)).axes)
     2
     """
-    if not 0.0 < exaggeration < math.inf:
-        raise GeometryError(f"exaggeration = {exaggeration} must be positive; 1 draws to scale")
-    if not tilts:
-        raise GeometryError("tilts is empty; give at least one tilt in radians")
+    check_panels(tilts, exaggeration)
     figure = new_figure((5.0 * len(tilts), 4.6))
     panels = np.atleast_1d(figure.subplots(1, len(tilts), sharey=True))
     for axes, tilt, title in zip(panels, tilts, (*titles, *[""] * len(tilts))):
         _section(axes, bearing, tilt, exaggeration)
-        gap = float(bearing.gap(abs(math.sin(tilt)), math.cos(tilt), "A"))
-        verdict = f"jams: {gap:.4f} mm too much" if gap > 0 else f"free: {-gap:.4f} mm left"
-        dress(axes, f"{title}\ntilt {tilt:.6f} rad, {verdict}".strip(), "distance from the bearing's wall, mm", "z, mm")
+        dress(axes, panel_title(bearing, tilt, title), "distance from the bearing's wall, mm", "z, mm")
     figure.suptitle(
         f"radial distances from the wall × {exaggeration:g}, heights to scale, middle of the bearing left out",
         fontsize=9,

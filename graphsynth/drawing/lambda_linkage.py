@@ -64,7 +64,9 @@ def lambda_sketch(
         An angle at which the linkage cannot be assembled shows the frame, the path and a word.
     """
     here = linkage.positions(f)
-    sketch, lower, upper = _background(linkage, width, f"Lambda linkage, crank at {degrees(f)}", labels, stroke)
+    sketch, lower, upper = _background(
+        linkage, width, f"Lambda linkage, crank at {degrees(f)}", stroke if labels else None
+    )
     O, C = 0j, complex(linkage.l1, 0.0)
     if not here.assembled:
         sketch.label((lower + upper) / 2, "cannot be assembled")
@@ -85,7 +87,7 @@ def lambda_sketch(
 
 
 def _background(
-    linkage: LambdaLinkage, width: float, title: str, stroke_too: bool, stroke: tuple[float, float] | None = STROKE
+    linkage: LambdaLinkage, width: float, title: str, stroke: tuple[float, float] | None
 ) -> tuple[Sketch, complex, complex]:
     """Draw what does not move: ground, crank circle, path of M; return the corners of the picture too."""
     turn = _turn(linkage)
@@ -101,7 +103,7 @@ def _background(
     sketch.ground(O)
     sketch.ground(C)
     sketch.trace(M, "a", 2.2, closed=True)
-    if stroke is not None and stroke_too:
+    if stroke is not None:
         sketch.trace(_plane(linkage.positions(np.linspace(*stroke, 121)).M), "c", 4.2)
     return sketch, lower, upper
 
@@ -147,7 +149,7 @@ def lambda_animation(
     stuck = [jams is not None and jams(float(angle)) for angle in f]
     notes = {"B jams": stuck, "B is free": [not s for s in stuck]} if jams is not None else {}
     return linkage_animation(
-        _background(linkage, width, "Lambda linkage in motion", True)[0],
+        _background(linkage, width, "Lambda linkage in motion", STROKE)[0],
         {"O": 0j, "C": complex(linkage.l1, 0.0), **tracks},
         bars=(Bar("O", "A", "b"), Bar("C", "B"), Bar("A", "M")),
         joints=("O", "C", "A", "B"),

@@ -32,6 +32,7 @@ __all__ = [
     "check_positions",
     "read_table",
     "require",
+    "require_positive",
     "suggest",
     "unit_of",
     "unknown",
@@ -89,6 +90,13 @@ def require(condition: bool, sentence: str) -> None:
     """
     if not condition:
         raise SceneError(sentence)
+
+
+def require_positive(table: object, names: Iterable[str], why: str = "it must be positive") -> None:
+    """Raise a `SceneError` unless these keys of a table are positive; `why` ends the sentence."""
+    for name in names:
+        value = getattr(table, name)
+        require(value > 0, f"has {name} = {value}; {why}")
 
 
 def check_positions(positions: int) -> None:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import Stage
-from graphsynth.scenes.tables import require
+from graphsynth.scenes.tables import require, require_positive
 
 __all__ = ["FAMILY", "AntennaComparison", "AntennaLengths", "AntennaSweep", "AntennaTable", "AntennaTolerances"]
 
@@ -23,8 +23,9 @@ class AntennaLengths:
     crank_x_mm: float
 
     def __post_init__(self) -> None:
-        for name in ("cardan_mm", "rod_y_mm", "crank_y_mm", "rod_x_mm", "crank_x_mm"):
-            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
+        require_positive(
+            self, ("cardan_mm", "rod_y_mm", "crank_y_mm", "rod_x_mm", "crank_x_mm"), "a length must be positive"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import Stage
-from graphsynth.scenes.tables import check_positions, require
+from graphsynth.scenes.tables import check_positions, require, require_positive
 
 __all__ = ["FAMILY", "BraiderTable", "MotorTable", "StartTable", "SwitchTable", "ThreadTable", "TrainTable"]
 
@@ -24,8 +24,7 @@ class LinkageTable:
     branch: Literal[1, -1] = 1
 
     def __post_init__(self) -> None:
-        for name in ("crank_mm", "coupler_mm", "rocker_mm", "frame_mm"):
-            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
+        require_positive(self, ("crank_mm", "coupler_mm", "rocker_mm", "frame_mm"), "a length must be positive")
 
 
 @dataclass(frozen=True, slots=True)

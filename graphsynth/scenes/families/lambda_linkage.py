@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import Stage
-from graphsynth.scenes.tables import ANY_LENGTH, check_positions, require
+from graphsynth.scenes.tables import ANY_LENGTH, check_positions, require, require_positive
 
 __all__ = ["FAMILY", "BearingTable", "LambdaLengths", "LambdaTable", "Tilt"]
 
@@ -24,8 +24,7 @@ class LambdaLengths:
     rocker: Annotated[float, ANY_LENGTH]
 
     def __post_init__(self) -> None:
-        for name in ("frame", "crank", "coupler", "rocker"):
-            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
+        require_positive(self, ("frame", "crank", "coupler", "rocker"), "a length must be positive")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from graphsynth.errors import SceneError
 from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import COLLECT, Stage
-from graphsynth.scenes.tables import check_positions, require
+from graphsynth.scenes.tables import check_positions, require, require_positive
 from graphsynth.scenes.units import Unit
 
 __all__ = ["FAMILY", "BearingsTable", "EmbodyTable", "LoadsTable", "MotionTable", "MotorTable", "PlanarTable"]
@@ -114,8 +114,7 @@ class BearingsTable:
     length_tolerance_percent: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("radius_mm", "height_mm", "alpha_deg"):
-            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; it must be positive")
+        require_positive(self, ("radius_mm", "height_mm", "alpha_deg"))
         require(self.clearance_mm >= 0, f"has clearance_mm = {self.clearance_mm}; it must not be negative")
 
 
@@ -129,8 +128,7 @@ class MotorTable:
     inertia_kg_m2: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("stall_Nm", "no_load_rad_s", "end_s"):
-            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; it must be positive")
+        require_positive(self, ("stall_Nm", "no_load_rad_s", "end_s"))
 
 
 @dataclass(frozen=True, slots=True)

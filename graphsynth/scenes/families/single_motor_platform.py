@@ -8,7 +8,7 @@ from typing import Literal
 from graphsynth.scenes.families.platform_drive import MachineDriveTable
 from graphsynth.scenes.family import Family
 from graphsynth.scenes.stages import Stage
-from graphsynth.scenes.tables import check_positions, require
+from graphsynth.scenes.tables import check_positions, require, require_positive
 
 __all__ = ["FAMILY", "PlatformTable"]
 
@@ -40,10 +40,8 @@ class PlatformTable:
     drive: MachineDriveTable | None = None
 
     def __post_init__(self) -> None:
-        for name in ("arm_mm", "intermediate_mm", "rocker_mm", "coupler_mm"):
-            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a length must be positive")
-        for name in ("pinion_teeth", "wheel_teeth"):
-            require(getattr(self, name) > 0, f"has {name} = {getattr(self, name)}; a gear needs teeth")
+        require_positive(self, ("arm_mm", "intermediate_mm", "rocker_mm", "coupler_mm"), "a length must be positive")
+        require_positive(self, ("pinion_teeth", "wheel_teeth"), "a gear needs teeth")
         require(min(self.crank_mm) >= 0, f"has crank_mm = {list(self.crank_mm)}; a crank must not be negative")
         check_positions(self.positions)
 
