@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["add_stress", "run"]
 
 WRONG = 1
+INTERRUPTED = 130
 
 
 def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
@@ -31,11 +32,13 @@ def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the cases; exit status 1 if one of them is WRONG."""
+    """Run the cases; exit status 1 if one of them is WRONG, 130 if Ctrl-C came, with what was run shown and written."""
     from graphsynth.accuracy.stress import run_stress
 
     if options.list:
         return _list(options)
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
     with _progress() as progress:
         report = run_stress(options.names, slow=not options.fast, progress=progress)
     if options.out:
@@ -50,6 +53,9 @@ def run(options: argparse.Namespace) -> int:
         _show(report)
         for path in files:
             console.put(path)
+    if report.not_reached:
+        console.note("graphsynth: interrupted")
+        return INTERRUPTED
     return WRONG if report.wrong else 0
 
 
@@ -66,24 +72,26 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _show(report: StressReport) -> None:
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title="Stress cases", title_justify="left")
-    for name in ("case", "what", "status", "checks", "error", "allowed", "s"):
-        left = name in ("case", "what", "status")
-        table.add_column(name, justify="left" if left else "right", no_wrap=name != "what")
+    screen = Console() if sys.stdout.isatty() else Console(width=132)
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    for name, width in (("case", 16), ("status", 7), ("error", 7), ("allowed", 7), ("s", 5), ("what", None)):
+        words = name in ("case", "status", "what")
+        table.add_column(name, justify="left" if words else "right", no_wrap=True, overflow="ellipsis", min_width=width)
     colours = {"ok": "green", "flagged": "cyan", "WRONG": "bold red", "not run": "yellow"}
     for outcome in report.outcomes:
         worst, status = outcome.worst, outcome.status.value
-        number = worst is not None and worst.error == worst.error
+        numbers = (f"{worst.error:.1e}", f"{worst.bound:.1e}") if worst and worst.error == worst.error else ("", "")
         table.add_row(
-            outcome.case.name, escape(outcome.case.title), f"[{colours[status]}]{status}[/]", str(len(outcome.checks)),
-            f"{worst.error:.1e}" if worst and number else "", f"{worst.bound:.1e}" if worst and number else "",
-            f"{outcome.seconds:.2f}",
+            outcome.case.name, f"[{colours[status]}]{status}[/]", *numbers, f"{outcome.seconds:.2f}",
+            escape(outcome.case.title),
         )  # fmt: skip
-    Console().print(table)
+    if report.outcomes:
+        screen.print(table)
     for outcome in report.outcomes:
         if outcome.reason:
             console.put(f"{outcome.case.name}: {outcome.reason}")

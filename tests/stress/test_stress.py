@@ -5,14 +5,19 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
 import re
+import signal
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from html.parser import HTMLParser
 from pathlib import Path
 
 import mpmath
+import numpy as np
 import pytest
 
 from graphsynth.accuracy.stress import Case, Checks, Status, run_case, run_stress, stress_cases
@@ -48,6 +53,9 @@ def status_of(*calls) -> list[Status]:
         (1e308, "-1e308", {"absolute": 1e308}, Status.WRONG),
         (mpmath.mpf(1) / 4, Fraction(1, 4), {}, Status.OK),
         (mpmath.mpf("nan"), 0, {"absolute": 1}, Status.WRONG),
+        (np.int64(2**53 + 1), 2**53 + 1, {}, Status.OK),  # a double does not hold it
+        (np.int64(2**53 + 1), 2**53, {}, Status.WRONG),
+        (np.float32(0.1), 0.1, {"relative": 1e-9}, Status.WRONG),
     ],
 )
 def test_numbers(given, right, options, status):
@@ -74,6 +82,7 @@ def test_lists_of_different_length_are_wrong():
 
 def test_reports_and_statements():
     assert status_of(("says", (1, 1), {}), ("says", (1, 2), {})) == [Status.FLAGGED, Status.WRONG]
+    assert status_of(("equals", (5, 5), {}), ("equals", (5, 6), {})) == [Status.OK, Status.WRONG]
     assert status_of(("agrees", (True,), {}), ("agrees", (0,), {})) == [Status.OK, Status.WRONG]
     assert status_of(("mentions", ("leg 2 is short", "leg 2"), {})) == [Status.FLAGGED]
     assert status_of(("mentions", ("leg 2 is short", "leg 3"), {})) == [Status.WRONG]
@@ -236,7 +245,60 @@ def test_command(capsys, tmp_path):
     assert main(["stress", "--list", "structure-5", "--fast"]) == 0
     assert capsys.readouterr().out.startswith("structure-5.1 ")
     assert main(["stress", "no-such-case"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1 and not captured.out
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_run(capsys, tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(Case, "load", lambda self: pytest.fail("a case was run"))
+    assert main(["stress", "structure-2.1", "--out", str(tmp_path / "file" / "under")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def interrupting(case):
+    """Case function: the first one is right; in the second Ctrl-C comes, and a compiler makes something else of it."""
+
+    def second(check):
+        check.value("half", 1, 1)
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+        except KeyboardInterrupt as error:
+            raise RuntimeError("compilation failed") from error
+
+    return (lambda check: check.value("whole", 1, 1)) if case.name == "structure-2.1" else second
+
+
+def test_interrupted_runs_keep_what_was_run(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(Case, "load", interrupting)
+    assert main(["stress", "structure-2", "--out", str(tmp_path)]) == 130
+    captured = capsys.readouterr()
+    assert "1 stress case with 1 checks: 1 ok, 0 flagged, 0 WRONG, interrupted before 2 more." in captured.out
+    assert captured.err == "graphsynth: interrupted\n"
+    with (tmp_path / "stress.csv").open(encoding="utf-8", newline="") as lines:
+        assert [row["case"] for row in csv.DictReader(lines)] == ["structure-2.1"]
+    assert "not reached: structure-2.2, structure-2.3" in (tmp_path / "stress.html").read_text(encoding="utf-8")
+
+
+def test_interrupts_are_handed_back(monkeypatch):
+    monkeypatch.setattr(running_module, "run_case", lambda case: Outcome(case, (), 0.0))
+    before = signal.getsignal(signal.SIGINT)
+    assert not run_stress(["structure-2"]).not_reached
+    assert signal.getsignal(signal.SIGINT) is before
+    with ThreadPoolExecutor(1) as pool:  # another thread cannot have handlers
+        assert len(pool.submit(run_stress, ["structure-2"]).result().outcomes) == 3
+
+
+def test_table_fits_a_narrow_terminal(monkeypatch, capsys):
+    monkeypatch.setattr(Case, "load", lambda self: lambda check: check.value("x", 1.0, 1))
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["stress"]) == 0
+    lines = re.sub(r"\x1b\[[\d;]*m", "", capsys.readouterr().out).splitlines()
+    assert len(lines) == len(CASES) + 3  # one line for each, the heading, the rule, the statement
+    assert max(map(len, lines[:-1])) <= 80
+    assert all(line.startswith(case.name) for line, case in zip(lines[2:], CASES))
 
 
 def test_command_tells_what_is_wrong(capsys, monkeypatch):

@@ -47,7 +47,8 @@ class Check:
     error, bound : float
         Distance of ``given`` from ``right`` and the distance allowed; NaN for reports and refusals.
     status : Status
-        OK: a number within its bound.  FLAGGED: the required report or refusal was given.  WRONG: neither.
+        OK: a number within its bound, or an answer that is right.  FLAGGED: the required report or refusal was given.
+        WRONG: neither.
     """
 
     what: str
@@ -69,8 +70,10 @@ def exact(value: Any) -> Fraction | None:
     >>> exact("0.1"), exact(0.5), exact(float("nan"))
     (Fraction(1, 10), Fraction(1, 2), None)
     """
-    if isinstance(value, (str, int, Fraction)):
+    if isinstance(value, (str, Fraction)):
         return Fraction(value)
+    if hasattr(value, "__index__"):  # also integers of numpy, which a double may not hold
+        return Fraction(int(value))
     if hasattr(value, "man_exp"):  # mpmath
         if not value.man and value.exp:  # infinities and NaN
             return None
@@ -166,9 +169,15 @@ class Checks:
         self.value(what, given, 0, absolute=bound, source=source)
 
     def says(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
-        """Require a report: a status, a verdict, a count, a flag, equal to what is right."""
+        """Require a report of something extreme: a status, an event, a flag, a proof withheld; others: `equals`."""
         good = bool(given == right)
         status = Status.FLAGGED if good else Status.WRONG
+        self.rows.append(Check(what, _text(right), _text(given), source or self.source, math.nan, math.nan, status))
+
+    def equals(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
+        """Require an answer that is no number with an error: a count, a list, a proved verdict; OK if it is right."""
+        good = bool(given == right)
+        status = Status.OK if good else Status.WRONG
         self.rows.append(Check(what, _text(right), _text(given), source or self.source, math.nan, math.nan, status))
 
     def agrees(self, what: str, good: object, given: Any = "", right: str = "yes", *, source: str = "") -> None:

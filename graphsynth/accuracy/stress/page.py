@@ -57,7 +57,7 @@ def stress_html(report: StressReport) -> str:
         for page, title in PAGES.items()
         if (chosen := [o for o in report.outcomes if o.case.page == page])
     ]
-    left = ", ".join(case.name for case in report.left_out)
+    left, lost = (", ".join(case.name for case in cases) for cases in (report.left_out, report.not_reached))
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
@@ -67,6 +67,7 @@ def stress_html(report: StressReport) -> str:
         "digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: the situation is extreme, and "
         "the library reports it as it must. <b>WRONG</b>: neither. Open a case to see its comparisons.</p>"
         + (f"<p>Left out because they are slow: {escape(left)}.</p>" if left else "")
+        + (f'<p class="not-run">Interrupted, not reached: {escape(lost)}.</p>' if lost else "")
         + f'<ul class="facts">{facts}<li><b>{report.seconds:.0f} s</b>run time</li></ul>'
         + "".join(pages)
         + f'<p class="soft">graphsynth {escape(graphsynth.__version__)}</p></main></body></html>\n'

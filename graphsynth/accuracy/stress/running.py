@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from time import perf_counter
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.accuracy.stress.catalogue import PAGES, Case, stress_cases
@@ -91,11 +95,14 @@ class StressReport:
         Slow cases that were not asked for.
     seconds : float
         Wall time of all.
+    not_reached : tuple of Case
+        Cases that were asked for but not ended when the run was interrupted.
     """
 
     outcomes: tuple[Outcome, ...]
     left_out: tuple[Case, ...]
     seconds: float
+    not_reached: tuple[Case, ...] = ()
 
     def count(self, status: Status) -> int:
         """Return the number of cases with a status."""
@@ -114,8 +121,11 @@ class StressReport:
             parts.append(f"{self.count(Status.NOT_RUN)} not run")
         if self.left_out:
             parts.append(f"{len(self.left_out)} slow ones left out")
+        if self.not_reached:
+            parts.append(f"interrupted before {len(self.not_reached)} more")
         numbers = sum(len(outcome.checks) for outcome in self.outcomes)
-        return f"{len(self.outcomes)} stress cases with {numbers} checks: {', '.join(parts)}."
+        cases = "1 stress case" if len(self.outcomes) == 1 else f"{len(self.outcomes)} stress cases"
+        return f"{cases} with {numbers} checks: {', '.join(parts)}."
 
     def to_pandas(self) -> pd.DataFrame:
         """Return one row per check (pandas is imported here)."""
@@ -136,6 +146,7 @@ class StressReport:
             "statement": self.statement,
             "counts": {status.value: self.count(status) for status in SEVERITY},
             "left_out": [case.name for case in self.left_out],
+            "not_reached": [case.name for case in self.not_reached],
             "seconds": round(self.seconds, 3),
             "cases": [outcome.summary() for outcome in self.outcomes],
         }
@@ -184,7 +195,8 @@ def run_stress(
     Returns
     -------
     StressReport
-        Never raises for what happens inside of a case: it is then WRONG, with the reason.
+        Never raises for what happens inside of a case: it is then WRONG, with the reason.  After Ctrl-C it holds what
+        was run until then, and the rest in ``not_reached``.
 
     Raises
     ------
@@ -195,14 +207,38 @@ def run_stress(
     --------
     >>> report = run_stress(["structure-2.1"])
     >>> report.statement
-    '1 stress cases with 7 checks: 0 ok, 1 flagged, 0 WRONG.'
+    '1 stress case with 7 checks: 1 ok, 0 flagged, 0 WRONG.'
     """
     names = list(names)
     chosen = stress_cases(names, slow=slow)
     left_out = tuple(case for case in stress_cases(names) if case not in chosen)
-    start, outcomes = perf_counter(), []
-    for k, case in enumerate(chosen):
-        if progress is not None:
-            progress(case, k, len(chosen))
-        outcomes.append(run_case(case))
-    return StressReport(tuple(outcomes), left_out, perf_counter() - start)
+    start = perf_counter()
+    outcomes: list[Outcome] = []
+    with _interrupts() as received, suppress(KeyboardInterrupt):
+        for k, case in enumerate(chosen):
+            if progress is not None:
+                progress(case, k, len(chosen))
+            outcome = run_case(case)
+            if received:
+                break
+            outcomes.append(outcome)
+    return StressReport(tuple(outcomes), left_out, perf_counter() - start, chosen[len(outcomes) :])
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """Note Ctrl-C, which raises KeyboardInterrupt as always: compilers turn it into exceptions of their own."""
+    received: list[int] = []
+
+    def handler(number: int, frame: FrameType | None) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield received
+        return
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGINT, before)

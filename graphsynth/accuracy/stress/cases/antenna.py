@@ -51,7 +51,7 @@ def false_roots(check: Checks) -> None:
     art = _antenna()
     survey = art.survey_roots(0.3, -0.2, starts=80, seed=1)
     total = survey.failed + survey.false + survey.genuine
-    check.says("failed, false and genuine ones together", total, 80)
+    check.equals("failed, false and genuine ones together", total, 80)
     check.agrees(
         "false roots are met and rejected",
         survey.false > 4 * survey.genuine > 0,
@@ -147,7 +147,7 @@ def approach(check: Checks) -> None:
     """All four folds of the stretched leg X, from 1e-3 to 1e-20 rad: the loss is the square root, and compensated."""
     stretched = _antenna(l3=0.12, l5=0.12)
     folds = stretched.folds("X")
-    check.says("folds of leg X", len(folds), 4)
+    check.equals("folds of leg X", len(folds), 4)
     # rod of leg X on a line through the centre: |S_X| = l1 + l4 or l4 - l1, so A cos + B sin = C of section 2.7
     import mpmath as mp
 
@@ -191,7 +191,7 @@ def dead_points(check: Checks) -> None:
     for leg, own in (("Y", (0, 0)), ("X", (1, 1))):
         points = [p for p in art.dead_points(leg, 0.3) if p.s_y != 0]
         check.agrees(f"leg {leg}: dead points", len(points) >= 2, str(len(points)))
-        check.says(f"leg {leg}: kinds", {p.kind for p in points}, {"stretched", "folded"})
+        check.equals(f"leg {leg}: kinds", {p.kind for p in points}, {"stretched", "folded"})
         for p in points:
             rates = art.rates(p.phi_x, p.phi_y, s_y=p.s_y, s_x=p.s_x)
             check.below(f"leg {leg}, {p.kind}: transmission", abs(p.transmission), 1e-14)
@@ -225,9 +225,9 @@ def tolerance_at_fold(check: Checks) -> None:
     for degrees in np.linspace(68.5, 69.39, 8):
         found = parallelogram.tolerance(math.radians(degrees), math.radians(degrees), method="mean_value")
         wrong += math.isnan(found.a.corner_lower) and found.status.name != "UNDECIDED"
-    check.says("certified although a corner fails", int(wrong), 0)
+    check.equals("certified although a corner fails", int(wrong), 0)
     art = _antenna().tolerance(math.radians(15), math.radians(15))
-    check.says("far from folds", art.status.name, "CERTIFIED")
+    check.equals("far from folds", art.status.name, "CERTIFIED")
     ends = ("8.803040986781996547718", "8.826927759715010619827")
     given = (math.degrees(art.b.lower), math.degrees(art.b.upper))
     check.values("bounds of b, degrees", given, ends, absolute=1e-8, source="section 2.10")

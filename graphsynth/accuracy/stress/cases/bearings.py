@@ -34,7 +34,7 @@ def no_clearance(check: Checks) -> None:
     found = surrogate_areas(bearing, S, C).circle_only
     check.values("interference of E4", found, areas, relative=1e-14, source="section 14.4")
     moving = assess_jamming(LambdaLinkage(alpha=1 / 30), bearing)
-    check.says("verdict with a tilt", moving.verdict.name, "CERTIFIED_JAMMED")
+    check.equals("verdict with a tilt", moving.verdict.name, "CERTIFIED_JAMMED")
     check.values("touching where A_z = 0", moving.arcs.touching, [0, math.pi], absolute=1e-15)
     still = assess_jamming(LambdaLinkage(), bearing)
     check.says("verdict without a tilt", still.verdict.name, "UNDECIDED")
@@ -74,7 +74,7 @@ def never_critical(check: Checks) -> None:
         right = mp.acos(R / mp.hypot(R + c, h)) - mp.atan(h / (R + c))
     check.value("critical tilt B", low.critical_tilt("B").angle, right, relative=2e-15, source="closed form of 4.7")
     verdict = assess_jamming(LambdaLinkage(alpha=1.0), low).verdict.name
-    check.says("whole turn, alpha = 1", verdict, "CERTIFIED_FREE")
+    check.equals("whole turn, alpha = 1", verdict, "CERTIFIED_FREE")
     equal = Bearing(4.0, 6.0, 1.0)  # h^2 = 9 = c (2R + c)
     touch = equal.critical_tilt("A")
     check.mentions("equality", touch.reason, "never overlap")
@@ -93,7 +93,7 @@ def disc(check: Checks) -> None:
     thin = Bearing(17.5, 0.0, 0.03)
     check.says("critical tilt A", thin.critical_tilt("A").angle, None)
     report = assess_jamming(LambdaLinkage(alpha=1 / 30), thin)
-    check.says("verdict A", report.verdict.name, "CERTIFIED_FREE")
+    check.equals("verdict A", report.verdict.name, "CERTIFIED_FREE")
     check.mentions("reason", report.arcs.reason, "disc")
     with mp.workdps(40):
         right = mp.acos(mp.mpf(17.5) / (mp.mpf(17.5) + mp.mpf(0.03)))

@@ -195,7 +195,7 @@ def long_run(check: Checks) -> None:
         _g1(), np.linspace(0.0, 1000.0, 101), keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1},
         form="constrained", rtol=1e-12, estimate_error=True,
     )  # fmt: skip
-    check.says("completed", motion.completed, True)
+    check.equals("completed", motion.completed, True)
     check.below("energy drift", motion.checks.energy, 1e-9)
     # the crank's angle is some 9000 rad at the end: the joints close to its last digit
     turned = float(np.spacing(np.abs(motion.poses[:, 1, 2]).max()))

@@ -207,7 +207,7 @@ def _parabola(check: Checks) -> None:
         return [x[0] ** 2 + x[1] ** 2 - 1 - p[0], x[0] - x[1] ** 2]
 
     found = krawczyk(system, ["[0.5, 0.75]", "[0.7, 0.87]"], ["[-0.1, 0.1]"], rounds=30)
-    check.says("x^2 + y^2 = 1 + d, x = y^2: status", found.status, Status.UNIQUE)
+    check.equals("x^2 + y^2 = 1 + d, x = y^2: status", found.status, Status.UNIQUE)
     exact_range = (
         ("x", 0, "0.5723805294763608304814160", "0.6618950038622250655537796"),
         ("y", 1, "0.7565583450576438063597680", "0.8135692987461025532683699"),

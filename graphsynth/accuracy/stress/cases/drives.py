@@ -74,7 +74,7 @@ def zero_cranks(check: Checks) -> None:
     for crank in ((10, 5, 0), (10, 0, 0), (0, 0, 0)):
         machine = SingleMotorPlatform(crank=crank)
         motion = machine.full_turn(samples=25)
-        check.says(f"{crank}: complete and closed", (motion.complete, motion.closed), (True, True))
+        check.equals(f"{crank}: complete and closed", (motion.complete, motion.closed), (True, True))
         rates = machine.drive(np.linspace(0, 6, 13)).theta1
         for leg, length in enumerate(crank):
             if length == 0:
@@ -94,7 +94,7 @@ def singular_turn(check: Checks) -> None:
     phases = SingleMotorPlatform().frame_angle
     for offset in (1e-9, 1e-3):
         below = SingleMotorPlatform(crank=(SINGULAR_CRANK - offset,) * 3, phase=phases).full_turn()
-        check.says(f"{offset:g} below the limit: complete, closed", (below.complete, below.closed), (True, True))
+        check.equals(f"{offset:g} below the limit: complete, closed", (below.complete, below.closed), (True, True))
         machine = SingleMotorPlatform(crank=(SINGULAR_CRANK + offset,) * 3, phase=phases)
         motion = machine.full_turn()
         event = motion.events[-1]
@@ -142,11 +142,11 @@ def open_path(check: Checks) -> None:
         apart[..., 2] = np.angle(np.exp(1j * apart[..., 2]))
         at = poses[np.linalg.norm(apart, axis=-1).argmin(axis=1)]
     joined = tuple(int(np.abs(sets[0][:, :2] - pose[:2]).sum(axis=1).argmin()) for pose in at)
-    check.says("permutation", turned.permutation, joined, source="all modes at 8001 angles")
+    check.equals("permutation", turned.permutation, joined, source="all modes at 8001 angles")
     check.agrees("it is no identity", joined != tuple(range(len(joined))), str(joined))
-    check.says("periods", turned.periods, (1, 1, 2, 2))
+    check.equals("periods", turned.periods, (1, 1, 2, 2))
     motion = machine.full_turn(start=turned.modes[2])
-    check.says("period of the motion", motion.period, 2)
+    check.equals("period of the motion", motion.period, 2)
     check.agrees("it is not at its start after one turn", motion.closure_error > 1.0, f"{motion.closure_error:.3g}")
     twice = machine.sweep(np.linspace(0, 2 * math.tau, 721), start=turned.modes[2])
     check.values("after two turns it is", twice.pose[720, :2], turned.modes[2, :2], absolute=1e-13, source="period 2")

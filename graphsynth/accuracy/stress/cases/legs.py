@@ -123,7 +123,7 @@ def free(check: Checks) -> None:
     check.says("status", _status(leg), "FREE")
     check.agrees("no single angle is shown", np.isnan(leg.angle(1)) and np.isnan(leg.angle(-1)))
     near = solve_leg(1e-300, 0.0, 1.0, 1.0)
-    check.says("1e-300 beside it", _status(near), "REACHABLE")
+    check.equals("1e-300 beside it", _status(near), "REACHABLE")
     _compare(check, "angle there", float(near.angle(1)), _angle(1.0, 1.0, 1e-300, 0.0, 1))
     check.says("unequal lengths", _status(solve_leg(0.0, 0.0, 1.0, 0.5)), "TOO_NEAR")
 
@@ -158,7 +158,7 @@ def length_ratios(check: Checks) -> None:
                 what = f"l1 = {l1:g}, l2 = {l2:g}, rho = 1 {t:+g} l"
                 if _status(leg) != "REACHABLE":
                     # the doubles may lie outside of the ring, decided exactly
-                    check.says(f"{what}: status", _status(leg), _exact_status(l1, l2, x, y))
+                    check.equals(f"{what}: status", _status(leg), _exact_status(l1, l2, x, y))
                     continue
                 for sigma in (1, -1):
                     right = _angle(l1, l2, x, y, sigma)
@@ -192,13 +192,13 @@ def half_turn(check: Checks) -> None:
     theta = g1.inverse([1.2, 0.9, alpha], (1, 1, 1)).theta
     modes = turned.direct(theta)
     right = math.remainder(alpha + math.pi, math.tau)
-    check.says("modes", len(modes), 2)
+    check.equals("modes", len(modes), 2)
     near = float(modes.poses[np.abs(modes.poses[:, 2] - right).argmin(), 2])
     check.value("alpha + pi", near, right, absolute=6e-15, source="frame turned by pi")
     # alpha = pi itself
     home = [1.2, 0.9, math.pi]
     legs = turned.inverse(home, (1, 1, 1))
-    check.says("alpha = pi is reached", legs.reachable, g1.inverse([1.2, 0.9, 0.0], (1, 1, 1)).reachable)
+    check.equals("alpha = pi is reached", legs.reachable, g1.inverse([1.2, 0.9, 0.0], (1, 1, 1)).reachable)
     back = turned.direct(legs.theta).poses
     gap = np.abs(back - home)
     gap[:, 2] = np.abs(np.angle(np.exp(1j * gap[:, 2])))
@@ -232,7 +232,7 @@ def units(check: Checks) -> None:
     for unit in (1e-150, 1e-9, 1e9, 1e150):
         A = g1.elbows(theta) * unit
         modes = assembly_modes(A, np.array(g1.b) * unit, np.array(g1.l2) * unit)
-        check.says(f"unit {unit:g}: modes", len(modes), 2)
+        check.equals(f"unit {unit:g}: modes", len(modes), 2)
         check.values(f"unit {unit:g}: alpha", modes.poses[:, 2], right, absolute=5e-15, source="section 14.3")
     for unit in (2.0**-500, 2.0**500):
         for l1, l2, u, v in LEGS[:4]:

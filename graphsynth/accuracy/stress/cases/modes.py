@@ -45,13 +45,13 @@ def none(check: Checks) -> None:
 
     for name, lengths in (("legs far too short", [1, 1, 1]), ("one leg far too long", [1, 1, 1e4])):
         modes = assembly_modes([0, 100, 50j], [0, 1, 1j], lengths)
-        check.says(f"{name}: modes", len(modes), 0)
-        check.says(f"{name}: consistent", modes.consistent, True)
-        check.says(f"{name}: flagged", modes.near_double_root, False)
+        check.equals(f"{name}: modes", len(modes), 0)
+        check.equals(f"{name}: consistent", modes.consistent, True)
+        check.equals(f"{name}: flagged", modes.near_double_root, False)
     batch = assembly_modes_batch([[0, 100, 50j]] * 3, [0, 1, 1j], [1, 1, 1])
-    check.says("batch: counts", batch.counts.tolist(), [0, 0, 0])
+    check.equals("batch: counts", batch.counts.tolist(), [0, 0, 0])
     proof = certify_assembly_modes([(0, 0), (100, 0), (0, 50)], [(0, 0), (1, 0), (0, 1)], [1, 1, 1])
-    check.says("certified", proof.certified and len(proof) == 0, True)
+    check.equals("certified", proof.certified and len(proof) == 0, True)
 
 
 def type_two(check: Checks) -> None:
@@ -75,7 +75,7 @@ def type_two(check: Checks) -> None:
         else:
             check.says(f"eps = {eps}: flag", modes.near_double_root, True)
             check.says(f"eps = {eps}: precision raised", modes.escalated, True)
-            check.says(f"eps = {eps}: modes for these doubles", len(modes), _count_for_doubles(given))
+            check.equals(f"eps = {eps}: modes for these doubles", len(modes), _count_for_doubles(given))
             if len(modes):
                 away = np.abs(modes.poses[:, 2] - float(ALPHA_S)).max()
                 check.below(f"eps = {eps}: distance of alpha", away, 2e-7)
@@ -113,7 +113,7 @@ def _proved(check: Checks, eps: str, theta: tuple[str, ...], twin: str) -> None:
     proof = certify_assembly_modes(
         _elbows(theta), [("-0.4", "-0.25"), ("0.45", "-0.3"), ("0.05", "0.5")], ["1.1", "0.95", "1.05"]
     )
-    check.says(f"eps = {eps}: two modes proved", proof.certified and len(proof) == 2, True)
+    check.equals(f"eps = {eps}: two modes proved", proof.certified and len(proof) == 2, True)
     for name, mode, right in (("twin", proof.modes[0], twin), ("given", proof.modes[1], str(_sum(ALPHA_S, eps)))):
         radius = float(mode.radius[2]) + 1e-16
         check.value(f"eps = {eps}: alpha, {name}", float(mode.alpha.mid()), right, absolute=radius)
@@ -161,9 +161,9 @@ def _exactly_singular(check: Checks) -> None:
         ("1e-30 longer", Fraction(1, 10**30), 2),
     ):
         proof = certify_assembly_modes(anchors, vertices, [5 + shift] * 3, cross_check=False)
-        check.says(f"singular {name}: modes proved", (proof.certified, len(proof)), (True, count))
+        check.equals(f"singular {name}: modes proved", (proof.certified, len(proof)), (True, count))
         if name == "exactly":
-            check.says("its multiplicity", proof.modes[0].multiplicity, 2)
+            check.equals("its multiplicity", proof.modes[0].multiplicity, 2)
     double = assembly_modes([complex(*a) for a in anchors], [complex(*b) for b in vertices], [5, 5, 5])
     check.says("double precision: flag", double.near_double_root, True)
     check.says("double precision: merged mode", double.double.tolist(), [True])
@@ -192,7 +192,7 @@ def delta_zero(check: Checks) -> None:
     order = np.argsort(level[:, 1])
     check.values("x", level[order, 0], ["0.3", "0.3"], absolute=1e-12, source="closed form")
     check.values("y", level[order, 1], ["-1.1", "1.1"], absolute=1e-12, source="closed form")
-    check.says("consistent", modes.consistent, True)
+    check.equals("consistent", modes.consistent, True)
     # similar collinear triangles: the root is fourfold, which 50 digits do not isolate; the exact method does
     anchors, vertices, lengths = [(0, 0), (12, 0), (6, 0)], [(0, 0), (6, 0), (3, 0)], [5, 5, 4]
     flat = assembly_modes([complex(*a) for a in anchors], [complex(*b) for b in vertices], lengths)
@@ -200,7 +200,7 @@ def delta_zero(check: Checks) -> None:
     check.mentions("fourfold root: sentence", flat.self_motion, "not decided")
     proof = certify_assembly_modes(anchors, vertices, lengths)
     exact = sorted((float(m.x), float(m.y)) for m in proof.modes if m.alpha.contains(0))
-    check.says("fourfold root: proved", (proof.certified, len(exact)), (True, 2))
+    check.equals("fourfold root: proved", (proof.certified, len(exact)), (True, 2))
     check.values("fourfold root: places", [v for pair in exact for v in pair], [3, -4, 3, 4], absolute=1e-15)
 
 
@@ -214,8 +214,8 @@ def coincident(check: Checks) -> None:
     ):
         modes = assembly_modes(A, b, [1.5, 1.5, 1.5])
         check.mentions(f"{name}: note", modes.note, "degree drops")
-        check.says(f"{name}: consistent", modes.consistent, True)
-        check.says(f"{name}: modes", len(modes), _count_by_grid(A, b, [1.5, 1.5, 1.5]))
+        check.equals(f"{name}: consistent", modes.consistent, True)
+        check.equals(f"{name}: modes", len(modes), _count_by_grid(A, b, [1.5, 1.5, 1.5]))
         opened = _opening(modes.poses, A, b, [1.5, 1.5, 1.5])
         check.below(f"{name}: closure", opened, 1e-12)
 
@@ -269,8 +269,8 @@ def collinear(check: Checks) -> None:
     for lengths in ([2.0, 1.5, 2.5], [3.0, 2.0, 2.2], [1.0, 1.4, 3.0]):
         modes = assembly_modes(A, b, lengths)
         check.agrees(f"{lengths}: at most four", len(modes) <= 4 and len(modes) % 2 == 0, str(len(modes)))
-        check.says(f"{lengths}: modes", len(modes), _count_by_grid(A, b, lengths))
-        check.says(f"{lengths}: consistent", modes.consistent, True)
+        check.equals(f"{lengths}: modes", len(modes), _count_by_grid(A, b, lengths))
+        check.equals(f"{lengths}: consistent", modes.consistent, True)
         check.below(f"{lengths}: closure", _opening(modes.poses, A, b, lengths), 1e-12)
         # a mirror image in the line is a mode too
         mirrored = np.sort(-modes.poses[:, 1])
@@ -278,7 +278,7 @@ def collinear(check: Checks) -> None:
             f"{lengths}: mirror image", float(np.abs(mirrored - np.sort(modes.poses[:, 1])).max(initial=0.0)), 1e-11
         )
     proof = certify_assembly_modes([(0, 0), (2, 0), (5, 0)], [(0, 0), (1, 0), ("1.8", 0)], [2, "1.5", "2.5"])
-    check.says("proved", (proof.certified, len(proof)), (True, _count_by_grid(A, b, [2.0, 1.5, 2.5])))
+    check.equals("proved", (proof.certified, len(proof)), (True, _count_by_grid(A, b, [2.0, 1.5, 2.5])))
     random = np.random.default_rng(5)
     batch = assembly_modes_batch([A] * 500, b, random.uniform(0.5, 4.0, (500, 3)))
     check.agrees("500 random problems: at most four", batch.counts.max() <= 4, str(batch.counts.max()))
@@ -299,7 +299,7 @@ def self_motion(check: Checks) -> None:
     turned = [(Fraction(3, 5) * x - Fraction(4, 5) * y, Fraction(4, 5) * x + Fraction(3, 5) * y) for x, y in triangle]
     check.says("exact verdict", certify_assembly_modes(turned, triangle, [2, 2, 2]).verdict.name, "SELF_MOTION")
     unequal = certify_assembly_modes(turned, triangle, [2, 2, Fraction(21, 10)])
-    check.says("unequal legs: decided", unequal.certified, True)
+    check.equals("unequal legs: decided", unequal.certified, True)
 
 
 def home(check: Checks) -> None:
@@ -318,8 +318,8 @@ def home(check: Checks) -> None:
         relative=1e-14, source="section 14.5",
     )  # fmt: skip
     proof = certify_direct(mock, theta.tolist())
-    check.says("proved", (proof.certified, len(proof)), (True, 2))
-    check.says("proved in a batch", certify_direct_batch(mock, theta).counts.tolist(), [2])
+    check.equals("proved", (proof.certified, len(proof)), (True, 2))
+    check.equals("proved in a batch", certify_direct_batch(mock, theta).counts.tolist(), [2])
 
 
 def parity(check: Checks) -> None:
@@ -337,13 +337,13 @@ def parity(check: Checks) -> None:
     lengths = random.uniform(0.3, 3, (3000, 3))
     batch = assembly_modes_batch(anchors, vertices, lengths)
     plain = ~batch.near_double_root
-    check.says("odd counts without a flag among 3000", int((batch.counts[plain] % 2).sum()), 0)
-    check.says("inconsistent ones without a flag", int((~batch.consistent[plain]).sum()), 0)
+    check.equals("odd counts without a flag among 3000", int((batch.counts[plain] % 2).sum()), 0)
+    check.equals("inconsistent ones without a flag", int((~batch.consistent[plain]).sum()), 0)
     balance = np.bincount(batch.problem, weights=np.sign(batch.determinants), minlength=3000)
-    check.says("sums of signs that are not 0", int((balance[plain] != 0).sum()), 0)
+    check.equals("sums of signs that are not 0", int((balance[plain] != 0).sum()), 0)
     other = 0
     for k in range(300):
         g = np.array(sextic(anchors[k], vertices[k], lengths[k]).g, dtype=complex)
         roots = np.roots([g[3], g[2], g[1], g[0], *np.conj(g[1:])])
         other += bool(plain[k]) and int(np.sum(np.abs(np.abs(roots) - 1) < 1e-6)) != batch.counts[k]
-    check.says("counts unlike companion eigenvalues, of 300", int(other), 0)
+    check.equals("counts unlike companion eigenvalues, of 300", int(other), 0)

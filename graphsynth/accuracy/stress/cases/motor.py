@@ -111,7 +111,7 @@ def reversal(check: Checks) -> None:
     found = _source(_motor(1.0, 0.1), base_inertia=0.0).simulate(np.linspace(0.0, 1.0, 101), speed=1.0)
     stalls = [event for event in found.events if event.kind == "stall"]
     check.agrees("there are stalls", bool(stalls), str(len(stalls)))
-    check.says("the run is complete", found.complete, True)
+    check.equals("the run is complete", found.complete, True)
     check.below("u at the stalls", max((abs(e.motion) for e in stalls), default=math.inf), 1e-10)
     inside = all(0.0 < event.time < 1.0 and math.isfinite(event.angle) for event in stalls)
     check.agrees("each has its time and angle", inside)
@@ -141,7 +141,7 @@ def no_inductance(check: Checks) -> None:
     """``L_a = 0``: the reduced model, said to be exact; against the closed form without platform."""
     found = _source(_motor(1.0, 0.0)).simulate([0.0, 0.05])
     check.mentions("note", " ".join(found.notes), "reduced model, exact")
-    check.says("currents kept", found.currents.shape[1], 0)
+    check.equals("currents kept", found.currents.shape[1], 0)
     near = _source(_motor(1.0, 1e-12)).simulate([0.0, 0.05], reduce=False, rtol=1e-12)
     check.value(
         "angle against L_a = 1e-12", found.angle[1], near.angle[1], absolute=1e-9, source="limit of the full model"

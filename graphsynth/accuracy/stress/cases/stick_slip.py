@@ -58,13 +58,13 @@ def exact_events(check: Checks) -> None:
     check.values(
         "belt: periods", times[2:] - times[:-2], [period] * (len(times) - 2), absolute=1e-14, source="section 3.7"
     )
-    check.says("belt: states", [event.state for event in motion.events], [1, 0] * 17 + [1])
-    check.says("belt: guarantee", motion.guarantee, "exact")
+    check.equals("belt: states", [event.state for event in motion.events], [1, 0] * 17 + [1])
+    check.equals("belt: guarantee", motion.guarantee, "exact")
     found = _harmonic().event_driven(10.0, times=[0.0, 10.0])
-    check.says("harmonic: events", len(found.events), 37, source="section 3.8")
+    check.equals("harmonic: events", len(found.events), 37, source="section 3.8")
     for k, (t, state, x) in EVENTS.items():
         event = found.events[k]
-        check.says(f"event {k + 1}: state", event.state, state, source="section 3.8")
+        check.equals(f"event {k + 1}: state", event.state, state, source="section 3.8")
         check.value(f"event {k + 1}: time", event.time, t, absolute=1e-14, source="section 3.8")
         check.value(f"event {k + 1}: position", event.position, x, absolute=1e-16, source="section 3.8")
         check.agrees(
@@ -124,7 +124,7 @@ def stiff_spring(check: Checks) -> None:
         found = model.event_driven(3.0, times=times, estimate=False)
         given = model.stiffness * found.x2 / model.normal
         check.values(f"factor {factor:g}: k x2 / N", given, values, absolute=2e-11, source="section 3.11")
-        check.says(f"factor {factor:g}: events", len(found.events), count, source="section 3.11")
+        check.equals(f"factor {factor:g}: events", len(found.events), count, source="section 3.11")
         gaps.append(float(np.abs(given - base.limit_force(times)).max()))
     check.agrees(
         "distance to the limit shrinks", gaps[0] > gaps[1] > gaps[2], f"{gaps[0]:.1e}, {gaps[1]:.1e}, {gaps[2]:.1e}"
@@ -140,7 +140,7 @@ def storm(check: Checks) -> None:
     for factor, count, value, bound in ((1e2, 61, "-0.9659947263", 1e-9), (1e4, 576, "-6.6689532298", 1e-7)):
         model = base.stiffened(factor, scaled_damping=False)
         found = model.event_driven(1.0, times=[1.0])
-        check.says(f"factor {factor:g}: events in a second", len(found.events), count, source="section 3.11")
+        check.equals(f"factor {factor:g}: events in a second", len(found.events), count, source="section 3.11")
         given = float(model.stiffness * found.x2[0] / model.normal)
         check.value(f"factor {factor:g}: k x2 / N", given, value, absolute=bound, source="section 3.11")
     severe = base.stiffened(1e6, scaled_damping=False)

@@ -36,9 +36,9 @@ def no_tilt(check: Checks) -> None:
             check.value(f"{name}: gap {condition.upper()} + c", np.abs(gaps + 0.03).max(), 0, absolute=4e-18)
         check.values(f"{name}: free area", report.table.surrogate_gap_area, [ANNULUS] * 7, relative=4e-16)
         check.value(f"{name}: interference", np.abs(report.table.lid_area).max(), 0)
-        check.says(f"{name}: verdict", report.verdict.name, "CERTIFIED_FREE")
-        check.says(f"{name}: jam arcs", len(jam_arcs(linkage, Bearing()).arcs), 0)
-    check.says("E4, a = b unequal to R1", exact_hull(surrogate_problem(Bearing(), "0")).status, Status.EMPTY)
+        check.equals(f"{name}: verdict", report.verdict.name, "CERTIFIED_FREE")
+        check.equals(f"{name}: jam arcs", len(jam_arcs(linkage, Bearing()).arcs), 0)
+    check.equals("E4, a = b unequal to R1", exact_hull(surrogate_problem(Bearing(), "0")).status, Status.EMPTY)
 
 
 def tiny_tilt(check: Checks) -> None:
@@ -56,8 +56,8 @@ def tiny_tilt(check: Checks) -> None:
     check.value("interference", table.lid_area[0], 0)
     for sine in ("4e-9", "4e-300"):
         found = exact_hull(surrogate_problem(Bearing(), sine, eps="1e-9"))
-        check.says(f"crossing at sin t = {sine}", found.status, Status.EMPTY)
-        check.says("its reason", [r.name for r in found.reasons], ["CIRCLE_INSIDE"])
+        check.equals(f"crossing at sin t = {sine}", found.status, Status.EMPTY)
+        check.equals("its reason", [r.name for r in found.reasons], ["CIRCLE_INSIDE"])
 
 
 def steep_tilt(check: Checks) -> None:

@@ -30,7 +30,7 @@ def touching(check: Checks) -> None:
     check.values("touching at", report.arcs.touching, [math.pi / 2, 3 * math.pi / 2], absolute=1e-15)
     for factor, verdict in ((1 - 1e-12, "CERTIFIED_FREE"), (1 + 1e-12, "CERTIFIED_JAMMED")):
         near = assess_jamming(LambdaLinkage(alpha=linkage.alpha * factor), bearing)
-        check.says(f"alpha times 1 {factor - 1:+.0e}", near.verdict.name, verdict, source="kappa = 1 is the border")
+        check.equals(f"alpha times 1 {factor - 1:+.0e}", near.verdict.name, verdict, source="kappa = 1 is the border")
 
 
 def crank_intervals(check: Checks) -> None:
@@ -53,7 +53,7 @@ def crank_intervals(check: Checks) -> None:
         ("three turns", -1.0, -1.0 + 6 * math.pi, jam),
         ("an end of the zone", low - e, low - e / 2, free),
     ):
-        check.says(what, proof.over(start, stop).name, right)
+        check.equals(what, proof.over(start, stop).name, right)
     check.refused("NaN", lambda: proof.over(math.nan, 1.0), "start = nan")
 
 
@@ -163,7 +163,7 @@ def units(check: Checks) -> None:
         for alpha, verdict in (("0.0151614", "CERTIFIED_FREE"), ("0.0151615", "CERTIFIED_JAMMED")):
             box = ToleranceBox(*lengths, alpha, Rb=own[0], Hb=own[1], clearance=own[2])
             found = certify_jamming(box).verdict.name
-            check.says(f"1e{power}: alpha = {alpha}", found, verdict, source="alpha_max of section 14.7")
+            check.equals(f"1e{power}: alpha = {alpha}", found, verdict, source="alpha_max of section 14.7")
         values = [Fraction(v) * exact for v in ("17.5", "17.53", "17.46")]
         status = exact_hull(circle_ellipse(*values)).status.name
-        check.says(f"1e{power}: crossing", status, "UNIQUE")
+        check.equals(f"1e{power}: crossing", status, "UNIQUE")
