@@ -92,7 +92,7 @@ def _text(value: Any) -> str:
         from mpmath import nstr
 
         return str(nstr(value, 22))
-    if isinstance(value, bool) or not hasattr(value, "__float__"):
+    if getattr(value, "dtype", type(value)) == bool or not hasattr(value, "__float__"):
         return str(value)
     return str(value) if isinstance(value, int) else f"{float(value):.17g}"
 

@@ -30,19 +30,31 @@ p{margin:.4rem 0 .8rem;max-width:46rem}.soft{color:var(--soft);font-size:.875rem
 .facts{display:flex;flex-wrap:wrap;gap:.6rem;margin:1rem 0;padding:0;list-style:none}
 .facts li{background:var(--card);border-radius:.5rem;padding:.5rem .9rem}.facts b{display:block;font-size:1.3rem}
 details{border-bottom:1px solid var(--rule);padding:.3rem 0}
-summary{display:grid;grid-template-columns:9.5rem 1fr 5rem 9rem 4rem;gap:.2rem .8rem;align-items:baseline}
-summary{cursor:pointer}
-summary::-webkit-details-marker{display:none}summary{list-style:none}
-summary span:nth-child(n+4){text-align:right;font-variant-numeric:tabular-nums;color:var(--soft);font-size:.875rem}
+summary,.head{display:grid;grid-template-columns:10.5rem 1fr 5rem 10rem 4rem;gap:.2rem .8rem;align-items:baseline}
+summary{cursor:pointer;list-style:none}summary::-webkit-details-marker{display:none}
+summary code::before{content:"\\25B8";display:inline-block;width:1.1em;color:var(--soft)}
+details[open] summary code::before{content:"\\25BE"}
+summary span:nth-child(n+4),.head span:nth-child(n+4){text-align:right;font-variant-numeric:tabular-nums}
+summary span:nth-child(n+4),.head{color:var(--soft);font-size:.875rem}
 .ok{color:var(--good)}.flagged{color:var(--told)}.WRONG{color:var(--bad);font-weight:700}.not-run{color:var(--none)}
 .scroll{overflow-x:auto;margin:.4rem 0 .8rem}
-table{border-collapse:collapse;font-size:.85rem;font-variant-numeric:tabular-nums}
+table{border-collapse:collapse;font-size:.8rem;font-variant-numeric:tabular-nums}
 th,td{text-align:left;vertical-align:top;padding:.2rem .9rem .2rem 0;border-bottom:1px solid var(--rule)}
-th{color:var(--soft);font-weight:600}td{overflow-wrap:anywhere}td.num{white-space:nowrap;text-align:right}
+th{color:var(--soft);font-weight:600}td{overflow-wrap:anywhere}td.num{text-align:right}
+td.num,td.ok,td.flagged,td.WRONG,td.not-run{white-space:nowrap}th,td{min-width:4.5em}
 code{font-size:.9em}
-@media (max-width:46rem){summary{grid-template-columns:1fr auto}summary span:nth-child(2){grid-row:2;grid-column:1/-1}
-summary span:nth-child(n+4){display:none}}
+@media (max-width:46rem){.head{display:none}summary{grid-template-columns:1fr auto}
+summary span:nth-child(2){grid-row:2;grid-column:1/-1}summary span:nth-child(4){grid-row:3;text-align:left}
+summary span:nth-child(4):not(:empty)::before{content:"error "}summary span:nth-child(5){grid-row:3}
+table,tbody,tr,td{display:block}thead{display:none}tr{border-bottom:1px solid var(--rule);padding:.35rem 0}
+td,td.num{border:0;padding:0;text-align:left;white-space:normal}td:empty{display:none}
+td[data-name]::before{content:attr(data-name) ": ";color:var(--soft)}td:first-child{font-weight:600}}
 """
+
+_HEAD = (
+    '<div class="head"><span>case</span><span>what</span><span>status</span><span>error of allowed</span>'
+    "<span>time</span></div>"
+)
 
 
 def stress_html(report: StressReport) -> str:
@@ -53,7 +65,7 @@ def stress_html(report: StressReport) -> str:
         if (number := report.count(status)) or status is Status.WRONG
     )
     pages = [
-        f"<h2>{escape(title)}</h2>" + "".join(map(_case, chosen))
+        f"<h2>{escape(title)}</h2>{_HEAD}" + "".join(map(_case, chosen))
         for page, title in PAGES.items()
         if (chosen := [o for o in report.outcomes if o.case.page == page])
     ]
@@ -89,7 +101,7 @@ def _class(status: Status) -> str:
 
 def _case(outcome: Outcome) -> str:
     status, worst = outcome.status, outcome.worst
-    error = f"{worst.error:.1e} of {worst.bound:.1e}" if worst and not math.isnan(worst.error) else ""
+    error = _error(worst) if worst and not math.isnan(worst.error) else ""
     opened = " open" if status is Status.WRONG else ""
     rows = "".join(map(_row, outcome.checks))
     reason = f'<p class="{_class(status)}">{escape(outcome.reason)}</p>' if outcome.reason else ""
@@ -102,10 +114,20 @@ def _case(outcome: Outcome) -> str:
     )
 
 
+def _error(check: Check) -> str:
+    return f"{check.error:.1e} of {check.bound:.1e}" if check.error or check.bound else "none: exact"
+
+
 def _row(check: Check) -> str:
     numbers = ("", "") if math.isnan(check.error) else (f"{check.error:.2e}", f"{check.bound:.2e}")
     return (
-        f"<tr><td>{escape(check.what)}</td><td>{escape(check.right)}</td><td>{escape(check.given)}</td>"
-        f'<td class="num">{numbers[0]}</td><td class="num">{numbers[1]}</td>'
-        f'<td class="{_class(check.status)}">{check.status.value}</td><td>{escape(check.source)}</td></tr>'
+        f'<tr><td>{escape(check.what)}</td><td data-name="right">{escape(check.right)}</td>'
+        f'<td data-name="given">{escape(check.given)}</td>{_number("error", numbers[0])}'
+        f"{_number('allowed', numbers[1])}"
+        f'<td class="{_class(check.status)}">{check.status.value}</td>'
+        f'<td data-name="what is right comes from">{escape(check.source)}</td></tr>'
     )
+
+
+def _number(name: str, text: str) -> str:
+    return f'<td class="num" data-name="{name}">{text}</td>' if text else "<td></td>"
