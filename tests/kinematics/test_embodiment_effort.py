@@ -1,4 +1,4 @@
-"""`effort` of `embody`: less of it is less work, never another standard of acceptance, and the same bytes every time."""
+"""`effort` of `embody`: less of it is less work, the same standard of acceptance, the same bytes every time."""
 
 from __future__ import annotations
 
