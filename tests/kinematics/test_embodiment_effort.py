@@ -117,4 +117,4 @@ def test_same_seed_same_bytes(effort: float) -> None:
 @pytest.mark.parametrize("effort", [0.0, -1.0, math.nan, math.inf, "much", None])
 def test_effort_that_makes_no_sense(effort: object) -> None:
     with pytest.raises(GeometryError, match="effort"):
-        embody(CYCLE, effort=effort)  # type: ignore[arg-type]
+        embody(CYCLE, effort=effort)
