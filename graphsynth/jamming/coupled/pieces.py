@@ -170,25 +170,37 @@ class Work:
         return found
 
     def on_branch(self, pieces: Found, links: Mask) -> Mask:
-        """Whether the assembly of a piece is proved to be that of the motion: it holds a sample, or is linked to one.
+        """Whether the assembly of a piece is proved to be that of the motion: a sample's own, or linked to such a one.
 
-        Every box holds exactly one assembly for each input, so the one near a sample is the one meant.
+        A sample of the motion stands for the one assembly proved next to it.  Every box holds exactly one for each
+        input, so a box around that assembly belongs to the motion.
         """
-        motion = self.motion
-        keep = np.flatnonzero(motion.assembled)
-        u, size = motion.inputs[keep], self.system.size
-        x = self.system.coordinates(motion.poses[keep], np.zeros_like(motion.poses[keep]))[0]
-        place = np.clip(np.searchsorted(pieces.lo, u, side="right") - 1, 0, None)
-        inside = pieces.proved[place] & (pieces.lo[place] <= u) & (u <= pieces.hi[place])
-        if size:
-            inside &= ((pieces.box_lo[place] <= x) & (x <= pieces.box_hi[place])).all(axis=1)
         found: Mask = np.zeros(len(pieces.lo), dtype=bool)
-        found[place[inside]] = True
+        rows, samples = self._samples(pieces)
+        if self.system.size and rows.size:
+            poses = self.motion.poses[samples]
+            x, u = self.system.coordinates(poses, np.zeros_like(poses))[0], self.motion.inputs[samples]
+            own = prove_tubes(self.system, (), points(u), x, np.zeros_like(x), self.system.count(poses))
+            box = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
+            rows = rows[own.proved & own.tight.subset(box).all(axis=1)]
+        found[rows] = True
         for k in range(1, len(found)):
             found[k] |= found[k - 1] & links[k - 1]
         for k in range(len(found) - 2, -1, -1):
             found[k] |= found[k + 1] & links[k]
         return found
+
+    def _samples(self, pieces: Found) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Proved pieces within which the motion has a sample, and for each the sample nearest to its middle."""
+        keep = np.flatnonzero(self.motion.assembled)
+        u = self.motion.inputs[keep]
+        place = np.clip(np.searchsorted(pieces.lo, u, side="right") - 1, 0, None)
+        inside = np.flatnonzero(pieces.proved[place] & (pieces.lo[place] <= u) & (u <= pieces.hi[place]))
+        place, u = place[inside], u[inside]
+        away = np.abs(u - 0.5 * (pieces.lo[place] + pieces.hi[place]))
+        order = np.lexsort((away, place))
+        rows, first = np.unique(place[order], return_index=True)
+        return rows, keep[inside[order[first]]]
 
 
 def cut(lo: Array, hi: Array) -> tuple[Array, Array]:

@@ -24,6 +24,7 @@ from graphsynth.jamming.coupled import (
 )
 from graphsynth.jamming.coupled.closure import joint_places, shifts
 from graphsynth.jamming.coupled.enclosure import Pieces, factor_bounds
+from graphsynth.jamming.coupled.pieces import Work
 from graphsynth.jamming.coupled.positions import Positions
 from graphsynth.jamming.coupled.problem import problem
 from graphsynth.jamming.coupled.slopes import slopes
@@ -148,6 +149,20 @@ def test_poses_of_another_branch_prove_nothing(monkeypatch):
     assert not (found.state == -1).any() and (found.state[found.high < 4.59] == 1).all()
     scale = largest_scale(own, Bearing(), tilt)
     assert scale.low == 0.0 and scale.high > 1.2 and "branch" in scale.reason
+
+
+def test_a_box_around_the_float_alone_is_not_that_of_the_motion():
+    """The sample lies in every box below, but the assembly proved next to it only in the first."""
+    motion = simulate(four_bar(), np.linspace(4.2, 5.2, 9))
+    given = problem(four_bar(), Bearing(), Misalignment(0, 1, 0.01))
+    work = Work(given, motion, 0.0)
+    pieces = work.evaluate(np.array([4.2]), np.array([4.25]))
+    none = np.zeros(0, dtype=bool)
+    assert work.on_branch(pieces, none).all()
+    x = work.system.coordinates(motion.poses[:1], np.zeros_like(motion.poses[:1]))[0]
+    assert not work.on_branch(pieces._replace(box_lo=x, box_hi=x), none).any()
+    assert not work.on_branch(pieces._replace(lo=pieces.lo + 0.01), none).any()  # no sample within
+    assert not work.on_branch(pieces._replace(proved=np.array([False])), none).any()
 
 
 def test_whole_turn_of_the_lambda_linkage():

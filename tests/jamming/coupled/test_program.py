@@ -272,10 +272,14 @@ def test_slider_limits():
 
 
 def test_coincident_and_collinear_joints():
-    """All joints on one line (folded pose), and two joints at one point."""
-    motion = simulate(four_bar(3.0, 1.0, 2.5, 1.5), [0.0])  # O, A, C and B on the x axis? A = 1, C = 3
-    report = assess_coupled(motion, JointLimits(0.01), Misalignment(0, 1, 0.01, 1.0))
-    assert report.gap[0] < 1e-12
+    """All joints on one line (a change point), and two joints at one point."""
+    line = four_bar(3.0, 1.0, 3.5, 1.5)  # 1 + 3.5 = 3 + 1.5: O = 0, A = 1, C = 3 and B = 4.5 on the x axis
+    motion = simulate(line, [0.0])
+    places = [motion.point(1, (1.0, 0.0)).position[0], motion.point(2, (3.5, 0.0)).position[0]]
+    np.testing.assert_allclose(places, [[1.0, 0.0], [4.5, 0.0]], atol=1e-7)
+    for direction in (0.0, 1.0, math.pi / 2):
+        report = assess_coupled(motion, JointLimits(0.01), Misalignment(0, 1, 0.01, direction))
+        assert report.gap[0] < 1e-12
     square = four_bar(1.0, 1.0, 1.0, 1.0)
     with np.errstate(all="ignore"):
         folded = simulate(square, [math.pi - 1e-13, math.pi])
