@@ -46,6 +46,7 @@ _PUBLIC: dict[str, str] = {
     "PistonMachine": "dynamics.piston",
     "Interval": "intervals.interval",
     "krawczyk": "intervals.proving",
+    "pave": "intervals.paving",
     "Status": "intervals.status",
     "assess_jamming": "jamming.assess",
     "JammingReport": "jamming.assess",

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
 from importlib import import_module
+from io import StringIO
 from typing import Any
 
 import numpy as np
@@ -16,8 +19,40 @@ __all__ = ["CvodeStepper"]
 Array = NDArray[np.float64]
 
 
+#: Where SUNDIALS is told to write its warnings, read when a solver is made.
+_WARNINGS = "SUNLOGGER_WARNING_FILENAME"
+
+
+@contextmanager
+def _collected() -> Iterator[StringIO]:
+    """Collect what the solver prints of a failure, and drop its warnings: the result says what happened.
+
+    Somebody who has told SUNDIALS where to write its warnings gets them there.
+    """
+    own = _WARNINGS not in os.environ
+    if own:
+        os.environ[_WARNINGS] = os.devnull
+    try:
+        with redirect_stdout(StringIO()) as said:
+            yield said
+    finally:
+        if own:
+            os.environ.pop(_WARNINGS, None)
+
+
 class CvodeStepper:
-    """Integrate to the bound in one call; the integration loop lands at every output time.
+    """One internal step of CVODE a call, the last one ending at the bound.
+
+    Parameters
+    ----------
+    rates : callable
+        Rates of the state at a time and a state.
+    t, bound : float
+        Where to begin and where to end.
+    y : ndarray
+        State at ``t``.
+    rtol, atol : float or ndarray
+        Tolerances of CVODE.
 
     Raises
     ------
@@ -36,14 +71,19 @@ class CvodeStepper:
         def right_hand_side(time: float, state: Array, found: Array) -> None:
             found[:] = rates(time, np.array(state))
 
-        self._solver: Any = CVODE(right_hand_side, rtol=rtol, atol=atol, method="BDF", max_num_steps=500_000)
+        with _collected():
+            self._solver: Any = CVODE(right_hand_side, rtol=rtol, atol=atol, method="BDF")
+            self._solver.init_step(t, np.array(y))
         self.t, self.y, self.t_bound, self.status = t, np.array(y), bound, "running"
 
     def step(self) -> str | None:
-        """Go to the bound; the status is "failed" if the solver did not reach it."""
-        found = self._solver.solve(np.array([self.t, self.t_bound]), self.y)
-        if not found.success or abs(float(found.t[-1]) - self.t_bound) > 1e-12 * max(1.0, abs(self.t_bound)):
+        """Take one step; the status is "failed" if the solver could not, "finished" at the bound."""
+        with _collected() as said:
+            found = self._solver.step(self.t_bound, method="onestep", tstop=self.t_bound)
+        if not found.success:
             self.status = "failed"
-            return str(found.message)
-        self.t, self.y, self.status = self.t_bound, np.asarray(found.y[-1]), "finished"
+            return " ".join(f"{found.message} {said.getvalue()}".split())
+        self.t, self.y = float(found.t), np.asarray(found.y)
+        if self.t >= self.t_bound:
+            self.t, self.status = self.t_bound, "finished"
         return None

@@ -20,6 +20,7 @@ from graphsynth.dynamics import (
 from graphsynth.dynamics.energies import warnings_of
 from graphsynth.dynamics.minimal import MinimalForm
 from graphsynth.dynamics.result import Checks
+from graphsynth.dynamics.stiff import CvodeStepper
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -263,6 +264,29 @@ def test_cvode():
     motion = simulate_dynamics(g1(), [0.0, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, method="CVODE", rtol=1e-8)
     reference = simulate_dynamics(g1(), [0.0, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, rtol=1e-12)
     assert motion.completed and np.abs(motion.poses - reference.poses).max() < 1e-5 and "sundae" in motion.backend
+
+
+def test_cvode_keeps_its_words_for_the_reason(capfd):
+    """y' = y^2 ends at t = 1: the words of the solver are the reason, not noise on the terminal."""
+    pytest.importorskip("sksundae")
+    stepper = CvodeStepper(lambda t, y: y * y, 0.0, np.array([1.0]), 2.0, 1e-8, 1e-10)
+    message = None
+    for _ in range(50_000):
+        before = stepper.t, float(stepper.y[0])
+        message = stepper.step()
+        if stepper.status == "failed":
+            break
+    assert stepper.status == "failed" and before[0] == pytest.approx(1.0, rel=1e-5) and before[1] > 1e5
+    assert "onvergence" in message and "corrector" in message
+    assert capfd.readouterr() == ("", "")
+
+
+def test_cvode_keeps_the_limit_of_steps():
+    pytest.importorskip("sksundae")
+    motion = simulate_dynamics(
+        g1(), [0.0, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, method="CVODE", rtol=1e-8, max_steps=5
+    )
+    assert not motion.completed and "more than 5 steps" in motion.message
 
 
 def test_stiff_friction_is_reported_not_quiet():
