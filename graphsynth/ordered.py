@@ -6,9 +6,10 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Executor, Future, InvalidStateError
 from contextlib import contextmanager
+from itertools import islice
 from typing import Any, TypeVar
 
-__all__ = ["AHEAD", "in_order", "processes"]
+__all__ = ["AHEAD", "Crew", "in_order", "processes"]
 
 P = TypeVar("P")
 T = TypeVar("T")
@@ -19,13 +20,16 @@ def in_order(executor: Executor | None, function: Callable[[P], T], pieces: Iter
     """Yield ``function(piece)`` for each piece, in order, whoever computes it.
 
     At most ``AHEAD`` pieces are submitted before their results are read, so memory stays bounded.  Without an executor
-    the pieces are done here, one by one.
+    the pieces are done here, one by one; with a :class:`Crew` this process does its share of them.
     """
     if executor is None:
         yield from map(function, pieces)
         return
     waiting: deque[Future[T]] = deque()
     try:
+        if isinstance(executor, Crew):
+            yield from _shared(executor, function, iter(pieces), waiting)
+            return
         for piece in pieces:
             waiting.append(executor.submit(function, piece))
             if len(waiting) == AHEAD:
@@ -37,9 +41,61 @@ def in_order(executor: Executor | None, function: Callable[[P], T], pieces: Iter
             future.cancel()
 
 
+class Crew(Executor):
+    """Other processes and this one: what is submitted runs in the others, and :func:`in_order` works here as well.
+
+    Parameters
+    ----------
+    others : Executor
+    hands : int
+        How many processes they are.
+    """
+
+    def __init__(self, others: Executor, hands: int) -> None:
+        self._others = others
+        self.most = 2 * hands + 1  # pieces handed out at once: nobody runs dry, and few are left when this process is
+
+    def submit(self, function: Callable[..., T], /, *arguments: Any, **named: Any) -> Future[T]:
+        """Have another process call the function."""
+        return self._others.submit(function, *arguments, **named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Let the others end."""
+        self._others.shutdown(wait, cancel_futures=cancel_futures)
+
+
+def _shared(
+    crew: Crew, function: Callable[[P], T], pieces: Iterator[P], waiting: deque[Future[T]]
+) -> Generator[T, None, None]:
+    """Hand out pieces, and while the next result is not there, do one here."""
+    more = True
+    while True:
+        under_way = sum(not future.done() for future in waiting)
+        for piece in islice(pieces, max(0, min(crew.most - under_way, AHEAD - len(waiting)))) if more else ():
+            waiting.append(crew.submit(function, piece))
+        if not waiting:
+            return
+        if not waiting[0].done() and len(waiting) < AHEAD and more:
+            more = False
+            for piece in islice(pieces, 1):
+                waiting.append(_done_here(function, piece))
+                more = True
+        else:
+            yield waiting.popleft().result()
+
+
+def _done_here(function: Callable[[P], T], piece: P) -> Future[T]:
+    future: Future[T] = Future()
+    try:
+        future.set_result(function(piece))
+    except Exception as error:  # raised in its turn, when the result is asked for
+        future.set_exception(error)
+    return future
+
+
 @contextmanager
 def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterator[Executor | None]:
-    """Give a pool of worker processes, or None for one worker (then everything is done in this process).
+    """Give a crew of so many processes, this one among them; None for one worker (then everything is done here).
 
     `prepare` is called here first, to put into caches on disk what all workers need.  When the block is left by an
     exception (Ctrl-C), the workers are stopped at once; what was already written stays.
@@ -52,10 +108,10 @@ def processes(workers: int, prepare: Callable[[], None] | None = None) -> Iterat
 
     if prepare:
         prepare()
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin_worker)
+    pool = ProcessPoolExecutor(workers - 1, mp_context=get_context("spawn"), initializer=_begin_worker)
     with _quiet_cancelling():  # all along: a worker stopped while it starts breaks the pool before this process knows
         try:
-            yield pool
+            yield Crew(pool, workers - 1)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for child in active_children():

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable
+import time
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-__all__ = ["StageTime", "memory_in_use", "new_modules", "peak_memory", "reset_peak", "rooms"]
+from graphsynth.scenes.stages import Context, Stage, load
+
+__all__ = ["StageTime", "measured", "memory_in_use", "new_modules", "peak_memory", "reset_peak", "rooms"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +24,8 @@ class StageTime:
     import_seconds, seconds : float
         Wall clock; for a stage for each candidate the sum over candidates, wherever they were computed.
     peak_mb : float
-        Largest resident memory of this process while it ran, in MB; of all stages for each candidate together.
+        Largest resident memory of the process where it ran, while it ran, in MB; of all stages for each candidate
+        together.
     modules : tuple of str
         Rooms of graphsynth and third-party packages it was the first to import, in the process where it ran.
     runs : int
@@ -33,6 +38,18 @@ class StageTime:
     peak_mb: float = math.nan
     modules: tuple[str, ...] = ()
     runs: int = 1
+
+
+def measured(stage: Stage, context: Context, needs: Sequence[Any]) -> tuple[Any, StageTime]:
+    """Import and call a stage, here or in another process; return what it gave and what it cost."""
+    before = frozenset(sys.modules)
+    reset_peak()
+    start = time.perf_counter()
+    function = load(stage)
+    imported = time.perf_counter()
+    result = function(context, *needs)
+    seconds = time.perf_counter() - imported
+    return result, StageTime(stage.name, imported - start, seconds, peak_memory(), new_modules(before))
 
 
 _STATUS = Path("/proc/self/status")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.journal import Journal, signature
-from graphsynth.scenes.measure import StageTime, memory_in_use, new_modules, peak_memory, reset_peak, rooms
+from graphsynth.scenes.measure import StageTime, measured, memory_in_use, new_modules, peak_memory, reset_peak, rooms
 from graphsynth.scenes.stages import Context, Progress, Stage, load
 from graphsynth.scenes.streaming import Plan, Spent, Streamed, given_by, plan_stream, stream
 
@@ -63,6 +64,7 @@ class Running:
         self._products: dict[str, Any] = {}
         self._started = time.perf_counter()
         self._source_seconds = 0.0
+        self._aside: list[tuple[Stage, int, Future[tuple[Any, StageTime]]]] = []
         self.times: list[StageTime] = []
         self.notes: list[str] = []
 
@@ -80,10 +82,13 @@ class Running:
             if stage.each and self._plan is not None:
                 self._run_stream(self._plan, done)
                 streamed = True
+            elif self._may_run_aside(stage):
+                self._run_aside(stage)
             else:
                 self._run_stage(stage, self.stages[done + 1 :])
             needed = {need for later in self.stages[done + 1 :] for need in later.needs} | set(self._wanted)
             self._products = {name: value for name, value in self._products.items() if name in needed}
+        self._gather_aside()
         self._tell("done", len(self.stages))
         return {name: self._products[name] for name in self._wanted}
 
@@ -93,18 +98,31 @@ class Running:
 
     def _run_stage(self, stage: Stage, later: Sequence[Stage]) -> None:
         """Import and call one stage; a stream is gathered if a stage over all candidates needs it whole."""
-        before = frozenset(sys.modules)
-        reset_peak()
-        start = time.perf_counter()
-        function = load(stage)
-        imported = time.perf_counter()
-        result = function(self._context, *(self._products[need] for need in stage.needs))
+        result, spent = measured(stage, self._context, [self._products[need] for need in stage.needs])
         if stage.stream:
+            start = time.perf_counter()
             whole = set(self._wanted).union(*(other.needs for other in later if not other.each))
             result = tuple(result) if whole & set(stage.gives) else self._timed(result)
+            spent = replace(spent, seconds=spent.seconds + time.perf_counter() - start)
         self._products.update(given_by(stage, result))
-        seconds = time.perf_counter() - imported
-        self.times.append(StageTime(stage.name, imported - start, seconds, peak_memory(), new_modules(before)))
+        self.times.append(spent)
+
+    def _may_run_aside(self, stage: Stage) -> bool:
+        needed = {need for other in self.stages for need in other.needs}
+        return stage.aside and self._context.executor is not None and not needed & set(stage.gives)
+
+    def _run_aside(self, stage: Stage) -> None:
+        """Have another process run a stage while later ones run here; only outputs come of it."""
+        assert self._context.executor is not None
+        needs = [self._products[need] for need in stage.needs]
+        future = self._context.executor.submit(measured, stage, replace(self._context, executor=None), needs)
+        self._aside.append((stage, len(self.times), future))
+        self.times.append(StageTime(stage.name, 0.0, 0.0))
+
+    def _gather_aside(self) -> None:
+        for stage, place, future in self._aside:
+            result, self.times[place] = future.result()
+            self._products.update(given_by(stage, result))
 
     def _timed(self, items: Iterable[Any]) -> Iterator[Any]:
         """Pass candidates on, adding up the time it takes to make them."""

@@ -45,6 +45,9 @@ class Stage:
         (:class:`~graphsynth.scenes.products.Rejected`: it does not meet a goal; anything else: it failed).
     cost : float
         Of stages for each candidate that could come next, the cheapest comes first.
+    aside : bool
+        Nothing but outputs comes of it, of products that can be sent to another process: with an executor it may run
+        there while later stages run here.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Stage:
     stream: bool = False
     each: bool = False
     cost: float = 1.0
+    aside: bool = False
 
 
 class Progress(Protocol):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import le
 
 from graphsynth.scenes.products import Objective, Ranking, Record
 from graphsynth.scenes.stages import Context
@@ -104,8 +105,10 @@ def _front(losses: dict[int, tuple[float, ...]]) -> list[int]:
     In lexicographic order a row can only be beaten by an earlier one, and if so then by one of the front.
     """
     front: list[int] = []
+    rows: list[tuple[float, ...]] = []  # of the front
     for number in sorted(losses, key=lambda n: (losses[n], n)):
         row = losses[number]
-        if not any(losses[f] != row and all(a <= b for a, b in zip(losses[f], row, strict=True)) for f in front):
+        if not any(all(map(le, other, row)) and other != row for other in rows):
             front.append(number)
+            rows.append(row)
     return front
