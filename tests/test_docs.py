@@ -4,14 +4,12 @@ Every example runs, every link leads somewhere, every command line parses; every
 verb and option is documented.
 """
 
-import argparse
 import contextlib
 import doctest
 import importlib.util
 import inspect
 import io
 import re
-import shlex
 import subprocess
 import sys
 from importlib import import_module
@@ -20,12 +18,18 @@ from urllib.parse import unquote
 
 import pytest
 
-from graphsynth.cli import main
 
-ROOT = Path(__file__).parents[1]
-PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"])
+def of_docs(name):
+    """Import a module of the documentation's folder."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).parents[1] / "docs" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+TEXT, API = of_docs("pages"), of_docs("public_api")
+ROOT, PAGES, FENCE, name_of, fences = TEXT.ROOT, TEXT.PAGES, TEXT.FENCE, TEXT.name_of, TEXT.fences
 FLAGS = doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL
-FENCE = re.compile(r"^```([^\n`]*)\n(.*?)^```\s*$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"(?<!!)\[[^\]\n]*\]\(([^)\s]+)\)|!\[[^\]\n]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
 
@@ -39,16 +43,6 @@ GIVEN = {
         "colours = np.zeros(3, np.int64)\n"
     ),
 }
-
-
-def name_of(page):
-    return page.relative_to(ROOT).as_posix()
-
-
-def fences(page):
-    text = page.read_text(encoding="utf-8")
-    for match in FENCE.finditer(text):
-        yield match[1].strip(), match[2], text.count("\n", 0, match.start(2))
 
 
 def is_example(language, body):
@@ -147,16 +141,6 @@ def explained_names():
     """Words in code font in the reference; runnable examples alone explain nothing."""
     text = FENCE.sub("", reference_text())
     return set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]+)`", text))))
-
-
-def public_api():
-    spec = importlib.util.spec_from_file_location("public_api", ROOT / "docs" / "public_api.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-API = public_api()
 
 
 @pytest.mark.parametrize("room", API.rooms())
@@ -265,93 +249,6 @@ def test_notation_names_what_exists():
     named = set(re.findall(r"[A-Za-z_]\w{2,}", " ".join(re.findall(r"`([^`]+)`", text))))
     assert len(named) > 100
     assert named - words == set()
-
-
-def commands():
-    """Yield (page, words after ``graphsynth``, the number a count is said to print or None)."""
-    for page in PAGES:
-        for language, body, _ in fences(page):
-            if language not in ("", "sh", "bash", "console"):
-                continue
-            lines = body.replace("\\\n", " ").splitlines()
-            for line, after in zip(lines, [*lines[1:], ""]):
-                if not re.match(r"(\$ )?graphsynth ", line) or "$(" in line:
-                    continue
-                words = shlex.split(line.removeprefix("$ "), comments=True)[1:]
-                # a synopsis is not a command
-                if not words or any(word.isupper() or word in ("...", "|") or "[" in word for word in words):
-                    continue
-                said = re.search(r"# (\d+)\b", line) or re.fullmatch(r"(\d+)", after)
-                yield page, words, int(said[1]) if said else None
-
-
-def verbs():
-    """Yield (verb or pair of verbs, its parser)."""
-    from graphsynth.cli.main import _parser
-
-    def inside(parser, words):
-        nested = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-        if words and not nested:
-            yield " ".join(words), parser
-        for action in nested:
-            for word, child in action.choices.items():
-                yield from inside(child, (*words, word))
-
-    yield from inside(_parser(), ())
-
-
-def section_of(page, verb):
-    """Return the text under the heading of a verb; for two words also the text under the first one."""
-    text = page.read_text(encoding="utf-8")
-    sections = re.split(r"(?m)^(?=#{2,4} )", text)
-    wanted = {f"`{verb}`", f"`{verb.split()[0]}`"}
-    return "".join(part for part in sections if wanted & set(re.findall(r"`[^`]+`", part.partition("\n")[0])))
-
-
-@pytest.mark.parametrize("verb", [verb for verb, _ in verbs()])
-def test_every_option_is_documented(verb):
-    page = ROOT / "docs" / "reference" / "command-line.md"
-    text = page.read_text(encoding="utf-8")
-    parser = dict(verbs())[verb]
-    assert re.search(rf"^graphsynth {re.escape(verb)}\b", text, re.MULTILINE), "no line in the synopsis"
-    section = section_of(page, verb)
-    assert section, "no section of its own"
-    shared = "".join(part for part in re.split(r"(?m)^(?=## )", text) if re.match(r"## (QUESTION|WORK)", part))
-    if verb in ("solve", "count", "enumerate"):
-        section += shared
-    ranges = {f"--{letter}{k}" for letter in "np" for k in range(10)}  # `--n2 X` .. `--n9 X`
-    options = {option for action in parser._actions for option in action.option_strings} - ranges - {"-h", "--help"}
-    known = set(re.findall(r"(?<![\w-])--?[A-Za-z][\w-]*", section)) | {"--json"}  # every verb has it, says the top
-    assert options - known == set()
-
-
-def test_documented_options_exist():
-    text = (ROOT / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")
-    options = {option for _, parser in verbs() for action in parser._actions for option in action.option_strings}
-    assert set(re.findall(r"`(--[a-z][\w-]*)", text)) - options - {"--version"} == set()
-
-
-def title(page, words):
-    return f"{name_of(page)}: {' '.join(words)}"
-
-
-@pytest.mark.parametrize("words", [pytest.param(words, id=title(page, words)) for page, words, _ in commands()])
-def test_documented_commands_parse(words):
-    from graphsynth.cli.main import _parser
-
-    options = _parser().parse_args([re.sub(r"\$\{?\w+\}?", "1", word) for word in words])
-    assert options.verb == words[0]
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [pytest.param(words, said, id=title(page, words)) for page, words, said in commands() if said is not None],
-)
-def test_documented_counts(words, said, capsys, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    assert words[0] == "count"
-    assert main(words) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == str(said)
 
 
 @pytest.mark.slow
