@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.drawing.bodies import Body, outline, thickness, world
+from graphsynth.drawing.bodies import Body, outline, thickness
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.mechanism.model import Mechanism
 
@@ -27,25 +27,29 @@ class _Room:
 
     def __init__(self, poses: Array, pixel: float) -> None:
         pick = np.unique(np.linspace(0, len(poses) - 1, min(_SAMPLES, len(poses))).round().astype(int))
-        self.poses, self.pixel = poses[pick], pixel
-        self.taken: list[tuple[Complex, int]] = []
+        chosen = poses[pick]
+        self.pixel, self.count = pixel, len(chosen)
+        self.at, self.turn = chosen[..., 0] + 1j * chosen[..., 1], np.exp(1j * chosen[..., 2])
+        self.taken: list[Complex] = []  # each of shape (points, poses)
+        self.own: list[int] = []  # the link of each point of all that may come near
+
+    def _world(self, link: int, points: Sequence[complex]) -> Complex:
+        """Carry points of a link to the plane, shape (points, poses)."""
+        return np.asarray(self.at[:, link] + self.turn[:, link] * np.array(points, dtype=np.complex128)[:, None])
 
     def add(self, link: int, points: Sequence[complex], own: int = -1) -> None:
         """Keep letters away from points of a link; those of link ``own`` may come near."""
-        self.taken += [(world(self.poses, link, point), own) for point in points]
+        if points:
+            self.taken.append(self._world(link, points))
+            self.own += [own] * len(points)
 
     def clearances(self, link: int, points: Sequence[complex]) -> list[float]:
         """Distances of points to the nearest thing, at most 22 pixels: the worst pose and the mean count half each."""
-        others = [z for z, own in self.taken if own != link]
-        if not others:
-            return [22.0] * len(points)
-        around = np.stack(others)
-        found = []
-        for point in points:
-            near = np.abs(around - world(self.poses, link, point)).min(axis=0) / self.pixel
-            capped = np.minimum(near, 22.0)
-            found.append(float(0.5 * capped.min() + 0.5 * capped.mean()))
-        return found
+        others = np.concatenate([np.empty((0, self.count), dtype=np.complex128), *self.taken])
+        others = others[np.array(self.own, dtype=np.intp) != link]
+        gaps = np.abs(self._world(link, points)[:, None] - others) / self.pixel
+        near: Array = gaps.min(axis=1, initial=22.0)
+        return list((0.5 * near.min(axis=1) + 0.5 * near.mean(axis=1)).tolist())
 
     def best(self, link: int, candidates: Sequence[complex]) -> complex:
         """Choose the first of the freest candidates, and take it."""
