@@ -6,6 +6,7 @@ import argparse
 import shutil
 import sys
 import time
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 from graphsynth.cli import console
@@ -95,14 +96,14 @@ def _other_format(path: Path) -> str | None:
 
 def _write_whole(problem: Problem, options: argparse.Namespace, executor: Executor | None) -> int:
     """Write all graphs in another format; the file appears when it is complete."""
-    from graphsynth.formats.registry import read_text, write
+    from graphsynth.formats.registry import read_stream, write
     from graphsynth.synthesis.parallel import texts
     from graphsynth.synthesis.writing import shard_of
 
     if options.output.exists() and not options.force:
         raise GraphsynthError(f"{options.output} exists; choose another name, or replace it with --force")
     blocks = texts(shard_of(problem.pieces(listing=True), options.shard), executor)
-    return write((graph for data, _ in blocks for graph in read_text(data, "text")), options.output)
+    return write((graph for data, _ in blocks for graph in read_stream(BytesIO(data), "text")), options.output)
 
 
 def _check_disk(problem: Problem, options: argparse.Namespace, weight: float) -> None:

@@ -12,9 +12,12 @@ from graphsynth.lazy import resolve
 _PUBLIC: dict[str, str] = {
     "FORMATS": "registry",
     "Format": "registry",
+    "GRAPHS_MAX": "registry",
+    "JOINTS_MAX": "registry",
     "format_of": "registry",
     "read": "registry",
     "read_all": "registry",
+    "read_stream": "registry",
     "read_text": "registry",
     "write": "registry",
     "write_text": "registry",

@@ -12,18 +12,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from graphsynth.errors import FormatError
-from graphsynth.formats.graph_json import json_value
-from graphsynth.mechanism.files import FORMAT, VERSION, from_dict, to_dict
+from graphsynth.mechanism.files import FORMAT, VERSION, from_dict, json_value, to_dict
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["Edge", "Item", "attributes_of", "item_from", "whole_number"]
+__all__ = ["OF_EDGE", "OF_GRAPH", "Edge", "Item", "Spent", "attributes_of", "item_from", "whole_number"]
 
 Item = MechanismGraph | Mechanism
 
 _WHOLE = ("drivers", "points", "pose")
-_NUMBER = re.compile(r"\s*([0-9]{1,4})\s*", re.ASCII)
+#: Attributes that are read; readers keep no others, so that defaults of many names cost nothing.
+OF_GRAPH = frozenset({"frame", "space", *_WHOLE})
+OF_EDGE = frozenset({"mobility", "joint"})
+_NUMBER = re.compile(r"\s*+([0-9]{1,4})\s*+", re.ASCII)
 
 
 class Edge(NamedTuple):
@@ -33,6 +35,28 @@ class Edge(NamedTuple):
     target: str
     attributes: Mapping[str, str]
     place: str
+
+
+class Spent:
+    """Characters of attributes that were read, each default counted wherever it applies.
+
+    Otherwise a text of a megabyte could say, by one default, what fills gigabytes.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.most, self.count = most, 0
+
+    def add(self, attributes: Mapping[str, str], place: str) -> None:
+        """Count the values of an element.
+
+        Raises
+        ------
+        FormatError
+            If they are too many.
+        """
+        self.count += sum(map(len, attributes.values()))
+        if self.count > self.most:
+            raise FormatError(f"the attributes, defaults included, have more than {self.most} characters", place)
 
 
 def attributes_of(item: Item) -> tuple[MechanismGraph, dict[str, str], list[dict[str, str]]]:
@@ -60,10 +84,10 @@ def _compact(value: object) -> str:
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 
-def item_from(nodes: Sequence[str], edges: Sequence[Edge], own: Mapping[str, str], place: str) -> Item:
+def item_from(nodes: Sequence[str], edges: Sequence[Edge], own: Mapping[str, str], place: str, spent: Spent) -> Item:
     """Build what :func:`attributes_of` describes.
 
-    Vertices named 0..N-1 keep their number; others are numbered in their order.
+    Vertices named 0..N-1 keep their number; others are numbered in their order.  ``spent`` bounds the work.
 
     Raises
     ------
@@ -75,6 +99,7 @@ def item_from(nodes: Sequence[str], edges: Sequence[Edge], own: Mapping[str, str
     number = {name: k for k, name in enumerate(nodes)}
     if set(number) == set(map(str, range(len(nodes)))):
         number = {name: int(name) for name in nodes}
+    spent.add(own, place)
     frame = None
     if "frame" in own:
         frame = number.get(own["frame"].strip())
@@ -83,6 +108,7 @@ def item_from(nodes: Sequence[str], edges: Sequence[Edge], own: Mapping[str, str
     seen: set[tuple[int, int]] = set()
     joints = []
     for edge in edges:
+        spent.add(edge.attributes, edge.place)
         a, b = number[edge.source], number[edge.target]
         if a == b or (min(a, b), max(a, b)) in seen:
             what = "joins a link to itself" if a == b else f"joins links {a} and {b} a second time"

@@ -9,25 +9,29 @@ Source: the DOT language reference of Graphviz.
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
-from typing import NamedTuple
 
-from graphsynth.errors import FormatError
-from graphsynth.formats.attributes import Edge, Item, attributes_of, item_from
+from graphsynth.errors import FormatError, GraphError
+from graphsynth.formats.attributes import OF_EDGE, OF_GRAPH, Edge, Item, Spent, attributes_of, item_from
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["compose", "parse"]
+__all__ = ["LENGTH_MAX", "TOKENS_MAX", "compose", "parse"]
 
 _TOKEN = re.compile(
-    r"(?P<skip>\s+|//[^\n]*|\#[^\n]*|/\*[^*]*(?:\*(?!/)[^*]*)*\*/)"
-    r'|(?P<quoted>"[^"\\]*(?:\\.[^"\\]*)*")'
-    r"|(?P<number>-?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?))"
-    r"|(?P<word>[A-Za-z_\x80-\U0010ffff][A-Za-z_0-9\x80-\U0010ffff]*)"
-    r"|(?P<mark>--|->|[][{}=;,:<+])",
+    r"(?:\s++|//[^\n]*+|\#[^\n]*+|/\*[^*]*+(?:\*(?!/)[^*]*+)*+\*/)*+"
+    r'(?:(?P<quoted>"[^"\\]*+(?:\\.[^"\\]*+)*+")'
+    r"|(?P<name>-?(?:\.[0-9]++|[0-9]++(?:\.[0-9]*+)?))"
+    r"|(?P<word>[A-Za-z_\x80-\U0010ffff][A-Za-z_0-9\x80-\U0010ffff]*+)"
+    r"|(?P<mark>--|->|[][{}=;,:<+])"
+    r"|(?P<bad>.)|\Z)",
     re.DOTALL,
 )
-_TOKENS_MAX = 400_000
+#: Characters of a text.
+LENGTH_MAX = 2_000_000
+#: Words and marks of a text; the complete graph on 255 links has 300 000.
+TOKENS_MAX = 320_000
 _EDGES = LINKS_MAX * (LINKS_MAX - 1) // 2
 _KEYWORDS = {"graph", "digraph", "node", "edge", "subgraph", "strict"}
 
@@ -44,7 +48,11 @@ def compose(items: Iterable[Item]) -> Iterator[str]:
             given = [f"{name}={_value(value)}" for name, value in attributes.items()]
             given += ["style=dashed"] if joint.mobility > 1 else []
             lines.append(f"  {joint.a} -- {joint.b} [{', '.join(given)}];")
-        yield "\n".join([*lines, "}\n"])
+        found = "\n".join([*lines, "}\n"])
+        tokens = 20 + 4 * len(own) + 6 * graph.links + sum(5 + 4 * len(part) for part in edges)
+        if len(found) > LENGTH_MAX or tokens > TOKENS_MAX:
+            raise GraphError(f"{graph} with {len(graph.joints)} joints is longer in DOT than is read; use json")
+        yield found
 
 
 def _value(text: str) -> str:
@@ -53,30 +61,30 @@ def _value(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-class _Token(NamedTuple):
-    text: str
-    line: int
-    is_name: bool  # an identifier, a number or a quotation
-    bare: bool = False  # could be a keyword
+#: Text, place, and the mark or keyword that it is; a name, a number and a quotation are none.
+_Token = tuple[str, int, str]
 
 
 def _tokens(text: str) -> list[_Token]:
     found: list[_Token] = []
-    at, line = 0, 1
-    while at < len(text):
-        match = _TOKEN.match(text, at)
-        if match is None:
-            raise FormatError(f"{text[at]!r} begins nothing of the DOT language", f"line {line}")
-        kind, piece = match.lastgroup, match[0]
-        if kind == "quoted":
-            found.append(_Token(_unquoted(piece), line, True))
-        elif kind != "skip":
-            found.append(_Token(piece, line, kind != "mark", kind == "word" and piece.lower() in _KEYWORDS))
-        at = match.end()
-        line += piece.count("\n")
-        if len(found) > _TOKENS_MAX:
-            raise FormatError(f"more than {_TOKENS_MAX} words; no mechanism graph needs so many", f"line {line}")
+    for match in _TOKEN.finditer(text):
+        kind, end = match.lastgroup, match.end() - 1
+        if kind is None:  # the end
+            break
+        piece = match[kind]
+        if kind == "bad":
+            raise FormatError(f"{piece!r} begins nothing of the DOT language", _line(text, end))
+        mark = piece if kind == "mark" else ""
+        if kind == "word" and piece.lower() in _KEYWORDS:
+            mark = piece.lower()
+        found.append((_unquoted(piece) if kind == "quoted" else piece, end, mark))
+        if len(found) > TOKENS_MAX:
+            raise FormatError(f"more than {TOKENS_MAX} words and marks; use json for so much", _line(text, end))
     return found
+
+
+def _line(text: str, at: int) -> str:
+    return f"line {text.count(chr(10), 0, at) + 1}"
 
 
 def _unquoted(piece: str) -> str:
@@ -90,22 +98,23 @@ class _Reader:
 
     def __init__(self, text: str) -> None:
         self.tokens, self.at = _tokens(text), 0
-        self.last = text.count("\n") + 1
+        self.breaks = [match.start() for match in re.finditer("\n", text)]
         self.nodes: dict[str, None] = {}
         self.edges: list[Edge] = []
         self.own: dict[str, str] = {}
         self.defaults: dict[str, str] = {}
+        self.spent = Spent(LENGTH_MAX)
 
     @property
     def place(self) -> str:
-        return f"line {self.tokens[self.at].line if self.at < len(self.tokens) else self.last}"
+        ended = self.at >= len(self.tokens)
+        return f"line {1 + (len(self.breaks) if ended else bisect(self.breaks, self.tokens[self.at][1]))}"
 
     def look(self) -> str:
         """Return the next mark or keyword; a name reads as the empty text."""
         if self.at >= len(self.tokens):
             raise FormatError("the text ends within a graph", self.place)
-        token = self.tokens[self.at]
-        return token.text.lower() if token.bare else "" if token.is_name else token.text
+        return self.tokens[self.at][2]
 
     def take(self, mark: str) -> bool:
         if self.look() == mark:
@@ -115,12 +124,12 @@ class _Reader:
 
     def name(self, what: str) -> str:
         if self.look():
-            raise FormatError(f"expected {what}, found {self.tokens[self.at].text[:24]!r}", self.place)
-        parts = [self.tokens[self.at].text]
+            raise FormatError(f"expected {what}, found {self.tokens[self.at][0][:24]!r}", self.place)
+        parts = [self.tokens[self.at][0]]
         self.at += 1
         while self.at + 1 < len(self.tokens) and self.look() == "+":  # "a" + "b"
             self.at += 1
-            parts.append(self.tokens[self.at].text)
+            parts.append(self.tokens[self.at][0])
             self.at += 1
         return "".join(parts)
 
@@ -138,7 +147,7 @@ class _Reader:
         self.nodes, self.edges, self.own, self.defaults = {}, [], {}, {}
         while not self.take("}"):
             self.statement()
-        return item_from(list(self.nodes), self.edges, self.own, first)
+        return item_from(list(self.nodes), self.edges, self.own, first, self.spent)
 
     def statement(self) -> None:
         if self.take(";"):
@@ -147,13 +156,15 @@ class _Reader:
         if kind in ("graph", "edge", "node"):
             self.at += 1
             table = {"graph": self.own, "edge": self.defaults, "node": {}}[kind]
-            table |= self.attributes()
+            table |= self.attributes(OF_GRAPH if kind == "graph" else OF_EDGE)
             return
         if kind in ("subgraph", "{"):
             raise FormatError("a subgraph is not read; write its edges into the graph", self.place)
         first = self.name("a vertex")
         if self.take("="):
-            self.own[first] = self.name("a value")
+            value = self.name("a value")
+            if first in OF_GRAPH:
+                self.own[first] = value
             return
         ends, place = [first], self.place
         while self.take("--"):
@@ -163,25 +174,27 @@ class _Reader:
         if self.look() in ("->", ":"):
             what = "the edge is directed" if self.look() == "->" else "a port is not read"
             raise FormatError(f"{what}; a mechanism graph has undirected edges between vertices", self.place)
-        attributes = {**(self.defaults if len(ends) > 1 else {}), **self.attributes()}
+        attributes = {**(self.defaults if len(ends) > 1 else {}), **self.attributes(OF_EDGE)}
         self.nodes |= dict.fromkeys(ends)
         if len(self.nodes) > LINKS_MAX or len(self.edges) + len(ends) - 1 > _EDGES:
             raise FormatError(f"more vertices or edges than a simple graph of {LINKS_MAX} links has", self.place)
         self.edges += [Edge(a, b, attributes, place) for a, b in pairwise(ends)]
 
-    def attributes(self) -> dict[str, str]:
+    def attributes(self, known: frozenset[str]) -> dict[str, str]:
         found: dict[str, str] = {}
         while self.take("["):
             while not self.take("]"):
                 name = self.name("the name of an attribute")
                 if not self.take("="):
                     raise FormatError(f"attribute {name[:24]!r} has no value", self.place)
-                found[name] = self.name("a value")
+                value = self.name("a value")
+                if name in known:
+                    found[name] = value
                 _ = self.take(",") or self.take(";")
         return found
 
 
-def parse(text: str) -> list[Item]:
+def parse(text: str) -> Iterator[Item]:
     """Read every graph of a DOT text.
 
     Raises
@@ -191,13 +204,11 @@ def parse(text: str) -> list[Item]:
 
     Examples
     --------
-    >>> parse('graph { frame=a; a -- b -- c -- a [mobility=1] }')[0].to_text()
+    >>> next(parse('graph { frame=a; a -- b -- c -- a [mobility=1] }')).to_text()
     'Bw f0'
     """
     reader = _Reader(text)
-    found = []
-    while reader.at < len(reader.tokens):
-        found.append(reader.graph())
-    if not found:
+    if not reader.tokens:
         raise FormatError("the text holds no graph", "end")
-    return found
+    while reader.at < len(reader.tokens):
+        yield reader.graph()

@@ -8,10 +8,11 @@ from typing import Any
 
 from graphsynth.errors import FormatError, GraphError
 from graphsynth.mechanism import files
+from graphsynth.mechanism.files import json_value
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["compose", "compose_lines", "graph_of", "json_value", "parse", "parse_line", "record_of"]
+__all__ = ["compose", "compose_lines", "graph_of", "parse", "parse_line", "record_of"]
 
 FORMAT = "graphsynth graph"
 VERSION = 1
@@ -65,35 +66,18 @@ def _name(value: Any) -> str:
     return {dict: "an object", list: "a list", str: "a text", type(None): "null"}.get(type(value), "a number")
 
 
-def json_value(text: str, place: str = "") -> Any:
-    """Read JSON; `FormatError` for anything else, whatever its size or depth."""
-    try:
-        return json.loads(text, parse_constant=_no_constant)
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        raise FormatError(f"not JSON ({error.msg})", f"{place}, {where}" if place else where) from None
-    except FormatError as error:
-        raise FormatError(str(error), place) from None
-    except (RecursionError, ValueError) as error:
-        raise FormatError(f"not JSON that can be read ({error})", place or "text") from None
-
-
-def _no_constant(name: str) -> Any:
-    raise FormatError(f"{name} is not a number of JSON")
-
-
-def parse(text: str) -> list[MechanismGraph | Mechanism]:
+def parse(text: str) -> Iterator[MechanismGraph | Mechanism]:
     """Read one JSON document: a graph, a mechanism, or a list of records of graphs."""
     data = json_value(text)
     if isinstance(data, list):
-        return [graph_of(record, f"record {k}") for k, record in enumerate(data, 1)]
+        return (graph_of(record, f"record {k}") for k, record in enumerate(data, 1))
     if isinstance(data, dict):
         if data.get("format") == files.FORMAT:
-            return [files.from_dict(data)]
+            return iter([files.from_dict(data)])
         if data.get("format", FORMAT) != FORMAT or data.get("version", VERSION) != VERSION:
             found = f"{str(data.get('format'))[:40]!r}, version {str(data.get('version'))[:12]}"
             raise FormatError(f"found {found}; this program reads {FORMAT!r}, version {VERSION}", "format")
-    return [graph_of(data)]
+    return iter([graph_of(data)])
 
 
 def parse_line(line: str, place: str) -> MechanismGraph:

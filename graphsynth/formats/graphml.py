@@ -1,7 +1,8 @@
 """GraphML, read and written.
 
 The reader takes what networkx, yEd, igraph and Gephi write of simple undirected graphs.  A document type declaration is
-refused, so there are no entities to expand and nothing outside the file is read; depth is limited.
+refused, so there are no entities to expand and nothing outside the file is read; depth is limited.  Graphs come out as
+they end, so a long file needs no more memory than its longest graph.
 
 Source: U. Brandes et al., *GraphML Progress Report*, GD 2001, and the GraphML primer.
 """
@@ -10,14 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 from graphsynth.errors import FormatError
-from graphsynth.formats.attributes import Edge, Item, attributes_of, item_from
+from graphsynth.formats.attributes import OF_EDGE, OF_GRAPH, Edge, Item, Spent, attributes_of, item_from
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["compose", "parse"]
+__all__ = ["LENGTH_MAX", "compose", "parse"]
+
+#: Bytes of one graph, of what stands before the first and of what stands between two.
+LENGTH_MAX = 4_000_000
 
 _SPACE = "http://graphml.graphdrawing.org/xmlns"
 _KEYS = [
@@ -27,6 +32,7 @@ _KEYS = [
 ]
 _DEPTH = 32
 _EDGES = LINKS_MAX * (LINKS_MAX - 1) // 2
+_KEYS_MAX = 1000
 
 
 def compose(items: Iterable[Item]) -> Iterator[str]:
@@ -78,6 +84,7 @@ class _Reader:
         self.attributes: dict[str, str] = {}
         self.key = ""
         self.text: list[str] = []
+        self.spent = Spent(LENGTH_MAX)
 
     @property
     def place(self) -> str:
@@ -96,13 +103,17 @@ class _Reader:
 
     def start_key(self, given: dict[str, str], outer: str) -> None:
         name = self._needed(given, "id", "key")
+        if len(self.keys) >= _KEYS_MAX:
+            raise FormatError(f"more than {_KEYS_MAX} keys; remove those that no mechanism graph needs", self.place)
         self.keys[name] = given.get("for", "all"), given.get("attr.name", name)
         self.key = name
 
     def start_default(self, given: dict[str, str], outer: str) -> None:
         if outer == "key":
             of, name = self.keys[self.key]
-            self.into, self.text = (self.defaults.setdefault(of, {}), name), []
+            known = OF_GRAPH if of == "graph" else OF_EDGE if of == "edge" else OF_GRAPH | OF_EDGE
+            if of in self.defaults and name in known:
+                self.into, self.text = (self.defaults[of], name), []
 
     def start_graph(self, given: dict[str, str], outer: str) -> None:
         if self.graph is not None or outer != "graphml":
@@ -118,7 +129,6 @@ class _Reader:
         if len(graph.nodes) >= LINKS_MAX:
             raise FormatError(f"more than {LINKS_MAX} vertices; a mechanism graph has at most so many", self.place)
         graph.nodes[name] = None
-        self.attributes = {}
 
     def start_edge(self, given: dict[str, str], outer: str) -> None:
         graph = self._open("edge")
@@ -136,11 +146,10 @@ class _Reader:
     def start_data(self, given: dict[str, str], outer: str) -> None:
         key = self._needed(given, "key", "data")
         name = self.keys.get(key, ("all", key))[1]
-        if outer == "graph":
-            self.into = self._open("data").own, name
-        elif outer in ("edge", "node"):
-            self.into = self.attributes, name
-        self.text = []
+        if outer == "graph" and name in OF_GRAPH:
+            self.into, self.text = (self._open("data").own, name), []
+        elif outer == "edge" and name in OF_EDGE:
+            self.into, self.text = (self.attributes, name), []
 
     def end(self, full: str) -> None:
         name = self.stack.pop()
@@ -161,7 +170,8 @@ class _Reader:
             for name in (edge.source, edge.target):
                 if name not in graph.nodes:
                     raise FormatError(f"the edge ends at {name[:24]!r}, which is not a vertex", edge.place)
-        self.found.append(item_from(list(graph.nodes), graph.edges, graph.own, graph.place))
+        self.found.append(item_from(list(graph.nodes), graph.edges, graph.own, graph.place, self.spent))
+        self.spent = Spent(LENGTH_MAX)
 
     def _open(self, name: str) -> _Graph:
         if self.graph is None:
@@ -177,11 +187,17 @@ class _Reader:
         raise FormatError("a document type declaration is not read; remove it", self.place)
 
 
+_SMALLER = "the largest graph of 255 links needs half of it"
 _HANDLED = {"key", "default", "graph", "node", "edge", "hyperedge", "data"}
 
 
-def parse(text: str) -> list[Item]:
+def parse(blocks: Iterable[bytes]) -> Iterator[Item]:
     """Read every ``<graph>``.
+
+    Parameters
+    ----------
+    blocks : iterable of bytes
+        The text in pieces, UTF-8.
 
     Raises
     ------
@@ -190,22 +206,26 @@ def parse(text: str) -> list[Item]:
     """
     from xml.parsers import expat
 
-    parser = expat.ParserCreate(namespace_separator=" ")
+    parser = expat.ParserCreate("UTF-8", namespace_separator=" ")
     parser.buffer_text = True
     reader = _Reader(parser)
     parser.StartElementHandler = reader.start
     parser.EndElementHandler = reader.end
     parser.CharacterDataHandler = reader.characters
     parser.StartDoctypeDeclHandler = reader.doctype
+    count = since = 0
     try:
-        parser.Parse(text, True)
+        for block in chain(blocks, [b""]):
+            if since > LENGTH_MAX:
+                raise FormatError(f"a graph of more than {LENGTH_MAX} bytes; {_SMALLER}", reader.place)
+            parser.Parse(block, not block)
+            since += len(block)
+            if reader.found:
+                count, since = count + len(reader.found), 0
+                yield from reader.found
+                reader.found = []
     except expat.ExpatError as error:
         what = expat.errors.messages.get(error.code, "not well-formed")
         raise FormatError(f"not XML ({what})", f"line {error.lineno}, column {error.offset + 1}") from None
-    except FormatError:
-        raise
-    except ValueError as error:  # characters that no encoding holds
-        raise FormatError(f"not XML ({error})", reader.place) from None
-    if not reader.found:
+    if not count:
         raise FormatError("the file holds no <graph>", "end")
-    return reader.found

@@ -7,12 +7,18 @@ from typing import NamedTuple
 
 from graphsynth.errors import FormatError, GraphError
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.text import LINKS_MAX
 
 __all__ = ["LENGTH_MAX", "Row", "head_of", "read_rows", "within"]
 
 #: Characters of a text; larger graphs need a sparse format.
 LENGTH_MAX = 4_000_000
-_HEAD = re.compile(r"#\s*(links|frame|space)\s*[=:]?\s*([0-9]{1,4})\s*", re.ASCII)
+#: Lines of a text, comments and empty ones too.
+LINES_MAX = 100_000
+#: Numbers on a line: an incidence matrix has a column for every joint.
+WORDS_MAX = LINKS_MAX * (LINKS_MAX - 1) // 2
+_HEAD = re.compile(r"#\s*+(links|frame|space)\s*+[=:]?\s*+([0-9]{1,4})\s*+", re.ASCII)
+_NUMBERS = re.compile(r"(?:[0-9]{1,4}+(?:\s++|\Z))*+", re.ASCII)
 _NUMBER = re.compile(r"[0-9]{1,4}", re.ASCII)
 
 
@@ -50,7 +56,12 @@ def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], 
     spaces = str.maketrans(dict.fromkeys(",;" + opening, " "))
     head: dict[str, int] = {}
     rows: list[Row] = []
-    for number, line in enumerate(text.split("\n"), 1):
+    lines = text.split("\n", LINES_MAX)
+    if len(lines) > LINES_MAX:
+        raise FormatError(f"more than {LINES_MAX} lines; no mechanism graph needs so many", f"line {LINES_MAX + 1}")
+    for number, line in enumerate(lines, 1):
+        if not line:
+            continue
         place = f"line {number}"
         if line.lstrip().startswith("#"):
             match = _HEAD.fullmatch(line.strip())
@@ -59,15 +70,23 @@ def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], 
             if match:
                 head[match[1]] = int(match[2])
             continue
-        words = line.translate(spaces).split()
+        numbers = _numbers(line.translate(spaces), place)
+        if numbers and len(rows) >= most:
+            raise FormatError(f"more than {most} rows; no mechanism graph needs so many", place)
+        if numbers:
+            rows.append(Row(numbers, place))
+    return head, rows
+
+
+def _numbers(line: str, place: str) -> list[int]:
+    words = line.split(None, WORDS_MAX)
+    if len(words) > WORDS_MAX:
+        raise FormatError(f"more than {WORDS_MAX} numbers; no mechanism graph needs so many", place)
+    if not _NUMBERS.fullmatch(line.lstrip()):
         for word in words:
             if not _NUMBER.fullmatch(word):
                 raise FormatError(f"{word[:24]!r} is not a whole number", place)
-        if words and len(rows) >= most:
-            raise FormatError(f"more than {most} rows; no mechanism graph needs so many", place)
-        if words:
-            rows.append(Row([int(word) for word in words], place))
-    return head, rows
+    return [int(word) for word in words]
 
 
 def within(text: str, what: str) -> str:

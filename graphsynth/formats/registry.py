@@ -1,13 +1,16 @@
 """The formats of graphs and mechanisms, and reading and writing files by suffix or name.
 
-Readers raise nothing but `FormatError`; their time and memory are bounded by the length of the text, and a text longer
-than the format's limit is refused before it is read.  Formats of one graph a line are read line by line.
+Readers raise nothing but `FormatError`.  Their time and memory are bounded: a text that is read at once has a longest
+length and a largest number of graphs and joints; a file of lines, rows or GraphML is read as it is asked for, and each
+of its graphs has a longest length.  What is longer is refused before it is read.
 """
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -17,12 +20,31 @@ from graphsynth.errors import FormatError, GraphError, SpecError
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["FORMATS", "Format", "format_of", "read", "read_all", "read_text", "write", "write_text"]
+__all__ = [
+    "FORMATS",
+    "GRAPHS_MAX",
+    "JOINTS_MAX",
+    "Format",
+    "format_of",
+    "read",
+    "read_all",
+    "read_stream",
+    "read_text",
+    "write",
+    "write_text",
+]
 
 Item = MechanismGraph | Mechanism
 
 #: Longest line of a file of lines; the longest text form is shorter.
 LINE_MAX = 1_000_000
+#: Longest text of several graphs that is read at once.
+TEXT_MAX = 4_000_000
+#: Graphs, and joints of all of them, in a text that is read at once.
+GRAPHS_MAX = 20_000
+JOINTS_MAX = 250_000
+_BLOCK = 1 << 16
+_MESSAGE = 360
 
 
 @dataclass(frozen=True)
@@ -41,11 +63,13 @@ class Format:
     mechanisms : bool
         Whether it holds dimensioned mechanisms too.
     limit : int
-        Longest text that is read, in characters; of one line if ``line``.
-    line : bool
-        Whether every line is one graph.
+        Longest text that is read at once, in bytes.
     parse, compose : str
         Functions of a module of this package, ``module:function``.
+    feed : {"whole", "lines", "rows", "blocks"}
+        How it is read: at once, or as it is asked for.
+    piece : int
+        Longest text of one graph, in bytes, if it is read as it is asked for.
     """
 
     name: str
@@ -56,46 +80,68 @@ class Format:
     limit: int
     parse: str
     compose: str
-    line: bool = False
+    feed: str = "whole"
+    piece: int = 0
+
+    @property
+    def line(self) -> bool:
+        """Whether every line is one graph."""
+        return self.feed == "lines"
+
+    @property
+    def bounds(self) -> str:
+        """What is read at most, for people."""
+        if self.feed == "whole":
+            return _size(self.limit)
+        return f"{_size(self.piece)} a {'line' if self.line else 'row' if self.feed == 'rows' else 'graph'}"
 
 
+def _size(count: int) -> str:
+    return f"{count / 1e6:g} MB" if count >= 1_000_000 else f"{count // 1000} kB"
+
+
+_MATRIX = 4_000_000
 FORMATS: dict[str, Format] = {
     entry.name: entry
     for entry in (
         Format(
-            "text", (".g6", ".txt"), "graph6 with frame and joint mobilities, one graph a line", True, False, LINE_MAX,
-            "plain:parse_text", "plain:compose_text", line=True,
+            "text", (".g6", ".txt"), "graph6 with frame and joint mobilities, one graph a line", True, False, TEXT_MAX,
+            "plain:parse_text", "plain:compose_text", "lines", LINE_MAX,
         ),
         Format(
-            "graph6", (), "graph6 alone: chains of turning pairs, one a line", True, False, LINE_MAX,
-            "plain:parse_graph6", "plain:compose_graph6", line=True,
+            "graph6", (), "graph6 alone: chains of turning pairs, one a line", True, False, TEXT_MAX,
+            "plain:parse_graph6", "plain:compose_graph6", "lines", LINE_MAX,
         ),
         Format(
-            "jsonl", (".jsonl", ".ndjson"), "JSON lines, one graph a line", True, False, LINE_MAX,
-            "graph_json:parse_line", "graph_json:compose_lines", line=True,
+            "jsonl", (".jsonl", ".ndjson"), "JSON lines, one graph a line", True, False, TEXT_MAX,
+            "graph_json:parse_line", "graph_json:compose_lines", "lines", LINE_MAX,
         ),
         Format(
-            "json", (".json",), "JSON: a graph, a list of graphs, or a mechanism", True, True, 20_000_000,
+            "json", (".json",), "JSON: a graph, a list of graphs, or a mechanism", True, True, TEXT_MAX,
             "graph_json:parse", "graph_json:compose",
         ),
         Format(
-            "toml", (".toml",), "TOML: a mechanism", False, True, 1_000_000, "plain:parse_toml", "plain:compose_toml",
-        ),
-        Format("graphml", (".graphml",), "GraphML", True, True, 20_000_000, "graphml:parse", "graphml:compose"),
-        Format("dot", (".dot", ".gv"), "DOT of Graphviz", True, True, 4_000_000, "dot:parse", "dot:compose"),
-        Format(
-            "csv", (".csv",), "table, a row for each graph", True, False, 20_000_000, "tables:parse", "tables:compose",
+            "toml", (".toml",), "TOML: a mechanism", False, True, 500_000, "plain:parse_toml", "plain:compose_toml",
         ),
         Format(
-            "edges", (".edges", ".edgelist"), "edge list", False, False, 4_000_000,
+            "graphml", (".graphml",), "GraphML", True, True, TEXT_MAX,
+            "graphml:parse", "graphml:compose", "blocks", 4_000_000,
+        ),
+        Format("dot", (".dot", ".gv"), "DOT of Graphviz", True, True, 2_000_000, "dot:parse", "dot:compose"),
+        Format(
+            "csv", (".csv",), "table, a row for each graph", True, False, TEXT_MAX,
+            "tables:parse", "tables:compose", "rows", 1_000_000,
+        ),
+        Format(
+            "edges", (".edges", ".edgelist"), "edge list", False, False, _MATRIX,
             "edge_list:parse", "edge_list:compose",
         ),
         Format(
-            "adjacency", (".adj",), "adjacency matrix", False, False, 4_000_000,
+            "adjacency", (".adj",), "adjacency matrix", False, False, _MATRIX,
             "matrices:parse_adjacency", "matrices:compose_adjacency",
         ),
         Format(
-            "incidence", (".inc",), "incidence matrix", False, False, 4_000_000,
+            "incidence", (".inc",), "incidence matrix", False, False, _MATRIX,
             "matrices:parse_incidence", "matrices:compose_incidence",
         ),
     )
@@ -146,7 +192,8 @@ def read_text(text: str | bytes, format: str) -> list[Item]:
     Raises
     ------
     FormatError
-        For anything that is not this format, with the place.
+        For anything that is not this format, with the place; for a text longer than ``FORMATS[format].limit``, more
+        than :data:`GRAPHS_MAX` graphs or :data:`JOINTS_MAX` joints in all.
     SpecError
         For an unknown format.
 
@@ -156,30 +203,81 @@ def read_text(text: str | bytes, format: str) -> list[Item]:
     0
     """
     entry = format_of("", format)
-    if not entry.line and len(text) > entry.limit:
-        raise FormatError(f"{len(text)} characters; {entry.name} is read up to {entry.limit}", "length")
-    if entry.line:
-        lines = text.split("\n") if isinstance(text, str) else text.split(b"\n")
-        return list(_lines(lines, entry, ""))
-    found: list[Item] = _function(entry.parse)(_decoded(text))
+    with _sentences(""):
+        _check_length(len(text), entry)
+        return _bounded(_fed(io.BytesIO(_encoded(text)), entry))
+
+
+def _encoded(text: str | bytes) -> bytes:
+    if not isinstance(text, str):
+        return text
+    try:
+        return text.encode()
+    except UnicodeEncodeError as error:
+        raise FormatError("half of a character that takes two", f"character {error.start}") from None
+
+
+def _check_length(length: int, entry: Format) -> None:
+    if length > entry.limit:
+        remedy = "split it, or write it in text or jsonl" if entry.many else "write it in json or graphml"
+        if entry.feed != "whole":
+            remedy = "split it, or put it into a file, which is read graph by graph"
+        raise FormatError(f"more than {entry.limit} bytes of {entry.name} at once; {remedy}", "length")
+
+
+def _bounded(items: Iterable[Item]) -> list[Item]:
+    found: list[Item] = []
+    joints = 0
+    for item in items:
+        found.append(item)
+        joints += len(item.joints) if isinstance(item, Mechanism) else len(item.packed) // 3
+        if len(found) > GRAPHS_MAX or joints > JOINTS_MAX:
+            most = f"{GRAPHS_MAX} graphs, or {JOINTS_MAX} joints in all,"
+            raise FormatError(f"more than {most} at once; split the text, or use a file of text or jsonl", "length")
     return found
 
 
-def _decoded(text: str | bytes) -> str:
-    if isinstance(text, str):
-        return text.removeprefix("\ufeff")
+@contextmanager
+def _sentences(name: str) -> Iterator[None]:
+    """Keep messages short, with the name of the file in front."""
+    try:
+        yield
+    except FormatError as error:
+        said = str(error)
+        if name or len(said) > _MESSAGE:
+            short = said if len(said) <= _MESSAGE else f"{said[: _MESSAGE - 64]} ... {said[-56:]}"
+            raise FormatError(short, name or error.place) from None
+        raise
+
+
+def _fed(file: io.BufferedIOBase, entry: Format) -> Iterator[Item]:
+    """Read the items of an open file as its format wants it."""
+    parse = _function(entry.parse)
+    if entry.feed == "lines":
+        return _lines(file, entry)
+    if entry.feed == "rows":
+        return iter(parse(_rows(file, entry)))
+    if entry.feed == "blocks":
+        return iter(parse(_blocks(file)))
+    data = file.read(entry.limit + 1)
+    _check_length(len(data), entry)
+    return iter(parse(_decoded(data)))
+
+
+def _decoded(text: bytes) -> str:
     try:
         return text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(f"not UTF-8 text ({error.reason})", f"byte {error.start}") from None
 
 
-def _lines(lines: Iterable[str | bytes], entry: Format, name: str) -> Iterator[Item]:
-    one = _function(entry.parse)
-    for number, line in enumerate(lines, 1):
-        place = f"{name} line {number}".lstrip()
-        if len(line) > entry.limit:
-            raise FormatError(f"more than {entry.limit} characters on one line", place)
+def _lines(file: io.BufferedIOBase, entry: Format) -> Iterator[Item]:
+    one, number = _function(entry.parse), 0
+    while line := file.readline(entry.piece + 2):
+        number += 1
+        place = f"line {number}"
+        if len(line) > entry.piece:
+            raise FormatError(f"more than {entry.piece} bytes on one line", place)
         try:
             text = _decoded(line).strip()
         except FormatError as error:
@@ -188,8 +286,63 @@ def _lines(lines: Iterable[str | bytes], entry: Format, name: str) -> Iterator[I
             yield one(text, place)
 
 
+def _rows(file: io.BufferedIOBase, entry: Format) -> Iterator[str]:
+    number = 0
+    while line := file.readline(entry.piece + 2):
+        number += 1
+        if len(line) > entry.piece:
+            raise FormatError(f"more than {entry.piece} bytes in one row", f"line {number}")
+        try:
+            yield _decoded(line) if number == 1 else line.decode()
+        except (FormatError, UnicodeDecodeError):
+            raise FormatError("not UTF-8 text", f"line {number}") from None
+
+
+def _blocks(file: io.BufferedIOBase) -> Iterator[bytes]:
+    while block := file.read(_BLOCK):
+        yield block
+
+
+def read_stream(file: io.BufferedIOBase, format: str, name: str = "") -> Iterator[Item]:
+    """Read every graph and mechanism of an open binary file, in order, as they are asked for.
+
+    Lines, rows and GraphML take the memory of one graph, whatever the length of the file.
+
+    Parameters
+    ----------
+    file : binary file
+        For example ``sys.stdin.buffer``; UTF-8.
+    format : str
+        A name in :data:`FORMATS`.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    FormatError
+        For a file that is not of this format, with its name and the place.
+    SpecError
+        For an unknown format.
+
+    Examples
+    --------
+    >>> import io
+    >>> [graph.links for graph in read_stream(io.BytesIO(b"Bw Cl".replace(b" ", bytes([10]))), "text")]
+    [3, 4]
+    """
+    entry = format_of("", format)
+
+    def items() -> Iterator[Item]:
+        with _sentences(name):
+            yield from _fed(file, entry)
+
+    return items()
+
+
 def read_all(path: str | os.PathLike[str], format: str | None = None) -> Iterator[Item]:
-    """Read every graph and mechanism of a file, in its order; files of lines are read as they are asked for.
+    """Read every graph and mechanism of a file, in its order, as they are asked for.
+
+    Lines, rows and GraphML take the memory of one graph, whatever the length of the file.
 
     Raises
     ------
@@ -198,23 +351,15 @@ def read_all(path: str | os.PathLike[str], format: str | None = None) -> Iterato
     SpecError
         For an unknown format.
     OSError
-        For a file that cannot be opened.
+        For a file that cannot be opened, when the first item is asked for.
     """
     entry, path = format_of(path, format), Path(path)
-    if entry.line:
-        return _lines(_file_lines(path, entry.limit), entry, path.name)
-    with path.open("rb") as file:
-        data = file.read(entry.limit + 1)
-    try:
-        return iter(read_text(data, entry.name))
-    except FormatError as error:
-        raise FormatError(str(error), path.name) from None
 
+    def items() -> Iterator[Item]:
+        with path.open("rb") as file:
+            yield from read_stream(file, entry.name, path.name)
 
-def _file_lines(path: Path, limit: int) -> Iterator[bytes]:
-    with path.open("rb") as file:
-        while line := file.readline(limit + 2):
-            yield line
+    return items()
 
 
 def read(path: str | os.PathLike[str], format: str | None = None, *, number: int = 1) -> Item:
@@ -311,6 +456,8 @@ def write(items: Item | Iterable[Item], path: str | os.PathLike[str], format: st
             for piece in _pieces(counted(), entry):
                 file.write(piece)
         fresh.replace(path)
+    except UnicodeEncodeError as error:
+        raise GraphError(f"a name holds half of a character that takes two ({error.object[error.start]!r})") from None
     finally:
         fresh.unlink(missing_ok=True)
     return count

@@ -7,10 +7,13 @@ import io
 from collections.abc import Iterable, Iterator
 
 from graphsynth.errors import FormatError, GraphError
-from graphsynth.formats.plain import graph_of_key
+from graphsynth.formats.plain import graph_of_key, graph_of_text, placed
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["COLUMNS", "compose", "parse"]
+__all__ = ["COLUMNS", "ROW_MAX", "compose", "parse"]
+
+#: Characters of a row, which may hold line ends.
+ROW_MAX = 1_000_000
 
 #: Columns that are written; ``text`` (or ``key`` or ``graph6``) is the one that is read.
 COLUMNS = ("text", "links", "joints", "frame", "space", "mobility", "loops", "assortment")
@@ -33,7 +36,7 @@ def compose(graphs: Iterable[MechanismGraph]) -> Iterator[str]:
         yield line.getvalue()
 
 
-def parse(text: str) -> list[MechanismGraph]:
+def parse(lines: Iterable[str]) -> Iterator[MechanismGraph]:
     """Read the column ``text`` (or ``key``, or ``graph6``) of every row; the other columns are not looked at.
 
     Raises
@@ -41,12 +44,12 @@ def parse(text: str) -> list[MechanismGraph]:
     FormatError
         For anything else, with the line.
     """
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    found: list[MechanismGraph] = []
+    source = _Rows(lines)
+    reader = csv.reader(source, strict=True)
     column, name = -1, ""
     try:
         for row in reader:
-            place = f"line {reader.line_num}"
+            source.since, place = 0, f"line {reader.line_num}"
             if column < 0:
                 name = next((known for known in _READ if known in row), "")
                 if not name:
@@ -55,16 +58,25 @@ def parse(text: str) -> list[MechanismGraph]:
             elif row:
                 if len(row) <= column:
                     raise FormatError(f"the row has no column {name!r}", place)
-                found.append(_graph(row[column], name, place))
+                yield placed(graph_of_key if name == "key" else graph_of_text, row[column], place)
     except csv.Error as error:
         raise FormatError(f"not CSV ({error})", f"line {reader.line_num}") from None
     if column < 0:
         raise FormatError("the text is empty; the first row names the columns", "line 1")
-    return found
 
 
-def _graph(text: str, name: str, place: str) -> MechanismGraph:
-    try:
-        return graph_of_key(text) if name == "key" else MechanismGraph.from_text(text)
-    except FormatError as error:
-        raise FormatError(str(error), place) from None
+class _Rows:
+    """Lines, while no row of them gets too long."""
+
+    def __init__(self, lines: Iterable[str]) -> None:
+        self.lines, self.since, self.number = iter(lines), 0, 0
+
+    def __iter__(self) -> _Rows:
+        return self
+
+    def __next__(self) -> str:
+        line = next(self.lines)
+        self.since, self.number = self.since + len(line), self.number + 1
+        if self.since > ROW_MAX:
+            raise FormatError(f"more than {ROW_MAX} characters in one row", f"line {self.number}")
+        return line

@@ -1,14 +1,16 @@
 """Mechanisms as TOML and JSON; the round trip is exact.
 
 Floats are written with ``repr``, the shortest text that reads back as the same double.  Readers accept any text or
-bytes and raise nothing but `FormatError`, whose place is the line or the key.
+bytes and raise nothing but `FormatError`, whose place is the line or the key; a text too long to be read within a
+second is refused before it is read.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import fields
 from typing import Any, TypeVar
 
@@ -18,13 +20,18 @@ from graphsynth.mechanism.laws import LAWS, Linear
 from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["from_dict", "from_json", "from_toml", "to_dict", "to_json", "to_toml"]
+__all__ = [
+    "JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "json_value", "to_dict", "to_json", "to_toml",
+]  # fmt: skip
 
 FORMAT = "graphsynth mechanism"
 VERSION = 1
 _KEYS = {"format", "version", "graph", "joints", "drivers", "points", "pose"}
-#: Longer than any mechanism of 255 links.
-_LENGTH_MAX = 20_000_000
+#: Longest texts that are read, in characters.
+JSON_MAX = 4_000_000
+TOML_MAX = 500_000
+_STRING = re.compile(r'"(?:[^"\\\n]|\\.)*+"' "|'[^'\n]*+'")
+_LONG_KEY = re.compile(r'(?<![\w"-])(?:[\w"-]++[ \t]*+\.[ \t]*+){12}', re.ASCII)
 _T = TypeVar("_T")
 
 
@@ -92,65 +99,97 @@ def _toml(value: Any) -> str:
     return "[" + ", ".join(map(_toml, value)) + "]"
 
 
-def _decoded(text: str | bytes) -> str:
-    if len(text) > _LENGTH_MAX:
-        raise FormatError(f"{len(text)} characters are more than a mechanism can need ({_LENGTH_MAX})", "length")
+def _decoded(text: str | bytes, most: int, name: str) -> str:
+    if len(text) > most:
+        raise FormatError(f"{len(text)} characters; a mechanism in {name} is read up to {most}", "length")
     if isinstance(text, str):
-        return text
+        return text.removeprefix("\ufeff")
     try:
-        return text.decode("utf-8")
+        return text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FormatError(f"not UTF-8 text ({error.reason})", f"byte {error.start}") from error
+        raise FormatError(f"not UTF-8 text ({error.reason})", f"byte {error.start}") from None
+
+
+def json_value(text: str, place: str = "") -> Any:
+    """Read JSON as plain values; `FormatError` for anything else, NaN and keys given twice too, whatever the depth."""
+    try:
+        return json.loads(text, parse_constant=_no_constant, object_pairs_hook=_pairs)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise FormatError(f"not JSON ({error.msg})", f"{place}, {where}" if place else where) from None
+    except FormatError as error:
+        raise FormatError(str(error), place) from None
+    except (RecursionError, ValueError) as error:
+        raise FormatError(f"not JSON that can be read ({error})", place or "text") from None
+
+
+def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        left = set(found)
+        for name, _ in pairs:
+            if name not in left:
+                raise FormatError(f"the key {name[:24]!r} is there twice")
+            left.remove(name)
+    return found
+
+
+def _no_constant(name: str) -> Any:
+    raise FormatError(f"{name} is not a number of JSON")
 
 
 def from_json(text: str | bytes) -> Mechanism:
     """Read JSON; anything that is not a mechanism is a `FormatError` with the line or key."""
-    try:
-        data = json.loads(_decoded(text))
-    except json.JSONDecodeError as error:
-        raise FormatError(f"not JSON ({error.msg})", f"line {error.lineno}, column {error.colno}") from error
-    except (RecursionError, ValueError) as error:
-        if isinstance(error, FormatError):
-            raise
-        raise FormatError(f"not JSON that can be read ({error})", "text") from error
-    return from_dict(data)
+    return from_dict(json_value(_decoded(text, JSON_MAX, "JSON")))
 
 
 def from_toml(text: str | bytes) -> Mechanism:
-    """Read TOML; anything that is not a mechanism is a `FormatError` with the line or key."""
+    """Read TOML; anything that is not a mechanism is a `FormatError` with the line or key.
+
+    A key of many parts is refused: the time of the parser grows with the square of their number.
+    """
+    decoded = _decoded(text, TOML_MAX, "TOML")
+    if match := _LONG_KEY.search(_STRING.sub('""', decoded)):
+        raise FormatError(f"the key {match[0][:24]!r}... has too many parts", "text")
     try:
-        data = tomllib.loads(_decoded(text))
+        data = tomllib.loads(decoded)
     except tomllib.TOMLDecodeError as error:
-        raise FormatError(f"not TOML ({error})", "text") from error
+        raise FormatError(f"not TOML ({error})", "text") from None
     except (RecursionError, ValueError) as error:
-        if isinstance(error, FormatError):
-            raise
-        raise FormatError(f"not TOML that can be read ({error})", "text") from error
+        raise FormatError(f"not TOML that can be read ({error})", "text") from None
     return from_dict(data)
 
 
 def from_dict(data: Any) -> Mechanism:
     """Build a mechanism from what :func:`to_dict` returns; `FormatError` with the key for anything else."""
+    try:
+        return _mechanism(data)
+    except RecursionError:  # values nested deeper than a message can show
+        raise FormatError("the values are nested too deep", "top level") from None
+
+
+def _mechanism(data: Any) -> Mechanism:
     table = _table(data, "top level", _KEYS, {"format", "version", "graph", "joints"})
     if table["format"] != FORMAT:
-        raise FormatError(f"found {table['format']!r}, expected {FORMAT!r}", "format")
+        raise FormatError(f"found {_shown(table['format'])}, expected {FORMAT!r}", "format")
     if table["version"] != VERSION or isinstance(table["version"], bool):
-        raise FormatError(f"found {table['version']!r}, this program reads version {VERSION}", "version")
+        raise FormatError(f"found {_shown(table['version'])}, this program reads version {VERSION}", "version")
     if not isinstance(table["graph"], str):
         raise FormatError("expected the text form of a graph", "graph")
     try:
         graph = MechanismGraph.from_text(table["graph"])
     except FormatError as error:
         raise FormatError(str(error), "graph") from error
-    joints = [_joint(entry, f"joints[{k}]") for k, entry in enumerate(_list(table["joints"], "joints"))]
-    drivers = [_driver(entry, f"drivers[{k}]") for k, entry in enumerate(_list(table.get("drivers", []), "drivers"))]
+    most = len(graph.joints)
+    joints = [_joint(entry, f"joints[{k}]") for k, entry in _entries(table["joints"], "joints", most)]
+    drivers = [_driver(entry, f"drivers[{k}]") for k, entry in _entries(table.get("drivers", []), "drivers", most)]
     named = table.get("points", {})
     if not isinstance(named, dict):
         raise FormatError("expected a table of points", "points")
-    points = {name: _point(entry, f"points.{name}") for name, entry in named.items()}
+    points = {_name(name): _point(entry, f"points.{name[:24]}") for name, entry in named.items()}
     pose = table.get("pose")
     if pose is not None:
-        pose = tuple(tuple(_list(row, f"pose[{k}]")) for k, row in enumerate(_list(pose, "pose")))
+        pose = tuple(tuple(_list(row, f"pose[{k}]")) for k, row in _entries(pose, "pose", graph.links))
     return _build(lambda: Mechanism(graph, tuple(joints), tuple(drivers), points, pose), "mechanism")
 
 
@@ -158,7 +197,29 @@ def _build(make: Callable[[], _T], place: str) -> _T:
     try:
         return make()
     except GeometryError as error:
-        raise FormatError(str(error), place) from error
+        said = str(error)
+        raise FormatError(said if len(said) <= 240 else f"{said[:160]} ... {said[-60:]}", place) from None
+
+
+def _shown(value: Any) -> str:
+    text = repr(value) if isinstance(value, str | int | float) else type(value).__name__
+    return text if len(text) <= 40 else f"{text[:36]} ..."
+
+
+def _name(name: str) -> str:
+    """Return the name of a point, if it can be written."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise FormatError(f"the name {name[:24]!r} holds half a character", "points") from None
+    return name
+
+
+def _entries(value: Any, place: str, most: int) -> Iterator[tuple[int, Any]]:
+    """Return the numbered entries of a list; refuse too many before any is looked at."""
+    if len(_list(value, place)) > most:
+        raise FormatError(f"{len(value)} entries; the graph takes at most {most}", place)
+    return enumerate(value)
 
 
 def _list(value: Any, place: str) -> list[Any]:
@@ -172,7 +233,7 @@ def _table(value: Any, place: str, known: set[str], needed: set[str]) -> dict[st
         raise FormatError(f"expected a table, found {type(value).__name__}", place)
     unknown = sorted(set(value) - known)
     if unknown:
-        raise FormatError(f"unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}", place)
+        raise FormatError(f"unknown key {_shown(unknown[0])}; known are {', '.join(sorted(known))}", place)
     missing = sorted(needed - set(value))
     if missing:
         raise FormatError(f"key {missing[0]!r} is missing", place)

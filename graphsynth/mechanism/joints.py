@@ -19,6 +19,9 @@ __all__ = ["COLUMNS", "Cam", "Gear", "JointGeometry", "PinSlot", "Prismatic", "R
 COLUMNS = ("ax", "ay", "a_angle", "bx", "by", "b_angle", "radius_a", "radius_b", "sign", "offset")
 
 
+_HARMONICS_MAX = 1024
+
+
 @dataclass(frozen=True)
 class _Pair:
     """Two links joined; the order a, b is the user's and need not ascend."""
@@ -150,8 +153,8 @@ class Cam(_Pair):
 
     The centre ``at_b`` of the roller stays on the pitch curve round ``at_a``, given in polar form by
     ``rho(psi) = radius + sum over k >= 1 of c_k cos(k psi) + s_k sin(k psi)`` with psi counted from the direction
-    ``angle_a`` of link a; ``harmonics`` holds the pairs (c_k, s_k).  The radius must be positive everywhere (checked at
-    64 angles for each harmonic).  Contact is kept from both sides, as in a groove.
+    ``angle_a`` of link a; ``harmonics`` holds the pairs (c_k, s_k), at most 1024.  The radius must be positive
+    everywhere (checked at 64 angles for each harmonic).  Contact is kept from both sides, as in a groove.
     """
 
     at_a: Point = (0.0, 0.0)
@@ -167,17 +170,27 @@ class Cam(_Pair):
         self._check(("at_a", "at_b"), ("angle_a",))
         name = f"of cam {self.a}-{self.b}"
         object.__setattr__(self, "radius", nonzero(f"radius {name}", self.radius))
-        try:
-            pairs = tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(self.harmonics, 1))
-        except TypeError as error:
-            raise GeometryError(f"harmonics {name} = {self.harmonics!r} are no list of pairs (c_k, s_k)") from error
-        object.__setattr__(self, "harmonics", pairs)
-        count = 64 * (len(pairs) + 1)
-        least = min(self.pitch_radius(2.0 * math.pi * k / count)[0] for k in range(count))
-        if least <= 0.0:
+        object.__setattr__(self, "harmonics", _harmonics(self.harmonics, name))
+        least = self._least_radius()
+        if not least > 0.0:
             raise GeometryError(
                 f"the pitch curve {name} has the radius {least:.6g} somewhere; make it positive everywhere"
             )
+
+    def _least_radius(self) -> float:
+        """Return a bound of the radius if that is positive, else the least value at many angles (estimated)."""
+        largest = sum(math.hypot(c, s) for c, s in self.harmonics)
+        if self.radius > largest * (1.0 + 1e-12):
+            return self.radius - largest
+        import numpy as np
+
+        unit = max(self.radius, largest)  # so that no sum overflows; not finite only if the harmonics are absurd
+        if not math.isfinite(unit):
+            return -math.inf
+        waves = np.zeros(32 * (len(self.harmonics) + 1) + 1, dtype=complex)
+        waves[0] = self.radius / unit
+        waves[1 : len(self.harmonics) + 1] = [complex(c / unit, -s / unit) / 2.0 for c, s in self.harmonics]
+        return float(np.fft.irfft(waves, norm="forward").min()) * unit
 
     def pitch_radius(self, psi: float) -> tuple[float, float, float]:
         """Radius of the pitch curve at ``psi`` (radians from ``angle_a``) and its first two derivatives."""
@@ -192,6 +205,15 @@ class Cam(_Pair):
     def row(self) -> tuple[float, ...]:
         """Numbers in the order of `COLUMNS` (the mean radius as the first; harmonics are the joint's own)."""
         return (*self.at_a, self.angle_a, *self.at_b, 0.0, self.radius, 0.0, 0.0, 0.0)
+
+
+def _harmonics(given: Any, name: str) -> tuple[Point, ...]:
+    try:
+        if len(given) > _HARMONICS_MAX:
+            raise GeometryError(f"harmonics {name}: {len(given)} are given, at most {_HARMONICS_MAX} are taken")
+        return tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(given, 1))
+    except TypeError as error:
+        raise GeometryError(f"harmonics {name} = {given!r} are no list of pairs (c_k, s_k)") from error
 
 
 JointGeometry = Revolute | Prismatic | PinSlot | Gear | Cam
