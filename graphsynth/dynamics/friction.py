@@ -30,6 +30,8 @@ def finite(name: str, value: float) -> float:
     """
     try:
         number = float(value)
+    except OverflowError:
+        raise SpecError(f"The {name} must be at most 1.8e308, the largest float.") from None
     except (TypeError, ValueError):
         raise SpecError(f"The {name} must be a number, not {value!r}.") from None
     if not math.isfinite(number):

@@ -21,6 +21,8 @@ def number(name: str, value: float, *, least: float = -math.inf, above: bool = F
     """Return a finite float not below ``least`` (or above it), or raise `SpecError` naming value, bound and remedy."""
     try:
         given = float(value)
+    except OverflowError:
+        raise SpecError(f"{name} is beyond the largest float, 1.8e308; give a number in SI units") from None
     except (TypeError, ValueError):
         raise SpecError(f"{name} = {value!r} is not a number; give a number in SI units") from None
     if math.isnan(given) or (math.isinf(given) and not infinite):
@@ -35,7 +37,7 @@ def numbers(name: str, values: Any, unit: str = "SI units", *, finite: bool = Tr
     """Return an array of floats (finite ones unless said otherwise), or raise `SpecError` naming what was given."""
     try:
         found = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         shown = repr(values)
         raise SpecError(
             f"{name} = {shown if len(shown) <= 60 else shown[:57] + '...'} are not real numbers; give them in {unit}"
@@ -49,7 +51,7 @@ def whole(name: str, value: Any, advice: str) -> int:
     """Return a whole number of at least 1, or raise `SpecError` with the advice."""
     try:
         given = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         given = math.nan
     if not given >= 1.0 or math.isinf(given) or given != math.floor(given):
         raise SpecError(f"{name} = {value!r} must be a whole number of at least 1; {advice}")

@@ -10,22 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import finite
 
 __all__ = [
     "choice", "finite", "finite_array", "plane_point", "positive", "sign", "three", "three_points", "triple", "triples",
     "unit_vector", "whole",
 ]  # fmt: skip
-
-
-def finite(name: str, value: Any) -> float:
-    """Return ``value`` as a float; raise `GeometryError` if it is not a finite real number."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError) as error:
-        raise GeometryError(f"{name} = {value!r} is not a real number; give a finite one") from error
-    if not math.isfinite(number):
-        raise GeometryError(f"{name} = {number} is not finite; give a finite number")
-    return number
 
 
 def positive(name: str, value: Any, *, zero: bool = False) -> float:
@@ -70,12 +60,14 @@ def unit_vector(name: str, value: Any) -> tuple[float, float, float]:
 def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return ``values`` as a float array; raise `GeometryError` if an entry is NaN or infinite."""
     try:
-        if np.iscomplexobj(values):
-            raise GeometryError(f"{name} holds complex numbers; give real ones")
-        array = np.asarray(values, dtype=np.float64)
+        given = np.asarray(values)
+        if given.dtype.kind in "cSU":
+            kind = "complex numbers" if given.dtype.kind == "c" else "text"
+            raise GeometryError(f"{name} holds {kind}; give real numbers")
+        array = given.astype(np.float64, copy=False)
     except GeometryError:
         raise
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise GeometryError(f"{name} is not an array of real numbers: {error}") from error
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:

@@ -77,7 +77,11 @@ class InverseSolution:
 
 
 def _lengths(name: str, values: Any) -> tuple[float, float, float]:
-    given = (values,) * 3 if np.ndim(values) == 0 else three(name, values)
+    try:
+        alone = np.ndim(values) == 0
+    except ValueError:  # parts of different lengths: the rule of a number finds the one that is none
+        alone = False
+    given = (values,) * 3 if alone else three(name, values)
     first, second, third = (positive(f"{name} of leg {leg}", value, zero=True) for leg, value in enumerate(given, 1))
     return (first, second, third)
 

@@ -133,6 +133,8 @@ class SingleMotorPlatform:
             object.__setattr__(self, name, tuple(rule(f"{name} of leg {k}", v) for k, v in enumerate(values, 1)))
         for name in ("axis", "pivot", "vertex"):
             object.__setattr__(self, name, three_points(name, getattr(self, name)))
+        if not isinstance(self.gears, GearTrain):
+            raise GeometryError(f"gears = {self.gears!r} is not a GearTrain; give the numbers of teeth to one")
         _ = self.platform, self.drives  # their own checks
 
     @cached_property

@@ -19,7 +19,9 @@ def finite(name: str, value: Any) -> float:
         raise GeometryError(f"{name} = {value!r} is not a real number; give a finite one")
     try:
         number = float(value)
-    except (TypeError, ValueError, OverflowError) as error:
+    except OverflowError as error:  # an integer of any length: its digits help nobody
+        raise GeometryError(f"{name} is beyond the largest float, 1.8e308; give a finite number") from error
+    except (TypeError, ValueError) as error:
         raise GeometryError(f"{name} = {value!r} is not a real number; give a finite one") from error
     if not math.isfinite(number):
         raise GeometryError(f"{name} = {number} is not finite; give a finite number")

@@ -21,6 +21,9 @@ from graphsynth.kinematics.embodiment import PathGoal, PosesGoal, embody
 from graphsynth.kinematics.engine.dyads import solve_rrr
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
+from graphsynth.kinematics.piston import rotary_assignments
+from graphsynth.kinematics.pointing import PointingMechanism
+from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -63,10 +66,23 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "start of a stroke": lambda bad: LAMBDA.straightness(start=bad),
     "stop of a stroke": lambda bad: LAMBDA.straightness(stop=bad),
     "samples of a stroke": lambda bad: LAMBDA.straightness(samples=bad),
+    "length of a linkage": lambda bad: LambdaLinkage(l1=bad),
+    "axis of a linkage": lambda bad: LambdaLinkage(axis=bad),
+    "length of a pointing mechanism": lambda bad: PointingMechanism(l1=bad),
+    "lengths of a platform": lambda bad: SingleMotorPlatform(l1=bad),
+    "pivots of a platform": lambda bad: SingleMotorPlatform(pivot=bad),
+    "gears of a platform": lambda bad: SingleMotorPlatform(gears=bad),
+    "seed of the assignments": rotary_assignments,
 }
 
 
-@pytest.mark.parametrize("bad", ["x", np.nan, (1, 1, "a"), object()], ids=["text", "nan", "text inside", "object"])
+BAD = {
+    "text": "x", "nan": np.nan, "text inside": (1, 1, "a"), "object": object(), "ragged": [[1], [2, 3]],
+    "too large for a float": 10**400, "bytes": b"1", "complex": 1j * np.inf,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("bad", BAD.values(), ids=BAD)
 @pytest.mark.parametrize("name", CALLS)
 def test_bad_argument_is_told_in_a_sentence(name: str, bad: object) -> None:
     with pytest.raises(GraphsynthError):

@@ -58,7 +58,7 @@ class Thread:
             object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
         try:
             point = complex(self.guide)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise SpecError(f"guide = {self.guide!r} is no point; give x + 1j * y in metres") from None
         number("guide x", point.real)
         number("guide y", point.imag)
@@ -152,6 +152,8 @@ class Braider:
         names = ("crank", "coupler", "rocker", "switch")
         if not isinstance(self.linkage, FourBar) or not isinstance(self.thread, Thread):
             raise SpecError("linkage and thread must be a FourBar and a Thread; make them first")
+        if not isinstance(self.train, Train):
+            raise SpecError(f"train = {self.train!r} is not a Train; give Train(ratio) or Train.of_teeth(stages)")
         check_motor(self.motor)
         masses = tuple(self.masses) if isinstance(self.masses, Iterable) else (self.masses,)
         if len(masses) != 4:

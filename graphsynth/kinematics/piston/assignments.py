@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from graphsynth.kinematics._checks import whole
 from graphsynth.kinematics.piston.spaces import LoopSpaces, loop_spaces
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
@@ -40,18 +41,24 @@ def rotary_assignments(seed: int = 0) -> list[Assignment]:
     Parameters
     ----------
     seed : int
-        Of the random geometry.
+        Of the random geometry, 0 or more.
 
     Returns
     -------
     list of Assignment
         Three; two of them have a crank that turns fully: the two mechanisms of the source.
 
+    Raises
+    ------
+    GeometryError
+        A seed that is not a whole number, or is negative.
+
     Examples
     --------
     >>> [(a.kinds, a.full_turn) for a in rotary_assignments()]
     [('RRRPPP', True), ('RRPPPP', True), ('RPRPPP', False)]
     """
+    seed = whole("seed", seed, 0, 2**63 - 1)
     found = []
     for kinds in product("RP", repeat=6):
         mechanism = _random("".join(kinds), seed)

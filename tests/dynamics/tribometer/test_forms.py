@@ -176,6 +176,7 @@ REFUSED = [
     (lambda: StribeckLaw(0.4, 0.25, 0.02, 0.5), "Stribeck exponent is 0.5"),
     (lambda: TwoCoefficientLaw(0.0, 0.0), "static friction coefficient is 0"),
     (lambda: TwoCoefficientLaw(0.4, float("nan")), "must be finite"),
+    (lambda: TwoCoefficientLaw(0.4, 10**400), "largest float"),
     (lambda: Tribometer(mass=-1.0), "mass is -1"),
     (lambda: Tribometer(stiffness=0.0), "spring stiffness is 0"),
     (lambda: Tribometer(load=-10.0), "platforms separate"),
