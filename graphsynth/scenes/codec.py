@@ -17,7 +17,7 @@ __all__ = ["decode", "encode"]
 _TAG = "~"  # names the dataclass, or "number" for one that JSON has no sign for
 _CLASSES: dict[str, type] = {
     name: getattr(products, name)
-    for name in ("Objective", "Outcome", "Part", "Picture", "Quantity", "Ranking", "Record", "Table")
+    for name in ("Finding", "Objective", "Outcome", "Part", "Picture", "Quantity", "Ranking", "Record", "Table")
 }
 
 

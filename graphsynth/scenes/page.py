@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.scenes.products import Picture, Record, Table
+from graphsynth.scenes.headline import facts, sentences
+from graphsynth.scenes.products import Finding, Picture, Record, Table
 from graphsynth.scenes.summary import summary_tables
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ td.num{white-space:nowrap}
 .facts li{background:var(--card);border-radius:.5rem;padding:.55rem .9rem;min-width:7.5rem}
 .facts b{display:block;font-size:1.3rem;line-height:1.25}
 .bad b,b.bad{color:var(--bad)}.good b,b.good{color:var(--good)}
-.verdict{font-size:1.15rem}
+.verdict{max-width:52rem;margin:.3rem 0 .6rem}.verdict b{font-size:1.1rem}
 .facts span{color:var(--soft);font-size:.85rem}
 .pictures{display:grid;grid-template-columns:repeat(12,1fr);gap:.9rem;align-items:stretch;margin-top:.9rem}
 figure{margin:0;background:var(--card);border-radius:.5rem;padding:.7rem}
@@ -45,7 +46,8 @@ figure{grid-column:span 6;min-width:0;display:flex;flex-direction:column}
 figure.wide{grid-column:1/-1}
 figure.small{grid-column:span 4}
 .sheet figure.small{grid-column:span 3}
-@media (max-width:50rem){table{font-size:.8rem}td:not(.num){min-width:6.5rem}
+@media (max-width:50rem){.facts{gap:.4rem}.facts li{padding:.35rem .6rem;min-width:0}
+.facts b{font-size:1.05rem}.verdict b{font-size:1rem}table{font-size:.8rem}td:not(.num){min-width:6.5rem}
 figure{grid-column:1/-1}
 figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
 figure .gs{--paper:var(--card)}
@@ -67,9 +69,9 @@ def report_html(report: Report) -> str:
     products = report.products
     parts = [
         f"<h1>{escape(scene.title)}</h1>",
+        *(f'<p class="verdict"><b>{escape(text)}</b></p>' for text in report.notes),
+        _answer(report),
         *(f"<p>{escape(text)}</p>" for text in scene.description.strip().split("\n\n") if text),
-        *(f'<p class="verdict"><b class="bad">{escape(text)}</b></p>' for text in report.notes),
-        _facts(report),
     ]
     galleries = {name: value for name, value in products.items() if name != "graph_pictures" and _are_pictures(value)}
     parts += [_gallery(_heading(name), galleries[name]) for name in sorted(galleries, key=_place_of)]
@@ -104,41 +106,23 @@ def _are_pictures(value: object) -> bool:
     return isinstance(value, tuple) and bool(value) and all(isinstance(item, Picture) for item in value)
 
 
-#: Verdicts printed in words at the top; more are read in the tables.
-_VERDICTS = 12
+_TONES = {True: "good", False: "bad", None: ""}
 
 
-def _facts(report: Report) -> str:
-    """Give the run in a row of numbers and the verdicts of what was assessed."""
-    products, facts = report.products, []
-    if "solutions" in products:
-        facts.append((str(len(products["solutions"])), "integer solutions", ""))
-    records: tuple[Record, ...] = products.get("records", ())
-    if records:
-        assessed = [r for r in records if r.status == "assessed"]
-        failed = sum(r.status == "failed" for r in records)
-        rejected = sum(r.status == "rejected" for r in records)
-        if any(r.key for r in records):
-            facts += [(str(len(records)), "candidate mechanisms", ""), (str(len(assessed)), "assessed", "")]
-        if rejected:
-            facts.append((str(rejected), "rejected", ""))
-        if failed:
-            facts.append((str(failed), "failed", "bad"))
-    facts.append((f"{sum(t.seconds + t.import_seconds for t in report.times):.2f} s", "all stages", ""))
+def _answer(report: Report) -> str:
+    """Give the run in a few sentences and, behind the first, a row of numbers."""
+    told = [f'<p class="verdict {_TONES[finding.good]}">{_strong(finding)}</p>' for finding in sentences(report)]
     items = "".join(
-        f'<li><b class="{tone}">{escape(value)}</b><span>{escape(name)}</span></li>' for value, name, tone in facts
+        f'<li><b class="{_TONES[fact.good]}">{escape(fact.value)}</b><span>{escape(fact.text)}</span></li>'
+        for fact in facts(report)
     )
-    return f'<ul class="facts">{items}</ul>{_verdicts(records)}'
+    return f'{"".join(told[:1])}<ul class="facts">{items}</ul>{"".join(told[1:])}'
 
 
-def _verdicts(records: Iterable[Record]) -> str:
-    """Print each verdict once, in words and colour."""
-    tones = {True: "good", False: "bad", None: ""}
-    verdicts = dict.fromkeys((r.recognised_as, r.verdict, r.good) for r in records if r.status == "assessed")
-    return "".join(
-        f'<p class="verdict {tones[good]}"><b>{escape(verdict)}</b> <span class="soft">{escape(module)}</span></p>'
-        for module, verdict, good in list(verdicts)[:_VERDICTS]
-    )
+def _strong(finding: Finding) -> str:
+    """Print what is good or bad in bold and colour, the rest plain."""
+    text = escape(finding.text)
+    return text if finding.good is None else f"<b>{text}</b>"
 
 
 def _figure(picture: Picture) -> str:

@@ -10,6 +10,7 @@ __all__ = [
     "Attempt",
     "Candidate",
     "Columns",
+    "Finding",
     "Objective",
     "Outcome",
     "Part",
@@ -160,13 +161,42 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
+class Finding:
+    """Something the first screen of the page and of the terminal says: a sentence, or a number and what it counts.
+
+    Attributes
+    ----------
+    text : str
+        The sentence; with a value its caption.
+    good : bool or None
+        Whether a designer hopes for it; None if it is neither good nor bad.
+    value : str
+        Printed large, over the caption; empty for a sentence.
+    """
+
+    text: str
+    good: bool | None = None
+    value: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
-    """A table of the report: strings, ready to print."""
+    """A table of the report: strings, ready to print.
+
+    Attributes
+    ----------
+    title, note : str
+    columns : tuple of str
+    rows : tuple of tuple of str
+    findings : tuple of Finding
+        What the first screen says about it.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

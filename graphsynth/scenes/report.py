@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.datafiles import data_files
+from graphsynth.scenes.headline import facts, sentences
 from graphsynth.scenes.page import report_html
 from graphsynth.scenes.parts import write_whole
 from graphsynth.scenes.summary import summary_tables
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table as RichTable
 
+    from graphsynth.scenes.products import Table
     from graphsynth.scenes.runner import Report
 
 __all__ = ["loaded_versions", "print_summary", "scene_json", "write_report"]
@@ -86,22 +89,47 @@ def scene_json(report: Report) -> str:
 
 
 def print_summary(report: Report, console: Console) -> None:
-    """Print the summary of a run on a rich console: solutions, candidates, verdicts, times, and where the files are."""
-    from rich.markup import escape
-    from rich.table import Table as RichTable
+    """Print the summary of a run on a rich console: the answer, the tables, and where the files are.
 
-    console.print(f"[bold]{escape(report.scene.scene.title)}[/bold]")
-    for text in report.notes:
-        console.print(f"[yellow]{escape(text)}[/yellow]")
-    for table in summary_tables(report):
-        shown = RichTable(
-            title=escape(table.title), title_justify="left", caption=escape(table.note) or None, caption_justify="left"
-        )
-        for column in table.columns:
-            shown.add_column(escape(column), overflow="fold")
-        for row in table.rows:
-            shown.add_row(*map(escape, row))
-        console.print(shown)
+    The answer stands first; on a terminal that shows only the end of a long report it is said again at the end.
+    """
+    from rich.markup import escape
+
+    answer = _answer(report)
+    lines = [f"[bold]{escape(report.scene.scene.title)}[/bold]", *answer]
+    for line in lines:
+        console.print(line, highlight=False)
+    shown = [_rich_table(table) for table in summary_tables(report)]
+    for table in shown:
+        console.print(table)
+    if console.is_terminal and sum(len(console.render_lines(table)) for table in shown) > console.height - len(lines):
+        for line in ("", *answer):
+            console.print(line, highlight=False)
     if report.folder is not None:
         names = sorted(path.name for path in report.folder.iterdir() if path.suffix in _KINDS)
         console.print(f"Report: {escape(str(report.folder))} ({', '.join(names)})")
+
+
+def _answer(report: Report) -> list[str]:
+    """Lay out what the first screen says, as rich markup."""
+    from rich.markup import escape
+
+    tones = {True: "green", False: "red", None: "default"}
+    lines = [f"[yellow]{escape(text)}[/yellow]" for text in report.notes]
+    lines += [f"[{tones[told.good]}]{escape(told.text)}[/]" for told in sentences(report)]
+    numbers = [f"[bold]{escape(fact.value)}[/bold] {escape(fact.text)}" for fact in facts(report)]
+    return [*lines, " · ".join(numbers)]
+
+
+def _rich_table(table: Table) -> RichTable:
+    from rich.markup import escape
+    from rich.table import Table as Grid
+
+    shown = Grid(
+        title=escape(table.title), title_justify="left", caption=escape(table.note) or None, caption_justify="left"
+    )
+    for column in table.columns:
+        shown.add_column(escape(column), overflow="fold")
+    for row in table.rows:
+        shown.add_row(*map(escape, row))
+    return shown

@@ -57,7 +57,11 @@ def test_a_mechanism_of_a_file_is_moved(tmp_path: Path) -> None:
     cosines = [(b * b + c * c - d * d) / (2 * b * c) for d in (g - a, g + a)]
     worst = min(min(math.acos(x), math.pi - math.acos(x)) for x in cosines)
     assert margins(report)["transmission angle"] == pytest.approx(math.degrees(worst), rel=1e-9)
-    assert record.verdict == "moves over the whole range" and record.good is True and record.key.startswith("1")
+    assert (
+        record.verdict == "moves over the whole range (estimated)"
+        and record.good is True
+        and record.key.startswith("1")
+    )
     kept = Mechanism.from_json(report["mechanisms"].columns["mechanism"][0])
     assert kept == linkage()
 

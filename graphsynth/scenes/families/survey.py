@@ -120,7 +120,7 @@ FAMILY = Family(
         Stage("store rows", f"{_STEPS}.survey:store", ("evaluated",), ("rows",), each=True),
         Stage("gather", f"{_STEPS}.survey_results:gather", ("surveyed",), ("survey",)),
         Stage("certify", f"{_STEPS}.survey_results:certify", ("survey",), ("certificates",)),
-        Stage("judge", f"{_STEPS}.survey_results:judge", ("survey", "certificates"), ("records", "tables")),
+        Stage("judge", f"{_STEPS}.survey_answer:judge", ("survey", "certificates"), ("records", "tables")),
         Stage("maps", f"{_STEPS}.survey_pictures:maps", ("survey",), ("plots",), aside=True),
         Stage("sketch best", f"{_STEPS}.survey_pictures:sketches", ("records", "ranking"), ("mechanism_pictures",)),
         Stage("animate best", f"{_STEPS}.survey_pictures:animations", ("records", "ranking"), ("animations",)),

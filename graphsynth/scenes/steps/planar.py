@@ -215,7 +215,7 @@ def _extent(motion: Motion) -> float:
 
 def judge(context: Context, moved: Moved, *parts: Jammed | Driven) -> Record:
     """Give the record of a candidate: what its motion, its bearings and its loads say."""
-    words = ["moves over the whole range", *(part.words for part in parts if part.words)]
+    words = ["moves over the whole range (estimated)", *(part.words for part in parts if part.words)]
     verdicts = [part.good for part in parts if part.words]
     margins = (*moved.margins, *(margin for part in parts for margin in part.margins))
     reason = "; ".join(part.reason for part in parts if part.reason)
