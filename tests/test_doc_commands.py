@@ -3,11 +3,13 @@
 import argparse
 import importlib.util
 import json
+import math
 import re
 import shlex
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from graphsynth.cli import main
@@ -38,7 +40,8 @@ CHECKED = {
 #: Commands that no test of this file runs, and why.
 NOT_RUN = {
     r"run |accuracy |stress": "the scenes, methods and cases have tests of their own: tests/scenes, accuracy, stress",
-    r"--links 1[68]|\$|part-": "hours, or a cluster: the same code with fewer links in tests/synthesis, atlas",
+    r"(enumerate|build) --links 16|--links 18": "much disk or many hours; fewer links in tests/synthesis, atlas",
+    r"\$|part-": "jobs of a batch system; shards in tests/synthesis, atlas",
     r"--scheduler": "needs a cluster; tests/atlas starts one",
     r"catalog site": "tests/atlas",
 }
@@ -179,6 +182,41 @@ def test_a_wrong_table_is_seen():
     lambda_scene = next(scene for scene in tables_of_scenes() if scene["scene"]["name"] == "lambda")
     assert reads(lambda_scene) is not None
     assert reads(merged(lambda_scene, {"mechanism": {"bearing": {"clearence_mm": 1}}})) is None
+
+
+def test_the_first_run_is_as_the_tutorial_tells(tmp_path, monkeypatch):
+    """The values shown, the changed clearance, the misspelt key."""
+    from graphsynth.errors import SceneError
+    from graphsynth.scenes.runner import execute
+    from graphsynth.scenes.scene import find_scene, load_scene
+
+    blocks = list(fences(ROOT / "docs" / "tutorial" / "first-run.md"))
+    shown, message = (body for language, body, _ in blocks if language == "text")
+    opened, fewer = (tomllib.loads(body) for language, body, _ in blocks if language == "toml")
+    text = find_scene("lambda").read_text("utf-8")
+    scene = merged(tomllib.loads(text), fewer)
+
+    report = execute(reads(scene))
+    rows = [[cell.strip() for cell in re.split(r"  +", line)] for line in shown.splitlines()]
+    values = {margin.name: margin.text for margin in report["records"][0].margins}
+    assert [(name, value) for name, value in rows if not name.startswith("jam arc") and values[name] != value] == []
+    arcs = [re.findall(r"[\d.]+", value) for name, value in rows if name.startswith("jam arc")]
+    critical = math.asin(math.sin(float(values["critical tilt"].split()[0])) / (0.4 * math.sin(1 / 30)))  # spec 7.2
+    first = [math.degrees(critical), 180 - math.degrees(critical)]
+    assert np.allclose([float(x) for arc in arcs for x in arc], [*first, *(180 + x for x in first)], atol=1e-6)
+
+    after = execute(reads(merged(scene, opened)))
+    assert (
+        after["records"][0].verdict.startswith("free over the whole turn")
+        and "certified" in after["records"][0].verdict
+    )
+
+    wrong = re.sub(r"(?m)^clearance_mm = 0\.03$", "clearence_mm = 0.07", text, count=1)
+    (tmp_path / "mine.toml").write_text(wrong, "utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SceneError) as caught:
+        load_scene("mine.toml")
+    assert str(caught.value) == message.strip()
 
 
 def verbs():
