@@ -38,6 +38,17 @@ def front(rows: Iterable[Row], floor: float = FLOOR) -> tuple[Row, ...]:
 
     Errors count as smaller only below half of another, and as ``floor`` if they are below it.
 
+    Parameters
+    ----------
+    rows : iterable of Row
+        Of one problem.
+    floor : float, optional
+        Errors below it count as it; half a unit in the last place of 1 by default.
+
+    Returns
+    -------
+    tuple of Row
+
     Examples
     --------
     >>> rows = [Row("a", str(k), e, t, 3, "", "") for k, (e, t) in enumerate([(1e-2, 1.0), (1e-3, 2.0), (1e-1, 3.0)])]
@@ -91,6 +102,17 @@ def knee(rows: Sequence[Row], floor: float = FLOOR) -> Row | None:
 
     From the fastest row of the method's own front on, a step is taken as long as it pays.  None without a good row.
 
+    Parameters
+    ----------
+    rows : sequence of Row
+        Of one method.
+    floor : float, optional
+        Errors below it count as it; half a unit in the last place of 1 by default.
+
+    Returns
+    -------
+    Row or None
+
     Examples
     --------
     >>> rows = [Row("a", str(k), 10.0**-k, t, 3, "", "") for k, t in enumerate([1.0, 1.5, 2.0, 9.0])]
@@ -110,7 +132,18 @@ def knee(rows: Sequence[Row], floor: float = FLOOR) -> Row | None:
 
 
 def knees(problem: Problem) -> tuple[Knee, ...]:
-    """Compare the default of every method that has three settings or more with its knee."""
+    """Compare the default of every method that has three settings or more with its knee.
+
+    Parameters
+    ----------
+    problem : Problem
+        With its measured rows.
+
+    Returns
+    -------
+    tuple of Knee
+        One for each such method.
+    """
     found = []
     for method in problem.methods:
         rows = problem.of(method)
@@ -155,6 +188,16 @@ def _two(value: float) -> str:
 
 def advice(problem: Problem) -> dict[str, str]:
     """Return one sentence for each method: for which accuracy to choose it, or what to take instead.
+
+    Parameters
+    ----------
+    problem : Problem
+        With its measured rows.
+
+    Returns
+    -------
+    dict of str to str
+        Method to sentence.
 
     Examples
     --------

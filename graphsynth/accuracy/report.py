@@ -173,6 +173,10 @@ def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
     report : AccuracyReport
     folder : Path
         Made if it is missing; files of an earlier run are replaced.
+
+    Returns
+    -------
+    tuple of Path
     """
     from graphsynth.accuracy.page import page
     from graphsynth.accuracy.pictures import work_precision_picture

@@ -199,6 +199,15 @@ def best_of(run: Callable[[], T], effort: Effort, *, warm: bool = True) -> tuple
 def table(problems: Iterable[Problem]) -> pd.DataFrame:
     """Return all rows as one table; what only some problems have (events, drift, ...) is NaN elsewhere.
 
+    Parameters
+    ----------
+    problems : iterable of Problem
+
+    Returns
+    -------
+    pandas.DataFrame
+        Errors in the unit of the column ``unit``, times in seconds.
+
     Examples
     --------
     >>> row = Row("sweep", "0.1 rad", 0.1, 0.002, 3, "proved width", "", more={"pieces": 12.0})

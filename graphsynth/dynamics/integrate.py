@@ -54,8 +54,9 @@ def simulate_dynamics(
     times : array_like, shape (n,)
         Output times, increasing, s; the first is the start.
     start : StartReport, optional
-        A consistent start; otherwise found from ``pose``, ``rates``, ``keep``, ``keep_rates``, ``modes`` as
-        :func:`consistent_start` does.
+        A consistent start; found from the next five if not given.
+    pose, rates, keep, keep_rates, modes : optional
+        As for :func:`consistent_start`.
     form : {"auto", "minimal", "reduced", "constrained"}
         Minimal: one coordinate through the planar engine.  Reduced: independent coordinates chosen by pivoted QR,
         changed where they fail.  Constrained: all coordinates, multipliers, projection.  Auto takes the minimal form

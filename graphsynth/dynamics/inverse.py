@@ -66,6 +66,11 @@ def inverse_dynamics(
     speed, acceleration : array_like, scalar or shape (n,)
         First and second time derivative of the input at every sample.
 
+    Returns
+    -------
+    InverseDynamics
+        Efforts of the drivers, N m or N, and reactions at every sample (estimated).
+
     Raises
     ------
     GeometryError

@@ -356,6 +356,16 @@ def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object)
     **options
         ``modes`` and ``start`` of :func:`graphsynth.kinematics.simulate`.
 
+    Returns
+    -------
+    EffectiveInertia
+        Arrays of shape (n,): ``inertia``, ``slope``, and the ``inputs`` (estimated: floating point).
+
+    Raises
+    ------
+    GeometryError
+        If the mechanism has no single input to reduce to.
+
     Examples
     --------
     >>> from graphsynth.dynamics.model import Body

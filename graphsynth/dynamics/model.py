@@ -50,7 +50,13 @@ class Body:
 
     @classmethod
     def combined(cls, *bodies: Body) -> Body:
-        """Return the body of several parts fixed to the same link."""
+        """Return the body of several parts fixed to the same link.
+
+        Raises
+        ------
+        GeometryError
+            If the parts have no mass.
+        """
         mass = sum(body.mass for body in bodies)
         if not mass > 0.0:
             raise GeometryError("the parts of a combined body have no mass; give one of them a positive mass")

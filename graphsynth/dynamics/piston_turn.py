@@ -174,6 +174,11 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
     length : float, optional
         Of both pistons and of the crosshead's shoe, m; the stroke by default.
 
+    Returns
+    -------
+    PistonComparison
+        Side loads and losses of both over a turn (estimated).
+
     Raises
     ------
     GeometryError

@@ -78,7 +78,13 @@ class Reactions:
     joints: tuple[JointReaction, ...]
 
     def between(self, a: int, b: int, index: int = 0) -> JointReaction:
-        """Return the reaction between two links; ``index`` chooses among several."""
+        """Return the reaction between two links; ``index`` chooses among several.
+
+        Raises
+        ------
+        GeometryError
+            If there is no such joint.
+        """
         found = [joint for joint in self.joints if {joint.a, joint.b} == {a, b}]
         if index >= len(found):
             raise GeometryError(f"links {a} and {b} have {len(found)} joints; number {index} does not exist")
@@ -89,6 +95,11 @@ class Reactions:
 
         ``|tangential force| tan(pressure_angle)`` along the line of centres: it pushes a wheel with outer teeth from
         the pitch point towards its own centre.  The bearings must carry it besides what they carry already (spec 5.7).
+
+        Raises
+        ------
+        GeometryError
+            If the joint is not a gear pair.
         """
         joint = self.between(a, b)
         if joint.kind != "gear":

@@ -53,7 +53,13 @@ class Train:
     def of_teeth(
         cls, stages: Sequence[tuple[int, int]], efficiency: Sequence[float] = (), inertia: float = 0.0
     ) -> Train:
-        """Train of stages (driving teeth, driven teeth), with the efficiency of each stage (1 by default)."""
+        """Train of stages (driving teeth, driven teeth), with the efficiency of each stage (1 by default).
+
+        Raises
+        ------
+        SpecError
+            For a stage that is not a pair of numbers of teeth, or another number of efficiencies.
+        """
         for stage in stages:
             if not isinstance(stage, Sequence) or len(stage) != 2:
                 raise SpecError(f"stage {stage!r} of the train must be a pair; give (driving teeth, driven teeth)")

@@ -34,6 +34,15 @@ Matrix = NDArray[np.int64]
 def adjacency_matrix(graph: MechanismGraph) -> Matrix:
     """Return the symmetric matrix of joint mobilities, shape (links, links).
 
+    Parameters
+    ----------
+    graph : MechanismGraph
+
+    Returns
+    -------
+    ndarray of int, shape (links, links)
+        Exact.
+
     Examples
     --------
     >>> adjacency_matrix(MechanismGraph(3, [(0, 1), (1, 2, 2)])).tolist()
@@ -49,6 +58,15 @@ def incidence_matrix(graph: MechanismGraph) -> Matrix:
     """Return links against joints, shape (links, joints), joints in the order of ``graph.joints``.
 
     A column holds the mobility of its joint at its two links, 0 elsewhere.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+
+    Returns
+    -------
+    ndarray of int, shape (links, joints)
+        Exact.
     """
     B = np.zeros((graph.links, len(graph.joints)), dtype=np.int64)
     for k, (a, b, mobility) in enumerate(graph.joints):
@@ -58,6 +76,19 @@ def incidence_matrix(graph: MechanismGraph) -> Matrix:
 
 def graph_from_adjacency(matrix: ArrayLike, *, frame: int | None = None, space: int = 3) -> MechanismGraph:
     """Build the graph of a symmetric matrix of joint mobilities (exact).
+
+    Parameters
+    ----------
+    matrix : array_like, shape (links, links)
+        Mobility of the joint between two links, 0 where there is none.
+    frame : int, optional
+        The fixed link; none by default.
+    space : int, optional
+        Mobility of the space; 3 is the plane.
+
+    Returns
+    -------
+    MechanismGraph
 
     Raises
     ------
@@ -85,6 +116,19 @@ def graph_from_adjacency(matrix: ArrayLike, *, frame: int | None = None, space: 
 
 def graph_from_incidence(matrix: ArrayLike, *, frame: int | None = None, space: int = 3) -> MechanismGraph:
     """Build the graph of a matrix of links against joints (exact).
+
+    Parameters
+    ----------
+    matrix : array_like, shape (links, joints)
+        In each column the mobility of the joint, at its two links.
+    frame : int, optional
+        The fixed link; none by default.
+    space : int, optional
+        Mobility of the space; 3 is the plane.
+
+    Returns
+    -------
+    MechanismGraph
 
     Raises
     ------

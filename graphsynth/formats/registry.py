@@ -151,6 +151,17 @@ FORMATS: dict[str, Format] = {
 def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
     """Return the format of a given name, or of the suffix of a file.
 
+    Parameters
+    ----------
+    path : path
+        The suffix counts; the file need not exist.
+    name : str, optional
+        A name in :data:`FORMATS`, which overrides the suffix.
+
+    Returns
+    -------
+    Format
+
     Raises
     ------
     SpecError
@@ -188,6 +199,10 @@ def read_text(text: str | bytes, format: str) -> list[Item]:
         Bytes are UTF-8.
     format : str
         A name in :data:`FORMATS`.
+
+    Returns
+    -------
+    list of MechanismGraph and Mechanism
 
     Raises
     ------
@@ -317,6 +332,10 @@ def read_stream(file: io.BufferedIOBase, format: str, name: str = "") -> Iterato
     name : str
         What messages call it.
 
+    Returns
+    -------
+    iterator of MechanismGraph and Mechanism
+
     Raises
     ------
     FormatError
@@ -343,6 +362,16 @@ def read_all(path: str | os.PathLike[str], format: str | None = None) -> Iterato
     """Read every graph and mechanism of a file, in its order, as they are asked for.
 
     Lines, rows and GraphML take the memory of one graph, whatever the length of the file.
+
+    Parameters
+    ----------
+    path : path
+    format : str, optional
+        A name in :data:`FORMATS`; by the suffix otherwise.
+
+    Returns
+    -------
+    iterator of MechanismGraph and Mechanism
 
     Raises
     ------
@@ -373,6 +402,10 @@ def read(path: str | os.PathLike[str], format: str | None = None, *, number: int
     number : int
         Which one of the file, from 1.
 
+    Returns
+    -------
+    MechanismGraph or Mechanism
+
     Raises
     ------
     FormatError
@@ -387,6 +420,16 @@ def read(path: str | os.PathLike[str], format: str | None = None, *, number: int
 
 def write_text(items: Item | Iterable[Item], format: str) -> str:
     r"""Write graphs or mechanisms as a text.
+
+    Parameters
+    ----------
+    items : MechanismGraph, Mechanism, or an iterable of them
+    format : str
+        A name in :data:`FORMATS`.
+
+    Returns
+    -------
+    str
 
     Raises
     ------
@@ -433,6 +476,11 @@ def write(items: Item | Iterable[Item], path: str | os.PathLike[str], format: st
     path : path
     format : str, optional
         A name in :data:`FORMATS`; by the suffix otherwise.
+
+    Returns
+    -------
+    int
+        Number of graphs and mechanisms written.
 
     Raises
     ------

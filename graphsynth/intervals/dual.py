@@ -104,7 +104,17 @@ class Dual:
 
 
 def variables(box: Interval) -> list[Dual]:
-    """Return the unknowns of boxes of shape (N, n) as n duals of shape (N,) with unit derivatives."""
+    """Return the unknowns of boxes of shape (N, n) as n duals of shape (N,) with unit derivatives.
+
+    Parameters
+    ----------
+    box : Interval, shape (N, n)
+
+    Returns
+    -------
+    list of Dual
+        Of length n.
+    """
     n = box.shape[-1]
     unit = np.zeros((n, n) + (1,) * (box.ndim - 1))
     for i in range(n):

@@ -52,6 +52,15 @@ def _mark_clipped(x: Interval, where: NDArray[np.bool_]) -> Interval:
 def sqr(x: Any) -> Any:
     """Square.
 
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+
     Examples
     --------
     >>> sqr(Interval(-1, 2))
@@ -61,12 +70,31 @@ def sqr(x: Any) -> Any:
 
 
 def sqrt(x: Any) -> Any:
-    """Square root; a negative part is clipped and recorded (`Decoration.CLIPPED`)."""
+    """Square root; a negative part is clipped and recorded (`Decoration.CLIPPED`).
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     return x.sqrt() if isinstance(x, Dual) else interval(x).sqrt()
 
 
 def sin(x: Any) -> Any:
     """Sine.
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
 
     Examples
     --------
@@ -79,14 +107,34 @@ def sin(x: Any) -> Any:
 
 
 def cos(x: Any) -> Any:
-    """Cosine."""
+    """Cosine.
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual):
         return x.chain(cos(x.value), -sin(x.value))
     return _apply("cos", interval(x))
 
 
 def tan(x: Any) -> Any:
-    """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`)."""
+    """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`).
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual):
         value = tan(x.value)
         return x.chain(value, value.sqr() + 1)
@@ -95,14 +143,34 @@ def tan(x: Any) -> Any:
 
 
 def atan(x: Any) -> Any:
-    """Inverse tangent."""
+    """Inverse tangent.
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual):
         return x.chain(atan(x.value), 1 / (x.value.sqr() + 1))
     return _apply("atan", interval(x))
 
 
 def asin(x: Any) -> Any:
-    """Inverse sine; a part outside [-1, 1] is clipped and recorded."""
+    """Inverse sine; a part outside [-1, 1] is clipped and recorded.
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual):
         return x.chain(asin(x.value), 1 / sqrt((1 - x.value) * (1 + x.value)))
     x = interval(x)
@@ -110,7 +178,17 @@ def asin(x: Any) -> Any:
 
 
 def acos(x: Any) -> Any:
-    """Inverse cosine; a part outside [-1, 1] is clipped and recorded."""
+    """Inverse cosine; a part outside [-1, 1] is clipped and recorded.
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual):
         return x.chain(acos(x.value), -1 / sqrt((1 - x.value) * (1 + x.value)))
     x = interval(x)
@@ -118,7 +196,17 @@ def acos(x: Any) -> Any:
 
 
 def exp(x: Any) -> Any:
-    """Exponential."""
+    """Exponential.
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual):
         value = exp(x.value)
         return x.chain(value, value)
@@ -126,7 +214,17 @@ def exp(x: Any) -> Any:
 
 
 def log(x: Any) -> Any:
-    """Natural logarithm; a part at or below 0 is clipped and recorded."""
+    """Natural logarithm; a part at or below 0 is clipped and recorded.
+
+    Parameters
+    ----------
+    x : Interval, Dual or anything an Interval takes
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual):
         return x.chain(log(x.value), 1 / x.value)
     x = interval(x)
@@ -135,6 +233,16 @@ def log(x: Any) -> Any:
 
 def atan2(y: Any, x: Any) -> Any:
     """Angle of the points (x, y) in (-pi, pi]; ``[-pi, pi]`` across the cut, recorded; clipped at the origin.
+
+    Parameters
+    ----------
+    y, x : Interval, Dual or anything an Interval takes
+        Shapes that broadcast.
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
 
     Examples
     --------
@@ -151,7 +259,18 @@ def atan2(y: Any, x: Any) -> Any:
 
 
 def hypot(x: Any, y: Any) -> Any:
-    """Distance from the origin, without overflow on the way."""
+    """Distance from the origin, without overflow on the way.
+
+    Parameters
+    ----------
+    x, y : Interval, Dual or anything an Interval takes
+        Shapes that broadcast.
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual) or isinstance(y, Dual):
         x, y = _dual(x, y), _dual(y, x)
         value = hypot(x.value, y.value)
@@ -164,7 +283,18 @@ def _dual(x: Any, like: Any) -> Dual:
 
 
 def minimum(x: Any, y: Any) -> Any:
-    """Smaller of two; the derivative holds both where either may be the smaller."""
+    """Smaller of two; the derivative holds both where either may be the smaller.
+
+    Parameters
+    ----------
+    x, y : Interval, Dual or anything an Interval takes
+        Shapes that broadcast.
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual) or isinstance(y, Dual):
         x, y = _dual(x, y), _dual(y, x)
         return _selected(minimum(x.value, y.value), x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo)
@@ -173,7 +303,18 @@ def minimum(x: Any, y: Any) -> Any:
 
 
 def maximum(x: Any, y: Any) -> Any:
-    """Larger of two; the derivative holds both where either may be the larger."""
+    """Larger of two; the derivative holds both where either may be the larger.
+
+    Parameters
+    ----------
+    x, y : Interval, Dual or anything an Interval takes
+        Shapes that broadcast.
+
+    Returns
+    -------
+    Interval or Dual
+        Encloses every value over the argument (certified); of the same kind and shape.
+    """
     if isinstance(x, Dual) or isinstance(y, Dual):
         x, y = _dual(x, y), _dual(y, x)
         return _selected(maximum(x.value, y.value), x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi)
@@ -196,6 +337,11 @@ def _selected(value: Interval, x: Dual, y: Dual, first: NDArray[np.bool_], secon
 def pi() -> Interval:
     """Return the interval of two neighbouring doubles around pi.
 
+    Returns
+    -------
+    Interval, shape ()
+        Certified.
+
     Examples
     --------
     >>> pi()
@@ -211,6 +357,16 @@ def divide_extended(a: Any, b: Any) -> tuple[Interval, Interval]:
 
     ``{x : x b = a for some a, b}`` without the case 0 b = 0: for a divisor with 0 inside and a numerator without it,
     the quotient is two half lines, needed by Gauss-Seidel steps.
+
+    Parameters
+    ----------
+    a, b : Interval or anything it takes
+        Numerator and divisor, shapes that broadcast.
+
+    Returns
+    -------
+    (Interval, Interval)
+        Their union holds every quotient (certified).
 
     Examples
     --------

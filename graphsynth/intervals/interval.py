@@ -112,6 +112,11 @@ class Interval(Measures):
     def midrad(cls, mid: Any, rad: Any) -> Interval:
         """Enclose ``mid - rad`` to ``mid + rad``; both exact text or numbers, or floats taken as they are.
 
+        Raises
+        ------
+        IntervalError
+            For a negative radius.
+
         Examples
         --------
         >>> Interval.midrad("17.5", "0.005")

@@ -133,6 +133,11 @@ def gauss_seidel(matrix: Any, right: Any, box: Any, *, rounds: int = _ROUNDS) ->
     LinearResult
         ``EMPTY`` if the box holds no solution, else ``UNDECIDED`` with the smaller box; certified.
 
+    Raises
+    ------
+    IntervalError
+        If the box has not one interval for each unknown.
+
     Examples
     --------
     >>> gauss_seidel([[2, 1], [1, 3]], [3, 4], ["[-9, 9]", "[-9, 9]"]).x.width.max() < 1e-3

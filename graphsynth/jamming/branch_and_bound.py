@@ -283,6 +283,11 @@ def largest_gap(box: ToleranceBox, condition: Condition = "general", **options: 
     **options
         As for `maximise`.
 
+    Returns
+    -------
+    Supremum
+        Lower and upper bound of the largest gap, mm (certified), and where it is.
+
     Raises
     ------
     GeometryError

@@ -106,6 +106,11 @@ class JamCertificate:
 
         ``stop`` below ``start`` runs across the full turn; a turn or more is the whole turn.
 
+        Raises
+        ------
+        GeometryError
+            For an angle that is not finite.
+
         Examples
         --------
         >>> from graphsynth.jamming.certify import certify_jamming

@@ -75,6 +75,18 @@ def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A"
 
     The range of ``alpha`` in the box is not used.  ``works`` covers every alpha from ``-works`` to ``works``.
 
+    Parameters
+    ----------
+    box : ToleranceBox
+        Ranges of all parameters; the statement holds for each of their combinations.
+    condition : {"A", "B", "general"}
+        Contact condition.
+
+    Returns
+    -------
+    CertifiedLimit
+        An angle that works and one that fails, both proved.
+
     Raises
     ------
     GeometryError
@@ -105,6 +117,18 @@ def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") 
     The range of ``clearance`` in the box is not used; ``works`` is proved for itself, and by monotonicity for every
     larger clearance.
 
+    Parameters
+    ----------
+    box : ToleranceBox
+        Ranges of all parameters; the statement holds for each of their combinations.
+    condition : {"A", "B", "general"}
+        Contact condition.
+
+    Returns
+    -------
+    CertifiedLimit
+        A clearance that works and one that fails, both proved.
+
     Examples
     --------
     >>> limit = certified_smallest_clearance(ToleranceBox(alpha="1/30"))
@@ -126,6 +150,18 @@ def certified_largest_height(box: ToleranceBox, condition: Condition = "A") -> C
     """Largest height Hb (mm) that leaves the turn free, whatever the other parameters.
 
     The range of ``Hb`` in the box is not used; ``works`` covers every height from 0 to it.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        Ranges of all parameters; the statement holds for each of their combinations.
+    condition : {"A", "B", "general"}
+        Contact condition.
+
+    Returns
+    -------
+    CertifiedLimit
+        A height that works and one that fails, both proved.
 
     Examples
     --------

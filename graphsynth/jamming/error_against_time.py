@@ -277,6 +277,15 @@ def _sign_changes(box: ToleranceBox, condition: Condition, count: int) -> int:
 def error_table(groups: Mapping[str, Sequence[ErrorRow]]) -> pd.DataFrame:
     """Return rows of several questions as one table: question, method, setting, error, seconds.
 
+    Parameters
+    ----------
+    groups : mapping of str to sequence of ErrorRow
+        Question to its rows.
+
+    Returns
+    -------
+    pandas.DataFrame
+
     Examples
     --------
     >>> error_table({"arc ends [rad]": [ErrorRow("sweep", "0.1 rad", 0.02, 0.003)]}).columns.tolist()

@@ -182,6 +182,11 @@ def assess_fits(
     diameter : Given, optional
         Nominal diameter, mm; by default twice the middle of ``Rb``.
 
+    Returns
+    -------
+    list of FitVerdict
+        In the order of ``fits``; certified.
+
     Examples
     --------
     >>> [v.fit.name for v in assess_fits(ToleranceBox(alpha="1/300")) if v.verdict.is_free][:2]
@@ -208,6 +213,22 @@ def tightest_free_fit(
     box: ToleranceBox, condition: Condition = "A", fits: tuple[str, ...] = STANDARD_FITS, diameter: Given | None = None
 ) -> FitVerdict | None:
     """Return the fit with the least largest clearance among those certified free; None if none is.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        Ranges of all parameters; the statement holds for each of their combinations.
+    condition : {"A", "B", "general"}
+        Contact condition.
+    fits : tuple of str, optional
+        Names, see `STANDARD_FITS`.
+    diameter : Given, optional
+        Nominal diameter, mm; by default twice the middle of ``Rb``.
+
+    Returns
+    -------
+    FitVerdict or None
+        Certified.
 
     Examples
     --------

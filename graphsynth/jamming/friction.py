@@ -72,6 +72,11 @@ def wedging(box: ToleranceBox, friction: Given, condition: Condition = "A") -> W
     condition : {"A", "B"}
         Contact condition.
 
+    Returns
+    -------
+    WedgingReport
+        Both limits and the decision (certified).
+
     Raises
     ------
     GeometryError
@@ -214,6 +219,25 @@ def insertion_diagram(friction: Given, depth: Given, radius: Given) -> Insertion
     """Return Whitney's diagram of a peg of given radius at a given depth of insertion (section 8.3).
 
     Source: Whitney (1982), Quasi-static assembly of compliantly supported rigid parts.
+
+    Parameters
+    ----------
+    friction : Given
+        Friction coefficient, a number or a range as text; positive.
+    depth : Given
+        Insertion depth, in the unit of the radius; positive.
+    radius : Given
+        Radius of the peg; positive.
+
+    Returns
+    -------
+    InsertionDiagram
+        Its parallelogram; the ratios are ranges with exact ends.
+
+    Raises
+    ------
+    GeometryError
+        For a value that is not positive.
 
     Examples
     --------

@@ -28,6 +28,24 @@ class Limit:
 def largest_misalignment(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Largest alpha (radians) for which the whole turn is free; None if every alpha is free, or none.
 
+    Parameters
+    ----------
+    linkage : LambdaLinkage
+    bearing : Bearing
+        Dimensions in millimetres.
+    condition : {"A", "B"}
+        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+
+    Returns
+    -------
+    Limit
+        Closed form in double precision.
+
+    Raises
+    ------
+    GeometryError
+        For the rod of the source (``rod="deck"``).
+
     Examples
     --------
     >>> round(largest_misalignment(LambdaLinkage(), Bearing()).value, 15)
@@ -63,6 +81,24 @@ def _tilt(linkage: LambdaLinkage) -> tuple[float, float]:
 def smallest_clearance(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Smallest radial clearance (mm) for which the whole turn is free, for the radius and height of ``bearing``.
 
+    Parameters
+    ----------
+    linkage : LambdaLinkage
+    bearing : Bearing
+        Dimensions in millimetres.
+    condition : {"A", "B"}
+        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+
+    Returns
+    -------
+    Limit
+        Closed form in double precision.
+
+    Raises
+    ------
+    GeometryError
+        For another condition than "A" and "B".
+
     Examples
     --------
     >>> round(smallest_clearance(LambdaLinkage(alpha=1 / 30), Bearing()).value, 15)
@@ -82,7 +118,26 @@ def smallest_clearance(linkage: LambdaLinkage, bearing: Bearing, condition: Cond
 
 
 def largest_height(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
-    """Largest height Hb (mm) for which the whole turn is free, for the radius and clearance of ``bearing``."""
+    """Largest height Hb (mm) for which the whole turn is free, for the radius and clearance of ``bearing``.
+
+    Parameters
+    ----------
+    linkage : LambdaLinkage
+    bearing : Bearing
+        Dimensions in millimetres.
+    condition : {"A", "B"}
+        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+
+    Returns
+    -------
+    Limit
+        Closed form in double precision.
+
+    Raises
+    ------
+    GeometryError
+        For another condition than "A" and "B".
+    """
     S, C = _tilt(linkage)
     R, c = bearing.Rb, bearing.clearance
     if c < 0.0:

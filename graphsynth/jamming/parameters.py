@@ -120,6 +120,11 @@ class ToleranceBox:
     def replace(self, **changes: Given) -> ToleranceBox:
         """Return the box with some parameters changed.
 
+        Raises
+        ------
+        GeometryError
+            For a name that is no parameter.
+
         Examples
         --------
         >>> str(ToleranceBox().replace(alpha="0.013")["alpha"])

@@ -146,6 +146,25 @@ Given = Any  # str, int, float, Fraction, Decimal, Interval, Range, or a pair of
 def spread(nominal: Given, absolute: Given = 0, relative: Given = 0) -> Range:
     """Return ``nominal`` with an absolute and a relative tolerance, exactly.
 
+    Parameters
+    ----------
+    nominal : Given
+        A number, text or range.
+    absolute : Given, optional
+        Plus or minus, in the same unit.
+    relative : Given, optional
+        Plus or minus, as a fraction of the value: 1/100 for one per cent.
+
+    Returns
+    -------
+    Range
+        Exact.
+
+    Raises
+    ------
+    GeometryError
+        For a negative tolerance.
+
     Examples
     --------
     >>> str(spread("0.0130", relative="1e-2"))

@@ -78,6 +78,11 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     seed : int
         Seed of the generator.
 
+    Returns
+    -------
+    Samples
+        Largest gap met, mm, and whether it respects the certified bound.
+
     Raises
     ------
     GeometryError

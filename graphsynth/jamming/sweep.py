@@ -99,6 +99,11 @@ def sweep_turn(
     max_pieces, max_seconds : budgets
         Exhausted: what is not settled is undecided, ``finished`` is False.
 
+    Returns
+    -------
+    TurnPartition
+        Pieces that jam, are free, cannot be assembled (certified), or are undecided.
+
     Raises
     ------
     GeometryError
@@ -186,6 +191,22 @@ def sweep_linkage(
     """Partition the turn of a lambda linkage (any four-bar) by interval kinematics, for all parameters of a box.
 
     Unlike the closed form it also proves where the linkage cannot be assembled.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        Ranges of all parameters; the statement holds for each of their combinations.
+    condition : {"A", "B", "general"}
+        Contact condition.
+    resolution : float, optional
+        Undecided pieces no longer than this (radians) are left.
+    max_pieces, max_seconds : optional
+        Budgets; when exhausted, what is not settled is undecided.
+
+    Returns
+    -------
+    TurnPartition
+        Pieces that jam, are free, cannot be assembled (certified), or are undecided.
 
     Examples
     --------

@@ -64,6 +64,19 @@ def jam_arcs(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A
     Exact closed form evaluated in double precision.  ``|kappa - 1|`` below sixteen units in the last place is reported
     as touching, because the sign of the difference is then a matter of rounding.
 
+    Parameters
+    ----------
+    linkage : LambdaLinkage
+    bearing : Bearing
+        Dimensions in millimetres.
+    condition : {"A", "B"}
+        Contact condition: short bearing in a long hole, or long shaft in a short hole.
+
+    Returns
+    -------
+    JamArcs
+        Crank angles in radians.
+
     Examples
     --------
     >>> arcs = jam_arcs(LambdaLinkage(alpha=1 / 30), Bearing())

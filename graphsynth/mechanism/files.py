@@ -38,6 +38,15 @@ _T = TypeVar("_T")
 def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     """Return plain lists, numbers and texts that describe a mechanism.
 
+    Parameters
+    ----------
+    mechanism : Mechanism
+
+    Returns
+    -------
+    dict
+        What :func:`from_dict` reads back without loss.
+
     Raises
     ------
     GeometryError
@@ -70,12 +79,32 @@ def _law_dict(driver: Driver) -> dict[str, Any]:
 
 
 def to_json(mechanism: Mechanism) -> str:
-    """Write JSON, indented, with a final line end."""
+    """Write JSON, indented, with a final line end.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+
+    Returns
+    -------
+    str
+        What :func:`from_json` reads back without loss.
+    """
     return json.dumps(to_dict(mechanism), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def to_toml(mechanism: Mechanism) -> str:
-    """Write TOML: one table per joint, driver and point."""
+    """Write TOML: one table per joint, driver and point.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+
+    Returns
+    -------
+    str
+        What :func:`from_toml` reads back without loss.
+    """
     data = to_dict(mechanism)
     lines = [f"{key} = {_toml(data[key])}" for key in ("format", "version", "graph", "pose") if key in data]
     lines += [f"{key} = []" for key in ("joints", "drivers") if not data[key]]
@@ -111,7 +140,24 @@ def _decoded(text: str | bytes, most: int, name: str) -> str:
 
 
 def json_value(text: str, place: str = "") -> Any:
-    """Read JSON as plain values; `FormatError` for anything else, NaN and keys given twice too, whatever the depth."""
+    """Read JSON as plain values.
+
+    Parameters
+    ----------
+    text : str
+        The document.
+    place : str, optional
+        What messages call it.
+
+    Returns
+    -------
+    dict, list, str, number, bool or None
+
+    Raises
+    ------
+    FormatError
+        For anything else, NaN and keys given twice too, whatever the depth.
+    """
     try:
         return json.loads(text, parse_constant=_no_constant, object_pairs_hook=_pairs)
     except json.JSONDecodeError as error:
@@ -139,7 +185,22 @@ def _no_constant(name: str) -> Any:
 
 
 def from_json(text: str | bytes) -> Mechanism:
-    """Read JSON; anything that is not a mechanism is a `FormatError` with the line or key."""
+    """Read JSON; anything that is not a mechanism is a `FormatError` with the line or key.
+
+    Parameters
+    ----------
+    text : str or bytes
+        Bytes are UTF-8.
+
+    Returns
+    -------
+    Mechanism
+
+    Raises
+    ------
+    FormatError
+        For anything that is not JSON of a mechanism, with the line or key.
+    """
     return from_dict(json_value(_decoded(text, JSON_MAX, "JSON")))
 
 
@@ -147,6 +208,20 @@ def from_toml(text: str | bytes) -> Mechanism:
     """Read TOML; anything that is not a mechanism is a `FormatError` with the line or key.
 
     A key of many parts is refused: the time of the parser grows with the square of their number.
+
+    Parameters
+    ----------
+    text : str or bytes
+        Bytes are UTF-8.
+
+    Returns
+    -------
+    Mechanism
+
+    Raises
+    ------
+    FormatError
+        For anything that is not TOML of a mechanism, with the line or key.
     """
     decoded = _decoded(text, TOML_MAX, "TOML")
     if match := _LONG_KEY.search(_STRING.sub('""', decoded)):
@@ -161,7 +236,22 @@ def from_toml(text: str | bytes) -> Mechanism:
 
 
 def from_dict(data: Any) -> Mechanism:
-    """Build a mechanism from what :func:`to_dict` returns; `FormatError` with the key for anything else."""
+    """Build a mechanism from what :func:`to_dict` returns; `FormatError` with the key for anything else.
+
+    Parameters
+    ----------
+    data : mapping
+        Tables as in a file, see ``docs/reference/mechanism.md``.
+
+    Returns
+    -------
+    Mechanism
+
+    Raises
+    ------
+    FormatError
+        For anything that is not a mechanism, with the key.
+    """
     try:
         return _mechanism(data)
     except RecursionError:  # values nested deeper than a message can show

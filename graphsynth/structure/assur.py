@@ -211,6 +211,11 @@ def find_fault(mechanism: MechanismGraph, drivers: Iterable[int | tuple[int, int
     drivers : iterable of int or (int, int)
         Driven joints: a link stands for its joint with the frame, a pair for the joint between the two links.
 
+    Returns
+    -------
+    Fault or None
+        The links that have too many constraints and those that stay free, and a sentence.
+
     Raises
     ------
     GraphError
@@ -348,6 +353,15 @@ def is_assur_group(graph: MechanismGraph) -> bool:
 
     Mobility 0, and DOF(S) >= 1 for every proper subset S of two links or more, with or without the frame.
 
+    Parameters
+    ----------
+    graph : MechanismGraph
+        With a frame: the links that the group hangs on, contracted to one.
+
+    Returns
+    -------
+    bool
+
     Raises
     ------
     GraphError
@@ -369,6 +383,14 @@ def is_baranov_truss(graph: MechanismGraph) -> bool:
 
     The condition does not mention the frame (mobility 0, and every proper subset of two links or more can move), so
     one link that makes a group implies that each does.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+
+    Returns
+    -------
+    bool
 
     Examples
     --------

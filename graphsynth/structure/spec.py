@@ -227,7 +227,13 @@ class StructuralSpec:
         return found
 
     def iter_solutions(self) -> Iterator[LinkAssortment]:
-        """Yield the solutions of :meth:`solve` one by one, without storing them."""
+        """Yield the solutions of :meth:`solve` one by one, without storing them.
+
+        Raises
+        ------
+        InfeasibleSpecError
+            If there is none; the message names what clashes.
+        """
         reading_of, first = self._first()
         if reading_of is None or first is None:
             raise explain(

@@ -97,6 +97,15 @@ def count_chains(
 ) -> int:
     """Count what ``enumerate_chains`` yields, without making the graphs (exact).
 
+    Parameters
+    ----------
+    links, mobility, space, joints_by_mobility, fractionated, symmetry, executor
+        As for `enumerate_chains`.
+
+    Returns
+    -------
+    int
+
     Examples
     --------
     >>> [count_chains(n) for n in (4, 6, 8, 10, 12, 14)]
@@ -146,6 +155,15 @@ def count_mechanisms(
 
     With a required symmetry, or wanted sizes of levels, the mechanisms are made and counted.
 
+    Parameters
+    ----------
+    spec, symmetry, executor
+        As for `enumerate_mechanisms`.
+
+    Returns
+    -------
+    int
+
     Examples
     --------
     >>> from graphsynth import StructuralSpec
@@ -167,6 +185,11 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     seed : int
         Seed of ``random.Random``; the same seed gives the same draws.
 
+    Returns
+    -------
+    list of MechanismGraph
+        Of length ``k``.
+
     Examples
     --------
     >>> from graphsynth import StructuralSpec
@@ -181,6 +204,19 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
 
     The group is given with the frame, contracted to one link, as link 0.
 
+    Parameters
+    ----------
+    links : int
+        Number of moving links.
+    space : int, optional
+        Mobility of the space; 3 is the plane.
+    executor : concurrent.futures.Executor, optional
+        Where pieces of the work are computed; here by default.  The result does not depend on it.
+
+    Returns
+    -------
+    iterator of MechanismGraph
+
     Examples
     --------
     >>> [group.to_text() for group in enumerate_assur_groups(2)]
@@ -191,6 +227,19 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
 
 def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
     """Count what ``enumerate_assur_groups`` yields (exact).
+
+    Parameters
+    ----------
+    links : int
+        Number of moving links.
+    space : int, optional
+        Mobility of the space; 3 is the plane.
+    executor : concurrent.futures.Executor, optional
+        Where pieces of the work are computed; here by default.  The result does not depend on it.
+
+    Returns
+    -------
+    int
 
     Examples
     --------
@@ -205,6 +254,19 @@ def enumerate_baranov_trusses(
 ) -> Iterator[MechanismGraph]:
     """Enumerate the Baranov trusses with N links and mobility-1 joints, each once (exact).
 
+    Parameters
+    ----------
+    links : int
+        Number of links.
+    space : int, optional
+        Mobility of the space; 3 is the plane.
+    executor : concurrent.futures.Executor, optional
+        Where pieces of the work are computed; here by default.  The result does not depend on it.
+
+    Returns
+    -------
+    iterator of MechanismGraph
+
     Examples
     --------
     >>> sum(1 for _ in enumerate_baranov_trusses(9))
@@ -215,6 +277,19 @@ def enumerate_baranov_trusses(
 
 def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
     """Count what ``enumerate_baranov_trusses`` yields (exact).
+
+    Parameters
+    ----------
+    links : int
+        Number of links.
+    space : int, optional
+        Mobility of the space; 3 is the plane.
+    executor : concurrent.futures.Executor, optional
+        Where pieces of the work are computed; here by default.  The result does not depend on it.
+
+    Returns
+    -------
+    int
 
     Examples
     --------

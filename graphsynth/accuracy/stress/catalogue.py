@@ -199,6 +199,10 @@ def stress_cases(names: Iterable[str] = (), *, slow: bool = True) -> tuple[Case,
     slow : bool
         With False, slow cases are left out unless one is named in full.
 
+    Returns
+    -------
+    tuple of Case
+
     Raises
     ------
     SpecError

@@ -162,6 +162,16 @@ def run_case(case: Case) -> Outcome:
     """Run one case; whatever it raises becomes its reason.
 
     Warnings are not shown: a case that a library warns about is judged by what it returns.
+
+    Parameters
+    ----------
+    case : Case
+        One of `stress_cases`.
+
+    Returns
+    -------
+    Outcome
+        Its comparisons, or the reason why it was not run or failed; time and status.
     """
     section = case.name.partition("-")[2].partition(".")[0]
     checks = Checks(f"{PAGES[case.page]}, section {section}")

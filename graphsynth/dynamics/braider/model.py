@@ -262,7 +262,13 @@ class Braider:
         return found
 
     def inductance_study(self, times: ArrayLike, inductances: tuple[float, ...]) -> ReductionStudy:
-        """Distance to the limit L -> 0 for several inductances (section 4.6), from rest."""
+        """Distance to the limit L -> 0 for several inductances (section 4.6), from rest.
+
+        Raises
+        ------
+        SpecError
+            For an ideal speed, which has no inductance.
+        """
         if isinstance(self.motor, IdealSpeed):
             raise SpecError("an ideal speed has no inductance to take to zero; give a SynchronousMotor or a DCMotor")
         return inductance_study(self.plant(), self.motor, self.train, times, inductances)
@@ -325,6 +331,11 @@ class Braider:
         """First time after which ``|w / target - 1| <= band`` up to ``end``, from rest.
 
         The last crossing between samples is solved on the cubic through speeds and accelerations.
+
+        Raises
+        ------
+        SpecError
+            For ``target = 0``.
         """
         number("band", band, least=0.0, above=True)
         if number("target", target) == 0.0:

@@ -78,8 +78,17 @@ def resistance_effect(
     ----------
     drive : MotorDrivenPlatform
         With a `DCMotor` whose inductance is positive; its resistance is replaced by each of ``resistances`` (ohm).
-    simulate : bool
-        Also integrate the full model from rest and measure over the second half of ``revolutions`` mean revolutions.
+    resistances : sequence of float
+        Armature resistances, ohm.
+    simulate : bool, optional
+        Also integrate the full model from rest and measure over the second half.
+    revolutions : int, optional
+        Mean revolutions of that run.
+
+    Returns
+    -------
+    ResistanceEffect
+        Arrays in the order of ``resistances``: speeds rad/s, torques N m (estimated).
 
     Raises
     ------

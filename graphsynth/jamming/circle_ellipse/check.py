@@ -50,6 +50,11 @@ def cross_check(problem: CircleEllipse, **limits: Any) -> CrossCheck:
     **limits
         As for `krawczyk_boxes`.
 
+    Returns
+    -------
+    CrossCheck
+        Both outcomes, and whether all they prove can hold together (certified).
+
     Examples
     --------
     >>> from graphsynth.jamming.circle_ellipse import circle_ellipse

@@ -66,6 +66,11 @@ def circle_ellipse(R1: Any, a: Any, b: Any, e1: Any = 0, e2: Any = 0, *, eps: An
     eps : the same, optional
         The one number that the source uses for both, although their units differ.
 
+    Returns
+    -------
+    CircleEllipse
+        The problem, its numbers exact.
+
     Raises
     ------
     GeometryError
@@ -116,8 +121,14 @@ def surrogate_problem(
         Its dimensions are read as the decimals they print as: 0.03 is 3/100.
     sine : number, text or Interval
         Sine of the tilt; its sign does not matter.
+    e1, e2, eps : as for `circle_ellipse`
     bits : int
         Digits to which the cosine is enclosed.
+
+    Returns
+    -------
+    CircleEllipse
+        The problem, its numbers exact.
 
     Raises
     ------

@@ -72,6 +72,11 @@ def reading_ellipse(
     lid : {1, -1}
         For E3: the lid at which the shift is ``+h sin t`` or ``-h sin t``.
 
+    Returns
+    -------
+    TiltedEllipse
+        Centre and semi-axes, mm, of the same shape (estimated: floating point).
+
     Raises
     ------
     GeometryError
@@ -105,6 +110,20 @@ def reading_areas(
 
     For E2 the interference is the ellipse outside the circle, for the others the circle outside the ellipse.  NaN where
     the ellipse does not exist.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        Dimensions in millimetres.
+    sine, cosine : array_like, shape (...)
+        Of the tilt.
+    reading : Reading, optional
+        Which ellipse; the lid E3 by default.
+
+    Returns
+    -------
+    CrescentAreas
+        Of the same shape, mm^2.
 
     Examples
     --------
@@ -142,7 +161,14 @@ def reading_problem(
         Its dimensions are read as the decimals they print as.
     sine : number, text or Interval
         Sine of the tilt.
+    reading : Reading
+        One of the centred ones.
     e1, e2, eps : as for `circle_ellipse`
+
+    Returns
+    -------
+    CircleEllipse
+        The problem, its numbers exact.
 
     Raises
     ------

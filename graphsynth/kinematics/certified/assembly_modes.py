@@ -197,6 +197,21 @@ def certify_direct(
     As `certify_assembly_modes`, with ``A_k = D_k + l1_k exp(i theta_k)`` in ball arithmetic; the dimensions (floats)
     and the angles (exact numbers, radians) are taken as exact.
 
+    Parameters
+    ----------
+    platform : ParallelPlatform
+    theta : sequence of three numbers
+        Rocker angles, radians; floats, integers, fractions or decimal text.
+    max_bits : int, optional
+        Precision at which an undecided count is given up.
+    cross_check : bool, optional
+        Also count by a second method and compare.
+
+    Returns
+    -------
+    AssemblyCertificate
+        Number of modes, enclosures of the poses, or the reason why undecided (certified).
+
     Examples
     --------
     >>> len(certify_direct(ParallelPlatform.mock(), [0.239804666389671, 2.334199768783167, -1.854590436003224]))

@@ -133,6 +133,8 @@ def certify_full_turn(
     ------
     GraphsynthError
         If python-flint (extra ``certified``) is not installed.
+    GeometryError
+        For anything but a `SingleMotorPlatform`.
 
     Notes
     -----

@@ -135,6 +135,22 @@ def certify_direct_batch(platform: ParallelPlatform, theta: ArrayLike) -> Assemb
     The anchors are balls that hold ``D_k + l1_k exp(i theta_k)``; problems that these balls do not decide are repeated
     with the exact data.
 
+    Parameters
+    ----------
+    platform : ParallelPlatform
+    theta : array_like, shape (N, 3)
+        Rocker angles, radians.
+
+    Returns
+    -------
+    AssemblyCertificateBatch
+        For each problem the number of modes and enclosures, or undecided (certified).
+
+    Raises
+    ------
+    GeometryError
+        For another shape, or angles that are not finite.
+
     Examples
     --------
     >>> certify_direct_batch(ParallelPlatform.g1(), [[0.0, 0.0, 0.0], [1.82, -2.64, -0.16]]).counts

@@ -190,7 +190,13 @@ class Motion:
         return found
 
     def point(self, name_or_link: str | int, local: ArrayLike | None = None) -> PointPath:
-        """Path of a named point, or of the point ``local`` (x, y) of a link, with derivatives by the input."""
+        """Path of a named point, or of the point ``local`` (x, y) of a link, with derivatives by the input.
+
+        Raises
+        ------
+        GeometryError
+            For a name or a link that the mechanism does not have.
+        """
         if isinstance(name_or_link, str):
             if name_or_link not in self.mechanism.points:
                 known = ", ".join(self.mechanism.points) or "none"

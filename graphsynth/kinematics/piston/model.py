@@ -200,6 +200,11 @@ class FloatingPiston:
             same.  The planar engine takes this one.
         at : float
             Crank angle of the pose, radians.
+
+        Raises
+        ------
+        GeometryError
+            For another ``slot``.
         """
         if slot not in ("sliding", "crowned"):
             raise GeometryError(f"slot = {slot!r} is not known; give 'sliding' or 'crowned'")

@@ -138,6 +138,11 @@ def mechanism_graphs(min_links: int = 4, max_links: int = 8, *, mobility: int = 
     min_links, max_links, mobility
         As for `chains`.
 
+    Returns
+    -------
+    hypothesis strategy
+        Of `MechanismGraph`.
+
     Examples
     --------
     >>> from hypothesis import find

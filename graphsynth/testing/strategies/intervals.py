@@ -27,6 +27,11 @@ def finite_numbers() -> st.SearchStrategy[float]:
 
     Whole numbers, ordinary ones, subnormal ones, the largest, both zeros, neighbours of 1.
 
+    Returns
+    -------
+    hypothesis strategy
+        Of floats.
+
     Examples
     --------
     >>> from hypothesis import find
@@ -127,6 +132,11 @@ def intervals_and_members(*, unbounded: bool = True) -> st.SearchStrategy[tuple[
     ----------
     unbounded : bool
         Whether unbounded intervals are drawn.
+
+    Returns
+    -------
+    hypothesis strategy
+        Of pairs ``(Interval, Fraction)``.
 
     Examples
     --------

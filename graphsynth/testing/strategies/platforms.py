@@ -102,6 +102,11 @@ def platform_poses(
     degenerate : bool
         As for `platforms`.
 
+    Returns
+    -------
+    hypothesis strategy
+        Of triples ``(ParallelPlatform, Pose, mode)``.
+
     Examples
     --------
     >>> from hypothesis import find

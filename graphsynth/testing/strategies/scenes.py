@@ -111,6 +111,11 @@ def scenes() -> st.SearchStrategy[str]:
 
     Give the text to a file, or ``graphsynth.scenes.scene.Scene.from_mapping(tomllib.loads(text), "scene.toml")``.
 
+    Returns
+    -------
+    hypothesis strategy
+        Of str.
+
     Examples
     --------
     >>> from hypothesis import find
