@@ -129,6 +129,11 @@ class Checks:
             Allowed distance.  Both zero: the numbers must be equal.
         source : str
             Where ``right`` comes from, if not the source of the case.
+
+        Raises
+        ------
+        ValueError
+            If ``right`` is not finite: the case is written wrongly.
         """
         wanted, found = exact(right), exact(given)
         if wanted is None:
