@@ -6,22 +6,29 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from inspect import signature
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from graphsynth.accuracy.choice import seconds_text
 from graphsynth.accuracy.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.errors import SpecError
+
+if TYPE_CHECKING:
+    from graphsynth.accuracy.precise_drive import Shape
 
 __all__ = ["drive_problem", "reduction_problem", "work_rows"]
 
 _L = "inductance [H]"
+_PRECISE = "extrapolated midpoint rule in long doubles on the equations of the specification"
 _KIND = "largest error of speed and currents over their largest values"
 #: A scipy solver that needs more calls of the right-hand side is a failure here.
 _MOST_CALLS = 30_000
 
 
-def drive_problem(plant: Any, motor: Any, train: Any, end: float, effort: Effort | None = None) -> Problem:
+def drive_problem(
+    plant: Any, motor: Any, train: Any, end: float, effort: Effort | None = None, *, shape: Shape | None = None
+) -> Problem:
     """Run a drive up from rest with every integrator and several tolerances.
 
     Parameters
@@ -31,6 +38,8 @@ def drive_problem(plant: Any, motor: Any, train: Any, end: float, effort: Effort
     end : float
         Final time, s.
     effort : Effort, optional
+    shape : Shape, optional
+        Inertia and load as `graphsynth.accuracy.precise_drive` takes them; by default those of the plant's series.
 
     Raises
     ------
@@ -57,9 +66,45 @@ def drive_problem(plant: Any, motor: Any, train: Any, end: float, effort: Effort
             plant, motor, train, times, tolerances=slow if solver != "DOP853" else tolerances, solvers=(solver,),
             **{**options, "rounds": 1},
         ).rows[-len(slow if solver != "DOP853" else tolerances) :]  # fmt: skip
-    note = f"Reference: {reference}. scipy's DOP853 is that method itself at a looser tolerance."
+    shaped = work_rows(rows, reference, effort, default)
+    truth = _precise(plant, motor, train, times, shape)
+    note = (
+        f"graphsynth is compared with {_PRECISE}, which shares no code with it; scipy's solvers with {reference}, "
+        "which shares the compiled right-hand side with them. scipy's DOP853 is that method at a looser tolerance."
+    )
+    if truth is None:
+        note = f"No reference of its own for this motor. All are compared with {reference}: the same right-hand side."
+    else:
+        shaped = tuple(_against(row, truth, (plant, motor, train, times)) for row in shaped)
     question = f"Speed and currents of the drive from rest to {end:g} s, at eleven times"
-    return Problem("drive", question, "relative", work_rows(rows, reference, effort, default), "run", note)
+    return Problem("drive", question, "relative", shaped, "run", note)
+
+
+def _precise(plant: Any, motor: Any, train: Any, times: Any, shape: Shape | None) -> Any:
+    """States at the times from another implementation; None for what it does not know."""
+    from graphsynth.accuracy.precise_drive import precise_drive, shape_of_series
+
+    if shape is None and (plant.linkage is not None or plant.load_series is not None):
+        return None
+    shape = shape or shape_of_series(plant.rows, plant.base, plant.load)
+    try:
+        return precise_drive(shape, motor, train.ratio, train.inertia, plant.friction, times.tolist())
+    except SpecError:  # another motor, or too stiff for an explicit method
+        return None
+
+
+def _against(row: Row, truth: Any, drive: Any) -> Row:
+    """Row of the own integrator with its error against the precise motion; others as they are."""
+    from graphsynth.dynamics.platform_drive.run import run
+
+    if row.method != "graphsynth" or not row.good:
+        return row
+    plant, motor, train, times = drive
+    found = run(plant, motor, train, times, rtol=float(row.setting.split()[1]), estimate=False)
+    states = np.column_stack([found.speed, found.currents])
+    scale = np.abs(truth).max(axis=0)[1:]
+    error = float((np.abs(states - truth[:, 1:]).max(axis=0) / np.where(scale > 0, scale, 1)).max())
+    return replace(row, error=error, reference=_PRECISE, more={**row.more, "distance from scipy DOP853": row.error})
 
 
 def work_rows(rows: Sequence[Any], reference: str, effort: Effort, default: float) -> tuple[Row, ...]:

@@ -7,11 +7,13 @@ import pytest
 
 from graphsynth import LambdaLinkage, ParallelPlatform
 from graphsynth.accuracy import Effort, RowStatus, knees
+from graphsynth.accuracy.coupled import exact_largest, lambda_problem
+from graphsynth.accuracy.crossing import area_problem, crossing_problem
 from graphsynth.accuracy.direct import mode_problem
 from graphsynth.accuracy.double_root import double_root_problem
 from graphsynth.accuracy.drives import work_rows
 from graphsynth.accuracy.enumeration import enumeration_problem
-from graphsynth.accuracy.jamming import arc_problem, area_problem, crossing_problem
+from graphsynth.accuracy.jamming import arc_problem
 from graphsynth.accuracy.position import NODES, _closed_row, four_bar, position_problem, precise_points
 from graphsynth.errors import GeometryError
 from graphsynth.jamming import Bearing, ToleranceBox
@@ -38,7 +40,7 @@ def test_crossing():
 def test_a_hull_without_the_crossing_is_a_failure(monkeypatch):
     from types import SimpleNamespace
 
-    from graphsynth.accuracy import jamming
+    from graphsynth.accuracy import crossing
     from graphsynth.jamming import circle_ellipse
 
     real = circle_ellipse.exact_hull
@@ -47,11 +49,61 @@ def test_a_hull_without_the_crossing_is_a_failure(monkeypatch):
         found = real(problem)
         return SimpleNamespace(hull=found.hull + 1e-9)
 
-    truth = jamming.precise_crossing(problem := circle_ellipse.surrogate_problem(Bearing(), SINE))
-    assert jamming._hull_row(problem, truth, QUICK).status is RowStatus.OK
+    truth = crossing.precise_crossing(problem := circle_ellipse.surrogate_problem(Bearing(), SINE))
+    assert crossing._hull_row(problem, truth, QUICK)[1].status is RowStatus.OK
     monkeypatch.setattr(circle_ellipse, "exact_hull", shifted)
-    row = jamming._hull_row(problem, truth, QUICK)
+    row = crossing._hull_row(problem, truth, QUICK)[1]
     assert row.status is RowStatus.FAILED and not row.good
+
+
+def test_enclosures_that_miss_are_failures_however_narrow(monkeypatch):
+    from graphsynth.accuracy import crossing
+
+    real = crossing.precise_crossing
+    monkeypatch.setattr(crossing, "precise_crossing", lambda problem: tuple(v + 1e-9 for v in real(problem)))
+    rows = crossing.crossing_problem(Bearing(), SINE, QUICK).rows
+    assert rows[0].reason == "the hull does not hold the crossing"
+    assert rows[-1].reason == "the enclosure does not hold the crossing" and rows[-1].default
+    right = crossing.precise_area(Bearing(), SINE)
+    monkeypatch.setattr(crossing, "precise_area", lambda bearing, sine: right + 1e-9)
+    rows = by(crossing.area_problem(Bearing(), SINE, QUICK), "closed form, enclosed")
+    assert {row.reason for row in rows} == {"the enclosure does not hold the area"}
+
+
+def test_a_search_that_ends_with_its_start_box_has_no_result():
+    first = by(crossing_problem(Bearing(), SINE, QUICK), "Krawczyk boxes")[0]
+    assert first.status is RowStatus.FAILED and "start box" in first.reason
+
+
+def test_coupled_joints_of_the_source():
+    problem = lambda_problem(LambdaLinkage(), Bearing(), effort=QUICK)
+    assert all(row.good for row in problem.rows)
+    assert "closed form with 50 digits" in by(problem, "samples")[0].reference
+    default = next(row for row in problem.rows if row.default)
+    assert default.proved and default.error < 1e-4
+    assert by(problem, "samples")[-1].error < 1e-3
+
+
+@pytest.mark.slow
+def test_coupled_joints_of_another_linkage_have_proved_bounds():
+    linkage = LambdaLinkage(2.2, 1.0, 2.4, 2.3)
+    assert exact_largest(linkage, Bearing()) is None
+    problem = lambda_problem(linkage, Bearing(clearance=0.02), 0.3, effort=QUICK)
+    assert all(row.good for row in problem.rows) and "(2.2, 1, 2.4, 2.3)" in problem.question
+    assert "proved bounds of the certificate itself" in by(problem, "samples")[0].reference
+
+
+def test_a_certificate_beside_the_reference_or_too_wide_is_a_failure():
+    from graphsynth.accuracy.coupled import _gap_row
+    from graphsynth.jamming.coupled.scale import ScaleCertificate
+
+    def row(low, high, gap=0.1, reason=""):
+        found = ScaleCertificate(low, high, 0.0, 10, reason, 0.1)
+        return _gap_row(found, gap, (1.21, 1.21, "closed form"), (0.1, 1), default=False)
+
+    assert row(1.2, 1.22).good and row(1.21, 1.22).good
+    assert row(1.22, 1.23).status is row(1.19, 1.2).status is RowStatus.FAILED
+    assert row(1.2, 1.22, 1e-4, "out of pieces").reason == "out of pieces"
 
 
 def test_areas():

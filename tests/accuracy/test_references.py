@@ -8,10 +8,11 @@ import pytest
 
 from graphsynth import LambdaLinkage, ParallelPlatform, SingleMotorPlatform
 from graphsynth.accuracy.continuation import precise_branch
+from graphsynth.accuracy.crossing import precise_area, precise_crossing
 from graphsynth.accuracy.direct_reference import precise_anchors, precise_modes
 from graphsynth.accuracy.eigenvalues import eigenvalue_modes
 from graphsynth.accuracy.embodiment import precise_strip
-from graphsynth.accuracy.jamming import precise_arc_ends, precise_crossing
+from graphsynth.accuracy.jamming import precise_arc_ends, precise_critical_tilt
 from graphsynth.accuracy.position import four_bar, precise_points, precise_poses
 from graphsynth.errors import GeometryError
 from graphsynth.jamming import Bearing, ToleranceBox
@@ -148,3 +149,78 @@ def test_branch_is_one_of_all_poses_of_the_platform():
     for angle, pose in zip(psi, precise_branch(machine, psi, near)):
         every = machine.all_poses(float(angle))
         assert np.abs((every - pose) / [45, 45, 1]).max(axis=1).min() < 1e-14
+
+
+def test_area_of_the_specification():
+    from graphsynth.jamming.error_against_time import WORST_SINE
+
+    # section 13, point 14: the free gap at the worst pose, 25 digits
+    with mpmath.workdps(30):
+        assert abs(precise_area(Bearing(), WORST_SINE) - mpmath.mpf("0.9749683652811658362854900")) < mpmath.mpf(
+            "1e-24"
+        )
+
+
+def test_critical_tilt_of_the_specification():
+    with mpmath.workdps(45):  # section 9.6: the whole turn is free up to twice this
+        twice = 2 * precise_critical_tilt(Bearing())
+        assert abs(twice - mpmath.mpf("0.012128793118312840120532205597449602345")) < mpmath.mpf("1e-38")
+
+
+@pytest.mark.parametrize("order", ["YX", "XY"])
+def test_rods_and_closed_form_agree_in_fifty_digits(order):
+    from graphsynth.accuracy.pointing import rod_angles
+    from graphsynth.kinematics.pointing import PointingMechanism
+    from graphsynth.kinematics.pointing.precise import precise_angles
+
+    mechanism = PointingMechanism(order=order)
+    pose = mechanism.poses(0.5, -0.3)
+    found = rod_angles(mechanism, 0.5, -0.3, (float(pose.a), float(pose.b)))
+    assert all(abs(p - q) < mpmath.mpf("1e-45") for p, q in zip(found, precise_angles(mechanism, 0.5, -0.3)))
+
+
+def test_a_pendulum_falls_as_the_elliptic_integral_says():
+    # released at rest at 2 rad from the vertical: a quarter period is K(sin 1) sqrt(l / g)
+    from graphsynth.accuracy.precise_drive import precise_drive
+
+    def shape(q):
+        return np.longdouble(1), np.longdouble(0), -np.sin(np.longdouble(q))
+
+    quarter = float(mpmath.ellipk(mpmath.sin(1) ** 2))
+    end = precise_drive(shape, None, 1.0, 0.0, 0.0, [0.0, quarter / 2, quarter], angle=2.0)[-1]
+    assert abs(float(end[0])) < 2e-15  # the end itself is rounded to a double
+    assert abs(float(end[1]) + 2.0 * math.sin(1.0)) < 1e-15
+
+
+def test_a_motor_without_load_follows_its_exponentials():
+    from graphsynth.accuracy.precise_drive import precise_drive
+    from graphsynth.dynamics.motors import DCMotor
+
+    motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=2.0, speed=20.0, rotor_inertia=0.003)
+    found = precise_drive(lambda q: (np.longdouble(0),) * 3, motor, 1.0, 0.0, 0.0, [0.0, 0.4])[-1]
+    with mpmath.workdps(40):  # w' = Km i / J, i' = (K (wd - w) - R i - ce w) / L
+        mpf = mpmath.mpf
+        A = mpmath.matrix([[0, mpf(0.1) / mpf(0.003)], [-(mpf(2.0) + mpf(0.1)) / mpf(0.2), -mpf(1.0) / mpf(0.2)]])
+        rest = mpmath.lu_solve(A, mpmath.matrix([0, -mpf(40) / mpf(0.2)]))
+        right = rest - mpmath.expm(A * mpf(0.4), method="taylor") * rest
+        assert all(abs(mpf(float(p)) - q) < 1e-14 * abs(q) for p, q in zip(found[1:], right))
+
+
+def test_four_bar_in_long_doubles_is_the_braider():
+    from graphsynth.accuracy.precise_four_bar import bodies_of, places, shape_of_braider
+    from graphsynth.dynamics.braider.model import Braider
+
+    braider = Braider()
+    shape = shape_of_braider(braider)
+    for theta in (0.3, 2.0, 4.4):
+        J, half, load = (float(value) for value in shape(theta))
+        value, slope = braider.effective_inertia(theta)
+        assert abs(J + braider.reflected_inertia - float(value)) < 1e-16
+        assert abs(2.0 * half - float(slope)) < 1e-18
+        right = float(braider.load_moment(theta) * braider.linkage.motion(theta).k3)
+        assert abs(load - right) < 1e-16
+        # the joints stay closed: the end of the coupler is that of the rocker
+        at, bar = places(braider.linkage, bodies_of(braider), theta), braider.linkage
+        middle, turn = complex(at[3], at[4]), np.exp(1j * float(at[5]))
+        end = bar.frame + bar.rocker * np.exp(1j * float(at[8]))
+        assert abs(middle + bar.coupler / 2 * turn - end) < 1e-17

@@ -17,17 +17,22 @@ def _braider(context: Any) -> Any:
 def start_up(context: Any, effort: Effort) -> Problem:
     """Start from rest with all currents."""
     from graphsynth.accuracy.drives import drive_problem
+    from graphsynth.accuracy.precise_four_bar import shape_of_braider
 
     b = _braider(context)
-    return drive_problem(b.plant(), b.motor, b.train, context.scene.mechanism.start.end_s, effort)
+    end = context.scene.mechanism.start.end_s
+    return drive_problem(b.plant(), b.motor, b.train, end, effort, shape=shape_of_braider(b))
 
 
 def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     """Measure the linkage without motor and thread, free to move from the speed of the scene."""
-    from graphsynth.accuracy.dynamics import braider_model, dynamics_problem
+    from graphsynth.accuracy.dynamics import Truth, braider_model, dynamics_problem, precise_swing
 
-    model, start = braider_model(_braider(context), context.scene.mechanism.speed_rad_s)
-    return dynamics_problem(model, start, 1.0 if effort.quick else 2.0, "the braider's linkage, free", effort)
+    braider, speed = _braider(context), context.scene.mechanism.speed_rad_s
+    model, start = braider_model(braider, speed)
+    end, name = 1.0 if effort.quick else 2.0, "the braider's linkage, free"
+    truth = Truth(lambda times: precise_swing(braider, speed, times, model.gravity), "the closed loop in long doubles")
+    return dynamics_problem(model, start, end, name, effort, truth=truth)
 
 
 def positions(context: Any, effort: Effort) -> Problem:

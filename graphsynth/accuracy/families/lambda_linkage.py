@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 from graphsynth.accuracy.registry import build
 from graphsynth.accuracy.rows import Effort, Problem
+from graphsynth.errors import GeometryError
 
 __all__ = ["arc_ends", "areas", "coupled_joints", "crossing", "dimensions", "positions"]
 
@@ -23,14 +25,14 @@ def _worst(context: Any) -> tuple[Any, str]:
 
 def crossing(context: Any, effort: Effort) -> Problem:
     """Measure circle and ellipse at the worst pose."""
-    from graphsynth.accuracy.jamming import crossing_problem
+    from graphsynth.accuracy.crossing import crossing_problem
 
     return crossing_problem(*_worst(context), effort)
 
 
 def areas(context: Any, effort: Effort) -> Problem:
     """Measure the area of the gap at the worst pose."""
-    from graphsynth.accuracy.jamming import area_problem
+    from graphsynth.accuracy.crossing import area_problem
 
     return area_problem(*_worst(context), effort)
 
@@ -43,10 +45,15 @@ def arc_ends(context: Any, effort: Effort) -> Problem:
 
 
 def coupled_joints(context: Any, effort: Effort) -> Problem:
-    """Measure three bearings that share a misalignment, on the linkage of the source."""
-    from graphsynth.accuracy.jamming import coupled_problem
+    """Measure the linkage and the bearing of the scene, the bearing in all three moving joints."""
+    from graphsynth.accuracy.coupled import lambda_problem
 
-    return coupled_problem(effort)
+    table = context.scene.mechanism
+    linkage, bearing = _box(context).nominal()
+    x, y, z = table.tilt.axis
+    if z:
+        raise GeometryError(f"tilt.axis = {table.tilt.axis} leaves the plane; the shared misalignment needs one in it")
+    return lambda_problem(replace(linkage, alpha=0.0), bearing, math.atan2(y, x), table.bearing.condition, effort)
 
 
 def positions(context: Any, effort: Effort) -> Problem:

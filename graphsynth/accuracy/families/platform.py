@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 from graphsynth.accuracy.registry import build
@@ -13,7 +14,18 @@ __all__ = ["assembly_modes", "double_root", "drive", "turn"]
 
 
 def _mechanism(context: Any) -> Any:
-    return build("graphsynth.scenes.steps.platform:_mechanism", context.scene.mechanism)
+    """Platform with the dimensions of the scene, as the stage of the scene moves it.
+
+    Raises
+    ------
+    GeometryError
+        If the stage cannot move it.
+    """
+    known = SimpleNamespace(candidate=None, module=context.scene.mechanism.module)
+    (moved,) = build("graphsynth.scenes.steps.platform:kinematics", context, (known,))
+    if moved.failed:
+        raise GeometryError(f"the platform of the scene does not move: {moved.reason}")
+    return moved.value.mechanism
 
 
 def assembly_modes(context: Any, effort: Effort) -> Problem:

@@ -42,7 +42,7 @@ def arc_ends(context: Any, effort: Effort) -> Problem:
 
 def crossing(context: Any, effort: Effort) -> Problem:
     """Measure circle and ellipse at the worst pose."""
-    from graphsynth.accuracy.jamming import crossing_problem
+    from graphsynth.accuracy.crossing import crossing_problem
 
     linkage, bearing = _box(context).nominal()
     return crossing_problem(bearing, repr(linkage.largest_tilt[1]), effort)
