@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import tempfile
@@ -12,7 +13,7 @@ from pathlib import Path
 from graphsynth.errors import SceneError
 from graphsynth.scenes.products import Columns, Outcome, Part
 
-__all__ = ["PartFolder", "split_parts", "write_whole"]
+__all__ = ["PartFolder", "split_parts", "unwritable", "write_whole"]
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -26,6 +27,19 @@ def write_whole(path: Path, data: bytes) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def unwritable(what: str, error: OSError) -> SceneError:
+    """Return the exception for a place that cannot be written, with the remedy.
+
+    Examples
+    --------
+    >>> str(unwritable("out", OSError(errno.EACCES, "Permission denied")))
+    'cannot write out: Permission denied; choose another folder with --out'
+    """
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    remedy = "free some space and give the same command again, or choose" if full else "choose"
+    return SceneError(f"cannot write {what}: {error.strerror}; {remedy} another folder with --out")
 
 
 def split_parts(outcome: Outcome, kinds: Sequence[str]) -> tuple[Outcome, dict[str, bytes]]:
@@ -118,9 +132,7 @@ class PartFolder:
                     self._begin(place.parent)
                 write_whole(place, data)
         except OSError as error:
-            raise SceneError(
-                f"cannot write into {self._folder}: {error.strerror}; choose another folder with --out"
-            ) from error
+            raise unwritable(f"into {self._folder}", error) from error
 
     def _begin(self, folder: Path) -> None:
         assert self._folder is not None

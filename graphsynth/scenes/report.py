@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from graphsynth.errors import SceneError
 from graphsynth.scenes.datafiles import data_files
 from graphsynth.scenes.headline import facts, sentences
+from graphsynth.scenes.journal import mark_reported
 from graphsynth.scenes.page import report_html
-from graphsynth.scenes.parts import write_whole
+from graphsynth.scenes.parts import unwritable, write_whole
 from graphsynth.scenes.summary import summary_tables
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["loaded_versions", "print_summary", "scene_json", "write_report"]
 
+_JOURNAL = "candidates.jsonl"
 _KINDS = {".html", ".csv", ".parquet", ".json", ".jsonl"}
 _PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
 
@@ -55,10 +56,9 @@ def write_report(report: Report, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             write_whole(folder / name, data)
+        mark_reported(folder / _JOURNAL)
     except OSError as error:
-        raise SceneError(
-            f"cannot write the report into {folder}: {error.strerror}; choose another folder with --out"
-        ) from error
+        raise unwritable(f"the report into {folder}", error) from error
     return folder
 
 

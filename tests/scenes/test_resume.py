@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -15,6 +16,7 @@ import pytest
 from graphsynth.errors import FormatError, SceneError
 from graphsynth.scenes.runner import run
 
+FULL = OSError(errno.ENOSPC, "No space left on device")
 PAUSE = "pause_s = 0.05\n"
 
 
@@ -133,3 +135,63 @@ def test_a_complete_run_starts_anew_and_budgets_do_not_change_the_question(sprin
     springs.write_text(springs.read_text(encoding="utf-8") + '\n[budget]\ntime = "1 h"\nmemory = "8 GB"\n', "utf-8")
     run(springs, out=tmp_path)
     assert json.loads((tmp_path / "candidates.jsonl").read_text(encoding="utf-8").splitlines()[0]) == head
+
+
+def test_a_run_stopped_between_its_last_candidate_and_its_report_computes_no_candidate_again(
+    springs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from graphsynth.scenes import report as reports
+
+    usual = reports.write_whole
+
+    def full(path: Path, data: bytes) -> None:
+        raise FULL
+
+    monkeypatch.setattr(reports, "write_whole", full)
+    with pytest.raises(SceneError, match=r"No space left on device; free some space and give the same command again"):
+        run(springs, out=tmp_path)
+    monkeypatch.setattr(reports, "write_whole", usual)
+    assert "20 candidates were taken over" in run(springs, out=tmp_path).notes[0]
+    run(springs, out=tmp_path / "straight")
+    for name in ("candidates.jsonl", "results.csv"):
+        assert (tmp_path / name).read_bytes() == (tmp_path / "straight" / name).read_bytes()
+    assert run(springs, out=tmp_path).notes == ()  # reported: anew
+
+
+def test_a_full_disk_while_candidates_come_leaves_what_is_stored(
+    springs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from graphsynth.scenes.journal import Journal
+
+    usual = Journal.append
+    count = 0
+
+    class Full:
+        def write(self, data: bytes) -> None:
+            raise FULL
+
+        def close(self) -> None:
+            raise FULL
+
+    def append(self: Journal, line: str) -> None:
+        nonlocal count
+        count += 1
+        if count == 9:
+            self._stream.close()
+            self._stream = Full()
+        usual(self, line)
+
+    said = r"cannot write .*candidates.jsonl: No space left on device; free some space"
+    with monkeypatch.context() as patch, pytest.raises(SceneError, match=said):
+        patch.setattr(Journal, "append", append)
+        run(springs, out=tmp_path)
+    assert "7 candidates were taken over" in run(springs, out=tmp_path).notes[0]
+
+
+def test_an_unreported_file_of_another_question_is_refused(springs: Path, tmp_path: Path) -> None:
+    run(springs, out=tmp_path)
+    path = tmp_path / "candidates.jsonl"
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+    springs.write_text(springs.read_text(encoding="utf-8").replace("count = 20", "count = 21"), "utf-8")
+    with pytest.raises(SceneError, match="holds an interrupted run of another question"):
+        run(springs, out=tmp_path)
