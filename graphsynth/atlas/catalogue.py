@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.building import BuildStep
-from graphsynth.atlas.schema import connect
+from graphsynth.atlas.schema import connect, settle
 from graphsynth.errors import FormatError, SpecError
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from graphsynth.atlas.evaluating import EvaluationStep
     from graphsynth.atlas.evaluations import Evaluation
     from graphsynth.atlas.verifying import Verification
+    from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
 __all__ = ["BuildStep", "Catalogue"]
@@ -244,7 +247,95 @@ class Catalogue:
         """
         from graphsynth.atlas.evaluations import record
 
-        return record(self.path, evaluations)
+        with self._written():
+            return record(self.path, evaluations)
+
+    @contextmanager
+    def _written(self) -> Iterator[None]:
+        """Leave one plain file after writing: the log of a killed process goes when nobody reads, this one included."""
+        try:
+            yield
+        finally:
+            if self.path.with_name(self.path.name + "-wal").exists():
+                self.connection.close()
+                with closing(connect(self.path)) as connection:
+                    settle(connection)
+                self.connection = connect(self.path, readonly=True)
+
+    def evaluate(
+        self,
+        links: Iterable[int] | None = None,
+        mobility: Iterable[int] | None = None,
+        *,
+        per_chain: int = 1,
+        limit: int | None = None,
+        seed: int = 0,
+        tries: int = 4,
+        jamming: tuple[float, float] | None = None,
+        executor: Executor | None = None,
+        watch: Callable[[EvaluationStep], None] | None = None,
+    ) -> int:
+        """Give mechanisms dimensions with which they turn, and store these with their transmission and verdict.
+
+        Each mechanism is stored as it is done; the same call goes on after an interruption.  Dimensions that were found
+        stay; where none were, another seed or number of tries searches anew.
+
+        Parameters
+        ----------
+        links, mobility : iterable of int, optional
+            Families to evaluate; default all.
+        per_chain : int
+            So many mechanisms of each chain, those of the smallest groups first; 0: all.
+        limit : int, optional
+            Evaluate at most so many now.
+        seed, tries : int
+            Of :func:`graphsynth.embody`, with its default goals: a full turn.
+        jamming : (tilt, joint_limit), optional
+            Prove also whether the mechanism jams when the axis of its first driver is tilted by at most ``tilt``, in
+            any direction, and every joint takes up ``joint_limit`` (radians, below 0.1; model L1).
+        executor : concurrent.futures.Executor, optional
+            Who computes; one process writes.  The same results for any.
+        watch : callable, optional
+            Told an ``EvaluationStep`` after every mechanism.
+
+        Returns
+        -------
+        int
+            Mechanisms evaluated now.  Dimensions are certified (one regular branch that closes) where python-flint is
+            there and proves it, else estimated; transmission is estimated; a verdict is certified or undecided.
+
+        Raises
+        ------
+        SpecError
+            For values out of their bounds.
+        GraphsynthError
+            If the file cannot be written.
+        """
+        from graphsynth.atlas.evaluating import Settings, evaluate
+
+        settings = Settings(seed, tries) if jamming is None else Settings(seed, tries, *jamming)
+        with self._written():
+            return evaluate(self.path, links, mobility, per_chain, limit, settings, executor, watch)
+
+    def mechanism(self, name: str, frame: int | None = None, driver: int | str | None = None) -> Mechanism:
+        """Return the first stored mechanism with dimensions of a chain, given by key or label.
+
+        Parameters
+        ----------
+        name : str
+        frame : int, optional
+        driver : int or str, optional
+            As in the table of mechanisms.
+
+        Raises
+        ------
+        SpecError
+            If no dimensions are stored; the message says how to have them computed.
+        """
+        from graphsynth.atlas.evaluations import dimensions
+        from graphsynth.mechanism.model import Mechanism
+
+        return Mechanism.from_json(dimensions(self.entry(name), frame, driver))
 
     def completeness(self) -> pd.DataFrame:
         """Return the statement of completeness, one row for each family.

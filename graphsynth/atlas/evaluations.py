@@ -19,7 +19,7 @@ from graphsynth.atlas.building import transaction
 from graphsynth.atlas.schema import connect, settle
 from graphsynth.errors import SpecError
 
-__all__ = ["GUARANTEES", "KINDS", "NOT_COMPUTED", "Evaluation", "record"]
+__all__ = ["GUARANTEES", "KINDS", "NOT_COMPUTED", "Evaluation", "record", "store"]
 
 #: Kinds that every entry lists, computed or not; others may be stored too.
 KINDS = ("dimensions", "transmission", "jamming")
@@ -88,10 +88,16 @@ class Evaluation:
 def record(path: Path, evaluations: Iterable[Evaluation]) -> int:
     """Store evaluations in one transaction; see :meth:`graphsynth.atlas.catalogue.Catalogue.record`."""
     with closing(connect(path)) as connection:
-        with transaction(connection):
-            rows = [(*_mechanism(connection, item), *_values(item)) for item in evaluations]
-            connection.executemany("INSERT OR REPLACE INTO evaluations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+        count = store(connection, evaluations)
         settle(connection)
+    return count
+
+
+def store(connection: sqlite3.Connection, evaluations: Iterable[Evaluation]) -> int:
+    """Write evaluations in one transaction; return how many."""
+    with transaction(connection):
+        rows = [(*_mechanism(connection, item), *_values(item)) for item in evaluations]
+        connection.executemany("INSERT OR REPLACE INTO evaluations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
     return len(rows)
 
 
@@ -111,3 +117,17 @@ def _mechanism(connection: sqlite3.Connection, item: Evaluation) -> tuple[int, i
             "take one from the table of mechanisms, which lists one of each orbit"
         )
     return row[0], item.frame, item.driver
+
+
+def dimensions(entry: dict[str, Any], frame: int | None, driver: int | str | None) -> str:
+    """Return the mechanism stored with an entry, as the JSON text that :class:`graphsynth.Mechanism` reads."""
+    for own in entry["mechanisms"]:
+        if frame in (None, own["frame"]) and (driver is None or str(driver) == str(own["driver"])):
+            known = own["evaluations"]["dimensions"]
+            data = known["data"] if isinstance(known, dict) else None
+            if isinstance(data, dict) and "mechanism" in data:
+                return json.dumps(data["mechanism"])
+    raise SpecError(
+        f"no dimensions are stored for {entry['label'] or entry['key']} with this choice of frame and driver: have "
+        "them computed by 'graphsynth catalog evaluate'"
+    )

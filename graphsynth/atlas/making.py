@@ -45,8 +45,8 @@ def make(
     try:
         for count in wanted:
             _family(connection, mobility, count, fractionated and mobility > 1, executor, shard, watch)
-        settle(connection)
     finally:
+        settle(connection)
         connection.close()
 
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
-from graphsynth.atlas.building import build_family, finish_family, open_family
+from graphsynth.atlas.building import build_family, finish_family, open_family, transaction
 from graphsynth.atlas.facts import GroupRow, Rows
 from graphsynth.atlas.schema import connect, settle
 from graphsynth.errors import GraphsynthError, SpecError
@@ -28,6 +28,8 @@ def merge(path: Path, parts: list[Path]) -> None:
         target = stack.enter_context(closing(connect(path, create=True)))
         for question in _families(shards):
             _merge_family(target, question, names)
+        for shard in shards:
+            _copy_evaluations(shard, target)
         settle(target)
 
 
@@ -74,6 +76,18 @@ def _merge_family(
 
     build_family(target, family_id, mobility, [(piece, 1.0) for piece in range(pieces)], results)
     finish_family(target, family_id)
+
+
+def _copy_evaluations(shard: sqlite3.Connection, target: sqlite3.Connection) -> None:
+    """Take over what was evaluated of the mechanisms of a shard."""
+    with transaction(target):
+        target.executemany(
+            "INSERT OR REPLACE INTO evaluations SELECT chain_id, ?, ?, ?, ?, ?, ?, ?, ? FROM chains WHERE key = ?",
+            shard.execute(
+                "SELECT frame, driver, kind, status, value, unit, guarantee, data, key FROM evaluations "
+                "JOIN chains USING (chain_id)"
+            ),
+        )
 
 
 def _check_all_there(

@@ -194,16 +194,27 @@ class Reference:
 
         None if some set has more constraints than freedoms, or some link is never placed.
         """
-        placed = 1 << frame | sum(1 << link for link in drivers)
+        found = self.members(frame, drivers)
+        if found is None:
+            return None
+        placed, keys = _mask({frame, *drivers}), []
+        for group in map(_mask, found):
+            keys.append(self._key_of(group, placed))
+            placed |= group
+        return tuple(keys)
+
+    def members(self, frame: int, drivers: tuple[int, ...]) -> list[set[int]] | None:
+        """Links of the groups in the order of assembly; None as for `groups`."""
+        placed = _mask({frame, *drivers})
         everything = (1 << self.links) - 1
-        keys = []
+        found = []
         while placed != everything:
             group = self._next_group(everything & ~placed, placed)
             if group is None:
                 return None
-            keys.append(self._key_of(group, placed))
+            found.append(set(_members(group)))
             placed |= group
-        return tuple(keys)
+        return found
 
     def _next_group(self, free: int, placed: int) -> int | None:
         sets = _subsets(free)
@@ -234,6 +245,10 @@ def _subsets(mask: int) -> Masks:
     for link in _members(mask):
         sets = np.concatenate([sets, sets | 1 << link])
     return sets[1:]
+
+
+def _mask(links: set[int]) -> int:
+    return sum(1 << link for link in links)
 
 
 def _members(mask: int) -> Iterator[int]:

@@ -140,7 +140,6 @@ def settle(connection: sqlite3.Connection) -> None:
     try:
         connection.execute("PRAGMA busy_timeout = 200")
         connection.execute("PRAGMA journal_mode = DELETE")
-    except sqlite3.OperationalError:
-        pass
-    finally:
         connection.execute("PRAGMA busy_timeout = 5000")
+    except sqlite3.Error:
+        pass  # it stays as it is: whole, with a log beside it

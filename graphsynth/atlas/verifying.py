@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from graphsynth.atlas.evaluations import GUARANTEES
+from graphsynth.atlas.rechecking import recheck
 from graphsynth.atlas.references import Reference, wanted_class
 from graphsynth.structure.assur import is_assur_group
 
@@ -265,6 +266,7 @@ def _check_chain(
     ]
     wanted_rows = [(frame, drivers, " ".join(groups)) for frame, drivers, groups in reference.mechanisms()]
     _same_rows(checks, "mechanisms", where, sorted(stored), sorted(wanted_rows))
+    recheck(connection, checks.same, number, reference)
 
 
 def _same_rows(checks: _Checks, field: str, where: str, stored: list[Any], wanted: list[Any]) -> None:

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from graphsynth.cli.catalog_evaluate import add_evaluate
 from graphsynth.cli.catalog_site import add_site
 
 __all__ = ["add_catalog"]
@@ -20,7 +21,7 @@ def add_catalog(
     workers: Callable[[str], int],
 ) -> None:
     """Add the verb with its own verbs; ``shard`` and ``workers`` read I/M and a number of processes."""
-    summary = "Build, ask, check, export and merge catalogues of chains and mechanisms."
+    summary = "Build, evaluate, ask, check, export and merge catalogues of chains and mechanisms."
     parser = verbs.add_parser("catalog", help=summary, description=summary, allow_abbrev=False)
     own = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     _add_build(own, shard, workers)
@@ -28,6 +29,7 @@ def add_catalog(
     _add_verify(own)
     _add_export(own)
     _add_merge(own)
+    add_evaluate(own, _numbers, _limit, workers)
     add_site(own, workers)
 
 
