@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from graphsynth.errors import FormatError, GraphError
-from graphsynth.formats.graph_json import KEYED_MAX
 from graphsynth.mechanism.files import TOML_MAX
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.canonical import decode_key
@@ -43,10 +42,8 @@ def graph_of_text(text: str) -> MechanismGraph:
 
 
 def graph_of_key(key: str) -> MechanismGraph:
-    """Read a key; that it is the canonical one is checked up to 24 links, where the check takes bounded time."""
+    """Read a key as the graph it describes; that it is the canonical one is not checked, which may take long."""
     links, joints, frame, space = decode_key(key)
-    if links <= KEYED_MAX:
-        return MechanismGraph.from_key(key)
     return MechanismGraph(links, joints, frame=frame, space=space)
 
 

@@ -73,6 +73,11 @@ def link_colours(graph: MechanismGraph) -> list[int]:
 def label(graph: MechanismGraph) -> Labelling:
     """Label a graph canonically.
 
+    Raises
+    ------
+    TooLargeError
+        For more than 64 links that are too symmetric (a hundred equal parts).
+
     Examples
     --------
     >>> from graphsynth.structure.graph import MechanismGraph
@@ -93,7 +98,7 @@ def _label_python(graph: MechanismGraph, colours: list[int]) -> Labelling:
     for a, b, mobility in graph.joints:
         layers[mobility - 1][a] |= 1 << b
         layers[mobility - 1][b] |= 1 << a
-    found = Search(graph.links, layers, colours).run()
+    found = Search(graph.links, layers, colours, twins=graph.links > _KERNEL_LINKS_MAX).run()
     return _labelling(found.order_of_vertices, found.generators, found.index, found.orbits)
 
 

@@ -13,7 +13,14 @@ Pruning:
 * a leaf equal to the first or to the best one gives an automorphism, and the search returns to where the paths
   parted: the two subtrees there are images of each other;
 * on the path to the first leaf, one vertex of each orbit of the automorphisms found so far is tried (all of them
-  fix the path above); elsewhere, one of each orbit of those generators that fix the path.
+  fix the path above); elsewhere, one of each orbit of those generators that fix the path;
+* with ``twins``, exchanging two vertices that have the same neighbours is an automorphism that needs no leaf: it fixes
+  the path above, and the branch it saves is the image of one that has been searched, so that the form, the order of
+  the vertices, the orbits and the order of the group stay the same.  A complete graph, a
+  star or links without joints are then one leaf.
+
+The tree of other very symmetric graphs (a hundred equal parts) grows with a high power of n.  A search does not
+go beyond ``WORK_MAX`` looks at a vertex or a cell: it then raises `TooLargeError`.
 
 Sources: B. D. McKay, *Practical graph isomorphism*, Congressus Numerantium 30 (1981) 45-87; B. D. McKay and
 A. Piperno, *Practical graph isomorphism, II*, J. Symbolic Comput. 60 (2014) 94-112.
@@ -23,10 +30,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from graphsynth.errors import TooLargeError
 from graphsynth.structure.levels import bits
 
-__all__ = ["Search"]
+__all__ = ["WORK_MAX", "Search"]
 
+#: Looks at a vertex or a cell in one search; a minute or two.
+WORK_MAX = 200_000_000
 _WORD = (1 << 64) - 1
 _MIX = 0x9E3779B97F4A7C15
 _LEAF = 1 << 63
@@ -72,6 +82,8 @@ class Search:
         ``layers[c][v]``: bit mask of the vertices joined to ``v`` by an edge of colour ``c``.
     colours : sequence of int
         Vertex colours; cells are ordered by colour first.
+    twins : bool
+        Exchange vertices with the same neighbours at once; the generators may then differ from those of the kernel.
 
     Attributes
     ----------
@@ -87,8 +99,10 @@ class Search:
         Smallest vertex of the orbit of each vertex.
     """
 
-    def __init__(self, n: int, layers: Sequence[Sequence[int]], colours: Sequence[int]) -> None:
+    def __init__(self, n: int, layers: Sequence[Sequence[int]], colours: Sequence[int], *, twins: bool = False) -> None:
         self.n = n
+        self.twins = twins
+        self.work = 0
         self.layers = layers
         self.colours = colours
         self.generators: list[list[int]] = []
@@ -118,7 +132,13 @@ class Search:
         self.order_of_vertices: list[int] = []
 
     def run(self) -> Search:
-        """Search the whole tree and return self."""
+        """Search the whole tree and return self.
+
+        Raises
+        ------
+        TooLargeError
+            After ``WORK_MAX`` looks.
+        """
         self._root()
         level = 0
         while True:
@@ -169,12 +189,20 @@ class Search:
             for vertex in lab[place:end]:
                 splitter |= 1 << vertex
             state = _mix(state, place << 8 | end - place)
+            self.work += starts.bit_count()
             low = 0
             while low < n:
                 high = _cell_end(starts, low, n)
                 if high - low > 1:
+                    self.work += high - low
                     starts, active, state = self._split(lab, low, high, splitter, starts, active, state)
                 low = high
+        self.work += n
+        if self.work > WORK_MAX:
+            raise TooLargeError(
+                f"{n} links are too symmetric to be labelled canonically (given up after {WORK_MAX:.0e} steps); "
+                "label the parts of the graph, or compare such graphs by other means"
+            )
         leaf = starts.bit_count() == n
         self.starts[level] = starts
         self.trace[level] = state >> 1 | (_LEAF if leaf else 0)
@@ -276,17 +304,34 @@ class Search:
         else:
             self.others = [*self.others[1 - self.n :], permutation] if self.n > 1 else []
 
+    def _exchange_twins(self, level: int) -> None:
+        """Join the vertex of the first path with its twins in the target cell: all they join is outside the path."""
+        vertex = self.first_path[level]
+        for other in bits(self.left[level]):
+            others = ~(1 << vertex | 1 << other)
+            if any((layer[vertex] ^ layer[other]) & others for layer in self.layers):
+                continue
+            a, b = _find(self.orbits, vertex), _find(self.orbits, other)
+            if a != b:
+                self.orbits[max(a, b)] = min(a, b)
+                permutation = list(range(self.n))
+                permutation[vertex], permutation[other] = other, vertex
+                self.generators.append(permutation)
+
     def _next(self, level: int) -> int:
         """Return the next vertex of the target cell to try, or -1."""
         left = self.left[level]
         if not left:
             return -1
         if not self.have_leaf or level == self.on_first:
+            if self.twins and self.have_leaf:
+                self._exchange_twins(level)
             parent = self.orbits
         else:
             parent = list(range(self.n))
             for permutation in (*self.generators, *self.others):
                 if all(permutation[vertex] == vertex for vertex in self.path[:level]):
+                    self.work += self.n
                     _merge(parent, permutation)
         while left:
             low = left & -left
