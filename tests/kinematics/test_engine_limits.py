@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.events import _touch
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear, Table
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -272,3 +274,52 @@ def test_parallelogram_with_three_bars(bar: float, words: str) -> None:
     tops = [Revolute(2, k, (x, 0.0), (0.0, bar if k == 4 else 1.0)) for k, x in ((1, 0.0), (3, 2.0), (4, 1.0))]
     motion = simulate(Mechanism(graph, bars + tops), [0.0])
     assert not motion.assembled.any() and words in motion.reason
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_parallel_guides_have_no_place(scale: float) -> None:
+    """Two guides that are parallel but for rounding: no pose far away, but a sentence."""
+    graph = MechanismGraph(4, [(0, 1), (0, 3), (1, 2), (2, 3)], frame=0)
+
+    def guides(angle: float) -> Mechanism:
+        return Mechanism(graph, [
+            Prismatic(0, 1, (0.0, 0.0), (-scale, scale), 0.5 * math.pi, 0.25 * math.pi),
+            Prismatic(0, 3, (-scale, -2.0 * scale), (-scale, 0.0), 0.5 * math.pi, 0.0),
+            Prismatic(1, 2, (2.0 * scale, 2.0 * scale), (0.0, scale), angle, 0.0),
+            Revolute(2, 3, (0.0, 2.0 * scale), (-2.0 * scale, scale)),
+        ], [Driver(0, 3)])  # fmt: skip
+
+    motion = simulate(guides(0.25 * math.pi), np.array([0.1, 0.2]) * scale)  # pi/4 on link 1, itself turned by pi/4
+    assert not motion.assembled.any() and np.isnan(motion.poses).all()
+    assert "parallel" in motion.reason and motion.events[0].kind == "not assembled"
+    motion = simulate(guides(0.25 * math.pi + 1e-6), np.array([0.1, 0.2]) * scale)
+    assert motion.completed and motion.residual < 1e-8
+
+
+def test_a_rate_that_is_zero_beside_a_reversal() -> None:
+    """A link driven against another one turns on the frame with a rate that may be zero to the bit."""
+    graph = MechanismGraph.from_text("EiM_ f0")
+    joints = [
+        Revolute(0, 1, (-1.0, 2.0), (1.0, -1.0)), Revolute(0, 5, (-1.0, 1.0), (-2.0, -1.0)),
+        Revolute(1, 2, (1.0, -1.0), (0.0, 1.0)), Revolute(1, 3, (2.0, 1.0), (-2.0, 0.0)),
+        Revolute(2, 4, (-1.0, -2.0), (2.0, 1.0)), Revolute(2, 5, (-2.0, -2.0), (2.0, -1.0)),
+        Revolute(3, 4, (2.0, 1.0), (0.0, -1.0)),
+    ]  # fmt: skip
+    motion = simulate(Mechanism(graph, joints, [Driver(4, 3)]), np.linspace(3.0, 0.0, 29))
+    assert motion.completed == (motion.reason == "")
+    assert motion.residual < 1e-12
+
+
+def test_a_fold_behind_a_group_that_is_lost() -> None:
+    """Where the margin cannot be followed to its zero, the branch ends at the last sample before."""
+
+    def reach(trace: object, k: int, u: float) -> tuple[SimpleNamespace, None]:
+        margin = np.nan if 0.1 < u < 0.75 else (u - 1.2) ** 2 - 0.09
+        return SimpleNamespace(M=np.array([[0.0], [margin]])), None
+
+    step = SimpleNamespace(group=0, kind="RRR", links=(1, 2))
+    tracker = SimpleNamespace(reach=reach, program=SimpleNamespace(steps=[step]))
+    trace = SimpleNamespace(u=np.array([0.0, 1.6, 2.0]), M=np.array([[1.35], [0.07], [0.55]]))
+    event = _touch(tracker, trace, 1, 0)
+    assert event.kind == "fold" and event.ends_motion
+    assert event.input == 0.0 and event.uncertainty == pytest.approx(1.2, abs=0.31)

@@ -98,7 +98,8 @@ class BatchMotion:
         if self.code[index] == codes.DONE:
             return ""
         at = self.inputs[self.reached[index]]
-        return f"group {self.group[index]} {_REASONS[int(self.code[index])]} (at the input {at:.12g})"
+        who = f"group {self.group[index]}" if self.group[index] >= 0 else "a driven link"
+        return f"{who} {_REASONS[int(self.code[index])]} (at the input {at:.12g})"
 
 
 def simulate_batch(

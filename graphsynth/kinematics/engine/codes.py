@@ -35,5 +35,9 @@ ELIM_WIDTH = 13
 #: Parameters of a driver step: known point, direction in the known link, placed link's point, sign, angle.
 DRIVE_WIDTH = 8
 
+#: Sine of the angle between two guides at and below which they are parallel: the products of sines and cosines that
+#: carry a direction through the links before have an error of a few 1e-16 each, and nothing is left of a place beyond.
+PARALLEL = 1e-14
+
 # Why a run stopped.
 DONE, UNREACHABLE, STEP_TOO_LONG, NO_CONVERGENCE, SINGULAR, BAD_INPUT = 0, 1, 2, 3, 4, 5

@@ -46,6 +46,8 @@ def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
             text = f"no pose of {name} was found at the first input; if there is one, give a start pose close to it"
         if stop.code == codes.SINGULAR:
             text = f"{name} is not held at the first input: its special dimensions let it move by itself"
+        if step.code == codes.P_LINE:
+            text = f"{name} has no place at the first input: its sliding directions are parallel"
         if trace.M[0, stop.step] == _COINCIDE:
             text = f"two points of {name} coincide at the first input, so that its place is not determined there"
         return MotionEvent("not assembled", stop.at, step.group, step.links, 0, 0.0, True, text)
@@ -207,10 +209,13 @@ def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None
     step = tracker.program.steps[s]
     name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
     if least < -_TOUCH:
-        start = float(trace.u[k - 1])
-        at = float(brentq(margin, start, at, xtol=1e-15 * min(1.0, high - low), rtol=1e-15))
+        start, uncertainty = float(trace.u[k - 1]), 1e-14 * max(1.0, abs(at))
+        try:
+            at = float(brentq(margin, start, at, xtol=1e-15 * min(1.0, high - low), rtol=1e-15))
+        except ValueError:  # a group before this one is lost on the way: known is only that the branch ends here
+            at, uncertainty = start, abs(at - start)
         text = f"{name} is stretched or folded at the input {at:.12g}: it cannot be assembled on a stretch beyond"
-        return MotionEvent("fold", at, step.group, step.links, 2, 1e-14 * max(1.0, abs(at)), True, text)
+        return MotionEvent("fold", at, step.group, step.links, 2, uncertainty, True, text)
     if not least <= _CLOSE:
         return None
     at = _flat(margin, at, 0.25 * (high - low))
@@ -334,7 +339,7 @@ def _reversal(
 def _order(at: Callable[[float], float], where: float, h: float) -> int:
     """First derivative of the coordinate that does not vanish at a reversal: even; 2 unless the rate is flat there."""
     near, far = abs(at(where + h)), abs(at(where + 2.0 * h))
-    if not (near > 0.0 and math.isfinite(far)):
+    if not (near > 0.0 and 0.0 < far < math.inf):
         return 2
     return 2 + 2 * max(0, round((math.log2(far / near) - 1.0) / 2.0))
 

@@ -5,6 +5,7 @@ import math
 from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     E_RP,
+    PARALLEL,
     P_DIST,
     P_LINE,
     PAX,
@@ -75,7 +76,7 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
         if code == P_LINE:
             sx, sy, other = line_of(rows, rp, k, x, own)
             det = tx * sy - ty * sx
-            if det == 0.0:
+            if abs(det) <= PARALLEL:
                 return 0.0
             x[own, 0], x[own, 1] = (kappa * sx - other * tx) / det, (kappa * sy - other * ty) / det
             return det
