@@ -119,7 +119,7 @@ class Journal:
         if self._stream is not None:
             self._write(_COMPLETE)
 
-    def _write(self, content: dict[str, object]) -> None:
+    def _write(self, content: dict[str, Any]) -> None:
         self.append(json.dumps(content, sort_keys=True))
 
     def __enter__(self) -> Journal:

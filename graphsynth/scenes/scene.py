@@ -75,7 +75,11 @@ class GenerateTable:
     def __post_init__(self) -> None:
         require(self.symmetry in (None, 3), f"has symmetry {self.symmetry}; only 3 is known, or leave it out")
         require(self.limit >= 1, f"has limit {self.limit}; it must be at least 1")
-        require(self.sample is None or self.sample >= 1, f"has sample {self.sample}; it must be at least 1")
+        most = min(self.limit, 1_000_000)
+        require(
+            self.sample is None or 1 <= self.sample <= most,
+            f"has sample {self.sample}; draw 1 to {most}, the limit on candidates",
+        )
         require(self.sample is None or self.symmetry is None, "has sample and symmetry; only one of them works")
         if self.fixed_moving_links is not None:
             require(self.symmetry is not None, "gives fixed_moving_links without symmetry; add symmetry = 3")

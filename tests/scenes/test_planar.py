@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 import json
 import math
+import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth.errors import SceneError
+from graphsynth.errors import SceneError, TooLargeError
 from graphsynth.jamming.bearing import Bearing
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -21,6 +23,7 @@ from graphsynth.scenes.scene import Scene
 from graphsynth.scenes.steps import planar as stages
 from graphsynth.scenes.steps.planar import scaled
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.spec import StructuralSpec
 
 LENGTHS = (0.08, 0.04, 0.1, 0.1)  # frame, crank, coupler, rocker of the lambda linkage, m
 FOUR = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
@@ -231,6 +234,56 @@ def test_scenes_that_make_no_sense(tmp_path: Path) -> None:
     del tables["mechanism"]["crank_mm"]
     with pytest.raises(SceneError, match=r"has \[mechanism.loads\] but no crank_mm"):
         Scene.from_mapping(tables)
+
+
+def test_files_are_read_before_work_begins_on_the_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One bad file of many refuses the scene at once, by its line and its name: nothing is computed and lost."""
+    worked: list[object] = []
+    monkeypatch.setattr(stages, "move", lambda context, built: worked.append(built))
+    good = linkage().to_toml()
+    spoilt = {
+        "nan.toml": good.replace("0.04", "nan", 1),
+        "text.toml": "lengths = [1, 'two', 3]\n",
+        "short.toml": good[: len(good) // 2],
+        "large.toml": "# x\n" * 300_000,
+        "binary.json": "\x00\x01",
+    }
+    for name, text in spoilt.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "loop.toml").symlink_to(tmp_path / "loop.toml")
+    for name in (*spoilt, "folder.toml", "loop.toml"):
+        own = scene(tmp_path, ["records"])
+        own = replace(own, mechanism=replace(own.mechanism, files=(*own.mechanism.files, name)))
+        with pytest.raises(SceneError, match=rf"\[mechanism.files.1\] names '{name}', which (is no mechanism|cannot)"):
+            run(own, out=tmp_path / "out")
+    assert worked == []
+
+
+def test_too_many_candidates_are_told_before_work_begins(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    worked: list[object] = []
+    monkeypatch.setattr(stages, "embody", lambda context, design: worked.append(design))
+    tables = question(["records"])
+    tables["structure"]["generate"] = {"limit": 4}
+    with pytest.raises(TooLargeError, match="more than limit = 4 mechanisms; raise the limit"):
+        run(Scene.from_mapping(tables), tmp_path)
+    assert worked == []
+
+
+def test_a_listing_without_end_obeys_the_time_of_the_budget(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from graphsynth import synthesis
+
+    usual = list(synthesis.enumerate_mechanisms(StructuralSpec(W=1, links=4, p2=0)))
+
+    def endless(*arguments: object, **options: object) -> Iterator[MechanismGraph]:
+        while True:
+            time.sleep(0.01)
+            yield usual[0]
+
+    monkeypatch.setattr(synthesis, "enumerate_mechanisms", endless)
+    tables = question(["records"]) | {"budget": {"time_s": 0.2}}
+    with pytest.raises(SceneError, match=r"\[budget\] stops the run while candidates are listed \(\d+ so far\).*0.2 s"):
+        run(Scene.from_mapping(tables), tmp_path)
 
 
 def test_only_what_is_asked_for_is_a_stage(tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ from graphsynth.scenes.tables import require
 
 __all__ = ["FAMILY", "Grashof", "RangeTable", "SurveyLengths", "SurveyLimits", "SurveyTable", "SurveyTolerances"]
 
+_MOST = 10**8
+
 Grashof = Literal["crank-rocker", "double crank"]
 Column = Literal[
     "frame", "coupler", "rocker", "type", "kind", "transmission angle", "rocker swing", "size", "largest tilt",
@@ -45,6 +47,12 @@ class SurveyLengths:
 
     def __post_init__(self) -> None:
         require(self.crank > 0, f"has crank = {self.crank}; a length must be positive")
+        sets = math.prod((r.last - r.first) / r.step + 1.0 for r in (self.frame, self.coupler, self.rocker))
+        require(
+            sets <= 1.001 * _MOST,
+            f"has ranges of {sets:.3g} dimension sets together, hours of work; at most {_MOST:.0e} are taken at once: "
+            "use larger steps, or one scene for each part of the range of the frame",
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.errors import FormatError, GraphsynthError
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from graphsynth.scenes.steps.planar_loads import Driven, Jammed
 
 __all__ = ["Built", "FileCandidate", "Moved", "embody", "judge", "mechanisms", "move", "scaled", "take", "write"]
+
+
+_LARGEST_FILE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +56,25 @@ class Moved:
 
 
 def take(context: Context) -> Iterator[Candidate | FileCandidate]:
-    """Yield the candidates of ``[structure]``, or those of the files, in their order."""
+    """Return the candidates of ``[structure]``, or those of the files, in their order.
+
+    All files are read, and all candidates counted, before work begins on the first.
+
+    Raises
+    ------
+    SceneError
+        A file that cannot be read or is no mechanism; a question without candidates.
+    TooLargeError
+        More candidates than the limit.
+    """
     table: PlanarTable = context.scene.mechanism
     if table.files:
-        return (_read(context, i, name) for i, name in enumerate(table.files))
-    from graphsynth.scenes.steps.structural import generate, solve
+        return iter([_read(context, i, name) for i, name in enumerate(table.files)])
+    from graphsynth.scenes.steps.structural import check_count, generate, solve
 
-    return generate(context, solve(context))
+    solutions = solve(context)
+    check_count(context, solutions)
+    return generate(context, solutions)
 
 
 def _read(context: Context, place: int, name: str) -> FileCandidate:
@@ -68,14 +84,30 @@ def _read(context: Context, place: int, name: str) -> FileCandidate:
     at = context.scene.place / "mechanism" / "files" / str(place)
     path = context.scene.folder / name
     try:
-        data = path.read_bytes()
+        data = _bytes_of(path)
         mechanism = Mechanism.from_json(data) if path.suffix == ".json" else Mechanism.from_toml(data)
     except OSError as error:
         raise at.error(f"names {name!r}, which cannot be read: {error.strerror}") from error
-    except FormatError as error:
+    except GraphsynthError as error:  # FormatError: no mechanism as text; others: one that nobody can build
         raise at.error(f"names {name!r}, which is no mechanism: {error}") from error
     key = f"{mechanism.graph.key} {hashlib.sha256(data).hexdigest()[:12]}"
     return FileCandidate(place + 1, path.stem, mechanism, key, assortment_text(mechanism.graph))
+
+
+def _bytes_of(path: Path) -> bytes:
+    """Read a file of a mechanism; neither a device nor a file that never ends.
+
+    Raises
+    ------
+    OSError, FormatError
+    """
+    if path.exists() and not path.is_file():
+        raise FormatError("not a file", path.name)
+    with path.open("rb") as stream:
+        data = stream.read(_LARGEST_FILE + 1)
+    if len(data) > _LARGEST_FILE:
+        raise FormatError(f"more than {_LARGEST_FILE} bytes", path.name)
+    return data
 
 
 def embody(context: Context, design: Candidate | FileCandidate) -> Built:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.spec import LinkAssortment, StructuralSpec
 
-__all__ = ["generate", "has_threefold_symmetry", "solve"]
+__all__ = ["check_count", "generate", "has_threefold_symmetry", "solve"]
 
 
 def solve(context: Context) -> tuple[LinkAssortment, ...]:
@@ -62,16 +63,39 @@ def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterato
     SceneError
         If there is none.
     """
-    options = _structure(context).generate
     count = 0
     for graph in _mechanisms(context):
-        if count == options.limit:
-            raise TooLargeError(
-                f"{context.scene.place / 'structure' / 'generate'} the question has more than limit = {options.limit} "
-                "mechanisms; raise the limit, or fix more variables of the question"
-            )
+        _refuse_more(context, count)
         count += 1
         yield Candidate(count, graph, assortment_text(graph))
+    _refuse_none(context, count, solutions)
+
+
+def check_count(context: Context, solutions: tuple[LinkAssortment, ...]) -> None:
+    """List the candidates once without keeping them: before much work is put into the first of too many.
+
+    Raises
+    ------
+    TooLargeError, SceneError
+        As `generate` does, but before it gives the first candidate.
+    """
+    count = 0
+    for _ in _mechanisms(context):
+        _refuse_more(context, count)
+        count += 1
+    _refuse_none(context, count, solutions)
+
+
+def _refuse_more(context: Context, count: int) -> None:
+    limit = _structure(context).generate.limit
+    if count == limit:
+        raise TooLargeError(
+            f"{context.scene.place / 'structure' / 'generate'} the question has more than limit = {limit} "
+            "mechanisms; raise the limit, or fix more variables of the question"
+        )
+
+
+def _refuse_none(context: Context, count: int, solutions: tuple[LinkAssortment, ...]) -> None:
     if not count:
         raise SceneError(
             f"{context.scene.place / 'structure'} gives no candidate ({len(solutions)} integer solutions): nothing "
@@ -80,6 +104,25 @@ def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterato
 
 
 def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
+    """Yield what passes the filters, as long as listing alone does not use up the time of ``[budget]``."""
+    budget = context.scene.budget.time_s
+    spent, listed, source = 0.0, 0, _filtered(context)
+    while True:
+        start = time.perf_counter()
+        graph = next(source, None)
+        spent += time.perf_counter() - start
+        if graph is None:
+            return
+        if budget is not None and spent > budget:
+            raise SceneError(
+                f"{context.scene.place / 'budget'} stops the run while candidates are listed ({listed} so far): the "
+                f"time of {budget:g} s is used up; raise it, or fix more variables of the question"
+            )
+        listed += 1
+        yield graph
+
+
+def _filtered(context: Context) -> Iterator[MechanismGraph]:
     options = _structure(context).generate
     fixed = options.fixed_moving_links
     for graph in _all(context):
