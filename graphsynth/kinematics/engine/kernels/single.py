@@ -5,9 +5,9 @@ import math
 from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     E_RP,
-    PARALLEL,
     P_DIST,
     P_LINE,
+    PARALLEL,
     PAX,
     PAY,
     PBX,
