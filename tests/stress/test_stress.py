@@ -55,6 +55,7 @@ def status_of(*calls) -> list[Status]:
         (mpmath.mpf("nan"), 0, {"absolute": 1}, Status.WRONG),
         (np.int64(2**53 + 1), 2**53 + 1, {}, Status.OK),  # a double does not hold it
         (np.int64(2**53 + 1), 2**53, {}, Status.WRONG),
+        (np.array(0.5), "0.5", {}, Status.OK),
         (np.float32(0.1), 0.1, {"relative": 1e-9}, Status.WRONG),
     ],
 )

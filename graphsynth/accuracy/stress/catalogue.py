@@ -2,8 +2,9 @@
 
 A name is the page of the specification and the number of the row in its section of extreme cases: ``lambda-12.6`` is
 row 6 of section 12 of the lambda linkage, ``platform-12.5`` row 5 of section 12 of the parallel platform,
-``instruments-9.13`` row 13 of section 9 of instruments and dynamics.  The structural page has no such section; its
-names give the section from which the case is taken.  Nothing of a case is imported here.
+``instruments-9.13`` row 13 of section 9 of instruments and dynamics.  Other numbers give the section from which a case
+is taken (the structural page has no section of extreme cases); ``beyond`` holds what no page asks for.  Nothing of a
+case is imported here.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ PAGES = {
     "platform": "Parallel platform",
     "instruments": "Instruments and dynamics",
     "structure": "Structural synthesis",
+    "beyond": "Beyond the specification",
 }
 
 
@@ -77,6 +79,7 @@ def _rows(page: str, text: str) -> tuple[Case, ...]:
 _LAMBDA = _rows(
     "lambda",
     """
+    11.1  | scales:interval_ends       | intervals: overflow, subnormal numbers, division by zero
     12.1  | tilts:no_tilt              | no tilt: alpha = 0, or the axis along z
     12.2  | tilts:tiny_tilt            | alpha = 1e-8
     12.3  | tilts:steep_tilt           | alpha = pi/2, or R sin t above h cos t
@@ -146,6 +149,7 @@ _PLATFORM = _rows(
 _INSTRUMENTS = _rows(
     "instruments",
     """
+    2.11  | scales:rest_trap           | start of 1e-41, where a difference quotient vanishes
     9.1   | antenna:singular_chart     | singular parametrisation
     9.2   | antenna:false_roots        | false orientation roots
     9.3   | antenna:all_modes          | all assembly modes
@@ -185,7 +189,30 @@ _STRUCTURE = _rows(
     5.2*  | graphs:large_counts        | counts of millions: 16 links, the worked example
     """,
 )
-CASES = (*_LAMBDA, *_PLATFORM, *_INSTRUMENTS, *_STRUCTURE)
+_BEYOND = _rows(
+    "beyond",
+    """
+    1.1   | scales:planar              | four-bars of 1e-60 to 1e60, and refused ones
+    1.2   | scales:ratios              | links of 1e16 beside a crank of 1
+    1.3   | scales:subnormal_platform  | platforms of 1e-300 and 1e150, legs of subnormal length
+    1.4   | scales:jamming             | bearings of 1e-90 and 1e90, boxes of 1e-300 and 1e300
+    1.5   | scales:crossings           | circle and ellipse that differ by 1e-60
+    2.1   | shapes:zero_links          | links of length zero
+    2.2   | shapes:all_in_one_point    | all joints at one place, a rhombus folded flat
+    2.3   | shapes:against_the_count   | mechanism that moves against the count
+    3.1   | borderline:gap_zero        | gap of a bearing exactly zero, and beside it by 1e-30
+    3.2   | borderline:grashof         | four-bars beside a change point by 1e-400
+    3.3   | borderline:near_fold       | poses 1e-14 before a fold, in doubles and as proofs
+    4.1   | loads:wheels               | torques of 1e18 N m, inertias of 1e200, times of 1e9 s
+    4.2   | loads:stiff_motor          | motor with an electrical time of 1e-15 s over 1000 s
+    4.3   | loads:broken_laws          | torque that becomes NaN or infinite
+    4.4   | loads:budget               | budget of steps used up
+    5.1   | limits:large_graphs        | strongly regular graphs, 255 links, 60! automorphisms
+    5.2   | limits:too_large           | questions beyond reach
+    5.3   | limits:budgets             | proofs with a budget of one box
+    """,
+)
+CASES = (*_LAMBDA, *_PLATFORM, *_INSTRUMENTS, *_STRUCTURE, *_BEYOND)
 
 
 def stress_cases(names: Iterable[str] = (), *, slow: bool = True) -> tuple[Case, ...]:

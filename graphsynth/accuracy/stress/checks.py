@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import zip_longest
+from numbers import Integral
 from typing import Any
 
 from graphsynth.errors import GraphsynthError
@@ -72,7 +73,7 @@ def exact(value: Any) -> Fraction | None:
     """
     if isinstance(value, (str, Fraction)):
         return Fraction(value)
-    if hasattr(value, "__index__"):  # also integers of numpy, which a double may not hold
+    if isinstance(value, Integral):  # also those of numpy, which a double may not hold
         return Fraction(int(value))
     if hasattr(value, "man_exp"):  # mpmath
         if not value.man and value.exp:  # infinities and NaN
@@ -92,7 +93,7 @@ def _text(value: Any) -> str:
         from mpmath import nstr
 
         return str(nstr(value, 22))
-    if getattr(value, "dtype", type(value)) == bool or not hasattr(value, "__float__"):
+    if isinstance(value, bool) or str(getattr(value, "dtype", "")) == "bool" or not hasattr(value, "__float__"):
         return str(value)
     return str(value) if isinstance(value, int) else f"{float(value):.17g}"
 

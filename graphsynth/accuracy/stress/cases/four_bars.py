@@ -67,14 +67,11 @@ def _ratios(theta: float, branch: int) -> tuple[Any, Any]:
     """Velocity ratios by the textbook formulas with 50 digits, for the decimal lengths."""
     import mpmath as mp
 
+    from graphsynth.accuracy.stress.cases.linkages import exact_four_bar
+
+    phi2, phi3 = exact_four_bar("0.02", "0.05", "0.03", "0.06", theta, branch)
     with mp.workdps(60):
-        a, b, c, g, t = mp.mpf("0.02"), mp.mpf("0.05"), mp.mpf("0.03"), mp.mpf("0.06"), mp.mpf(theta)
-        A = a * mp.expj(t)
-        d = abs(g - A)
-        e = (g - A) / d
-        u = (b * b - c * c + d * d) / (2 * d)
-        B = A + e * mp.mpc(u, branch * mp.sqrt(b * b - u * u))
-        phi2, phi3 = mp.arg(B - A), mp.arg(B - g)
+        a, b, c, t = mp.mpf("0.02"), mp.mpf("0.05"), mp.mpf("0.03"), mp.mpf(theta)
         k2 = -a * mp.sin(t - phi3) / (b * mp.sin(phi2 - phi3))
         return k2, a * mp.sin(t - phi2) / (c * mp.sin(phi3 - phi2))
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["built", "four_bar", "wheel"]
+__all__ = ["built", "exact_four_bar", "four_bar", "wheel"]
 
 
 def built(graph: MechanismGraph, joints: Iterable[Any], pose: Iterable[Any] | None = None) -> Mechanism:
@@ -31,6 +31,19 @@ def four_bar(crank: float, coupler: float, rocker: float, frame: float) -> Mecha
         Revolute(0, 3, (frame, 0.0)),
     ]  # fmt: skip
     return built(graph, joints)
+
+
+def exact_four_bar(crank: Any, coupler: Any, rocker: Any, frame: Any, theta: float, branch: int) -> tuple[Any, Any]:
+    """Angles of coupler and rocker with 60 digits by the two circles about A and D, for numbers or decimal text."""
+    import mpmath as mp
+
+    with mp.workdps(60):
+        a, b, c, g, t = (mp.mpf(value) for value in (crank, coupler, rocker, frame, theta))
+        A = a * mp.expj(t)
+        d = abs(g - A)
+        u = (b * b - c * c + d * d) / (2 * d)
+        B = A + (g - A) / d * mp.mpc(u, branch * mp.sqrt(b * b - u * u))
+        return mp.arg(B - A), mp.arg(B - g)
 
 
 def wheel() -> Mechanism:
