@@ -199,7 +199,7 @@ def test_a_broken_case_is_on_the_page_and_in_the_table():
 
 def test_selection():
     assert [c.name for c in stress_cases(["lambda-12.1"])] == ["lambda-12.1"]  # not 12.10 to 12.19
-    assert len(stress_cases(["platform-12"])) == 31 and len(stress_cases(["instruments"])) == 24
+    assert len(stress_cases(["platform-12"])) == 31 and len(stress_cases(["instruments-9"])) == 24
     assert len(stress_cases(["lambda-12"])) == 24
     assert not any(c.slow for c in stress_cases(slow=False))
     slow = next(c for c in CASES if c.slow)
