@@ -73,7 +73,8 @@ def entry(name: str, thing: object) -> str:
         parts.append(f"```python\n{call}\n```\n")
     documented = inspect.isclass(thing) or inspect.isroutine(thing) or inspect.ismodule(thing)
     text = (inspect.getdoc(thing) or "") if documented else ""
-    body, _, examples = text.replace("``", "`").partition("\nExamples\n--------\n")
+    text = re.sub(r":\w+:`~?", "`", text.replace("``", "`"))  # roles of reStructuredText
+    body, _, examples = text.partition("\nExamples\n--------\n")
     if body:
         parts.append(f"````text\n{body.strip()}\n````\n")
     inner = members(thing) if isinstance(thing, type) else ""
