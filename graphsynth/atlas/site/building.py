@@ -18,8 +18,9 @@ from graphsynth.atlas.site.families import (
     family_script,
     groups_script,
     relatives_script,
+    stored_mechanisms,
 )
-from graphsynth.atlas.site.motions import motion_of
+from graphsynth.atlas.site.motions import MotionTask, motion_of
 from graphsynth.atlas.site.sketches import PER_FILE, sketch_scripts
 from graphsynth.errors import GraphsynthError, SpecError
 
@@ -81,7 +82,8 @@ def build_site(
     folder : str or Path
         Made if it does not exist; a page that is there is replaced, anything else is refused.
     motion_links : int
-        Chains of at most so many links are given dimensions and shown in motion (0: none).
+        Chains of at most so many links are given dimensions and shown in motion (0: none at all).  Where the catalogue
+        holds dimensions these are shown, for chains of any size.
     executor : concurrent.futures.Executor, optional
         Who computes sketches and motions; the files are the same for any.
     watch : callable, optional
@@ -149,7 +151,13 @@ def _write(
     """Write all files; return what a report holds after its page."""
     data = folder / "data"
     data.mkdir(parents=True)
-    tasks = [(row["label"], row["key"]) for family in found if family.links <= motion_links for row in family.rows]
+    stored = stored_mechanisms(connection) if motion_links else {}
+    tasks = [
+        MotionTask(row["label"], row["key"], stored.get(row["chain_id"]), family.links <= motion_links)
+        for family in found
+        for row in family.rows
+        if family.links <= motion_links or row["chain_id"] in stored
+    ]
     chains = sum(len(family.rows) for family in found)
     # a motion takes about as long as ten sketches
     progress = _Progress(chains + 10 * len(tasks), watch)
@@ -177,7 +185,7 @@ def _write(
 
 
 def _motions(
-    folder: Path, tasks: list[tuple[str, str]], executor: Executor | None, progress: _Progress
+    folder: Path, tasks: list[MotionTask], executor: Executor | None, progress: _Progress
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Write the pages of motions; yield label and facts."""
     from graphsynth.ordered import in_order

@@ -1,4 +1,4 @@
-"""Motions of chains with dimensions found for them: one page with a player for each."""
+"""Motions of chains, with the dimensions that the catalogue holds or that are found now: one page for each."""
 
 from __future__ import annotations
 
@@ -6,12 +6,34 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["ShownMotion", "choice_of", "motion_of"]
+__all__ = ["MotionTask", "ShownMotion", "choice_of", "motion_of"]
 
 #: Frames and drivers tried, and searches for dimensions with each.
 _CHOICES, _TRIES = 3, 4
+#: Samples of a turn with stored dimensions.
+_SAMPLES = 721
+
+
+@dataclass(frozen=True, slots=True)
+class MotionTask:
+    """A chain to be shown in motion.
+
+    Parameters
+    ----------
+    label, key : str
+    stored : str, optional
+        A mechanism of the chain with dimensions, as JSON, from the evaluations of the catalogue.
+    search : bool
+        Look for dimensions where none are stored, or where those stored do not turn.
+    """
+
+    label: str
+    key: str
+    stored: str | None = None
+    search: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,26 +78,72 @@ def choice_of(chain: MechanismGraph, most: int) -> list[tuple[int, list[int]]]:
     return found
 
 
-def motion_of(task: tuple[str, str]) -> ShownMotion:
-    """Find dimensions for a chain and show it moving; the numbers of the links are those of the key.
+def motion_of(task: MotionTask) -> ShownMotion:
+    """Show a chain moving, with stored dimensions or with such as are found; the numbers of the links are the key's.
 
     Parameters
     ----------
-    task : (str, str)
-        Label and key.
+    task : MotionTask
 
     Returns
     -------
     ShownMotion
         Deterministic.  Where nothing is accepted the page is empty and the statement says why.
     """
+    shown = _stored(task) if task.stored is not None else None
+    if shown is not None:
+        return shown
+    if not task.search:
+        return ShownMotion(task.label, "", "", {"statement": "those of the catalogue make no full turn"})
+    return _searched(task.label, task.key)
+
+
+def _stored(task: MotionTask) -> ShownMotion | None:
+    """Move the mechanism of the catalogue through a turn; None if it is of another chain or does not turn."""
+    import numpy as np
+
+    from graphsynth.errors import GraphsynthError
+    from graphsynth.kinematics.embodiment.verify import length_ratio, smallest_transmission
+    from graphsynth.kinematics.simulation import simulate
+    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.structure.graph import MechanismGraph
+
+    try:
+        mechanism = Mechanism.from_json(task.stored or "")
+        if mechanism.graph.without_frame() != MechanismGraph.from_key(task.key) or not mechanism.drivers:
+            return None
+        motion = simulate(mechanism, np.linspace(0.0, 2.0 * np.pi, _SAMPLES))
+    except GraphsynthError:
+        return None
+    if not motion.completed:
+        return None
+    return _shown(
+        task.label, motion, "dimensions of the catalogue", smallest_transmission(motion), length_ratio(mechanism)
+    )
+
+
+def _shown(label: str, motion: Motion, statement: str, transmission: float, ratio: float) -> ShownMotion:
     from graphsynth.drawing.animation import animation_html
     from graphsynth.drawing.frames import with_trace_points
+
+    mechanism = motion.mechanism
+    page = animation_html(with_trace_points(motion), frames=90, title=f"Chain {label}")
+    frame = mechanism.graph.frame
+    facts = {
+        "frame": frame,
+        "drivers": [driver.link if driver.base == frame else driver.base for driver in mechanism.drivers],
+        "statement": statement,
+        "transmission": round(float(transmission), 4),
+        "ratio": round(float(ratio), 3),
+    }
+    return ShownMotion(label, page, mechanism.to_toml(), facts)
+
+
+def _searched(label: str, key: str) -> ShownMotion:
     from graphsynth.errors import GraphError
     from graphsynth.kinematics.embodiment import embody
     from graphsynth.structure.graph import MechanismGraph
 
-    label, key = task
     chain = MechanismGraph.from_key(key)
     statement = ""
     try:
@@ -88,13 +156,6 @@ def motion_of(task: tuple[str, str]) -> ShownMotion:
         statement = statement or found.statement
         if not found.accepted or found.motion is None or found.mechanism is None or found.figures is None:
             continue
-        page = animation_html(with_trace_points(found.motion), frames=90, title=f"Chain {label}")
-        facts = {
-            "frame": frame,
-            "drivers": drivers,
-            "statement": found.statement,
-            "transmission": round(float(found.figures.transmission_angle), 4),
-            "ratio": round(float(found.figures.length_ratio), 3),
-        }
-        return ShownMotion(label, page, found.mechanism.to_toml(), facts)
+        figures = found.figures
+        return _shown(label, found.motion, found.statement, figures.transmission_angle, figures.length_ratio)
     return ShownMotion(label, "", "", {"statement": statement})

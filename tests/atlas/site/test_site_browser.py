@@ -1,10 +1,13 @@
 """The page used as people use it, in a real headless Chromium: browse, filter, open, save, move, paste, draw."""
 
+import math
 import time
 
 import pytest
 
 from graphsynth import MechanismGraph
+from graphsynth.atlas.catalogue import Catalogue
+from graphsynth.atlas.site import build_site
 from graphsynth.formats.registry import read_text
 
 by = pytest.importorskip("selenium.webdriver.common.by").By
@@ -212,6 +215,32 @@ def test_what_was_not_computed_says_so(page):
     assert "Not in this atlas" in css(window, "#entry").text
 
 
+def test_evaluations_are_shown_and_what_lacks_is_not_computed(window, tmp_path):
+    with Catalogue.build(tmp_path / "own.sqlite", links=[4, 6]) as own:
+        own.evaluate(links=[4])
+        ((angle, frame, driver),) = own.connection.execute(
+            "SELECT value, frame, driver FROM evaluations WHERE kind = 'transmission'"
+        ).fetchall()
+        folder = tmp_path / "Átlas № 1, ход"
+        folder.mkdir()
+        report = build_site(own, folder / "page", motion_links=4)
+    window.get("about:blank")
+    window.get(report.page.as_uri() + "#/1BAN4")
+    until(window, "document.querySelector('#evaluations table')")
+    rows = window.execute_script(
+        "return [...document.querySelectorAll('#evaluations tbody tr')].map(r => [...r.cells].map(c => c.textContent))"
+    )
+    assert rows[0][:4] == [str(frame), str(driver), "dimensions", "found"]
+    assert rows[1] == ["", "", "transmission", "found", f"{float(f'{math.degrees(angle):.4g}'):g}°", "estimated"]
+    assert rows[2] == ["", "", "jamming", "not computed", "", ""]
+    assert "dimensions of the catalogue" in css(window, "#entry").text
+    assert until(window, "document.querySelector('#entry iframe')")
+    window.get(report.page.as_uri() + "#/1BgOB7A")
+    until(window, "document.querySelector('#entry h1')?.textContent === '1.6.4-2.2'")
+    time.sleep(0.3)
+    assert "jamming: not computed in this catalogue" in css(window, "#evaluations").text
+
+
 def test_definitions_open_in_place_and_close_with_escape(page):
     window = page("#/1BAN4")
     term = until(window, "document.querySelector('#entry [data-term=mobility]')")
@@ -263,6 +292,59 @@ def test_what_is_not_in_the_atlas_is_told_why(page):
         field.send_keys(text)
         until(window, "document.querySelector('#answer').textContent.includes(arguments[0])", why)
         assert not window.find_elements(by.CSS_SELECTOR, "#answer b")
+
+
+def test_sentences_name_links_as_they_were_pasted(page):
+    window = page("#/find")
+    field = until(window, "document.querySelector('#pasted')")
+    field.send_keys("11-12, 12-13, 13-14")
+    until(window, "document.querySelector('#answer').textContent.includes('Link 11 has only one joint')")
+
+
+def test_a_long_paste_is_turned_down_before_it_is_laid_out(page):
+    window = page("#/find")
+    until(window, "document.querySelector('#pasted')")
+    kept = window.execute_script(
+        """const data = new DataTransfer(), field = document.querySelector("#pasted");
+           data.setData("text", "0 1 ".repeat(2500000));
+           return field.dispatchEvent(new ClipboardEvent("paste", {clipboardData: data, cancelable: true}));"""
+    )
+    assert not kept  # the browser is told not to put it in
+    assert css(window, "#answer").text == "10000000 characters: at most 20000 are read."
+
+
+def test_nothing_plays_by_itself_where_motion_is_unwanted(page):
+    window = page("#/1BAN4")
+    still = [{"name": "prefers-reduced-motion", "value": "reduce"}]
+    window.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": still})
+    try:
+        window.refresh()
+        frame = until(window, "document.querySelector('#entry iframe')")
+        window.execute_script("arguments[0].scrollIntoView({block: 'center'})", frame)
+        time.sleep(0.5)
+        window.switch_to.frame(frame)
+        until(window, "document.querySelector('.grip')")
+        assert window.execute_script("return playing") is False
+    finally:
+        window.switch_to.default_content()
+        window.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_seven_thousand_rows_are_chosen_and_sorted_at_once(page):
+    window = page()
+    until(window, "document.querySelectorAll('#list li').length")
+    spent = window.execute_script(
+        """const own = Atlas.rows; const many = [];
+           while (many.length < 6856) many.push(...own.map(row => ({...row, id: many.length})));
+           Atlas.rows = many.slice(0, 6856);
+           const begin = performance.now();
+           const found = Atlas.choose({links: "8", planar: "yes", text: "1.8", sort: "symmetry", down: "yes"});
+           const spent = performance.now() - begin;
+           Atlas.rows = own;
+           return [found.length, spent];"""
+    )
+    assert spent[0] > 5000
+    assert spent[1] < 100
 
 
 def test_a_chain_is_drawn_by_mouse(page):

@@ -196,6 +196,33 @@ def test_evaluations_of_the_catalogue_are_handed_over(tmp_path):
     assert data["evaluations"] == {"0": [[frame, str(driver), "jamming", "free", 0.25, "rad", "certified"]]}
 
 
+def test_stored_dimensions_are_shown_in_motion(tmp_path):
+    from graphsynth import Mechanism
+
+    with Catalogue.build(tmp_path / "own.sqlite", links=[4, 6]) as own:
+        own.evaluate(links=[4])
+        mechanism = own.connection.execute("SELECT data FROM evaluations WHERE kind = 'dimensions'").fetchone()[0]
+        # a second mechanism, of a better transmission by its word, that is none of this chain
+        other = json.loads(mechanism)
+        four, six = (
+            own.connection.execute("SELECT key FROM chains WHERE links = ?", (n,)).fetchone()[0] for n in (4, 6)
+        )
+        frame, driver = own.connection.execute(
+            "SELECT frame, driver FROM mechanisms JOIN chains USING (chain_id) WHERE key = ?", (six,)
+        ).fetchone()
+        own.record([Evaluation(six, frame, driver, "dimensions", "found", data=other)])
+        page = build_site(own, tmp_path / "page", motion_links=4)
+    contents = handed(page.page.parent / "data" / "contents.js")[0]
+    shown = {label: facts.get("statement") for label, facts in contents["motions"].items()}
+    assert shown["1.4.4.1"] == "dimensions of the catalogue"
+    assert [words for label, words in shown.items() if label.startswith("1.6.")] == [
+        "those of the catalogue make no full turn"
+    ]
+    moved = Mechanism.from_toml((page.page.parent / "motions" / "1.4.4.1.toml").read_text("utf-8"))
+    assert moved == Mechanism.from_json(json.dumps(json.loads(mechanism)["mechanism"]))
+    assert moved.graph.without_frame() == MechanismGraph.from_key(four)
+
+
 def test_other_mobilities_and_fractionated_chains(tmp_path):
     with Catalogue.build(tmp_path / "two.sqlite", links=[5, 7], mobility=2, fractionated=True) as own:
         page = build_site(own, tmp_path / "page", motion_links=5)

@@ -2,7 +2,7 @@
 
 import json
 import random
-from itertools import combinations
+from itertools import combinations, product
 
 import networkx as nx
 import pytest
@@ -81,6 +81,48 @@ def test_different_graphs_get_different_keys(page):
     first, second = (MechanismGraph(16, list(graph.edges)) for graph in (rook, shrikhande))
     found = [row[0] for row in keys_in_browser(page(), [first, second])]
     assert found == [first.key, second.key] and found[0] != found[1]
+
+
+def hard_graphs():
+    """Symmetric graphs of 24 to 64 links, where searches of this kind are slowest."""
+    latin = [((x, y), (u, v)) for x, y, u, v in product(range(8), repeat=4)]
+    same = [(p, q) for p, q in latin if p < q and (p[0] == q[0] or p[1] == q[1] or p[0] ^ p[1] == q[0] ^ q[1])]
+    return [
+        nx.complete_graph(30), nx.complete_graph(64), nx.complete_bipartite_graph(12, 12),
+        nx.complete_bipartite_graph(32, 32), nx.star_graph(63), nx.empty_graph(64), nx.hypercube_graph(6),
+        nx.complete_multipartite_graph(*[4] * 16), nx.disjoint_union_all([nx.petersen_graph()] * 6), nx.Graph(same),
+        nx.kneser_graph(8, 2), nx.random_regular_graph(3, 64, 1),
+    ]  # fmt: skip
+
+
+def test_a_hard_graph_gets_its_key_or_a_sentence_in_time(page):
+    lots = random.Random(3)
+    window = page()
+    for graph in map(nx.convert_node_labels_to_integers, hard_graphs()):
+        to = list(graph)
+        lots.shuffle(to)
+        again = nx.relabel_nodes(graph, dict(enumerate(to)))
+        found = window.execute_script(
+            """const [n, ...all] = arguments, begin = performance.now();
+               let keys = ["", ""];
+               try { keys = all.map(joints => Atlas.label(Atlas.graph(n, joints)).key); }
+               catch (fault) { if (!(fault instanceof Atlas.Fault)) throw fault; }
+               return [...keys, performance.now() - begin];""",
+            len(graph),
+            *([sorted(edge) for edge in one.edges] for one in (graph, again)),
+        )
+        assert found[0] == found[1]  # the same key in two numberings
+        assert found[2] < 10_000
+        if len(graph) <= 32:
+            assert found[0] == MechanismGraph(len(graph), [tuple(sorted(edge)) for edge in graph.edges]).key
+    # time is up at once: a sentence
+    words = window.execute_script(
+        """const now = performance.now.bind(performance); let calls = 0;
+           performance.now = () => now() + 1e6 * calls++;
+           try { Atlas.label(Atlas.fromGraph6("G?r@`_")); return ""; } catch (fault) { return fault.message; }
+           finally { performance.now = now; }"""
+    )
+    assert "too symmetric" in words
 
 
 def mechanisms(chain):

@@ -6,7 +6,8 @@
   const MIX = 0x9E3779B97F4A7C15n, LEAF = 1n << 63n;
   const word = value => BigInt.asUintN(64, value);
   const mix = (state, value) => { const next = word((state ^ value) * MIX); return next ^ next >> 32n; };
-  const MOST_NODES = 20000;
+  // nodes of a search, and milliseconds: a sentence rather than a page that hangs
+  const MOST_NODES = 20000, MOST_TIME = 4000;
 
   function find(parent, vertex) {
     while (parent[vertex] !== vertex) { parent[vertex] = parent[parent[vertex]]; vertex = parent[vertex]; }
@@ -32,7 +33,7 @@
       const entry = value => new Array(n + 1).fill(value);
       this.lab = entry(null); this.starts = entry(null); this.cell = entry(0); this.left = entry(null);
       this.path = entry(-1); this.trace = entry(0n); this.likeFirst = entry(true); this.versusBest = entry(0);
-      this.haveLeaf = false; this.onFirst = -1; this.nodes = 0;
+      this.haveLeaf = false; this.onFirst = -1; this.nodes = 0; this.begun = performance.now();
       this.firstTrace = []; this.bestTrace = []; this.bestPath = [];
     }
 
@@ -70,7 +71,7 @@
     }
 
     child(level, vertex) {
-      if (++this.nodes > MOST_NODES)
+      if (++this.nodes > MOST_NODES || performance.now() - this.begun > MOST_TIME)
         throw new Atlas.Fault("This graph is too symmetric to be named in the browser; ask graphsynth show for its key.");
       const lab = this.lab[level].slice(), place = this.cell[level], where = lab.indexOf(vertex, place);
       [lab[place], lab[where]] = [lab[where], lab[place]];

@@ -49,9 +49,9 @@
 
   function motion(row) {
     const facts = motionOf(row);
-    if (!facts) return `<p class="soft">Not computed: this atlas gives dimensions to chains of up to ${Atlas.contents.motionLinks} links.</p>`;
+    if (!facts) return `<p class="soft">Not computed${Atlas.contents.motionLinks ? `: this atlas gives dimensions to chains of up to ${Atlas.contents.motionLinks} links` : " in this atlas"}.</p>`;
     if (!facts.drivers) return `<p class="soft">No dimensions were accepted: ${facts.statement}.</p>`;
-    return `<p>Frame ${facts.frame}, driver ${listed(facts.drivers)}; smallest ${Atlas.term("transmission")} ${(facts.transmission * 180 / Math.PI).toFixed(1)}°, ` +
+    return `<p>Frame ${facts.frame}, driver ${listed(facts.drivers)}, ${facts.statement.startsWith("dimensions of") ? "dimensions of the catalogue" : "dimensions found for this page"}; smallest ${Atlas.term("transmission")} ${(facts.transmission * 180 / Math.PI).toFixed(1)}°, ` +
       `longest link over shortest ${facts.ratio}. Drag the driven link. <a href="motions/${row.label}.html">On a page of its own</a> · <a href="motions/${row.label}.toml" download>dimensions, TOML</a></p>` +
       `<iframe src="motions/${row.label}.html" title="Chain ${row.label} in motion" loading="lazy"></iframe>`;
   }
@@ -206,13 +206,27 @@
     $("relatives").querySelectorAll(".thumb").forEach(box => seen.observe(box));
   }
 
+  const KINDS = ["dimensions", "transmission", "jamming"];
+  const measure = (value, unit) => (value === null ? "" : unit === "rad" ? `${+(value * 180 / Math.PI).toPrecision(4)}°` : `${+value.toPrecision(6)} ${unit || ""}`);
+
   async function evaluations(row) {
     const rows = await Atlas.evaluationsOf(row);
     if (state.row !== row || !rows.length) return;
     const heads = ["frame", "driver", "what", "result", "value", "guarantee"].map(words => `<th scope="col">${words}</th>`).join("");
-    const line = ([frame, drivers, kind, status, value, unit, guarantee]) => [frame, drivers, kind, status,
-      value === null ? "" : `${+value.toPrecision(6)} ${unit || ""}`, guarantee || ""].map(words => `<td>${Atlas.plain(String(words))}</td>`).join("");
-    $("evaluations").innerHTML = `<div class="scroll"><table class="inversions"><thead><tr>${heads}</tr></thead><tbody>${rows.map(one => `<tr>${line(one)}</tr>`).join("")}</tbody></table></div>`;
+    const cells = words => words.map(one => `<td>${Atlas.plain(String(one))}</td>`).join("");
+    const mechanisms = new Map();
+    for (const [frame, drivers, ...rest] of rows) {
+      const name = `${frame}|${drivers}`;
+      mechanisms.set(name, [...(mechanisms.get(name) || []), rest]);
+    }
+    const lines = [...mechanisms].flatMap(([name, own]) => {
+      const [frame, drivers] = name.split("|");
+      const missing = KINDS.filter(kind => !own.some(one => one[0] === kind)).map(kind => [kind, "not computed", null, null, null]);
+      return [...own, ...missing].map(([kind, status, value, unit, guarantee], k) =>
+        `<tr>${k ? "<td></td><td></td>" : cells([frame, drivers])}${cells([kind, status, measure(value, unit), guarantee || ""])}</tr>`);
+    });
+    $("evaluations").innerHTML = `<div class="scroll"><table class="inversions"><thead><tr>${heads}</tr></thead><tbody>${lines.join("")}</tbody></table></div>` +
+      `<p class="soft">Other frames and drivers: not computed in this catalogue.</p>`;
   }
 
   function choiceIn(parameters, row, graph, label) {
@@ -244,7 +258,7 @@
       `<div class="columns"><section><h2>${Atlas.term("group", "Structural groups")}</h2><div id="groups"></div></section><section><h2>Properties</h2>${properties(row, label)}</section></div>` +
       `<h2>${Atlas.term("inversion", "Inversions")} and drivers</h2>${inversions(graph, label)}` +
       `<h2>Motion</h2>${motion(row)}` +
-      `<h2>Evaluations</h2><div id="evaluations"><p class="soft">Transmission, jamming: not computed in this catalogue.</p></div>` +
+      `<h2>Evaluations</h2><div id="evaluations"><p class="soft">Dimensions, transmission, jamming: not computed in this catalogue.</p></div>` +
       `<h2>Matrices</h2><div class="columns">${matrixTable(Atlas.matrix(graph), Atlas.term("adjacency"), [...Array(graph.links).keys()])}` +
       `${matrixTable(Atlas.incidence(graph), Atlas.term("incidence"), joints)}</div>` +
       `<h2>${Atlas.term("parent", "Parents and children")}</h2><div id="relatives" class="relatives"></div>` +

@@ -16,6 +16,10 @@
 <button type="button" data-example="1-2, 2-3, 3-4, 4-1, 4-5, 5-6, 6-1">joints</button> <button type="button" data-example="G@Q?~C">graph6</button></p></section>
 <section><h2>Draw</h2><div id="editor"></div></section></div>`;
     $("pasted").addEventListener("input", () => fromText());
+    $("pasted").addEventListener("paste", event => { // the browser would lay millions of characters out first
+      const text = event.clipboardData.getData("text");
+      if (text.length > Atlas.LONGEST) { event.preventDefault(); say(`${text.length} characters: at most ${Atlas.LONGEST} are read.`); }
+    });
     $("find").addEventListener("click", event => {
       const example = event.target.dataset.example;
       if (example) { $("pasted").value = example; fromText(); }
@@ -58,12 +62,14 @@
   async function tell(graph, how, names) {
     const mine = ++asked;
     const head = `${how} ${graph.links} links, ${graph.joints.length} joints${graph.frame === null ? "" : `, frame ${names ? names[graph.frame] : graph.frame}`}.`;
-    const fault = Atlas.judge(graph);
+    const fault = Atlas.judge(graph, names);
     const label = Atlas.label({...graph, frame: null}), row = await Atlas.find(label.key);
     if (mine !== asked) return;
     if (!row) {
       const mobility = Atlas.mobility(graph), held = Atlas.familiesOf(mobility, graph.links).length;
-      const why = fault || (held ? "It is fractionated, or the catalogue is not complete: chains that fall apart at a link are not listed here."
+      const cut = Atlas.cutLink(graph), apart = cut === null ? "This family of the catalogue is not complete."
+        : `It is fractionated: it falls apart at link ${names ? names[cut] : cut}, and this family lists no such chains.`;
+      const why = fault || (held ? apart
         : `This atlas does not reach chains of mobility ${mobility} with ${graph.links} links.`);
       $("answer").innerHTML = `<p>${Atlas.plain(head)} <strong>Not in this atlas.</strong> ${Atlas.plain(why)}</p><p>${Atlas.term("key")} <code>${label.key}</code></p>`;
       return;

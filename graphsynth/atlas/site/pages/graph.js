@@ -57,6 +57,17 @@ Atlas.levels = function (graph, frame = graph.frame) {
 
 Atlas.isConnected = graph => Atlas.levels(graph, 0).flat().length === graph.links;
 
+/** A link without which the rest is not connected, or null. */
+Atlas.cutLink = function (graph) {
+  const near = Atlas.neighbours(graph);
+  for (let cut = 0; graph.links > 2 && cut < graph.links; cut++) {
+    const seen = new Set([cut, cut ? 0 : 1]), waiting = [cut ? 0 : 1];
+    while (waiting.length) for (const next of near[waiting.pop()]) if (!seen.has(next)) { seen.add(next); waiting.push(next); }
+    if (seen.size < graph.links) return cut;
+  }
+  return null;
+};
+
 /** Numbers of links with 2, 3, ... joints, as the labels write them: "4-4". */
 Atlas.assortment = function (graph) {
   const degrees = Atlas.neighbours(graph).map(list => list.length), most = Math.max(2, ...degrees);

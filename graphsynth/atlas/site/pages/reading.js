@@ -3,7 +3,7 @@
 "use strict";
 
 (function () {
-  const LONGEST = 20000;
+  const LONGEST = Atlas.LONGEST = 20000;
 
   Atlas.read = function (text) {
     const {held, ...found} = readPlain(text);
@@ -89,16 +89,17 @@
   }
 
   /** Why a graph is not in the atlas, or what it is: one sentence. */
-  Atlas.judge = function (graph) {
+  Atlas.judge = function (graph, names) {
+    const name = link => (names ? names[link] : link);
     if (graph.space !== 3) return "It is a graph of another space than the plane; the atlas holds planar chains.";
     if (graph.joints.some(joint => joint[2] !== 1)) return "It has joints of mobility 2; the atlas holds chains of turning and sliding pairs (mobility 1).";
     if (!Atlas.isConnected(graph)) return "It is not connected: it is several chains, not one.";
     const near = Atlas.neighbours(graph), loose = near.findIndex(list => list.length < 2);
-    if (loose >= 0) return `Link ${loose} has ${near[loose].length === 1 ? "only one joint" : "no joint"}: links of a closed chain have two or more.`;
+    if (loose >= 0) return `Link ${name(loose)} has ${near[loose].length === 1 ? "only one joint" : "no joint"}: links of a closed chain have two or more.`;
     const mobility = Atlas.mobility(graph);
     if (mobility < 1) return `Its mobility is ${mobility}: it is a structure, not a chain that moves.`;
     const rigid = Atlas.rigidPart(graph);
-    if (rigid) return `Links ${rigid.join(", ")} cannot move against each other: they are one link, and the chain a smaller one.`;
+    if (rigid) return `Links ${rigid.map(name).join(", ")} cannot move against each other: they are one link, and the chain a smaller one.`;
     return null;
   };
 })();
