@@ -219,7 +219,7 @@ def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tupl
     good = [row for row in rows if row.good]
     if not good:
         why = next((row.reason for row in rows if row.reason), "no result")
-        return f"{method}: do not choose it here; every setting failed ({why})."
+        return f"{method}: do not choose it here; every setting failed ({why}){_settings(rows)}."
     mine = [row for row in best if row.method == method]
     if mine:
         text = f"choose it {_range(mine, best, problem.unit)}"
@@ -229,11 +229,20 @@ def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tupl
     else:
         text = _beaten(good, best, problem.unit, floor)
     lost = [row for row in rows if row.status is not RowStatus.OK]
-    tail = ""
+    tail = _settings(rows)
     if lost:
         which = ", ".join(row.setting or "its only setting" for row in lost[:3]) + (" ..." if len(lost) > 3 else "")
-        tail = f"; {len(lost)} of {len(rows)} settings {'is' if len(lost) == 1 else 'are'} no use here ({which})"
+        tail += f"; {len(lost)} of {len(rows)} settings {'is' if len(lost) == 1 else 'are'} no use here ({which})"
     return f"{method}: {text}{tail}."
+
+
+def _settings(rows: Sequence[Row]) -> str:
+    """Say that a method has fewer than three settings, so that its row is a point and no curve."""
+    if len(rows) >= 3:
+        return ""
+    if len(rows) == 1 and not rows[0].setting:
+        return "; it has no setting"
+    return f"; measured at {len(rows)} setting{'s' if len(rows) > 1 else ''} only"
 
 
 def _range(mine: list[Row], best: tuple[Row, ...], unit: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,7 +107,8 @@ def turn_problem(mechanism: SingleMotorPlatform, effort: Effort | None = None) -
             mechanism, "continuation, all modes compared, events", count, truth, effort,
             partial(_turned, mechanism, grid),
         ))  # fmt: skip
-    rows += [_proof(mechanism, boxes, truth, psi, effort) for boxes in (40, 400, 100_000)]
+    limit = _default_boxes()
+    rows += [_proof(mechanism, boxes, truth, psi, effort) for boxes in sorted({40, 400, limit})]
     question = "The home branch of the platform of the scene over a turn of the wheels"
     return Problem("turn", question, "relative", tuple(rows), "position")
 
@@ -132,6 +134,12 @@ def _row(
     )  # fmt: skip
 
 
+def _default_boxes() -> int:
+    from graphsynth.kinematics.certified import certify_full_turn
+
+    return int(signature(certify_full_turn).parameters["max_boxes"].default)
+
+
 def _proof(mechanism: SingleMotorPlatform, boxes: int, truth: Array, psi: Array, effort: Effort) -> Row:
     """Certificate of the whole turn: every angle is proved, so the seconds are those of the turn."""
     method, kind = "certificate of the full turn", "largest proved radius at the nodes"
@@ -141,7 +149,7 @@ def _proof(mechanism: SingleMotorPlatform, boxes: int, truth: Array, psi: Array,
         found, seconds, rounds = best_of(lambda: certify_full_turn(mechanism, max_boxes=boxes), effort)
     except GraphsynthError as error:
         return Row(method, f"{boxes} boxes", math.nan, math.nan, 0, kind, "", RowStatus.FAILED, str(error))
-    default, setting = boxes == 100_000, f"up to {boxes} boxes"
+    default, setting = boxes == _default_boxes(), f"up to {boxes} boxes"
     if not found.certified:
         return Row(
             method, setting, math.nan, seconds, rounds, kind, "", RowStatus.FAILED, found.statement, default, True

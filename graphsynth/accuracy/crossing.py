@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["area_problem", "crossing_problem", "precise_area", "precise_crossing"]
 
 _DIGITS = 50
+#: Parts of the search by boxes after which it is stopped.
+_PARTS = (0.3, 0.6, 0.75, 0.85, 0.92, 0.97)
 _NO_SHARE = "the enclosure is wider than the area itself, {:.3g} mm²"
 
 
@@ -77,7 +79,8 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
     hull, row = _hull_row(given, truth, effort)
     rows = [row]
     limit = signature(krawczyk_boxes).parameters["max_boxes"].default
-    for boxes in effort.some((30, 100, 200, 300, 400, 500, limit)):
+    whole = krawczyk_boxes(given).tested
+    for boxes in effort.some((*(max(1, round(part * whole)) for part in _PARTS), limit)):
         found, seconds, rounds = best_of(lambda n=boxes: krawczyk_boxes(given, max_boxes=n), effort)  # type: ignore[misc]
         # a search that ends by itself is what the default limit gives
         ended = bool(found.finished) or boxes == limit
@@ -123,8 +126,9 @@ def _enclosed(
     # two roundings outward for each coordinate: more than the hull can be too wide
     rounding = float((np.spacing(np.abs(hull.lo)) + np.spacing(np.abs(hull.hi))).max(initial=0.0))
     excess = max(float((found.width - hull.width).max()), rounding)
-    # the search begins with a box from the origin, so an enclosure of that size is no result
-    why = f"{setting} leave the whole start box" if bool((found.lo <= 0.0).any()) else ""
+    # the search begins with a square over the quarter circle: an enclosure of its size is no result
+    radius = float(np.hypot(*hull.hi))
+    why = f"{setting} leave the whole start box" if float(found.width.max()) > 0.99 * radius else ""
     why = why if _holds(found, truth) else "the enclosure does not hold the crossing"
     status = RowStatus.FAILED if why else RowStatus.OK
     return Row(

@@ -56,7 +56,8 @@ def _rows(
 
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     embody(graph)  # compiled and loaded
-    default = signature(embody).parameters["effort"].default
+    given = signature(embody).parameters
+    default = given["effort"].default, given["tries"].default
     rows = []
     for effort, tries in settings:
         errors, times, lost = [], [], ""
@@ -73,7 +74,7 @@ def _rows(
                 "search", f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}",
                 math.nan if missed else middle, median(times), seeds, kind, reference,
                 RowStatus.FAILED if missed else RowStatus.OK, lost if missed else "",
-                default=effort == default, more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
+                default=(effort, tries) == default, more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
             )
         )  # fmt: skip
     return tuple(rows)
@@ -111,6 +112,7 @@ _NOTE = (
 
 def path_problem(effort: Effort | None = None) -> Problem:
     """Find a four-bar linkage through eight points at given inputs, taken from a linkage: no error is possible."""
+    from graphsynth.kinematics.embodiment.api import embody
     from graphsynth.kinematics.embodiment.goals import Goals, PathGoal
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
@@ -119,8 +121,9 @@ def path_problem(effort: Effort | None = None) -> Problem:
     M = LambdaLinkage(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M
     points = tuple((float(x), float(y)) for x, y, _ in M)
     goals = Goals(target=PathGoal(points, tuple(inputs.tolist())), min_transmission_angle=math.radians(15))
-    efforts, seeds = ((0.02, 0.05, 0.1), 1) if effort.quick else ((0.02, 0.1, 0.3, 1.0), 3)
-    settings = tuple((share, 2) for share in efforts)
+    own = signature(embody).parameters
+    efforts, seeds = ((0.02, 0.05, 0.1), 1) if effort.quick else ((0.02, 0.1, 0.3, own["effort"].default), 3)
+    settings = tuple((share, own["tries"].default) for share in efforts)  # a target that is met ends the tries
     rows = _rows(
         goals, settings, seeds, lambda found: found.figures.goal_error,
         f"largest distance from a point over the size of the set, median of {seeds} seeds",

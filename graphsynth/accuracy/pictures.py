@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.accuracy.rows import FLOOR, Problem, Row, RowStatus
@@ -23,7 +24,7 @@ def work_precision_picture(problem: Problem) -> Figure:
     """Draw every row of a problem: time to the right, error upwards; a cross at the upper edge is a failure.
 
     Filled markers are proved results.  A circle around a marker is the library's default.  Unreliable results are
-    crosses at their error.  Errors of rounding size are drawn on one line.
+    crosses at their error.  Errors of rounding size are drawn on one line.  Dashed: a growth law, extrapolated.
 
     Parameters
     ----------
@@ -52,15 +53,48 @@ def work_precision_picture(problem: Problem) -> Figure:
     figure = new_figure((7.2, 5.8))
     axes = figure.subplots()
     top = _top(problem)
+    names: list[Any] = []
     for k, method in enumerate(problem.methods):
         style = {"color": _COLOURS[k % len(_COLOURS)], "marker": _MARKERS[k % len(_MARKERS)]}
-        _method(axes, problem, problem.of(method), top, style)
+        _method(axes, problem, problem.of(method), top, style, names)
+        if problem.count:
+            _law(axes, problem.of(method), problem.count, style["color"])
     if any(row.status is not RowStatus.OK for row in problem.rows):
         axes.plot([], [], "x", color=_SOFT, ms=8, mew=2, label="failed (upper edge) or unreliable")
     if any(row.default for row in problem.rows):
         axes.plot([], [], "o", ms=11, mfc="none", mec=_SOFT, label="default of the library")
     _dress(axes, problem, top)
+    _part(figure, axes, names)
     return figure
+
+
+def _decades(axes: Any, name: str, least: float) -> None:
+    """Widen an axis to some decades, so that noise looks like noise; numbers at decades only."""
+    from matplotlib.ticker import NullFormatter
+
+    left, right = getattr(axes, f"get_{name}lim")()
+    low, high = math.log10(min(left, right)), math.log10(max(left, right))
+    room = max(0.0, least - (high - low)) / 2.0
+    ends = 10.0 ** (low - room), 10.0 ** (high + room)
+    getattr(axes, f"set_{name}lim")(ends if left < right else ends[::-1])
+    getattr(axes, f"{name}axis").set_minor_formatter(NullFormatter())
+
+
+def _law(axes: Any, rows: tuple[Row, ...], count: str, colour: str) -> None:
+    """Draw the growth law of a method, dashed, a hundred times further than it was measured."""
+    from graphsynth.accuracy.enumeration import growth
+
+    good = [row for row in rows if row.good]
+    law = growth([row.more[count] for row in good], [row.seconds for row in good])
+    if law is None:
+        return
+    largest = max(row.more[count] for row in good)
+    ends = [min(row.more[count] for row in good if row.more[count] >= 100.0), 100.0 * largest]
+    axes.plot(ends, [law.seconds(n) for n in ends], "--", color=colour, lw=0.9, alpha=0.7)
+    axes.annotate(
+        f"time ~ {count}^{law.exponent:.2f}", (ends[1], law.seconds(ends[1])), textcoords="offset points",
+        xytext=(-4, 4), ha="right", fontsize=7, color=colour,
+    )  # fmt: skip
 
 
 def _top(problem: Problem) -> float:
@@ -79,7 +113,9 @@ def _place(problem: Problem, row: Row, top: float) -> tuple[float, float]:
     return (row.more.get(problem.over, math.nan) if problem.over else row.seconds), height
 
 
-def _method(axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, style: dict[str, str]) -> None:
+def _method(
+    axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, style: dict[str, str], names: list[Any]
+) -> None:
     good = [row for row in rows if row.good]
     places = [_place(problem, row, top) for row in good]
     colour = style["color"]
@@ -99,20 +135,54 @@ def _method(axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, styl
     for row in rows:
         if row.status is not RowStatus.OK:
             x, y = _place(problem, row, top)
-            axes.plot(x if math.isfinite(x) else max(times, default=1.0), y, "x", color=colour, ms=8, mew=2)
-    _name_ends(axes, rows, good, places, colour)
+            axes.plot(x if math.isfinite(x) else max(times, default=1.0), y, "x", color=colour, ms=9, mew=2.2, zorder=4)
+    _name_ends(axes, rows, good, places, colour, names)
 
 
-def _name_ends(axes: Any, rows: tuple[Row, ...], good: list[Row], places: list[Any], colour: str) -> None:
-    """Write the settings at the first and the last point of a line."""
+def _name_ends(
+    axes: Any, rows: tuple[Row, ...], good: list[Row], places: list[Any], colour: str, taken: list[Any]
+) -> None:
+    """Write the settings at the first and the last point of a line, where no other text stands."""
     for k in sorted({0, len(good) - 1}) if good else ():
         if not good[k].setting:
             continue
         below = k > 0 or len(rows) == 1
-        axes.annotate(
+        text = axes.annotate(
             good[k].setting, places[k], textcoords="offset points", xytext=(5, -10 if below else 6), fontsize=7,
             color=colour, ha="left",
         )  # fmt: skip
+        taken.append((text, places[k]))
+
+
+#: Where the name of a setting may stand beside its marker, in points: offset and alignment, the best first.
+_SPOTS = (
+    ((6, 6), "left"), ((6, -11), "left"), ((-6, 6), "right"), ((-6, -11), "right"), ((6, 15), "left"),
+    ((6, -20), "left"), ((-6, 15), "right"), ((-6, -20), "right"), ((6, 24), "left"), ((6, -29), "left"),
+)  # fmt: skip
+
+
+def _part(figure: Any, axes: Any, names: list[Any]) -> None:
+    """Move names of settings that overlap each other, a marker or the edge to a free spot; drop those without one."""
+    from matplotlib.transforms import Bbox
+
+    figure.draw_without_rendering()
+    inside = axes.get_window_extent()
+    points = [axes.transData.transform(xy) for line in axes.lines for xy in line.get_xydata()]
+    kept: list[Any] = []
+    for text, _ in names:
+        for offset, side in _SPOTS:
+            text.set(ha=side, position=offset)
+            box = text.get_window_extent()
+            within = inside.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and inside.y0 <= box.y0 and box.y1 <= inside.y1
+            if (
+                within
+                and not any(box.overlaps(other) for other in kept)
+                and not any(box.contains(*at) for at in points)
+            ):
+                kept.append(Bbox(box.padded(1.0)))
+                break
+        else:
+            text.set_visible(False)
 
 
 def _dress(axes: Any, problem: Problem, top: float) -> None:
@@ -121,7 +191,7 @@ def _dress(axes: Any, problem: Problem, top: float) -> None:
     if problem.count:
         axes.set(xlabel=problem.count, ylabel=f"time of one {problem.per} [s]")
     else:
-        unit = "" if problem.unit == "relative" else f" [{problem.unit}]"
+        unit = " (relative)" if problem.unit == "relative" else f" [{problem.unit}]"
         axes.set(xlabel=problem.over or f"time of one {problem.per} [s]", ylabel=f"error{unit}")
         if any(not math.isfinite(row.error) for row in problem.rows):
             axes.axhline(top, color=_SOFT, lw=0.8, ls=":")
@@ -129,8 +199,10 @@ def _dress(axes: Any, problem: Problem, top: float) -> None:
         axes.invert_xaxis()  # harder to the right
     if not any(row.good for row in problem.rows):
         axes.set_ylim(0.1 * top, 10.0 * top)
-    axes.set_title(problem.question, fontsize=9, loc="left")
+    axes.set_title(fill(problem.question, 92), fontsize=9, loc="left")
     axes.margins(0.12, 0.1)
+    _decades(axes, "x", 2.3)
+    _decades(axes, "y", 3.0)
     axes.grid(which="major", color="#e8ebef", lw=0.8)
     axes.set_axisbelow(True)
     for side in ("top", "right"):

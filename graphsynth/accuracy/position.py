@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["NODES", "Closed", "eight_link", "four_bar", "position_problem", "precise_points", "precise_poses"]
+__all__ = ["NODES", "Closed", "four_bar", "position_problem", "precise_points", "precise_poses"]
 
 Array = NDArray[np.float64]
 #: Name of a closed form, and what it gives at inputs (n,): the position (n,) of the watched point, complex.
@@ -78,21 +78,6 @@ def _point(poses: Array, watched: tuple[int, tuple[float, float]]) -> NDArray[np
     link, at = watched
     place = poses[..., link, :]
     return np.asarray(place[..., 0] + 1j * place[..., 1] + np.exp(1j * place[..., 2]) * complex(*at))
-
-
-def eight_link() -> Mechanism:
-    """Return an eight-link mechanism with an Assur group of more than two links that turns fully; always the same."""
-    from graphsynth.kinematics.embodiment.api import embody
-    from graphsynth.structure.assur import decompose
-    from graphsynth.synthesis import enumerate_chains
-
-    for chain in enumerate_chains(8):
-        found = embody(chain, tries=2)
-        if found.accepted and found.mechanism is not None:
-            parts = decompose(found.mechanism.graph, found.drivers)
-            if max(len(group.links) for group in parts.groups) > 2:
-                return found.mechanism
-    raise GeometryError("no eight-link chain could be given dimensions")
 
 
 def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any]]:

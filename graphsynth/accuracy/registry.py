@@ -57,7 +57,7 @@ PLANS: dict[str, tuple[Plan, ...]] = {
     "braider": _plans("braider", "start-up", "linkage-dynamics", "positions"),
     "platform_drive": _plans("platform_drive", "drive", "small-inductance"),
     "floating_piston": _plans("floating_piston", "positions", "loads", "work"),
-    "planar": _plans("planar", "positions", "dimensions", "path-dimensions"),
+    "planar": _plans("planar", "positions", "coupled-joints", "linkage-dynamics", "dimensions", "path-dimensions"),
     "four_bar_survey": _plans("survey", "many-sets", "arc-ends", "crossing", "dimensions"),
 }
 

@@ -44,6 +44,8 @@ class AccuracyReport:
         Processor, threads and versions, in one line.
     times : mapping of str to float
         Wall time of each measurement, reference, loading and compiling included.
+    interrupted : bool
+        Whether Ctrl-C ended the measurement; what was not finished is left out.
     """
 
     scene: str
@@ -52,6 +54,7 @@ class AccuracyReport:
     seconds: float
     machine: str
     times: Mapping[str, float] = field(default_factory=dict)
+    interrupted: bool = False
 
     @cached_property
     def advice(self) -> dict[str, dict[str, str]]:
@@ -86,7 +89,7 @@ class AccuracyReport:
         return {
             "scene": self.scene, "machine": self.machine, "seconds": round(self.seconds, 3),
             "measured in": {name: round(value, 3) for name, value in self.times.items()}, "problems": problems,
-            "left_out": [list(pair) for pair in self.left_out],
+            "left_out": [list(pair) for pair in self.left_out], "interrupted": self.interrupted,
         }  # fmt: skip
 
 
@@ -112,14 +115,19 @@ def measure(
     Returns
     -------
     AccuracyReport
-        A problem that a scene's numbers do not pose (no jam, no crossing) is left out with its reason.
+        A problem that a scene's numbers do not pose (no jam, no crossing) is left out with its reason, and so is one
+        whose measurement fails.  Ctrl-C ends the measurement; what is finished is kept.
 
     Raises
     ------
     SceneError
-        If the scene cannot be built, or none of its problems exists.
+        If the scene cannot be built.
+    KeyboardInterrupt
+        Ctrl-C before the first problem is finished.
     """
-    begin, found, left_out, times = perf_counter(), [], [], {}
+    begin, interrupted, times = perf_counter(), False, {}
+    found: list[Problem] = []
+    left_out: list[tuple[str, str]] = []
     effort = effort or Effort()
     for done, plan in enumerate(plans):
         if progress:
@@ -129,14 +137,33 @@ def measure(
             found.append(replace(load(plan)(context, effort), name=plan.name))
         except SceneError:
             raise
-        except GraphsynthError as error:
-            left_out.append((plan.name, " ".join(str(error).split())))
+        except (KeyboardInterrupt, Exception) as error:
+            interrupted = _by_hand(error)
+            if interrupted and not found:
+                raise
+            left_out.append((plan.name, "interrupted" if interrupted else _why(error)))
         times[plan.name] = perf_counter() - start
+        if interrupted:
+            left_out += [(rest.name, "not begun: interrupted") for rest in plans[done + 1 :]]
+            break
     if progress:
         progress("done", len(plans), len(plans))
     return AccuracyReport(
-        context.scene.name, tuple(found), tuple(left_out), perf_counter() - begin, _machine(), times
+        context.scene.name, tuple(found), tuple(left_out), perf_counter() - begin, _machine(), times, interrupted
     )  # fmt: skip
+
+
+def _by_hand(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an exception: the compiler of the kernels turns it into one of its own."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _why(error: BaseException) -> str:
+    """Reason in one line; what nobody foresaw is named as the failure it is."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, GraphsynthError) else f"failed: {type(error).__name__}: {text}"
 
 
 def _machine() -> str:

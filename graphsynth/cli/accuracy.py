@@ -29,18 +29,33 @@ def run(options: argparse.Namespace) -> int:
             f"{scene.place}: no numerical method is known for module = {scene.mechanism.module!r}; other packages add "
             "some through the entry points graphsynth.accuracy"
         )
+    folder = options.out or Path("graphsynth-out") / f"{scene.name}-accuracy"
+    _check_writable(folder)
     effort = Effort(rounds=options.rounds, quick=options.quick)
     with _progress() as progress:
         report = measure(Context(scene), plans, effort, progress)
-    folder = options.out or Path("graphsynth-out") / f"{scene.name}-accuracy"
     files = write_report(report, folder)
     if options.json:
         console.put_json({**report.document(), "folder": str(folder), "files": [file.name for file in files]})
-        return 0
-    for line in summary(report):
-        console.put(line)
-    console.put(f"{len(report.to_pandas())} rows in {report.seconds:.0f} s: {folder / 'accuracy.html'}")
+    else:
+        for line in summary(report):
+            console.put(line)
+        console.put(f"{len(report.to_pandas())} rows in {report.seconds:.0f} s: {folder / 'accuracy.html'}")
+    if report.interrupted:
+        console.note(f"what was measured before is kept in {folder}")
+        raise KeyboardInterrupt
     return 0
+
+
+def _check_writable(folder: Path) -> None:
+    """Refuse a folder that cannot be written now, not after a minute of measurements."""
+    from tempfile import TemporaryFile
+
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from error
 
 
 @contextmanager

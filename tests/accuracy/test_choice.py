@@ -64,14 +64,18 @@ def test_sentences_of_a_small_table():
     )  # fmt: skip
     said = advice(Problem("p", "q", "mm", table))
     assert said["polygon"] == (
-        "polygon: choose it for errors down to 0.01 mm (16 corners, 10 µs); finer errors are cheaper with closed form."
+        "polygon: choose it for errors down to 0.01 mm (16 corners, 10 µs); finer errors are cheaper with closed form; "
+        "measured at 2 settings only."
     )
     assert said["closed form"].startswith("closed form: choose it for errors from 0.01 mm down to 1e-15 mm (100 µs)")
+    assert said["closed form"].endswith("; it has no setting.")
     assert said["sweep"].startswith(
         "sweep: choose it where a proof is wanted, for errors down to 1e-06 mm (fine, 100 ms)"
     )
     assert said["sweep"].endswith("; 1 of 3 settings is no use here (finest).")
-    assert said["guess"] == "guess: do not choose it here; every setting failed (it never converges)."
+    assert said["guess"] == (
+        "guess: do not choose it here; every setting failed (it never converges); measured at 1 setting only."
+    )
     assert "take closed form instead: 1e-15 mm in 100 µs, 10000 times faster" in said["slow"]
 
 
@@ -130,3 +134,11 @@ def test_times_are_written_with_two_digits():
         "no time",
         "20 ns",
     ]
+
+
+@given(rows.filter(bool))
+def test_fewer_than_three_settings_are_said(given):
+    problem = Problem("p", "q", "mm", tuple(given))
+    for method, text in advice(problem).items():
+        few = "it has no setting" in text or "only" in text
+        assert few == (len(problem.of(method)) < 3)
