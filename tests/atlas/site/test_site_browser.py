@@ -414,6 +414,25 @@ def test_light_and_dark_by_the_system_and_by_choice(page):
         window.execute_script("document.querySelector('#theme').dispatchEvent(new Event('change'))")
 
 
+def test_paper_is_white_whatever_the_screen(page):
+    window = page("#/1BAN4")
+    until(window, "document.querySelector('#entry h1')")
+    dark = [{"name": "prefers-color-scheme", "value": "dark"}]
+    window.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print", "features": dark})
+    try:
+        for theme in ("auto", "dark"):
+            window.execute_script("document.documentElement.dataset.theme = arguments[0]", theme)
+            colours = window.execute_script(
+                "const s = getComputedStyle(document.body); return [s.backgroundColor, s.color]"
+            )
+            assert colours == ["rgb(255, 255, 255)", "rgb(32, 38, 43)"]
+        assert not css(window, ".top").is_displayed()
+        assert css(window, "#sketch").is_displayed()
+    finally:
+        window.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
+        window.execute_script("document.documentElement.dataset.theme = 'auto'")
+
+
 def test_no_text_is_too_faint(page):
     # WCAG 2: 4.5 to 1 for text; colours of text on the paper and on cards, light and dark
     window = page()

@@ -295,3 +295,16 @@ def test_saved_files_are_read_by_the_package(page):
             assert MechanismGraph.from_graph6(texts.pop("g6").strip()) == graph.without_frame()
             for suffix, text in texts.items():
                 assert read_text(text, suffixes[suffix]) == [graph], suffix
+
+
+def test_links_that_hold_a_chain_together(page):
+    lots = random.Random(5)
+    graphs = [nx.gnm_random_graph(lots.randint(3, 9), lots.randint(3, 14), seed=k) for k in range(300)]
+    graphs = [graph for graph in graphs if nx.is_connected(graph)]
+    cuts = page().execute_script(
+        "return arguments[0].map(([n, joints]) => Atlas.cutLink(Atlas.graph(n, joints)))",
+        [[len(graph), [sorted(edge) for edge in graph.edges]] for graph in graphs],
+    )
+    assert len(graphs) > 100 and None in cuts
+    for graph, cut in zip(graphs, cuts, strict=True):
+        assert cut == min(nx.articulation_points(graph), default=None)
