@@ -2,7 +2,9 @@
 
     python catalog/build_shipped.py
 
-All planar chains of mobility-1 joints with mobility 1 to 4 and at most ten links, fractionated ones included.
+All planar chains of mobility-1 joints with mobility 1 to 4 and at most ten links, fractionated ones included.  One
+mechanism of each chain of mobility 1 with at most eight links has dimensions with which it turns; the four-bar linkage
+also has a verdict on jamming.
 """
 
 from pathlib import Path
@@ -12,12 +14,22 @@ from graphsynth.atlas.catalogue import Catalogue
 FOLDER = Path(__file__).parent
 LINKS = range(4, 11)
 MOBILITIES = range(1, 5)
+EVALUATED = range(4, 9)
+#: Tilt of the motor and of what every joint takes up, radians.
+JAMMING = (0.001, 0.005)
 
 
 def build(path: Path) -> None:
     """Build the shipped catalogue."""
     for mobility in MOBILITIES:
         Catalogue.build(path, LINKS, mobility, fractionated=True).close()
+
+
+def evaluate(path: Path) -> None:
+    """Give the smaller chains dimensions."""
+    with Catalogue(path) as catalogue:
+        catalogue.evaluate(EVALUATED, [1])
+        catalogue.evaluate([4], [1], jamming=JAMMING)
 
 
 def statement(catalogue: Catalogue) -> str:
@@ -48,6 +60,7 @@ def main() -> None:
     path, fresh = FOLDER / "up-to-10-links.sqlite", FOLDER / "up-to-10-links.sqlite.new"
     fresh.unlink(missing_ok=True)
     build(fresh)
+    evaluate(fresh)
     with Catalogue(fresh) as catalogue:
         found = catalogue.verify()
         print(found.statement)

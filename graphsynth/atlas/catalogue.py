@@ -5,12 +5,12 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.building import BuildStep
-from graphsynth.atlas.schema import connect, settle
+from graphsynth.atlas.schema import connect, readable, settle
 from graphsynth.errors import FormatError, SpecError
 
 if TYPE_CHECKING:
@@ -98,7 +98,8 @@ class Catalogue:
         """
         from graphsynth.atlas.making import make
 
-        make(Path(path), links, mobility, fractionated, executor, shard, watch)
+        with readable(Path(path)):
+            make(Path(path), links, mobility, fractionated, executor, shard, watch)
         return cls(path)
 
     @classmethod
@@ -119,7 +120,8 @@ class Catalogue:
         """
         from graphsynth.atlas.merging import merge
 
-        merge(Path(path), [Path(part) for part in parts])
+        with readable(Path(path)):
+            merge(Path(path), [Path(part) for part in parts])
         return cls(path)
 
     @classmethod
@@ -154,15 +156,13 @@ class Catalogue:
         return int(self._rows("SELECT COUNT(*) FROM chains", ())[1][0][0])
 
     def _rows(self, text: str, parameters: Sequence[Any]) -> tuple[list[str], list[tuple[Any, ...]]]:
-        try:
-            cursor = self.connection.execute(text, tuple(parameters))
-            return [column[0] for column in cursor.description or ()], cursor.fetchall()
-        except sqlite3.DatabaseError as error:
-            if isinstance(error, sqlite3.OperationalError | sqlite3.ProgrammingError):
-                raise SpecError(f"SQLite refuses {text!r}: {error}") from None
-            raise FormatError(f"the file is damaged ({error}): build it anew", str(self.path)) from None
-        except (sqlite3.Error, sqlite3.Warning, ValueError) as error:
-            raise SpecError(f"SQLite refuses {text!r}: {error}") from None
+        from graphsynth.atlas.asking import ask
+
+        return ask(self.connection, self.path, text, parameters)
+
+    def _readable(self) -> AbstractContextManager[None]:
+        """Rows of a damaged file may hold whatever."""
+        return readable(self.path, ValueError, TypeError, LookupError, ArithmeticError)
 
     def query(self, table: str = "chains", where: str = "1", parameters: Sequence[Any] = ()) -> pd.DataFrame:
         """Return the rows of a table that fulfil an SQL condition.
@@ -179,19 +179,30 @@ class Catalogue:
         Raises
         ------
         SpecError
-            For an unknown table or a condition that SQLite refuses; the message says why.
+            For an unknown table or column, with those there are, or a condition that SQLite refuses.
+        FormatError
+            If the file is damaged.
         """
+        from graphsynth.atlas.asking import columns
+
         if table not in _TABLES:
             raise SpecError(f"there is no table {table!r}; choose one of {', '.join(_TABLES)}")
-        return self.sql(f"SELECT * FROM {table} WHERE {where}", parameters)
+        try:
+            return self.sql(f"SELECT * FROM {table} WHERE {where}", parameters)
+        except SpecError as error:
+            if "no such column" not in str(error):
+                raise
+            raise SpecError(f"{error}; {table} has {', '.join(columns(self.connection, table))}") from None
 
     def sql(self, text: str, parameters: Sequence[Any] = ()) -> pd.DataFrame:
-        """Return the result of any SQL question; the file is open read-only.
+        """Return the result of any SQL question that only reads.
 
         Raises
         ------
         SpecError
-            If SQLite refuses it.
+            If SQLite refuses it, or it would write or attach a file.
+        FormatError
+            If the file is damaged.
         """
         import pandas as pd
 
@@ -208,7 +219,8 @@ class Catalogue:
         """
         from graphsynth.structure.graph import MechanismGraph
 
-        return MechanismGraph.from_key(self._fetch(name)["key"])
+        with self._readable():
+            return MechanismGraph.from_key(self._fetch(name)["key"])
 
     def _fetch(self, name: str) -> dict[str, Any]:
         columns, rows = self._rows("SELECT * FROM chains WHERE key = ? OR label = ?", (name, name))
@@ -228,7 +240,8 @@ class Catalogue:
         """
         from graphsynth.atlas.entry import entry
 
-        return entry(self.connection, self._fetch(name))
+        with self._readable():
+            return entry(self.connection, self._fetch(name))
 
     def record(self, evaluations: Iterable[Evaluation]) -> int:
         """Store evaluations of mechanisms, one for each mechanism and kind (a new one replaces the old).
@@ -247,7 +260,7 @@ class Catalogue:
         """
         from graphsynth.atlas.evaluations import record
 
-        with self._written():
+        with readable(self.path), self._written():
             return record(self.path, evaluations)
 
     @contextmanager
@@ -256,7 +269,8 @@ class Catalogue:
         try:
             yield
         finally:
-            if self.path.with_name(self.path.name + "-wal").exists():
+            real = self.path.resolve()
+            if real.with_name(real.name + "-wal").exists():
                 self.connection.close()
                 with closing(connect(self.path)) as connection:
                     settle(connection)
@@ -314,7 +328,7 @@ class Catalogue:
         from graphsynth.atlas.evaluating import Settings, evaluate
 
         settings = Settings(seed, tries) if jamming is None else Settings(seed, tries, *jamming)
-        with self._written():
+        with readable(self.path), self._written():
             return evaluate(self.path, links, mobility, per_chain, limit, settings, executor, watch)
 
     def mechanism(self, name: str, frame: int | None = None, driver: int | str | None = None) -> Mechanism:
@@ -335,7 +349,8 @@ class Catalogue:
         from graphsynth.atlas.evaluations import dimensions
         from graphsynth.mechanism.model import Mechanism
 
-        return Mechanism.from_json(dimensions(self.entry(name), frame, driver))
+        with self._readable():
+            return Mechanism.from_json(dimensions(self.entry(name), frame, driver))
 
     def completeness(self) -> pd.DataFrame:
         """Return the statement of completeness, one row for each family.
@@ -346,7 +361,8 @@ class Catalogue:
         """
         from graphsynth.atlas.statement import completeness
 
-        return completeness(self.connection)
+        with self._readable():
+            return completeness(self.connection)
 
     def verify(self, *, chains: int | None = None, seed: int = 0) -> Verification:
         """Recompute every stored field by another route and compare (exact).
@@ -374,7 +390,8 @@ class Catalogue:
         """
         from graphsynth.atlas.exporting import digest
 
-        return digest(self.connection)
+        with self._readable():
+            return digest(self.connection)
 
     def export(self, folder: str | Path, form: str = "parquet") -> list[Path]:
         """Write the tables to a folder, one file each; equal catalogues give equal bytes.
@@ -397,4 +414,5 @@ class Catalogue:
         """
         from graphsynth.atlas.exporting import export
 
-        return export(self.connection, Path(folder), form)
+        with self._readable():
+            return export(self.connection, Path(folder), form)

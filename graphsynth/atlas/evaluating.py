@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.evaluations import Evaluation, store
-from graphsynth.atlas.schema import connect, settle
+from graphsynth.atlas.schema import connect, readable, settle
 from graphsynth.errors import GraphError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
@@ -122,7 +122,8 @@ def evaluate(
         raise SpecError("the numbers of mechanisms must be 0 or more")
     with closing(connect(path)) as connection:
         try:
-            wanted = list(islice(tasks(connection, links, mobility, per_chain, settings), limit))
+            with readable(path, ValueError, LookupError, TypeError):
+                wanted = list(islice(tasks(connection, links, mobility, per_chain, settings), limit))
             found = 0
             for done, evaluations in enumerate(in_order(executor, evaluate_task, wanted), 1):
                 store(connection, evaluations)

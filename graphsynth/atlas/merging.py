@@ -10,7 +10,9 @@ from typing import Any
 
 from graphsynth.atlas.building import build_family, finish_family, open_family, transaction
 from graphsynth.atlas.facts import GroupRow, Rows
-from graphsynth.atlas.schema import connect, settle
+from graphsynth.atlas.making import expected_of
+from graphsynth.atlas.pieces import problem_of
+from graphsynth.atlas.schema import connect, readable, settle
 from graphsynth.errors import GraphsynthError, SpecError
 
 __all__ = ["merge"]
@@ -41,12 +43,12 @@ def _families(shards: list[sqlite3.Connection]) -> list[tuple[int, int, int]]:
 def _merge_family(
     target: sqlite3.Connection, question: tuple[int, int, int], names: dict[sqlite3.Connection, Path]
 ) -> None:
-    mobility, links, _ = question
+    mobility, links, fractionated = question
     where: dict[int, tuple[sqlite3.Connection, int, int]] = {}
-    cuts: dict[tuple[int, str, int], Path] = {}
+    cuts: dict[tuple[int, str], Path] = {}
     for shard, name in names.items():
         row = shard.execute(
-            "SELECT family_id, pieces, cut, expected FROM families WHERE (mobility, links, fractionated) = (?, ?, ?)",
+            "SELECT family_id, pieces, cut FROM families WHERE (mobility, links, fractionated) = (?, ?, ?)",
             question,
         ).fetchone()
         if row is None:
@@ -65,14 +67,20 @@ def _merge_family(
         raise GraphsynthError(
             f"{' and '.join(map(str, cuts.values()))} were built by different versions: build all shards with one"
         )
-    pieces, cut, expected = next(iter(cuts))
+    pieces, cut = next(iter(cuts))
     _check_all_there(question, pieces, where, names)
+    expected = expected_of(problem_of(links, mobility, bool(fractionated)), None)
+    if not expected:
+        return
     family_id, complete = open_family(target, question, (pieces, cut, "1/1", expected))
     if complete:
         return
 
     def results(places: list[int]) -> Iterator[Rows]:
-        return (_read(*where[piece]) for piece in places)
+        for piece in places:
+            with readable(names[where[piece][0]], TypeError, ValueError, LookupError):
+                rows = _read(*where[piece])
+            yield rows
 
     build_family(target, family_id, mobility, [(piece, 1.0) for piece in range(pieces)], results)
     finish_family(target, family_id)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from graphsynth.errors import FormatError
+from graphsynth.errors import FormatError, GraphsynthError
 
-__all__ = ["APPLICATION_ID", "INDEXES", "SCHEMA", "SCHEMA_VERSION", "connect", "settle"]
+__all__ = ["APPLICATION_ID", "INDEXES", "SCHEMA", "SCHEMA_VERSION", "connect", "readable", "settle"]
 
 #: In the header of every catalogue file ("GSyn"), so that another SQLite file is not taken for one.
 APPLICATION_ID = 0x4753796E
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 SCHEMA = """
 CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -22,7 +25,7 @@ CREATE TABLE families (
   pieces INTEGER NOT NULL,      -- units of work
   cut TEXT NOT NULL,            -- fingerprint of the question and of its cut into pieces
   shard TEXT NOT NULL,          -- 'i/m': the part of the family this file holds
-  expected INTEGER NOT NULL,             -- chains of the whole family by counting without listing
+  expected INTEGER,             -- chains of the whole family by counting without listing; a shard is not counted
   complete INTEGER NOT NULL,    -- 1 when every piece is there and labels are given
   UNIQUE (mobility, links));
 -- a piece that is written stands here, in the same transaction as its chains, which have consecutive numbers
@@ -96,6 +99,8 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
         raise FormatError("the folder of the catalogue does not exist: make it, or name another file", str(path))
     mode = "ro" if readonly else "rwc" if create else "rw"
     connection = None
+    if readonly and _is_still(path):
+        mode = "ro&immutable=1"
     try:
         connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None)
         _check(connection, path, create)
@@ -111,6 +116,38 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
             connection.close()
         raise
     return connection
+
+
+def _is_still(path: Path) -> bool:
+    """Whether nobody can write the file, as on a read-only medium: SQLite then needs no files beside it."""
+    return not os.access(path, os.W_OK) and not os.access(path.resolve().parent, os.W_OK)
+
+
+@contextmanager
+def readable(path: Path, *garbage: type[Exception]) -> Iterator[None]:
+    """Turn what a damaged file does to a reader into one sentence.
+
+    Parameters
+    ----------
+    path : Path
+    *garbage : exception types
+        What values that nobody wrote may cause, beside the errors of SQLite.
+
+    Raises
+    ------
+    FormatError
+        If the file is damaged.
+    """
+    damage: tuple[type[Exception], ...] = (sqlite3.Error, *garbage)
+    try:
+        yield
+    except GraphsynthError:
+        raise
+    except damage as error:
+        raise FormatError(
+            f"the file is damaged or cannot be read ({error}): 'graphsynth catalog verify' says where; build it anew",
+            str(path),
+        ) from None
 
 
 def _check(connection: sqlite3.Connection, path: Path, create: bool) -> None:

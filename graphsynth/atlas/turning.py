@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 
 #: Steps of a turn: half a degree, the grid of :mod:`graphsynth.kinematics.embodiment.verify`.
 _STEPS = 720
+_STRIDE = 10
 _ITERATIONS = 30
 #: Largest gap of a joint over the largest length, and largest change of an angle within a step, radians.
-_GAP, _JUMP = 1e-11, 0.5
+_GAP, _JUMP = 1e-11, 0.1
 
 
 class Turning:
@@ -63,12 +64,12 @@ class Turning:
         c, s, x, y = np.cos(angle), np.sin(angle), self.arms[..., 0], self.arms[..., 1]
         return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
-    def residual(self, pose: Array, u: float) -> Array:
-        """Gaps of all joints, the frame at rest, and the drivers at the input."""
-        points = pose[self.ends, :2] + self._turned(pose)
-        gaps = (points[:, 0] - points[:, 1]).ravel()
-        angles = pose[self.driven, 2] - pose[self.frame, 2] - self.offsets - u
-        return np.concatenate([gaps, pose[self.frame], angles])
+    def residual(self, pose: Array, u: Array) -> Array:
+        """Gaps of all joints, the frame at rest, and the drivers at the inputs, for poses of shape (n, links, 3)."""
+        points = pose[:, self.ends, :2] + self._turned(pose)
+        gaps = (points[..., 0, :] - points[..., 1, :]).reshape(len(pose), -1)
+        angles = pose[:, self.driven, 2] - pose[:, [self.frame], 2] - self.offsets - u[:, None]
+        return np.concatenate([gaps, pose[:, self.frame], angles], axis=1)
 
     def jacobian(self, pose: Array) -> Array:
         """Differentiate the residual by (x, y, theta) of every link, for poses of shape (..., links, 3)."""
@@ -88,8 +89,8 @@ class Turning:
         found[..., row, base + 2] = -1.0
         return found
 
-    def assembled(self, pose: Array, u: float) -> Array:
-        """Solve for the pose at an input, from one close to it.
+    def assembled(self, pose: Array, u: Array) -> Array:
+        """Solve for the poses at inputs, from poses close to them, shape (n, links, 3).
 
         Raises
         ------
@@ -97,32 +98,40 @@ class Turning:
             If the joints cannot be closed.
         """
         bound = _GAP * max(1.0, self.size)
-        gap = self.residual(pose, u)
         for _ in range(_ITERATIONS):
-            pose = pose - np.linalg.solve(self.jacobian(pose), gap).reshape(pose.shape)
             gap = self.residual(pose, u)
-            if np.abs(gap).max() <= bound:
+            worst = np.abs(gap).max(axis=1)
+            if worst.max() <= bound:
                 return pose
-        raise ValueError(f"the joints do not close at the input {u:.4f}")
+            pose = pose - np.linalg.solve(self.jacobian(pose), gap[..., None]).reshape(pose.shape)
+        raise ValueError(f"the joints do not close at the input {u[int(worst.argmax())]:.4f}")
 
     def turn(self) -> Array:
         """Return the poses of a full turn of all drivers, shape (721, links, 3).
+
+        Every fifth degree is reached from the one before, the poses between from their neighbours.
 
         Raises
         ------
         ValueError
             If a joint opens, a link jumps, or the last pose is not the first.
         """
-        poses = [self.assembled(self.start, 0.0)]
-        for u in np.linspace(0.0, math.tau, _STEPS + 1)[1:]:
-            poses.append(self.assembled(poses[-1], float(u)))
-            if not np.abs(poses[-1][:, 2] - poses[-2][:, 2]).max() < _JUMP:
-                raise ValueError(f"a link jumps before the input {u:.4f}")
+        coarse = np.linspace(0.0, math.tau, _STEPS // _STRIDE + 1)
+        found = [self.assembled(self.start[None], coarse[:1])[0]]
+        for u in coarse[1:]:
+            found.append(self.assembled(found[-1][None], np.array([u]))[0])
+        poses, u = np.array(found), np.linspace(0.0, math.tau, _STEPS + 1)
+        part = (np.arange(_STEPS) % _STRIDE / _STRIDE)[:, None, None]
+        first, second = np.repeat(poses[:-1], _STRIDE, axis=0), np.repeat(poses[1:], _STRIDE, axis=0)
+        poses = np.concatenate([self.assembled((1.0 - part) * first + part * second, u[:-1]), poses[-1:]])
+        steps = np.abs(np.diff(poses[..., 2], axis=0)).max(axis=1)
+        if not steps.max() < _JUMP:
+            raise ValueError(f"a link jumps behind the input {u[int(steps.argmax())]:.4f}")
         change = poses[-1] - poses[0]
         change[:, 2] -= math.tau * np.round(change[:, 2] / math.tau)
         if not np.abs(change).max() < 1e-8 * max(1.0, self.size):
             raise ValueError("the mechanism does not come back to its first pose after the turn")
-        return np.array(poses)
+        return np.asarray(poses, np.float64)
 
     def transmission(self, poses: Array, groups: Sequence[set[int]]) -> float:
         """Smallest transmission angle over poses and bars, radians; pi/2 without bars.

@@ -54,3 +54,14 @@ def test_the_builder_makes_the_same_today(shipped, script, tmp_path):
 def test_it_is_found_by_name(shipped):
     with Catalogue.shipped() as catalogue:
         assert catalogue.digest() == shipped.digest()
+
+
+def test_the_smaller_chains_have_dimensions(shipped):
+    """One mechanism of each chain of mobility 1 with at most eight links turns; the rest says that nobody looked."""
+    for row in shipped.query("chains", "mobility = 1").to_dict("records"):
+        dimensions = [own["evaluations"]["dimensions"] for own in shipped.entry(row["key"])["mechanisms"]]
+        found = [known for known in dimensions if known != "not computed"]
+        assert [known["guarantee"] for known in found] == ["certified"] * (row["links"] <= 8)
+        if found:
+            assert shipped.mechanism(row["label"]).graph.key
+    assert shipped.query("evaluations", "kind = 'jamming'")["guarantee"].tolist() == ["certified"]
