@@ -100,7 +100,8 @@ class Knee:
 def knee(rows: Sequence[Row], floor: float = FLOOR) -> Row | None:
     """Return the finest row up to which each further decade of accuracy costs at most `DECADE_COST` times as much.
 
-    From the fastest row of the method's own front on, a step is taken as long as it pays.  None without a good row.
+    From the fastest row of the method's own front on, every step that pays is taken, also over rows that do not.  None
+    without a good row.
 
     Parameters
     ----------
@@ -125,9 +126,9 @@ def knee(rows: Sequence[Row], floor: float = FLOOR) -> Row | None:
     at = own[0]
     for row in own[1:]:
         decades = math.log10(_size(at) / _size(row))
-        if row.seconds > at.seconds * max(DECADE_COST**decades, _NOISE if decades > 0.3 else 1.0):
-            break
-        at = row
+        # a step that does not pay may lead to one that does: one slow run must not end the search
+        if row.seconds <= at.seconds * max(DECADE_COST**decades, _NOISE if decades > 0.3 else 1.0):
+            at = row
     return at
 
 
@@ -202,7 +203,7 @@ def advice(problem: Problem) -> dict[str, str]:
     Examples
     --------
     >>> rows = [Row("a", "coarse", 1e-2, 1e-3, 3, "", ""), Row("a", "fine", 1e-4, 1e-1, 3, "", ""),
-    ...         Row("b", "", 1e-12, 1e-2, 3, "", "")]
+    ...         Row("a", "finest", 1e-5, 1.0, 3, "", ""), Row("b", "", 1e-12, 1e-2, 3, "", "")]
     >>> advice(Problem("p", "q", "mm", tuple(rows)))["a"]
     'a: choose it for errors down to 0.01 mm (coarse, 1 ms); finer errors are cheaper with b.'
     """

@@ -95,6 +95,12 @@ def test_the_knee_of_a_method_of_high_order_is_where_rounding_begins():
     assert knee(given).setting == "5"
 
 
+def test_one_slow_run_does_not_end_the_search_for_the_knee():
+    times = (1.0, 9.0, 9.5, 10.0, 40.0)
+    given = [row("a", 10.0 ** (-3 * k), t, str(k)) for k, t in enumerate(times[:4])] + [row("a", 1e-10, 40.0, "dear")]
+    assert knee(given).setting == "3"
+
+
 def test_defaults_are_judged():
     def verdict(name):
         errors, times = (1e-2, 1e-4, 1e-6, 1e-7), (1.0, 1.5, 2.0, 40.0)
