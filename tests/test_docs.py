@@ -33,6 +33,16 @@ FLAGS = doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL
 LINK = re.compile(r"(?<!!)\[[^\]\n]*\]\(([^)\s]+)\)|!\[[^\]\n]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
 
+# other tools in the README's table, for each of the benches named under it
+PEERS = [
+    ["geng"],
+    ["pylinkage", "fsolve"],
+    ["companion matrices"],
+    ["codac", "IntvalPy", "python-flint"],
+    ["exudyn", "MuJoCo", "scipy"],
+    ["LSODA"],
+]
+
 # what an excerpt takes for granted
 GIVEN = {
     "docs/reference/mechanism-graph.md": (
@@ -249,6 +259,17 @@ def test_notation_names_what_exists():
     named = set(re.findall(r"[A-Za-z_]\w{2,}", " ".join(re.findall(r"`([^`]+)`", text))))
     assert len(named) > 100
     assert named - words == set()
+
+
+def test_the_table_of_the_readme_is_repeated_by_benches():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    section = text.partition("## Beside other tools")[2].partition("\n## ")[0]
+    benches = re.findall(r"`(test_\w+_speed\.py)`", section)
+    assert len(benches) == 6
+    code = [(ROOT / "tests" / "bench" / name).read_text(encoding="utf-8").lower() for name in benches]
+    for peers, source in zip(PEERS, code):
+        for peer in peers:
+            assert peer.lower() in section.lower() and peer.lower() in source, peer
 
 
 @pytest.mark.slow

@@ -76,3 +76,38 @@ def test_reactions_of_a_turn(benchmark):
     theta = np.linspace(0.0, math.tau, 100_000)
     found = repeat(benchmark, lambda: reactions(Braider(), theta, 1.803, 0.0))
     assert found.power_error < 1e-13
+
+
+OUTPUTS = np.linspace(0.0, 1.0, 101)
+END = 26.757075249208202
+
+
+def test_platform_with_outputs(benchmark):
+    found = repeat(benchmark, lambda: PLATFORM.simulate(OUTPUTS, rtol=1e-8))
+    assert found.speed[-1] == pytest.approx(END, rel=2e-11)
+
+
+def test_platform_with_outputs_by_scipy(benchmark):
+    """LSODA of scipy on the same equations and Jacobian, compiled, at about the same error."""
+    from numba import njit
+    from scipy.integrate import solve_ivp
+
+    @njit
+    def rhs(_t, y):
+        q, w, current = y
+        torque = 0.1 * current + 0.0025 * math.sin(2.0 * q) * w * w
+        inertia = 0.002 + 0.005 * math.cos(q) ** 2
+        return np.array([w, torque / inertia, (20.0 * (20.0 - w) - current - 0.1 * w) / 0.2])
+
+    @njit
+    def jacobian(_t, y):
+        q, w, current = y
+        torque = 0.1 * current + 0.0025 * math.sin(2.0 * q) * w * w
+        inertia, slope = 0.002 + 0.005 * math.cos(q) ** 2, -0.005 * math.sin(2.0 * q)
+        by_angle = 0.005 * math.cos(2.0 * q) * w * w / inertia - torque * slope / inertia**2
+        by_speed = 0.005 * math.sin(2.0 * q) * w / inertia
+        return np.array([[0.0, 1.0, 0.0], [by_angle, by_speed, 0.1 / inertia], [0.0, -20.1 / 0.2, -1.0 / 0.2]])
+
+    options = {"method": "LSODA", "t_eval": OUTPUTS, "rtol": 1e-12, "atol": 1e-12, "jac": jacobian}
+    done = repeat(benchmark, lambda: solve_ivp(rhs, (0.0, 1.0), np.zeros(3), **options))
+    assert done.success and done.y[1, -1] == pytest.approx(END, rel=2e-11)
