@@ -166,7 +166,10 @@ def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], ef
             )
         )  # fmt: skip
     question = "The motor without its inductance: error of the speed after the electrical transient"
-    note = "The settings are inductances, not accuracies."
+    note = (
+        "The settings are inductances, not accuracies. Errors with the inductance are the integrator's own estimate: "
+        "no other method follows so stiff a motor."
+    )
     found_rows = tuple(replace(row, more={**row.more, _L: float(row.setting.split()[2])}) for row in rows)
     problem = Problem("small-inductance", question, "rad/s", found_rows, "run", note, over=_L)
     return replace(problem, sentences=_limit_sentences(problem))

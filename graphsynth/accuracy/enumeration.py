@@ -20,6 +20,10 @@ PUBLISHED: Mapping[int, int] = {
     4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318_162, 16: 19_819_281, 18: 1_535_380_884,
 }  # fmt: skip
 _GRAPHS = "graphs"
+_NOTE = (
+    "Kinematic chains of mobility 1, whose numbers are published, whatever the scene asks. Extrapolated: one process, "
+    "and the law holds on."
+)
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ def enumeration_problem(effort: Effort | None = None) -> Problem:
         laws[method] = _law(method, own)
     return Problem(
         "enumeration", "Kinematic chains of mobility 1: time against their number", "graphs", tuple(rows),
-        "enumeration", "Extrapolated: one process, and the law holds on.", _GRAPHS, sentences=laws,
+        "enumeration", _NOTE, _GRAPHS, sentences=laws,
     )  # fmt: skip
 
 
