@@ -45,6 +45,11 @@ class ConstrainedForm:
     ----------
     loss : float
         Kinetic energy removed by velocity projection so far (J).
+
+    Raises
+    ------
+    GeometryError
+        A body without mass or inertia.
     """
 
     name = "constrained"

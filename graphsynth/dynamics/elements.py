@@ -92,6 +92,11 @@ class Force:
     """Force at a point of a link: constant, or a function ``(t, place, velocity) -> (fx, fy)`` in world coordinates.
 
     ``frame="body"`` turns a constant force with the link.
+
+    Raises
+    ------
+    GeometryError
+        A frame other than "world" or "body", numbers that are not finite.
     """
 
     link: int
@@ -166,6 +171,11 @@ class TorqueSource:
     motor speed / speed of b, J the rotor's inertia (kg m^2), B its viscous friction (N m s).  ``eta`` becomes
     ``1/eta`` while power flows back.  ``torque=0`` leaves the reflected inertia alone: a flywheel behind a train.
     The inertia is taken as ``G^2 J`` on the relative angle: right for a fixed a, and for large ratios.
+
+    Raises
+    ------
+    GeometryError
+        A ratio of zero, an efficiency that is not in (0, 1].
     """
 
     a: int
@@ -201,6 +211,11 @@ class JointFriction:
     pin force; in a sliding pair the friction force is ``mu(v) (|N1| + |N2|)``, N1 and N2 the normal forces at the
     ends of a shoe of the given ``length`` that carry the guide's force and couple (0: the force alone).  The
     friction depends on the reactions and they on it: solved by iteration, see ``docs/explanation/planar-dynamics.md``.
+
+    Raises
+    ------
+    GeometryError
+        Negative coefficients, a kinetic one above the static one, or no Stribeck speed between them.
     """
 
     a: int

@@ -132,7 +132,13 @@ def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, r
 
 
 class MinimalForm:
-    """State ``(theta, omega, work)``; a solver workspace, not a result."""
+    """State ``(theta, omega, work)``; a solver workspace, not a result.
+
+    Raises
+    ------
+    GeometryError
+        A model without a minimal form; the message says why.
+    """
 
     name = "minimal"
     loss = 0.0

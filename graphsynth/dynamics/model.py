@@ -73,6 +73,11 @@ class Rack:
     ``e . (r_rack - c) - radius theta_pinion`` keeps its value at the start; e is the direction ``angle`` of the frame,
     c the pinion's ``centre`` (in its link frame), which must be fixed, as the rack must not turn (spec 5.2).  The tooth
     force acts along e at the pitch point, so the reactions in guide and bearing contain it.
+
+    Raises
+    ------
+    GeometryError
+        One link for both, or a radius that is not positive.
     """
 
     rack: int

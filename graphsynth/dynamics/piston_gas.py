@@ -62,7 +62,13 @@ class ConstantForce:
 
 @dataclass(frozen=True)
 class GivenForce:
-    """A force given as a smooth function ``(crank angle, gap, towards the head) -> N`` of arrays."""
+    """A force given as a smooth function ``(crank angle, gap, towards the head) -> N`` of arrays.
+
+    Raises
+    ------
+    GeometryError
+        A law that cannot be called.
+    """
 
     law: Callable[[Array, Array, NDArray[np.bool_]], Array]
 

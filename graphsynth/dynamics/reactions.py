@@ -53,7 +53,13 @@ class JointReaction:
     apart: Complex = field(repr=False)
 
     def on(self, link: int, frame: str = "world") -> tuple[Array, Array]:
-        """Force (n, 2) and couple (n,) on one of the two links, in the "world" or in that "body"'s frame."""
+        """Force (n, 2) and couple (n,) on one of the two links, in the "world" or in that "body"'s frame.
+
+        Raises
+        ------
+        GeometryError
+            A link that is not in the joint, or an unknown frame.
+        """
         if link not in (self.a, self.b):
             raise GeometryError(f"link {link} is not in joint {self.a}-{self.b}; name one of the two")
         if frame not in ("world", "body"):

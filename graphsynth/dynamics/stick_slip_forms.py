@@ -34,7 +34,15 @@ _SHARE = 0.5
 def time_stepping(
     model: Tribometer, duration: float, times: Array, step: float, weight: float, estimate: bool
 ) -> StickSlipMotion:
-    """March with fixed steps; see `graphsynth.dynamics.tribometer.Tribometer.time_stepping`."""
+    """March with fixed steps; see `graphsynth.dynamics.tribometer.Tribometer.time_stepping`.
+
+    Raises
+    ------
+    SpecError
+        A weight outside [0, 1].
+    TooLargeError
+        More steps than the limit.
+    """
     step = positive("step", step)
     if not 0.0 <= finite("weight of the step", weight) <= 1.0:
         raise SpecError(f"The weight of the step is {weight:g}; give a number from 0 to 1, best 0.5.")

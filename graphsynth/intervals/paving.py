@@ -369,6 +369,11 @@ def pave(f: System, box: Any, parameters: Any = None, **options: Any) -> Paving:
     Paving
         Certified; ``finished`` is False if a budget ended the search.
 
+    Raises
+    ------
+    IntervalError
+        For whatever `Search` refuses.
+
     Examples
     --------
     >>> found = pave(lambda x: [x[0] ** 2 + x[1] ** 2 - 1, x[0] - x[1] ** 2], ["[-2, 2]", "[-2, 2]"])

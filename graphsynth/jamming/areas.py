@@ -89,6 +89,11 @@ def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> Cresce
 
     Relative error of a few units in the last place down to the thinnest crescents.
 
+    Raises
+    ------
+    GeometryError
+        Semi-axes that make no ellipse within the formula.
+
     Examples
     --------
     >>> print(f"{ellipse_circle_stable(1.0, 1e-9, 1e-9).ellipse_only.item():.14e}")

@@ -55,6 +55,11 @@ def crescent_points(R1: float, a: float, b: float, count: int) -> Array:
     Returns
     -------
     ndarray, shape (2 * (count // 2), 2)
+
+    Raises
+    ------
+    GeometryError
+        Axes that make no crescent, or fewer than 4 boxes.
     """
     if not 0.0 < b < R1 < a:
         raise GeometryError(f"b = {b}, R1 = {R1}, a = {a}: a crescent needs 0 < b < R1 < a")

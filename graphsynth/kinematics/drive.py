@@ -66,6 +66,11 @@ class FourBarDrive:
     tau : {+1, -1}
         Assembly branch of the four-bar.
 
+    Raises
+    ------
+    GeometryError
+        Lengths that are not positive, or both fixed points at one place.
+
     Notes
     -----
     Specification parallel_platform, sections 7.2 to 7.4.

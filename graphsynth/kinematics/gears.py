@@ -17,6 +17,11 @@ class GearTrain:
 
     Source: specification parallel_platform, section 7.1.
 
+    Raises
+    ------
+    GeometryError
+        Numbers of teeth that are not positive integers.
+
     Examples
     --------
     >>> train = GearTrain(30, 60)

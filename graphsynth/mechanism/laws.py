@@ -86,7 +86,13 @@ class Polynomial:
 
 @dataclass(frozen=True)
 class Table:
-    """Values at increasing inputs, joined by a cubic spline (natural ends); NaN outside the table."""
+    """Values at increasing inputs, joined by a cubic spline (natural ends); NaN outside the table.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than two inputs, inputs that do not increase, numbers that are not finite, lists of different lengths.
+    """
 
     inputs: tuple[float, ...]
     values: tuple[float, ...]

@@ -43,6 +43,11 @@ class Driver:
         ``theta_link - theta_base`` of a turning pair, the displacement along the line of a sliding pair.
     law : Law
         Coordinate as a function of the input; the input itself by default.
+
+    Raises
+    ------
+    GeometryError
+        Links that are no numbers, a law that cannot be called.
     """
 
     base: int

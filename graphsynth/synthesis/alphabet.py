@@ -132,7 +132,13 @@ class Alphabet:
         return self.space if self.mobility == 0 and self.whole else self.space - 1
 
     def labels(self, multiplicity: int, marked: bool) -> list[Label]:
-        """List the labels of a class of the given multiplicity."""
+        """List the labels of a class of the given multiplicity.
+
+        Raises
+        ------
+        TooLargeError
+            More labels than the kernels are laid out for.
+        """
         zero = (0,) * len(self.limits)
         if not marked:
             found = [Label(words, 0) for words in self._multisets(multiplicity, 0, zero, 0, False)]
@@ -231,7 +237,13 @@ class Alphabet:
 
     @cached_property
     def tables(self) -> Tables:
-        """The same for the kernels."""
+        """The same for the kernels.
+
+        Raises
+        ------
+        TooLargeError
+            More resource states than the kernels are laid out for.
+        """
         if any(limit > 100 for limit in self.limits) or self.resources > 50_000:
             raise TooLargeError(f"{self.resources} resource states (bound 50000): ask for fewer links or higher pairs")
         return _tables(self)

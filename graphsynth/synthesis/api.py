@@ -106,6 +106,13 @@ def count_chains(
     -------
     int
 
+    Raises
+    ------
+    SpecError
+        For a value out of its bounds.
+    TooLargeError
+        For more loops than the shipped contracted graphs have (8), or more than 2**62 chains of one of them.
+
     Examples
     --------
     >>> [count_chains(n) for n in (4, 6, 8, 10, 12, 14)]
@@ -164,6 +171,11 @@ def count_mechanisms(
     -------
     int
 
+    Raises
+    ------
+    InfeasibleSpecError, SpecError, TooLargeError
+        As for `enumerate_mechanisms`.
+
     Examples
     --------
     >>> from graphsynth import StructuralSpec
@@ -189,6 +201,11 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     -------
     list of MechanismGraph
         Of length ``k``.
+
+    Raises
+    ------
+    InfeasibleSpecError, SpecError, TooLargeError
+        As for `enumerate_mechanisms`; also for a number of draws or a seed that is none.
 
     Examples
     --------
@@ -217,6 +234,13 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
     -------
     iterator of MechanismGraph
 
+    Raises
+    ------
+    SpecError
+        For a value out of its bounds.
+    TooLargeError
+        For more loops than the shipped contracted graphs have (8), at once.
+
     Examples
     --------
     >>> [group.to_text() for group in enumerate_assur_groups(2)]
@@ -240,6 +264,11 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
     Returns
     -------
     int
+
+    Raises
+    ------
+    SpecError, TooLargeError
+        As for `enumerate_assur_groups`.
 
     Examples
     --------
@@ -267,6 +296,13 @@ def enumerate_baranov_trusses(
     -------
     iterator of MechanismGraph
 
+    Raises
+    ------
+    SpecError
+        For a value out of its bounds.
+    TooLargeError
+        For more loops than the shipped contracted graphs have (8), at once.
+
     Examples
     --------
     >>> sum(1 for _ in enumerate_baranov_trusses(9))
@@ -290,6 +326,11 @@ def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | No
     Returns
     -------
     int
+
+    Raises
+    ------
+    SpecError, TooLargeError
+        As for `enumerate_baranov_trusses`.
 
     Examples
     --------

@@ -137,7 +137,15 @@ class Problem:
         *,
         framed: bool = False,
     ) -> Problem:
-        """State the enumeration of chains (of mechanisms with every frame, if ``framed``)."""
+        """State the enumeration of chains (of mechanisms with every frame, if ``framed``).
+
+        Raises
+        ------
+        SpecError
+            A value out of its bounds, or no mobility.
+        TooLargeError
+            More loops than there are contracted graphs.
+        """
         if mobility == 0 and not isinstance(mobility, bool):
             raise SpecError("mobility = 0 must be at least 1: Baranov trusses are the structures without mobility")
         higher = dict(joints_by_mobility or {})
@@ -158,7 +166,15 @@ class Problem:
 
     @classmethod
     def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> Problem:
-        """State the enumeration of the mechanisms that answer a structural question."""
+        """State the enumeration of the mechanisms that answer a structural question.
+
+        Raises
+        ------
+        SpecError
+            Not a structural question; `InfeasibleSpecError` for one without an answer.
+        TooLargeError
+            More loops than there are contracted graphs.
+        """
         order = check_symmetry(symmetry)
         levels: Levels = ()
         fractionated = False
@@ -192,7 +208,15 @@ class Problem:
 
     @classmethod
     def trusses(cls, links: int, space: int, framed: bool) -> Problem:
-        """State the enumeration of Baranov trusses (of Assur groups, if ``framed``)."""
+        """State the enumeration of Baranov trusses (of Assur groups, if ``framed``).
+
+        Raises
+        ------
+        SpecError
+            A number of links out of its bounds.
+        TooLargeError
+            More loops than there are contracted graphs.
+        """
         if framed and (isinstance(links, bool) or not isinstance(links, int) or links < 2):
             raise SpecError(f"moving links = {links - 1!r} must be a whole number, at least 1")
         joints = chain_joints(links, 0, space, {})

@@ -38,6 +38,11 @@ class Thread:
     gravity : float
         m/s^2.
 
+    Raises
+    ------
+    SpecError
+        Negative or infinite numbers, a guide that is no point.
+
     Notes
     -----
     Specification instruments_and_dynamics, section 4.3: the in-plane part of the tension acts on the switch.

@@ -38,6 +38,11 @@ class EffectiveInertia:
     truncation : float
         Largest neglected part relative to the largest value; 0 if exact.
 
+    Raises
+    ------
+    SpecError
+        Rows with an even number of columns, or not finite.
+
     Notes
     -----
     Specification parallel_platform, section 11.2.

@@ -71,6 +71,11 @@ def prepare(
     """Check everything and lay it out for the integrator; the arguments are those of `run`.
 
     ``singular`` allows an inertia that vanishes, for motions that are given.
+
+    Raises
+    ------
+    SpecError
+        Currents that do not fit the motor, or an inertia that vanishes on the way.
     """
     from graphsynth.dynamics.platform_drive.kernels import systems as s
 
@@ -133,7 +138,13 @@ def _motor(motor: Motor) -> tuple[int, Array, int]:
 
 
 def load_coefficients(series: ArrayLike) -> Array:
-    """Return the coefficients ``a0, a1, b1, ...`` of a load torque, checked."""
+    """Return the coefficients ``a0, a1, b1, ...`` of a load torque, checked.
+
+    Raises
+    ------
+    SpecError
+        An even number of coefficients.
+    """
     load = numbers("load_series", series, "N m")
     if load.ndim != 1 or load.size % 2 == 0:
         raise SpecError(f"load_series of shape {load.shape} must be coefficients a0, a1, b1, ...; give an odd number")

@@ -42,6 +42,11 @@ def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
 
     In the direction of the push both rims reach ``offset`` further, so that all three contact conditions hold with the
     clearance less the offset; in other directions more is left.  Specification, section 9.7, level L2.
+
+    Raises
+    ------
+    GeometryError
+        An offset that is negative or more than the smallest clearance.
     """
     if not 0.0 <= offset < math.inf:
         raise GeometryError(f"radial_offset = {offset} must be a distance of zero or more, in mm; correct the value")

@@ -138,6 +138,11 @@ class Misalignment:
     alpha_range, direction_range : (float, float), optional
         Tolerance boxes.
 
+    Raises
+    ------
+    GeometryError
+        Links that are no numbers, values outside of their ranges, |alpha| above 0.5 rad.
+
     Examples
     --------
     >>> Misalignment(0, 1, 0.01).vector

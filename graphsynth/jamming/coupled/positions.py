@@ -52,6 +52,11 @@ class _Edge(NamedTuple):
 def law_enclosed(law: Law, u: Any) -> Any:
     """Enclose the coordinate of a driver over the inputs u.
 
+    Raises
+    ------
+    Unsupported
+        A law of another kind.
+
     Examples
     --------
     >>> law_enclosed(Linear(rate=2.0), Interval(0.25)).contains(0.5)

@@ -65,6 +65,11 @@ class LineGoal:
         The point is to lie on the line through the link's first two joints: the link is a straight rod.
     tolerance : float
         Largest width of the strip that holds the segment, over its length.
+
+    Raises
+    ------
+    GeometryError
+        A span outside (0, 2 pi], or numbers that are not finite.
     """
 
     length: float
@@ -96,6 +101,11 @@ class PathGoal:
         The link that carries the point; by default the one farthest from the frame.
     tolerance : float
         Largest distance from a point, over the size of the set of points.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than three points, or all at one place.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -128,6 +138,11 @@ class PosesGoal:
         By default the link farthest from the frame.
     tolerance : float
         Largest distance from a pose over the size of the set of points; angles count as arcs of that size.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than three poses, or inputs missing.
     """
 
     poses: tuple[tuple[float, float, float], ...]

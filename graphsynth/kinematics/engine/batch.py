@@ -85,7 +85,13 @@ class BatchMotion:
         return np.concatenate([self.frames[..., :2], angle[..., None]], axis=-1)
 
     def point(self, link: int, local: ArrayLike) -> Array:
-        """Positions of a point (x, y) of a link, shape (sets, n, 2); ``local`` may differ by set, shape (sets, 2)."""
+        """Positions of a point (x, y) of a link, shape (sets, n, 2); ``local`` may differ by set, shape (sets, 2).
+
+        Raises
+        ------
+        GeometryError
+            A link that was not kept.
+        """
         at = finite_array("local", local)
         px, py = at[..., 0:1], at[..., 1:2]
         if link not in self.links:

@@ -69,7 +69,13 @@ class PointPath(NamedTuple):
     acceleration: Array
 
     def straightness(self) -> float:
-        """Largest distance of the sampled points from the chord between the first and the last (NaN left out)."""
+        """Largest distance of the sampled points from the chord between the first and the last (NaN left out).
+
+        Raises
+        ------
+        GeometryError
+            A path without two different ends.
+        """
         p = self.position[np.isfinite(self.position).all(axis=1)]
         if len(p) < 2 or not (p[-1] - p[0]).any():
             raise GeometryError("straightness needs a path with two different ends; choose other inputs")

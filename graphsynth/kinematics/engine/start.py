@@ -52,6 +52,11 @@ def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array 
 
     Groups solved by Newton start from ``guess`` if there is one, else from the mode of the given rank (0 by default)
     among all modes found.
+
+    Raises
+    ------
+    GeometryError
+        A mode that does not exist.
     """
     program = tracker.program
     links = program.mechanism.graph.links

@@ -69,6 +69,11 @@ class FloatingPiston:
     group : FloatingGroup or None
         The second group, in a space of mobility 2; None: the crosshead itself is the piston.
 
+    Raises
+    ------
+    GeometryError
+        Parts that are of another type.
+
     Examples
     --------
     >>> machine = FloatingPiston.crank_slider(0.05, 0.2)

@@ -87,6 +87,11 @@ def aspects(
     Aspects
         Estimated on the grid.
 
+    Raises
+    ------
+    GeometryError
+        Fewer than 4 nodes along an axis, or a working mode that is none.
+
     Notes
     -----
     Specification parallel_platform, section 6.1.  Nodes are connected along the axes of the grid.

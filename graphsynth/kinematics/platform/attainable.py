@@ -82,6 +82,11 @@ def attainable(mechanism: SingleMotorPlatform, direction: ArrayLike) -> Attainab
     Attainable
         Floating point, first order in the cranks.
 
+    Raises
+    ------
+    GeometryError
+        A direction without three numbers, or of zeros.
+
     Notes
     -----
     Specification parallel_platform, section 10.4: ``1 - mu`` with mu the largest eigenvalue of the pencil

@@ -33,7 +33,13 @@ class Harmonics:
     tail: Array
 
     def order(self, m: int) -> NDArray[np.complex128]:
-        """Amplitudes of harmonic m (from 1), shape (d,)."""
+        """Amplitudes of harmonic m (from 1), shape (d,).
+
+        Raises
+        ------
+        GeometryError
+            A harmonic that the samples do not resolve.
+        """
         if not 1 <= m <= len(self.amplitudes):
             raise GeometryError(f"harmonic {m} is not resolved; choose 1 to {len(self.amplitudes)} or more samples")
         return np.asarray(self.amplitudes[m - 1])
@@ -48,7 +54,13 @@ class Harmonics:
             return np.asarray(np.sqrt((size[1:] ** 2).sum(axis=0)) / size[0])
 
     def total_distortion(self, Lc: float) -> float:
-        """Return the distortion of the whole pose (x, y, alpha), angles multiplied by ``Lc``."""
+        """Return the distortion of the whole pose (x, y, alpha), angles multiplied by ``Lc``.
+
+        Raises
+        ------
+        GeometryError
+            Harmonics of something that is no pose.
+        """
         weight = np.array([1.0, 1.0, positive("Lc", Lc)])
         if self.mean.shape != (3,):
             raise GeometryError(f"a pose has three coordinates, not {self.mean.size}; use distortion()")
@@ -70,6 +82,11 @@ def harmonics(samples: ArrayLike) -> Harmonics:
     Harmonics
         Exact for trigonometric polynomials of degree below N/2; for analytic motions the error falls faster than any
         power of N.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than 4 samples, or samples that are not finite.
 
     Examples
     --------

@@ -108,6 +108,11 @@ def quality(platform: ParallelPlatform, poses: ArrayLike, sigma: Sequence[int], 
     Quality
         Floating point.  Singular poses give zeros and infinities, poses out of reach NaN.
 
+    Raises
+    ------
+    GeometryError
+        Poses without three coordinates, or not finite.
+
     Notes
     -----
     Specification parallel_platform, sections 4.3 and 6.3.

@@ -62,7 +62,13 @@ class LoopClosure:
         return len(self.columns) - self.rank
 
     def component(self, column: str) -> Array:
-        """Speeds of one joint freedom in every instantaneous motion."""
+        """Speeds of one joint freedom in every instantaneous motion.
+
+        Raises
+        ------
+        GeometryError
+            A column that does not exist.
+        """
         if column not in self.columns:
             raise GeometryError(f"column {column!r} is unknown; use one of {', '.join(self.columns)}")
         return np.asarray(self.motions[:, self.columns.index(column)])
@@ -176,6 +182,11 @@ def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, toleran
     Returns
     -------
     LoopClosure
+
+    Raises
+    ------
+    GeometryError
+        No configuration, or one of another shape.
 
     Notes
     -----

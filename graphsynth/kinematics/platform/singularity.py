@@ -68,7 +68,13 @@ class Singularity:
 
 
 def closed_pose(platform: ParallelPlatform, pose: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
-    """Check one pose with its rocker angles: finite, and closed to 1e-6 of the longest link."""
+    """Check one pose with its rocker angles: finite, and closed to 1e-6 of the longest link.
+
+    Raises
+    ------
+    GeometryError
+        Not three numbers each, or legs that do not close.
+    """
     X, t = finite_array("pose", pose).reshape(-1), finite_array("theta", theta).reshape(-1)
     if X.shape != (3,) or t.shape != (3,):
         raise GeometryError(f"pose and theta have {X.size} and {t.size} numbers; give three each")

@@ -100,6 +100,11 @@ def statics(
     -------
     Statics
 
+    Raises
+    ------
+    GeometryError
+        A wrench without three components, or legs that do not close.
+
     Notes
     -----
     Specification parallel_platform, section 4.4: ``JX^T lambda = W``, ``tau_k = -JT_kk lambda_k``, axial force
@@ -147,6 +152,11 @@ def crank_statics(
     Returns
     -------
     CrankStatics
+
+    Raises
+    ------
+    GeometryError
+        An angle at which a drive cannot be assembled, or a wrench without three components.
 
     Notes
     -----

@@ -95,7 +95,13 @@ def deviations(path: Path, leg: str, place: float, step: float) -> tuple[float, 
 
 
 def approach(mechanism: PointingMechanism, fold: Fold, distances: ArrayLike, branch: int) -> ApproachToFold:
-    """Compare three ways to compute the output near a fold; see `PointingMechanism.approach`."""
+    """Compare three ways to compute the output near a fold; see `PointingMechanism.approach`.
+
+    Raises
+    ------
+    GeometryError
+        Distances that are not positive, or a fold that is not simple.
+    """
     from mpmath import mp
 
     distance = np.atleast_1d(finite_array("distances", distances))

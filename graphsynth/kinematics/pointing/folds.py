@@ -138,7 +138,13 @@ def _first_output(mechanism: PointingMechanism, leg: Leg, phi: float, sign: int)
 
 
 def folds(mechanism: PointingMechanism, leg: str, phi_other: float, s_other: int | None) -> tuple[Fold, ...]:
-    """All folds of one leg over a turn of its crank; see `PointingMechanism.folds`."""
+    """All folds of one leg over a turn of its crank; see `PointingMechanism.folds`.
+
+    Raises
+    ------
+    GeometryError
+        A crank angle out of the reach of the other leg.
+    """
     choice("leg", leg, ("Y", "X"))
     other_angle = finite("phi_other", phi_other)
     scale = scale_of(mechanism)
@@ -186,7 +192,13 @@ def fold_on_path(
 
 
 def dead_points(mechanism: PointingMechanism, leg: str, phi_other: float, s_other: int | None) -> tuple[DeadPoint, ...]:
-    """All dead points of one crank; see `PointingMechanism.dead_points`."""
+    """All dead points of one crank; see `PointingMechanism.dead_points`.
+
+    Raises
+    ------
+    GeometryError
+        A crank angle out of the reach of the other leg.
+    """
     choice("leg", leg, ("Y", "X"))
     other_angle = finite("phi_other", phi_other)
     scale = scale_of(mechanism)

@@ -118,6 +118,11 @@ def loop_equations(
     -------
     LoopEquations
         Rows: three positions of leg Y, three of leg X, direction z of both legs (two each), direction x of both.
+
+    Raises
+    ------
+    GeometryError
+        A chart that does not exist.
     """
     if chart not in CHARTS:
         raise GeometryError(f"chart = {chart!r} is unknown; use one of {', '.join(map(repr, CHARTS))}")

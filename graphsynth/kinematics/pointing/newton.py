@@ -167,7 +167,13 @@ def solve_loops(
 def survey_roots(
     mechanism: PointingMechanism, phi_x: float, phi_y: float, starts: int, seed: int, chart: str
 ) -> RootSurvey:
-    """Newton's method from random starts at one pose; see `PointingMechanism.survey_roots`."""
+    """Newton's method from random starts at one pose; see `PointingMechanism.survey_roots`.
+
+    Raises
+    ------
+    GeometryError
+        A number of starts below 1.
+    """
     if starts < 1:
         raise GeometryError(f"starts = {starts} must be at least 1; give a number of random starts")
     random = np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, 12))

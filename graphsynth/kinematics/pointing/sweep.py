@@ -59,7 +59,13 @@ def sweep(
     s_y: int,
     s_x: int,
 ) -> PointingSweep:
-    """Follow one assembly mode; see `PointingMechanism.sweep`."""
+    """Follow one assembly mode; see `PointingMechanism.sweep`.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than two values, or values that do not rise or fall throughout.
+    """
     values = finite_array("t", t)
     change = np.diff(values)
     if values.ndim != 1 or values.size < 2 or not ((change > 0.0).all() or (change < 0.0).all()):

@@ -171,7 +171,13 @@ def tolerance(
     mechanism: PointingMechanism, phi_x: float, phi_y: float, widths: ArrayLike, s_y: int, s_x: int, method: str,
     converted: bool = False,
 ) -> Tolerance:  # fmt: skip
-    """Bound both outputs; see `PointingMechanism.tolerance`."""
+    """Bound both outputs; see `PointingMechanism.tolerance`.
+
+    Raises
+    ------
+    GeometryError
+        Not one width or five, or a width that reaches the length.
+    """
     choice("method", method, ("mixed", "mean_value"))
     given = finite_array("widths", widths)
     if given.shape not in ((), (5,)):
