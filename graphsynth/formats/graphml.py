@@ -22,7 +22,7 @@ from graphsynth.structure.text import LINKS_MAX
 __all__ = ["LENGTH_MAX", "compose", "parse"]
 
 #: Bytes of one graph, of what stands before the first and of what stands between two.
-LENGTH_MAX = 4_000_000
+LENGTH_MAX = 3_000_000
 
 _SPACE = "http://graphml.graphdrawing.org/xmlns"
 _KEYS = [
@@ -171,7 +171,6 @@ class _Reader:
                 if name not in graph.nodes:
                     raise FormatError(f"the edge ends at {name[:24]!r}, which is not a vertex", edge.place)
         self.found.append(item_from(list(graph.nodes), graph.edges, graph.own, graph.place, self.spent))
-        self.spent = Spent(LENGTH_MAX)
 
     def _open(self, name: str) -> _Graph:
         if self.graph is None:
@@ -220,6 +219,7 @@ def parse(blocks: Iterable[bytes]) -> Iterator[Item]:
                 raise FormatError(f"a graph of more than {LENGTH_MAX} bytes; {_SMALLER}", reader.place)
             parser.Parse(block, not block)
             since += len(block)
+            reader.spent.most += len(block)
             if reader.found:
                 count, since = count + len(reader.found), 0
                 yield from reader.found

@@ -39,10 +39,10 @@ Item = MechanismGraph | Mechanism
 #: Longest line of a file of lines; the longest text form is shorter.
 LINE_MAX = 1_000_000
 #: Longest text of several graphs that is read at once.
-TEXT_MAX = 4_000_000
+TEXT_MAX = 3_000_000
 #: Graphs, and joints of all of them, in a text that is read at once.
 GRAPHS_MAX = 20_000
-JOINTS_MAX = 250_000
+JOINTS_MAX = 120_000
 _BLOCK = 1 << 16
 _MESSAGE = 360
 
@@ -121,11 +121,11 @@ FORMATS: dict[str, Format] = {
             "graph_json:parse", "graph_json:compose",
         ),
         Format(
-            "toml", (".toml",), "TOML: a mechanism", False, True, 500_000, "plain:parse_toml", "plain:compose_toml",
+            "toml", (".toml",), "TOML: a mechanism", False, True, 400_000, "plain:parse_toml", "plain:compose_toml",
         ),
         Format(
             "graphml", (".graphml",), "GraphML", True, True, TEXT_MAX,
-            "graphml:parse", "graphml:compose", "blocks", 4_000_000,
+            "graphml:parse", "graphml:compose", "blocks", 3_000_000,
         ),
         Format("dot", (".dot", ".gv"), "DOT of Graphviz", True, True, 2_000_000, "dot:parse", "dot:compose"),
         Format(

@@ -28,8 +28,8 @@ FORMAT = "graphsynth mechanism"
 VERSION = 1
 _KEYS = {"format", "version", "graph", "joints", "drivers", "points", "pose"}
 #: Longest texts that are read, in characters.
-JSON_MAX = 4_000_000
-TOML_MAX = 500_000
+JSON_MAX = 3_000_000
+TOML_MAX = 400_000
 _STRING = re.compile(r'"(?:[^"\\\n]|\\.)*+"' "|'[^'\n]*+'")
 _LONG_KEY = re.compile(r'(?<![\w"-])(?:[\w"-]++[ \t]*+\.[ \t]*+){12}', re.ASCII)
 _T = TypeVar("_T")
