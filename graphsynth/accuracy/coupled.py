@@ -26,6 +26,7 @@ __all__ = ["coupled_problem", "exact_largest", "lambda_problem"]
 
 #: Gap of the proved bounds that are the reference where no closed form is known.
 _FINE_GAP = 1e-6
+_DIGITS = 50
 
 
 def exact_largest(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Any:
@@ -41,11 +42,14 @@ def exact_largest(linkage: LambdaLinkage, bearing: Bearing, condition: Condition
     >>> print(f"{float(exact_largest(LambdaLinkage(), Bearing())):.16f}")
     0.0121287931183128
     """
+    import mpmath
+
     crank = linkage.l2
     if (linkage.l1, linkage.l3, linkage.l4) != (2.0 * crank, 2.5 * crank, 2.5 * crank):
         return None
     critical = precise_critical_tilt(bearing, condition)
-    return None if critical is None else 2 * critical
+    with mpmath.workdps(_DIGITS):
+        return None if critical is None else 2 * critical
 
 
 def lambda_problem(
@@ -128,8 +132,9 @@ def coupled_problem(
         kind = "distance from the reference"
         rows.append(Row("samples", f"{count} positions", error, seconds, done, kind, reference))
     default = signature(largest_scale).parameters["relative_gap"].default
-    for gap in sorted({1e-1, 1e-2, default} if effort.quick else {1e-1, 1e-2, 1e-3, default}, reverse=True):
-        found, seconds, done = best_of(partial(prove, relative_gap=gap), rounds, warm=False)
+    gaps = sorted({1e-1, 1e-2, default} if effort.quick else {1e-1, 1e-2, 1e-3, default}, reverse=True)
+    for gap in gaps:
+        found, seconds, done = best_of(partial(prove, relative_gap=gap), rounds, warm=gap == gaps[0])
         rows.append(_gap_row(found, gap, (low, high, reference), (seconds, done), default=gap == default))
     question = f"Largest misalignment of {name} whose bearings share it"
     note = "Samples err on the wrong side: they never find the worst input itself."
@@ -152,8 +157,11 @@ def _gap_row(
 
 def _reference(prove: Any, tilt: Misalignment, exact: Any) -> tuple[Any, Any, str]:
     """Bounds of the largest factor on the misalignment, and where they are from."""
+    import mpmath
+
     if exact is not None:
-        scale = exact / tilt.alpha
+        with mpmath.workdps(_DIGITS):
+            scale = exact / mpmath.mpf(tilt.alpha)
         return scale, scale, "closed form with 50 digits: twice the critical tilt of one bearing"
     found = prove(relative_gap=_FINE_GAP, max_pieces=200_000)
     if not 0.0 < found.low <= found.high < math.inf:

@@ -6,21 +6,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from inspect import signature
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from graphsynth.accuracy.choice import seconds_text
+from graphsynth.accuracy.precise_drive import NAME, Shape, precise_drive, shape_of_series
 from graphsynth.accuracy.rows import Effort, Problem, Row, RowStatus, best_of
 from graphsynth.errors import SpecError
-
-if TYPE_CHECKING:
-    from graphsynth.accuracy.precise_drive import Shape
 
 __all__ = ["drive_problem", "reduction_problem", "work_rows"]
 
 _L = "inductance [H]"
-_PRECISE = "extrapolated midpoint rule in long doubles on the equations of the specification"
+_PRECISE = f"{NAME} on the equations of the specification"
 _KIND = "largest error of speed and currents over their largest values"
 #: A scipy solver that needs more calls of the right-hand side is a failure here.
 _MOST_CALLS = 30_000
@@ -82,8 +80,6 @@ def drive_problem(
 
 def _precise(plant: Any, motor: Any, train: Any, times: Any, shape: Shape | None) -> Any:
     """States at the times from another implementation; None for what it does not know."""
-    from graphsynth.accuracy.precise_drive import precise_drive, shape_of_series
-
     if shape is None and (plant.linkage is not None or plant.load_series is not None):
         return None
     shape = shape or shape_of_series(plant.rows, plant.base, plant.load)

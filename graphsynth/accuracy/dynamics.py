@@ -129,7 +129,7 @@ def _row(
             }  # fmt: skip
             if right is not None and truth is not None:
                 more["distance from " + reference] = error
-                error, reference = _away(found, right), f"{truth.name}, extrapolated midpoint rule"
+                error, reference = _away(found, right), truth.name
         except GraphsynthError:
             pass
     return Row(

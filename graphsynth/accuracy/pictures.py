@@ -151,7 +151,7 @@ def _name_ends(
             good[k].setting, places[k], textcoords="offset points", xytext=(5, -10 if below else 6), fontsize=7,
             color=colour, ha="left",
         )  # fmt: skip
-        taken.append((text, places[k]))
+        taken.append(text)
 
 
 #: Where the name of a setting may stand beside its marker, in points: offset and alignment, the best first.
@@ -169,7 +169,7 @@ def _part(figure: Any, axes: Any, names: list[Any]) -> None:
     inside = axes.get_window_extent()
     points = [axes.transData.transform(xy) for line in axes.lines for xy in line.get_xydata()]
     kept: list[Any] = []
-    for text, _ in names:
+    for text in names:
         for offset, side in _SPOTS:
             text.set(ha=side, position=offset)
             box = text.get_window_extent()

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 from graphsynth.errors import SpecError
 
-__all__ = ["DIGITS", "Long", "Shape", "Vector", "precise_drive", "shape_of_series"]
+__all__ = ["DIGITS", "NAME", "Long", "Shape", "Vector", "precise_drive", "shape_of_series"]
 
 Long = np.longdouble
 Vector = NDArray[np.longdouble]
@@ -26,6 +26,7 @@ Vector = NDArray[np.longdouble]
 Shape = Callable[[Any], tuple[Any, Any, Any]]
 #: Digits of the arithmetic: 18 on most machines, 15 where a long double is a double.
 DIGITS = int(np.finfo(Long).precision)
+NAME = f"extrapolated midpoint rule in long doubles ({DIGITS} digits)"
 _COLUMNS = 9  # steps 2, 4, ..., 18 of the midpoint rule: order 18
 _BOUND = 300.0 * float(np.finfo(Long).eps)  # error of a step, over one plus the value
 _MOST_STEPS = 20_000

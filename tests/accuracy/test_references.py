@@ -161,6 +161,14 @@ def test_area_of_the_specification():
         )
 
 
+def test_the_closed_form_of_coupled_joints_keeps_its_digits():
+    from graphsynth.accuracy.coupled import exact_largest
+
+    found = exact_largest(LambdaLinkage(), Bearing())  # section 9.6
+    with mpmath.workdps(45):
+        assert abs(found - mpmath.mpf("0.012128793118312840120532205597449602345")) < mpmath.mpf("1e-38")
+
+
 def test_critical_tilt_of_the_specification():
     with mpmath.workdps(45):  # section 9.6: the whole turn is free up to twice this
         twice = 2 * precise_critical_tilt(Bearing())
