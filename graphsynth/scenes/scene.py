@@ -32,6 +32,9 @@ __all__ = [
 _PACKAGE = Path(__file__).resolve().parent
 
 
+_LONGEST_NAME = 100
+
+
 @dataclass(frozen=True, slots=True)
 class SceneTable:
     """``[scene]``: how the scene is called."""
@@ -46,6 +49,11 @@ class SceneTable:
             re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", self.name) is not None,
             f"has name {self.name!r}; it names a folder, so use letters, digits, '-', '_' and '.'",
         )
+        require(len(self.name) <= _LONGEST_NAME, f"has name of {len(self.name)} letters; use at most {_LONGEST_NAME}")
+        for key in ("title", "description"):
+            strange = [c for c in getattr(self, key) if not c.isprintable() and c not in "\n\t"]
+            require(not strange, f"has {key} with {strange[:1]}, which cannot be printed; remove it")
+        require(0 <= self.seed < 2**63, f"has seed = {self.seed}; use 0 to 2**63 - 1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,6 +336,19 @@ def _read_bytes(path: Path) -> bytes:
     return data
 
 
+#: A dotted key of a hundred parts: reading many more takes time and memory that grow with their square.
+_DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){100}""")
+
+
+def _refuse_deep_keys(text: str, path: Path) -> None:
+    found = _DEEP.search(text)
+    if found:
+        line = text.count("\n", 0, found.start()) + 1
+        raise FormatError(
+            "a key of more than 100 parts; no key of a scene has more than ten", f"{path.name}, line {line}"
+        )
+
+
 def load_scene(name_or_path: str | Path) -> Scene:
     """Read a scene by name or path.
 
@@ -346,10 +367,12 @@ def load_scene(name_or_path: str | Path) -> Scene:
     path = find_scene(name_or_path)
     data = _read_bytes(path)
     try:
-        text = data.decode("utf-8")
-        tables = tomllib.loads(text)
+        text = data.decode("utf-8-sig")  # some editors put a mark before the first letter
     except UnicodeDecodeError as error:
         raise FormatError("not UTF-8 text; save the scene as UTF-8", f"{path.name}, byte {error.start}") from None
+    _refuse_deep_keys(text, path)
+    try:
+        tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: TOMLDecodeError, and integers of thousands of digits
         raise FormatError(f"not TOML: {error}", path.name) from None
     scene = Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest(), text)

@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
 from graphsynth.errors import SceneError
-from graphsynth.scenes.tables import Place, suggest
+from graphsynth.scenes.tables import Place, shortened, suggest
 
 if TYPE_CHECKING:
     from graphsynth.scenes.scene import Scene
@@ -184,9 +184,8 @@ def resolve(
         giver = givers.get(product) or installed(product)
         if giver is None:
             who = f"stage {path[-1]!r} needs" if path else "asks for"
-            raise SceneError(
-                f"{at}{who} {product!r}, which no stage gives{suggest(product, (*givers, *installed_products()))}"
-            )
+            known = suggest(product, (*givers, *installed_products()))
+            raise SceneError(f"{at}{who} {shortened(repr(product))}, which no stage gives{known}")
         givers[product] = giver
         if giver in order:
             return

@@ -11,6 +11,7 @@ The ending of a key says its unit: ``radius_mm = 17.5``.  Instead, a unit may be
 from __future__ import annotations
 
 import dataclasses
+import datetime
 import math
 import re
 import types
@@ -33,6 +34,7 @@ __all__ = [
     "read_table",
     "require",
     "require_positive",
+    "shortened",
     "suggest",
     "unit_of",
     "unknown",
@@ -74,11 +76,25 @@ class Place:
     def _said(self, key: str = "") -> str:
         line = line_of(_lines(self.text), (*self.keys, key) if key else self.keys) if self.text else None
         file = self.file if line is None else f"{self.file}, line {line}"
-        return f"{file}: [{'.'.join(self.keys)}]" if self.keys else file
+        return f"{file}: [{shortened('.'.join(self.keys))}]" if self.keys else file
 
     def error(self, sentence: str, key: str = "") -> SceneError:
         """Return the exception for this place, or with the line of a key of the table at this place."""
-        return SceneError(f"{self._said(key)} {sentence}")
+        return SceneError(f"{self._said(key)} {shortened(sentence)}")
+
+
+_LONG = re.compile(r"\S{81,}")
+
+
+def shortened(sentence: str) -> str:
+    """Return a sentence in which no word is longer than a line: some files hold keys of megabytes.
+
+    Examples
+    --------
+    >>> len(shortened("has an unknown key " + 5000 * "k"))
+    99
+    """
+    return _LONG.sub(lambda word: word[0][:77] + "...", sentence)
 
 
 def require(condition: bool, sentence: str) -> None:
@@ -366,6 +382,8 @@ def _expected(kind: Any, unit: Unit) -> str:
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, datetime.date | datetime.time):
+        return f"the {'time' if isinstance(value, datetime.time) else 'date'} {value}"
     try:
         text = repr(value)
     except ValueError:  # an integer of thousands of digits

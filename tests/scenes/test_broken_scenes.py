@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import re
+import time
 from pathlib import Path
 
 import pytest
 
 from graphsynth.cli.main import main
-from graphsynth.scenes.scene import find_scene
+from graphsynth.scenes.scene import find_scene, load_scene
 
 LAMBDA = find_scene("lambda").read_text(encoding="utf-8")
+SURVEY = find_scene("four_bar_survey").read_text(encoding="utf-8")
+SEARCH = find_scene("eight_link_search").read_text(encoding="utf-8")
 
 
 def changed(old: str, new: str, text: str = LAMBDA) -> bytes:
@@ -94,6 +98,102 @@ BROKEN: dict[str, tuple[bytes, str]] = {
         LAMBDA.encode() + b"[budget]\ntime = '1 us'\n",
         r"\[budget\] stops the run before stage 'solve'",
     ),
+    # numbers that are none, and numbers nobody can mean
+    "1e400 with a unit": (changed("height_mm = 10", 'height_mm = "1e400 mm"'), r"LINE: .*must be a finite number"),
+    "exponent of nine digits": (changed("height_mm = 10", 'height_mm = "1e999999999 mm"'), r"LINE: .*must be a finite"),
+    "nan as text": (changed("height_mm = 10", 'height_mm = "nan"'), r"LINE: .*must be a finite number"),
+    "nan in a list": (changed("axis = [1, 0, 0]", "axis = [nan, 0, 0]"), r"axis.0\] must be a finite number"),
+    "fraction of nothing": (changed('"1/30"', '"1/0"'), r"LINE: .*must be a finite number in rad"),
+    "full-width digits": (changed("height_mm = 10", 'height_mm = "１０ mm"'), r"LINE: .*must be a finite number in mm"),
+    "bare full-width digits": (changed("height_mm = 10", "height_mm = １０"), r"not TOML: .*line 35"),
+    "Arabic digits": (changed("height_mm = 10", 'height_mm = "١٠ mm"'), r"LINE: .*must be a finite number in mm"),
+    "a date for a count": (
+        changed("positions = 360", "positions = 1979-05-27"),
+        r"an integer, not the date 1979-05-27",
+    ),
+    "a time for a count": (changed("positions = 360", "positions = 07:32:00"), r"an integer, not the time 07:32:00"),
+    "negative count": (changed("positions = 360", "positions = -5"), r"LINE: .*positions = -5; use 8 to 1000000"),
+    "true for a count": (changed("positions = 360", "positions = true"), r"LINE: .*must be an integer, not True"),
+    "a count with a point": (changed("positions = 360", "positions = 360.0"), r"LINE: .*must be an integer, not 360.0"),
+    "a thousand million links": (changed("links = 4", "links = 1000000000"), r"LINE: .*between 2 and 10000"),
+    "links of thirty digits": (changed("links = 4", "links = 1" + "0" * 30), r"LINE: .*between 2 and 10000"),
+    "negative seed": (changed('name = "lambda"', 'name = "lambda"\nseed = -1'), r"line 5: .*seed = -1; use 0 to"),
+    "time in bytes": (LAMBDA.encode() + b"[budget]\ntime = '1 GB'\n", r"a time with its unit.*is a size of memory"),
+    "negative memory": (LAMBDA.encode() + b"[budget]\nmemory_MB = -1\n", r"NEXT: .*memory_MB = -1.0; it must be"),
+    "half a box": (LAMBDA.encode() + b"[budget]\nboxes = 10.5\n", r"NEXT: .*must be an integer, not 10.5"),
+    # texts that are none
+    "UTF-16 without a mark": (LAMBDA.encode("utf-16-le"), r"not TOML: .*line 1"),
+    "NUL inside": (changed('name = "lambda"', 'name = "lam\0bda"'), r"not TOML: .*line 4"),
+    "NUL written": (changed('name = "lambda"', r'name = "lam\u0000bda"'), r"LINE: .*it names a folder"),
+    "escape sequence": (changed('title = "', r'title = "\u001b[31m'), r"LINE: .*which cannot be printed; remove it"),
+    "name of a paragraph": (
+        changed('name = "lambda"', f'name = "{"n" * 300}"'),
+        r"LINE: .*300 letters; use at most 100",
+    ),
+    "blanks only": (b" \n\t\n", r"lacks the table \[scene\]"),
+    # shapes
+    "key of 200000 parts": (
+        LAMBDA.encode() + b"\n" + b".".join([b"a"] * 200_000) + b" = 1\n",
+        r"line \d+: a key of more",
+    ),
+    "table of 20000 parts": (
+        LAMBDA.encode() + b"\n[" + b" . ".join([b"a"] * 20_000) + b"]\n",
+        r"a key of more than 100",
+    ),
+    "quoted key of 5000 parts": (
+        LAMBDA.encode() + b"\n" + b'."a"' * 5_000 + b" = 1\n",
+        r"a key of more than 100 parts",
+    ),
+    "key of half a megabyte": (LAMBDA.encode() + b"\n" + b"k" * 500_000 + b" = 1\n", r"unknown key 'k{70,80}\.\.\."),
+    "deep inline tables": (b"x = " + b"{a=" * 3000 + b"1" + b"}" * 3000, r"not TOML"),
+    "tables as a list": (changed("[scene]", "[[scene]]"), r"line 3: \[scene\] must be a table"),
+    "a table for a text": (changed('name = "lambda"', "name = { a = 1 }"), r"LINE: .*must be a string"),
+    "family by number": (changed('"lambda_linkage"', "3"), r"lacks the key 'module'"),
+    "product by number": (changed('"solutions", ', "1, "), r"products.0\] must be a string, not 1"),
+    "empty product": (changed('"solutions", ', '"", '), r"asks for '', which no stage gives"),
+    "product of a paragraph": (
+        changed('"solutions", ', f'"{"p" * 5000}", '),
+        r"asks for 'p{70,80}\.\.\.,? which no stage",
+    ),
+    "both spellings": (changed("height_mm = 10", 'height_mm = 10\nheight = "1 cm"'), r"gives both 'height_mm' and"),
+    # surveys and searches
+    "steps of a thousandth of a thousandth": (
+        changed("step = 0.05 }", "step = 0.000005 }", SURVEY),
+        r"9.7e\+17 dimension sets",
+    ),
+    "steps of 1e-300": (SURVEY.replace("step = 0.05", "step = 1e-300").encode(), r"at most 1e\+08 are taken at once"),
+    "no step": (changed("step = 0.05 }", "step = 0 }", SURVEY), r"step = 0.0; it must be positive"),
+    "negative length": (changed("first = 0.05", "first = -0.05", SURVEY), r"first = -0.05; a length must be positive"),
+    "text in a range": (changed("first = 0.05", "first = 'small'", SURVEY), r"frame.first\] must be a finite number"),
+    "nan in a range": (changed("first = 0.05", "first = nan", SURVEY), r"frame.first\] must be a finite number"),
+    "a list for a range": (changed("{ first = 0.05, last = 5, step = 0.05 }", "[1, 2]", SURVEY), r"must be a table"),
+    "unknown column": (changed('rows = "passing"', 'columns = ["weight"]', SURVEY), r"columns.0\] must be one of"),
+    "slice at nan": (changed("[1, 2.5, 4]", "[nan]", SURVEY), r"slices.0\] must be a finite number"),
+    "effort of 1e300": (
+        changed("effort = 0.05", "effort = 1e300", SEARCH),
+        r"LINE: .*effort = 1e\+300; use more than 0",
+    ),
+    "tries without end": (changed("tries = 1\n", "tries = 1000000000000\n", SEARCH), r"LINE: .*use 1 to 10000"),
+    "range without end": (
+        changed("[mechanism.motion]", "[mechanism.motion]\nspan_deg = 1e300", SEARCH),
+        r"at most 36000",
+    ),
+    "line of negative length": (
+        changed("length = 3", "length = -3", SEARCH),
+        r"embody\] asks for what cannot be: length",
+    ),
+    "ratio below one": (changed("max_length_ratio = 8", "max_length_ratio = 0.5", SEARCH), r"asks for what cannot be"),
+    "files and a question": (
+        changed("[mechanism]\n", '[mechanism]\nfiles = ["a.toml"]\n', SEARCH),
+        r"needs candidates",
+    ),
+    "files by number": (changed("[mechanism]\n", "[mechanism]\nfiles = [1]\n", SEARCH), r"files.0\] must be a string"),
+    "a million draws of few": (
+        changed("[mechanism]\n", "[structure.generate]\nsample = 1000000000\n\n[mechanism]\n", SEARCH),
+        r"sample 1000000000; draw 1 to 10000",
+    ),
+    "weight nan": (changed("weight = 2", "weight = nan", SEARCH), r"weight\] must be a finite number"),
+    "unknown goal": (changed('goal = "min"', 'goal = "best"', SEARCH), r"goal\] must be one of 'min', 'max'"),
 }
 
 
@@ -104,13 +204,14 @@ def test_a_broken_scene_is_answered_with_one_sentence(
     data, message = BROKEN[name]
     path = tmp_path / "broken.toml"
     path.write_bytes(data)
-    before, after = LAMBDA.splitlines(), data.decode(errors="replace").splitlines()
+    own = SURVEY if b"four_bar_survey" in data else SEARCH if b"eight_link_search" in data else LAMBDA
+    before, after = own.splitlines(), data.decode(errors="replace").splitlines()
     first = next((i for i, (a, b) in enumerate(zip(before, after), 1) if a != b), len(before) + 1)
     message = message.replace("LINE", f"line {first}").replace("NEXT", f"line {first + 1}")
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr()
     assert said.out == ""
-    lines = said.err.strip().splitlines()
+    lines = [line for line in said.err.strip().splitlines() if not line.startswith("compiling kernels (first use only")]
     assert len(lines) == 1 and lines[0].startswith("graphsynth: ") and "Traceback" not in said.err
     assert re.search(message, lines[0]), lines[0]
     assert len(lines[0]) < 500
@@ -118,7 +219,33 @@ def test_a_broken_scene_is_answered_with_one_sentence(
 
 
 def test_more_than_thirty() -> None:
-    assert len(BROKEN) >= 30
+    assert len(BROKEN) >= 90
+
+
+def test_a_file_of_fifty_megabytes_is_refused_unread(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "large.toml"
+    with path.open("wb") as stream:
+        stream.truncate(50_000_000)
+    start = time.perf_counter()
+    assert main(["run", str(path)]) == 2
+    assert "more than 1048576 bytes" in capsys.readouterr().err and time.perf_counter() - start < 2.0
+
+
+def test_a_mark_before_the_first_letter_is_no_mistake(tmp_path: Path) -> None:
+    path = tmp_path / "marked.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + LAMBDA.encode())
+    assert load_scene(path).mechanism == load_scene("lambda").mechanism
+
+
+def test_links_that_lead_in_a_circle_and_pipes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    loop = tmp_path / "loop.toml"
+    loop.symlink_to(loop)
+    pipe = tmp_path / "pipe.toml"
+    os.mkfifo(pipe)  # nobody writes: reading it would wait without end
+    for path in (loop, pipe):
+        assert main(["run", str(path)]) == 2
+        said = capsys.readouterr().err.strip().splitlines()
+        assert len(said) == 1 and "neither the path of a .toml file nor one of the shipped scenes" in said[0]
 
 
 @pytest.mark.parametrize("what", ["folder", "missing", "not toml by name"])

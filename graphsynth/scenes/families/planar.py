@@ -77,8 +77,10 @@ class EmbodyTable:
     function: FunctionTable | None = None
 
     def __post_init__(self) -> None:
-        require(self.tries >= 1, f"has tries = {self.tries}; use 1 or more")
-        require(self.effort > 0, f"has effort = {self.effort}; it must be positive")
+        require(1 <= self.tries <= 10_000, f"has tries = {self.tries}; use 1 to 10000")
+        require(
+            0 < self.effort <= 100, f"has effort = {self.effort}; use more than 0 and at most 100, 1 is the usual work"
+        )
         targets = [name for name in ("line", "path", "poses", "function") if getattr(self, name) is not None]
         require(len(targets) < 2, f"has {' and '.join(targets)}; only one target works")
 
@@ -93,7 +95,9 @@ class MotionTable:
 
     def __post_init__(self) -> None:
         check_positions(self.positions)
-        require(self.span_deg > 0, f"has span_deg = {self.span_deg}; it must be positive")
+        require(
+            0 < self.span_deg <= 36_000, f"has span_deg = {self.span_deg}; use more than 0 and at most 36000, 100 turns"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,7 +63,7 @@ def take(context: Context) -> Iterator[Candidate | FileCandidate]:
     Raises
     ------
     SceneError
-        A file that cannot be read or is no mechanism; a question without candidates.
+        A file that cannot be read or is no mechanism; goals nobody can mean; a question without candidates.
     TooLargeError
         More candidates than the limit.
     """
@@ -72,6 +72,10 @@ def take(context: Context) -> Iterator[Candidate | FileCandidate]:
         return iter([_read(context, i, name) for i, name in enumerate(table.files)])
     from graphsynth.scenes.steps.structural import check_count, generate, solve
 
+    try:
+        goals_of(table.embody)
+    except GraphsynthError as error:
+        raise (context.scene.place / "mechanism" / "embody").error(f"asks for what cannot be: {error}") from error
     solutions = solve(context)
     check_count(context, solutions)
     return generate(context, solutions)
