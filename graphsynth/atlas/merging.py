@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +28,24 @@ def merge(path: Path, parts: list[Path]) -> None:
     with ExitStack() as stack:
         shards = [stack.enter_context(closing(connect(part, readonly=True))) for part in parts]
         names = dict(zip(shards, parts))
+        # everything is checked before the file is made
+        plans = [_plan(question, names) for question in _families(shards)]
         target = stack.enter_context(closing(connect(path, create=True)))
-        for question in _families(shards):
-            _merge_family(target, question, names)
+        for plan in plans:
+            _merge_family(target, plan, names)
         for shard in shards:
             _copy_evaluations(shard, target)
         settle(target)
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """A family: its pieces and the fingerprint of their cut; where each piece is: shard, first chain, chains."""
+
+    question: tuple[int, int, int]
+    pieces: int
+    cut: str
+    where: dict[int, tuple[sqlite3.Connection, int, int]]
 
 
 def _families(shards: list[sqlite3.Connection]) -> list[tuple[int, int, int]]:
@@ -40,16 +53,20 @@ def _families(shards: list[sqlite3.Connection]) -> list[tuple[int, int, int]]:
     return sorted({row for shard in shards for row in shard.execute(select)})
 
 
-def _merge_family(
-    target: sqlite3.Connection, question: tuple[int, int, int], names: dict[sqlite3.Connection, Path]
-) -> None:
-    mobility, links, fractionated = question
+def _plan(question: tuple[int, int, int], names: dict[sqlite3.Connection, Path]) -> _Plan:
+    """Find every piece of a family.
+
+    Raises
+    ------
+    GraphsynthError
+        If a piece is missing or twice there, or the shards are of different cuts.
+    """
+    mobility, links, _ = question
     where: dict[int, tuple[sqlite3.Connection, int, int]] = {}
     cuts: dict[tuple[int, str], Path] = {}
     for shard, name in names.items():
         row = shard.execute(
-            "SELECT family_id, pieces, cut FROM families WHERE (mobility, links, fractionated) = (?, ?, ?)",
-            question,
+            "SELECT family_id, pieces, cut FROM families WHERE (mobility, links, fractionated) = (?, ?, ?)", question
         ).fetchone()
         if row is None:
             continue
@@ -69,20 +86,26 @@ def _merge_family(
         )
     pieces, cut = next(iter(cuts))
     _check_all_there(question, pieces, where, names)
+    return _Plan(question, pieces, cut, where)
+
+
+def _merge_family(target: sqlite3.Connection, plan: _Plan, names: dict[sqlite3.Connection, Path]) -> None:
+    """Write the pieces of a family in their order; count it, once for all shards."""
+    mobility, links, fractionated = plan.question
     expected = expected_of(problem_of(links, mobility, bool(fractionated)), None)
     if not expected:
         return
-    family_id, complete = open_family(target, question, (pieces, cut, "1/1", expected))
+    family_id, complete = open_family(target, plan.question, (plan.pieces, plan.cut, "1/1", expected))
     if complete:
         return
 
     def results(places: list[int]) -> Iterator[Rows]:
         for piece in places:
-            with readable(names[where[piece][0]], TypeError, ValueError, LookupError):
-                rows = _read(*where[piece])
+            with readable(names[plan.where[piece][0]], TypeError, ValueError, LookupError):
+                rows = _read(*plan.where[piece])
             yield rows
 
-    build_family(target, family_id, mobility, [(piece, 1.0) for piece in range(pieces)], results)
+    build_family(target, family_id, mobility, [(piece, 1.0) for piece in range(plan.pieces)], results)
     finish_family(target, family_id)
 
 

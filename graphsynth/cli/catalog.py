@@ -1,4 +1,4 @@
-"""``graphsynth catalog``: build, query, verify, export, merge."""
+"""``graphsynth catalog``: build, query, verify, export, merge; `evaluate` and `site` have modules of their own."""
 
 from __future__ import annotations
 
@@ -88,7 +88,8 @@ def _summary(options: argparse.Namespace, begin: float) -> int:
         )  # fmt: skip
         return 0
     _put_frame(families)
-    console.put(f"{options.output}: {chains} chains, {size / 1e6:.1f} MB ({seconds:.1f} s)")
+    part = "" if getattr(options, "shard", None) is None else ", part {}/{}: merge all parts".format(*options.shard)
+    console.put(f"{options.output}: {chains} chains{part}, {size / 1e6:.1f} MB ({seconds:.1f} s)")
     return 0
 
 

@@ -43,7 +43,9 @@ def add_evaluate(
         "--per-chain", type=limit, default=1, metavar="N",
         help="mechanisms of each chain, those of the smallest groups first (default 1; 0: all)",
     )  # fmt: skip
-    parser.add_argument("--limit", type=limit, metavar="N", help="evaluate at most N mechanisms now")
+    parser.add_argument(
+        "--limit", type=limit, metavar="N", default=0, help="evaluate at most N mechanisms now (default 0: all)"
+    )
     parser.add_argument("--seed", type=limit, default=0, metavar="S", help="of the search for dimensions (default 0)")
     parser.add_argument("--tries", type=limit, default=4, metavar="N", help="searches for each mechanism (default 4)")
     parser.add_argument(
@@ -73,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
         try:
             with processes(workers_for(options.workers, False)) as executor, _progress() as watch:
                 done = catalogue.evaluate(
-                    options.links, options.mobility, per_chain=options.per_chain, limit=options.limit,
+                    options.links, options.mobility, per_chain=options.per_chain, limit=options.limit or None,
                     seed=options.seed, tries=options.tries, jamming=jamming, executor=executor, watch=watch,
                 )  # fmt: skip
         except KeyboardInterrupt:

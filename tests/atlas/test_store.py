@@ -172,6 +172,7 @@ def test_merged_shards_are_the_catalogue_to_the_last_number(many, tmp_path, fine
             assert merged.digest() == many.digest()
     with pytest.raises(GraphsynthError, match="are in none of the files"):
         Catalogue.merge(tmp_path / "x.sqlite", parts[:2])
+    assert not (tmp_path / "x.sqlite").exists()
     with pytest.raises(GraphsynthError, match="give every shard once"):
         Catalogue.merge(tmp_path / "y.sqlite", [*parts, parts[0]])
     with pytest.raises(SpecError, match="is one of the shards"):
@@ -507,3 +508,21 @@ def test_evaluations_are_kept_shown_and_replaced(tmp_path):
 def test_evaluations_without_sense_are_refused(given):
     with pytest.raises(SpecError):
         Evaluation(**{"chain": "1.4.4.1", "frame": 0, "driver": 2, "kind": "jamming", "status": "free"} | given)
+
+
+def test_shards_are_not_counted_but_merged_ones_are(tmp_path, monkeypatch):
+    """Counting a large family takes a good part of the time of one shard: it is done once, by the merge."""
+    from graphsynth.atlas import making
+
+    counted = []
+    whole = making.expected_of
+    monkeypatch.setattr(making, "expected_of", lambda *work: counted.append(work) or whole(*work))
+    parts = [tmp_path / f"{i}.sqlite" for i in (1, 2)]
+    for i, part in enumerate(parts, 1):
+        with Catalogue.build(part, [5, 6, 8], shard=(i, 2)) as shard:
+            assert shard.completeness()["counted"].isna().all() and not shard.completeness()["complete"].any()
+            assert shard.verify().passed
+    assert not counted
+    with Catalogue.merge(tmp_path / "x.sqlite", parts) as merged:
+        assert merged.completeness()["counted"].tolist() == [2, 16]
+        assert merged.completeness()["complete"].all()
