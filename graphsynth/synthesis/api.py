@@ -246,7 +246,7 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
     >>> [group.to_text() for group in enumerate_assur_groups(2)]
     ['Bw f0']
     """
-    return _list(Problem.trusses(links + 1, space, True), executor)
+    return _list(Problem.groups(links, space), executor)
 
 
 def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
@@ -275,7 +275,7 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
     >>> [count_assur_groups(n) for n in (2, 4, 6, 8, 10)]
     [1, 2, 10, 173, 5438]
     """
-    return _count(Problem.trusses(links + 1, space, True), executor)
+    return _count(Problem.groups(links, space), executor)
 
 
 def enumerate_baranov_trusses(

@@ -148,6 +148,11 @@ class Problem:
         """
         if mobility == 0 and not isinstance(mobility, bool):
             raise SpecError("mobility = 0 must be at least 1: Baranov trusses are the structures without mobility")
+        if not isinstance(joints_by_mobility, Mapping | None):
+            raise SpecError(
+                f"joints_by_mobility = {joints_by_mobility!r} must be a mapping from the mobility of a joint to a "
+                "number of joints, as in {2: 1}"
+            )
         higher = dict(joints_by_mobility or {})
         joints = chain_joints(links, mobility, space, higher)
         placed = tuple(sorted((i, count) for i, count in higher.items() if i > 1 and count))
@@ -207,6 +212,21 @@ class Problem:
         return cls(title, tuple(families), tuple(handfuls), order)
 
     @classmethod
+    def groups(cls, moving: int, space: int) -> Problem:
+        """State the enumeration of Assur groups with a number of moving links.
+
+        Raises
+        ------
+        SpecError
+            A number of links out of its bounds.
+        TooLargeError
+            More loops than there are contracted graphs.
+        """
+        if isinstance(moving, bool) or not isinstance(moving, int):
+            raise SpecError(f"moving links = {moving!r} must be a whole number, at least 1")
+        return cls.trusses(moving + 1, space, True)
+
+    @classmethod
     def trusses(cls, links: int, space: int, framed: bool) -> Problem:
         """State the enumeration of Baranov trusses (of Assur groups, if ``framed``).
 
@@ -217,8 +237,8 @@ class Problem:
         TooLargeError
             More loops than there are contracted graphs.
         """
-        if framed and (isinstance(links, bool) or not isinstance(links, int) or links < 2):
-            raise SpecError(f"moving links = {links - 1!r} must be a whole number, at least 1")
+        if framed and isinstance(links, int) and links < 2:
+            raise SpecError(f"moving links = {links - 1} must be a whole number, at least 1")
         joints = chain_joints(links, 0, space, {})
         title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
         if joints is None:

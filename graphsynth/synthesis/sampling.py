@@ -36,12 +36,14 @@ def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
     Raises
     ------
     SpecError
-        If k is negative, or the problem asks for a symmetry or for levels.
+        If k is negative, the seed no whole number, or the problem asks for a symmetry or for levels.
     InfeasibleSpecError
         If there is nothing to draw from.
     """
     if isinstance(k, bool) or not isinstance(k, int) or k < 0:
         raise SpecError(f"k = {k!r} must be a whole number >= 0")
+    if isinstance(seed, bool) or not isinstance(seed, int):  # None would draw others every time
+        raise SpecError(f"seed = {seed!r} must be a whole number; the same one gives the same draws")
     if problem.symmetry or any(family.levels for family in problem.families):
         raise SpecError("sampling with a required symmetry or wanted levels is not supported: list them and choose")
     listed = [graph for handful in problem.handfuls for graph in handful.graphs()]

@@ -25,6 +25,7 @@ LISTING_SIZE = 200_000.0  # bound on the labellings of a unit to list, before sp
 COUNTING_SIZE = 512  # contracted graphs in a unit to count
 _ROWS = 4096
 _MOST_STATES = 1 << 24
+_ONE_BYTE = 62  # most links whose number the text form writes in one byte, as the kernel does
 
 
 @dataclass(frozen=True)
@@ -197,6 +198,9 @@ def graphs_of(unit: Unit) -> Iterator[MechanismGraph]:
 def text_of(unit: Unit) -> Iterator[tuple[bytes, int]]:
     """Stream the chains of a unit as (lines of the text form, number of lines)."""
     family = unit.family
+    if family.links > _ONE_BYTE:
+        yield from ((f"{graph.to_text()}\n".encode(), 1) for graph in graphs_of(unit))
+        return
     spelling = spelling_of(family)
     highest = max((i for i, _ in family.higher), default=1)
     line = 16 + family.links * family.links // 12 + 8 * sum(count for _, count in family.higher) + 4 * highest

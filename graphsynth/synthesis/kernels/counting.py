@@ -232,6 +232,8 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                     fixed += n
                 if mode == FRAME_PATH:
                     work.classes[KIND, frame] -= 1
+                if total > (np.int64(1) << 62) - fixed // kept:
+                    return TOO_LARGE
                 total += fixed // kept
         out[h - start] = total
     return 0
