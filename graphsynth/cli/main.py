@@ -87,6 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_count(verbs)
     _add_enumerate(verbs)
     _add_show(verbs)
+    _add_convert(verbs)
     _add_animate(verbs)
     _add_run(verbs)
     _add_accuracy(verbs)
@@ -150,6 +151,16 @@ def _add_show(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser.add_argument(
         "--view", choices=("diagram", "levels", "both"), help="kinematic diagram (default), graph by levels, or both"
     )
+
+
+def _add_convert(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _verb(verbs, "convert", "convert", "Write the graphs and mechanisms of a file in another format.")
+    parser.add_argument("source", metavar="FILE|-", help="file of any format; - is standard input")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE|-", help="file to write; - is standard output")
+    parser.add_argument("--from", dest="source_format", metavar="FORMAT", help="format of the input, if not by suffix")
+    parser.add_argument("--to", dest="target_format", metavar="FORMAT", help="format of the output, if not by suffix")
+    parser.add_argument("--graphs", action="store_true", help="of mechanisms, write the graphs only")
+    parser.add_argument("--force", action="store_true", help="replace FILE")
 
 
 def _add_animate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
