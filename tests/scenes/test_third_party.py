@@ -1,4 +1,4 @@
-"""The package of docs/how-to/write-a-scene.md, installed as it stands there, run by the command line and from Python."""
+"""The package of docs/how-to/write-a-scene.md, installed as it stands there, run by command line and Python."""
 
 from __future__ import annotations
 
