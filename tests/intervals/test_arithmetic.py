@@ -11,10 +11,11 @@ from interval_samples import SPECIAL, bounds
 
 from graphsynth.intervals import Interval, divide_extended
 from graphsynth.intervals import arrays as numpy_form
+from graphsynth.testing import finite_numbers
 
 INF = math.inf
 ORDINARY = st.floats(-1e6, 1e6, allow_nan=False).filter(lambda x: x == 0.0 or abs(x) > 1e-100)
-FINITE = st.floats(allow_nan=False, allow_infinity=False)
+FINITE = finite_numbers()
 
 
 def ordered(a, b):

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from graphsynth.errors import FormatError, IntervalError
 from graphsynth.intervals import Decoration, Interval
+from graphsynth.testing import finite_numbers
 
 INF = math.inf
 
@@ -90,7 +91,7 @@ def test_bad_input_gets_a_sentence(make, error, word):
         make()
 
 
-FLOATS = st.floats(allow_nan=False, allow_infinity=False)
+FLOATS = finite_numbers()
 
 
 @given(FLOATS, FLOATS)

@@ -31,6 +31,7 @@ from graphsynth.synthesis.parallel import texts
 from graphsynth.synthesis.problem import Problem
 from graphsynth.synthesis.units import Unit, cut, graphs_of, text_of
 from graphsynth.synthesis.writing import shard_of
+from graphsynth.testing import chains, specs
 
 EXACT = settings(deadline=None)  # the first example may compile
 
@@ -198,18 +199,13 @@ def _keys(links):
 
 
 @EXACT
-@given(st.randoms(use_true_random=False), st.integers(0, 4))
-def test_chains_grown_by_dyads_are_listed(rng, dyads):
-    joints = [(0, 1), (1, 2), (2, 3), (0, 3)]
-    links = 4
-    for _ in range(dyads):
-        a, b = rng.sample(range(links), 2)
-        joints += [(a, links), (links, links + 1), (b, links + 1)]
-        links += 2
-    names = list(range(links))
-    rng.shuffle(names)
-    g = MechanismGraph(links, [(names[a], names[b]) for a, b in joints])
-    assert g.key in _keys(links)
+@given(chains(4, 10), st.data())
+def test_a_chain_with_one_more_dyad_is_listed(chain, data):
+    links = chain.links
+    a, b = data.draw(st.lists(st.integers(0, links - 1), min_size=2, max_size=2, unique=True))
+    joints = [(joint.a, joint.b) for joint in chain.joints]
+    grown = MechanismGraph(links + 2, [*joints, (a, links), (links, links + 1), (b, links + 1)])
+    assert grown.key in _keys(links + 2)
 
 
 # --- symmetry ---------------------------------------------------------------------------------------------------------
@@ -334,3 +330,20 @@ def test_keys_do_not_depend_on_labels(seed):
     rng.shuffle(names)
     other = g.relabelled(names)
     assert (other.key, other.automorphism_order) == (g.key, g.automorphism_order)
+
+
+# --- questions drawn at random ----------------------------------------------------------------------------------------
+
+
+@settings(max_examples=12, deadline=None)
+@given(specs(4, 6))
+def test_counts_are_lengths_of_lists(spec):
+    listed = list(enumerate_mechanisms(spec))
+    assert len(listed) == count_mechanisms(spec) == len({g.key for g in listed})
+    assert all(g.frame is not None and g.rigid_subchain() is None for g in listed)
+    assert {g.key for g in listed} <= {g.key for g in enumerate_mechanisms(StructuralSpec(W=1, n=spec_links(spec)))}
+
+
+def spec_links(spec):
+    """Moving links of a question of `specs`: always given."""
+    return next(a.n for a in spec.solve())

@@ -11,7 +11,7 @@ from graphsynth.testing.strategies.graphs import mechanism_graphs
 
 __all__ = ["specs"]
 
-_FREE = ("p", "v", "v_ct", "v_P", "t0", "G", "n2", "n3", "n4", "p1", "p2")
+_FREE = ("p", "v", "v_ct", "v_P", "t0", "G", "n2", "n3", "n4", "p1")
 
 
 def _values(graph: MechanismGraph) -> dict[str, int]:
