@@ -28,10 +28,10 @@ from graphsynth.intervals import (
     sqrt,
     tan,
 )  # fmt: skip
+from graphsynth.testing import finite_numbers
 
 INF = math.inf
 WORST = 6381956970095103 * 2.0**797  # the double nearest to a multiple of pi/2, relative to the spacing (Kahan)
-from graphsynth.testing import finite_numbers
 
 FUNCTIONS = {"sin": sin, "cos": cos, "tan": tan, "atan": atan, "asin": asin, "acos": acos, "exp": exp, "log": log}
 SPECIAL = [
