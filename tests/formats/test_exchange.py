@@ -8,7 +8,7 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth import formats
@@ -18,21 +18,11 @@ from graphsynth.mechanism.laws import Linear, Table
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
+from graphsynth.testing import graphs
 
 EVERY = sorted(set(formats.FORMATS) - {"toml", "graph6"})
 MANY = [name for name in EVERY if formats.FORMATS[name].many]
 OF_MECHANISMS = [name for name in formats.FORMATS if formats.FORMATS[name].mechanisms]
-
-
-@st.composite
-def graphs(draw: st.DrawFn) -> MechanismGraph:
-    """Any labelled graph: in parts or not, with any mobilities, frame and space."""
-    links = draw(st.integers(1, 12))
-    pairs = [(a, b) for b in range(links) for a in range(b)]
-    chosen = draw(st.lists(st.sampled_from(pairs), unique=True)) if pairs else []
-    space = draw(st.sampled_from([3, 3, 2, 6]))
-    joints = [(a, b, draw(st.integers(1, space - 1))) for a, b in chosen]
-    return MechanismGraph(links, joints, frame=draw(st.none() | st.integers(0, links - 1)), space=space)
 
 
 number = st.floats(-1e9, 1e9) | st.sampled_from([-0.0, 5e-324, 0.1, 1 / 3])
@@ -92,6 +82,7 @@ def test_chains_and_mechanisms_of_the_enumerator(name: str, links: int) -> None:
 
 
 @pytest.mark.parametrize("name", OF_MECHANISMS)
+@settings(max_examples=40)
 @given(mechanism=mechanisms())
 def test_mechanisms_come_back_to_the_last_bit(name: str, mechanism: Mechanism) -> None:
     (back,) = formats.read_text(formats.write_text(mechanism, name), name)
