@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 import time
 
 import numpy as np
@@ -110,6 +111,41 @@ def test_every_inversion_of_ten_links() -> None:
             assert crossings(sketch) == sketch.crossings == (0 if chain.is_planar else 1)
 
 
+def grown(links: int, lots: random.Random) -> MechanismGraph:
+    """A planar chain grown from a four-bar by dyads."""
+    joints, count = [(0, 1), (1, 2), (2, 3), (0, 3)], 4
+    while count < links:
+        a, b = sorted(lots.sample(range(count), 2))
+        tried = MechanismGraph(count + 2, [*joints, (a, count), (count, count + 1), (b, count + 1)])
+        if tried.is_planar and max(tried.degrees) < 6:
+            joints, count = [(a, b) for a, b, _ in tried.joints], count + 2
+    return MechanismGraph(links, joints)
+
+
+@pytest.mark.parametrize("links", [14, 20, 30])
+def test_large_planar_chains_are_not_crowded(links: int) -> None:
+    lots, room = random.Random(links), []
+    for _ in range(5):
+        sketch = layout(grown(links, lots))
+        assert sketch.planar and crossings(sketch) == 0
+        places = sketch.positions.tolist()
+        lengths = [math.dist(places[a], places[b]) for a, b in sides(sketch)]
+        closest = min(math.dist(p, q) for p, q in itertools.combinations(places, 2))
+        room.append(closest * len(lengths) / sum(lengths))
+    assert sorted(room)[2] >= 0.3  # a few stay crowded somewhere
+
+
+def test_a_large_graph_that_is_not_planar_is_drawn_in_time() -> None:
+    lots, joints = random.Random(7), [(0, 1), (1, 2), (2, 3), (0, 3)]
+    for count in range(4, 30, 2):
+        a, b = lots.sample(range(count), 2)
+        joints += [(a, count), (count, count + 1), (b, count + 1)]
+    begin = time.process_time()
+    sketch = layout(MechanismGraph(30, joints))
+    assert sketch.crossings > 0
+    assert time.process_time() - begin < 5.0
+
+
 def test_the_judge_sees_crossings() -> None:
     square = layout(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)]))
     assert crossings(square) == 0
@@ -152,7 +188,7 @@ def _from_middle(positions: list[list[float]], polygon: tuple[int, ...], k: int)
 
 
 def test_a_sketch_is_quick() -> None:
-    """Well under the 20 ms of a calm computer; a busy one gets three times as much."""
+    """Well under the 20 ms of a calm computer, also on a busy one."""
     chains = [chain for k, chain in enumerate(enumerate_chains(10)) if k % 10 == 0]
     graph_svg(chains[0])
     spent = []
@@ -160,4 +196,4 @@ def test_a_sketch_is_quick() -> None:
         begin = time.thread_time()
         graph_svg(chain)
         spent.append(time.thread_time() - begin)
-    assert sorted(spent)[len(spent) // 2] < 0.06
+    assert sorted(spent)[len(spent) // 2] < 0.02

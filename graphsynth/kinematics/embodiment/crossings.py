@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,6 +34,8 @@ _STARTS, _STEPS, _FINISH = 40, 50, 40
 #: Repulsion; distance of joints from foreign sides below which a force acts, in mean sides, and its strength.
 _REPEL, _CLEAR, _CLEARING = 0.35, 0.45, 1.5
 _SEED = 20
+#: Planarity tests at most: every choice of two pairs up to twelve links, a second for a large graph.
+_TRIALS = 500
 
 
 def crossing_pairs(graph: MechanismGraph, most: int = 2) -> list[tuple[int, int]]:
@@ -56,7 +58,7 @@ def crossing_pairs(graph: MechanismGraph, most: int = 2) -> list[tuple[int, int]
     pairs = [(a, b) for a, b in combinations(binary, 2) if b not in around[a] and not around[a] & around[b]]
     pairs.sort(key=lambda pair: graph.frame in pair)
     for count in range(1, most + 1):
-        for chosen in combinations(pairs, count):
+        for chosen in islice(combinations(pairs, count), _TRIALS):
             flat = {link for pair in chosen for link in pair}
             if len(flat) < 2 * count:
                 continue

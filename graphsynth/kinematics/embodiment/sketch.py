@@ -32,6 +32,8 @@ IntArray = NDArray[np.intp]
 
 #: Steps of forces: for the comparison of outer faces, and for the picture.
 _ROUGH, _STEPS = 15, 60
+#: Further rounds of steps while two joints are closer than this, in mean sides.
+_ROUNDS, _CLOSE = 30, 0.3
 #: Outer faces compared, the longest first.
 _OUTER = 4
 #: Springs of polygons over those of bars: plates are to be nearly regular.
@@ -48,6 +50,7 @@ _CLEAR, _CLEARING = 0.5, 5.0
 _APART = 0.6
 #: Strength of the force that keeps triangles from becoming flat.
 _BARRIER = 0.05
+_STRENGTHS = (_APART, _CLEAR, _CLEARING, _BARRIER, _HEIGHT, _KEPT, float(_RETRIES))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +157,14 @@ def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygon
     drawings = [_Drawing(graph, loops, k, polygons) for k in near[:_OUTER]]
     for drawing in drawings:
         drawing.even_out(_ROUGH)
-    best = max(drawings, key=_Drawing.room)  # the first of equals
+    rooms = [drawing.room() for drawing in drawings]
+    # the first of equals: rounding must not choose among faces that symmetry makes alike
+    best = next(drawing for drawing, room in zip(drawings, rooms) if room >= (1.0 - 1e-6) * max(rooms))
     best.even_out(_STEPS)
+    for _ in range(_ROUNDS):  # large graphs begin crowded
+        if best.closest() >= _CLOSE:
+            break
+        best.even_out(_STEPS, crowded=True)
     return _upright(graph, best.z[: len(graph.joints)], best.outer)
 
 
@@ -172,56 +181,34 @@ class _Drawing:
         self.triangles = np.array(triangles + self.plates + _corners(self.outer), dtype=np.intp)
         stiff = {pair for p in polygons if len(p) > 2 for pair in _sides((p,))}
         self.springs = _Springs(
-            np.array(sides), [_STIFF if side in stiff else 1.0 for side in sides], count, len(inner)
+            np.array(sides, dtype=np.intp), [_STIFF if side in stiff else 1.0 for side in sides], count
         )
         z = _tutte(count + len(inner), np.array(sides + spokes), self.outer)
         self.z = z / float(np.abs(self.springs.stretch(z)).mean())
         self.sense = np.sign(_areas(self.z, self.triangles))
-        self.faces_on = self.triangles.T.ravel()
         self.joints = count
         self.corners = np.array(self.plates, dtype=np.intp).reshape(-1, 3)
-        self.corners_on = self.corners.T.ravel()
         self.turned = np.sign(_areas(self.z, self.corners))
 
-    def even_out(self, steps: int) -> None:
+    def even_out(self, steps: int, crowded: bool = False) -> None:
         """Let springs, repulsion and the room of the faces act; no face turns over.
 
         A step keeps a share of the area of every triangle, so it never gets stuck at a face that is small already.
         """
-        step = 0.15
-        for _ in range(steps):
-            areas = _areas(self.z, self.triangles) * self.sense
-            move = self.springs.force(self.z) + self._room_of_faces(areas) + self.springs.clearing(self.z)
-            if self.plates:
-                self._raise_corners(move)
-            move *= min(step, 0.2 / max(float(np.abs(move).max()), 1e-9))
-            for _ in range(_RETRIES):
-                bad = _areas(self.z + move, self.triangles) * self.sense < _KEPT * areas
-                if not bad.any():
-                    self.z, step = self.z + move, min(0.3, step * 1.2)
-                    break
-                move[self.triangles[bad].ravel()] *= 0.3
-            else:
-                step *= 0.5
-            if step < 1e-3:
-                break
+        from graphsynth.kinematics.embodiment import kernels
 
-    def _room_of_faces(self, areas: Array) -> Complex:
-        """Force of a logarithmic barrier: every triangle wants some area."""
-        a, b, c = self.triangles.T
-        push = 1j * self.sense * _BARRIER / np.maximum(areas, 1e-3)
-        p, q, r = self.z[a], self.z[b], self.z[c]
-        shares = np.concatenate([push * (r - q), push * (p - r), push * (q - p)])  # across the opposite side
-        return _gathered(len(self.z), self.faces_on, shares)
+        x, y = self.z.real.copy(), self.z.imag.copy()
+        kernels.even_out(
+            x, y, self.joints, self.springs.sides, self.springs.stiffness, self.triangles, self.sense,
+            self.corners, self.turned, steps, crowded, _STRENGTHS,
+        )  # fmt: skip
+        self.z = x + 1j * y
 
-    def _raise_corners(self, move: Complex) -> None:
-        """Push corners of flat plates out: springs alone leave them nearly on a line."""
-        a, _, c = self.corners.T
-        side = self.z[c] - self.z[a]
-        length = np.maximum(np.abs(side), 1e-9)
-        heights = _areas(self.z, self.corners) * self.turned / length
-        push = -4.0 * np.maximum(0.0, _HEIGHT - heights) * self.turned * 1j * side / length
-        move += _gathered(len(self.z), self.corners_on, np.concatenate([-0.5 * push, push, -0.5 * push]))
+    def closest(self) -> float:
+        """Smallest distance of two joints in mean sides."""
+        z = self.z[: self.joints]
+        apart = np.abs(z[:, None] - z)[np.triu_indices(len(z), 1)].min()
+        return float(apart / np.abs(self.springs.stretch(z)).mean())
 
     def room(self) -> float:
         """Smallest distance of two joints, or height of a plate, over the size of the picture."""
@@ -235,62 +222,24 @@ class _Drawing:
 
 
 class _Springs:
-    """Springs of rest length 1 along sides, and repulsion between all vertices (hubs repel weakly)."""
+    """The sides of links, their springs of rest length 1, and the joints they are to keep away from."""
 
-    def __init__(self, sides: IntArray, stiffness: list[float], joints: int, hubs: int) -> None:
-        count = joints + hubs
-        self.first, self.second, self.stiffness = sides[:, 0], sides[:, 1], np.array(stiffness)
-        self.ends = sides.T.ravel()
-        weight = np.where(np.arange(count) < joints, 1.0, 0.2)
-        self.touching = 3.0 * np.outer(weight == 1.0, weight == 1.0)
-        self.weight, self.eye = 0.35 * np.outer(weight, weight), np.eye(count)
-        self.foreign = np.array(
-            [(k, p, q) for k in range(joints) for p, q in sides.tolist() if k not in (p, q)], dtype=np.intp
-        ).reshape(-1, 3)
-        self.clearing_on = self.foreign.T.ravel()
+    def __init__(self, sides: IntArray, stiffness: list[float], joints: int) -> None:
+        self.sides, self.stiffness = sides, np.array(stiffness)
+        of_side, joint = np.divmod(np.arange(joints * len(sides)), joints)
+        foreign = (joint != sides[of_side, 0]) & (joint != sides[of_side, 1])
+        self.foreign = joint[foreign], sides[of_side[foreign], 0], sides[of_side[foreign], 1]
 
     def stretch(self, z: Complex) -> Complex:
         """Vectors along the sides."""
-        return np.asarray(z[self.second] - z[self.first])
+        return np.asarray(z[self.sides[:, 1]] - z[self.sides[:, 0]])
 
     def clearances(self, z: Complex) -> Array:
         """Distances of joints from the sides they are not on."""
-        return np.abs(self._gaps(z)[0])
-
-    def _gaps(self, z: Complex) -> tuple[Complex, Array]:
-        """Ways from the nearest point of a side to a joint, and where on the side (0 to 1) that point is."""
-        k, p, q = self.foreign.T
+        k, p, q = self.foreign
         side, way = z[q] - z[p], z[k] - z[p]
         share = (way.real * side.real + way.imag * side.imag) / np.maximum(side.real**2 + side.imag**2, 1e-12)
-        at = np.minimum(np.maximum(share, 0.0), 1.0)
-        return way - at * side, at
-
-    def clearing(self, z: Complex) -> Complex:
-        """Force that drives joints away from sides they are not on."""
-        gap, at = self._gaps(z)
-        distance = np.maximum(np.abs(gap), 1e-9)
-        push = gap * (_CLEARING * np.maximum(0.0, _CLEAR - distance) / distance)
-        shares = np.concatenate([push, (at - 1.0) * push, -at * push])
-        return _gathered(len(z), self.clearing_on, shares)
-
-    def force(self, z: Complex) -> Complex:
-        """Force on every vertex."""
-        gap = z[:, None] - z
-        square = gap.real**2 + gap.imag**2 + self.eye
-        d = self.stretch(z)
-        pull = d * (self.stiffness * (1.0 - 1.0 / np.maximum(np.abs(d), 1e-9)))
-        distance = np.sqrt(square)
-        near = self.touching * np.maximum(0.0, _APART - distance) / distance
-        return np.asarray((gap * (self.weight / square**2 + near)).sum(axis=1)) + _gathered(
-            len(z), self.ends, np.concatenate([pull, -pull])
-        )
-
-
-def _gathered(count: int, index: IntArray, shares: Complex) -> Complex:
-    """Sum the shares that go to each vertex (no matrix product: its threads would cost more than the sum)."""
-    return np.asarray(
-        np.bincount(index, shares.real, minlength=count) + 1j * np.bincount(index, shares.imag, minlength=count)
-    )
+        return np.asarray(np.abs(way - np.minimum(np.maximum(share, 0.0), 1.0) * side))
 
 
 def _sides(polygons: Polygons) -> list[tuple[int, int]]:
