@@ -46,16 +46,17 @@ def facts(report: Report) -> tuple[Finding, ...]:
     """Return the numbers of the first screen: `Finding` with a value, what it counts, and its tone."""
     products = report.products
     found = [finding for finding in _given(report) if finding.value]
-    if "solutions" in products:
-        found.append(Finding("integer solutions", value=str(len(products["solutions"]))))
     records: tuple[Record, ...] = products.get("records", ())
+    if len(records) == 1 and records[0].status == "assessed":
+        found += [_margin(margin) for margin in records[0].margins[:_MARGINS]]
+    if "solutions" in products:
+        count = len(products["solutions"])
+        found.append(Finding("integer solutions" if count != 1 else "integer solution", value=str(count)))
     if any(record.key for record in records):
         found += _counts(records)
     found += [
         Finding("on the Pareto front", value=str(len(ranking.front))) for ranking in _rankings(report) if ranking.front
     ]
-    if len(records) == 1 and records[0].status == "assessed":
-        found += [_margin(margin) for margin in records[0].margins[:_MARGINS]]
     seconds = sum(time.seconds + time.import_seconds for time in report.times)
     return (*found, Finding("all stages", value=f"{seconds:.1f} s"))
 

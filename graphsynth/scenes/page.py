@@ -46,7 +46,7 @@ figure{grid-column:span 6;min-width:0;display:flex;flex-direction:column}
 figure.wide{grid-column:1/-1}
 figure.small{grid-column:span 4}
 .sheet figure.small{grid-column:span 3}
-@media (max-width:50rem){.facts{gap:.4rem}.facts li{padding:.35rem .6rem;min-width:0}
+@media (max-width:50rem){.facts{gap:.4rem}.facts li{padding:.35rem .6rem;min-width:0;flex:1 1 40%}
 .facts b{font-size:1.05rem}.verdict b{font-size:1rem}table{font-size:.8rem}td:not(.num){min-width:6.5rem}
 figure{grid-column:1/-1}
 figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
