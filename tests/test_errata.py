@@ -1,7 +1,7 @@
 """Numbers on the page of errata, computed anew from formulas, without the library where that is possible.
 
-Not here: the events and the chatter of the tribometer (tests/dynamics/tribometer), the settling time of the braider, the
-count of starts from which the printed antenna equations are solved, the error floors of MuJoCo, which need the engine, and
+Not here: events and chatter of the tribometer (tests/dynamics/tribometer), the settling time of the braider, the
+count of starts from which the printed antenna equations are solved, the error floors of MuJoCo (they need it), and
 the jam of three equal bearings at every input (tests/jamming/coupled).  The interval shoelace sum and the counts are
 the library's own; the counts have a second producer in catalog/counts.
 """
