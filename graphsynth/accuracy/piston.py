@@ -99,7 +99,7 @@ def _exact_work(machine: PistonMachine) -> tuple[float, str]:
 
 
 def precise_work(gas: CompressorCycle, stroke: float) -> Any:
-    """Work of a compressor's gas on the piston over a turn, J: area of its diagram by quadrature with 50 digits.
+    """Indicated work of a compressor over a turn, J: area of its diagram by quadrature with 50 digits.
 
     Compression and re-expansion are polytropic, the valves open at the pressures outside; no formula for the work is
     used.
@@ -120,4 +120,4 @@ def precise_work(gas: CompressorCycle, stroke: float) -> Any:
         opens = min(mpmath.mpf(1), (1 + c) * (low / top) ** (1 / n) - c), c * ((top / low) ** (1 / n) - 1)
         closing = mpmath.quad(lambda x: low * ((1 + c) / (x + c)) ** n, [opens[0], 1]) + opens[0] * top
         opening = mpmath.quad(lambda x: top * (c / (x + c)) ** n, [0, opens[1]]) + (1 - opens[1]) * low
-        return area * mpmath.mpf(stroke) * (opening - closing)
+        return area * mpmath.mpf(stroke) * (closing - opening)
