@@ -99,7 +99,7 @@ def _exact_work(machine: PistonMachine) -> tuple[float, str]:
 
 
 def precise_work(gas: CompressorCycle, stroke: float) -> Any:
-    """Indicated work of a compressor over a turn, J: area of its diagram by quadrature with 50 digits.
+    """Return the indicated work of a compressor over a turn, J: area of its diagram by quadrature with 50 digits.
 
     Compression and re-expansion are polytropic, the valves open at the pressures outside; no formula for the work is
     used.
