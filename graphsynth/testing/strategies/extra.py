@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from graphsynth.errors import GraphsynthError, SpecError
 
-__all__ = ["assume", "check_range", "st"]
+__all__ = ["assume", "check_range", "ready", "st"]
 
 try:
     from hypothesis import assume
@@ -13,6 +15,12 @@ except ImportError as error:  # pragma: no cover - tested in a process of its ow
     raise GraphsynthError(
         "graphsynth.testing draws its examples with hypothesis, which is not installed; pip install hypothesis"
     ) from error
+
+
+def ready(strategy: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+    """Let a strategy prepare what it draws from now: hypothesis times the draws, and preparing may compile kernels."""
+    strategy.validate()
+    return strategy
 
 
 def check_range(name: str, low: int, high: int, least: int, most: int) -> None:

@@ -6,7 +6,7 @@ from functools import cache
 
 from graphsynth.errors import SpecError
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.testing.strategies.extra import check_range, st
+from graphsynth.testing.strategies.extra import check_range, ready, st
 
 __all__ = ["chains", "graphs", "mechanism_graphs"]
 
@@ -121,6 +121,15 @@ def chains(
             f"no chain of mobility {mobility} has {min_links} to {max_links} links; "
             f"give sizes from {mobility + 3}, every other one"
         )
+    return st.deferred(lambda: _prepared(sizes, mobility, fractionated, relabel))
+
+
+def _prepared(
+    sizes: tuple[int, ...], mobility: int, fractionated: bool, relabel: bool
+) -> st.SearchStrategy[MechanismGraph]:
+    """List the chains before the first draw, which hypothesis times."""
+    for links in sizes:
+        _listed(links, mobility, fractionated)
     return _chains(sizes, mobility, fractionated, relabel)
 
 
@@ -149,4 +158,5 @@ def mechanism_graphs(min_links: int = 4, max_links: int = 8, *, mobility: int = 
     >>> find(mechanism_graphs(), lambda g: g.degrees[g.frame] == 3).links
     6
     """
-    return _mechanism_graphs(chains(min_links, max_links, mobility=mobility))
+    of = chains(min_links, max_links, mobility=mobility)
+    return st.deferred(lambda: _mechanism_graphs(ready(of)))

@@ -9,7 +9,7 @@ from graphsynth.errors import SpecError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.testing.strategies.extra import check_range, st
+from graphsynth.testing.strategies.extra import check_range, ready, st
 from graphsynth.testing.strategies.four_bars import CLASSES, four_bars
 from graphsynth.testing.strategies.graphs import mechanism_graphs
 
@@ -80,7 +80,8 @@ def mechanisms(min_links: int = 4, max_links: int = 8, *, prismatic: bool = Fals
     4
     """
     check_range("links", min_links, max_links, 4, 10)
-    return _mechanisms(mechanism_graphs(min_links, max_links), prismatic)
+    of = mechanism_graphs(min_links, max_links)
+    return st.deferred(lambda: _mechanisms(ready(of), prismatic))
 
 
 @st.composite

@@ -6,7 +6,7 @@ from collections import Counter
 
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.spec import StructuralSpec
-from graphsynth.testing.strategies.extra import check_range, st
+from graphsynth.testing.strategies.extra import check_range, ready, st
 from graphsynth.testing.strategies.graphs import mechanism_graphs
 
 __all__ = ["specs"]
@@ -92,4 +92,5 @@ def specs(min_links: int = 4, max_links: int = 8, *, feasible: bool = True) -> s
     True
     """
     check_range("links", min_links, max_links, 4, 10)
-    return _specs(mechanism_graphs(min_links, max_links), feasible)
+    of = mechanism_graphs(min_links, max_links)
+    return st.deferred(lambda: _specs(ready(of), feasible))
