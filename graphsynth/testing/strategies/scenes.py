@@ -10,7 +10,7 @@ from graphsynth.testing.strategies.extra import st
 __all__ = ["scenes", "toml_text"]
 
 #: Titles hold any printable character, quotes and backslashes included.
-_PRINTABLE = st.characters(min_codepoint=32, exclude_categories=("Cs", "Cc"))
+_PRINTABLE = st.characters(exclude_categories=("C", "Z"), include_characters=" ")
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
