@@ -9,9 +9,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from graphsynth.synthesis.writing import Step
 
-__all__ = ["note", "progress", "put", "put_json", "table"]
+__all__ = ["note", "progress", "put", "put_json", "screen", "table"]
 
 
 def put(text: str) -> None:
@@ -29,9 +31,19 @@ def note(text: str) -> None:
     sys.stderr.write(text + "\n")
 
 
+def screen(width: int | None = None) -> Console:
+    """Return a rich console on standard output; a reader who has seen enough raises BrokenPipeError, as elsewhere."""
+    from rich.console import Console
+
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # rich itself would end the process with status 1
+
+    return Screen(width=width)
+
+
 def table(title: str, header: list[str], rows: list[list[str]]) -> None:
     """Print a table on standard output."""
-    from rich.console import Console
     from rich.table import Table
 
     shown = Table(title=title, title_justify="left")
@@ -39,7 +51,7 @@ def table(title: str, header: list[str], rows: list[list[str]]) -> None:
         shown.add_column(name, justify="right")
     for row in rows:
         shown.add_row(*row)
-    Console().print(shown)
+    screen().print(shown)
 
 
 @contextmanager

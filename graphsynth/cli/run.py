@@ -20,7 +20,7 @@ __all__ = ["run"]
 
 def run(options: argparse.Namespace) -> int:
     """Run a scene and print its summary."""
-    from graphsynth.scenes.runner import JOURNAL
+    from graphsynth.scenes.journal import JOURNAL
     from graphsynth.scenes.scene import load_scene
 
     scene = load_scene(options.scene)
@@ -39,11 +39,9 @@ def run(options: argparse.Namespace) -> int:
 
         console.put(explain(report))
         return 0
-    from rich.console import Console
-
     from graphsynth.scenes.report import print_summary
 
-    print_summary(report, Console())
+    print_summary(report, console.screen())
     return 0
 
 

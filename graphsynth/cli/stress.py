@@ -73,11 +73,10 @@ def _list(options: argparse.Namespace) -> int:
 
 def _show(report: StressReport) -> None:
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
-    screen = Console() if sys.stdout.isatty() else Console(width=132)
+    screen = console.screen(None if sys.stdout.isatty() else 132)
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
     for name, width in (("case", 16), ("status", 7), ("error", 7), ("allowed", 7), ("s", 5), ("what", None)):
         words = name in ("case", "status", "what")

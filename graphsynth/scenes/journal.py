@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     from graphsynth.scenes.scene import Scene
     from graphsynth.scenes.stages import Stage
 
-__all__ = ["Journal", "mark_reported", "signature"]
+__all__ = ["JOURNAL", "Journal", "mark_reported", "signature"]
+
+#: Name of the file in the report folder.
+JOURNAL = "candidates.jsonl"
 
 _COMPLETE = {"complete": True}
 _REPORTED = {"reported": True}

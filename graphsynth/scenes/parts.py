@@ -7,13 +7,14 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.products import Columns, Outcome, Part
 
-__all__ = ["PartFolder", "split_parts", "unwritable", "write_whole"]
+__all__ = ["PartFolder", "check_folder", "split_parts", "unwritable", "write_whole"]
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -27,6 +28,30 @@ def write_whole(path: Path, data: bytes) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def check_folder(folder: Path) -> None:
+    """Try whether files can be written into a folder; what is made for that is removed.
+
+    Raises
+    ------
+    SceneError
+        If not.
+    """
+    made: list[Path] = []
+    try:
+        for part in (*reversed(folder.parents), folder):
+            if not part.exists():
+                part.mkdir()
+                made.append(part)
+        with tempfile.TemporaryFile(dir=folder) as stream:
+            stream.write(b"x")
+    except OSError as error:
+        raise unwritable(f"the report into {folder}", error) from error
+    finally:
+        for part in reversed(made):
+            with suppress(OSError):  # somebody else began to use it
+                part.rmdir()
 
 
 def unwritable(what: str, error: OSError) -> SceneError:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.scenes.datafiles import data_files
 from graphsynth.scenes.headline import facts, sentences
-from graphsynth.scenes.journal import mark_reported
+from graphsynth.scenes.journal import JOURNAL, mark_reported
 from graphsynth.scenes.page import report_html
 from graphsynth.scenes.parts import unwritable, write_whole
 from graphsynth.scenes.summary import summary_tables
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["loaded_versions", "print_summary", "scene_json", "write_report"]
 
-_JOURNAL = "candidates.jsonl"
 _KINDS = {".html", ".csv", ".parquet", ".json", ".jsonl"}
 _PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
 
@@ -56,7 +55,7 @@ def write_report(report: Report, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             write_whole(folder / name, data)
-        mark_reported(folder / _JOURNAL)
+        mark_reported(folder / JOURNAL)
     except OSError as error:
         raise unwritable(f"the report into {folder}", error) from error
     return folder

@@ -11,15 +11,15 @@ from typing import Any
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.datafiles import check_files
+from graphsynth.scenes.journal import JOURNAL
 from graphsynth.scenes.measure import StageTime
+from graphsynth.scenes.parts import check_folder
 from graphsynth.scenes.report import loaded_versions, write_report
 from graphsynth.scenes.running import Running
 from graphsynth.scenes.scene import Scene, load_scene
 from graphsynth.scenes.stages import Context, Progress, Stage, resolve
 
-__all__ = ["JOURNAL", "Report", "StageTime", "execute", "run"]
-
-JOURNAL = "candidates.jsonl"
+__all__ = ["Report", "StageTime", "execute", "run"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,13 +98,15 @@ def run(
     Raises
     ------
     SceneError, FormatError
-        If the scene cannot be read or asks for something no stage gives.
+        If the scene cannot be read or asks for something no stage gives, or the folder cannot be written: this is tried
+        before anything is computed.
     SpecError
         If the structural question makes no sense.
     """
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
     folder = Path(out) if out is not None else Path("graphsynth-out") / scene.name
+    check_folder(folder)
     report = execute(scene, executor, progress, folder / JOURNAL, fresh)
     return replace(report, folder=write_report(report, folder))
 

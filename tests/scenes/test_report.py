@@ -16,9 +16,10 @@ from graphsynth.errors import SceneError
 from graphsynth.scenes.datafiles import results_csv
 from graphsynth.scenes.measure import StageTime
 from graphsynth.scenes.page import report_html
+from graphsynth.scenes.parts import check_folder
 from graphsynth.scenes.products import Attempt, Candidate, Columns, Picture, Quantity, Record, Table, each
 from graphsynth.scenes.report import scene_json, write_report
-from graphsynth.scenes.runner import Report
+from graphsynth.scenes.runner import Report, run
 from graphsynth.scenes.running import Running
 from graphsynth.scenes.scene import OutputsTable, Scene
 from graphsynth.scenes.stages import Context, Stage
@@ -168,3 +169,23 @@ def test_parquet_holds_the_same_as_csv(report: Report, tmp_path: Path) -> None:
     rows = list(csv.DictReader(io.StringIO((folder / "results.csv").read_text(encoding="utf-8"), newline="")))
     assert len(found) == len(rows) == 3 and found[0]["gap [mm]"] == float(rows[0]["gap [mm]"]) == -0.25
     assert found[1]["gap [mm]"] is None and list(found[0]) == list(rows[0])
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_computed(
+    lambda_tables: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    monkeypatch.setattr(Running, "run", lambda self: pytest.fail("computed before the folder was tried"))
+    scene = Scene.from_mapping(lambda_tables)
+    for out, why in (("file", "Not a directory"), ("file/out", "Not a directory"), (300 * "x", "too long")):
+        with pytest.raises(SceneError, match=rf"cannot write the report into .*({why}); choose another folder"):
+            run(scene, tmp_path / out)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_trying_a_folder_leaves_nothing_behind(tmp_path: Path) -> None:
+    check_folder(tmp_path / "a" / "b")
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "kept").mkdir()
+    check_folder(tmp_path / "kept")
+    assert [path.name for path in tmp_path.rglob("*")] == ["kept"]
