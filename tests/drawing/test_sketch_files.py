@@ -25,7 +25,7 @@ CM = 2.54 / 96
 
 def test_tikz_circles_are_where_the_svg_has_them() -> None:
     sketch, pose = graph_sketch(GRAPH, driver=1)
-    text = tikz(sketch, pose)
+    text = tikz(sketch, pose, max_width=None)
     number = r"(-?[0-9.]+)"
     ours = [
         tuple(map(float, m)) for m in re.findall(rf"\({number},{number}\) circle\[radius={number}\]", text)
@@ -37,6 +37,38 @@ def test_tikz_circles_are_where_the_svg_has_them() -> None:
         assert (x / CM, y / CM, r / CM) == pytest.approx((cx, sketch.height - cy, cr), abs=0.02)
     assert text.count(r"\node") == 6
     assert text.count("\\path") + text.count("\\node") == len(sketch.shapes)
+
+
+NUMBERS = re.compile(r"-?[0-9]+(?:\.[0-9]+)?")
+
+
+def test_tikz_is_no_wider_than_the_column_of_an_article() -> None:
+    """Made smaller as a whole: every number outside names is the same part of what it was."""
+    sketch, pose = graph_sketch(GRAPH, driver=1)
+    wide = Sketch(sketch.lower, sketch.upper, width=1000.0)
+    wide.shapes.extend(sketch.shapes)
+    whole, narrow = (tikz(wide, pose, max_width=bound) for bound in (None, 12.0))
+    assert tikz(wide, pose) == narrow
+    part = 12.0 / (1000.0 * CM)
+    drawn = [line for line in whole.splitlines() if line.startswith(("\\path", "\\node"))]
+    shown = [line for line in narrow.splitlines() if line.startswith(("\\path", "\\node"))]
+    assert len(drawn) == len(shown) == len(wide.shapes)
+    places = 0
+    for before, after in zip(drawn, shown):
+        # opacity and the text of a label are no lengths
+        old, new = (re.sub(r"opacity=[0-9.]+|\{[0-9]+\};.*|%.*", "", line) for line in (before, after))
+        for a, b in zip(NUMBERS.findall(old), NUMBERS.findall(new), strict=True):
+            assert float(b) == pytest.approx(part * float(a), abs=1e-4)
+            places += 1
+        for x in re.findall(r"\((-?[0-9.]+),", after):
+            assert 0.0 <= float(x) <= 12.0
+    assert places > 100
+    small = Sketch(sketch.lower, sketch.upper, width=200.0)
+    small.shapes.extend(sketch.shapes)
+    assert tikz(small, pose) == tikz(small, pose, max_width=None)
+    for bad in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(GraphsynthError, match="must be positive and finite"):
+            tikz(sketch, pose, max_width=bad)
 
 
 def test_tikz_is_balanced_and_escapes_what_tex_reads() -> None:

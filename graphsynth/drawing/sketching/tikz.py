@@ -1,18 +1,23 @@
 """A sketch as TikZ: for papers in LaTeX.
 
-Shapes are written in centimetres, one pixel being 1/96 inch, with colours defined by name in the picture.
+Shapes are written in centimetres, one pixel being 1/96 inch, with colours defined by name in the picture.  A sketch
+wider than the column of an article is made smaller as a whole, letters and line widths included.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.shapes import Circle, Path, Placement, Point, Shape, Style, Text, placement
 from graphsynth.drawing.sketch import Sketch
+from graphsynth.errors import GraphsynthError
 
-__all__ = ["document", "tikz"]
+__all__ = ["MAX_WIDTH", "document", "tikz"]
 
+#: Widest picture in centimetres: the column of LaTeX's article class at 10 pt is 12.1 cm wide.
+MAX_WIDTH = 12.0
 _CM = 2.54 / 96.0
 _PT = 72.27 / 96.0
 _ANCHOR = {"middle": "center", "start": "west", "end": "east"}
@@ -25,7 +30,7 @@ _ESCAPE = str.maketrans(
 )  # fmt: skip
 
 
-def tikz(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None) -> str:
+def tikz(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None, *, max_width: float | None = MAX_WIDTH) -> str:
     r"""Write a sketch as a ``tikzpicture``.
 
     Parameters
@@ -33,11 +38,18 @@ def tikz(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None) -> str:
     sketch : Sketch
     pose : sequence of (x, y, theta), optional
         Where every link is; needed if any shape is fixed to a link.
+    max_width : float, optional
+        Centimetres; a wider sketch is made so wide, a narrower one keeps its size.  None: no bound.
 
     Returns
     -------
     str
         Needs nothing but ``\usepackage{tikz}``.
+
+    Raises
+    ------
+    GraphsynthError
+        For a width that is not positive and finite.
 
     Examples
     --------
@@ -46,8 +58,11 @@ def tikz(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None) -> str:
     >>> tikz(s).count("circle")
     1
     """
+    if max_width is not None and not 0.0 < max_width < math.inf:
+        raise GraphsynthError(f"max_width = {max_width!r} cm must be positive and finite; None for no bound")
     place = placement(pose)
-    body = [_element(shape, sketch, place) for shape in sketch.ordered()]
+    zoom = 1.0 if max_width is None else min(1.0, max_width / (sketch.width * _CM))
+    body = [_element(shape, sketch, place, zoom) for shape in sketch.ordered()]
     title = [f"% {' '.join(sketch.title.split())}"] if sketch.title else []
     lines = [*title, r"\begin{tikzpicture}[line join=round]"]
     lines += [rf"\definecolor{{gs-{name}}}{{HTML}}{{{value[1:].upper()}}}" for name, value in LIGHT.items()]
@@ -66,20 +81,22 @@ def _number(value: float) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def _element(shape: Shape, sketch: Sketch, place: Placement) -> str:
+def _element(shape: Shape, sketch: Sketch, place: Placement, zoom: float) -> str:
+    cm = zoom * _CM
+
     def at(point: Point, offset: Point = 0j) -> str:
         x, y = sketch.xy(place(shape.link, point))
-        return f"({_number((x + offset.real) * _CM)},{_number((sketch.height - y + offset.imag) * _CM)})"
+        return f"({_number((x + offset.real) * cm)},{_number((sketch.height - y + offset.imag) * cm)})"
 
     note = f" % {shape.part}" if shape.part else ""
     if isinstance(shape, Text):
-        size = _number(shape.size * _PT)
+        size = _number(shape.size * zoom * _PT)
         font = rf"\fontsize{{{size}}}{{{size}}}\selectfont\sffamily" + (r"\bfseries" if shape.weight else "")
         options = f"anchor={_ANCHOR[shape.anchor]}, text=gs-{shape.colour}, inner sep=0pt, font={{{font}}}"
         return rf"\node[{options}] at {at(shape.at, shape.offset)} {{{shape.text.translate(_ESCAPE)}}};{note}"
-    options = _options(shape.style, sketch.symbol)
+    options = _options(shape.style, sketch.symbol * zoom, zoom)
     if isinstance(shape, Circle):
-        radius = _number(shape.radius * sketch.scale * _CM)
+        radius = _number(shape.radius * sketch.scale * cm)
         return rf"\path[{options}] {at(shape.centre)} circle[radius={radius}];{note}"
     return rf"\path[{options}] {_runs(shape, at)};{note}"
 
@@ -96,7 +113,7 @@ def _runs(path: Path, at: Callable[[Point], str]) -> str:
     return " ".join(pieces)
 
 
-def _options(style: Style, symbol: float) -> str:
+def _options(style: Style, symbol: float, zoom: float) -> str:
     found = []
     if style.fill:
         found.append(f"fill=gs-{style.fill}")
@@ -107,6 +124,8 @@ def _options(style: Style, symbol: float) -> str:
         if style.round_ends:
             found.append("line cap=round")
         if style.dash:
-            words = [f"{'off' if k % 2 else 'on'} {_number(length * _PT)}pt" for k, length in enumerate(style.dash)]
+            words = [
+                f"{'off' if k % 2 else 'on'} {_number(length * zoom * _PT)}pt" for k, length in enumerate(style.dash)
+            ]
             found.append(f"dash pattern={' '.join(words)}")
     return ", ".join(found)
