@@ -37,7 +37,7 @@ def sentences(report: Report) -> tuple[Finding, ...]:
     found = [told for ranking in _rankings(report) for told in _best(ranking, records)]
     given = [finding for finding in _given(report) if not finding.value]
     found += given or _verdicts(records)
-    found += _turned_down(records)
+    found += _nothing_left(records) + (_turned_down(records) if len(records) > 1 else [])
     found += [told for ranking in _rankings(report) for told in _how_sure(ranking, records)]
     return tuple(found)
 
@@ -168,6 +168,21 @@ def _verdicts(records: Sequence[Record]) -> list[Finding]:
         rest = sum(counts.values()) - sum(count for _, count in counts.most_common(_VERDICTS))
         found.append(Finding(f"{rest} more with {len(counts) - _VERDICTS} other verdicts: see results.csv."))
     return found
+
+
+def _nothing_left(records: Sequence[Record]) -> list[Finding]:
+    """Say so when no candidate came through."""
+    stopped = [record for record in records if record.status in ("rejected", "failed")]
+    if not stopped or any(record.status == "assessed" for record in records):
+        return []
+    if len(records) > 1:
+        return [Finding(f"None of the {len(records)} candidates came through all stages.", False)]
+    words = "was rejected" if stopped[0].status == "rejected" else "failed"
+    return [Finding(f"The only candidate {words}: {_ended(stopped[0].reason or stopped[0].cause)}", False)]
+
+
+def _ended(text: str) -> str:
+    return text if text.endswith(".") else f"{text}."
 
 
 def _turned_down(records: Sequence[Record]) -> list[Finding]:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeVar
 
+from graphsynth.errors import GraphsynthError
+
 __all__ = [
     "Attempt",
     "Candidate",
@@ -280,7 +282,8 @@ def each(attempts: Iterable[Attempt], step: Callable[[Any], Any]) -> tuple[Attem
             try:
                 attempt = replace(attempt, value=step(attempt.value))
             except Exception as error:
-                attempt = replace(attempt, value=None, reason=f"{type(error).__name__}: {error}")
+                words = "" if isinstance(error, GraphsynthError) else f"{type(error).__name__}: "
+                attempt = replace(attempt, value=None, reason=f"{words}{error}")
         done.append(attempt)
     return tuple(done)
 

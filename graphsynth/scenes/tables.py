@@ -47,6 +47,9 @@ _WORDS: dict[type, str] = {str: "a string", int: "an integer", float: "a number"
 _NAMED = re.compile(r"(?:has|gives) (\w+)")
 _lines = lru_cache(maxsize=4)(key_lines)
 
+#: Sizes of numbers that are not zero, in the unit of their key: beyond, products of a few of them overflow or vanish.
+SMALLEST, LARGEST = 1e-30, 1e18
+
 #: Annotation of lengths that may be in any one unit: all of them with a written unit, or none.
 ANY_LENGTH = Unit("mm", Fraction(1, 1000), 0, (1, 0, 0, 0, 0, 0))
 
@@ -312,6 +315,11 @@ def _read_float(value: object, place: Place, unit: Unit, unit_needed: bool) -> f
         number = _read_written(value, place, unit, unit_needed)
     if not math.isfinite(number):
         raise place.error(f"must be {_wanted(unit, unit_needed)}, not {_shown(value)}")
+    if number and not SMALLEST <= abs(number) <= LARGEST:
+        raise place.error(
+            f"is {_shown(value)}, which no mechanism has; use 0 or a size from {SMALLEST:g} to {LARGEST:g}"
+            f"{' ' + unit.text if unit.text else ''}"
+        )
     return number
 
 

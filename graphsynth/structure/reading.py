@@ -155,6 +155,8 @@ def _plain_value(key: str, value: Any) -> Any:
     if isinstance(value, Mapping):
         return {_level_or_kind(key, inner): _plain_value(key, own) for inner, own in value.items()}
     if isinstance(value, str) and not (key == "max_link_joints" and value == "all"):
+        if _NUMBER.fullmatch(value):
+            raise SpecError(f'{key} = "{value}" is text; write the number without quotes: {int(value)}')
         return _parse_value(key, value)
     return value
 

@@ -143,3 +143,23 @@ def test_the_best_is_the_first_of_the_ranking(rows: list[tuple[int, int, bool | 
 def test_tones_of_the_page(lambda_tables: dict[str, Any], good: bool | None) -> None:
     page = report_html(report_of(lambda_tables, (record(1, 1.0, 1.0, good),), False))
     assert f'<p class="verdict {({True: "good", False: "bad", None: ""})[good]}">' in page
+
+
+def test_a_run_of_which_nothing_came_through_says_so_first(lambda_tables: dict[str, Any]) -> None:
+    failed = Record(1, "k1", status="failed", reason="OverflowError: (34, 'Numerical result out of range')")
+    (told,) = sentences(report_of(lambda_tables, (failed,), False))
+    assert told == Finding("The only candidate failed: OverflowError: (34, 'Numerical result out of range').", False)
+    unfit = replace(failed, status="rejected", reason="too slow: 3 s", cause="too slow")
+    (told,) = sentences(report_of(lambda_tables, (unfit,), False))
+    assert told == Finding("The only candidate was rejected: too slow: 3 s.", False)
+    first, *rest = sentences(
+        report_of(lambda_tables, (failed, rejected(2, "too slow"), rejected(3, "too slow")), False)
+    )
+    assert first == Finding("None of the 3 candidates came through all stages.", False)
+    assert rest[0].text.startswith("Turned down: 3 of 3: 2 because too slow; 1 because OverflowError")
+
+
+def test_a_candidate_that_came_through_or_none_known_is_no_failure(lambda_tables: dict[str, Any]) -> None:
+    unknown = Record(2, "k2", status="not recognised", reason="unknown")
+    assert not any("came through" in text for text in said(report_of(lambda_tables, (record(1, 1.0, 2.0), unknown))))
+    assert said(report_of(lambda_tables, (unknown,), False)) == []

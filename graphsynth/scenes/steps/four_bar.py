@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from graphsynth.scenes.families.lambda_linkage import LambdaTable
 from graphsynth.scenes.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each
 from graphsynth.scenes.stages import Context
+from graphsynth.scenes.steps.four_bar_tolerances import tolerance_box
 from graphsynth.scenes.steps.records import recognise_by_key, records_of
 
 if TYPE_CHECKING:
@@ -18,24 +19,11 @@ if TYPE_CHECKING:
     from graphsynth.jamming.certified_limits import CertifiedLimit
     from graphsynth.jamming.certify import JamCertificate
     from graphsynth.jamming.circle_sets import Span
-    from graphsynth.jamming.parameters import ToleranceBox
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage, LambdaPositions
 
 __all__ = ["LambdaMotion", "jamming", "judge", "kinematics", "recognise", "tolerance_box"]
 
 _C = Literal["A", "B"]
-#: Key of ``[mechanism.tolerances]``: parameter of the box, and where its nominal value stands in the scene.
-_TOLERANCES: dict[str, tuple[str, tuple[str, str] | None]] = {
-    "frame": ("l1", ("lengths", "frame")),
-    "crank": ("l2", ("lengths", "crank")),
-    "coupler": ("l3", ("lengths", "coupler")),
-    "rocker": ("l4", ("lengths", "rocker")),
-    "alpha_rad": ("alpha", ("tilt", "alpha_rad")),
-    "azimuth_rad": ("azimuth", None),
-    "radius_mm": ("Rb", ("bearing", "radius_mm")),
-    "height_mm": ("Hb", ("bearing", "height_mm")),
-    "clearance_mm": ("clearance", ("bearing", "clearance_mm")),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,88 +89,6 @@ def _move(table: LambdaTable) -> LambdaMotion:
     rod = np.sqrt(((tilted.A - tilted.B) ** 2).sum(axis=-1))
     residual = float(np.nanmax(np.abs(rod / linkage.l3 - 1.0)))
     return LambdaMotion(linkage, replace(linkage, alpha=0.0).positions(f), tilted, residual)
-
-
-def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
-    """Return the exact dimensions of the scene, with the tolerances of ``[mechanism.tolerances]`` if there are any.
-
-    Numbers of the file are taken as the decimals that stand there, not as the doubles nearest to them; a dimension that
-    was changed after reading is taken as the double it is.
-
-    Raises
-    ------
-    SceneError
-        For a tolerance with an unknown name, or one that is no number.
-    """
-    from graphsynth.jamming.parameters import ToleranceBox
-    from graphsynth.jamming.ranges import Range, spread
-
-    table = _table(context)
-    raw = context.scene.raw.get("mechanism", {})
-    raw = raw if isinstance(raw, Mapping) else {}
-    given: dict[str, Any] = {"azimuth": 0}
-    for name, place in _TOLERANCES.values():
-        if place:
-            given[name] = _exact(_inside(raw, *place), getattr(getattr(table, place[0]), place[1]))
-    axis = [_exact(number, value) for number, value in zip(_axis(raw), table.tilt.axis)]
-    for key, size in table.tolerances.items() if tolerances else ():
-        name = _tolerance_name(context, key)
-        absolute, relative = _tolerance(context, key, size)
-        given[name] = spread(Range.read(key, given[name]), absolute, relative)
-    return ToleranceBox(**given, axis=axis, sgn=table.branch)
-
-
-def _axis(raw: Mapping[str, Any]) -> list[Fraction | None]:
-    from graphsynth.scenes.tables import exact_number
-    from graphsynth.scenes.units import Unit
-
-    tilt = raw.get("tilt", {})
-    numbers = tilt.get("axis") if isinstance(tilt, Mapping) else None
-    return [exact_number(number, Unit.parse("")) for number in numbers or [None] * 3]
-
-
-def _inside(raw: Mapping[str, Any], table: str, key: str) -> Fraction | None:
-    from graphsynth.scenes.tables import written
-
-    return written(raw.get(table, {}), key)
-
-
-def _exact(number: Fraction | None, value: float) -> Any:
-    """Return the number that stands in the file, if it is the one that was read; else the double."""
-    return number if number is not None and float(number) == value else value
-
-
-def _tolerance_name(context: Context, key: str) -> str:
-    from graphsynth.scenes.tables import suggest
-
-    if key not in _TOLERANCES:
-        raise (context.scene.place / "mechanism" / "tolerances").error(
-            f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}", key
-        )
-    return _TOLERANCES[key][0]
-
-
-def _tolerance(context: Context, key: str, size: Any) -> tuple[Fraction, Fraction]:
-    """Read an absolute tolerance, or a relative one such as ``"1 %"``."""
-    from graphsynth.scenes.tables import ANY_LENGTH
-    from graphsynth.scenes.units import Unit, convert, split_suffix, split_value
-
-    expected = Unit.parse(split_suffix(key)[1]) if split_suffix(key)[1] else ANY_LENGTH
-    try:
-        number, text = split_value(size if isinstance(size, str) else repr(size))
-        unit = Unit.parse(text)
-        if text and text != "%":
-            number, exact = convert(number, unit, expected) if unit.agrees(expected) else (Fraction(-1), True)
-            number *= 1 if exact else 1 + Fraction(1, 10**40)  # outward: more than the error of pi
-    except ValueError:
-        number, text = Fraction(-1), ""
-    if number < 0 or isinstance(size, bool):
-        raise (context.scene.place / "mechanism" / "tolerances").error(
-            f'has {key} = {size!r}; give a tolerance of zero or more, as in 0.005 or "0.005 {expected.text}", '
-            'or relative, as in "1 %"',
-            key,
-        )
-    return (Fraction(0), number / 100) if text == "%" else (number, Fraction(0))
 
 
 def jamming(context: Context, motions: tuple[Attempt, ...]) -> tuple[Attempt, ...]:
