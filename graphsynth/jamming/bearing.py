@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import choice, finite, positive
+from graphsynth.kinematics._checks import check_sizes, choice, finite, positive
 
 __all__ = ["CONDITIONS", "Bearing", "Condition", "CriticalTilt"]
 
@@ -62,7 +62,8 @@ class Bearing:
     Raises
     ------
     GeometryError
-        A radius that is not positive, a negative height, a clearance of ``-Rb`` or less, a NaN.
+        A radius that is not positive, a negative height, a clearance of ``-Rb`` or less, a NaN, a size beyond 1e60 or
+        between 0 and 1e-60.
 
     Notes
     -----
@@ -87,6 +88,8 @@ class Bearing:
             raise GeometryError(f"clearance = {self.clearance} mm leaves no hole; it must exceed -Rb = {-self.Rb} mm")
         if self.hole_length is not None:
             object.__setattr__(self, "hole_length", positive("hole_length", self.hole_length))
+        sizes = ("Rb", "Hb", "clearance", "hole_length")
+        check_sizes("bearing", {name: getattr(self, name) for name in sizes})
 
     @property
     def Rh(self) -> float:

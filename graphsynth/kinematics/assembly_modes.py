@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import positive
+from graphsynth.kinematics._checks import check_largest, positive
+from graphsynth.mechanism.checks import LARGEST
 
 __all__ = ["AssemblyModeBatch", "AssemblyModes", "assembly_modes", "assembly_modes_batch"]
 
@@ -176,7 +177,8 @@ def assembly_modes_batch(
     Raises
     ------
     GeometryError
-        Numbers that are not finite, negative lengths, shapes that do not fit.
+        Numbers that are not finite, negative lengths, shapes that do not fit, a problem whose largest dimension is not
+        between 1e-60 and 1e60.
 
     Examples
     --------
@@ -193,6 +195,7 @@ def assembly_modes_batch(
     n = max(len(A), len(b), len(l2))
     if any(len(rows) not in (1, n) for rows in (A, b, l2)):
         raise GeometryError(f"{len(A)} anchors, {len(b)} platforms and {len(l2)} legs; give N or one of each")
+    _check_sizes(A, b, l2)
     if len(A) < n:
         A = np.repeat(A, n, axis=0)
     batch = _compiled(A, b, l2)
@@ -202,6 +205,16 @@ def assembly_modes_batch(
     if undecided.size == 0:
         return batch
     return _escalated(batch, undecided, A, np.broadcast_to(b, A.shape), np.broadcast_to(l2, A.shape), arms)
+
+
+def _check_sizes(A: Complex, b: Complex, l2: Array) -> None:
+    """Refuse problems whose determinants, length^4, would not be numbers."""
+    tables = [np.abs(rows.view(np.float64)) for rows in (A, b, l2)]
+    largest = max(float(table.max(initial=0.0)) for table in tables)
+    if not (largest <= LARGEST and l2.min(initial=LARGEST) >= 1.0 / LARGEST):  # else no problem can be out of range
+        size = np.maximum.reduce(np.broadcast_arrays(*(table.max(axis=1) for table in tables)))
+        for problem in np.flatnonzero((size > LARGEST) | ((size > 0.0) & (size < 1.0 / LARGEST))):
+            check_largest(float(size[problem]), f"dimension of problem {problem}")
 
 
 def _compiled(A: Complex, b: Complex, l2: Array) -> AssemblyModeBatch:

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.kinematics._checks import choice, finite, finite_array, positive, sign, unit_vector
+from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import check_sizes, choice, finite, finite_array, positive, sign, unit_vector
 from graphsynth.kinematics._turn import FullTurn, full_turn
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["AssemblyStatus", "LambdaLinkage", "LambdaPositions", "Straightness"]
 
 Array = NDArray[np.float64]
+_LEAST_RISE = 1e-300
 
 
 class AssemblyStatus(IntEnum):
@@ -144,7 +146,8 @@ class LambdaLinkage:
     Raises
     ------
     GeometryError
-        A length that is not positive, a NaN, an axis without direction, an unknown option.
+        A length that is not positive or not between 1e-60 and 1e60, a NaN, an axis without direction, a tilt so small
+        that it underflows, an unknown option.
 
     Notes
     -----
@@ -174,10 +177,19 @@ class LambdaLinkage:
             object.__setattr__(self, name, positive(name, getattr(self, name)))
         for name in ("k", "alpha"):
             object.__setattr__(self, name, finite(name, getattr(self, name)))
+        sizes = {name: getattr(self, name) for name in ("l1", "l2", "l3", "l4")}
+        check_sizes("lambda linkage", sizes)
+        check_sizes("lambda linkage", {"1 + |k|": 1.0 + abs(self.k)})
         object.__setattr__(self, "sgn", sign("sgn", self.sgn))
         object.__setattr__(self, "axis", unit_vector("axis", self.axis))
         choice("rod", self.rod, ("rigid", "deck"))
         choice("convention", self.convention, ("spec", "deck"))
+        tilted = self.alpha != 0.0 and self.axis[:2] != (0.0, 0.0)
+        if tilted and min(self.pin_height, self.pin_height / self.l3) < _LEAST_RISE:
+            raise GeometryError(
+                f"alpha = {self.alpha:g} rad about {self.axis} lifts the crank pin by less than {_LEAST_RISE:g}, which "
+                "double precision does not hold; give 0"
+            )
 
     @property
     def _angle(self) -> float:
@@ -199,10 +211,10 @@ class LambdaLinkage:
 
     @cached_property
     def pin_height(self) -> float:
-        """Largest |A_z| over a turn, ``l2 sqrt((1 - R33)(1 + R33))`` without cancellation."""
-        n1, n2, _ = self.axis
-        deficit = 2.0 * math.sin(0.5 * self._angle) ** 2 * (n1 * n1 + n2 * n2)
-        return self.l2 * math.sqrt(deficit * max(0.0, 2.0 - deficit))
+        """Largest |A_z| over a turn, ``l2 hypot(R31, R32)`` without cancellation or squares that underflow."""
+        n1, n2, n3 = self.axis
+        lift = math.hypot(math.sin(self._angle), 2.0 * math.sin(0.5 * self._angle) ** 2 * n3)
+        return self.l2 * math.hypot(n1, n2) * lift
 
     @cached_property
     def pin_phase(self) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import positive, three, three_points, triple, triples
+from graphsynth.kinematics._checks import check_largest, positive, three, three_points, triple, triples
 from graphsynth.kinematics._plane import cross, directions
 from graphsynth.kinematics.assembly_modes import AssemblyModeBatch, AssemblyModes, assembly_modes, assembly_modes_batch
 from graphsynth.kinematics.leg import LegStatus, PlatformLegs, sensitivity
@@ -102,7 +102,8 @@ class ParallelPlatform:
     Raises
     ------
     GeometryError
-        A negative or NaN length, a point that is not finite; the message names the leg.
+        A negative or NaN length, a point that is not finite (the message names the leg), a largest dimension that is
+        not between 1e-60 and 1e60.
 
     Notes
     -----
@@ -126,6 +127,7 @@ class ParallelPlatform:
         object.__setattr__(self, "b", three_points("b", self.b))
         object.__setattr__(self, "l1", _lengths("l1", self.l1))
         object.__setattr__(self, "l2", _lengths("l2", self.l2))
+        check_largest(float(np.abs((*self.D, *self.b, *self.l1, *self.l2)).max()))
 
     @cached_property
     def _legs(self) -> PlatformLegs:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Mapping
 from typing import Any
 
-from graphsynth.errors import GeometryError
+from graphsynth.errors import GeometryError, GraphsynthError
 
-__all__ = ["finite", "link_number", "nonzero", "point"]
+__all__ = ["LARGEST", "Size", "check_largest", "check_sizes", "finite", "link_number", "nonzero", "point"]
 
 Point = tuple[float, float]
+Size = float | complex | None
+
+#: Sizes from 1 / LARGEST to LARGEST are taken, in whatever unit: products of four lengths are then numbers.
+LARGEST = 1e60
 
 
 def finite(name: str, value: Any) -> float:
@@ -58,3 +63,56 @@ def link_number(name: str, value: Any) -> int:
     if number < 0:
         raise GeometryError(f"{name} = {value!r} is not a link; give its number, 0 or more")
     return number
+
+
+def check_sizes(owner: str, sizes: Mapping[str, Size], error: type[GraphsynthError] = GeometryError) -> None:
+    """Refuse sizes whose products leave the range of double precision; zero and None are left to other checks.
+
+    Parameters
+    ----------
+    owner : str
+        What has these sizes, for the sentence.
+    sizes : mapping of str to float, complex or None
+        Checked values by name: lengths, masses, stiffnesses, ...; the magnitude of a complex one.
+    error : type
+        Exception of the caller's room.
+
+    Raises
+    ------
+    GeometryError or ``error``
+        A size beyond 1e60 or between 0 and 1e-60.
+
+    Examples
+    --------
+    >>> check_sizes("lever", {"length": 1e-70})
+    Traceback (most recent call last):
+        ...
+    graphsynth.errors.GeometryError: length = 1e-70 of the lever is not between 1e-60 and 1e+60; change the unit
+    """
+    for name, value in sizes.items():
+        size = 0.0 if value is None else math.hypot(value.real, value.imag)
+        if size != 0.0 and not 1.0 / LARGEST <= size <= LARGEST:
+            raise error(
+                f"{name} = {size:g} of the {owner} is not between {1.0 / LARGEST:g} and {LARGEST:g}; change the unit"
+            )
+
+
+def check_largest(largest: float, what: str = "dimension") -> None:
+    """Refuse a mechanism whose largest dimension is beyond 1e60, or below 1e-60 but not zero.
+
+    Smaller dimensions of the same mechanism may be as small as they like.
+
+    Raises
+    ------
+    GeometryError
+        Which dimension it is, and its bounds.
+
+    Examples
+    --------
+    >>> check_largest(2.5), check_largest(0.0)
+    (None, None)
+    """
+    if largest != 0.0 and not 1.0 / LARGEST <= largest <= LARGEST:
+        raise GeometryError(
+            f"the largest {what} is {largest:.3g}, not between {1.0 / LARGEST:g} and {LARGEST:g}; change the unit"
+        )

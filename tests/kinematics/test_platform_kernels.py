@@ -64,7 +64,7 @@ def test_extreme_legs_of_section_14_2(l1, l2, u, v):
 @settings(max_examples=200, deadline=None)
 @given(
     st.floats(-6, 6), st.floats(-6, 6), st.floats(1e-90, 1), st.floats(-math.pi, math.pi), st.sampled_from((1, -1)),
-    st.sampled_from((1.0, 1e-25, 1e25, 1e-100, 1e100)),
+    st.sampled_from((1.0, 1e-25, 1e25, 1e-53, 1e53)),
 )  # fmt: skip
 def test_legs_against_sixty_digits(log1, log2, t, direction, sigma, unit):
     l1, l2 = 10**log1 * unit, 10**log2 * unit
@@ -578,7 +578,7 @@ def case_symmetric_home():
 def case_units():
     theta = np.random.default_rng(6).uniform(-3, 3, (500, 3))
     base = G1.direct_batch(theta)
-    for unit in (2.0**-300, 1e-30, 1e30, 2.0**60):
+    for unit in (2.0**-199, 1e-30, 1e30, 2.0**60, 2.0**198):
         scaled = ParallelPlatform(
             tuple(np.array(G1.D) * unit), tuple(np.array(G1.b) * unit), tuple(np.array(G1.l1) * unit),
             tuple(np.array(G1.l2) * unit),

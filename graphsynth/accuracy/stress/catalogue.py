@@ -194,8 +194,8 @@ _BEYOND = _rows(
     """
     1.1   | scales:planar              | four-bars of 1e-60 to 1e60, and refused ones
     1.2   | scales:ratios              | links of 1e16 beside a crank of 1
-    1.3   | scales:subnormal_platform  | platforms of 1e-300 and 1e150, legs of subnormal length
-    1.4   | scales:jamming             | bearings of 1e-90 and 1e90, boxes of 1e-300 and 1e300
+    1.3   | scales:subnormal_platform  | platforms of 1e-59 and 1e59, legs of subnormal length
+    1.4   | scales:jamming             | bearings of 1e-57 and 1e57, boxes of 1e-300 and 1e300
     1.5   | scales:crossings           | circle and ellipse that differ by 1e-60
     2.1   | shapes:zero_links          | links of length zero
     2.2   | shapes:all_in_one_point    | all joints at one place, a rhombus folded flat

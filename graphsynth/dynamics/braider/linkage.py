@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.motors import number
 from graphsynth.errors import GeometryError, SpecError
+from graphsynth.mechanism.checks import check_sizes
 
 __all__ = ["ChangePoint", "FourBar", "FourBarState"]
 
@@ -61,7 +62,7 @@ class FourBar:
     Raises
     ------
     GeometryError
-        A length that is not positive and finite, or another branch.
+        A length that is not positive and between 1e-60 and 1e60, or another branch.
 
     Notes
     -----
@@ -86,6 +87,8 @@ class FourBar:
                 object.__setattr__(self, name, number(name, getattr(self, name), least=0.0, above=True))
             except SpecError as error:
                 raise GeometryError(str(error)) from None
+        sizes = {name: getattr(self, name) for name in ("crank", "coupler", "rocker", "frame")}
+        check_sizes("four-bar", sizes)
         if self.branch not in (1, -1):
             raise GeometryError(f"branch = {self.branch!r} must be +1 or -1")
 

@@ -5,6 +5,7 @@ import math
 from graphsynth.compilation import kernel
 from graphsynth.dynamics.kernels.combining import combined
 from graphsynth.dynamics.kernels.systems import load_vector, state_rows
+from graphsynth.kinematics.engine.kernels.rows import nearest_turn
 from graphsynth.kinematics.engine.kernels.running import run
 
 
@@ -22,7 +23,7 @@ def centre_motion(T, E, S, centres, theta):
         raw = math.atan2(s, c)
         w, e = S.V[link, 2, 1], S.W[link, 2, 1]
         q[k], q[k + 1] = S.X[link, 0, 1] + ux, S.X[link, 1, 1] + uy
-        q[k + 2] = raw + 2.0 * math.pi * math.floor((near - raw) / (2.0 * math.pi) + 0.5)
+        q[k + 2] = nearest_turn(raw, near)
         if E.need[link]:
             q[k + 2] = S.TH[link, 1]
         else:

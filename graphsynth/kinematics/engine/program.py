@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError, GraphError
 from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.checks import check_largest
 from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import characteristic_length
@@ -30,7 +31,6 @@ Complex = NDArray[np.complex128]
 Number = float | Array
 
 _WIDE = 1e-14
-_LARGEST = 1e60
 #: Columns of a dimension set that are lengths.
 _LENGTHS = [k for k, name in enumerate(COLUMNS) if name in ("ax", "ay", "bx", "by", "radius_a", "radius_b")]
 
@@ -127,11 +127,7 @@ def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Pr
 def _check_size(mechanism: Mechanism, dimensions: Array | None) -> None:
     """Products of four lengths must be numbers."""
     points = np.abs((mechanism.dimensions if dimensions is None else dimensions)[..., _LENGTHS])
-    largest = float(points.max(initial=0.0))
-    if largest > _LARGEST or 0.0 < largest < 1.0 / _LARGEST:
-        raise GeometryError(
-            f"the largest dimension is {largest:.3g}, not between {1.0 / _LARGEST:g} and {_LARGEST:g}; change the unit"
-        )
+    check_largest(float(points.max(initial=0.0)))
 
 
 class _Compiler:

@@ -59,15 +59,19 @@ def ratios(check: Checks) -> None:
 
 
 def subnormal_platform(check: Checks) -> None:
-    """Platforms and legs of 1e-300 and 1e150 have the modes of those of 1; subnormal lengths are taken as they are."""
+    """Platforms of 1e-59 to 1e59 have the modes of those of 1, others are refused; legs of subnormal lengths are taken."""
     from graphsynth.kinematics.leg import LegStatus, solve_leg
     from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
     g1 = ParallelPlatform.g1()
+    parts: list[Any]
     right = ["-0.1676478906740002300845393288613099", "0.4780458846922180136167385177734372"]
-    for exponent in (-1000, -500, 490):
+    for exponent in (-1000, -300, 250, 490):
+        parts = [np.array(part) * 2.0**exponent for part in (g1.D, g1.b, g1.l1, g1.l2)]
+        check.refused(f"unit 2^{exponent}", partial(ParallelPlatform, *parts), "change the unit")
+    for exponent in (-196, -100, 100, 195):
         unit = 2.0**exponent
-        parts: list[Any] = [np.array(part) * unit for part in (g1.D, g1.b, g1.l1, g1.l2)]
+        parts = [np.array(part) * unit for part in (g1.D, g1.b, g1.l1, g1.l2)]
         own = ParallelPlatform(*parts)
         modes = own.direct((0.0, 0.0, 0.0))
         what = f"unit 2^{exponent}"
@@ -86,12 +90,12 @@ def subnormal_platform(check: Checks) -> None:
 
 
 def jamming(check: Checks) -> None:
-    """Bearings of 1e-90 and 1e90 have the same zones; boxes of 1e-300 and 1e300 the same certificates."""
+    """Bearings of 1e-57 to 1e57 have the same zones; boxes of 1e-300 and 1e300 the same certificates."""
     from graphsynth.accuracy.stress.cases.turns import ZONE_A
     from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, jam_arcs
     from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
-    for exponent in (-300, 300):
+    for exponent in (-190, 190):
         unit = 2.0**exponent
         linkage = LambdaLinkage(2 * unit, unit, 2.5 * unit, 2.5 * unit, alpha=1 / 30)
         arcs = jam_arcs(linkage, Bearing(17.5 * unit, 10 * unit, 0.03 * unit)).arcs

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from graphsynth.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     ANGLE,
@@ -38,10 +40,19 @@ def world(x, link, px, py):
 
 
 @kernel
+def nearest_turn(raw, near):
+    """Angle that differs from ``raw`` by whole turns and lies nearest to ``near``, for angles of any size.
+
+    ``math.floor`` would give a 64-bit integer here, which wraps round from 5.8e19 rad on.
+    """
+    return raw + TAU * np.floor((near - raw) / TAU + 0.5)
+
+
+@kernel
 def follow_angle(link, x, near):
     """Unwrapped angle of a link, nearest to ``near``."""
     raw = math.atan2(x[link, 3], x[link, 2])
-    x[link, 4] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
+    x[link, 4] = nearest_turn(raw, near)
 
 
 @kernel
@@ -112,7 +123,7 @@ def row(kind, p, k, a, b, x, phi, q, g):
     nx, ny = -dy / square, dx / square
     slot = int(p[k, SLOT])
     raw = math.atan2(dy, dx)
-    here = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
+    here = nearest_turn(raw, phi[slot])
     scale = 1.0 / (p[k, RA] + p[k, RB])
     g[0], g[1], g[2] = scale * total * nx, scale * total * ny, scale * (p[k, RA] + total * (ux * ny - uy * nx))
     g[3], g[4] = -scale * total * nx, -scale * total * ny

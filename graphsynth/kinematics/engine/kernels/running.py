@@ -22,7 +22,7 @@ from graphsynth.kinematics.engine.codes import (
 )  # fmt: skip
 from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, first_bad, rrr_loop
 from graphsynth.kinematics.engine.kernels.newton import anchors, newton, platform, predict, rates
-from graphsynth.kinematics.engine.kernels.rows import TAU, follow_angle, world
+from graphsynth.kinematics.engine.kernels.rows import follow_angle, nearest_turn, world
 from graphsynth.kinematics.engine.kernels.single import closed_form, pivot_rates, place_eliminated
 
 
@@ -56,7 +56,7 @@ def unwrap(link, u, X, TH, V, i0, i1, derivs):
         if i > 0:
             near = TH[link, i - 1] + ((u[i] - u[i - 1]) * V[link, 2, i - 1] if derivs else 0.0)
         raw = math.atan2(X[link, 3, i], X[link, 2, i])
-        TH[link, i] = raw + TAU * math.floor((near - raw) / TAU + 0.5)
+        TH[link, i] = nearest_turn(raw, near)
 
 
 @kernel
@@ -79,7 +79,7 @@ def carry_centres(rows, rp, r0, nr, i, x, phi, PHI):
             ax, ay = world(x, rows[k, 1], rp[k, 0], rp[k, 1])
             bx, by = world(x, rows[k, 2], rp[k, 2], rp[k, 3])
             raw = math.atan2(by - ay, bx - ax)
-            phi[slot] = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
+            phi[slot] = nearest_turn(raw, phi[slot])
             PHI[slot, i] = phi[slot]
 
 

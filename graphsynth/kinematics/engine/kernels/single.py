@@ -23,7 +23,7 @@ from graphsynth.kinematics.engine.codes import (
     TY,
     H,
 )
-from graphsynth.kinematics.engine.kernels.rows import TAU, gamma, row, world
+from graphsynth.kinematics.engine.kernels.rows import gamma, nearest_turn, row, world
 
 
 @kernel
@@ -149,7 +149,7 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
             return -5e-324
         raw = math.atan2(dy, dx)
         slot = int(rp[k, SLOT])
-        here = raw + TAU * math.floor((phi[slot] - raw) / TAU + 0.5)
+        here = nearest_turn(raw, phi[slot])
         ra, rb = rp[k, RA], rp[k, SIGN] * rp[k, RB]
         if own == a:
             x[own, 4] = here - rb * (x[other, 4] - here - rp[k, H]) / ra
