@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import sqlite3
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.building import BuildStep
+from graphsynth.atlas.opened import OpenCatalogue
 from graphsynth.atlas.schema import connect, readable, settle
 from graphsynth.errors import FormatError, SpecError
 
@@ -24,13 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["BuildStep", "Catalogue"]
 
-_TABLES = (
-    "chains", "inversions", "mechanisms", "groups", "structures", "contracted", "dyads", "relatives", "evaluations",
-    "families",
-)  # fmt: skip
 
-
-class Catalogue:
+class Catalogue(OpenCatalogue):
     """A catalogue file, open for questions.
 
     Parameters
@@ -52,10 +47,6 @@ class Catalogue:
     19 ['1BgMw8g', '1BgOB7A']
     >>> folder.cleanup()
     """
-
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        self.connection: sqlite3.Connection = connect(self.path, readonly=True)
 
     @classmethod
     def build(
@@ -141,74 +132,6 @@ class Catalogue:
             "the shipped catalogue is not installed; build one with 'graphsynth catalog build'", "shipped"
         )
 
-    def __enter__(self) -> Catalogue:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self.connection.close()
-
-    def __len__(self) -> int:
-        """Return the number of chains."""
-        return int(self._rows("SELECT COUNT(*) FROM chains", ())[1][0][0])
-
-    def _rows(self, text: str, parameters: Sequence[Any]) -> tuple[list[str], list[tuple[Any, ...]]]:
-        from graphsynth.atlas.asking import ask
-
-        return ask(self.connection, self.path, text, parameters)
-
-    def _readable(self) -> AbstractContextManager[None]:
-        """Rows of a damaged file may hold whatever."""
-        return readable(self.path, ValueError, TypeError, LookupError, ArithmeticError)
-
-    def query(self, table: str = "chains", where: str = "1", parameters: Sequence[Any] = ()) -> pd.DataFrame:
-        """Return the rows of a table that fulfil an SQL condition.
-
-        Parameters
-        ----------
-        table : str
-            One of the tables of the reference page.
-        where : str
-            SQL condition; values as ``?``.
-        parameters : sequence
-            The values.
-
-        Raises
-        ------
-        SpecError
-            For an unknown table or column, with those there are, or a condition that SQLite refuses.
-        FormatError
-            If the file is damaged.
-        """
-        from graphsynth.atlas.asking import columns
-
-        if table not in _TABLES:
-            raise SpecError(f"there is no table {table!r}; choose one of {', '.join(_TABLES)}")
-        try:
-            return self.sql(f"SELECT * FROM {table} WHERE {where}", parameters)
-        except SpecError as error:
-            if "no such column" not in str(error):
-                raise
-            raise SpecError(f"{error}; {table} has {', '.join(columns(self.connection, table))}") from None
-
-    def sql(self, text: str, parameters: Sequence[Any] = ()) -> pd.DataFrame:
-        """Return the result of any SQL question that only reads.
-
-        Raises
-        ------
-        SpecError
-            If SQLite refuses it, or it would write or attach a file.
-        FormatError
-            If the file is damaged.
-        """
-        import pandas as pd
-
-        columns, rows = self._rows(text, parameters)
-        return pd.DataFrame(rows, columns=columns)
-
     def chain(self, name: str) -> MechanismGraph:
         """Return a chain by its key or its label.
 
@@ -219,7 +142,7 @@ class Catalogue:
         """
         from graphsynth.structure.graph import MechanismGraph
 
-        with self._readable():
+        with self.reading():
             return MechanismGraph.from_key(self._fetch(name)["key"])
 
     def _fetch(self, name: str) -> dict[str, Any]:
@@ -240,7 +163,7 @@ class Catalogue:
         """
         from graphsynth.atlas.entry import entry
 
-        with self._readable():
+        with self.reading():
             return entry(self.connection, self._fetch(name))
 
     def record(self, evaluations: Iterable[Evaluation]) -> int:
@@ -324,6 +247,15 @@ class Catalogue:
             For values out of their bounds.
         GraphsynthError
             If the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile, pathlib
+        >>> folder = tempfile.TemporaryDirectory()
+        >>> with Catalogue.build(pathlib.Path(folder.name) / "four.sqlite", links=[4]) as four:
+        ...     four.evaluate(), four.evaluate()  # the second call finds nothing to do
+        (1, 0)
+        >>> folder.cleanup()
         """
         from graphsynth.atlas.evaluating import Settings, evaluate
 
@@ -332,7 +264,7 @@ class Catalogue:
             return evaluate(self.path, links, mobility, per_chain, limit, settings, executor, watch)
 
     def mechanism(self, name: str, frame: int | None = None, driver: int | str | None = None) -> Mechanism:
-        """Return the first stored mechanism with dimensions of a chain, given by key or label.
+        """Return a stored mechanism of a chain, given by key or label: with several, that of the best transmission.
 
         Parameters
         ----------
@@ -341,16 +273,37 @@ class Catalogue:
         driver : int or str, optional
             As in the table of mechanisms.
 
+        Returns
+        -------
+        Mechanism
+            Exactly as stored; what is known of it stands in the table ``evaluations``.
+
         Raises
         ------
         SpecError
             If no dimensions are stored; the message says how to have them computed.
+        FormatError
+            If the file is damaged.
+
+        Examples
+        --------
+        >>> with Catalogue.shipped() as shipped:
+        ...     mechanism = shipped.mechanism("1.8.4-4.1")
+        >>> mechanism.graph.links, len(mechanism.drivers)
+        (8, 1)
         """
-        from graphsynth.atlas.evaluations import dimensions
+        from graphsynth.atlas.stored import stored_mechanisms
         from graphsynth.mechanism.model import Mechanism
 
-        with self._readable():
-            return Mechanism.from_json(dimensions(self.entry(name), frame, driver))
+        chain = self._fetch(name)
+        with self.reading():
+            for own in stored_mechanisms(self.connection, chain["chain_id"]):
+                if frame in (None, own.frame) and (driver is None or str(driver) == str(own.driver)):
+                    return Mechanism.from_json(own.text)
+        raise SpecError(
+            f"no dimensions are stored for {chain['label'] or chain['key']} with this choice of frame and driver: have "
+            "them computed by 'graphsynth catalog evaluate'"
+        )
 
     def completeness(self) -> pd.DataFrame:
         """Return the statement of completeness, one row for each family.
@@ -361,7 +314,7 @@ class Catalogue:
         """
         from graphsynth.atlas.statement import completeness
 
-        with self._readable():
+        with self.reading():
             return completeness(self.connection)
 
     def verify(self, *, chains: int | None = None, seed: int = 0) -> Verification:
@@ -390,7 +343,7 @@ class Catalogue:
         """
         from graphsynth.atlas.exporting import digest
 
-        with self._readable():
+        with self.reading():
             return digest(self.connection)
 
     def export(self, folder: str | Path, form: str = "parquet") -> list[Path]:
@@ -414,5 +367,5 @@ class Catalogue:
         """
         from graphsynth.atlas.exporting import export
 
-        with self._readable():
+        with self.reading():
             return export(self.connection, Path(folder), form)

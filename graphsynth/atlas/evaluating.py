@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.evaluations import Evaluation, store
 from graphsynth.atlas.schema import connect, readable, settle
+from graphsynth.atlas.stored import fingerprint, mechanism_in
 from graphsynth.errors import GraphError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
@@ -183,7 +184,7 @@ def _task(
     }
     status, data = stored.get("dimensions", ("", None))
     if status == "found" and data is not None:
-        if settings.tilt is None or _has(stored.get("jamming"), _question(settings)):
+        if settings.tilt is None or _has(stored.get("jamming"), _question(settings, data)):
             return None
         return Task(key, frame, driver, settings, data)
     if status and _has((status, data), {"seed": settings.seed, "tries": settings.tries}):
@@ -233,11 +234,12 @@ def _dimensions(task: Task) -> list[Evaluation]:
         **settings, "statement": found.statement, "goals": goals, "length_ratio": found.figures.length_ratio,
         "mechanism": json.loads(found.mechanism.to_json()),
     }  # fmt: skip
+    named = fingerprint(data["mechanism"])
     guarantee = "certified" if turn_is_proved(found.motion) else "estimated"
-    angle = found.figures.transmission_angle
+    angle, turn = found.figures.transmission_angle, {"range": [0.0, math.tau], "dimensions": named}
     return [
         Evaluation(*place, "dimensions", "found", guarantee=guarantee, data=data),
-        Evaluation(*place, "transmission", "found", angle, "rad", "estimated", {"range": [0.0, math.tau]}),
+        Evaluation(*place, "transmission", "found", angle, "rad", "estimated", turn),
     ]
 
 
@@ -268,8 +270,11 @@ def motion_of(mechanism: Mechanism, samples: int = _SAMPLES) -> Motion:
     return simulate(mechanism, np.linspace(0.0, math.tau, samples))
 
 
-def _question(settings: Settings) -> dict[str, Any]:
-    return {"tilt": settings.tilt, "joint_limit": settings.joint_limit}
+def _question(settings: Settings, dimensions: str) -> dict[str, Any]:
+    """Return what a verdict is about: tilt, what the joints take up, and the name of the dimensions."""
+    mechanism = mechanism_in(json.loads(dimensions))
+    named = None if mechanism is None else fingerprint(mechanism)
+    return {"tilt": settings.tilt, "joint_limit": settings.joint_limit, "dimensions": named}
 
 
 def _jamming(task: Task, text: str) -> Evaluation:
@@ -282,7 +287,7 @@ def _jamming(task: Task, text: str) -> Evaluation:
     mechanism = Mechanism.from_json(json.dumps(json.loads(text)["mechanism"]))
     proof = jamming_proof(mechanism, settings.tilt, settings.joint_limit)
     status, guarantee = VERDICTS.get(proof.verdict.name, ("undecided", None))
-    data = {**_question(settings), "reason": proof.reason, "version": graphsynth.__version__}
+    data = {**_question(settings, text), "reason": proof.reason, "version": graphsynth.__version__}
     return Evaluation(task.key, task.frame, task.driver, "jamming", status, settings.tilt, "rad", guarantee, data)
 
 

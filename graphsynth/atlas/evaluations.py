@@ -17,6 +17,7 @@ from typing import Any
 
 from graphsynth.atlas.building import transaction
 from graphsynth.atlas.schema import connect, settle
+from graphsynth.atlas.stored import TIED, fingerprint, fingerprint_at, mechanism_in
 from graphsynth.errors import SpecError
 
 __all__ = ["GUARANTEES", "KINDS", "NOT_COMPUTED", "Evaluation", "record", "store"]
@@ -94,11 +95,50 @@ def record(path: Path, evaluations: Iterable[Evaluation]) -> int:
 
 
 def store(connection: sqlite3.Connection, evaluations: Iterable[Evaluation]) -> int:
-    """Write evaluations in one transaction; return how many."""
+    """Write evaluations in one transaction, dimensions first; return how many.
+
+    Results that belong to dimensions which are replaced now are dropped.
+    """
+    items = sorted(evaluations, key=lambda item: item.kind != "dimensions")
     with transaction(connection):
-        rows = [(*_mechanism(connection, item), *_values(item)) for item in evaluations]
-        connection.executemany("INSERT OR REPLACE INTO evaluations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
-    return len(rows)
+        for item in items:
+            place = _mechanism(connection, item)
+            if item.kind == "dimensions":
+                _drop_tied(connection, place, item)
+            elif item.kind in TIED:
+                _check_tie(connection, place, item)
+            connection.execute(
+                "INSERT OR REPLACE INTO evaluations VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", (*place, *_values(item))
+            )
+    return len(items)
+
+
+def _named_dimensions(connection: sqlite3.Connection, place: tuple[int, int, int | str]) -> str | None:
+    """Name of the dimensions stored for a mechanism; None also where they cannot be read."""
+    try:
+        return fingerprint_at(connection, place)
+    except ValueError:
+        return None
+
+
+def _drop_tied(connection: sqlite3.Connection, place: tuple[int, int, int | str], item: Evaluation) -> None:
+    """Drop what was found for other dimensions than the new ones."""
+    mechanism = mechanism_in(item.data)
+    if mechanism is None or fingerprint(mechanism) != _named_dimensions(connection, place):
+        kinds = ", ".join("?" * len(TIED))
+        connection.execute(
+            f"DELETE FROM evaluations WHERE (chain_id, frame, driver) = (?, ?, ?) AND kind IN ({kinds})",
+            (*place, *TIED),
+        )
+
+
+def _check_tie(connection: sqlite3.Connection, place: tuple[int, int, int | str], item: Evaluation) -> None:
+    named = item.data.get("dimensions") if isinstance(item.data, dict) else None
+    if named is not None and named != _named_dimensions(connection, place):
+        raise SpecError(
+            f"the {item.kind} of {item.chain} with frame {item.frame} and driver {item.driver} is of the dimensions "
+            f"{named!r}, which are not those stored: store its dimensions first, or compute it for the stored ones"
+        )
 
 
 def _values(item: Evaluation) -> tuple[Any, ...]:
@@ -117,17 +157,3 @@ def _mechanism(connection: sqlite3.Connection, item: Evaluation) -> tuple[int, i
             "take one from the table of mechanisms, which lists one of each orbit"
         )
     return row[0], item.frame, item.driver
-
-
-def dimensions(entry: dict[str, Any], frame: int | None, driver: int | str | None) -> str:
-    """Return the mechanism stored with an entry, as the JSON text that :class:`graphsynth.Mechanism` reads."""
-    for own in entry["mechanisms"]:
-        if frame in (None, own["frame"]) and (driver is None or str(driver) == str(own["driver"])):
-            known = own["evaluations"]["dimensions"]
-            data = known["data"] if isinstance(known, dict) else None
-            if isinstance(data, dict) and "mechanism" in data:
-                return json.dumps(data["mechanism"])
-    raise SpecError(
-        f"no dimensions are stored for {entry['label'] or entry['key']} with this choice of frame and driver: have "
-        "them computed by 'graphsynth catalog evaluate'"
-    )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sqlite3
+from collections import OrderedDict
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,93 +20,125 @@ from graphsynth.errors import GraphsynthError, SpecError
 __all__ = ["merge"]
 
 
+#: Shards open at a time: a process may open some hundred files, a build may have thousands of shards.
+_OPEN = 64
+
+
 def merge(path: Path, parts: list[Path]) -> None:
     """Make one catalogue of shards; see :meth:`graphsynth.atlas.catalogue.Catalogue.merge`."""
     if not parts:
         raise SpecError("no shards given; name the files built with --shard i/m")
     if path.resolve() in {part.resolve() for part in parts}:
         raise SpecError(f"{path} is one of the shards; name a new file")
-    with ExitStack() as stack:
-        shards = [stack.enter_context(closing(connect(part, readonly=True))) for part in parts]
-        names = dict(zip(shards, parts))
-        # everything is checked before the file is made
-        plans = [_plan(question, names) for question in _families(shards)]
-        target = stack.enter_context(closing(connect(path, create=True)))
+    # everything is checked before the file is made
+    plans = _plans(parts)
+    with closing(_Shards()) as shards, closing(connect(path, create=True)) as target:
         for plan in plans:
-            _merge_family(target, plan, names)
-        for shard in shards:
-            _copy_evaluations(shard, target)
+            _merge_family(target, plan, shards)
+        for part in parts:
+            with readable(part):
+                _copy_evaluations(shards.open(part), target)
         settle(target)
 
 
-@dataclass(frozen=True, slots=True)
+class _Shards:
+    """Connections to shards, those used last kept open."""
+
+    def __init__(self) -> None:
+        self._open: OrderedDict[Path, sqlite3.Connection] = OrderedDict()
+
+    def open(self, part: Path) -> sqlite3.Connection:
+        """Return the connection to a shard; it may be closed when others are opened."""
+        if part not in self._open:
+            if len(self._open) >= _OPEN:
+                self._open.popitem(last=False)[1].close()
+            self._open[part] = connect(part, readonly=True)
+        self._open.move_to_end(part)
+        return self._open[part]
+
+    def close(self) -> None:
+        """Close all of them."""
+        while self._open:
+            self._open.popitem()[1].close()
+
+
+@dataclass(slots=True)
 class _Plan:
-    """A family: its pieces and the fingerprint of their cut; where each piece is: shard, first chain, chains."""
+    """A family: the shards given, the cuts they were made by, and where each piece is: shard, first chain, chains."""
 
     question: tuple[int, int, int]
-    pieces: int
-    cut: str
-    where: dict[int, tuple[sqlite3.Connection, int, int]]
+    given: set[str] = field(default_factory=set)
+    cuts: dict[tuple[int, str], Path] = field(default_factory=dict)
+    where: dict[int, tuple[Path, int, int]] = field(default_factory=dict)
+
+    @property
+    def pieces(self) -> int:
+        """Pieces of the whole family."""
+        return next(iter(self.cuts))[0]
 
 
-def _families(shards: list[sqlite3.Connection]) -> list[tuple[int, int, int]]:
-    select = "SELECT mobility, links, fractionated FROM families"
-    return sorted({row for shard in shards for row in shard.execute(select)})
-
-
-def _plan(question: tuple[int, int, int], names: dict[sqlite3.Connection, Path]) -> _Plan:
-    """Find every piece of a family.
+def _plans(parts: list[Path]) -> list[_Plan]:
+    """Find every piece of every family, one shard after the other.
 
     Raises
     ------
     GraphsynthError
         If a piece is missing or twice there, or the shards are of different cuts.
     """
-    mobility, links, _ = question
-    where: dict[int, tuple[sqlite3.Connection, int, int]] = {}
-    cuts: dict[tuple[int, str], Path] = {}
-    for shard, name in names.items():
-        row = shard.execute(
-            "SELECT family_id, pieces, cut FROM families WHERE (mobility, links, fractionated) = (?, ?, ?)", question
-        ).fetchone()
-        if row is None:
-            continue
-        cuts.setdefault(row[1:], name)
-        for piece, first, chains in shard.execute(
-            "SELECT piece, first_chain, chains FROM pieces WHERE family_id = ?", row[:1]
-        ):
-            if piece in where:
-                raise GraphsynthError(
-                    f"{name} and {names[where[piece][0]]} both hold piece {piece} of mobility {mobility}, {links} "
-                    "links: give every shard once"
-                )
-            where[piece] = shard, first, chains
-    if len(cuts) > 1:
-        raise GraphsynthError(
-            f"{' and '.join(map(str, cuts.values()))} were built by different versions: build all shards with one"
-        )
-    pieces, cut = next(iter(cuts))
-    _check_all_there(question, pieces, where, names)
-    return _Plan(question, pieces, cut, where)
+    plans: dict[tuple[int, int, int], _Plan] = {}
+    for part in parts:
+        with closing(connect(part, readonly=True)) as shard, readable(part):
+            for number, *question, pieces, cut, name in shard.execute(
+                "SELECT family_id, mobility, links, fractionated, pieces, cut, shard FROM families"
+            ).fetchall():
+                key = question[0], question[1], question[2]
+                plan = plans.setdefault(key, _Plan(key))
+                plan.given.add(name)
+                plan.cuts.setdefault((pieces, cut), part)
+                _add_pieces(plan, part, shard, number)
+    for plan in plans.values():
+        if len(plan.cuts) > 1:
+            raise GraphsynthError(
+                f"{' and '.join(map(str, plan.cuts.values()))} were built by different versions: build all shards with "
+                "one"
+            )
+        _check_all_there(plan)
+    return [plans[key] for key in sorted(plans)]
 
 
-def _merge_family(target: sqlite3.Connection, plan: _Plan, names: dict[sqlite3.Connection, Path]) -> None:
+def _add_pieces(plan: _Plan, part: Path, shard: sqlite3.Connection, number: int) -> None:
+    """Add the pieces that a shard holds of a family."""
+    mobility, links, _ = plan.question
+    for piece, first, chains in shard.execute(
+        "SELECT piece, first_chain, chains FROM pieces WHERE family_id = ?", (number,)
+    ):
+        if piece in plan.where:
+            raise GraphsynthError(
+                f"{part} and {plan.where[piece][0]} both hold piece {piece} of mobility {mobility}, {links} links: "
+                "give every shard once"
+            )
+        plan.where[piece] = part, first, chains
+
+
+def _merge_family(target: sqlite3.Connection, plan: _Plan, shards: _Shards) -> None:
     """Write the pieces of a family in their order; count it, once for all shards."""
     mobility, links, fractionated = plan.question
     expected = expected_of(problem_of(links, mobility, bool(fractionated)), None)
     if not expected:
         return
-    family_id, complete = open_family(target, plan.question, (plan.pieces, plan.cut, "1/1", expected))
+    ((pieces, cut),) = plan.cuts
+    family_id, complete = open_family(target, plan.question, (pieces, cut, "1/1", expected))
     if complete:
         return
 
     def results(places: list[int]) -> Iterator[Rows]:
         for piece in places:
-            with readable(names[plan.where[piece][0]], TypeError, ValueError, LookupError):
-                rows = _read(*plan.where[piece])
+            part, first, chains = plan.where[piece]
+            with readable(part, TypeError, ValueError, LookupError):
+                rows = _read(shards.open(part), first, chains)
             yield rows
 
-    build_family(target, family_id, mobility, [(piece, 1.0) for piece in range(plan.pieces)], results)
+    build_family(target, family_id, mobility, [(piece, 1.0) for piece in range(pieces)], results)
     finish_family(target, family_id)
 
 
@@ -121,20 +154,14 @@ def _copy_evaluations(shard: sqlite3.Connection, target: sqlite3.Connection) -> 
         )
 
 
-def _check_all_there(
-    question: tuple[int, int, int],
-    pieces: int,
-    where: dict[int, tuple[sqlite3.Connection, int, int]],
-    names: dict[sqlite3.Connection, Path],
-) -> None:
-    missing = [piece for piece in range(pieces) if piece not in where]
+def _check_all_there(plan: _Plan) -> None:
+    missing = [piece for piece in range(plan.pieces) if piece not in plan.where]
     if not missing:
         return
-    select = "SELECT shard FROM families WHERE (mobility, links, fractionated) = (?, ?, ?)"
-    given = ", ".join(sorted({row[0] for shard in names for row in shard.execute(select, question)}))
     raise GraphsynthError(
-        f"{len(missing)} of {pieces} pieces of mobility {question[0]}, {question[1]} links are in none of the files "
-        f"(given: {given}; first missing piece {missing[0]}): finish or add the shard that holds them"
+        f"{len(missing)} of {plan.pieces} pieces of mobility {plan.question[0]}, {plan.question[1]} links are in none "
+        f"of the files (given: {', '.join(sorted(plan.given))}; first missing piece {missing[0]}): finish or add the "
+        "shard that holds them"
     )
 
 

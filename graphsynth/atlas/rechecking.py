@@ -13,6 +13,7 @@ import numpy as np
 
 from graphsynth.atlas.evaluating import VERDICTS, jamming_proof, motion_of, turn_is_proved
 from graphsynth.atlas.references import Reference
+from graphsynth.atlas.stored import TIED, fingerprint
 from graphsynth.atlas.turning import Turning
 
 if TYPE_CHECKING:
@@ -73,9 +74,18 @@ class _Recheck:
         if guarantee == "certified" and _has_flint():
             proved = turn_is_proved(motion_of(self.mechanism, 721))
             self.same("evaluations: turn proved", self.where, proved, True)
+        self._ties(kinds)
         jamming = kinds.get("jamming")
         if jamming is not None and jamming[4] is not None:
             self._jamming(jamming[0], jamming[3], json.loads(jamming[4]))
+
+    def _ties(self, kinds: dict[str, tuple[Any, ...]]) -> None:
+        """Results that name their dimensions name these."""
+        named = fingerprint(self.data["mechanism"])
+        for kind in TIED:
+            data = json.loads(kinds[kind][4]) if kind in kinds and kinds[kind][4] else None
+            if isinstance(data, dict) and "dimensions" in data:
+                self.same(f"evaluations: dimensions of {kind}", self.where, data["dimensions"], named)
 
     def _goal(self, name: str, slack: float) -> float:
         return float(self.data["goals"][name]) * (1.0 + slack)

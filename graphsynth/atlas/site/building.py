@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sqlite3
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -18,10 +17,10 @@ from graphsynth.atlas.site.families import (
     family_script,
     groups_script,
     relatives_script,
-    stored_mechanisms,
 )
 from graphsynth.atlas.site.motions import MotionTask, motion_of
 from graphsynth.atlas.site.sketches import PER_FILE, sketch_scripts
+from graphsynth.atlas.stored import stored_mechanisms
 from graphsynth.errors import GraphsynthError, SpecError
 
 if TYPE_CHECKING:
@@ -97,6 +96,8 @@ def build_site(
     ------
     SpecError
         If ``motion_links`` is negative.
+    FormatError
+        If the catalogue is damaged.
     GraphsynthError
         If the catalogue has no finished family, or the folder holds something else.
     """
@@ -104,13 +105,14 @@ def build_site(
         raise SpecError(f"motion_links = {motion_links} must be 0 (no motions) or more")
     target = Path(folder)
     _check_place(target)
-    found = families(catalogue.connection)
+    with catalogue.reading():
+        found = families(catalogue.connection)
     if not found:
         raise GraphsynthError(f"{catalogue.path.name} has no finished family: finish building it first")
     building = target.with_name(target.name + ".building")
     shutil.rmtree(building, ignore_errors=True)
     try:
-        report = _write(catalogue.connection, found, building, motion_links, executor, watch)
+        report = _write(catalogue, found, building, motion_links, executor, watch)
         shutil.rmtree(target, ignore_errors=True)
         building.rename(target)
     except BaseException:
@@ -141,7 +143,7 @@ class _Progress:
 
 
 def _write(
-    connection: sqlite3.Connection,
+    catalogue: Catalogue,
     found: list[Family],
     folder: Path,
     motion_links: int,
@@ -151,7 +153,7 @@ def _write(
     """Write all files; return what a report holds after its page."""
     data = folder / "data"
     data.mkdir(parents=True)
-    stored = stored_mechanisms(connection) if motion_links else {}
+    stored = _best_stored(catalogue) if motion_links else {}
     tasks = [
         MotionTask(row["label"], row["key"], stored.get(row["chain_id"]), family.links <= motion_links)
         for family in found
@@ -162,18 +164,18 @@ def _write(
     # a motion takes about as long as ten sketches
     progress = _Progress(chains + 10 * len(tasks), watch)
     motions = dict(_motions(folder, tasks, executor, progress))
-    _write_families(connection, found, data, executor, progress)
+    _write_families(catalogue, found, data, executor, progress)
     first, room = [], _FIRST_LOAD
     for family in found:
         size = (data / f"family-{family.name}.js").stat().st_size
         if size <= room:
             room -= size
             first.append(family.name)
-    known = contents(
-        connection, found, first=first, sketchesPerFile=PER_FILE, motions=motions, motionLinks=motion_links
-    )
+    more = {"first": first, "sketchesPerFile": PER_FILE, "motions": motions, "motionLinks": motion_links}
+    with catalogue.reading():
+        known, groups = contents(catalogue.connection, found, **more), groups_script(catalogue.connection)
     _put(data / "contents.js", known)
-    _put(data / "groups.js", groups_script(connection))
+    _put(data / "groups.js", groups)
     loaded = [*_write_pages(folder, first), data / "contents.js", *(data / f"family-{name}.js" for name in first)]
     _put(folder / _MARK, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")
     everything = [path for path in folder.rglob("*") if path.is_file()]
@@ -182,6 +184,15 @@ def _write(
         chains, shown, len(everything), sum(path.stat().st_size for path in everything),
         sum(path.stat().st_size for path in loaded),
     )  # fmt: skip
+
+
+def _best_stored(catalogue: Catalogue) -> dict[int, str]:
+    """Return the mechanism that ``catalogue.mechanism`` gives, as JSON, for each chain that has one."""
+    found: dict[int, str] = {}
+    with catalogue.reading():
+        for own in stored_mechanisms(catalogue.connection):
+            found.setdefault(own.chain_id, own.text)
+    return found
 
 
 def _motions(
@@ -201,12 +212,14 @@ def _motions(
 
 
 def _write_families(
-    connection: sqlite3.Connection, found: list[Family], data: Path, executor: Executor | None, progress: _Progress
+    catalogue: Catalogue, found: list[Family], data: Path, executor: Executor | None, progress: _Progress
 ) -> None:
     places = {row["key"]: (family.name, k) for family in found for k, row in enumerate(family.rows)}
     for family in found:
-        _put(data / f"family-{family.name}.js", family_script(family))
-        _put(data / f"relatives-{family.name}.js", relatives_script(connection, family, places))
+        with catalogue.reading():
+            own, relatives = family_script(family), relatives_script(catalogue.connection, family, places)
+        _put(data / f"family-{family.name}.js", own)
+        _put(data / f"relatives-{family.name}.js", relatives)
         for name, text, count in sketch_scripts(family, executor):
             _put(data / name, text)
             progress.add("sketches", count)

@@ -15,7 +15,6 @@ __all__ = [
     "groups_script",
     "relatives_script",
     "script",
-    "stored_mechanisms",
 ]
 
 
@@ -151,23 +150,6 @@ def _evaluations(connection: sqlite3.Connection, family: Family) -> dict[int, li
                ORDER BY frame, driver, kind"""
     found = {k: connection.execute(query, (row["chain_id"],)).fetchall() for k, row in enumerate(family.rows)}
     return {k: [[frame, str(driver), *rest] for frame, driver, *rest in rows] for k, rows in found.items() if rows}
-
-
-def stored_mechanisms(connection: sqlite3.Connection) -> dict[int, str]:
-    """Return for each chain with stored dimensions the mechanism of the best transmission, as JSON."""
-    query = """SELECT d.chain_id, d.data FROM evaluations d LEFT JOIN evaluations t
-               ON (t.chain_id, t.frame, t.driver, t.kind) = (d.chain_id, d.frame, d.driver, 'transmission')
-               WHERE d.kind = 'dimensions' AND d.status = 'found' AND d.data IS NOT NULL
-               ORDER BY d.chain_id, t.value DESC, d.frame, d.driver"""
-    found: dict[int, str] = {}
-    for number, text in connection.execute(query):
-        try:
-            data = json.loads(text)
-        except ValueError:  # 'catalog verify' tells of it
-            continue
-        if number not in found and isinstance(data, dict) and "mechanism" in data:
-            found[number] = json.dumps(data["mechanism"])
-    return found
 
 
 def groups_script(connection: sqlite3.Connection) -> str:
