@@ -14,17 +14,35 @@ __all__ = ["chains", "graphs", "mechanism_graphs"]
 MOST_LINKS = 10
 
 
+_SPACES = st.sampled_from((3, 2, 4, 5, 6))
+
+
+@cache
+def _below(number: int) -> st.SearchStrategy[int]:
+    """Whole numbers from 0, kept: making and checking a strategy takes longer than drawing from it."""
+    return st.integers(0, number - 1)
+
+
+@cache
+def _pairs(links: int) -> st.SearchStrategy[list[tuple[int, int]]]:
+    return st.lists(st.sampled_from([(a, b) for b in range(links) for a in range(b)]), unique=True)
+
+
+@cache
+def _frames(links: int) -> st.SearchStrategy[int | None]:
+    return st.none() | _below(links)
+
+
 @st.composite
-def _graphs(draw: st.DrawFn, least: int, largest: int, space: int | None, connected: bool) -> MechanismGraph:
-    links = draw(st.integers(least, largest))
-    of = draw(st.sampled_from((3, 2, 4, 5, 6))) if space is None else space
-    pairs = [(a, b) for b in range(links) for a in range(b)]
-    chosen = set(draw(st.lists(st.sampled_from(pairs), unique=True))) if pairs else set()
+def _graphs(
+    draw: st.DrawFn, sizes: st.SearchStrategy[int], spaces: st.SearchStrategy[int], connected: bool
+) -> MechanismGraph:
+    links, space = draw(sizes), draw(spaces)
+    chosen = set(draw(_pairs(links))) if links > 1 else set()
     if connected:
-        chosen |= {(draw(st.integers(0, b - 1)), b) for b in range(1, links)}
-    joints = [(a, b, draw(st.integers(1, of - 1))) for a, b in sorted(chosen)]
-    frame = draw(st.none() | st.integers(0, links - 1))
-    return MechanismGraph(links, joints, frame=frame, space=of)
+        chosen |= {(draw(_below(b)), b) for b in range(1, links)}
+    joints = [(a, b, 1 + draw(_below(space - 1))) for a, b in sorted(chosen)]
+    return MechanismGraph(links, joints, frame=draw(_frames(links)), space=space)
 
 
 def graphs(
@@ -62,7 +80,8 @@ def graphs(
     check_range("links", min_links, max_links, 1, 60)
     if space is not None and space not in range(2, 7):
         raise SpecError(f"space = {space!r}; the mobility of a free link is 2 to 6")
-    return _graphs(min_links, max_links, space, connected)
+    spaces = _SPACES if space is None else st.just(space)
+    return _graphs(st.integers(min_links, max_links), spaces, connected)
 
 
 @cache
