@@ -1,0 +1,67 @@
+"""The page of a damaged catalogue: one sentence, and the older page stays."""
+
+from __future__ import annotations
+
+import sqlite3
+
+import pytest
+
+from graphsynth.atlas.catalogue import Catalogue
+from graphsynth.atlas.evaluations import Evaluation
+from graphsynth.atlas.site import build_site
+from graphsynth.cli import main
+from graphsynth.errors import FormatError
+
+WRONG = {
+    "assortment": "UPDATE chains SET assortment = 'x-y'",
+    "label": "UPDATE chains SET label = 'nonsense'",
+    "key": "UPDATE chains SET key = X'00ff'",
+    "class": "DROP TABLE structures",
+    "relatives": "DROP TABLE dyads",
+    "groups": "DROP TABLE groups",
+    "contracted": "DROP TABLE contracted",
+    "evaluations": "DROP TABLE evaluations",
+    "dimensions": "UPDATE evaluations SET data = '{' WHERE kind = 'dimensions'",
+    "families": "DROP TABLE families",
+    "girth": "UPDATE chains SET girth = 'x'",
+}
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory):
+    path = tmp_path_factory.mktemp("right") / "x.sqlite"
+    with Catalogue.build(path, [4]) as catalogue:
+        frame, driver = catalogue.connection.execute("SELECT frame, driver FROM mechanisms").fetchone()
+        place = "1.4.4.1", frame, driver
+        catalogue.record([Evaluation(*place, "dimensions", "found", data={"mechanism": {}})])
+    return path
+
+
+@pytest.mark.parametrize("kind", sorted(WRONG))
+def test_damage_is_one_sentence(right, tmp_path, capsys, kind):
+    path, page = tmp_path / "x.sqlite", tmp_path / "page"
+    path.write_bytes(right.read_bytes())
+    raw = sqlite3.connect(path, isolation_level=None)
+    raw.execute("PRAGMA writable_schema = ON")
+    raw.execute("PRAGMA foreign_keys = OFF")
+    raw.execute(WRONG[kind])
+    raw.close()
+    page.mkdir()
+    (page / "atlas-page.txt").write_text("older")
+    with Catalogue(path) as catalogue, pytest.raises(FormatError, match=r"damaged|a key is"):
+        build_site(catalogue, page, motion_links=1)
+    assert main(["catalog", "site", str(path), "-o", str(page)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and ("x.sqlite" in error or kind == "key")
+    assert [own.name for own in page.iterdir()] == ["atlas-page.txt"]
+    assert not page.with_name("page.building").exists()
+
+
+def test_damaged_pages_of_the_file_are_one_sentence(right, tmp_path, capsys):
+    data = bytearray(right.read_bytes())
+    for start in range(4096, len(data), 4096):
+        path = tmp_path / "y.sqlite"
+        path.write_bytes(data[:start] + bytes(4096) + data[start + 4096 :])
+        status = main(["catalog", "site", str(path), "-o", str(tmp_path / "page")])
+        error = capsys.readouterr().err
+        assert status in (0, 2) and (status == 0 or error.count("\n") == 1)
