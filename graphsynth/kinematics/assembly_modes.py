@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import check_largest, positive
-from graphsynth.mechanism.checks import LARGEST
+from graphsynth.mechanism.checks import LARGEST, SMALLEST
 
 __all__ = ["AssemblyModeBatch", "AssemblyModes", "assembly_modes", "assembly_modes_batch"]
 
@@ -211,9 +211,9 @@ def _check_sizes(A: Complex, b: Complex, l2: Array) -> None:
     """Refuse problems whose determinants, length^4, would not be numbers."""
     tables = [np.abs(rows.view(np.float64)) for rows in (A, b, l2)]
     largest = max(float(table.max(initial=0.0)) for table in tables)
-    if not (largest <= LARGEST and l2.min(initial=LARGEST) >= 1.0 / LARGEST):  # else no problem can be out of range
+    if not (largest <= LARGEST and l2.min(initial=LARGEST) >= SMALLEST):  # else no problem can be out of range
         size = np.maximum.reduce(np.broadcast_arrays(*(table.max(axis=1) for table in tables)))
-        for problem in np.flatnonzero((size > LARGEST) | ((size > 0.0) & (size < 1.0 / LARGEST))):
+        for problem in np.flatnonzero((size > LARGEST) | ((size > 0.0) & (size < SMALLEST))):
             check_largest(float(size[problem]), f"dimension of problem {problem}")
 
 

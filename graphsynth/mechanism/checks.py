@@ -9,13 +9,13 @@ from typing import Any
 
 from graphsynth.errors import GeometryError, GraphsynthError
 
-__all__ = ["LARGEST", "Size", "check_largest", "check_sizes", "finite", "link_number", "nonzero", "point"]
+__all__ = ["LARGEST", "SMALLEST", "Size", "check_largest", "check_sizes", "finite", "link_number", "nonzero", "point"]
 
 Point = tuple[float, float]
 Size = float | complex | None
 
-#: Sizes from 1 / LARGEST to LARGEST are taken, in whatever unit: products of four lengths are then numbers.
-LARGEST = 1e60
+#: Sizes from SMALLEST to LARGEST are taken, in whatever unit: products of four lengths are then numbers.
+SMALLEST, LARGEST = 1e-60, 1e60
 
 
 def finite(name: str, value: Any) -> float:
@@ -91,9 +91,9 @@ def check_sizes(owner: str, sizes: Mapping[str, Size], error: type[GraphsynthErr
     """
     for name, value in sizes.items():
         size = 0.0 if value is None else math.hypot(value.real, value.imag)
-        if size != 0.0 and not 1.0 / LARGEST <= size <= LARGEST:
+        if size != 0.0 and not SMALLEST <= size <= LARGEST:
             raise error(
-                f"{name} = {size:g} of the {owner} is not between {1.0 / LARGEST:g} and {LARGEST:g}; change the unit"
+                f"{name} = {size:g} of the {owner} is not between {SMALLEST:g} and {LARGEST:g}; change the unit"
             )
 
 
@@ -112,7 +112,7 @@ def check_largest(largest: float, what: str = "dimension") -> None:
     >>> check_largest(2.5), check_largest(0.0)
     (None, None)
     """
-    if largest != 0.0 and not 1.0 / LARGEST <= largest <= LARGEST:
+    if largest != 0.0 and not SMALLEST <= largest <= LARGEST:
         raise GeometryError(
-            f"the largest {what} is {largest:.3g}, not between {1.0 / LARGEST:g} and {LARGEST:g}; change the unit"
+            f"the largest {what} is {largest:.3g}, not between {SMALLEST:g} and {LARGEST:g}; change the unit"
         )

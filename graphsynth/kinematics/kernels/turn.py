@@ -178,9 +178,8 @@ def advance(p, e, goal, q, Lc, check, quick):
     if not accurate:
         return False
     det *= 8.0
-    if check and not (
-        first <= 0.1 * travelled + 1e-9 and rate <= 0.1 and det * q[DET] > 0.0 and abs(det) > 0.5 * abs(q[DET])
-    ):
+    same = (det > 0.0) == (q[DET] > 0.0)  # a product of two determinants, length^8, would underflow
+    if check and not (first <= 0.1 * travelled + 1e-9 and rate <= 0.1 and same and abs(det) > 0.5 * abs(q[DET])):
         return False
     if not check and not first <= 0.1:
         return False

@@ -59,7 +59,7 @@ def ratios(check: Checks) -> None:
 
 
 def subnormal_platform(check: Checks) -> None:
-    """Platforms of 1e-59 to 1e59 have the modes of those of 1, others are refused; legs of subnormal lengths are taken."""
+    """Platforms of 1e-59 to 1e59 have the modes of those of 1, others are refused; legs may be subnormal."""
     from graphsynth.kinematics.leg import LegStatus, solve_leg
     from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
