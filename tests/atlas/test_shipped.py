@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 from graphsynth.atlas.catalogue import Catalogue
+from graphsynth.atlas.evaluations import Evaluation
+from graphsynth.atlas.stored import fingerprint
 
 CATALOG = Path(__file__).parents[2] / "catalog"
 
@@ -49,6 +51,29 @@ def test_the_builder_makes_the_same_today(shipped, script, tmp_path):
     with Catalogue(tmp_path / "x.sqlite") as fresh:
         assert fresh.digest() == shipped.digest()
         assert script.statement(fresh) == (CATALOG / "up-to-10-links.toml").read_text()
+
+
+@pytest.mark.slow
+def test_the_builder_evaluates_the_same_today(shipped, script, tmp_path):
+    """The same mechanisms with the same status, unit and guarantee; digits of dimensions may differ, and turn."""
+    script.build(tmp_path / "x.sqlite")
+    script.evaluate(tmp_path / "x.sqlite")
+    with Catalogue(tmp_path / "x.sqlite") as fresh:
+        text = (CATALOG / "up-to-10-links.toml").read_text()
+        assert script.differences(shipped, fresh, text) == []
+        assert script.same_dimensions(shipped, fresh)[1] == 19
+        fresh.record([Evaluation("1.4.4.1", 0, 2, "dimensions", "not found")])
+        kept = {row[3:5] for row in script.evaluated(shipped) - script.evaluated(fresh)}
+        assert kept == {("dimensions", "found"), ("transmission", "found"), ("jamming", "free")}
+
+
+def test_every_result_names_its_dimensions(shipped):
+    for name in shipped.query("chains", "mobility = 1 AND links <= 8")["key"]:
+        for own in shipped.entry(name)["mechanisms"]:
+            known = {kind: row for kind, row in own["evaluations"].items() if row != "not computed"}
+            if known:
+                named = fingerprint(known.pop("dimensions")["data"]["mechanism"])
+                assert known and all(row["data"]["dimensions"] == named for row in known.values())
 
 
 def test_it_is_found_by_name(shipped):
