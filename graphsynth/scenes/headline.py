@@ -36,7 +36,8 @@ def sentences(report: Report) -> tuple[Finding, ...]:
     records: tuple[Record, ...] = report.products.get("records", ())
     found = [told for ranking in _rankings(report) for told in _best(ranking, records)]
     given = [finding for finding in _given(report) if not finding.value]
-    found += given or _verdicts(records)
+    few = sum(record.status == "assessed" for record in records) <= _VERDICTS
+    found += (_verdicts(records) if few or not given else []) + given
     found += _nothing_left(records) + (_turned_down(records) if len(records) > 1 else [])
     found += [told for ranking in _rankings(report) for told in _how_sure(ranking, records)]
     return tuple(found)
@@ -47,12 +48,15 @@ def facts(report: Report) -> tuple[Finding, ...]:
     products = report.products
     found = [finding for finding in _given(report) if finding.value]
     records: tuple[Record, ...] = products.get("records", ())
-    if len(records) == 1 and records[0].status == "assessed":
-        found += [_margin(margin) for margin in records[0].margins[:_MARGINS]]
-    if "solutions" in products:
+    assessed = [record for record in records if record.status == "assessed"]
+    others = [record for record in records if record.status not in ("assessed", "not recognised")]
+    if len(assessed) == 1 and not others:
+        found += [_margin(margin) for margin in assessed[0].margins[:_MARGINS]]
+    plain = len(records) == len(assessed) == 1  # one answer: nothing was chosen from
+    if "solutions" in products and not (plain and len(products["solutions"]) == 1):
         count = len(products["solutions"])
         found.append(Finding("integer solutions" if count != 1 else "integer solution", value=str(count)))
-    if any(record.key for record in records):
+    if any(record.key for record in records) and not plain:
         found += _counts(records)
     found += [
         Finding("on the Pareto front", value=str(len(ranking.front))) for ranking in _rankings(report) if ranking.front
@@ -84,7 +88,7 @@ def _counts(records: Sequence[Record]) -> list[Finding]:
 
 
 def _margin(margin: Quantity) -> Finding:
-    unit = f" {margin.unit}" if margin.unit else ""
+    unit = margin.unit if margin.unit in ("", "°", "′", "″") else f" {margin.unit}"
     return Finding(f"{margin.name} ({margin.guarantee})", value=f"{margin.value:.4g}{unit}")
 
 
@@ -195,6 +199,10 @@ def _turned_down(records: Sequence[Record]) -> list[Finding]:
     ]
     more = f"; {len(listed) - _REASONS} more reasons" if len(listed) > _REASONS else ""
     total = sum(causes.values())
+    if len(causes) == 1 and total > 1:
+        return [
+            Finding(f"Turned down: {total} of {len(records)}, all for the same reason: {_ended(next(iter(causes)))}")
+        ]
     return [Finding(f"Turned down: {total} of {len(records)}: {'; '.join(listed[:_REASONS])}{more}.")]
 
 

@@ -110,13 +110,15 @@ _TONES = {True: "good", False: "bad", None: ""}
 
 
 def _answer(report: Report) -> str:
-    """Give the run in a few sentences and, behind the first, a row of numbers."""
-    told = [f'<p class="verdict {_TONES[finding.good]}">{_strong(finding)}</p>' for finding in sentences(report)]
+    """Give the run in a few sentences and, behind what is good or bad, a row of numbers."""
+    found = sentences(report)
+    told = [f'<p class="verdict {_TONES[finding.good]}">{_strong(finding)}</p>' for finding in found]
     items = "".join(
         f'<li><b class="{_TONES[fact.good]}">{escape(fact.value)}</b><span>{escape(fact.text)}</span></li>'
         for fact in facts(report)
     )
-    return f'{"".join(told[:1])}<ul class="facts">{items}</ul>{"".join(told[1:])}'
+    first = next((k for k, finding in enumerate(found) if finding.good is None), len(told)) or len(told)
+    return f'{"".join(told[:first])}<ul class="facts">{items}</ul>{"".join(told[first:])}'
 
 
 def _strong(finding: Finding) -> str:

@@ -131,7 +131,7 @@ class Quantity:
     @property
     def text(self) -> str:
         """The value with its unit, to a readable number of digits."""
-        return f"{self.value:.10g}{' ' + self.unit if self.unit else ''}"
+        return f"{self.value:.10g}{'' if self.unit in ('', '°', '′', '″') else ' '}{self.unit}"
 
 
 @dataclass(frozen=True, slots=True)

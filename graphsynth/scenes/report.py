@@ -17,13 +17,13 @@ from graphsynth.scenes.parts import unwritable, write_whole
 from graphsynth.scenes.summary import summary_tables
 
 if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.table import Table as RichTable
+    from rich.console import Console, Group
+    from rich.text import Text
 
     from graphsynth.scenes.products import Table
     from graphsynth.scenes.runner import Report
 
-__all__ = ["loaded_versions", "print_summary", "scene_json", "write_report"]
+__all__ = ["column_widths", "loaded_versions", "print_summary", "scene_json", "write_report"]
 
 _KINDS = {".html", ".csv", ".parquet", ".json", ".jsonl"}
 _PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
@@ -98,7 +98,7 @@ def print_summary(report: Report, console: Console) -> None:
     lines = [f"[bold]{escape(report.scene.scene.title)}[/bold]", *answer]
     for line in lines:
         console.print(line, highlight=False)
-    shown = [_rich_table(table) for table in summary_tables(report)]
+    shown = [_fitted(table, console.width) for table in summary_tables(report)]
     for table in shown:
         console.print(table)
     if console.is_terminal and sum(len(console.render_lines(table)) for table in shown) > console.height - len(lines):
@@ -120,15 +120,53 @@ def _answer(report: Report) -> list[str]:
     return [*lines, " · ".join(numbers)]
 
 
-def _rich_table(table: Table) -> RichTable:
+#: Words up to this length are not broken on the terminal; longer ones are keys and digests.
+_WORD = 24
+
+
+def _fitted(table: Table, width: int) -> Group | Text:
+    """Lay out a table so that no word or number is broken; where that cannot be, say where the table is."""
+    from rich.box import HEAVY_HEAD, SIMPLE_HEAD
+    from rich.console import Group
     from rich.markup import escape
     from rich.table import Table as Grid
+    from rich.text import Text
 
-    shown = Grid(
-        title=escape(table.title), title_justify="left", caption=escape(table.note) or None, caption_justify="left"
-    )
-    for column in table.columns:
-        shown.add_column(escape(column), overflow="fold")
+    count = len(table.columns)
+    framed, bare = (column_widths(table, width - used) for used in (3 * count + 1, 2 * count - 1))
+    if bare is None:
+        size = f"{len(table.rows)} x {count} cells"
+        return Text.assemble((table.title, "italic"), f"\n{size} are too wide for this terminal; see report.html.")
+    shown = Grid(box=HEAVY_HEAD) if framed else Grid(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    for column, columns in zip(table.columns, framed or bare, strict=True):
+        shown.add_column(escape(column), overflow="fold", width=columns)
     for row in table.rows:
         shown.add_row(*map(escape, row))
-    return shown
+    note = (Text(table.note, "dim"),) if table.note else ()
+    return Group(
+        Text(table.title, "italic"), shown, *note
+    )  # not as title and caption: these are as narrow as the table
+
+
+def column_widths(table: Table, room: int) -> list[int] | None:
+    """Share the room of a line among the columns of a table so that no word is broken; None if it does not suffice.
+
+    Examples
+    --------
+    >>> from graphsynth.scenes.products import Table
+    >>> table = Table("", ("name", "what it means"), (("12345678", "ten words or so"),))
+    >>> column_widths(table, 40), column_widths(table, 20), column_widths(table, 12)
+    ([8, 15], [8, 12], None)
+    """
+    from rich.cells import cell_len
+
+    texts = list(zip(table.columns, *table.rows, strict=True))
+    least = [max((min(_WORD, cell_len(word)) for text in cell for word in text.split()), default=1) for cell in texts]
+    most = [max(cell_len(line) for text in cell for line in text.splitlines() or [" "]) for cell in texts]
+    wanted = [max(a, b) - a for a, b in zip(least, most, strict=True)]
+    spare = room - sum(least)
+    if spare < 0:
+        return None
+    if sum(wanted) <= spare:
+        return [a + b for a, b in zip(least, wanted, strict=True)]
+    return [a + b * spare // sum(wanted) for a, b in zip(least, wanted, strict=True)]

@@ -101,10 +101,10 @@ _MOST = 40
 def _verdict_table(records: tuple[Record, ...]) -> Table:
     """Count the candidates by what became of them; reasons of those turned down have a table of their own."""
     counts = Counter(
-        (r.solution, r.status, r.recognised_as, r.verdict, r.reason if r.status == "not recognised" else "")
+        (r.solution, r.status, r.recognised_as, r.verdict or (r.reason if r.status == "not recognised" else ""))
         for r in records
     )
-    columns = ("count", "assortment", "status", "recognised as", "verdict", "reason")
+    columns = ("count", "assortment", "status", "recognised as", "verdict or reason")
     rows = [(str(count), *key) for key, count in counts.items()]
     told = [i for i in range(len(columns)) if any(row[i] for row in rows)]
     shown = tuple(tuple(row[i] for i in told) for row in rows[:_MOST])

@@ -100,7 +100,9 @@ def test_a_single_record_shows_its_margins(lambda_tables: dict[str, Any]) -> Non
 def test_what_a_stage_says_itself_comes_behind_the_best(lambda_tables: dict[str, Any]) -> None:
     table = Table("T", ("a",), (), findings=(Finding("sets looked at", value="7"), Finding("All <agree>.")))
     report = report_of(lambda_tables, (record(1, 1.0, 1.0), record(2, 2.0, 3.0)), True, table)
-    assert said(report)[1] == "All <agree>." and facts(report)[0].value == "7"
+    assert said(report)[1:3] == ["2 of 2: holds (certified).", "All <agree>."] and facts(report)[0].value == "7"
+    many = tuple(record(number, 1.0, 1.0) for number in range(1, 6))
+    assert said(report_of(lambda_tables, many, False, table)) == ["All <agree>."]
     page = report_html(report)
     assert page.index("Best of 2 ranked") < page.index("sets looked at") < page.index("All &lt;agree&gt;.")
     assert "All <agree>." not in page
@@ -163,3 +165,15 @@ def test_a_candidate_that_came_through_or_none_known_is_no_failure(lambda_tables
     unknown = Record(2, "k2", status="not recognised", reason="unknown")
     assert not any("came through" in text for text in said(report_of(lambda_tables, (record(1, 1.0, 2.0), unknown))))
     assert said(report_of(lambda_tables, (unknown,), False)) == []
+
+
+def test_the_margins_of_the_only_one_that_is_known_are_shown(lambda_tables: dict[str, Any]) -> None:
+    unknown = tuple(Record(n, f"k{n}", status="not recognised", reason="unknown") for n in (1, 3))
+    told = {
+        fact.text: fact.value for fact in facts(report_of(lambda_tables, (unknown[0], record(2, 1.5, 2.0), unknown[1])))
+    }
+    assert told["mass (estimated)"] == "1.5 kg" and told["candidate mechanisms"] == "3"
+    alone = {fact.text for fact in facts(report_of(lambda_tables, (record(1, 1.5, 2.0),), False))}
+    assert "mass (estimated)" in alone and not any("candidate" in text or text == "assessed" for text in alone)
+    stopped = {fact.text for fact in facts(report_of(lambda_tables, (record(1, 1.5, 2.0), rejected(2, "slow")), False))}
+    assert "mass (estimated)" not in stopped and "candidate mechanisms" in stopped

@@ -7,10 +7,14 @@ import io
 import json
 from dataclasses import replace
 from html.parser import HTMLParser
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
 
 from graphsynth.errors import SceneError
 from graphsynth.scenes.datafiles import results_csv
@@ -18,7 +22,7 @@ from graphsynth.scenes.measure import StageTime
 from graphsynth.scenes.page import report_html
 from graphsynth.scenes.parts import check_folder
 from graphsynth.scenes.products import Attempt, Candidate, Columns, Picture, Quantity, Record, Table, each
-from graphsynth.scenes.report import scene_json, write_report
+from graphsynth.scenes.report import column_widths, print_summary, scene_json, write_report
 from graphsynth.scenes.runner import Report, run
 from graphsynth.scenes.running import Running
 from graphsynth.scenes.scene import OutputsTable, Scene
@@ -189,3 +193,32 @@ def test_trying_a_folder_leaves_nothing_behind(tmp_path: Path) -> None:
     (tmp_path / "kept").mkdir()
     check_folder(tmp_path / "kept")
     assert [path.name for path in tmp_path.rglob("*")] == ["kept"]
+
+
+@given(
+    st.lists(st.lists(st.text("ab 1-", max_size=30), min_size=3, max_size=3), min_size=1, max_size=5),
+    st.integers(4, 90),
+)
+def test_tables_on_the_terminal_break_no_word(rows: list[list[str]], room: int) -> None:
+    head, *cells = rows
+    table = Table("", tuple(head), tuple(map(tuple, cells)))
+    longest = [max((len(word) for row in rows for word in row[k].split()), default=1) for k in range(3)]
+    widths = column_widths(table, room)
+    if max(longest) <= 24:
+        assert (widths is None) == (sum(longest) > room)
+    if widths is not None:
+        assert sum(widths) <= room
+        assert all(width >= min(24, word) for width, word in zip(widths, longest, strict=True))
+
+
+def test_a_table_too_wide_for_the_terminal_is_named(report: Report) -> None:
+    wide = Table("Forces", tuple(f"column{k}" for k in range(20)), (tuple(20 * ["-12.345678"]),))
+    narrow = Table("Words", ("what",), (("some [bold] words",),), "a note that is longer than the table below it is")
+    shown = replace(report, products={**report.products, "tables": (wide, narrow)})
+    out = StringIO()
+    print_summary(shown, Console(file=out, width=80))
+    lines = out.getvalue().splitlines()
+    at = lines.index("Forces")
+    assert lines[at + 1] == "1 x 20 cells are too wide for this terminal; see report.html."
+    assert "a note that is longer than the table below it is" in lines and max(map(len, lines)) <= 80
+    assert "some [bold] words" in out.getvalue()

@@ -112,7 +112,7 @@ def _margins(
                 found.append(
                     Quantity(f"difference of the two models {name}", value, "′", "estimated", 4.0 * error * _MINUTE)
                 )
-    for degrees, tolerance in bounds:
+    for degrees, tolerance in reversed(bounds):  # the widest turn first
         for name, side in (("elevation", tolerance.a), ("azimuth", tolerance.b)):
             worst = max(map(abs, side.deviation))
             if math.isfinite(worst):

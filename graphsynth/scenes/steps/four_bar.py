@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
 from graphsynth.scenes.families.lambda_linkage import LambdaTable
-from graphsynth.scenes.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each
+from graphsynth.scenes.products import Attempt, Candidate, Finding, Quantity, Recognised, Record, Table, each
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.four_bar_tolerances import tolerance_box
 from graphsynth.scenes.steps.records import recognise_by_key, records_of
@@ -65,8 +65,6 @@ def kinematics(context: Context, recognised: tuple[Recognised, ...]) -> tuple[At
 
 
 def _move(table: LambdaTable) -> LambdaMotion:
-    from dataclasses import replace
-
     import numpy as np
 
     from graphsynth.errors import GeometryError
@@ -125,7 +123,32 @@ def judge(
         return records, ()
     motion = next(m.value for m in motions if m.candidate.number == done.candidate.number)
     proved = _proof_table(context, done.value, limits)
-    return records, (_motion_table(motion), _jam_table(context, done.value, limits), proved, _fit_table(context))
+    told = _arcs_told(done.value[condition]) + _limits_told(limits[condition])
+    jam = replace(_jam_table(context, done.value, limits), findings=told)
+    return records, (_motion_table(motion), jam, proved, _fit_table(context))
+
+
+def _arcs_told(report: JammingReport) -> tuple[Finding, ...]:
+    """Say at which crank angles the nominal bearing jams."""
+    arcs = report.arcs.arcs
+    if not arcs or sum(arc.length for arc in arcs) >= math.tau:
+        return ()
+    angles = " and ".join(f"{math.degrees(arc.start):.2f}° to {math.degrees(arc.stop):.2f}°" for arc in arcs)
+    return (Finding(f"With the nominal dimensions it jams at crank angles {angles} (estimated)."),)
+
+
+def _limits_told(limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]:
+    """Say which clearance is proved to be enough and which tilt harmless, rounded to the safe side."""
+    from graphsynth.intervals.reading import shortened
+
+    clearance, tilt = limits["smallest clearance"], limits["largest axis tilt"]
+    words = []
+    if clearance.works is not None:
+        words.append(f"a clearance of {shortened(clearance.works, 1, 4)} {clearance.unit} is enough")
+    if tilt.works is not None:
+        words.append(f"a tilt of the axis of {shortened(tilt.works, -1, 4)} {tilt.unit} is harmless")
+    sentence = "; with the clearance given, ".join(words)
+    return (Finding(f"{sentence[:1].upper()}{sentence[1:]} (certified, without tolerances)."),) if words else ()
 
 
 def _nominal(context: Context, condition: _C) -> JamCertificate:

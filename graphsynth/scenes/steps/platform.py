@@ -157,18 +157,18 @@ def _margins(motion: Motion) -> tuple[Quantity, ...]:
     x, y, alpha = motion.pose.T
     error = motion.closure_error * motion.Lc if math.isfinite(motion.closure_error) else None
     return (
-        exact("wheel positions computed", len(motion.psi)),
-        Quantity(
-            "least |det JX| of the turn over that at its start",
-            float(np.abs(motion.determinant / motion.determinant[0]).min()),
-        ),
-        Quantity("least |leg Jacobian|", float(np.abs(motion.leg).min()), "mm^2"),
-        Quantity("distance to the nearest other assembly mode", float(motion.gap.min()) * motion.Lc, "mm"),
         Quantity("travel in x", float(np.ptp(x)), "mm", "estimated", error),
         Quantity("travel in y", float(np.ptp(y)), "mm", "estimated", error),
         Quantity(
             "swing", float(np.ptp(alpha)), "rad", "estimated", motion.closure_error if error is not None else None
         ),
+        Quantity("distance to the nearest other assembly mode", float(motion.gap.min()) * motion.Lc, "mm"),
+        Quantity(
+            "least |det JX| of the turn over that at its start",
+            float(np.abs(motion.determinant / motion.determinant[0]).min()),
+        ),
+        exact("wheel positions computed", len(motion.psi)),
+        Quantity("least |leg Jacobian|", float(np.abs(motion.leg).min()), "mm^2"),
         Quantity("closure of the turn", motion.closure_error * motion.Lc, "mm"),
         Quantity("relative closure residual", motion.residual),
     )

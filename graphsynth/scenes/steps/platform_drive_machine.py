@@ -80,7 +80,7 @@ def tables(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Table, ...]
         Quantity("dead centres of the platform in a turn", len(model.inertia.dead_centres), "", "estimated")
     )
     note = "Series of the real motion over a turn; its truncation is the error."
-    return (quantity_table("What the motor feels", quantities, note), *run_tables(runs))
+    return (quantity_table("What the motor feels", quantities, note), *run_tables(runs, told=True))
 
 
 def curves(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ...]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from graphsynth.scenes.products import Quantity, Record, Table
+from graphsynth.scenes.products import Finding, Quantity, Record, Table
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.platform_drive import Claim, LabelledRun, WithoutInertia, table_of
 from graphsynth.scenes.steps.platform_drive_common import balance_rows, limit_table, quantity_table
@@ -37,9 +38,15 @@ def _record(number: int, item: LabelledRun) -> Record:
             number, status="failed", recognised_as="platform_drive", reason=f"{item.label}: {item.run.reason}"
         )
     margins = _margins(item)
+    return Record(number, recognised_as="platform_drive", verdict=_words(item, margins), margins=margins)
+
+
+def _words(item: LabelledRun, margins: tuple[Quantity, ...]) -> str:
     speed, torque = margins[2].value, margins[3].value
-    words = f"{item.label}: in steady motion the speed varies by {speed:.4g} rad/s, the torque by {torque:.4g} N m"
-    return Record(number, recognised_as="platform_drive", verdict=f"{words} (estimated)", margins=margins)
+    return (
+        f"{item.label}: in steady motion the speed varies by {speed:.4g} rad/s, the torque by {torque:.4g} N m "
+        "(estimated)"
+    )
 
 
 def _margins(item: LabelledRun) -> tuple[Quantity, ...]:
@@ -71,12 +78,14 @@ def _margins(item: LabelledRun) -> tuple[Quantity, ...]:
     )  # fmt: skip
 
 
-def run_tables(runs: tuple[LabelledRun, ...]) -> tuple[Table, ...]:
-    """Quantities of every run that reached its end, and how each was had."""
+def run_tables(runs: tuple[LabelledRun, ...], *, told: bool = False) -> tuple[Table, ...]:
+    """Quantities of every run that reached its end, and how each was had; `told`: the first screen tells of them."""
     tables = []
     for item in runs:
         if item.run.complete:
-            tables.append(quantity_table(f"Motion with {item.label}", _margins(item)))
+            margins = _margins(item)
+            said = (Finding(f"Motor with {_words(item, margins)}."),) if told else ()
+            tables.append(replace(quantity_table(f"Motion with {item.label}", margins), findings=said))
         tables.append(Table(f"How the run with {item.label} was had", ("", ""), balance_rows(item.run)))
     return tuple(tables)
 
@@ -116,8 +125,33 @@ def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
         "that are not small."
     )
     return (
-        Table("Does a larger resistance calm the machine?", heads, tuple(said), truth),
+        Table("Does a larger resistance calm the machine?", heads, tuple(said), truth, (_claim_told(found),)),
         Table("Ripples over the resistance", columns, tuple(rows), note),
+    )
+
+
+def _claim_told(found: Claim) -> Finding:
+    """Answer the claim: in how many cases each ripple falls all the way."""
+    count = len(found.effects)
+    speed = sum(_trend(effect.simulated_speed) == "falls" for effect in found.effects.values())
+    torque = sum(_trend(effect.simulated_current) == "falls" for effect in found.effects.values())
+    calms = "calms" if speed == torque == count else "does not always calm"
+    return Finding(
+        f"A larger armature resistance {calms} the machine: of {count} cases the ripple of the speed falls throughout "
+        f"in {speed}, that of the torque in {torque} (estimated)."
+    )
+
+
+def _bare_told(bare: WithoutInertia, root: float) -> tuple[Finding, ...]:
+    """Say what the model without rotor inertia does at its first dead centre."""
+    first = next((event for event in bare.source.events if event.kind == "dead centre"), None)
+    if first is None:
+        return ()
+    return (
+        Finding(
+            f"Without rotor inertia the crank speed is unbounded at each dead centre, first after {first.time:.4g} s; "
+            f"the platform passes it at {abs(first.motion) / root:.4g} m/s (estimated)."
+        ),
     )
 
 
@@ -170,7 +204,7 @@ def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
         "energy",
     )
     return (
-        Table("Without inertia: dead centres and reversals", columns, rows, note),
+        Table("Without inertia: dead centres and reversals", columns, rows, note, _bare_told(bare, root)),
         Table(
             "The model without inertia is a limit",
             heads,

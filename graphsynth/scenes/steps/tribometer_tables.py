@@ -63,10 +63,7 @@ def _margins(motion: StickSlipMotion, cycle: LimitCycle) -> tuple[Quantity, ...]
     import numpy as np
 
     worst = max((event.error for event in motion.events), default=0.0)
-    found = [
-        exact("changes between stick and slip", len(motion.events)),
-        Quantity("largest estimated error of an event time", worst, "s", "estimated"),
-    ]
+    found = [exact("changes between stick and slip", len(motion.events))]
     known = np.flatnonzero(np.isfinite(motion.x2))
     if known.size:
         last = int(known[-1])
@@ -79,10 +76,11 @@ def _margins(motion: StickSlipMotion, cycle: LimitCycle) -> tuple[Quantity, ...]
         ]  # fmt: skip
     if math.isfinite(motion.shortest_dwell):
         found.append(Quantity("shortest dwell", motion.shortest_dwell, "s", "estimated", 2.0 * worst))
-    found.append(Quantity("energy that does not balance, relative", motion.energy_residual, "", "estimated"))
     if math.isfinite(cycle.period):
         found.append(Quantity("period of the cycle", cycle.period, "s", "estimated", _period_error(cycle)))
         found.append(Quantity("largest multiplier of the cycle", max(map(abs, cycle.multipliers)), "", "estimated"))
+    found.append(Quantity("largest estimated error of an event time", worst, "s", "estimated"))
+    found.append(Quantity("energy that does not balance, relative", motion.energy_residual, "", "estimated"))
     return tuple(found)
 
 
