@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import SpecError
+from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["FrictionLaw", "StribeckLaw", "TwoCoefficientLaw", "finite", "positive"]
 
@@ -136,6 +137,7 @@ class TwoCoefficientLaw(FrictionLaw):
             ("static", "kinetic", "viscous"), _coefficients(self.static, self.kinetic, self.viscous)
         ):
             object.__setattr__(self, name, value)
+        check_fields(self, ("static",), SpecError, small=("kinetic", "viscous"))
 
     def _weakening(self, v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return np.zeros_like(v), np.zeros_like(v)
@@ -186,6 +188,7 @@ class StribeckLaw(FrictionLaw):
             raise SpecError(f"The Stribeck exponent is {exponent:g}; it must be at least 1.")
         for name, value in zip(("static", "kinetic", "viscous", "velocity", "exponent"), (*found, velocity, exponent)):
             object.__setattr__(self, name, value)
+        check_fields(self, ("static", "velocity", "exponent"), SpecError, small=("kinetic", "viscous"))
 
     def _weakening(self, v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         z, d = v / self.velocity, self.exponent

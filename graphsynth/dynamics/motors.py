@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import SpecError
+from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["DCMotor", "IdealSpeed", "IdealTorque", "LinearCharacteristic", "Motor", "SynchronousMotor"]
 
@@ -67,6 +68,8 @@ def _check(motor: object, zero_or_more: tuple[str, ...], positive: tuple[str, ..
         low = 0.0 if name in zero_or_more or name in positive else -math.inf
         checked = number(name, value, least=low, above=name in positive, infinite=name == "voltage_limit")
         object.__setattr__(motor, name, checked)
+        if math.isfinite(checked):
+            check_fields(motor, (), SpecError, small=(name,))
 
 
 @dataclass(frozen=True)

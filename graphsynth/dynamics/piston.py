@@ -19,7 +19,7 @@ from graphsynth.dynamics.piston_solving import Reaction, cross, one_contact, two
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.piston.drives import CrankSlider
 from graphsynth.kinematics.piston.model import FloatingPiston, PistonMotion
-from graphsynth.mechanism.checks import Point, finite, point
+from graphsynth.mechanism.checks import Point, check_fields, check_sizes, finite, point
 
 __all__ = ["PistonFriction", "PistonLoads", "PistonMachine", "PistonMasses"]
 
@@ -78,6 +78,8 @@ class PistonMachine:
         for name in ("speed", "acceleration"):
             object.__setattr__(self, name, finite(f"{name} of the crank", getattr(self, name)))
         object.__setattr__(self, "gravity", point("gravity", self.gravity))
+        check_fields(self, (), small=("speed", "acceleration"))
+        check_sizes("PistonMachine", {"gravity": max(1.0, *map(abs, self.gravity))})
 
     def without_group(self) -> PistonMachine:
         """Return the plain machine: piston and crosshead one body of the same mass in the cylinder, the same gas."""

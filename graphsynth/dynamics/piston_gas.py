@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.elements import not_negative
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import finite, nonzero
+from graphsynth.mechanism.checks import check_fields, finite, nonzero
 
 __all__ = ["CompressorCycle", "ConstantForce", "GasLaw", "GivenForce"]
 
@@ -46,6 +46,7 @@ class ConstantForce:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", finite("size of the gas force", self.size))
+        check_fields(self, (), small=("size",))
 
     def force(self, angle: Array, gap: Array, towards_head: NDArray[np.bool_], stroke: float) -> Array:
         """See :class:`GasLaw`."""
@@ -135,6 +136,7 @@ class CompressorCycle:
             object.__setattr__(self, name, nonzero(f"{name} of the compressor", getattr(self, name)))
         back = self.suction if self.back is None else not_negative("back pressure of the compressor", self.back)
         object.__setattr__(self, "back", back)
+        check_fields(self, ("bore", "suction", "discharge", "back", "clearance", "exponent"))
         if self.discharge < self.suction:
             raise GeometryError(
                 f"discharge = {self.discharge:.6g} Pa is below suction = {self.suction:.6g} Pa; exchange them"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.elements import not_negative
-from graphsynth.mechanism.checks import finite, nonzero
+from graphsynth.mechanism.checks import check_fields, finite, nonzero
 
 __all__ = ["PistonFriction", "PistonLoads", "PistonMasses"]
 
@@ -39,6 +39,7 @@ class PistonMasses:
             object.__setattr__(self, name, not_negative(f"mass or inertia {name}", getattr(self, name)))
         for name in ("crank_centre", "rod_centre"):
             object.__setattr__(self, name, finite(name, getattr(self, name)))
+        check_fields(self, (), small=(item.name for item in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,7 @@ class PistonFriction:
         for name in ("guide", "cylinder", "slot", "yoke", "rings"):
             object.__setattr__(self, name, not_negative(f"friction {name}", getattr(self, name)))
         object.__setattr__(self, "regular_speed", nonzero("regular_speed", self.regular_speed))
+        check_fields(self, ("regular_speed",), small=("guide", "cylinder", "slot", "yoke", "rings"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from graphsynth.dynamics.motors import number, whole
 from graphsynth.errors import SpecError
+from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["Train"]
 
@@ -46,6 +47,7 @@ class Train:
         object.__setattr__(self, "ratio", number("ratio", self.ratio, least=0.0, above=True))
         object.__setattr__(self, "efficiency", number("efficiency", self.efficiency, least=0.0, above=True))
         object.__setattr__(self, "inertia", number("inertia of the train", self.inertia, least=0.0))
+        check_fields(self, ("ratio", "efficiency"), SpecError, small=("inertia",))
         if self.efficiency > 1.0:
             raise SpecError(f"efficiency = {self.efficiency:g} must be at most 1; give a fraction, not a percentage")
 

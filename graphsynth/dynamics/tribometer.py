@@ -18,6 +18,7 @@ from graphsynth.dynamics.stick_slip import StickSlipMotion, event_driven
 from graphsynth.dynamics.stick_slip_forms import regularised, time_stepping
 from graphsynth.dynamics.tribometer_drives import CrankDrive, Drive
 from graphsynth.errors import SpecError
+from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["Tribometer"]
 
@@ -89,6 +90,7 @@ class Tribometer:
             ("v2", None if self.v2 is None else finite("initial velocity", self.v2)),
         ):
             object.__setattr__(self, name, value)
+        check_fields(self, ("mass", "stiffness"), SpecError, small=("damping", "load", "gravity", "x2", "v2"))
         if not isinstance(self.law, FrictionLaw):
             raise SpecError(f"The friction law is {self.law!r}; give a TwoCoefficientLaw or a StribeckLaw.")
         if not isinstance(self.drive, Drive):

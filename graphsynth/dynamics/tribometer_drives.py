@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.friction import finite, positive
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["BeltDrive", "CrankDrive", "Drive", "DriveMotion", "HarmonicDrive"]
 
@@ -67,6 +68,7 @@ class BeltDrive(Drive):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "speed", finite("belt speed", self.speed))
+        check_fields(self, (), small=("speed",))
 
     @property
     def period(self) -> float:
@@ -111,6 +113,7 @@ class HarmonicDrive(Drive):
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", positive("radius", self.radius))
         object.__setattr__(self, "speed", _turning(self.speed))
+        check_fields(self, ("radius", "speed"))
 
     def motion(self, t: ArrayLike) -> DriveMotion:
         """Motion of the lower platform at the times ``t``; exact but for rounding."""
@@ -153,6 +156,7 @@ class CrankDrive(Drive):
         object.__setattr__(self, "radius", positive("crank radius", self.radius))
         object.__setattr__(self, "rod", positive("length of the connecting rod", self.rod))
         object.__setattr__(self, "speed", _turning(self.speed))
+        check_fields(self, ("radius", "rod", "speed"))
         if not self.radius < self.rod:
             raise GeometryError(
                 f"The crank radius {self.radius:g} m is not below the length of the connecting rod, {self.rod:g} m; "

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import check_sizes, choice, finite, positive
+from graphsynth.kinematics._checks import check_fields, choice, finite, positive
 
 __all__ = ["CONDITIONS", "Bearing", "Condition", "CriticalTilt"]
 
@@ -88,8 +88,7 @@ class Bearing:
             raise GeometryError(f"clearance = {self.clearance} mm leaves no hole; it must exceed -Rb = {-self.Rb} mm")
         if self.hole_length is not None:
             object.__setattr__(self, "hole_length", positive("hole_length", self.hole_length))
-        sizes = ("Rb", "Hb", "clearance", "hole_length")
-        check_sizes("bearing", {name: getattr(self, name) for name in sizes})
+        check_fields(self, ("Rb", "Hb", "hole_length"), small=("clearance",))
 
     @property
     def Rh(self) -> float:

@@ -89,8 +89,7 @@ def jam_arcs(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A
         if bearing.clearance < 0.0:
             return JamArcs((Arc(0.0, math.tau),), (), 0.0, phase, condition, reason=critical.reason)
         return JamArcs((), (), math.inf, phase, condition, reason=critical.reason)
-    _, largest = linkage.largest_tilt
-    if largest == 0.0:
+    if not linkage.tilted:
         if bearing.clearance == 0.0:
             text = "no tilt and no clearance: touching at every angle"
             return JamArcs((), (0.0,), math.nan, phase, condition, reason=text)
@@ -117,6 +116,8 @@ def _ends(phase: float, kappa: float) -> tuple[float, ...]:
 
 def _kappa(linkage: LambdaLinkage, sine: float) -> float:
     """Value of ``|sin(f - psi1)|`` at which the tilt becomes critical."""
+    if sine == 0.0 or linkage.pin_height == 0.0:  # tilts that underflow
+        return math.inf if sine > 0.0 else 0.0
     if linkage.rod == "rigid":
         return linkage.l3 * sine / linkage.pin_height
     return linkage.l3 * sine / math.sqrt((1.0 - sine) * (1.0 + sine)) / linkage.pin_height  # tan theta = A_z / l3

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import check_largest, check_sizes, finite
+from graphsynth.mechanism.checks import check_fields, check_largest, check_sizes, finite
 
 __all__ = [
-    "check_largest", "check_sizes", "choice", "finite", "finite_array", "plane_point", "positive", "sign", "three",
-    "three_points", "triple", "triples", "unit_vector", "whole",
+    "check_fields", "check_largest", "check_sizes", "choice", "finite", "finite_array", "plane_point", "positive",
+    "sign", "three", "three_points", "triple", "triples", "unit_vector", "whole",
 ]  # fmt: skip
 
 

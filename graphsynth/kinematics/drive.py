@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import check_sizes, finite, positive, sign
+from graphsynth.kinematics._checks import check_fields, check_sizes, finite, positive, sign
 from graphsynth.kinematics.leg import solve_leg
 from graphsynth.kinematics.motion import Event
 
@@ -103,8 +103,8 @@ class FourBarDrive:
         object.__setattr__(self, "tau", sign("tau", self.tau))
         if self.axis == self.pivot:
             raise GeometryError(f"axis and pivot coincide at {self.axis}; the drive needs two different fixed points")
-        sizes = {name: getattr(self, name) for name in ("crank", "coupler", "rocker", "axis", "pivot")}
-        check_sizes("four-bar drive", {**sizes, "distance of axis and pivot": self.axis - self.pivot})
+        check_fields(self, ("crank", "coupler", "rocker", "axis", "pivot"))
+        check_sizes("FourBarDrive", {"distance of axis and pivot": self.axis - self.pivot})
 
     def motion(self, psi: ArrayLike, scale: float = 1.0) -> DriveMotion:
         """Rocker angle and its first two derivatives with respect to psi (radians, any shape).

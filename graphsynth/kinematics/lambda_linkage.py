@@ -16,8 +16,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import check_sizes, choice, finite, finite_array, positive, sign, unit_vector
+from graphsynth.kinematics._checks import (
+    check_fields,
+    check_sizes,
+    choice,
+    finite,
+    finite_array,
+    positive,
+    sign,
+    unit_vector,
+)
 from graphsynth.kinematics._turn import FullTurn, full_turn
 
 if TYPE_CHECKING:
@@ -26,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["AssemblyStatus", "LambdaLinkage", "LambdaPositions", "Straightness"]
 
 Array = NDArray[np.float64]
-_LEAST_RISE = 1e-300
+_BESIDE = 1e-140
 
 
 class AssemblyStatus(IntEnum):
@@ -146,8 +154,8 @@ class LambdaLinkage:
     Raises
     ------
     GeometryError
-        A length that is not positive or not between 1e-60 and 1e60, a NaN, an axis without direction, a tilt so small
-        that it underflows, an unknown option.
+        A length that is not positive or not between 1e-60 and 1e60, a NaN, an axis without direction, an unknown
+        option.
 
     Notes
     -----
@@ -177,19 +185,12 @@ class LambdaLinkage:
             object.__setattr__(self, name, positive(name, getattr(self, name)))
         for name in ("k", "alpha"):
             object.__setattr__(self, name, finite(name, getattr(self, name)))
-        sizes = {name: getattr(self, name) for name in ("l1", "l2", "l3", "l4")}
-        check_sizes("lambda linkage", sizes)
-        check_sizes("lambda linkage", {"1 + |k|": 1.0 + abs(self.k)})
+        check_fields(self, ("l1", "l2", "l3", "l4"))
+        check_sizes("the tracing point", {"1 + |k|": 1.0 + abs(self.k)})
         object.__setattr__(self, "sgn", sign("sgn", self.sgn))
         object.__setattr__(self, "axis", unit_vector("axis", self.axis))
         choice("rod", self.rod, ("rigid", "deck"))
         choice("convention", self.convention, ("spec", "deck"))
-        tilted = self.alpha != 0.0 and self.axis[:2] != (0.0, 0.0)
-        if tilted and min(self.pin_height, self.pin_height / self.l3) < _LEAST_RISE:
-            raise GeometryError(
-                f"alpha = {self.alpha:g} rad about {self.axis} lifts the crank pin by less than {_LEAST_RISE:g}, which "
-                "double precision does not hold; give 0"
-            )
 
     @property
     def _angle(self) -> float:
@@ -209,6 +210,11 @@ class LambdaLinkage:
             ]
         )
 
+    @property
+    def tilted(self) -> bool:
+        """Whether the crank pin leaves the plane, also by a height that underflows to zero."""
+        return self.axis[:2] != (0.0, 0.0) and math.sin(self._angle) != 0.0
+
     @cached_property
     def pin_height(self) -> float:
         """Largest |A_z| over a turn, ``l2 hypot(R31, R32)`` without cancellation or squares that underflow."""
@@ -219,7 +225,7 @@ class LambdaLinkage:
     @cached_property
     def pin_phase(self) -> float:
         """psi1 with ``A_z = pin_height * sin(f - psi1)``, radians; 0 if the pin stays in the plane."""
-        return math.atan2(-float(self.rotation[2, 0]), float(self.rotation[2, 1])) if self.pin_height > 0.0 else 0.0
+        return math.atan2(-float(self.rotation[2, 0]), float(self.rotation[2, 1])) if self.tilted else 0.0
 
     @cached_property
     def largest_tilt(self) -> tuple[float, float]:
@@ -277,11 +283,15 @@ class LambdaLinkage:
         A, dA, s3, near, far, dx = self._closure(f)
         az, dy = A[..., 2], A[..., 1]
         D = np.hypot(dx, dy)
+        # A beside C with coupler and rocker equal: near = D^2, which underflows
+        beside = (D > 0.0) & (D < _BESIDE * self.l4) & (s3 == self.l4) & (az * az <= 1e-17 * D * self.l4)
+        near = np.where(beside, D, near)  # from here on only its sign counts
         status = self._status(D, az, s3, near, far)
         assembled = status <= AssemblyStatus.LIMIT
         safe = np.where(assembled, D, 1.0)
         ex, ey = dx / safe, dy / safe
         root = np.sqrt(np.where(assembled, np.maximum(near, 0.0) * np.maximum(far, 0.0), np.nan))  # 2 D |yB|
+        root = np.where(beside & assembled, D * np.sqrt(np.maximum(far, 0.0)), root)
         xB = 0.5 * (D + (self.l4 - s3) * (self.l4 + s3) / safe)
         yB = self.sgn * 0.5 * root / safe
         B = np.stack([self.l1 + xB * ex + yB * ey, xB * ey - yB * ex, np.where(assembled, 0.0, np.nan)], axis=-1)

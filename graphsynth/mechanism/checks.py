@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from graphsynth.errors import GeometryError, GraphsynthError
 
-__all__ = ["LARGEST", "SMALLEST", "Size", "check_largest", "check_sizes", "finite", "link_number", "nonzero", "point"]
+__all__ = [
+    "LARGEST",
+    "SMALLEST",
+    "Size",
+    "check_fields",
+    "check_largest",
+    "check_sizes",
+    "finite",
+    "link_number",
+    "nonzero",
+    "point",
+]
 
 Point = tuple[float, float]
 Size = float | complex | None
@@ -84,7 +95,7 @@ def check_sizes(owner: str, sizes: Mapping[str, Size], error: type[GraphsynthErr
 
     Examples
     --------
-    >>> check_sizes("lever", {"length": 1e-70})
+    >>> check_sizes("the lever", {"length": 1e-70})
     Traceback (most recent call last):
         ...
     graphsynth.errors.GeometryError: length = 1e-70 of the lever is not between 1e-60 and 1e+60; change the unit
@@ -92,9 +103,38 @@ def check_sizes(owner: str, sizes: Mapping[str, Size], error: type[GraphsynthErr
     for name, value in sizes.items():
         size = 0.0 if value is None else math.hypot(value.real, value.imag)
         if size != 0.0 and not SMALLEST <= size <= LARGEST:
-            raise error(
-                f"{name} = {size:g} of the {owner} is not between {SMALLEST:g} and {LARGEST:g}; change the unit"
-            )
+            raise error(f"{name} = {size:g} of {owner} is not between {SMALLEST:g} and {LARGEST:g}; change the unit")
+
+
+def check_fields(
+    owner: object,
+    names: Iterable[str],
+    error: type[GraphsynthError] = GeometryError,
+    *,
+    small: Iterable[str] = (),
+) -> None:
+    """Apply `check_sizes` to attributes of a dataclass.
+
+    Parameters
+    ----------
+    owner : dataclass
+    names : iterable of str
+        Attributes that set a scale: from 1e-60 to 1e60, or zero.
+    error : type
+        Exception of the caller's room.
+    small : iterable of str
+        Attributes that may be as near to zero as they like: offsets, speeds, loads.
+
+    Raises
+    ------
+    GeometryError or ``error``
+        A size out of its bounds.
+    """
+    sizes = {name: getattr(owner, name) for name in names}
+    for name in small:
+        value = getattr(owner, name)
+        sizes[name] = None if value is None or abs(value) < 1.0 else value
+    check_sizes(type(owner).__name__, sizes, error)
 
 
 def check_largest(largest: float, what: str = "dimension") -> None:

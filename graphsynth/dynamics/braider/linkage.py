@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.motors import number
 from graphsynth.errors import GeometryError, SpecError
-from graphsynth.mechanism.checks import check_sizes
+from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["ChangePoint", "FourBar", "FourBarState"]
 
@@ -87,8 +87,7 @@ class FourBar:
                 object.__setattr__(self, name, number(name, getattr(self, name), least=0.0, above=True))
             except SpecError as error:
                 raise GeometryError(str(error)) from None
-        sizes = {name: getattr(self, name) for name in ("crank", "coupler", "rocker", "frame")}
-        check_sizes("four-bar", sizes)
+        check_fields(self, ("crank", "coupler", "rocker", "frame"))
         if self.branch not in (1, -1):
             raise GeometryError(f"branch = {self.branch!r} must be +1 or -1")
 

@@ -17,6 +17,7 @@ from graphsynth.dynamics.platform_drive.reduction import ReductionStudy, choose_
 from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, RunStatus, run
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
+from graphsynth.mechanism.checks import check_fields, check_sizes
 
 __all__ = ["Braider", "LinkMotion", "Peak", "Settling", "Thread"]
 
@@ -68,6 +69,7 @@ class Thread:
         number("guide x", point.real)
         number("guide y", point.imag)
         object.__setattr__(self, "guide", point)
+        check_fields(self, (), SpecError, small=("weight", "height", "gravity", "guide"))
 
     def force(self, tip: ArrayLike) -> NDArray[np.complex128]:
         """Force (N, complex) on the switch tip at points ``tip`` (complex, m)."""
@@ -165,6 +167,8 @@ class Braider:
             raise SpecError(f"{len(masses)} masses given; give four: {', '.join(names)}")
         checked = tuple(number(f"mass of the {n}", m, least=0.0) for n, m in zip(names, masses))
         object.__setattr__(self, "masses", checked)
+        check_fields(self, (), SpecError, small=("switch", "inertia"))
+        check_sizes("Braider", {f"mass of the {n}": m for n, m in zip(names, checked)}, SpecError)
 
     @property
     def moments(self) -> tuple[float, float, float]:

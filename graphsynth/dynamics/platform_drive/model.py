@@ -22,6 +22,7 @@ from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, run
 from graphsynth.dynamics.platform_drive.setup import load_coefficients
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
+from graphsynth.mechanism.checks import check_fields
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
@@ -82,6 +83,7 @@ class MotorDrivenPlatform:
         for name in ("base_inertia", "friction"):
             object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
         object.__setattr__(self, "load", number("load", self.load))
+        check_fields(self, (), SpecError, small=("base_inertia", "friction", "load"))
         if not isinstance(self.inertia, EffectiveInertia):
             raise SpecError(f"inertia = {self.inertia!r} is no EffectiveInertia; use EffectiveInertia.of_slider(...)")
         if self.load_series is not None:

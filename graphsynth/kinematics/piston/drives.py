@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import finite, nonzero
+from graphsynth.mechanism.checks import check_fields, finite, nonzero
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 
 __all__ = ["CrankSlider", "Derivatives", "ScotchYoke"]
@@ -67,6 +67,7 @@ class CrankSlider:
         object.__setattr__(self, "offset", finite("offset of the crank-slider", self.offset))
         if self.branch not in (1, -1):
             raise GeometryError(f"branch = {self.branch!r} must be 1 or -1: the side of the crosshead")
+        check_fields(self, ("crank", "rod"), small=("offset",))
         least = self.crank + abs(self.offset)
         if not self.rod > least:
             raise GeometryError(
@@ -162,6 +163,7 @@ class ScotchYoke:
         object.__setattr__(self, "crank", nonzero("crank of the Scotch yoke", self.crank))
         for name in ("offset", "yoke_angle"):
             object.__setattr__(self, name, finite(f"{name} of the Scotch yoke", getattr(self, name)))
+        check_fields(self, ("crank",), small=("offset",))
         if not math.sin(self.yoke_angle) > 1e-9:
             raise GeometryError(
                 f"yoke_angle = {self.yoke_angle:.6g} rad must lie between 0 and pi, best at pi/2: a slot parallel to "

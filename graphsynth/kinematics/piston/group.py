@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import finite
+from graphsynth.mechanism.checks import check_fields, finite
 
 __all__ = ["FloatingGroup"]
 
@@ -50,6 +50,7 @@ class FloatingGroup:
     def __post_init__(self) -> None:
         for name in ("cylinder_angle", "slot_angle", "cylinder_offset", "lead"):
             object.__setattr__(self, name, finite(f"{name} of the floating group", getattr(self, name)))
+        check_fields(self, (), small=("cylinder_offset",))
         if math.cos(self.cylinder_angle) < _PARALLEL:
             raise GeometryError(
                 f"cylinder_angle = {self.cylinder_angle:.6g} rad turns the cylinder square to the crosshead's guide or "
