@@ -167,6 +167,10 @@ def column_widths(table: Table, room: int) -> list[int] | None:
     spare = room - sum(least)
     if spare < 0:
         return None
-    if sum(wanted) <= spare:
-        return [a + b for a, b in zip(least, wanted, strict=True)]
-    return [a + b * spare // sum(wanted) for a, b in zip(least, wanted, strict=True)]
+    widths = list(least)
+    order = sorted(range(len(wanted)), key=wanted.__getitem__)
+    for done, k in enumerate(order):  # who wants little gets it all, the rest share alike
+        share = min(wanted[k], spare // (len(order) - done))
+        widths[k] += share
+        spare -= share
+    return widths
