@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 from graphsynth.accuracy.registry import build
@@ -14,18 +13,8 @@ __all__ = ["assembly_modes", "double_root", "drive", "turn"]
 
 
 def _mechanism(context: Any) -> Any:
-    """Platform with the dimensions of the scene, as the stage of the scene moves it.
-
-    Raises
-    ------
-    GeometryError
-        If the stage cannot move it.
-    """
-    known = SimpleNamespace(candidate=None, module=context.scene.mechanism.module)
-    (moved,) = build("graphsynth.scenes.steps.platform:kinematics", context, (known,))
-    if moved.failed:
-        raise GeometryError(f"the platform of the scene does not move: {moved.reason}")
-    return moved.value.mechanism
+    """Platform with the dimensions of the scene, as its stage builds it."""
+    return build("graphsynth.scenes.steps.platform:platform_of", context)
 
 
 def assembly_modes(context: Any, effort: Effort) -> Problem:

@@ -42,7 +42,7 @@ def sketches(
         svg = mechanism_svg(motion, _clear(motion), width=420, height=320, title=f"Place {place}")
         record = by_number[number]
         margins = ", ".join(f"{m.name} {m.value:.3g}{' ' + m.unit if m.unit else ''}" for m in record.margins[:5])
-        text = f"{record.verdict[:1].upper()}{record.verdict[1:]}. {margins}."
+        text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."
         pictures.append(Picture(f"Place {place}: candidate {number}", svg, text))
     return tuple(pictures)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.motion import Motion
     from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["PlatformMotion", "judge", "kinematics", "recognise"]
+__all__ = ["PlatformMotion", "judge", "kinematics", "platform_of", "recognise"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +66,17 @@ def kinematics(context: Context, recognised: tuple[Recognised, ...]) -> tuple[At
     """Move every recognised candidate through one turn with the dimensions of the scene."""
     table = _table(context)
     return each((Attempt(r.candidate, r) for r in recognised if r.module), lambda _: _move(table))
+
+
+def platform_of(context: Context) -> SingleMotorPlatform:
+    """Return the platform with the dimensions of the scene, not moved yet.
+
+    Raises
+    ------
+    GeometryError
+        For dimensions that no platform can have.
+    """
+    return _mechanism(_table(context))
 
 
 def _mechanism(table: PlatformTable) -> SingleMotorPlatform:
