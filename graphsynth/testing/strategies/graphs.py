@@ -24,6 +24,11 @@ def _below(number: int) -> st.SearchStrategy[int]:
 
 
 @cache
+def _mobilities(space: int) -> st.SearchStrategy[int]:
+    return st.integers(1, space - 1)
+
+
+@cache
 def _pairs(links: int) -> st.SearchStrategy[list[tuple[int, int]]]:
     return st.lists(st.sampled_from([(a, b) for b in range(links) for a in range(b)]), unique=True)
 
@@ -41,7 +46,7 @@ def _graphs(
     chosen = set(draw(_pairs(links))) if links > 1 else set()
     if connected:
         chosen |= {(draw(_below(b)), b) for b in range(1, links)}
-    joints = [(a, b, 1 + draw(_below(space - 1))) for a, b in sorted(chosen)]
+    joints = [(a, b, draw(_mobilities(space))) for a, b in sorted(chosen)]
     return MechanismGraph(links, joints, frame=draw(_frames(links)), space=space)
 
 
@@ -74,8 +79,9 @@ def graphs(
     Examples
     --------
     >>> from hypothesis import find
-    >>> find(graphs(), lambda g: g.frame is not None and len(g.joints) > 0).to_text()
-    'A_ f0'
+    >>> found = find(graphs(), lambda g: g.frame is not None and len(g.joints) > 0)
+    >>> found.links, len(found.joints)
+    (2, 1)
     """
     check_range("links", min_links, max_links, 1, 60)
     if space is not None and space not in range(2, 7):

@@ -56,7 +56,7 @@ def _neighbours(low: float, steps: int) -> tuple[float, float]:
 
 @st.composite
 def _bounds(draw: st.DrawFn, empty: bool, unbounded: bool) -> tuple[float, float]:
-    kinds = ["point", "narrow", "bounded"] + ["below", "above", "entire"] * unbounded + ["empty"] * empty
+    kinds = ["point", "bounded", "narrow"] + ["below", "above", "entire"] * unbounded + ["empty"] * empty
     kind = draw(st.sampled_from(kinds))
     if kind == "empty":
         return math.inf, -math.inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 from graphsynth.errors import SpecError
@@ -16,23 +17,35 @@ from graphsynth.testing.strategies.graphs import mechanism_graphs
 __all__ = ["four_bar_mechanisms", "mechanisms"]
 
 
+_GRID = st.integers(-16, 16)
+_ANGLE = st.floats(-math.pi, math.pi)
+_TURN = st.sampled_from((0.0, math.pi / 2)) | st.floats(-math.pi, math.pi, allow_subnormal=False)
+
+
+@cache
+def _places(count: int) -> st.SearchStrategy[list[tuple[int, int]]]:
+    """Different points, kept: making and checking a strategy takes longer than drawing from it."""
+    return st.lists(st.tuples(_GRID, _GRID), min_size=count, max_size=count, unique=True)
+
+
+@cache
+def _one_or_none(count: int) -> st.SearchStrategy[int | None]:
+    return st.none() | st.integers(0, count - 1)
+
+
 @st.composite
 def _mechanisms(draw: st.DrawFn, of: st.SearchStrategy[MechanismGraph], prismatic: bool) -> Mechanism:
     graph = draw(of)
-    grid = st.integers(-16, 16)
-    count = len(graph.joints)
-    chosen = draw(st.lists(st.tuples(grid, grid), min_size=count, max_size=count, unique=True))
-    places = [(x / 8.0, y / 8.0) for x, y in chosen]
+    places = [(x / 8.0, y / 8.0) for x, y in draw(_places(len(graph.joints)))]
     on_frame = [k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)]
     driven = draw(st.sampled_from(on_frame))
-    sliding = draw(st.none() | st.integers(0, len(places) - 1)) if prismatic else None
-    turn = st.sampled_from((0.0, math.pi / 2)) | st.floats(-math.pi, math.pi, allow_subnormal=False)
-    turns = [0.0 if k == graph.frame else draw(turn) for k in range(graph.links)]
+    sliding = draw(_one_or_none(len(places))) if prismatic else None
+    turns = [0.0 if k == graph.frame else draw(_TURN) for k in range(graph.links)]
     joints: list[Any] = []
     for k, (joint, place) in enumerate(zip(graph.joints, places)):
         a, b = (_seen_from(place, turns[link]) for link in (joint.a, joint.b))
         if k == sliding:
-            angle = draw(st.floats(-math.pi, math.pi))
+            angle = draw(_ANGLE)
             joints.append(Prismatic(joint.a, joint.b, a, b, angle - turns[joint.a], angle - turns[joint.b]))
         else:
             joints.append(Revolute(joint.a, joint.b, a, b))

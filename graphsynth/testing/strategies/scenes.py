@@ -57,14 +57,14 @@ def _lambda_linkage(draw: st.DrawFn) -> dict[str, Any]:
     number = st.integers(1, 40).map(lambda k: k / 8.0)
     bearing = {
         "radius_mm": draw(st.floats(1.0, 40.0)), "height_mm": draw(st.floats(0.5, 40.0)),
-        "clearance_mm": draw(st.sampled_from((0, 0.03)) | st.floats(0.0, 1.0)),
+        "clearance_mm": draw(st.sampled_from((0, 0.03)) | st.floats(1e-9, 1.0)),
         "condition": draw(st.sampled_from("AB")),
     }  # fmt: skip
     return {
         "module": "lambda_linkage", "positions": draw(st.integers(8, 400)),
         "lengths": {name: draw(number) for name in ("frame", "crank", "coupler", "rocker")},
         "tilt": {
-            "alpha_rad": draw(st.sampled_from((0, 1e-8, 1.5)) | st.floats(-1.5, 1.5)),
+            "alpha_rad": draw(st.sampled_from((0, 1e-8, 1.5)) | st.floats(1e-9, 1.5) | st.floats(-1.5, -1e-9)),
             "axis": draw(st.sampled_from(([1, 0, 0], [0, 1, 0], [2, -1, 2], [0, 0, 1]))),
         },
         "bearing": bearing,
