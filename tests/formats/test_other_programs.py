@@ -25,7 +25,8 @@ HIGHER = MechanismGraph(5, [(0, 1), (1, 2, 2), (2, 3), (3, 4), (0, 4)], frame=0)
 def test_latex_sets_the_sketches(tmp_path: Path) -> None:
     pictures = [tikz(*graph_sketch(graph, driver=1, title="100 % of_it & #1 ~^{}")) for graph in (FRAMED, HIGHER)]
     pictures.append(tikz(levels_sketch(FRAMED)))
-    text = "\n\n".join(pictures)
+    pictures.append(tikz(*graph_sketch(FRAMED, width=1500.0)))
+    text = "\n\n".join(f"\\noindent {picture}" for picture in pictures)
     (tmp_path / "x.tex").write_text(
         "\\documentclass{article}\\usepackage{tikz}\\begin{document}\n" + text + "\n\\end{document}\n"
     )
@@ -34,6 +35,7 @@ def test_latex_sets_the_sketches(tmp_path: Path) -> None:
         cwd=tmp_path, capture_output=True, timeout=120, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout.decode(errors="replace")[-2000:]
+    assert "Overfull" not in (tmp_path / "x.log").read_text(errors="replace")  # none is wider than the column
     assert (tmp_path / "x.pdf").read_bytes().startswith(b"%PDF")
 
 
