@@ -58,6 +58,10 @@ def test_sensors_and_second_way(tables: dict[str, Any]) -> None:
     at = int(np.argmin(np.abs(turn.theta - math.radians(45))))
     assert turn.F01[at] == pytest.approx((-0.004839456837046956, -0.002393107550719340), rel=1e-12)
     assert turn.torque[at] == pytest.approx(3.459660339026256e-5, rel=1e-11)
+    (told,) = next(t for t in report["tables"] if t.title == "The four sensors over a turn").findings
+    largest = [float(number) for number in told.text.split("at most ")[1].split(" mN")[0].split(", ")]
+    sizes = [[1e3 * math.hypot(*force) for force in forces] for forces in turn.forces().swapaxes(0, 1)]
+    assert largest == pytest.approx([max(joint) for joint in sizes], rel=6e-4)
     second = next(t for t in report["tables"] if t.title == "Reactions had a second way")
     assert float(second.rows[0][1]) < 1e-12
     limit = next(t for t in report["tables"] if t.title == "The limit L -> 0")

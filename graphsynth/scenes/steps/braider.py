@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.errors import GeometryError, SpecError
 from graphsynth.scenes.families.braider import BraiderTable
-from graphsynth.scenes.products import Quantity, Record, Table
+from graphsynth.scenes.products import Finding, Quantity, Record, Table
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.platform_drive_common import balance_rows, limit_table, quantity_table
 
@@ -189,7 +189,19 @@ def _along_table(braider: Braider, run: DriveRun) -> Table:
         "torque [mN m]",
     )
     note = f"Sizes of the reactions. Closed form on estimated states; power balance to {found.power_error:.0e}."
-    return Table("Reactions during the start-up", columns, rows, note)
+    return Table("Reactions during the start-up", columns, rows, note, _largest("During the start-up", found))
+
+
+def _largest(when: str, found: Reactions) -> tuple[Finding, ...]:
+    """Say what each joint carries at most; nothing if the linkage is never assembled."""
+    import numpy as np
+
+    sizes = found.magnitudes()
+    sizes = sizes[np.isfinite(sizes).all(axis=1)]
+    if not sizes.size:
+        return ()
+    largest = ", ".join(f"{1e3 * size:.4g}" for size in sizes.max(axis=0))
+    return (Finding(f"{when} the joints O1, A, B, O2 carry at most {largest} mN (estimated, largest sample)."),)
 
 
 def _sensor_table(context: Context, braider: Braider, turn: Reactions) -> Table:
@@ -217,7 +229,8 @@ def _sensor_table(context: Context, braider: Braider, turn: Reactions) -> Table:
         f"(x, y) in the fixed frame, {'; '.join(JOINTS)}. Exact but for rounding; power balance to "
         f"{turn.power_error:.0e}."
     )
-    return Table("The four sensors over a turn", columns, tuple(rows), note)
+    told = _largest(f"Over a turn at {table_of(context).speed_rad_s:g} rad/s", turn)
+    return Table("The four sensors over a turn", columns, tuple(rows), note, told)
 
 
 def _second_way_table(braider: Braider, turn: Reactions) -> Table:
