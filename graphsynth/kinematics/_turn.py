@@ -108,7 +108,7 @@ def _tilted_turn(linkage: LambdaLinkage) -> FullTurn:
     nodes = list(zip(grid, values))
     for index in range(_SAMPLES):  # a minimum between samples may dip below zero unseen
         before, here, after = values[index - 1], values[index], values[index + 1]
-        if here <= before and here <= after:
+        if here <= before and here <= after and not before == here == after:  # flat where the tilt is below rounding
             found = minimize_scalar(
                 lambda f: _margin(linkage, f),
                 bounds=(grid[index] - step, grid[index] + step),

@@ -284,7 +284,8 @@ class LambdaLinkage:
         az, dy = A[..., 2], A[..., 1]
         D = np.hypot(dx, dy)
         # A beside C with coupler and rocker equal: near = D^2, which underflows
-        beside = (D > 0.0) & (D < _BESIDE * self.l4) & (s3 == self.l4) & (az * az <= 1e-17 * D * self.l4)
+        close = (D > 0.0) & (D / self.l4 < _BESIDE)
+        beside = close & (s3 == self.l4) & (az * az <= 1e-17 * D * self.l4)
         near = np.where(beside, D, near)  # from here on only its sign counts
         status = self._status(D, az, s3, near, far)
         assembled = status <= AssemblyStatus.LIMIT

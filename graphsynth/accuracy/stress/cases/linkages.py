@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["built", "exact_four_bar", "four_bar", "wheel"]
+__all__ = ["built", "exact_four_bar", "four_bar", "planet", "wheel"]
 
 
 def built(graph: MechanismGraph, joints: Iterable[Any], pose: Iterable[Any] | None = None) -> Mechanism:
@@ -52,3 +52,13 @@ def wheel() -> Mechanism:
     from graphsynth.structure.graph import MechanismGraph
 
     return built(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)])
+
+
+def planet(sun: float, wheel: float) -> Mechanism:
+    """Planet wheel, link 2, that rolls round a fixed sun wheel of radius ``sun``; the carrier is link 1."""
+    from graphsynth.mechanism.joints import Gear, Revolute
+    from graphsynth.structure.graph import MechanismGraph
+
+    graph = MechanismGraph(3, [(0, 1), (1, 2), (0, 2, 2)], frame=0)
+    joints = [Revolute(0, 1), Revolute(1, 2, (sun + wheel, 0.0)), Gear(0, 2, radius_a=sun, radius_b=wheel)]
+    return built(graph, joints)
