@@ -578,7 +578,7 @@ def case_symmetric_home():
 def case_units():
     theta = np.random.default_rng(6).uniform(-3, 3, (500, 3))
     base = G1.direct_batch(theta)
-    for unit in (2.0**-199, 1e-30, 1e30, 2.0**60, 2.0**198):
+    for unit in (2.0**-199, 1e-30, 1e30, 2.0**60, 2.0**195):
         scaled = ParallelPlatform(
             tuple(np.array(G1.D) * unit), tuple(np.array(G1.b) * unit), tuple(np.array(G1.l1) * unit),
             tuple(np.array(G1.l2) * unit),
