@@ -190,7 +190,7 @@ def _add_run(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
     parser = _verb(verbs, "run", "run", "Run a scene: from the question to a report.")
     parser.add_argument("scene", metavar="SCENE", help="name of a shipped scene, or a TOML file")
     parser.add_argument("--out", type=Path, metavar="DIR", help="report folder (default graphsynth-out/SCENE)")
-    parser.add_argument("--workers", type=_workers, metavar="K", help="worker processes for candidates (default one)")
+    parser.add_argument("--workers", type=_workers, metavar="K", help="processes (default: all cores for a stream)")
     parser.add_argument("--fresh", action="store_true", help="start anew, do not go on with an interrupted run in DIR")
     parser.add_argument(
         "--explain", action="store_true", help="print what ran and why, what did not, imports, time and memory"

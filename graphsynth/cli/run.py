@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
+from graphsynth.cli.workers import workers_for
 
 if TYPE_CHECKING:
     from graphsynth.scenes.runner import Report
@@ -46,15 +47,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run(scene: Any, folder: Path, options: argparse.Namespace) -> Report:
+    from graphsynth.ordered import processes
+    from graphsynth.scenes.runner import has_stream
     from graphsynth.scenes.runner import run as run_scene
 
-    with _progress() as progress:
-        if (options.workers or 1) == 1:
-            return run_scene(scene, folder, None, progress, options.fresh)
-        from graphsynth.ordered import processes
-
-        with processes(options.workers) as executor:
-            return run_scene(scene, folder, executor, progress, options.fresh)
+    with _progress() as progress, processes(workers_for(options.workers, has_stream(scene))) as executor:
+        return run_scene(scene, folder, executor, progress, options.fresh)
 
 
 def _document(report: Report, explained: bool) -> dict[str, Any]:

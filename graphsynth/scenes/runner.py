@@ -18,8 +18,9 @@ from graphsynth.scenes.report import loaded_versions, write_report
 from graphsynth.scenes.running import Running
 from graphsynth.scenes.scene import Scene, load_scene
 from graphsynth.scenes.stages import Context, Progress, Stage, resolve
+from graphsynth.scenes.tables import Place
 
-__all__ = ["Report", "StageTime", "execute", "run"]
+__all__ = ["Report", "StageTime", "execute", "has_stream", "run"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +112,21 @@ def run(
     return replace(report, folder=write_report(report, folder))
 
 
+def has_stream(scene: Scene) -> bool:
+    """Whether what the scene asks for takes candidates one by one, which several processes can share.
+
+    Raises
+    ------
+    SceneError
+        If it asks for something no stage gives.
+    """
+    return any(stage.each for stage in resolve(scene.stages(), scene.outputs.products, _place_of_products(scene)))
+
+
+def _place_of_products(scene: Scene) -> Place:
+    return scene.place / "outputs" / "products"
+
+
 def execute(
     scene: str | Path | Scene,
     executor: Executor | None = None,
@@ -129,7 +145,7 @@ def execute(
         scene = load_scene(scene)
     check_files(scene)
     wanted = scene.outputs.products
-    stages = resolve(scene.stages(), wanted, scene.place / "outputs" / "products")
+    stages = resolve(scene.stages(), wanted, _place_of_products(scene))
     done = Running(stages, wanted, Context(scene, executor), progress, journal, fresh)
     products = done.run()
     return Report(

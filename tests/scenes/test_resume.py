@@ -38,7 +38,7 @@ def interrupt(springs: Path, out: Path, *options: str) -> subprocess.CompletedPr
     return subprocess.CompletedProcess(command, process.returncode, out_text, error)
 
 
-@pytest.mark.parametrize("options", [(), ("--workers", "2")])
+@pytest.mark.parametrize("options", [("--workers", "1"), ("--workers", "2"), ()])
 def test_ctrl_c_and_again(springs: Path, tmp_path: Path, options: tuple[str, ...]) -> None:
     slowly(springs)
     done = interrupt(springs, tmp_path / "out", *options)
