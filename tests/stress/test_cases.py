@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
 from graphsynth.accuracy.stress import Status, run_case, stress_cases
 
+PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "stress.md"
+SAID = dict(re.findall(r"^\| `([a-z]+-[\d.]+)` .* \| (\w+) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
 CASES = [pytest.param(c, id=c.name, marks=pytest.mark.slow if c.slow else ()) for c in stress_cases()]
 
 
@@ -18,3 +23,4 @@ def test_case(case):
     assert not outcome.reason
     assert not wrong
     assert outcome.status in (Status.OK, Status.FLAGGED) and outcome.checks
+    assert SAID[case.name] == outcome.status.value  # the page tells what runs gave

@@ -197,6 +197,9 @@ _BEYOND = _rows(
     1.3   | scales:subnormal_platform  | platforms of 1e-59 and 1e59, legs of subnormal length
     1.4   | scales:jamming             | bearings of 1e-57 and 1e57, boxes of 1e-300 and 1e300
     1.5   | scales:crossings           | circle and ellipse that differ by 1e-60
+    1.6   | sizes:refused              | linkages, bearings, platforms, drives beyond 1e60: refused
+    1.7   | sizes:linkages             | linkages and drives of 1e-57 and 1e57
+    1.8   | sizes:tiny_tilts           | tilts of 5e-324 rad without clearance
     2.1   | shapes:zero_links          | links of length zero
     2.2   | shapes:all_in_one_point    | all joints at one place, a rhombus folded flat
     2.3   | shapes:against_the_count   | mechanism that moves against the count
@@ -207,6 +210,8 @@ _BEYOND = _rows(
     4.2   | loads:stiff_motor          | motor with an electrical time of 1e-15 s over 1000 s
     4.3   | loads:broken_laws          | torque that becomes NaN or infinite
     4.4   | loads:budget               | budget of steps used up
+    4.5   | sizes:huge_angles          | angles of 1e20 to 1e150 rad
+    4.6   | sizes:many_turns           | 50 turns forward and back
     5.1   | limits:large_graphs        | strongly regular graphs, 255 links, 60! automorphisms
     5.2   | limits:too_large           | questions beyond reach
     5.3   | limits:budgets             | proofs with a budget of one box

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -222,18 +223,23 @@ def bad_lengths(check: Checks) -> None:
 
 def units(check: Checks) -> None:
     """Lengths times a constant change no angle and no number of modes."""
-    from graphsynth.kinematics.assembly_modes import assembly_modes
+    from graphsynth.kinematics.assembly_modes import AssemblyModes, assembly_modes
     from graphsynth.kinematics.leg import solve_leg
     from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
     g1 = ParallelPlatform.g1()
     theta = (0.0, 0.0, 0.0)
     right = ["-0.1676478906740002300845393288613099", "0.4780458846922180136167385177734372"]
-    for unit in (1e-150, 1e-9, 1e9, 1e150):
-        A = g1.elbows(theta) * unit
-        modes = assembly_modes(A, np.array(g1.b) * unit, np.array(g1.l2) * unit)
+
+    def modes_of(unit: float) -> AssemblyModes:
+        return assembly_modes(g1.elbows(theta) * unit, np.array(g1.b) * unit, np.array(g1.l2) * unit)
+
+    for unit in (1e-57, 1e-9, 1e9, 1e57):
+        modes = modes_of(unit)
         check.equals(f"unit {unit:g}: modes", len(modes), 2)
         check.values(f"unit {unit:g}: alpha", modes.poses[:, 2], right, absolute=5e-15, source="section 14.3")
+    for unit in (1e-150, 1e150):
+        check.refused(f"unit {unit:g}", partial(modes_of, unit), "1e-60", "1e+60")
     for unit in (2.0**-500, 2.0**500):
         for l1, l2, u, v in LEGS[:4]:
             found = float(solve_leg(u * unit, v * unit, l1 * unit, l2 * unit).angle(1))
