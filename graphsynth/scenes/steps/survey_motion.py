@@ -19,7 +19,7 @@ __all__ = ["Moved", "four_bar", "move"]
 
 Array = NDArray[np.float64]
 
-_PIECE = 2000  # sets moved at once: their poses stay in the cache
+_PIECE = 1000  # sets moved at once: their poses stay in the cache, and memory is used again
 #: Squared sine of the transmission angle below which modes meet; sets of the lattice that keep clear are above 1e-9.
 _MEETING = 1e-12
 
