@@ -64,7 +64,7 @@ class Running:
         self._products: dict[str, Any] = {}
         self._started = time.perf_counter()
         self._source_seconds = 0.0
-        self._aside: list[tuple[Stage, int, Future[tuple[Any, StageTime]]]] = []
+        self._aside: dict[str, Future[tuple[Any, StageTime]]] = {}  # by stage
         self.times: list[StageTime] = []
         self.notes: list[str] = []
 
@@ -79,11 +79,12 @@ class Running:
                 continue
             self._tell(stage.name, done)
             self._refuse_if_used_up(stage)
+            self._start_aside(self.stages[done:])
             if stage.each and self._plan is not None:
                 self._run_stream(self._plan, done)
                 streamed = True
-            elif self._may_run_aside(stage):
-                self._run_aside(stage)
+            elif stage.name in self._aside:
+                self.times.append(StageTime(stage.name, 0.0, 0.0))  # until it is gathered
             else:
                 self._run_stage(stage, self.stages[done + 1 :])
             needed = {need for later in self.stages[done + 1 :] for need in later.needs} | set(self._wanted)
@@ -107,22 +108,25 @@ class Running:
         self._products.update(given_by(stage, result))
         self.times.append(spent)
 
-    def _may_run_aside(self, stage: Stage) -> bool:
-        needed = {need for other in self.stages for need in other.needs}
-        return stage.aside and self._context.executor is not None and not needed & set(stage.gives)
-
-    def _run_aside(self, stage: Stage) -> None:
-        """Have another process run a stage while later ones run here; only outputs come of it."""
-        assert self._context.executor is not None
-        needs = [self._products[need] for need in stage.needs]
-        future = self._context.executor.submit(measured, stage, replace(self._context, executor=None), needs)
-        self._aside.append((stage, len(self.times), future))
-        self.times.append(StageTime(stage.name, 0.0, 0.0))
+    def _start_aside(self, waiting: Sequence[Stage]) -> None:
+        """Have another process run every stage that only gives outputs, as soon as what it needs is there."""
+        executor = self._context.executor
+        if executor is None:
+            return
+        needed = {need for stage in self.stages for need in stage.needs}
+        for stage in waiting:
+            ready = set(stage.needs) <= set(self._products)
+            if stage.aside and ready and stage.name not in self._aside and not needed & set(stage.gives):
+                needs = [self._products[need] for need in stage.needs]
+                alone = replace(self._context, executor=None)
+                self._aside[stage.name] = executor.submit(measured, stage, alone, needs)
 
     def _gather_aside(self) -> None:
-        for stage, place, future in self._aside:
-            result, self.times[place] = future.result()
-            self._products.update(given_by(stage, result))
+        given = {stage.name: stage for stage in self.stages}
+        for place, spent in enumerate(self.times):
+            if spent.stage in self._aside:
+                result, self.times[place] = self._aside[spent.stage].result()
+                self._products.update(given_by(given[spent.stage], result))
 
     def _timed(self, items: Iterable[Any]) -> Iterator[Any]:
         """Pass candidates on, adding up the time it takes to make them."""

@@ -86,6 +86,19 @@ def stages(monkeypatch: pytest.MonkeyPatch) -> list[Stage]:
     ]
 
 
+def test_it_starts_as_soon_as_its_needs_are_there(stages: list[Stage]) -> None:
+    _FIRST.set()
+    executor = Noted()
+    shuffled = [stages[0], stages[2], stages[1]]  # "go on" stands before it, but gives nothing it needs
+    running = Running(shuffled, ("picture", "next"), Context(survey(), executor))
+    tell = running._tell
+    seen: dict[str, list[str]] = {}
+    running._tell = lambda what, done: (seen.update({what: list(executor.names)}), tell(what, done))[1]  # type: ignore
+    assert running.run() == {"picture": "picture", "next": 2}
+    assert seen == {"count": [], "go on": [], "draw": ["draw"], "done": ["draw"]}
+    assert [time.stage for time in running.times] == ["count", "go on", "draw"]
+
+
 def test_later_stages_go_on_meanwhile(stages: list[Stage]) -> None:
     _FIRST.clear()
     with ThreadPoolExecutor(1) as executor:
