@@ -19,7 +19,7 @@ __all__ = ["Moved", "four_bar", "move"]
 
 Array = NDArray[np.float64]
 
-_PIECE = 1000  # sets moved at once: their poses stay in the cache, and memory is used again
+_POSITIONS = 180_000  # computed at once: poses stay in the cache, and memory is used again
 #: Squared sine of the transmission angle below which modes meet; sets of the lattice that keep clear are above 1e-9.
 _MEETING = 1e-12
 
@@ -95,7 +95,8 @@ def move(lengths: Ints, positions: int) -> Moved:
     >>> [KINDS[k] for k in found.kind], np.degrees(found.transmission).round(6).tolist()
     (['full turn', 'change point', 'limited'], [23.073918, nan, nan])
     """
-    parts = [_move(lengths[k : k + _PIECE], positions) for k in range(0, len(lengths), _PIECE)]
+    piece = max(1, _POSITIONS // positions)
+    parts = [_move(lengths[k : k + piece], positions) for k in range(0, len(lengths), piece)]
     joined = [np.concatenate([getattr(part, name) for part in parts]) for name in ("kind", "transmission", "swing")]
     return Moved(joined[0], joined[1], joined[2], sum(part.positions for part in parts))
 
