@@ -43,7 +43,8 @@ def signature(scene: Scene, stages: Sequence[Stage], kept: Sequence[str]) -> str
     """
     structure = scene.structure
     if structure is not None:
-        structure = replace(structure, generate=replace(structure.generate, limit=1))
+        least = structure.generate.sample or 1  # any limit that is allowed
+        structure = replace(structure, generate=replace(structure.generate, limit=least))
     content = {
         "version": graphsynth.__version__,
         "seed": scene.scene.seed,
