@@ -107,13 +107,17 @@ def _check_file(connection: sqlite3.Connection, checks: _Checks) -> None:
 
 
 def _check_families(connection: sqlite3.Connection, checks: _Checks) -> None:
+    from graphsynth.atlas.pieces import fingerprint, problem_of, tasks_of
     from graphsynth.atlas.statement import PUBLISHED
     from graphsynth.synthesis import count_chains
 
-    for number, mobility, links, fractionated, pieces, shard, expected, complete in connection.execute(
-        "SELECT family_id, mobility, links, fractionated, pieces, shard, expected, complete FROM families"
+    for number, mobility, links, fractionated, pieces, cut, shard, expected, complete in connection.execute(
+        "SELECT family_id, mobility, links, fractionated, pieces, cut, shard, expected, complete FROM families"
     ).fetchall():
         where = f"family {mobility}.{links}"
+        whole = tasks_of(links, mobility, bool(fractionated))
+        checks.same("families.cut", where, cut, fingerprint(problem_of(links, mobility, bool(fractionated)), whole))
+        checks.same("families.pieces", where, pieces, len(whole))
         listed, keys = connection.execute(
             "SELECT COUNT(*), COUNT(DISTINCT key) FROM chains WHERE (family_id, mobility, links) = (?, ?, ?)",
             (number, mobility, links),
