@@ -20,13 +20,13 @@ from graphsynth.synthesis.families import chain_families
 from graphsynth.synthesis.rings import rings
 from graphsynth.synthesis.units import cut, graphs_of
 
-__all__ = ["fractionated_chains"]
+__all__ = ["Higher", "blocks_of", "fractionated_chains"]
 
 Higher = tuple[tuple[int, int], ...]
 
 
 @lru_cache(maxsize=512)
-def _blocks(links: int, mobility: int, space: int, higher: Higher) -> tuple[MechanismGraph, ...]:
+def blocks_of(links: int, mobility: int, space: int, higher: Higher) -> tuple[MechanismGraph, ...]:
     """List the blocks with given numbers: non-fractionated chains, or a single joint."""
     content = dict(higher)
     if links == 2:
@@ -102,11 +102,11 @@ def _representatives(graph: MechanismGraph) -> list[int]:
 @lru_cache(maxsize=512)
 def _trees(links: int, mobility: int, space: int, higher: Higher) -> tuple[MechanismGraph, ...]:
     """List the connected chains of blocks, loose ends (single joints as leaf blocks) included."""
-    found = list(_blocks(links, mobility, space, higher))
+    found = list(blocks_of(links, mobility, space, higher))
     for block_links in range(2, links):
         for block_mobility in range(1, mobility):
             for own, other in _shares(higher):
-                blocks = _blocks(block_links, block_mobility, space, own)
+                blocks = blocks_of(block_links, block_mobility, space, own)
                 if not blocks:
                     continue
                 for parent in _trees(links - block_links + 1, mobility - block_mobility, space, other):

@@ -21,6 +21,7 @@ from graphsynth.synthesis.families import (
     truss_families,
 )
 from graphsynth.synthesis.fractionated import fractionated_chains
+from graphsynth.synthesis.joined import count_fractionated
 from graphsynth.synthesis.rings import rings
 from graphsynth.synthesis.units import Unit, count_unit, cut, graphs_of, text_of
 
@@ -33,7 +34,7 @@ _PRIMES = (2, 3, 5, 7, 11, 13)
 
 @dataclass(frozen=True)
 class Handful:
-    """Rings, or fractionated chains: few enough to be made one by one.
+    """Rings, or fractionated chains: few enough to be made one by one (to count, most need not be made).
 
     ``assortment`` and ``levels`` restrict mechanisms, ``symmetry`` asks for an automorphism of that prime order.
     """
@@ -56,6 +57,12 @@ class Handful:
                 continue
             if self._fits(graph):
                 yield graph
+
+    def count(self) -> int:
+        """Count the graphs; fractionated chains without any restriction are not made."""
+        if self.kind == "fractionated" and not (self.assortment or self.levels or self.symmetry):
+            return count_fractionated(self.links, self.mobility, self.space, self.higher, self.framed)
+        return sum(1 for _ in self.graphs())
 
     def _all(self) -> Iterator[MechanismGraph]:
         if self.kind == "rings":
@@ -314,7 +321,7 @@ def check_loops(loops: int, links: int) -> None:
 
 def count_piece(piece: Piece) -> int:
     """Count the graphs of a piece (exact)."""
-    return count_unit(piece) if isinstance(piece, Unit) else sum(1 for _ in piece.graphs())
+    return count_unit(piece) if isinstance(piece, Unit) else piece.count()
 
 
 def graphs_of_piece(piece: Piece) -> Iterator[MechanismGraph]:

@@ -41,8 +41,8 @@ class Unit:
     weight: float = 1.0
 
 
-@lru_cache(maxsize=8)
-def _work(resources: int, key_words: int = 1 << 18) -> Work:
+@lru_cache(maxsize=1)  # twenty megabytes
+def _work(resources: int, key_words: int) -> Work:
     return make_work(resources, key_words=key_words)
 
 
@@ -103,7 +103,7 @@ def count_each(family: Family, start: int, stop: int) -> NDArray[np.int64]:
     out = np.zeros(stop - start, np.int64)
     key_words = 1 << 18
     while True:
-        work = _work(alphabet.resources, key_words)
+        work = _work(max(1024, 1 << (alphabet.resources - 1).bit_length()), key_words)
         outcome = count_block(
             family.vertices, family.graphs, start, stop, family.frames, family.frame_degree, alphabet.tables, work, out
         )
