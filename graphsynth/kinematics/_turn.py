@@ -31,8 +31,9 @@ class FullTurn:
     ----------
     possible : bool
         True if the crank passes every angle on one branch.
-    kind : {"full turn", "change point", "limited", "never assembled"}
-        "change point": the branches meet but the crank can pass; the branch after it is ambiguous.
+    kind : {"full turn", "change point", "limited", "immovable", "never assembled"}
+        "change point": the branches meet but the crank can pass; the branch after it is ambiguous.  "immovable": the
+        linkage can only lie stretched, at one angle, which is its limit angle.
     limit_angles, change_angles : tuple of float
         Crank angles (radians, in [0, 2 pi)) of the dead points and of the change points.
     method : str
@@ -74,6 +75,9 @@ def _planar_turn(linkage: LambdaLinkage) -> FullTurn:
             limits += [angle, -angle] if 0 < half < 1 else [angle]
     limits_t = tuple(sorted(sense * (angle - phase) % math.tau for angle in limits))
     changes_t = tuple(sorted(sense * (angle - phase) % math.tau for angle in changes))
+    if nearest == longest or farthest == shortest:
+        text = f"nothing moves: the linkage can only lie stretched, at {math.degrees(limits_t[0]):.6g} degrees"
+        return FullTurn(False, "immovable", limits_t, (), "exact", text)
     if limits_t:
         degrees = ", ".join(f"{math.degrees(angle):.6g}" for angle in limits_t)
         text = f"the crank cannot make a full turn: dead points at {degrees} degrees"
@@ -118,7 +122,11 @@ def _tilted_turn(linkage: LambdaLinkage) -> FullTurn:
             nodes.append((float(found.x) % math.tau, float(found.fun)))
     nodes.sort()
     worst = min(value for _, value in nodes)
-    if max(value for _, value in nodes) < 0.0:
+    best = max(nodes, key=lambda node: node[1])
+    if abs(best[1]) <= 64 * np.finfo(float).eps:
+        text = "the largest margin is at the rounding level: immovable or never assembled, not decided"
+        return FullTurn(False, "immovable", (best[0],), (), "estimated", text)
+    if best[1] < 0.0:
         text = "the linkage cannot be assembled at any sampled crank angle"
         return FullTurn(False, "never assembled", (), (), "estimated", text)
     limits = tuple(

@@ -42,9 +42,10 @@ class DriveMotion(NamedTuple):
 
 
 class DriveTurn(NamedTuple):
-    """Exact statement on a full turn: ``kind`` is "full turn", "change point", "limited" or "never assembled".
+    """Exact statement on a full turn.
 
-    ``admissible`` lists the intervals of the wheel angle psi (radians) inside the reach; None means every psi.
+    ``kind`` is "full turn", "change point", "limited", "immovable" or "never assembled"; ``admissible`` lists the
+    intervals of the wheel angle psi (radians) inside the reach; None means every psi.
     """
 
     kind: str
@@ -154,15 +155,20 @@ class FourBarDrive:
             return DriveTurn("full turn", None)
         if far <= 0 and near >= 0:
             return DriveTurn("change point", None)
-        return self._limited(float(square), float(least), float(most))
+        # one place, crank and frame in line with the dyad: |OD| + l_B = |l_CD - l_BC|, ||OD| - l_B| = l_CD + l_BC
+        short = _order(square, least - crank) if least > crank else 1
+        long = max(_order(square, crank + most), -_order(square, crank - most) if crank > most else -1)
+        if short < 0 or long > 0:
+            return DriveTurn("never assembled", ())
+        kind = "limited" if short and long else "immovable"
+        return DriveTurn(kind, self._limited(float(square), float(least), float(most)))
 
-    def _limited(self, square: float, least: float, most: float) -> DriveTurn:
+    def _limited(self, square: float, least: float, most: float) -> tuple[tuple[float, float], ...]:
+        """Return the admissible angles of a crank that can be somewhere."""
         span = 2.0 * math.sqrt(square) * self.crank
         low, high = ((bound * bound - square - self.crank**2) / span for bound in (least, most))
-        if high < -1.0 or low > 1.0:
-            return DriveTurn("never assembled", ())
-        inner = math.acos(min(high, 1.0))
-        outer = math.acos(max(low, -1.0))
+        inner = math.acos(max(-1.0, min(high, 1.0)))
+        outer = math.acos(min(1.0, max(low, -1.0)))
         shift = cmath.phase(self.axis - self.pivot) - self.phase
         if high >= 1.0:
             intervals = [(-outer, outer)]
@@ -170,7 +176,7 @@ class FourBarDrive:
             intervals = [(inner, math.tau - inner)]
         else:
             intervals = [(inner, outer), (-outer, -inner)]
-        return DriveTurn("limited", tuple((start + shift, stop + shift) for start, stop in intervals))
+        return tuple((start + shift, stop + shift) for start, stop in intervals)
 
     def barriers(self) -> tuple[tuple[float, str], ...]:
         """Wheel angles psi in [0, 2 pi) that the crank cannot pass on a definite branch, with "lock" or "change point".
@@ -178,7 +184,7 @@ class FourBarDrive:
         The angles are closed forms in double precision; whether there are any is decided exactly (see `turn`).
         """
         state = self.turn()
-        if state.kind == "limited" and state.admissible is not None:
+        if state.kind in ("limited", "immovable") and state.admissible is not None:
             return tuple(sorted((bound % math.tau, "lock") for interval in state.admissible for bound in interval))
         if state.kind != "change point":
             return ()

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from graphsynth.scenes.products import Finding, Objective, Quantity, Ranking, Record, Table
+from graphsynth.scenes.products import Finding, Quantity, Ranking, Record, Table
 
 if TYPE_CHECKING:
     from graphsynth.scenes.runner import Report
@@ -59,7 +59,7 @@ def facts(report: Report) -> tuple[Finding, ...]:
     if any(record.key for record in records) and not plain:
         found += _counts(records)
     found += [
-        Finding("on the Pareto front", value=str(len(ranking.front))) for ranking in _rankings(report) if ranking.front
+        Finding("on the Pareto front", value=str(ranking.front_size)) for ranking in _rankings(report) if ranking.front
     ]
     seconds = sum(time.seconds + time.import_seconds for time in report.times)
     return (*found, Finding("all stages", value=f"{seconds:.1f} s"))
@@ -101,7 +101,7 @@ def _best(ranking: Ranking, records: Sequence[Record]) -> list[Finding]:
     if not order:
         return []
     first = _one(ranking, order[0])
-    count = len(ranking.numbers)
+    count = ranking.ranked
     found = [
         Finding(f"Best of {count} ranked: {first}." if count > 1 else f"The only one left: {first}.", order[0].good)
     ]
@@ -132,19 +132,10 @@ def _one(ranking: Ranking, record: Record) -> str:
 
 def _rank_word(ranking: Ranking, which: int, place: int) -> str:
     """Say how a value stands among all ranked ones: ``"least"``, ``"3rd greatest"``, ``"2nd nearest to 5"``."""
-    objective = ranking.objectives[which]
-    better = sum(
-        _loss(objective, row[which]) < _loss(objective, ranking.values[place][which]) for row in ranking.values
-    )
+    objective, better = ranking.objectives[which], ranking.places[place][which]
     words = {"min": "least", "max": "greatest"}
     word = words[objective.goal] if isinstance(objective.goal, str) else f"nearest to {objective.goal:g}"
     return word if not better else f"{_ordinal(better + 1)} {word}"
-
-
-def _loss(objective: Objective, value: float) -> float:
-    if isinstance(objective.goal, str):
-        return value if objective.goal == "min" else -value
-    return abs(value - objective.goal)
 
 
 def _ordinal(number: int) -> str:

@@ -319,6 +319,10 @@ class Ranking:
         In the order of `numbers`: the value of each objective.
     unranked : tuple of (int, str)
         Assessed candidates without some objective, and which.
+    places : tuple of tuple of int
+        In the order of `numbers`: by objective, how many of all ranked ones are better.
+    ranked, front_size : int
+        How many were ranked, and how many of them are on the Pareto front; `numbers` may be the first of them only.
     """
 
     objectives: tuple[Objective, ...]
@@ -327,3 +331,6 @@ class Ranking:
     front: tuple[int, ...]
     values: tuple[tuple[float, ...], ...]
     unranked: tuple[tuple[int, str], ...] = ()
+    places: tuple[tuple[int, ...], ...] = ()
+    ranked: int = 0
+    front_size: int = 0

@@ -263,7 +263,7 @@ class Scene:
         own = family(self.mechanism.module).stages_for(self)
         given = {product for stage in (*STRUCTURE, *own) for product in stage.gives}
         common = tuple(stage for stage in STRUCTURE if given.issuperset(stage.needs)) if self.structure else ()
-        ranking = (RANK,) if self.ranking is not None else ()
+        ranking = (RANK,) if self.ranking is not None and "ranking" not in given else ()
         return (*common, *ranking, *own)
 
 

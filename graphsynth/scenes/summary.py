@@ -69,7 +69,7 @@ def _ranking_table(ranking: Ranking, report: Report) -> Table:
     )
     weights = ", ".join(f"{o.weight:g}" for o in ranking.objectives)
     note = (
-        f"{len(ranking.front)} of {len(ranking.numbers)} ranked candidates are on the Pareto front: no other one is at "
+        f"{ranking.front_size} of {ranking.ranked} ranked candidates are on the Pareto front: no other one is at "
         f"least as good in every objective and better in one. Score: weighted mean (weights {weights}) of the "
         "objectives, each scaled from 0 (worst of all) to 1 (best of all)."
     )

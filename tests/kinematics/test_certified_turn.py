@@ -24,7 +24,10 @@ from graphsynth.kinematics.certified import (
 from graphsynth.kinematics.certified import extra as extra_module
 from graphsynth.kinematics.certified.balls import Balls, exact
 from graphsynth.kinematics.certified.platform_equations import PlatformSystem
+from graphsynth.kinematics.drive import FourBarDrive
+from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
+from graphsynth.testing.strategies.four_bars import classify
 
 LEG = (-5 * math.pi / 6, -math.pi / 6, math.pi / 2)
 
@@ -159,8 +162,8 @@ def test_four_bars_agree_with_grashof_and_with_the_extreme_positions(lengths: li
         assert s + longest < p + q and proof.type in ("crank-rocker", "double crank")
     if proof.type in ("crank-rocker", "double crank"):
         assert proof.kind == "full turn"
-    if proof.kind == "never assembled":
-        assert longest > s + p + q
+    assert (proof.kind == "never assembled") == (proof.type == "never assembled") == (longest > s + p + q)
+    assert (proof.kind == "immovable") == (proof.type == "immovable") == (longest == s + p + q)
     for limit in proof.limits:
         with mp.workdps(40):
             reach = b + c if limit.place == "stretched" else abs(b - c)
@@ -180,7 +183,46 @@ def test_change_points_are_decided_exactly(excess: float | Fraction) -> None:
     assert certify_four_bar(2, 1, 2, 1).change_angles == ("0", "pi")
 
 
+@given(st.permutations(range(4)), st.lists(st.fractions(Fraction(1, 50), 50), min_size=3, max_size=3))
+def test_four_bars_that_can_only_lie_stretched_are_immovable(order: list[int], short: list[Fraction]) -> None:
+    """The longest link is as long as the others together: a class of its own, wherever four-bars are classified."""
+    lengths = [[*short, sum(short, Fraction(0))][k] for k in order]
+    proof = certify_four_bar(*lengths)
+    assert (proof.kind, proof.type, proof.full_turn, proof.change_angles) == ("immovable", "immovable", False, ())
+    (limit,) = proof.limits
+    assert limit.low in (0.0, math.pi - 2.0**-51, math.pi) and limit.high - limit.low < 1e-14
+    assert classify(*lengths) == "immovable"
+    below = math.lcm(*(length.denominator for length in lengths))
+    whole = [int(length * below) for length in lengths]
+    if max(whole) < 2**50:
+        turn = LambdaLinkage(*map(float, whole)).full_turn()
+        assert (turn.kind, turn.possible, turn.method) == ("immovable", False, "exact")
+        assert turn.limit_angles == pytest.approx((round(limit.low / math.pi) * math.pi,))
+        g, a, b, c = map(float, whole)
+        drive = FourBarDrive(0.0, complex(g), a, c, b)
+        assert drive.turn().kind == "immovable" and len(drive.turn().admissible) == 1
+
+
+@pytest.mark.parametrize("more", [0, 1, -1])
+def test_the_class_changes_exactly_at_the_stretched_length(more: int) -> None:
+    kind = {0: "immovable", 1: "never assembled", -1: "limited"}[more]
+    part = Fraction(more, 10**60)
+    for k in range(4):
+        lengths = [Fraction(n) for n in (1, 2, 4)]
+        lengths.insert(k, 7 + part)
+        assert certify_four_bar(*lengths).kind == kind
+        assert certify_four_bar(*lengths).type == {"limited": "triple rocker"}.get(kind, kind)
+    assert certify_slider_crank(1, 2, 3 + part).kind == kind == certify_slider_crank(1, 2, -3 - part).kind
+    assert certify_inverted_slider_crank(1, 2, 3 + part).kind == kind
+    found = [n * 2**40 for n in (7, 1, 2, 4)]
+    found[0] += more
+    g, a, b, c = map(float, found)
+    assert FourBarDrive(0.0, complex(g), a, c, b).turn().kind == kind == LambdaLinkage(g, a, b, c).full_turn().kind
+
+
 def test_sliders() -> None:
+    assert [round(limit.low, 12) for limit in certify_slider_crank(1, 2, 3).limits] == [-round(math.pi / 2, 12)]
+    assert certify_inverted_slider_crank(1, 2, 3).limits[0].low == pytest.approx(math.pi, abs=1e-15)
     assert certify_slider_crank("0.1", "0.3", "0.2").change_angles == ("pi/2",)
     assert certify_slider_crank(1, 3, -1).kind == "full turn"
     assert certify_slider_crank(1, 1, 0).change_angles == ("pi/2", "-pi/2")

@@ -182,6 +182,9 @@ def test_batch_says_which_sets_cannot_be_assembled() -> None:
         assert batch.reason(0) == "" and "assembled" in batch.reason(1)
         M = batch.point(2, (5.0, 0.0))
         np.testing.assert_allclose(M[0], simulate(base, u).point(2, (5.0, 0.0)).position, atol=1e-14)
+        bare = simulate_batch(base, u, sets, rates=rates, keep=[])  # margins do not depend on what is kept
+        np.testing.assert_array_equal(bare.margins, batch.margins)
+        assert np.isnan(bare.margins[2]).all() and bare.frames.shape == (3, 91, 0, 4)
     with pytest.raises(GeometryError, match="shape"):
         simulate_batch(base, u, sets[:, :2])
     with pytest.raises(GeometryError, match="strictly"):

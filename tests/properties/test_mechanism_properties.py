@@ -58,6 +58,8 @@ def test_exact_class_decides_the_full_turn(bar):
         assert kind == "full turn"
     elif bar.type in ("rocker-crank", "double rocker", "triple rocker"):
         assert kind == "limited"
+    elif bar.type == "immovable":
+        assert kind == "immovable"
     else:
         assert kind in ("change point", "limited", "full turn")  # the crank may pass where two other links line up
 

@@ -12,8 +12,11 @@ import pytest
 
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.model import Mechanism
+from graphsynth.scenes.products import Quantity, Record
 from graphsynth.scenes.runner import run
 from graphsynth.scenes.scene import GenerateTable, Scene, load_scene
+from graphsynth.scenes.stages import Context
+from graphsynth.scenes.steps.rank import rank
 
 
 def check(report: Any) -> None:
@@ -37,7 +40,10 @@ def check(report: Any) -> None:
         driver = mechanism.drivers[0]
         at = [j.at_a if j.a == driver.link else j.at_b for j in mechanism.joints if driver.link in j.pair]
         assert min(abs(math.dist(p, q) * 3.0 - stroke) for p in at for q in at if p != q) < 0.2 * stroke
-    assert set(report["ranking"].numbers) == set(texts)
+    ranking = report["ranking"]
+    assert set(ranking.numbers) == set(texts)
+    deviations = [next(m.value for m in r.margins if m.name == "deviation") for r in report["records"] if r.margins]
+    assert [row[0] for row in ranking.values] == sorted(deviations)
 
 
 def narrowest(points: np.ndarray) -> float:
@@ -52,6 +58,17 @@ def narrowest(points: np.ndarray) -> float:
 def drawn(scene: Scene, count: int) -> Scene:
     assert scene.structure is not None
     return replace(scene, structure=replace(scene.structure, generate=GenerateTable(sample=count)))
+
+
+def test_the_answer_is_the_straightest_line() -> None:
+    """Even if it is the worst of all in whatever else is known of it."""
+    scene = load_scene("eight_link_search")
+    lines = ((1, 0.0101, 50.0, 5.0), (2, 0.0099, 21.0, 12.0), (3, 0.02, 60.0, 4.0))
+    records = tuple(
+        Record(number, margins=(Quantity("deviation", d), Quantity("transmission angle", t), Quantity("size", s)))
+        for number, d, t, s in lines
+    )
+    assert rank(Context(scene), records).numbers == (2, 1, 3)
 
 
 def test_some_of_the_mechanisms(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from graphsynth.scenes.scene import BudgetTable, Scene, find_scene, load_scene
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps import survey as stages
 from graphsynth.scenes.steps import survey_motion
-from graphsynth.scenes.steps.survey import evaluate_sets, front_of, losses_and_scores
+from graphsynth.scenes.steps.survey import QUANTITIES, evaluate_sets, front_of, losses_of, objectives_of
 from graphsynth.scenes.steps.survey_jamming import close_form
 from graphsynth.scenes.steps.survey_lattice import KINDS, TYPES, classify, lattice_of
 from graphsynth.scenes.steps.survey_motion import move
@@ -64,15 +64,15 @@ def grashof(g: int, a: int, b: int, c: int) -> str:
     """The textbook rule: the sum of the shortest and longest link against the other two."""
     ordered = sorted((g, a, b, c))
     excess = ordered[0] + ordered[3] - ordered[1] - ordered[2]
-    if ordered[3] > sum(ordered[:3]):
-        return "never assembled"
+    if ordered[3] >= sum(ordered[:3]):
+        return "immovable" if ordered[3] == sum(ordered[:3]) else "never assembled"
     if excess >= 0:
         return "triple rocker" if excess else "change point"
     return {g: "double crank", a: "crank-rocker", c: "rocker-crank", b: "double rocker"}[ordered[0]]
 
 
 def test_motion_finds_the_exact_class_of_every_set() -> None:
-    lengths = np.array([(g, 6, b, c) for g, b, c in itertools.product(range(1, 14), repeat=3)])
+    lengths = np.array([(g, 6, b, c) for g, b, c in itertools.product(range(1, 15), repeat=3)])
     kind, _ = classify(lengths)
     found = move(lengths, 36)
     assert np.bincount(kind, minlength=4).min() > 90  # every kind occurs, change points and kites among them
@@ -130,7 +130,7 @@ def test_shards_give_what_the_whole_lattice_gives() -> None:
     lattice, context = lattice_of(Context(scene)), Context(scene)
     whole = evaluate_sets(context, lattice, np.arange(len(lattice)))
     passing = np.flatnonzero(whole.passes)
-    losses, _ = losses_and_scores(context, lattice, whole, passing)
+    losses = losses_of(objectives_of(context), whole, passing)
     report = execute(replace(scene, outputs=replace(scene.outputs, products=("survey", "tables"))))
     survey = report["survey"]
     assert (survey.sets, survey.passing, survey.disagreements) == (1000, len(passing), 0)
@@ -139,6 +139,102 @@ def test_shards_give_what_the_whole_lattice_gives() -> None:
     assert sum(survey.maps["turning"]) == int(np.sum(whole.kind == KINDS.index("full turn")))
     again = execute(replace(small(shard=1000), outputs=replace(scene.outputs, products=("survey",))))["survey"]
     assert (again.front, again.chosen, again.maps) == (survey.front, survey.chosen, survey.maps)
+
+
+def random_scene(random: np.random.Generator) -> dict[str, Any]:
+    """A little lattice with random limits and objectives."""
+    found = tables(certify=int(random.integers(1, 30)), positions=8, shard=100, rows="passing")
+    spans = {}
+    for name in ("frame", "coupler", "rocker"):
+        first, step, count = random.integers(1, 12), random.integers(1, 5), random.integers(0, 7)
+        spans[name] = {"first": first / 4, "last": (first + step * count) / 4, "step": step / 4}
+    found["mechanism"]["lengths"] = {"crank": 1, **spans}
+    found["mechanism"]["limits"] |= {
+        "transmission_deg": float(random.integers(0, 40)), "free": bool(random.integers(0, 2)),
+    }  # fmt: skip
+    names = random.permutation([name for name in QUANTITIES if name != "smallest clearance"])[: random.integers(1, 4)]
+    found["ranking"]["objectives"] = [
+        {"quantity": str(name), "goal": str(random.choice(["min", "max"])), "weight": float(random.integers(1, 4))}
+        for name in names
+    ]
+    if random.integers(0, 2):
+        found["ranking"]["objectives"][0]["target"] = float(random.integers(0, 60))
+    found["mechanism"]["columns"] = names.tolist()
+    found["outputs"] = {"products": ["survey", "ranking"]}
+    return found
+
+
+def brute_force(scene: Scene) -> tuple[list[int], list[float]]:
+    """Rank the rows of all sets that pass: the Pareto front first, then by the weighted mean of scaled objectives."""
+    context = Context(scene)
+    lattice = lattice_of(context)
+    rows = stages.store(context, evaluate_sets(context, lattice, np.arange(len(lattice)))).columns
+    sets = rows["set"].tolist()
+    columns, weights = [], []
+    for wanted in scene.ranking.objectives:
+        unit = QUANTITIES[wanted.quantity]
+        values = rows[f"{wanted.quantity} [{unit}]" if unit else wanted.quantity].tolist()
+        if wanted.target is not None:
+            values = [-abs(value - wanted.target) for value in values]
+        elif wanted.goal == "min":
+            values = [-value for value in values]
+        columns.append(values)  # more is better
+        weights.append(wanted.weight)
+    score, front = {}, set()
+    for i, number in enumerate(sets):
+        parts = [(c[i] - min(c)) / (max(c) - min(c)) if max(c) > min(c) else 1.0 for c in columns]
+        score[number] = round(sum(w * part for w, part in zip(weights, parts, strict=True)) / sum(weights), 11)
+        if not any(all(c[j] >= c[i] for c in columns) and any(c[j] > c[i] for c in columns) for j in range(len(sets))):
+            front.add(number)
+    order = sorted(sets, key=lambda number: (number not in front, -score[number], number))
+    return order, [score[number] for number in order]
+
+
+def test_the_best_are_the_best_of_all_rows_whatever_is_certified() -> None:
+    """Against a ranking of all rows, one by one, on random scenes."""
+    random = np.random.default_rng(13)
+    ranked = 0
+    for _ in range(100):
+        scene = Scene.from_mapping(random_scene(random))
+        report = execute(replace(scene, outputs=replace(scene.outputs, products=("survey",))))
+        order, scores = brute_force(scene)
+        survey = report["survey"]
+        most = scene.mechanism.certify
+        assert survey.order.ranked == len(order)
+        assert survey.order.scores == pytest.approx(scores[:most], abs=1e-10)
+        assert list(survey.chosen[:1]) == order[:1]
+        assert list(survey.chosen) == order[:most]
+        ranked += len(order) > most
+    assert ranked > 20
+
+
+def test_the_best_does_not_depend_on_how_many_are_certified() -> None:
+    reports = [execute(small(certify=most)) for most in (1, 7, 40)]
+    texts = [report["records"][report["ranking"].numbers[0] - 1].solution for report in reports]
+    assert len(set(texts)) == 1 and len({report["ranking"].scores[0] for report in reports}) == 1
+    assert {report["ranking"].ranked for report in reports} == {reports[0]["ranking"].ranked} != {40}
+    assert [report["ranking"].places[0] for report in reports] == 3 * [reports[0]["ranking"].places[0]]
+    said = [[told.text for told in reports[k]["tables"][0].findings] for k in (0, 2)]
+    assert all(any("The best set is on the edge of the lattice (frame" in text for text in own) for own in said)
+
+
+def test_a_best_set_inside_the_lattice_gives_no_warning() -> None:
+    found = tables(certify=1)
+    found["mechanism"]["lengths"]["rocker"] = {"first": 3, "last": 3, "step": 1}  # no range: no edge
+    found["ranking"]["objectives"] = [{"quantity": "size", "goal": "min", "target": 3.5}]
+    report = execute(Scene.from_mapping(found))
+    assert "frame 3.5" in report["records"][0].solution or "coupler 3.5" in report["records"][0].solution
+    assert not any("edge of the lattice" in told.text for told in report["tables"][0].findings)
+
+
+def test_a_margin_at_its_limit_is_kept() -> None:
+    """The transmission angle of 4, 1, 3, 3 is 60 degrees: (9 + 9 - 9) / 18 is one half."""
+    found = tables(limits={"transmission_deg": 60, "free": False}, certify=1)
+    for scale in (1, 3, 7, 10):
+        one = {name: {"first": k * scale / 10, "last": k * scale / 10, "step": 1} for name, k in
+               (("frame", 4), ("coupler", 3), ("rocker", 3))}  # fmt: skip
+        found["mechanism"]["lengths"] = {"crank": scale / 10, **one}
+        assert execute(Scene.from_mapping(found))["ranking"].ranked == 1
 
 
 def test_certificates_agree_with_the_closed_form_and_hold_the_tolerances() -> None:
@@ -321,6 +417,23 @@ def test_pictures_show_the_maps_and_the_best() -> None:
     assert "crank 1" in report["mechanism_pictures"][0].caption
 
 
+def test_the_shipped_lattice_has_9651_immovable_sets() -> None:
+    lattice = lattice_of(Context(load_scene("four_bar_survey")))
+    kinds, types = classify(lattice.lengths(np.arange(len(lattice))))
+    immovable = types == TYPES.index("immovable")
+    assert int(immovable.sum()) == 9651 and (immovable == (kinds == KINDS.index("immovable"))).all()
+    assert int((types == TYPES.index("triple rocker")).sum()) == 386_470 - 9651
+
+
+def test_immovable_sets_are_found_in_motion() -> None:
+    """The longest as long as the others together, whichever it is; one unit less moves, one more is never assembled."""
+    short = np.random.default_rng(5).integers(1, 6000, (60, 3))
+    for more, kind in ((0, "immovable"), (-1, "limited"), (1, "never assembled")):
+        rows = np.column_stack([short, short.sum(axis=1) + more])
+        lengths = np.concatenate([np.roll(rows, k, axis=1) for k in range(4)])
+        assert {KINDS[k] for k in move(lengths, 8).kind} <= {kind, *(["change point"] if more < 0 else [])}
+
+
 @pytest.mark.slow
 def test_a_million_sets(tmp_path: Path) -> None:
     report = run(load_scene("four_bar_survey"), out=tmp_path)
@@ -342,7 +455,8 @@ def independent_counts() -> dict[tuple[str, str], int]:
         ("double crank", "full turn"): (excess < 0) & (shortest == g),
         ("rocker-crank", "limited"): (excess < 0) & (shortest == c),
         ("double rocker", "limited"): (excess < 0) & (shortest == b),
-        ("triple rocker", "limited"): (excess > 0) & (four[3] <= four[:3].sum(axis=0)),
+        ("triple rocker", "limited"): (excess > 0) & (four[3] < four[:3].sum(axis=0)),
+        ("immovable", "immovable"): four[3] == four[:3].sum(axis=0),
         ("never assembled", "never assembled"): four[3] > four[:3].sum(axis=0),
         # without room to spare, a crank passes if frame and crank are not the two that are too far apart
         ("change point", "change point"): (excess == 0) & (g + 20 <= b + c) & (abs(g - 20) >= abs(b - c)),

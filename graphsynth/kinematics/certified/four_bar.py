@@ -25,6 +25,8 @@ __all__ = [
 ]
 
 _BITS = 80
+#: Kinds with limits.
+_BOUNDED = ("limited", "immovable")
 
 
 class LimitAngle(NamedTuple):
@@ -41,14 +43,15 @@ class CrankCertificate:
 
     Attributes
     ----------
-    kind : {"full turn", "change point", "limited", "never assembled"}
+    kind : {"full turn", "change point", "limited", "immovable", "never assembled"}
         "full turn": the crank passes every angle and the two assembly modes never meet.  "change point": it passes
-        every angle, but modes meet.  "limited": some angles cannot be assembled.
+        every angle, but modes meet.  "limited": some angles cannot be assembled.  "immovable": only one can.
     type : str
         Of a four-bar: "crank-rocker", "rocker-crank", "double crank", "double rocker" (Grashof), "triple rocker"
-        (non-Grashof) or "change point"; seen from the input link.  Of the sliders: their name.
+        (non-Grashof), "change point", "immovable" (the longest link is as long as the others together: they can only
+        lie stretched along it) or "never assembled"; seen from the input link.  Of the sliders: their name.
     limits : tuple of LimitAngle
-        Enclosed angles that bound the motion; empty unless "limited".
+        Enclosed angles that bound the motion, or the only one there is; empty unless "limited" or "immovable".
     change_angles : tuple of str
         Exact angles at which modes meet: "0", "pi", "pi/2" or "-pi/2".
     statement : str
@@ -90,6 +93,8 @@ def certify_four_bar(ground: Any, crank: Any, coupler: Any, rocker: Any) -> Cran
     --------
     >>> certify_four_bar(2, 1, "2.5", "2.5").type, certify_four_bar("0.3", "0.1", "0.2", "0.2").kind
     ('crank-rocker', 'change point')
+    >>> certify_four_bar("0.3", "0.1", "0.1", "0.1").type  # it can only lie stretched
+    'immovable'
     >>> limited = certify_four_bar(2, 1.5, 1, 1)
     >>> [round(limit.low, 9) for limit in limited.limits], limited.limits[0].place
     ([1.186399552], 'stretched')
@@ -101,7 +106,7 @@ def certify_four_bar(ground: Any, crank: Any, coupler: Any, rocker: Any) -> Cran
     kind = _kind(abs(g - a), g + a, abs(b - c), b + c)
     changes = tuple(angle for angle, hit in (("0", abs(g - a) == abs(b - c)), ("pi", g + a == b + c)) if hit)
     limits = []
-    if kind == "limited":
+    if kind in _BOUNDED:
         for place, reach, blocks in (
             ("stretched", b + c, g + a > b + c),
             ("folded", abs(b - c), abs(g - a) < abs(b - c)),
@@ -114,8 +119,8 @@ def certify_four_bar(ground: Any, crank: Any, coupler: Any, rocker: Any) -> Cran
 def _type(g: Fraction, a: Fraction, b: Fraction, c: Fraction) -> str:
     """Grashof's rule: the shortest and longest links against the other two."""
     s, p, q, longest = sorted((g, a, b, c))
-    if longest > s + p + q:
-        return "never assembled"
+    if longest >= s + p + q:
+        return "immovable" if longest == s + p + q else "never assembled"
     if s + longest == p + q:
         return "change point"
     if s + longest > p + q:
@@ -154,7 +159,7 @@ def certify_slider_crank(crank: Any, coupler: Any, offset: Any = 0) -> CrankCert
     kind = _kind(nearest, abs(e) + a, Fraction(-1), b)
     changes = tuple(t for t, y in (("pi/2", e + a), ("-pi/2", e - a)) if abs(y) == b)
     limits = []
-    if kind == "limited":
+    if kind in _BOUNDED:
         for sign in (1, -1):
             sine = (sign * b - e) / a
             if abs(sine) <= 1 and abs(e + sign * a) > b:
@@ -188,7 +193,7 @@ def certify_inverted_slider_crank(crank: Any, ground: Any, offset: Any = 0) -> C
     a, g, e = _length("crank", crank), _length("ground", ground), abs(rational("offset", offset))
     kind = _kind(abs(g - a), g + a, e, g + a + 1)
     limits = []
-    if kind == "limited":
+    if kind in _BOUNDED:
         limits.append(_cosine("folded", (g * g + a * a - e * e) / (2 * g * a)))
     return _certificate(kind, "inverted slider-crank", limits, ("0",) if kind == "change point" else ())
 
@@ -204,6 +209,8 @@ def _kind(nearest: Fraction, farthest: Fraction, least: Fraction, most: Fraction
     """Compare the extremes of the reach over a turn with its bounds."""
     if nearest > most or farthest < least:
         return "never assembled"
+    if nearest == most or farthest == least:
+        return "immovable"
     if nearest > least and farthest < most:
         return "full turn"
     return "change point" if nearest >= least and farthest <= most else "limited"
@@ -238,6 +245,8 @@ def _certificate(kind: str, type_: str, limits: list[LimitAngle], changes: tuple
         "full turn": "the crank makes a full turn on one assembly mode",
         "change point": f"the crank passes every angle, but assembly modes meet at {', '.join(changes)}",
         "limited": "the crank stops at " + ", ".join(f"{limit.low:.12g} rad ({limit.place})" for limit in limits),
+        "immovable": "nothing moves, the crank has one place: "
+        + ", ".join(f"{limit.low:.12g} rad ({limit.place})" for limit in limits),
         "never assembled": "the linkage cannot be assembled at any crank angle",
     }[kind]
     return CrankCertificate(kind, type_, tuple(limits), changes, f"proved ({type_}): {text}")

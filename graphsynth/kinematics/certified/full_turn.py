@@ -50,7 +50,7 @@ class FullTurnCertificate:
         start pose, and the pose after exactly 2 pi is the start pose.  NOT_FULL_TURN and CHANGE_POINT are exact
         statements on the drives.
     drives : tuple of str
-        Exact kind of every drive: "full turn", "change point", "limited" or "never assembled".
+        Exact kind of every drive: "full turn", "change point", "limited", "immovable" or "never assembled".
     covered : float
         The branch is proved for wheel angles from 0 to here (radians; 0 if nothing is).
     sigma : tuple of int
@@ -154,12 +154,13 @@ def certify_full_turn(
     kinds = [turn.kind for turn in mechanism.drive_turns()]
     drives = (kinds[0], kinds[1], kinds[2])
     for verdict, bad in (
-        (TurnVerdict.NOT_FULL_TURN, ("limited", "never assembled")),
+        (TurnVerdict.NOT_FULL_TURN, ("limited", "immovable", "never assembled")),
         (TurnVerdict.CHANGE_POINT, ("change point",)),
     ):
         legs = [str(k) for k, kind in enumerate(drives, 1) if kind in bad]
+        words = " and ".join(dict.fromkeys(kind for kind in drives if kind in bad))
         if legs:
-            return _without_cover(verdict, drives, f"drive {', '.join(legs)}: {bad[0]}, decided exactly", begin)
+            return _without_cover(verdict, drives, f"drive {', '.join(legs)}: {words}, decided exactly", begin)
     try:
         motion = mechanism.full_turn(_NODES, start)
     except GeometryError as error:

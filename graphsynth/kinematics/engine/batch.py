@@ -235,9 +235,11 @@ def _run(
     needed = rates or any(step.iterative for step in program.steps)
     groups = np.array([k for k, step in enumerate(program.steps) if step.group >= 0], dtype=np.int64)
     width = n if rates else 0
+    links = kept or [program.mechanism.frame]  # the kernel delivers margins with links only
     out = Delivery(
-        poses, np.array(kept, dtype=np.int64), groups, np.empty((sets, len(kept), 4, n)),
-        np.empty((sets, len(kept), 3, width)), np.empty((sets, len(kept), 3, width)), np.empty((sets, len(groups), n)),
+        poses, np.array(links, dtype=np.int64), groups, np.empty((sets, len(links), 4, n)),
+        np.empty((sets, len(links), 3, width)), np.empty((sets, len(links), 3, width)),
+        np.empty((sets, len(groups), n)),
     )  # fmt: skip
     q, memory = Tracker(program, signs).values(u), workspace(program, n, needed)
     done, why = run_program(program, signs, u, q, memory, 0, needed, _wanted(program, kept), out)
@@ -245,9 +247,10 @@ def _run(
     for array in (out.frames, out.velocities, out.accelerations, out.margins):
         array[~found] = np.nan
     group = np.array([step.group for step in program.steps] + [-1], dtype=np.int64)[why[:, 1]]
-    frames, V, W, M = (
-        np.moveaxis(array, -1, 1) for array in (out.frames, out.velocities, out.accelerations, out.margins)
+    frames, V, W = (
+        np.moveaxis(array, -1, 1)[:, :, : len(kept)] for array in (out.frames, out.velocities, out.accelerations)
     )
+    M = np.moveaxis(out.margins, -1, 1)
     return BatchMotion(u, tuple(kept), frames, V, W, M, done, why[:, 0], group)
 
 

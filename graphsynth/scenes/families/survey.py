@@ -119,6 +119,7 @@ class SurveyTable:
 
 
 _STEPS = "graphsynth.scenes.steps"
+_RANK = Stage("rank", f"{_STEPS}.survey_order:rank", ("survey", "records"), ("ranking",))
 FAMILY = Family(
     table=SurveyTable,
     structure="none",
@@ -133,4 +134,5 @@ FAMILY = Family(
         Stage("sketch best", f"{_STEPS}.survey_pictures:sketches", ("records", "ranking"), ("mechanism_pictures",)),
         Stage("animate best", f"{_STEPS}.survey_pictures:animations", ("records", "ranking"), ("animations",)),
     ),
+    more=lambda scene: (_RANK,) if scene.ranking is not None else (),
 )

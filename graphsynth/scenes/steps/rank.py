@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from operator import le
 
@@ -10,7 +11,10 @@ from graphsynth.scenes.products import Objective, Ranking, Record
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.tables import suggest
 
-__all__ = ["rank", "ranking_of"]
+__all__ = ["DIGITS", "rank", "ranking_of"]
+
+#: Decimals of a score: what differs by rounding alone is a tie.
+DIGITS = 12
 
 
 def rank(context: Context, records: tuple[Record, ...]) -> Ranking:
@@ -41,7 +45,8 @@ def ranking_of(objectives: tuple[Objective, ...], records: Sequence[Record]) -> 
     """Rank the assessed records that have a finite value for every objective.
 
     Candidates of the Pareto front come first, then the others; both by falling score, ties by number.  The score is
-    the weighted mean of the objectives, each scaled linearly to 0 (worst of all ranked) .. 1 (best of all ranked).
+    the weighted mean of the objectives, each scaled linearly to 0 (worst of all ranked) .. 1 (best of all ranked), to
+    12 decimals.
 
     Examples
     --------
@@ -67,6 +72,7 @@ def ranking_of(objectives: tuple[Objective, ...], records: Sequence[Record]) -> 
     losses = {number: tuple(map(_loss, objectives, row)) for number, row in values.items()}
     scores = _scores(objectives, losses)
     front = set(_front(losses))
+    columns = [sorted(column) for column in zip(*losses.values(), strict=True)]
     numbers = sorted(values, key=lambda number: (number not in front, -scores[number], number))
     return Ranking(
         objectives,
@@ -75,6 +81,9 @@ def ranking_of(objectives: tuple[Objective, ...], records: Sequence[Record]) -> 
         tuple(n for n in numbers if n in front),
         tuple(values[n] for n in numbers),
         tuple(unranked),
+        tuple(tuple(map(bisect_left, columns, losses[n])) for n in numbers),
+        len(numbers),
+        len(front),
     )
 
 
@@ -94,7 +103,7 @@ def _scores(objectives: Sequence[Objective], losses: dict[int, tuple[float, ...]
 
     def score(row: tuple[float, ...]) -> float:
         parts = (1.0 - (x - low) / span if span else 1.0 for x, low, span in zip(row, lows, spans, strict=True))
-        return math.fsum(o.weight * part for o, part in zip(objectives, parts, strict=True)) / total
+        return round(math.fsum(o.weight * part for o, part in zip(objectives, parts, strict=True)) / total, DIGITS)
 
     return {number: score(row) for number, row in losses.items()}
 

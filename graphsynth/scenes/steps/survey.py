@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from base64 import b64decode, b64encode
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ from graphsynth.scenes.steps.survey_lattice import KINDS, TYPES, Ints, Lattice, 
 from graphsynth.scenes.steps.survey_motion import Moved, move
 from graphsynth.scenes.tables import suggest
 
-__all__ = ["QUANTITIES", "Evaluated", "Shard", "evaluate", "evaluate_sets", "front_of", "objectives_of", "shards"]
-__all__ += ["store"]
+__all__ = ["QUANTITIES", "Evaluated", "Shard", "evaluate", "evaluate_sets", "front_of", "losses_of", "objectives_of"]
+__all__ += ["shards", "store", "unpacked"]
 
 Array = NDArray[np.float64]
 
@@ -92,6 +93,13 @@ class Evaluated:
         }
         return found[name]
 
+    def rounded(self, name: str) -> Array:
+        """Return a margin to the 9 decimals by which sets are turned down, ranked and stored: rounding decides nothing.
+
+        What is 30 degrees but for rounding keeps a limit of 30 degrees, and what differs by rounding alone is a tie.
+        """
+        return np.round(self.quantity(name), 9)
+
 
 def shards(context: Context) -> Iterator[Shard]:
     """Cut the lattice into runs of sets; a shard depends on the scene and its number only."""
@@ -131,12 +139,19 @@ def evaluate_sets(context: Context, lattice: Lattice, sets: Ints) -> Evaluated:
     kind, types = classify(lengths)
     moved = move(lengths, table.positions)
     jamming = close_form(table, lengths)
-    passes = (kind == KINDS.index("full turn")) & np.isin(types, [TYPES.index(name) for name in table.limits.types])
-    passes &= np.degrees(moved.transmission) >= table.limits.transmission_deg  # NaN is not
-    if table.limits.free:
-        passes &= jamming.part == 0.0
     size = lengths.max(axis=1) / lattice.crank
-    return Evaluated(sets, lengths, kind, types, moved, jamming, size, passes)
+    done = Evaluated(sets, lengths, kind, types, moved, jamming, size, np.zeros(len(sets), dtype=np.bool_))
+    return replace(done, passes=np.all(list(_kept(table, done).values()), axis=0))
+
+
+def _kept(table: SurveyTable, done: Evaluated) -> dict[str, NDArray[np.bool_]]:
+    """Return which sets keep each limit, by the words that turn the others down, in the order of asking."""
+    return {
+        "the crank does not turn fully": done.kind == KINDS.index("full turn"),
+        f"not {' or '.join(table.limits.types)}": np.isin(done.type, [TYPES.index(t) for t in table.limits.types]),
+        "the transmission angle is too small": done.rounded("transmission angle") >= table.limits.transmission_deg,
+        "the bearing jams at the tilt of the scene": (done.jamming.part == 0.0) | (not table.limits.free),
+    }
 
 
 def evaluate(context: Context, shard: Shard) -> tuple[Evaluated, dict[str, Any]]:
@@ -151,7 +166,7 @@ def evaluate(context: Context, shard: Shard) -> tuple[Evaluated, dict[str, Any]]
         "classes": _classes(done),
         "turned down": _turned_down(table, done),
         "maps": _maps(lattice, done),
-        **_best(context, lattice, done),
+        **ranked_by(context, done),
     }
 
 
@@ -166,16 +181,11 @@ def _classes(done: Evaluated) -> list[list[int]]:
 
 def _turned_down(table: SurveyTable, done: Evaluated) -> dict[str, int]:
     """Count the sets that a limit turns down; each is counted at the first limit it misses."""
-    turns = done.kind == KINDS.index("full turn")
-    of_type = np.isin(done.type, [TYPES.index(name) for name in table.limits.types])
-    well = np.degrees(done.moved.transmission) >= table.limits.transmission_deg
-    jams = (done.jamming.part > 0.0) & table.limits.free
-    return {
-        "the crank does not turn fully": int(np.sum(~turns)),
-        f"not {' or '.join(table.limits.types)}": int(np.sum(turns & ~of_type)),
-        "the transmission angle is too small": int(np.sum(turns & of_type & ~well)),
-        "the bearing jams at the tilt of the scene": int(np.sum(turns & of_type & well & jams)),
-    }
+    left, found = np.ones(len(done.sets), dtype=np.bool_), {}
+    for words, kept in _kept(table, done).items():
+        found[words] = int(np.sum(left & ~kept))
+        left &= kept
+    return found
 
 
 def _maps(lattice: Lattice, done: Evaluated) -> dict[str, list[Any]]:
@@ -198,52 +208,42 @@ def _maps(lattice: Lattice, done: Evaluated) -> dict[str, list[Any]]:
     }
 
 
-def _best(context: Context, lattice: Lattice, done: Evaluated) -> dict[str, Any]:
-    """Keep the sets of this shard's Pareto front and its best ones by score, both among those that pass."""
+def ranked_by(context: Context, done: Evaluated) -> dict[str, Any]:
+    """Keep what the sets that pass are ranked by, and which of them are on the Pareto front of this shard."""
     passing = np.flatnonzero(done.passes)
-    losses, scores = losses_and_scores(context, lattice, done, passing)
-    front = np.sort(front_of(losses))
-    best = np.lexsort((done.sets[passing], scores))[: context.scene.mechanism.certify]
+    losses = losses_of(objectives_of(context), done, passing)
     return {
         "passing": len(passing),
-        "front": done.sets[passing[front]].tolist(),
-        "front losses": losses[front].tolist(),
-        "best": done.sets[passing[best]].tolist(),
-        "best scores": scores[best].tolist(),
+        "front": done.sets[passing[front_of(losses)]].tolist(),
+        "losses": packed(np.column_stack([done.sets[passing], losses])),
     }
 
 
-def losses_and_scores(
-    context: Context, lattice: Lattice, done: Evaluated, which: NDArray[np.intp]
-) -> tuple[Array, Array]:
-    """Return what is to be small, shape (n, objectives), and its weighted mean on scales that all shards share."""
-    objectives = objectives_of(context)
+def packed(rows: Array) -> str:
+    """Return rows of numbers as text, bit by bit, at 11 characters a number."""
+    return b64encode(rows.astype("<f8").tobytes()).decode()
+
+
+def unpacked(text: str, columns: int) -> Array:
+    """Return the rows of `packed`.
+
+    Examples
+    --------
+    >>> unpacked(packed(np.array([[1.0, 0.1]])), 2).tolist()
+    [[1.0, 0.1]]
+    """
+    return np.frombuffer(b64decode(text), dtype="<f8").reshape(-1, columns)
+
+
+def losses_of(objectives: tuple[Objective, ...], done: Evaluated, which: NDArray[np.intp]) -> Array:
+    """Return what is to be small, shape (n, objectives)."""
     losses = np.empty((len(which), len(objectives)))
+    sign = {"min": 1.0, "max": -1.0}
     for k, objective in enumerate(objectives):
-        values = done.quantity(objective.quantity)[which]
-        sign = {"min": 1.0, "max": -1.0}
-        goal = objective.goal
+        values, goal = done.rounded(objective.quantity)[which], objective.goal
         losses[:, k] = sign[goal] * values if isinstance(goal, str) else np.abs(values - goal)
     losses[~np.isfinite(losses)] = np.inf
-    scale = np.array([_scale(context, lattice, objective.quantity) for objective in objectives])
-    weights = np.array([objective.weight for objective in objectives])
-    return losses, losses @ (weights / scale) / weights.sum()
-
-
-def _scale(context: Context, lattice: Lattice, quantity: str) -> float:
-    """Return a span of a quantity that depends on the scene only."""
-    if quantity in ("transmission angle", "largest tilt"):
-        return 90.0
-    if quantity == "rocker swing":
-        return 360.0
-    if quantity == "jammed part":
-        return 1.0
-    if quantity == "size":
-        return max(r[-1] for r in (lattice.frame, lattice.coupler, lattice.rocker)) / lattice.crank
-    ends = np.array([[1, lattice.crank, end, 1] for end in (lattice.coupler[0], lattice.coupler[-1])])
-    found = close_form(context.scene.mechanism, ends)
-    values = np.degrees(found.axis_tilt) if quantity == "largest axis tilt" else found.clearance
-    return float(np.ptp(values)) or 1.0
+    return losses
 
 
 def front_of(losses: Array) -> NDArray[np.intp]:
@@ -297,5 +297,5 @@ def _column(done: Evaluated, name: str, unit: float) -> NDArray[Any]:
         return np.array(KINDS)[done.kind]
     if name == "passes":
         return done.passes.astype(np.int8)
-    values = done.quantity(name)
-    return np.where(np.isfinite(values), np.round(values, 9), math.nan)
+    values = done.rounded(name)
+    return np.where(np.isfinite(values), values, math.nan)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from graphsynth.scenes.products import Finding, Record, Table
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps import survey_results
+from graphsynth.scenes.steps.survey_order import edges_of
 from graphsynth.scenes.steps.survey_results import Certificate, Survey
 
 __all__ = ["findings", "judge"]
@@ -35,7 +36,21 @@ def findings(survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Fin
         found.append(Finding("of the best undecided", None, _number(proved[None])))
     if survey.failed:
         found.append(Finding("shards failed", False, _number(len(survey.failed))))
-    return (*found, _turned_down(survey), _motion(survey))
+    return (*found, *_edge(survey), _turned_down(survey), _motion(survey))
+
+
+def _edge(survey: Survey) -> list[Finding]:
+    """Warn if the best set is at the edge of the lattice."""
+    import numpy as np
+
+    if not survey.chosen:
+        return []
+    lengths = survey.lattice.lengths(np.array(survey.chosen[:1]))[0].tolist()
+    edges = edges_of(survey.lattice, lengths)
+    if not edges:
+        return []
+    words = f"The best set is on the edge of the lattice ({', '.join(edges)} of its range)"
+    return [Finding(f"{words}: better ones may lie beyond; widen the range.", False)]
 
 
 def _number(count: int) -> str:

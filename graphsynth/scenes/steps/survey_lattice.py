@@ -20,10 +20,11 @@ __all__ = ["KINDS", "LONGEST", "TYPES", "Lattice", "classify", "lattice_of"]
 Ints = NDArray[np.int64]
 
 #: Whether the crank turns, as `certify_four_bar` calls it; codes are places in this tuple.
-KINDS = ("full turn", "change point", "limited", "never assembled")
+KINDS = ("full turn", "change point", "limited", "never assembled", "immovable")
 #: Types by Grashof's rule, seen from the crank.
 TYPES = (
     "crank-rocker", "double crank", "rocker-crank", "double rocker", "change point", "triple rocker", "never assembled",
+    "immovable",
 )  # fmt: skip
 #: Lengths in units of the lattice: products of four stay exact, and margins stay clear of rounding.
 LONGEST = 20_000
@@ -127,21 +128,23 @@ def classify(lengths: Ints) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
     -------
     kind, type : ndarray of int8, shape (n,)
         Places in `KINDS` and `TYPES`.  The crank turns if its pin keeps a distance from the rocker's pivot that
-        coupler and rocker can span: ``|c - d| < |a - b|`` and ``a + b < c + d`` (Grashof, 1883).
+        coupler and rocker can span: ``|c - d| < |a - b|`` and ``a + b < c + d`` (Grashof, 1883).  Kind and type are
+        "immovable" if the longest link is as long as the others together: they can only lie stretched along it.
 
     Examples
     --------
-    >>> kind, type_ = classify(np.array([[4, 2, 5, 5], [4, 2, 3, 5], [4, 3, 2, 2], [1, 1, 1, 9]]))
+    >>> kind, type_ = classify(np.array([[4, 2, 5, 5], [4, 2, 3, 5], [4, 3, 2, 2], [1, 1, 1, 9], [3, 1, 1, 1]]))
     >>> [KINDS[k] for k in kind], [TYPES[k] for k in type_]
     ... # doctest: +NORMALIZE_WHITESPACE
-    (['full turn', 'change point', 'limited', 'never assembled'],
-     ['crank-rocker', 'change point', 'triple rocker', 'never assembled'])
+    (['full turn', 'change point', 'limited', 'never assembled', 'immovable'],
+     ['crank-rocker', 'change point', 'triple rocker', 'never assembled', 'immovable'])
     """
     g, a, b, c = lengths.T
     nearest, farthest, least, most = np.abs(g - a), g + a, np.abs(b - c), b + c
     kind = np.full(len(lengths), KINDS.index("limited"), dtype=np.int8)
     kind[(nearest >= least) & (farthest <= most)] = KINDS.index("change point")
     kind[(nearest > least) & (farthest < most)] = KINDS.index("full turn")
+    kind[(nearest == most) | (farthest == least)] = KINDS.index("immovable")
     kind[(nearest > most) | (farthest < least)] = KINDS.index("never assembled")
     ordered = np.sort(lengths, axis=1)
     s, p, q, longest = ordered.T
@@ -150,5 +153,6 @@ def classify(lengths: Ints) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
     types = np.array([TYPES.index(name) for name in names], dtype=np.int8)[place]
     types[s + longest > p + q] = TYPES.index("triple rocker")
     types[s + longest == p + q] = TYPES.index("change point")
+    types[longest == s + p + q] = TYPES.index("immovable")
     types[longest > s + p + q] = TYPES.index("never assembled")
     return kind, types

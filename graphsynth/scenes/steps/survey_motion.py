@@ -115,7 +115,11 @@ def _move(lengths: Ints, positions: int) -> Moved:
     kind[meets] = KINDS.index("change point")
     kind[(batch.reached > 0) & ~done] = KINDS.index("limited")
     left = np.flatnonzero(batch.reached == 0)
-    kind[left[_assembled_elsewhere(sizes[left])]] = KINDS.index("limited")
+    elsewhere, at_pi = _assembled_elsewhere(sizes[left])
+    kind[left[elsewhere]] = KINDS.index("limited")
+    begins = np.flatnonzero((batch.reached > 0) & ~done & (batch.margins[:, 0, 0] <= _MEETING))
+    for stretched, angle in ((begins, 0.0), (left[at_pi], math.pi)):
+        kind[stretched[~_assembled_beside(sizes[stretched], angle)]] = KINDS.index("immovable")
     g, a, b, c = lengths.T
     folded = np.flatnonzero((g == a) & (b == c))  # kites: at angle 0 the pin is on the pivot, the dyad is free to turn
     kind[folded[_assembled_between(sizes[folded], turn)]] = KINDS.index("change point")
@@ -126,8 +130,8 @@ def _move(lengths: Ints, positions: int) -> Moved:
     return Moved(kind, transmission, swing, int(batch.reached.sum()) + 2 * len(left))
 
 
-def _assembled_elsewhere(sizes: Array) -> NDArray[np.bool_]:
-    """Whether sets that cannot be assembled at crank angle 0 can be anywhere else.
+def _assembled_elsewhere(sizes: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether sets that cannot be assembled at crank angle 0 can be anywhere else; whether modes meet at pi.
 
     Tried are pi, and the angle at which coupler and rocker are at right angles: a crank that is assembled anywhere is
     assembled at one of the three.
@@ -135,15 +139,30 @@ def _assembled_elsewhere(sizes: Array) -> NDArray[np.bool_]:
     from graphsynth.kinematics.simulation import simulate_batch
 
     if not len(sizes):
-        return np.zeros(0, dtype=np.bool_)
+        return np.zeros(0, dtype=np.bool_), np.zeros(0, dtype=np.bool_)
     g, a, b, c = sizes.T
     square = np.clip((g * g + a * a - b * b - c * c) / (2.0 * g * a), -1.0, 1.0)
-    found = np.zeros(len(sizes), dtype=np.bool_)
-    for turned in (None, -np.arccos(square)):
-        start = [math.pi] if turned is None else [0.0]
-        batch = simulate_batch(four_bar(), start, _dimensions(sizes, turned), modes={0: 1}, rates=False, keep=[])
-        found |= batch.completed
-    return found
+    across = simulate_batch(
+        four_bar(), [0.0], _dimensions(sizes, -np.arccos(square)), modes={0: 1}, rates=False, keep=[]
+    )
+    ahead = simulate_batch(four_bar(), [math.pi], _dimensions(sizes), modes={0: 1}, rates=False, keep=[])
+    return across.completed | ahead.completed, ahead.completed & (ahead.margins[:, 0, 0] <= _MEETING)
+
+
+def _assembled_beside(sizes: Array, angle: float) -> NDArray[np.bool_]:
+    """Whether sets whose dyad is in line at a crank angle can be assembled beside it too.
+
+    Tried is an angle at which the pin comes nearer or goes farther by less than the dyad can give, if it can give at
+    all: ``g a (1 - cos) <= b c / 2``.
+    """
+    from graphsynth.kinematics.simulation import simulate_batch
+
+    if not len(sizes):
+        return np.zeros(0, dtype=np.bool_)
+    g, a, b, c = sizes.T
+    beside = np.minimum(0.5, np.sqrt(b * c / (g * a)))
+    turned = _dimensions(sizes, -(angle + beside))
+    return simulate_batch(four_bar(), [0.0], turned, modes={0: 1}, rates=False, keep=[]).completed
 
 
 def _assembled_between(sizes: Array, turn: Array) -> NDArray[np.bool_]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["animations", "maps", "sketches"]
 
 #: Colours of `TYPES`: cranks that turn are strong, the others pale, change points dark.
-_COLOURS = ("#0072B2", "#009E73", "#E8C37B", "#D9A0BE", "#333333", "#C9CFD6", "#F3F4F6")
+_COLOURS = ("#0072B2", "#009E73", "#E8C37B", "#D9A0BE", "#333333", "#C9CFD6", "#F3F4F6", "#7A1F1F")
 _SKETCHED, _ANIMATED = 6, 3
 
 
@@ -93,7 +93,8 @@ def _classes(context: Context, lattice: Lattice) -> Picture:
         loc="outside lower center", ncols=4, frameon=False, fontsize=9,
     )  # fmt: skip
     caption = (
-        "Grashof's classes, decided in whole numbers. Blue and green: the crank turns fully. Dark lines: change points."
+        "Grashof's classes, decided in whole numbers. Blue and green: the crank turns fully. Dark lines: change "
+        "points; red ones: immovable, they can only lie stretched."
     )
     return Picture("Classes", _svg(figure), caption, "wide")
 

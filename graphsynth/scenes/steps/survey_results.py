@@ -13,6 +13,7 @@ from graphsynth.scenes.families.survey import SurveyTable
 from graphsynth.scenes.products import Outcome, Quantity, Record, Table, exact
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.survey_lattice import KINDS, TYPES, Lattice, lattice_of
+from graphsynth.scenes.steps.survey_order import Order, order_of
 
 if TYPE_CHECKING:
     from graphsynth.jamming.parameters import ToleranceBox
@@ -36,10 +37,8 @@ class Survey:
     turned_down : dict of str to int
     maps : dict of str to list
         Columns by pair of frame and coupler.
-    front : tuple of int
-        Sets that pass and that no other set beats in every objective.
-    chosen : tuple of int
-        The best sets: the front, then by score.
+    order : Order
+        Of all sets that pass, as far as it is used.
     failed : tuple of str
         Shards that failed, with the reason.
     """
@@ -51,9 +50,18 @@ class Survey:
     classes: dict[tuple[int, int, int], int]
     turned_down: dict[str, int]
     maps: dict[str, list[Any]]
-    front: tuple[int, ...]
-    chosen: tuple[int, ...]
+    order: Order
     failed: tuple[str, ...]
+
+    @property
+    def front(self) -> tuple[int, ...]:
+        """Sets that pass and that no other set beats in every objective."""
+        return self.order.front
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """The best sets of all that pass, the best first; as many as are certified."""
+        return self.order.best
 
     @property
     def disagreements(self) -> int:
@@ -73,7 +81,6 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
         turned_down.update(shard["turned down"])
         for name, column in shard["maps"].items():
             maps.setdefault(name, []).extend(column)
-    front, chosen = _chosen(context.scene.mechanism.certify, done)
     return Survey(
         lattice_of(context),
         sum(shard["sets"] for shard in done),
@@ -82,27 +89,9 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
         dict(classes),
         dict(turned_down),
         maps,
-        front,
-        chosen,
+        order_of(context, done),
         tuple(f"{o.key}: {o.reason}" for o in outcomes if o.status == "failed"),
     )
-
-
-def _chosen(most: int, done: list[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the Pareto front of all shards, and the best `most` sets: of the front first, then by score."""
-    import numpy as np
-
-    from graphsynth.scenes.steps.survey import front_of
-
-    sets = np.array([number for shard in done for number in shard["front"]], dtype=np.int64)
-    if not len(sets):
-        return (), ()
-    losses = np.array([row for shard in done for row in shard["front losses"]])
-    front = sets[front_of(losses)].tolist()
-    scored = [pair for shard in done for pair in zip(shard["best scores"], shard["best"], strict=True)]
-    first = dict.fromkeys(front)
-    rest = [number for _, number in sorted(scored) if number not in first]
-    return tuple(front), tuple([*front, *rest][:most])
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ __all__ = ["CLASSES", "FourBarLengths", "four_bars"]
 
 #: Classes, seen from the crank.
 CLASSES = (
-    "crank-rocker", "rocker-crank", "double crank", "double rocker", "triple rocker", "change point", "never assembled",
+    "crank-rocker", "rocker-crank", "double crank", "double rocker", "triple rocker", "change point",
+    "immovable", "never assembled",
 )  # fmt: skip
 
 
@@ -26,7 +27,8 @@ class FourBarLengths:
         Positive.
     type : str
         One of ``CLASSES``: Grashof's rule with the shortest link, or "triple rocker" (not Grashof), "change point"
-        (equality), "never assembled" (the longest is not shorter than the others together).
+        (equality), "immovable" (the longest is as long as the others together: it can only lie stretched), "never
+        assembled" (it is longer).
     """
 
     ground: Fraction
@@ -53,7 +55,9 @@ def classify(ground: Fraction, crank: Fraction, coupler: Fraction, rocker: Fract
     shortest, longest, total = min(lengths), max(lengths), sum(lengths, Fraction(0))
     if 2 * longest > total:
         return "never assembled"
-    if 2 * (shortest + longest) == total or 2 * longest == total:
+    if 2 * longest == total:
+        return "immovable"
+    if 2 * (shortest + longest) == total:
         return "change point"
     if 2 * (shortest + longest) > total:
         return "triple rocker"
@@ -85,7 +89,8 @@ def _of_class(draw: st.DrawFn, kind: str, scale: int) -> FourBarLengths:
         lengths = list(draw(st.permutations((s, s + x, s + y, longest))))
     else:
         a, b, c = draw(part), draw(part), draw(part)
-        lengths = list(draw(st.permutations((a, b, c, a + b + c + draw(near)))))
+        more = 0 if kind == "immovable" else draw(near)
+        lengths = list(draw(st.permutations((a, b, c, a + b + c + more))))
     ground, crank, coupler, rocker = (Fraction(length, scale) for length in lengths)
     assume(classify(ground, crank, coupler, rocker) == kind)
     return FourBarLengths(ground, crank, coupler, rocker, kind)

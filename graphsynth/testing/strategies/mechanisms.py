@@ -109,13 +109,17 @@ def _four_bar_mechanisms(draw: st.DrawFn, types: tuple[str, ...]) -> tuple[Mecha
     return Mechanism(graph, joints, (Driver(0, 1),)), bar.type
 
 
+_BORDERLINE = ("change point", "immovable", "never assembled")
+
+
 def four_bar_mechanisms(*types: str) -> st.SearchStrategy[tuple[Mechanism, str]]:
     """Four-bars of `four_bars` as mechanisms for `simulate`, with their class.
 
     Parameters
     ----------
     *types : str
-        Classes; by default those whose class rounding of the lengths cannot change: all but "change point".
+        Classes; by default those whose class rounding of the lengths cannot change: all but "change point" and
+        "immovable".
 
     Returns
     -------
@@ -137,4 +141,4 @@ def four_bar_mechanisms(*types: str) -> st.SearchStrategy[tuple[Mechanism, str]]
     for kind in types:
         if kind not in CLASSES:
             raise SpecError(f"{kind!r} is no class of four-bars; use {', '.join(CLASSES)}")
-    return _four_bar_mechanisms(types or tuple(kind for kind in CLASSES[:-1] if kind != "change point"))
+    return _four_bar_mechanisms(types or tuple(kind for kind in CLASSES if kind not in _BORDERLINE))

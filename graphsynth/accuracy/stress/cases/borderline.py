@@ -74,6 +74,7 @@ def grashof(check: Checks) -> None:
             kind = certify_four_bar(10, 4, 3, 3 + sign * step).kind
             right = "never assembled" if sign < 0 else "limited"
             check.equals(f"10, 4, 3, 3 {'-+'[sign > 0]} 1e-{power}", kind, right, source="longest against the others")
+    check.equals("10, 4, 3, 3", certify_four_bar(10, 4, 3, 3).kind, "immovable", source="longest against the others")
 
 
 def near_fold(check: Checks) -> None:
