@@ -59,12 +59,7 @@ def _ends(values: list[tuple[Array, Array]]) -> tuple[Array, Array, Mask, Mask]:
 def _multiply(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
     """Product, with ``0 * inf = 0``."""
     lo, hi, below, above = _ends([rounding.multiply(a, b) for a in (al, ah) for b in (bl, bh)])
-    lo = down(lo, below & (np.abs(lo) >= rounding.PRODUCT_MIN))
-    hi = up(hi, above & (np.abs(hi) >= rounding.PRODUCT_MIN))
-    zero = ((al == 0.0) & (ah == 0.0)) | ((bl == 0.0) & (bh == 0.0))
-    lo = np.where((lo < 0.0) & (zero | ((al >= 0.0) & (bl >= 0.0)) | ((ah <= 0.0) & (bh <= 0.0))), 0.0, lo)
-    hi = np.where((hi > 0.0) & (zero | ((al >= 0.0) & (bh <= 0.0)) | ((ah <= 0.0) & (bl >= 0.0))), 0.0, hi)
-    return _masked(lo, hi, (al > ah) | (bl > bh))
+    return _masked(down(lo, below), up(hi, above), (al > ah) | (bl > bh))
 
 
 def _divide(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
@@ -88,24 +83,15 @@ def _divide(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
 
 
 def _divide_nonzero(al: Array, ah: Array, bl: Array, bh: Array) -> Bounds:
-    inner, outer = np.where(bl > 0.0, bl, -bh), np.where(bl > 0.0, bh, -bl)
-    safe = (inner >= rounding.DIVISOR_MIN) & (outer <= rounding.FACTOR_MAX)
     lo, hi, below, above = _ends([rounding.divide(a, b) for a in (al, ah) for b in (bl, bh)])
-    low, high = rounding.QUOTIENT_MIN, rounding.QUOTIENT_MAX
-    lo = down(lo, safe & below & (np.abs(lo) >= low) & (np.abs(lo) <= high))
-    hi = up(hi, safe & above & (np.abs(hi) >= low) & (np.abs(hi) <= high))
-    zero = (al == 0.0) & (ah == 0.0)
-    lo = np.where((lo < 0.0) & (zero | ((al >= 0.0) & (bl > 0.0)) | ((ah <= 0.0) & (bh < 0.0))), 0.0, lo)
-    hi = np.where((hi > 0.0) & (zero | ((al >= 0.0) & (bh < 0.0)) | ((ah <= 0.0) & (bl > 0.0))), 0.0, hi)
-    return _masked(lo, hi, (al > ah) | (bl > bh))
+    return _masked(down(lo, below), up(hi, above), (al > ah) | (bl > bh))
 
 
 def _one_product(a: Array, b: Array) -> Bounds:
     """Lower and upper bound of the product of two numbers that are not negative."""
     p, e = rounding.multiply(a, b)
     zero = (a == 0.0) | (b == 0.0)
-    safe = p >= rounding.PRODUCT_MIN
-    return np.maximum(down(p, zero | (safe & (e >= 0.0))), 0.0), up(p, zero | (safe & (e <= 0.0)))
+    return down(p, zero | (e >= 0.0)), up(p, zero | (e <= 0.0))
 
 
 def absolute(al: Array, ah: Array) -> Bounds:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.intervals.rounding import ETA, MAX, PHI, PRODUCT_MIN, SPLIT, SPLIT_MAX
+from graphsynth.intervals.rounding import MAX, PRODUCT_MIN, SPLIT, SPLIT_MAX
 
 __all__ = ["BLOCK", "add", "in_blocks", "multiply", "subtract"]
 
@@ -48,15 +48,16 @@ class _Room:
         return self.floats[:, :count], self.masks[:, :count]
 
 
-def _move(x: Array, wrong: Mask, outward: float, size: Array) -> None:
-    """Move ``x`` one step outward where it is wrong; ``size`` holds its absolute value and is destroyed."""
-    np.multiply(size, PHI, out=size)
-    np.add(size, ETA, out=size)
-    np.multiply(size, wrong, out=size)
-    (np.add if outward > 0.0 else np.subtract)(x, size, out=x)
+def _move(x: Array, wrong: Mask, outward: int, room: Array) -> None:
+    """Move ``x`` to its neighbour outward where it is wrong: one unit of its bit pattern; not for zeros."""
+    bits, step = x.view(np.int64), room.view(np.int64)
+    np.right_shift(bits, 63, out=step)  # -1 for negative numbers, whose patterns ascend downward
+    np.bitwise_or(step, 1, out=step)
+    np.multiply(step, wrong, out=step)
+    (np.add if outward > 0 else np.subtract)(bits, step, out=bits)
 
 
-def _one_end(a: Array, b: Array, out: Array, floats: Array, wrong: Mask, outward: float) -> bool:
+def _one_end(a: Array, b: Array, out: Array, floats: Array, wrong: Mask, outward: int) -> bool:
     """One end of a sum (two-sum of Knuth); False where the block needs the complete form."""
     t, u = floats
     np.add(a, b, out=out)
@@ -66,7 +67,7 @@ def _one_end(a: Array, b: Array, out: Array, floats: Array, wrong: Mask, outward
     np.subtract(b, t, out=t)
     np.add(t, u, out=u)
     np.abs(out, out=t)
-    if outward > 0.0:
+    if outward > 0:
         np.greater(u, 0.0, out=wrong)
     else:
         np.less(u, 0.0, out=wrong)
@@ -83,8 +84,8 @@ def _sum(al: Array, ah: Array, b_low: Array, b_high: Array, again: Callable[[sli
         part = slice(start, start + BLOCK)
         floats, masks = room.of(len(al[part]))
         if not (
-            _one_end(al[part], b_low[part], lo[part], floats, masks[0], -1.0)
-            and _one_end(ah[part], b_high[part], hi[part], floats, masks[0], 1.0)
+            _one_end(al[part], b_low[part], lo[part], floats, masks[0], -1)
+            and _one_end(ah[part], b_high[part], hi[part], floats, masks[0], 1)
         ):
             lo[part], hi[part] = again(part)
     return lo, hi
@@ -143,7 +144,7 @@ def _product(operands: list[Array], lo: Array, hi: Array, floats: Array, masks: 
             np.logical_and(m, compare(e, 0.0, out=k), out=m)
             np.logical_or(wrong, m, out=wrong)
     odd = _vanished(products, [(operands[i], operands[j]) for i, j in pairs])
-    for end, wrong, outward in ((lo, below, -1.0), (hi, above, 1.0)):
+    for end, wrong, outward in ((lo, below, -1), (hi, above, 1)):
         np.abs(end, out=t)
         if not (t.min() >= PRODUCT_MIN and t.max() <= MAX):
             odd |= ~((t >= PRODUCT_MIN) & (t <= MAX) | (t == 0.0))

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.dual import Dual
+from graphsynth.intervals.guard import check_quickly
 from graphsynth.intervals.interval import Interval, _clipped, _make, interval
-from graphsynth.intervals.operations import flat_of
+from graphsynth.intervals.operations import common_shape, flat_of
 from graphsynth.intervals.reading import DISCONTINUOUS
 
 __all__ = [
@@ -29,8 +30,9 @@ def _apply(name: str, *arguments: Interval) -> Interval:
     """Run a compiled loop over broadcast arguments; decorations of all are joined."""
     from graphsynth.intervals.kernels import elementary
 
+    check_quickly()
     sides = [side for a in arguments for side in (a.lo, a.hi)]
-    shape = sides[0].shape if len(arguments) == 1 else np.broadcast(*sides).shape
+    shape = common_shape(*sides)
     lo, hi = np.empty(shape), np.empty(shape)
     getattr(elementary, name)(*[flat_of(a, shape) for a in sides], lo.reshape(-1), hi.reshape(-1))
     flags = arguments[0].flags

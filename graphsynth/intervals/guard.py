@@ -3,7 +3,8 @@
 Every bound of this package comes from operations rounded to nearest, with gradual underflow.  Other libraries in the
 same process may have left the processor rounding upward (codac does) or flushing tiny numbers to zero (shared
 libraries linked with ``-ffast-math`` do).  Bounds would then be silently wrong, so `check_rounding` runs when the
-package is imported and at the start of every public solve.  Specification: section 11.1, item 1.
+package is imported and at the start of every public solve, and `check_quickly` in every operation on an `Interval`.
+Specification: section 11.1, item 1.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 
 from graphsynth.errors import GraphsynthError
 
-__all__ = ["check_rounding", "rounding_faults"]
+__all__ = ["check_quickly", "check_rounding", "rounding_faults"]
 
 _U = 2.0**-53
 # run-time values in arrays: neither the byte-code compiler nor a C compiler can fold the sums below
@@ -22,6 +23,8 @@ _SUM = (1.0, -1.0, 1.0, 1.0 + 4.0 * _U, -1.0 - 4.0 * _U)
 _TINY = np.array([5e-324, 2.0**-1022, 2.0**-537])
 _FACTOR = np.array([1.0, 0.5, 2.0**-537])
 _PRODUCT_BITS = (1, 1 << 51, 1)
+# global names, so that no compiler folds the sums: one differs downward and to zero, the other upward and to zero
+_ONE, _PART, _NEXT, _LEAST = 1.0, 1.5 * _U, 1.0 + 2.0 * _U, 2.0**-1022
 
 
 def rounding_faults() -> list[str]:
@@ -65,3 +68,14 @@ def check_rounding() -> None:
             "nearest with subnormal numbers is required; another library has changed the floating-point mode: "
             "use it in a process of its own, or restore the default mode"
         )
+
+
+def check_quickly() -> None:
+    """Do what `check_rounding` does, in a tenth of a microsecond where all is well.
+
+    Raises
+    ------
+    GraphsynthError
+    """
+    if _ONE + _PART != _NEXT or -_ONE - _PART != -_NEXT or _LEAST * 0.5 == 0.0:
+        check_rounding()

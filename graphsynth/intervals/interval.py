@@ -64,9 +64,10 @@ class Interval(Measures):
 
     Notes
     -----
-    Guarantee: certified.  + - * / and the square root give the tightest bounds for ordinary magnitudes, at most one
-    step more elsewhere; elementary functions at most one or two steps more.  Source: specification section 11; Rump,
-    Zimmermann, Boldo, Melquiond (2009); proofs in ``docs/explanation/intervals.md``.
+    Guarantee: certified.  + - * /, squares and square roots give the tightest bounds for operands of any size;
+    elementary functions at most one or two steps more; a power n at most 2 n steps more.  Every operation checks that
+    the processor rounds to nearest.  Source: specification section 11; Dekker (1971); Rump, Zimmermann, Boldo,
+    Melquiond (2009); proofs in ``docs/explanation/intervals.md``.
 
     Examples
     --------
@@ -194,21 +195,27 @@ class Interval(Measures):
         product: Interval = self * other
         return product.sum(-1)
 
+    def _beside(self, other: Any) -> Interval:
+        """Read the other operand; its shape must fit."""
+        read: Interval = interval(other)
+        operations.common_shape(self.lo, read.lo)
+        return read
+
     # -- comparisons: certain for all points, or possible for some ---------------------------------------------------
 
     def certainly_less(self, other: Any) -> Mask:
         """Whether every point lies below every point of the other; true for an empty one."""
-        other = interval(other)
+        other = self._beside(other)
         return np.asarray((self.hi < other.lo) | self.is_empty | other.is_empty)
 
     def certainly_less_equal(self, other: Any) -> Mask:
         """Whether no point lies above a point of the other; true for an empty one."""
-        other = interval(other)
+        other = self._beside(other)
         return np.asarray((self.hi <= other.lo) | self.is_empty | other.is_empty)
 
     def possibly_less(self, other: Any) -> Mask:
         """Whether some point lies below some point of the other."""
-        other = interval(other)
+        other = self._beside(other)
         return np.asarray((self.lo < other.hi) & ~self.is_empty & ~other.is_empty)
 
     def possibly_equal(self, other: Any) -> Mask:
@@ -217,12 +224,12 @@ class Interval(Measures):
 
     def subset(self, other: Any) -> Mask:
         """Whether inside the other; the empty one always is."""
-        other = interval(other)
+        other = self._beside(other)
         return np.asarray(self.is_empty | ((other.lo <= self.lo) & (self.hi <= other.hi)))
 
     def interior(self, other: Any) -> Mask:
         """Whether inside the interior of the other, in the topology of the line."""
-        other = interval(other)
+        other = self._beside(other)
         left = (other.lo < self.lo) | ((other.lo == -np.inf) & (self.lo == -np.inf))
         right = (self.hi < other.hi) | ((other.hi == np.inf) & (self.hi == np.inf))
         return np.asarray(self.is_empty | (left & right))
@@ -233,21 +240,21 @@ class Interval(Measures):
 
     def equal(self, other: Any) -> Mask:
         """Whether the bounds are the same."""
-        other = interval(other)
+        other = self._beside(other)
         return np.asarray((self.lo == other.lo) & (self.hi == other.hi))
 
     # -- sets ------------------------------------------------------------------------------------------------------
 
     def intersect(self, other: Any) -> Interval:
         """Return the common part."""
-        other = interval(other)
+        other = self._beside(other)
         lo, hi = np.maximum(self.lo, other.lo), np.minimum(self.hi, other.hi)
         void = lo > hi
         return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), _both(self.flags, other.flags))
 
     def hull(self, other: Any) -> Interval:
         """Return the smallest interval around both."""
-        other = interval(other)
+        other = self._beside(other)
         return _make(np.minimum(self.lo, other.lo), np.maximum(self.hi, other.hi), _both(self.flags, other.flags))
 
     def inflate(self, relative: float = 0.1, absolute: float = 0.0) -> Interval:
@@ -258,8 +265,11 @@ class Interval(Measures):
         return _make((self - grow).lo, (self + grow).hi, self.flags)
 
     def bisect(self) -> tuple[Interval, Interval]:
-        """Cut at the midpoint; both halves hold it."""
-        return _make(self.lo, self.mid, self.flags), _make(self.mid, self.hi, self.flags)
+        """Cut at the midpoint; both halves hold it, those of the empty set are empty."""
+        mid = self.mid
+        void = self.is_empty
+        low, high = np.where(void, -np.inf, mid), np.where(void, np.inf, mid)
+        return _make(self.lo, low, self.flags), _make(high, self.hi, self.flags)
 
     # -- arithmetic ------------------------------------------------------------------------------------------------
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.errors import FormatError
 from graphsynth.intervals import operations
 from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, fraction
 
@@ -59,11 +63,11 @@ class Measures:
 
     @property
     def mid(self) -> Array:
-        """Midpoint rounded, always inside; 0 for the whole line, the largest number for a half line, NaN for empty."""
+        """Midpoint rounded, always inside; 0 for the line, the largest number of its sign for a half line, NaN for empty."""
         big = float(np.finfo(np.float64).max)
         with np.errstate(all="ignore"):
-            lo, hi = np.maximum(self.lo, -big), np.minimum(self.hi, big)
-            middle = np.where(lo == -hi, 0.0, 0.5 * lo + 0.5 * hi)
+            middle = np.where(self.lo == -np.inf, -big, np.where(self.hi == np.inf, big, 0.5 * self.lo + 0.5 * self.hi))
+            middle = np.where((self.lo == -np.inf) & (self.hi == np.inf), 0.0, middle)
             middle = np.where(self.is_empty, np.nan, np.minimum(np.maximum(middle, self.lo), self.hi))
         return np.asarray(middle)
 
@@ -99,19 +103,54 @@ class Measures:
     def contains(self, point: Any) -> Any:
         """Whether a number lies inside, exactly decided; text and fractions for one interval, floats for arrays.
 
+        An infinity is no number and lies in no interval.
+
+        Raises
+        ------
+        FormatError
+            For anything that is no number.
+        IntervalError
+            For an array of another shape.
+
         Examples
         --------
         >>> from graphsynth.intervals import Interval
-        >>> Interval("1/30").contains("1/30")
-        True
+        >>> Interval("1/30").contains("1/30"), Interval.entire().contains(float("inf"))
+        (True, False)
         """
-        if isinstance(point, np.ndarray):
-            return np.asarray((self.lo <= point) & (point <= self.hi))
-        from fractions import Fraction
-
-        value = point if isinstance(point, float) else fraction(point) if isinstance(point, str) else Fraction(point)
         lo, hi = self.lo, self.hi
-        if self.ndim == 0:
-            return bool(float(lo) <= value <= float(hi))
+        if isinstance(point, np.ndarray) and point.ndim and point.dtype.kind in "fiu":
+            operations.common_shape(lo, point)
+            if point.dtype.kind in "iu":
+                point = _exact_floats(point)
+            return np.asarray((lo <= point) & (point <= hi) & np.isfinite(point))
+        value = _number(point)
+        if value is None:
+            return False if self.ndim == 0 else np.zeros(self.shape, dtype=np.bool_)
         inside = [a <= value <= b for a, b in zip(lo.ravel().tolist(), hi.ravel().tolist())]
-        return np.array(inside, dtype=np.bool_).reshape(self.shape)
+        return inside[0] if self.ndim == 0 else np.array(inside, dtype=np.bool_).reshape(self.shape)
+
+
+def _exact_floats(whole: NDArray[Any]) -> Array:
+    floats = whole.astype(np.float64)
+    if (np.abs(floats) > 2.0**53).any():
+        raise FormatError("an array of whole numbers beyond 2^53 is not one of floats; ask number by number")
+    return floats
+
+
+def _number(point: Any) -> Fraction | float | None:
+    """Return an exact number, None for an infinity or NaN; `FormatError` for anything else."""
+    point = point[()] if isinstance(point, np.ndarray) and point.ndim == 0 else point
+    if isinstance(point, str):
+        return fraction(point)
+    if isinstance(point, float):
+        return point if math.isfinite(point) else None
+    if (isinstance(point, Decimal) and not point.is_finite()) or (
+        isinstance(point, np.floating) and not np.isfinite(point)
+    ):
+        return None
+    if isinstance(point, np.floating):
+        return Fraction(*point.as_integer_ratio())
+    if isinstance(point, int | np.integer | Fraction | Decimal) and not isinstance(point, bool):
+        return Fraction(int(point) if isinstance(point, np.integer) else point)
+    raise FormatError(f"{point!r} is not a number; give a number, a Fraction, a Decimal, text or an array of floats")

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.errors import IntervalError
 from graphsynth.intervals import arrays
+from graphsynth.intervals.guard import check_quickly
 
-__all__ = ["binary", "flat_of", "power", "unary"]
+__all__ = ["binary", "common_shape", "flat_of", "power", "unary"]
 
 Array = NDArray[np.float64]
 
@@ -32,12 +34,22 @@ def _loops(size: int) -> Any:
     return loaded
 
 
-def _run(name: str, operands: tuple[Array, ...], extra: tuple[int, ...] = ()) -> tuple[Array, Array]:
+def common_shape(*operands: Array) -> tuple[int, ...]:
+    """Return the shape to which arrays spread; `IntervalError` if there is none."""
     shape = operands[0].shape
     for a in operands:
         if a.shape != shape:
-            shape = np.broadcast(*operands).shape
-            break
+            try:
+                return np.broadcast(*operands).shape
+            except ValueError:
+                shapes = " and ".join(str(shape) for shape in dict.fromkeys(a.shape for a in operands))
+                raise IntervalError(f"shapes {shapes} do not fit; give equal shapes, or axes of length 1") from None
+    return shape
+
+
+def _run(name: str, operands: tuple[Array, ...], extra: tuple[int, ...] = ()) -> tuple[Array, Array]:
+    check_quickly()
+    shape = common_shape(*operands)
     loops = _loops(math.prod(shape))
     if loops is None:
         with np.errstate(all="ignore"):

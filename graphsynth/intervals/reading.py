@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import FormatError, IntervalError
+from graphsynth.intervals.guard import check_quickly
 
 __all__ = [
     "CLIPPED",
@@ -63,6 +64,7 @@ def lower_bound(value: Fraction) -> float:
     >>> lower_bound(Fraction(1, 10)) < Fraction(1, 10) < upper_bound(Fraction(1, 10))
     True
     """
+    check_quickly()
     try:
         nearest = float(value)
     except OverflowError:

@@ -305,3 +305,23 @@ def test_constants_against_mpmath():
     assert math.nextafter(constants.PI[0], 4.0) == constants.PI[1]
     assert math.floor(math.log(2.0) * 2**40) == exponential._TOP * 2**40
     assert trigonometry._WORDS.tolist() == words
+
+
+@pytest.mark.parametrize(
+    ("y", "x", "lo", "hi"),
+    [
+        ((0, 0), (0, 1), 0.0, 0.0),
+        ((0, 0), (2, 3), 0.0, 0.0),
+        ((0, 0), (-1, 0), 3.141592653589793, 3.1415926535897936),
+        ((0, 0), (-1, 1), 0.0, 3.1415926535897936),
+        ((0, 1), (0, 0), 1.5707963267948966, 1.5707963267948968),
+        ((-1, 0), (0, 0), -1.5707963267948968, -1.5707963267948966),
+        ((0, 1), (0, 1), 0.0, 1.5707963267948968),
+        ((-1, 0), (0, 1), -1.5707963267948968, 0.0),
+        ((0, 0), (0, 0), math.inf, -math.inf),
+    ],
+)
+def test_angles_of_boxes_beside_the_origin(y, x, lo, hi):
+    """The origin has no angle; what is left of the box has exactly these."""
+    found = atan2(Interval(*y), Interval(*x))
+    assert (float(found.lo), float(found.hi)) == (lo, hi)

@@ -87,6 +87,50 @@ except GraphsynthError as error:
     assert run(code).strip().endswith("refused")
 
 
+@needs_control_word
+def test_a_changed_mode_is_refused_in_every_operation():
+    """One interval, some in numpy, many compiled: no operation makes bounds that exclude the exact result."""
+    changes = [UPWARD, UPWARD.replace("0x800", "0x400"), UPWARD.replace("0x800", "0xc00")]
+    changes += [textwrap.dedent(FLUSH.format(bits=bits)).strip() for bits in ("0x8040", "0x8000", "0x40")]
+    code = f"""
+import ctypes
+import numpy as np
+import graphsynth.intervals as gi
+from graphsynth.errors import GraphsynthError
+from graphsynth.intervals import Interval
+many = np.linspace(1.0, 2.0, 6000)
+one, some, all_of = Interval("0.1"), Interval(["0.1", "0.3"]), Interval.from_bounds(many, many + 1.0)
+dual = gi.variables(some)[0]
+gi.sin(one)
+operations = [
+    lambda x: x + x, lambda x: x - 1, lambda x: 1 - x, lambda x: x * x, lambda x: 3 * x, lambda x: x / 3,
+    lambda x: 1 / x, lambda x: x**3, lambda x: x**-2, lambda x: x.sqr(), lambda x: x.sqrt(), lambda x: x.sum(),
+    lambda x: x.reshape(-1).dot(x.reshape(-1)), lambda x: x.inflate(), lambda x: x.width, lambda x: x.rad,
+    gi.sin, gi.cos, gi.tan, gi.atan, gi.exp, gi.log, gi.sqrt, gi.sqr, gi.asin, gi.acos,
+    lambda x: gi.atan2(x, x), lambda x: gi.hypot(x, x), lambda x: gi.divide_extended(x, x), lambda x: Interval("0.1"),
+    lambda x: Interval.midrad("0.1", "0.2"), lambda x: Interval("0.1", "0.2"), lambda x: dual * dual,
+]
+library = ctypes.CDLL("libm.so.6")
+plain = (ctypes.c_uint32 * 8)()
+library.fegetenv(plain)
+for change in {changes!r}:
+    exec(change)
+    missed = []
+    for k, operation in enumerate(operations):
+        for operand in (one, some, all_of):
+            try:
+                operation(operand)
+            except GraphsynthError:
+                continue
+            missed.append(k)
+    library.fesetenv(plain)
+    assert not missed, (change, missed)
+assert (one + one).contains("0.2")
+print("refused")
+"""
+    assert run(code).strip().endswith("refused")
+
+
 def test_the_message_names_the_remedy(monkeypatch):
     from graphsynth.intervals import guard
 

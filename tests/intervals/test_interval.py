@@ -191,3 +191,54 @@ def test_exponents_with_underscores_do_not_hang():
         Interval("1e9_999_999_999")
     with pytest.raises(FormatError, match="not a number"):
         Interval("1e+_9")
+
+
+def test_halves_of_the_empty_set_are_empty():
+    left, right = Interval.empty(2).bisect()
+    assert left.is_empty.all() and right.is_empty.all()
+    mixed = Interval.from_bounds([INF, 0.0], [-INF, 2.0]).bisect()
+    assert [half.is_empty.tolist() for half in mixed] == [[True, False]] * 2
+    assert mixed[0][1].equal(Interval(0, 1)) and mixed[1][1].equal(Interval(1, 2))
+
+
+def test_an_infinity_is_no_number_of_any_interval():
+    for x in (Interval.entire(), Interval(0, INF), Interval(-INF, 0)):
+        for point in (INF, -INF, math.nan, np.float64(INF), np.float32(-INF), Decimal("inf"), Decimal("nan")):
+            assert x.contains(point) is False
+    both = Interval.entire(2)
+    assert both.contains(np.array([INF, 1.0])).tolist() == [False, True]
+    assert both.contains(-INF).tolist() == [False, False]
+    assert both.contains(np.array([1, 2])).tolist() == [True, True]
+    assert Interval(1, 2).contains(np.array(1.5)) and Interval(1, 2).contains(np.int64(2))
+
+
+def test_midpoints_of_half_lines():
+    largest = float(np.finfo(np.float64).max)
+    assert Interval(0, INF).mid == largest and Interval(-INF, 5).mid == -largest
+    assert Interval.entire().mid == 0.0 and np.isnan(Interval.empty().mid)
+    assert Interval(largest, INF).mid == largest and Interval(-largest, largest).mid == 0.0
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "word"),
+    [
+        (lambda x: x.contains(None), FormatError, "None is not a number"),
+        (lambda x: x.contains([1.0]), FormatError, "not a number"),
+        (lambda x: x.contains("one"), FormatError, "not a number"),
+        (lambda x: x.contains(True), FormatError, "not a number"),
+        (lambda x: x.contains(np.array(["a", "b"])), FormatError, "not a number"),
+        (lambda x: x.contains(np.zeros(3)), IntervalError, "do not fit"),
+        (lambda x: x.contains(np.array([2**60, 1])), FormatError, "number by number"),
+        (lambda x: x + Interval([1, 2, 3]), IntervalError, "do not fit"),
+        (lambda x: x * np.zeros(3), IntervalError, "do not fit"),
+        (lambda x: x.hull([1, 2, 3]), IntervalError, "do not fit"),
+        (lambda x: x.intersect(Interval([1, 2, 3])), IntervalError, "do not fit"),
+        (lambda x: x.certainly_less([1, 2, 3]), IntervalError, "do not fit"),
+        (lambda x: x.subset(Interval([1, 2, 3])), IntervalError, "do not fit"),
+        (lambda x: x + None, FormatError, "NoneType"),
+        (lambda x: x.hull(None), FormatError, "NoneType"),
+    ],
+)
+def test_a_wrong_operand_gets_a_sentence(make, error, word):
+    with pytest.raises(error, match=word):
+        make(Interval([1, 2]))

@@ -6,7 +6,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mpf
 
@@ -228,6 +228,7 @@ ratio = st.floats(0.0, 1.0)
 )
 def test_ranges_hold_all_their_points(R, c, h, S, spread, seed):
     """Ranges of all parameters at once against the double-precision closed forms at random points inside."""
+    assume(h == 0.0 or h > 1e-50)  # smaller sizes are refused by `Bearing`
     rng = np.random.default_rng(seed)
     boxes = {"R": (R, R * (1 + 0.01 * spread)), "c": (c, c * (1 + spread)), "h": (h, h * (1 + spread)),
              "S": (S, min(S * (1 + spread), 1.0))}  # fmt: skip

@@ -15,6 +15,7 @@ from graphsynth.intervals.kernels.rounding import (
     add_up,
     divide_both,
     down,
+    excess,
     fma,
     multiply_both,
     root_down,
@@ -97,13 +98,9 @@ def multiply_any(al, ah, bl, bh):
     s = 0.0 if s != s else s
     lo = p if p < q else q
     hi = r if r > s else s
-    below = (fma(al, u, -lo) < 0.0) | (fma(ah, w, -lo) < 0.0)
-    above = (fma(al, v, -hi) > 0.0) | (fma(ah, z, -hi) > 0.0)
-    lo = down(lo, (not below) & (abs(lo) >= PRODUCT_MIN))
-    hi = up(hi, (not above) & (abs(hi) >= PRODUCT_MIN))
-    zero = ((al == 0.0) & (ah == 0.0)) | ((bl == 0.0) & (bh == 0.0))
-    lo = 0.0 if (lo < 0.0) & (zero | ((al >= 0.0) & (bl >= 0.0)) | ((ah <= 0.0) & (bh <= 0.0))) else lo
-    hi = 0.0 if (hi > 0.0) & (zero | ((al >= 0.0) & (bh <= 0.0)) | ((ah <= 0.0) & (bl >= 0.0))) else hi
+    below = (excess(al, u, lo) < 0.0) | (excess(ah, w, lo) < 0.0)
+    above = (excess(al, v, hi) > 0.0) | (excess(ah, z, hi) > 0.0)
+    lo, hi = down(lo, not below), up(hi, not above)
     void = (al > ah) | (bl > bh)
     return INF if void else lo, -INF if void else hi
 
@@ -127,27 +124,35 @@ def scale(a, bl, bh):
 
 
 @kernel(forceinline=True)
-def divide_nonzero(al, ah, bl, bh):
-    """Quotient by a divisor without 0; without branches."""
+def divide_plain(al, ah, bl, bh):
+    """Quotient of intervals of ordinary size; the lower bound is NaN where `divide_any` must be asked."""
     q1, q2, q3, q4 = al / bl, al / bh, ah / bl, ah / bh
     r1, r2, r3, r4 = fma(-q1, bl, al), fma(-q2, bh, al), fma(-q3, bl, ah), fma(-q4, bh, ah)
     sign = 1.0 if bl > 0.0 else -1.0
     r1, r2, r3, r4 = r1 * sign, r2 * sign, r3 * sign, r4 * sign
-    q1 = 0.0 if q1 != q1 else q1
-    q2 = 0.0 if q2 != q2 else q2
-    q3 = 0.0 if q3 != q3 else q3
-    q4 = 0.0 if q4 != q4 else q4
     lo, hi, below, above = ends_of_four(q1, q2, q3, q4, r1, r2, r3, r4)
     inner = bl if bl > 0.0 else -bh
     outer = bh if bl > 0.0 else -bl
-    safe = (inner >= DIVISOR_MIN) & (outer <= FACTOR_MAX)
-    lo = down(lo, safe & below & (abs(lo) >= QUOTIENT_MIN) & (abs(lo) <= QUOTIENT_MAX))
-    hi = up(hi, safe & above & (abs(hi) >= QUOTIENT_MIN) & (abs(hi) <= QUOTIENT_MAX))
-    zero = (al == 0.0) & (ah == 0.0)
-    lo = 0.0 if (lo < 0.0) & (zero | ((al >= 0.0) & (bl > 0.0)) | ((ah <= 0.0) & (bh < 0.0))) else lo
-    hi = 0.0 if (hi > 0.0) & (zero | ((al >= 0.0) & (bh < 0.0)) | ((ah <= 0.0) & (bl > 0.0))) else hi
-    void = (al > ah) | (bl > bh)
-    return INF if void else lo, -INF if void else hi
+    small, large = abs(lo), abs(hi)
+    # a quotient of 0 leaves the numerator as its remainder; empty and unbounded operands are beyond the limits
+    safe = (inner >= DIVISOR_MIN) & (outer <= FACTOR_MAX) & (al <= ah) & (bl <= bh)
+    safe &= ((small >= QUOTIENT_MIN) & (small <= QUOTIENT_MAX)) | (small == 0.0)
+    safe &= ((large >= QUOTIENT_MIN) & (large <= QUOTIENT_MAX)) | (large == 0.0)
+    return down(lo, below) if safe else NAN, up(hi, above)
+
+
+@kernel
+def divide_any(al, ah, bl, bh):
+    """Quotients of any intervals by the nonzero part of the divisor."""
+    if bl <= 0.0 <= bh:
+        return divide_zero(al, ah, bl, bh)
+    if al > ah or bl > bh:
+        return INF, -INF
+    l1, u1 = divide_both(al, bl)
+    l2, u2 = divide_both(al, bh)
+    l3, u3 = divide_both(ah, bl)
+    l4, u4 = divide_both(ah, bh)
+    return min(min(l1, l2), min(l3, l4)), max(max(u1, u2), max(u3, u4))
 
 
 @kernel
@@ -161,11 +166,11 @@ def divide_zero(al, ah, bl, bh):
         return -INF, INF
     if bl == 0.0:
         if al >= 0.0:
-            return max(divide_both(al, bh)[0], 0.0), INF
-        return -INF, min(divide_both(ah, bh)[1], 0.0)
+            return divide_both(al, bh)[0], INF
+        return -INF, divide_both(ah, bh)[1]
     if al >= 0.0:
-        return -INF, min(divide_both(al, bl)[1], 0.0)
-    return max(divide_both(ah, bl)[0], 0.0), INF
+        return -INF, divide_both(al, bl)[1]
+    return divide_both(ah, bl)[0], INF
 
 
 @kernel(forceinline=True)
@@ -173,7 +178,10 @@ def divide(al, ah, bl, bh):
     """Quotients by the nonzero part of the divisor."""
     if bl <= 0.0 <= bh:
         return divide_zero(al, ah, bl, bh)
-    return divide_nonzero(al, ah, bl, bh)
+    lo, hi = divide_plain(al, ah, bl, bh)
+    if lo != lo:
+        return divide_any(al, ah, bl, bh)
+    return lo, hi
 
 
 @kernel(forceinline=True)
@@ -184,7 +192,6 @@ def square(al, ah):
     mag = -al if -al > ah else ah
     lo = multiply_both(mig, mig)[0]
     hi = multiply_both(mag, mag)[1]
-    lo = 0.0 if lo < 0.0 else lo
     return INF if void else lo, -INF if void else hi
 
 
@@ -210,11 +217,11 @@ def power_down(x, n):
     result, factor = 1.0, x
     while True:
         if n & 1:
-            result = max(multiply_both(result, factor)[0], 0.0)
+            result = multiply_both(result, factor)[0]
         n >>= 1
         if n == 0:
             return result
-        factor = max(multiply_both(factor, factor)[0], 0.0)
+        factor = multiply_both(factor, factor)[0]
 
 
 @kernel

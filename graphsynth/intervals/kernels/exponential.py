@@ -14,9 +14,11 @@ from graphsynth.intervals.kernels.rounding import (
     MAX,
     add_down,
     add_up,
+    fma,
     multiply_both,
     root_down,
     root_up,
+    up,
 )
 
 _LOG2 = Fraction(constants.log2_fixed(300), 2**300)
@@ -132,10 +134,13 @@ def _hypot_at(x, y):
         scale = 2.0**600
     a = big * scale
     b = small * scale
-    if b < 2.0**-450 and b < a * 2.0**-50:  # hypot - big < small^2 / (2 big), less than a step
-        return big, add_up(big, ETA)
-    lo = root_down(add_down(multiply_both(a, a)[0], multiply_both(b, b)[0]))
-    hi = root_up(add_up(multiply_both(a, a)[1], multiply_both(b, b)[1]))
-    if scale == 1.0:
-        return max(lo, big), hi
-    return max(multiply_both(lo, 1.0 / scale)[0], big), multiply_both(hi, 1.0 / scale)[1]
+    if b < a * 2.0**-30:  # hypot - big < small^2 / (2 big), less than a step
+        return big, up(big, False)
+    ph, qh = a * a, b * b
+    h, l = dd.add(ph, fma(a, a, -ph), qh, fma(b, b, -qh))
+    h, l = dd.root(h, l)
+    lo, hi = dd.bounds(h, l, h * RELATIVE)
+    # roots of bounds are wider, but exact where the squares and their sum are
+    lo = max(lo, root_down(add_down(multiply_both(a, a)[0], multiply_both(b, b)[0])))
+    hi = min(hi, root_up(add_up(multiply_both(a, a)[1], multiply_both(b, b)[1])))
+    return multiply_both(lo, 1.0 / scale)[0], multiply_both(hi, 1.0 / scale)[1]

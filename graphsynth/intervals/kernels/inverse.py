@@ -169,6 +169,10 @@ def angle_at(y, x):
 @kernel
 def _angle_above(yl, yh, xl, xh):
     """Range for ``yl >= 0``, without the origin inside; the extremes lie at corners."""
+    if yh == 0.0 and xl >= 0.0:
+        return 0.0, 0.0
+    if yh == 0.0 and xh <= 0.0:
+        return PI_DOWN, PI_UP
     if yl == 0.0 and xl < 0.0 < xh:  # the origin on the border: all of [0, pi]
         return 0.0, PI_UP
     yl = 0.0 if yl < 0.0 else yl

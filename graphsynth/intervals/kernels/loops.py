@@ -40,10 +40,10 @@ def multiply(al, ah, bl, bh, lo, hi):
 def divide(al, ah, bl, bh, lo, hi):
     """Quotients of flat arrays."""
     for i in range(lo.size):
-        lo[i], hi[i] = arithmetic.divide_nonzero(al[i], ah[i], bl[i], bh[i])
+        lo[i], hi[i] = arithmetic.divide_plain(al[i], ah[i], bl[i], bh[i])
     for i in range(lo.size):  # the rare cases afterwards, so that the loop above uses vector instructions
-        if bl[i] <= 0.0 <= bh[i]:
-            lo[i], hi[i] = arithmetic.divide_zero(al[i], ah[i], bl[i], bh[i])
+        if lo[i] != lo[i]:
+            lo[i], hi[i] = arithmetic.divide_any(al[i], ah[i], bl[i], bh[i])
 
 
 @kernel

@@ -4,7 +4,7 @@ The sign of a rounding error comes from one fused multiply-add that is written d
 itself must not fuse anything: no ``fastmath`` anywhere, and a test compares with the uncompiled functions.
 """
 
-from math import sqrt
+from math import frexp, ldexp, sqrt
 
 from numba import types
 from numba.extending import intrinsic
@@ -22,6 +22,8 @@ DIVISOR_MIN = 2.0**-500
 QUOTIENT_MIN = 2.0**-400
 QUOTIENT_MAX = 2.0**490
 ROOT_MAX = 2.0**1000
+NORMAL_MIN = 2.0**-1022
+SCALE = 2.0**600
 
 
 @intrinsic
@@ -36,71 +38,101 @@ def fma(typing_context, a, b, c):
 
 @kernel(forceinline=True)
 def down(x, exact):
-    """Move a nearest result down one step unless it is exact enough."""
-    y = x if exact else x - (PHI * abs(x) + ETA)
-    return MAX if x > MAX else y
+    """Move a nearest result to its neighbour below unless it is a lower bound; an overflow to the largest number."""
+    size = abs(x)
+    y = fma(size, -PHI, x) if size >= NORMAL_MIN else x - ETA
+    return MAX if x > MAX else (x if exact else y)
 
 
 @kernel(forceinline=True)
 def up(x, exact):
-    """Move a nearest result up one step unless it is exact enough."""
-    y = x if exact else x + (PHI * abs(x) + ETA)
-    return -MAX if x < -MAX else y
+    """Move a nearest result to its neighbour above unless it is an upper bound; ``-inf`` to the smallest number."""
+    size = abs(x)
+    y = fma(size, PHI, x) if size >= NORMAL_MIN else x + ETA
+    return -MAX if x < -MAX else (x if exact else y)
+
+
+@kernel(forceinline=True)
+def _sum(a, b):
+    """Sum and its error, which overflows only with the sum (Dekker 1971)."""
+    s = a + b
+    first = abs(a) >= abs(b)
+    return s, (b if first else a) - (s - (a if first else b))
 
 
 @kernel(forceinline=True)
 def add_down(a, b):
     """Lower bound of a sum."""
-    s = a + b
-    t = s - a
-    e = (a - (s - t)) + (b - t)
+    s, e = _sum(a, b)
     return down(s, (e >= 0.0) & (e <= MAX))
 
 
 @kernel(forceinline=True)
 def add_up(a, b):
     """Upper bound of a sum."""
-    s = a + b
-    t = s - a
-    e = (a - (s - t)) + (b - t)
+    s, e = _sum(a, b)
     return up(s, (e <= 0.0) & (e >= -MAX))
+
+
+@kernel(forceinline=True)
+def excess(a, b, p):
+    """Return a number with the sign of ``a b - p``; NaN beside an infinity.
+
+    A tiny p is scaled with both factors, so that no part of the difference vanishes; a product that is not tiny may
+    overflow then, with the right sign.
+    """
+    tiny = abs(p) < PRODUCT_MIN
+    scaled = fma(a * SCALE, b * SCALE, -p * SCALE * SCALE)
+    return scaled if tiny else fma(a, b, -p)
 
 
 @kernel(forceinline=True)
 def multiply_both(a, b):
     """Lower and upper bound of a product, with ``0 * inf = 0``."""
     p = a * b
-    e = fma(a, b, -p)
     p = 0.0 if p != p else p
+    e = excess(a, b, p)
     zero = (a == 0.0) | (b == 0.0)
-    safe = abs(p) >= PRODUCT_MIN
-    return down(p, zero | (safe & (e >= 0.0))), up(p, zero | (safe & (e <= 0.0)))
+    return down(p, zero | (e >= 0.0)), up(p, zero | (e <= 0.0))
 
 
-@kernel(forceinline=True)
+@kernel
+def remainder(a, b, q):
+    """Return a number with the sign of ``a - q b`` for numbers of any size, from their fractions and exponents."""
+    fa, na = frexp(a)
+    fb, nb = frexp(b)
+    fq, nq = frexp(q)
+    return fma(-fq, fb, ldexp(fa, min(max(na - nb - nq, -100), 100)))
+
+
+@kernel
 def divide_both(a, b):
     """Lower and upper bound of a quotient, ``b`` not 0, ``inf / inf = 0``."""
     q = a / b
-    r = fma(-q, b, a)
     q = 0.0 if q != q else q
+    r = remainder(a, b, q)
     r = r if b > 0.0 else -r
-    size = abs(q)
-    safe = (abs(b) >= DIVISOR_MIN) & (abs(b) <= FACTOR_MAX) & (size >= QUOTIENT_MIN) & (size <= QUOTIENT_MAX)
-    zero = a == 0.0
-    return down(q, zero | (safe & (r >= 0.0))), up(q, zero | (safe & (r <= 0.0)))
+    zero = (a == 0.0) | (abs(b) > MAX)
+    return down(q, zero | (r >= 0.0)), up(q, zero | (r <= 0.0))
+
+
+@kernel(forceinline=True)
+def _root(a):
+    """Root, and a number with the sign of its error."""
+    s = sqrt(a)
+    f = 2.0**300 if a < PRODUCT_MIN else (2.0**-300 if a > ROOT_MAX else 1.0)
+    return s, fma(-s * f, s * f, a * f * f)
 
 
 @kernel(forceinline=True)
 def root_down(a):
     """Lower bound of a root."""
-    s = sqrt(a)
-    r = fma(-s, s, a)
-    return down(s, (a == 0.0) | ((a >= PRODUCT_MIN) & (a <= ROOT_MAX) & (r >= 0.0)))
+    s, r = _root(a)
+    return down(s, r >= 0.0)
 
 
 @kernel(forceinline=True)
 def root_up(a):
     """Upper bound of a root."""
-    s = sqrt(a)
-    r = fma(-s, s, a)
-    return up(s, (a == 0.0) | (a > MAX) | ((a >= PRODUCT_MIN) & (a <= ROOT_MAX) & (r <= 0.0)))
+    s, r = _root(a)
+    return up(s, r <= 0.0)

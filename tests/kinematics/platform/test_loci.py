@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -173,11 +174,31 @@ def test_conic_equals_the_determinant(
     anchors: list[complex], vertices: list[complex], alpha: float, points: list[complex]
 ) -> None:
     conic = singular_conic(anchors, vertices, alpha)
-    p = np.array(points)
-    arm = np.exp(1j * alpha) * np.array(vertices)
-    d = p[:, None] + arm - np.array(anchors)
-    expected = np.linalg.det(2.0 * np.stack([d.real, d.imag, (np.conj(arm) * d).imag], axis=-1))
-    np.testing.assert_allclose(conic(p), expected, atol=1e-11 * 9**2 * 8)
+    arms = np.exp(1j * alpha) * np.array(vertices)
+    expected = [exact_determinant(anchors, arms.tolist(), point) for point in points]
+    np.testing.assert_allclose(conic(np.array(points)), expected, atol=1e-11 * 9**2 * 8)
+
+
+def exact_determinant(anchors: list[complex], arms: list[complex], point: complex) -> float:
+    """Determinant of the rows ``2 (d_x, d_y, arm x d)`` of the legs in fractions; only the result is rounded."""
+    rows = []
+    for anchor, arm in zip(anchors, arms):
+        x, y = Fraction(arm.real), Fraction(arm.imag)
+        dx = Fraction(point.real) + x - Fraction(anchor.real)
+        dy = Fraction(point.imag) + y - Fraction(anchor.imag)
+        rows.append((2 * dx, 2 * dy, 2 * (x * dy - y * dx)))
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return float(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
+
+
+def test_the_conic_of_numbers_whose_products_vanish() -> None:
+    """Lengths of 1e-156 underflow in products: zero to all digits asked for, and no warning."""
+    tiny = [1e-156 + 1e-156j, -1e-156j, 2e-156]
+    points = [1e-156 + 0j, 0.5j, 3.0]
+    conic = singular_conic(tiny, tiny[::-1], 0.5)
+    arms = (np.exp(0.5j) * np.array(tiny[::-1])).tolist()
+    expected = [exact_determinant(tiny, arms, point) for point in points]
+    np.testing.assert_allclose(conic(np.array(points)), expected, atol=1e-11)
 
 
 def test_third_differences_of_the_determinant_vanish() -> None:
