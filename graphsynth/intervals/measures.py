@@ -63,7 +63,7 @@ class Measures:
 
     @property
     def mid(self) -> Array:
-        """Midpoint rounded, always inside; 0 for the line, the largest number of its sign for a half line, NaN for empty."""
+        """Midpoint, always inside; 0 for the line, the largest number of its sign for a half line, NaN for empty."""
         big = float(np.finfo(np.float64).max)
         with np.errstate(all="ignore"):
             middle = np.where(self.lo == -np.inf, -big, np.where(self.hi == np.inf, big, 0.5 * self.lo + 0.5 * self.hi))

@@ -27,12 +27,12 @@ SPLIT, SPLIT_MAX = 2.0**27 + 1.0, 2.0**900
 
 
 def down(x: Array, exact: Mask | bool = False) -> Array:
-    """Return the neighbour below except where ``x`` is a lower bound already; an overflow becomes the largest number."""
+    """Return the neighbour below except where ``x`` is a lower bound; an overflow becomes the largest number."""
     return np.where(x > MAX, MAX, np.where(exact, x, np.nextafter(x, -np.inf)))
 
 
 def up(x: Array, exact: Mask | bool = False) -> Array:
-    """Return the neighbour above except where ``x`` is already an upper bound; ``-inf`` becomes the smallest number."""
+    """Return the neighbour above except where ``x`` is an upper bound; ``-inf`` becomes the smallest number."""
     return np.where(x < -MAX, -MAX, np.where(exact, x, np.nextafter(x, np.inf)))
 
 
