@@ -1,14 +1,22 @@
 """Work in order with the help of others: a crew of this process and some more."""
 
 import os
+import signal
+import subprocess
+import sys
 import time
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
+from multiprocessing import get_context, parent_process
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graphsynth.ordered import AHEAD, Crew, in_order, processes
+from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.ordered import AHEAD, RETRIES, Crew, in_order, processes
 
 
 class Held(Executor):
@@ -79,3 +87,84 @@ def test_a_crew_of_two_is_this_process_and_another():
         found = list(in_order(crew, _where, range(30)))
     assert os.getpid() in found
     assert len(set(found)) == 2
+
+
+def _killed(marks, i):
+    """Work whose process is killed the first ``marks`` times it gets to a multiple of five."""
+    folder, times = marks
+    if parent_process() is not None and i % 5 == 0:
+        for attempt in range(times):
+            with suppress(FileExistsError):
+                (Path(folder) / f"{i}-{attempt}").touch(exist_ok=False)
+                os.kill(os.getpid(), signal.SIGKILL)
+    return i * i
+
+
+def test_a_killed_worker_is_replaced_and_its_piece_done_again(tmp_path):
+    with processes(2) as crew:
+        crew.submit(int).result()
+        found = list(in_order(crew, partial(_killed, (tmp_path, 1)), range(1, 17)))
+    assert found == [i * i for i in range(1, 17)]
+    assert crew.submit(int).exception() is not None  # it is closed
+
+
+def test_work_that_kills_every_worker_is_one_sentence(tmp_path):
+    with processes(2) as crew, pytest.raises(GraphsynthError, match="killed while they worked, again and again"):
+        crew.submit(_killed, (tmp_path, 100), 5).result()
+    assert len(list(tmp_path.iterdir())) == 1 + RETRIES
+
+
+def test_the_broken_pool_of_a_caller_is_one_sentence(tmp_path):
+    with (
+        ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool,
+        pytest.raises(GraphsynthError, match="killed while they worked"),
+    ):
+        list(in_order(pool, partial(_killed, (tmp_path, 1)), [5, 6]))
+
+
+@pytest.mark.parametrize("wrong", [4, "processes", True])
+def test_what_is_no_executor_is_refused(wrong):
+    with pytest.raises(SpecError, match=f"executor = {wrong!r} must be a concurrent.futures.Executor"):
+        in_order(wrong, abs, [1])
+
+
+PARENT = """
+import os, sys, time
+from graphsynth.ordered import processes
+from tests_busy import busy
+if __name__ == "__main__":
+    with processes(3) as crew:
+        for _ in range(2):
+            crew.submit(busy, sys.argv[1])
+        time.sleep(60)
+"""
+BUSY = """
+import ctypes, os, pathlib
+def busy(folder):
+    (pathlib.Path(folder) / f"pid{os.getpid()}").touch()
+    ctypes.PyDLL(None).sleep(60)  # compiled code that keeps every other thread from running
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a worker ends when its compiled code returns")
+def test_no_worker_outlives_its_parent(tmp_path):
+    (tmp_path / "tests_busy.py").write_text(BUSY)
+    (tmp_path / "parent.py").write_text(PARENT)
+    parent = subprocess.Popen([sys.executable, tmp_path / "parent.py", tmp_path])
+    end = time.monotonic() + 30
+    while len(workers := [int(path.name[3:]) for path in tmp_path.glob("pid*")]) < 2:
+        assert parent.poll() is None and time.monotonic() < end
+        time.sleep(0.01)
+    parent.kill()
+    parent.wait()
+    end = time.monotonic() + 2
+    while any(_runs(pid) for pid in workers):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def _runs(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Executor, Future
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, Executor
 from contextlib import contextmanager
-from typing import Any, TypeVar
 
 from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.ordered import RETRIES, Again
 
-__all__ = ["RETRIES", "dask_executor"]
-
-T = TypeVar("T")
-
-#: How often a piece is computed anew when it fails; pieces of a lost worker go to another one by themselves.
-RETRIES = 3
+__all__ = ["dask_executor"]
 
 
 @contextmanager
@@ -48,7 +43,7 @@ def dask_executor(address: str, timeout: float = 20.0) -> Iterator[Executor]:
         _check_versions(client.run(_version))
         try:
             with client.get_executor(retries=RETRIES) as executor:
-                yield _Again(executor)
+                yield Again(executor, _lost)
         except KilledWorker as error:
             raise GraphsynthError(
                 f"several workers died over one piece ({error}): give them more memory, then the same command to go on"
@@ -75,33 +70,10 @@ def _check_versions(found: dict[str, str]) -> None:
         )
 
 
-class _Again(Executor):
-    """An executor of dask whose pieces are submitted again if their state is lost with a worker.
+def _lost(error: BaseException) -> bool:
+    """Whether dask lost a piece.
 
-    When a worker dies just after it gave a result, dask's own executor can meet a result without a state, and raises
-    a TypeError of its own.
+    When a worker dies just after it gave a result, dask's executor can meet a result without a state, and raises a
+    TypeError of its own.
     """
-
-    def __init__(self, executor: Executor) -> None:
-        self._executor = executor
-
-    def submit(self, function: Callable[..., T], /, *arguments: Any, **named: Any) -> Future[T]:
-        """Submit a piece; its future holds what the last attempt gave."""
-        outer: Future[T] = Future()
-
-        def attempt(left: int) -> None:
-            def done(inner: Future[T]) -> None:
-                if outer.cancelled():
-                    return
-                error = CancelledError() if inner.cancelled() else inner.exception()
-                if isinstance(error, TypeError) and left and "cannot unpack non-iterable" in str(error):
-                    attempt(left - 1)
-                elif error is not None:
-                    outer.set_exception(error)
-                else:
-                    outer.set_result(inner.result())
-
-            self._executor.submit(function, *arguments, **named).add_done_callback(done)
-
-        attempt(RETRIES)
-        return outer
+    return isinstance(error, TypeError) and "cannot unpack non-iterable" in str(error)

@@ -7,7 +7,8 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -24,57 +25,88 @@ from graphsynth.errors import GraphsynthError
 __all__ = ["main"]
 
 USAGE_ERROR = 2
-INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return the exit status.
 
-    0: done; 2: bad input, told in one sentence on standard error; 130: interrupted.
+    0: done; 2: bad input or a place that cannot be written, told in one sentence on standard error; 130: interrupted;
+    143: told to end (SIGTERM), which does the same.
     """
     options = _parser().parse_args(arguments)
     announce(lambda: note("compiling kernels (first use only, some seconds) ..."))
-    interrupted = _note_interrupts()
-    try:
-        # each verb lives in a module of its own, imported when it is used
-        status: int = import_module(f"graphsynth.cli.{options.module}").run(options)
-        sys.stdout.flush()
-    except GraphsynthError as error:
-        print(f"graphsynth: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
-        return USAGE_ERROR
-    except KeyboardInterrupt:
-        return _interrupted()
-    except BrokenPipeError:
+    with _interrupts(at_exit=arguments is None) as received:
+        try:
+            # each verb lives in a module of its own, imported when it is used
+            status: int = import_module(f"graphsynth.cli.{options.module}").run(options)
+            sys.stdout.flush()
+        except KeyboardInterrupt:
+            return _interrupted(received)
+        except Exception as error:
+            # an interruption inside the compiler of the kernels comes out as an exception of its own
+            return _interrupted(received) if received else _failed(error, options)
+        return status
+
+
+def _failed(error: Exception, options: argparse.Namespace) -> int:
+    """Say in one sentence what a user can mend; anything else is a fault of the program and is raised."""
+    if isinstance(error, BrokenPipeError):
         # the reader (head, a pager) has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as error:
-        print(f"graphsynth: {error.filename or 'input/output'}: {error.strerror}", file=sys.stderr)  # noqa: T201
-        return USAGE_ERROR
-    except Exception:
-        # an interruption inside the compiler of the kernels comes out as an exception of its own
-        if interrupted:
-            return _interrupted()
-        raise
-    return status
+    if isinstance(error, GraphsynthError):
+        text = str(error)
+    elif isinstance(error, MemoryError):
+        text = "the memory does not suffice: ask for less, use fewer workers, or free some memory"
+    elif isinstance(error, OSError):
+        text = _of_the_system(error, options)
+    else:
+        raise error
+    note(f"graphsynth: {' '.join(text.split())}")
+    return USAGE_ERROR
 
 
-def _interrupted() -> int:
-    print("graphsynth: interrupted", file=sys.stderr)  # noqa: T201
-    return INTERRUPTED
+def _of_the_system(error: OSError, options: argparse.Namespace) -> str:
+    """Name the file and what can be done; an error while writing carries no name, it is of the output."""
+    from graphsynth.journal import FULL
+
+    full = error.errno in FULL
+    name = error.filename or (getattr(options, "output", None) or getattr(options, "out", None) if full else None)
+    if full and name is None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left of it is not tried again
+        name = "standard output"
+    remedy = ": free some space or name another place, then give the same command" if full else ""
+    return f"{name or 'input/output'}: {error.strerror}{remedy}"
 
 
-def _note_interrupts() -> list[int]:
-    """Return a list that receives the signal when Ctrl-C is pressed (which raises KeyboardInterrupt as always)."""
+def _interrupted(received: list[int]) -> int:
+    note("graphsynth: interrupted")
+    return 128 + (received[0] if received else signal.SIGINT)
+
+
+@contextmanager
+def _interrupts(*, at_exit: bool) -> Iterator[list[int]]:
+    """Raise KeyboardInterrupt when Ctrl-C is pressed or the process is told to end; give the signals that came.
+
+    A second signal ends the process at once; so does one that comes after the block, if the program ends with it.
+    """
     received: list[int] = []
 
     def handler(number: int, frame: FrameType | None) -> None:
         received.append(number)
+        if len(received) > 1:
+            os._exit(128 + number)
         raise KeyboardInterrupt
 
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, handler)
-    return received
+    if threading.current_thread() is not threading.main_thread():
+        yield received
+        return
+    before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for number, old in before.items():
+            signal.signal(number, signal.SIG_DFL if at_exit else old)
 
 
 def _parser() -> argparse.ArgumentParser:

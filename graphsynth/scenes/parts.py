@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import tempfile
@@ -12,9 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from graphsynth.errors import SceneError
+from graphsynth.journal import writing
 from graphsynth.scenes.products import Columns, Outcome, Part
 
-__all__ = ["PartFolder", "check_folder", "split_parts", "unwritable", "write_whole"]
+__all__ = ["REMEDY", "PartFolder", "check_folder", "split_parts", "write_whole"]
+
+#: What to do where a report folder cannot be written.
+REMEDY = "choose another folder with --out"
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -40,31 +43,17 @@ def check_folder(folder: Path) -> None:
     """
     made: list[Path] = []
     try:
-        for part in (*reversed(folder.parents), folder):
-            if not part.exists():
-                part.mkdir()
-                made.append(part)
-        with tempfile.TemporaryFile(dir=folder) as stream:
-            stream.write(b"x")
-    except OSError as error:
-        raise unwritable(f"the report into {folder}", error) from error
+        with writing(f"the report into {folder}", REMEDY, SceneError):
+            for part in (*reversed(folder.parents), folder):
+                if not part.exists():
+                    part.mkdir()
+                    made.append(part)
+            with tempfile.TemporaryFile(dir=folder) as stream:
+                stream.write(b"x")
     finally:
         for part in reversed(made):
             with suppress(OSError):  # somebody else began to use it
                 part.rmdir()
-
-
-def unwritable(what: str, error: OSError) -> SceneError:
-    """Return the exception for a place that cannot be written, with the remedy.
-
-    Examples
-    --------
-    >>> str(unwritable("out", OSError(errno.EACCES, "Permission denied")))
-    'cannot write out: Permission denied; choose another folder with --out'
-    """
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    remedy = "free some space and give the same command again, or choose" if full else "choose"
-    return SceneError(f"cannot write {what}: {error.strerror}; {remedy} another folder with --out")
 
 
 def split_parts(outcome: Outcome, kinds: Sequence[str]) -> tuple[Outcome, dict[str, bytes]]:
@@ -150,14 +139,12 @@ class PartFolder:
         """
         if self._folder is None:
             return
-        try:
+        with writing(f"into {self._folder}", REMEDY, SceneError):
             for path, data in files.items():
                 place = self._folder / path
                 if place.parent not in self._begun:
                     self._begin(place.parent)
                 write_whole(place, data)
-        except OSError as error:
-            raise unwritable(f"into {self._folder}", error) from error
 
     def _begin(self, folder: Path) -> None:
         assert self._folder is not None

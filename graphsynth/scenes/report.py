@@ -9,11 +9,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from graphsynth.errors import SceneError
+from graphsynth.journal import writing
 from graphsynth.scenes.datafiles import data_files
 from graphsynth.scenes.headline import facts, sentences
 from graphsynth.scenes.journal import JOURNAL, mark_reported
 from graphsynth.scenes.page import report_html
-from graphsynth.scenes.parts import unwritable, write_whole
+from graphsynth.scenes.parts import REMEDY, write_whole
 from graphsynth.scenes.summary import summary_tables
 
 if TYPE_CHECKING:
@@ -51,13 +53,11 @@ def write_report(report: Report, folder: Path) -> Path:
     """
     files = {"report.html": report_html(report).encode(), "scene.json": scene_json(report).encode()}
     files |= data_files(report)
-    try:
+    with writing(f"the report into {folder}", REMEDY, SceneError):
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             write_whole(folder / name, data)
         mark_reported(folder / JOURNAL)
-    except OSError as error:
-        raise unwritable(f"the report into {folder}", error) from error
     return folder
 
 

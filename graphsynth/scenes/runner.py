@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from graphsynth.errors import SceneError
+from graphsynth.ordered import check_executor
 from graphsynth.scenes.datafiles import check_files
 from graphsynth.scenes.journal import JOURNAL
 from graphsynth.scenes.measure import StageTime
@@ -143,6 +144,7 @@ def execute(
     """
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
+    check_executor(executor)
     check_files(scene)
     wanted = scene.outputs.products
     stages = resolve(scene.stages(), wanted, _place_of_products(scene))

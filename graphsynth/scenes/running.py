@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from graphsynth.errors import SceneError
-from graphsynth.scenes.journal import Journal, signature
+from graphsynth.scenes.journal import Candidates, signature
 from graphsynth.scenes.measure import StageTime, measured, memory_in_use, new_modules, peak_memory, reset_peak, rooms
 from graphsynth.scenes.stages import Context, Progress, Stage, load
 from graphsynth.scenes.streaming import Plan, Spent, Streamed, given_by, plan_stream, stream
@@ -150,7 +150,7 @@ class Running:
             loads[stage.name] = StageTime(stage.name, time.perf_counter() - start, 0.0, modules=new_modules(before))
         reset_peak()
         mark = signature(self._context.scene, plan.stages, plan.kept)
-        with Journal(self._journal, self._context.scene.name, mark, self._fresh) as journal:
+        with Candidates(self._journal, self._context.scene.name, mark, self._fresh) as journal:
             shared = {name: self._products[name] for name in plan.shared}
             found = stream(
                 plan,

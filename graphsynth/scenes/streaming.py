@@ -16,7 +16,7 @@ from typing import Any
 from graphsynth.errors import SceneError
 from graphsynth.ordered import in_order
 from graphsynth.scenes.codec import decode, encode
-from graphsynth.scenes.journal import Journal
+from graphsynth.scenes.journal import Candidates
 from graphsynth.scenes.parts import PartFolder, split_parts
 from graphsynth.scenes.products import Outcome, Rejected
 from graphsynth.scenes.stages import Context, Stage, load
@@ -187,7 +187,7 @@ def stream(
     context: Context,
     shared: Mapping[str, Any],
     items: Iterable[Any],
-    journal: Journal,
+    journal: Candidates,
     used_up: Callable[[], str],
     progress: Callable[[int], None] | None = None,
 ) -> Streamed:
@@ -197,7 +197,7 @@ def stream(
     ----------
     items : iterable
         The candidates; taken one by one, at most some chunks ahead.
-    journal : Journal
+    journal : Candidates
         What it has already is not computed again.
     used_up : callable
         Says which budget is used up, or nothing; asked after each chunk.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
+from itertools import chain
 
 from graphsynth import ordered
 from graphsynth.ordered import AHEAD, in_order
@@ -35,12 +36,9 @@ def texts(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[tuple[
 
 def graphs(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[MechanismGraph]:
     """Yield the graphs of all pieces, in order."""
-    if executor is None:
-        for piece in pieces:
-            yield from graphs_of_piece(piece)
-        return
-    for block in in_order(executor, _packed, pieces):
-        yield from block
+    return chain.from_iterable(
+        map(graphs_of_piece, pieces) if executor is None else in_order(executor, _packed, pieces)
+    )
 
 
 def processes(workers: int) -> AbstractContextManager[Executor | None]:

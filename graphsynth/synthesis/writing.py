@@ -1,20 +1,24 @@
 """Writing long listings to a file that survives an interruption, and counting with a checkpoint.
 
-Beside ``FILE`` stands ``FILE.progress`` until the work is done: the problem, the pieces written, the bytes they take.
-A resumed run cuts the file back to whole pieces and goes on, so the result is the same to the byte.
+Beside ``FILE`` stands ``FILE.progress`` until the work is done: a journal with the bytes, the lines and a checksum of
+each piece.  A resumed run cuts the file back to whole pieces and goes on, so the result is the same to the byte.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from graphsynth.errors import FormatError, GraphsynthError, SpecError
+from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.journal import Journal, Work, digest_of, writing
 from graphsynth.synthesis import parallel
 from graphsynth.synthesis.problem import Piece, Problem, graphs_of_piece
 
@@ -58,22 +62,10 @@ def shard_of(pieces: Sequence[Piece], shard: tuple[int, int] | None) -> list[Pie
     ]
 
 
-def _signature(problem: Problem, shard: tuple[int, int] | None, form: str) -> str:
-    return f"{problem.signature} {shard[0]}/{shard[1]} {form}" if shard else f"{problem.signature} 1/1 {form}"
-
-
-def _read_progress(path: Path) -> dict[str, Any]:
-    try:
-        progress = json.loads(path.read_text())
-        return {key: progress[key] for key in ("problem", "title", "pieces", "bytes", "graphs")}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FormatError(f"cannot be read as a progress file ({error}); delete it to start anew", str(path)) from None
-
-
-def _write_progress(path: Path, **progress: Any) -> None:
-    fresh = path.with_name(path.name + ".new")
-    fresh.write_text(json.dumps(progress) + "\n")
-    fresh.replace(path)
+def _work(problem: Problem, pieces: Sequence[Piece], form: str, remedy: str) -> Work:
+    """State what a journal is of: the question and its cut."""
+    cut = [(repr(piece.weight), *(getattr(piece, name, 0) for name in ("start", "stop", "part"))) for piece in pieces]
+    return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy)
 
 
 def _json_lines(piece: Piece) -> tuple[bytes, int]:
@@ -108,7 +100,7 @@ def write_listing(
     shard : (int, int), optional
         Shard i of m.
     resume : bool
-        Go on with an interrupted file of the same problem.
+        Go on with an interrupted file of the same problem; of a complete one nothing is left to do.
     overwrite : bool
         Replace a file that exists.
     executor : concurrent.futures.Executor, optional
@@ -123,56 +115,80 @@ def write_listing(
     """
     form = "jsonl" if path.suffix == ".jsonl" else "text"
     note = path.with_name(path.name + ".progress")
-    signature = _signature(problem, shard, form)
     pieces = shard_of(problem.pieces(listing=True), shard)
-    total = sum(piece.weight for piece in pieces) or 1.0
-    start, size, graphs = _where_to_start(path, note, signature, problem.title, resume, overwrite)
-    done = sum(piece.weight for piece in pieces[:start])
-    rest = pieces[start:]
-    if form == "jsonl":
-        blocks: Iterator[tuple[bytes, int]] = parallel.in_order(executor, _json_lines, rest)
-    else:
-        blocks = parallel.texts(rest, executor)
-    state = {"problem": signature, "title": problem.title}
-    with path.open("r+b" if start else "wb") as file:
-        file.truncate(size)
-        file.seek(size)
-        _write_progress(note, **state, pieces=start, bytes=size, graphs=graphs)
-        for number, (piece, (data, lines)) in enumerate(zip(rest, blocks), start + 1):
-            file.write(data)
-            file.flush()
-            size += len(data)
-            graphs += lines
-            done += piece.weight
-            _write_progress(note, **state, pieces=number, bytes=size, graphs=graphs)
-            if watch:
-                watch(Step(graphs, done / total))
-    note.unlink()
+    if not path.parent.is_dir():
+        raise GraphsynthError(f"the folder {path.parent} does not exist: create it, or name another file")
+    if path.exists() and not note.exists() and not overwrite:
+        if not resume:
+            raise GraphsynthError(f"{path} exists: name another file, or replace it with --force")
+        return _graphs_of_complete(path, pieces, form)
+    remedy = "give the same options, or start anew with --force"
+    with Journal(note, _work(problem, pieces, form, remedy), fresh=overwrite and not resume) as journal:
+        if journal.entries and not resume:
+            raise GraphsynthError(f"{path} is an interrupted listing: go on with --resume, or start anew with --force")
+        with writing(path, remedy):
+            file = path.open("r+b" if path.exists() else "w+b")
+        with closing(file):
+            with writing(path, remedy):
+                graphs = _cut_back(file, journal, len(pieces))
+            done = sum(piece.weight for piece in pieces[: len(journal.entries)])
+            total = sum(piece.weight for piece in pieces) or 1.0
+            rest = pieces[len(journal.entries) :]
+            for piece, (data, lines) in zip(rest, _blocks(rest, form, executor)):
+                with writing(path, remedy):
+                    file.write(data)
+                    file.flush()
+                journal.append(json.dumps([len(data), lines, zlib.crc32(data)]))
+                graphs += lines
+                done += piece.weight
+                if watch:
+                    watch(Step(graphs, done / total))
+            with writing(path, remedy):
+                os.fsync(file.fileno())
+        journal.remove()
     return graphs
 
 
-def _where_to_start(
-    path: Path, note: Path, signature: str, title: str, resume: bool, overwrite: bool
-) -> tuple[int, int, int]:
-    """Return (pieces, bytes, graphs) already written."""
-    if not path.parent.is_dir():
-        raise GraphsynthError(f"the folder {path.parent} does not exist: create it, or name another file")
-    if resume and note.exists():
-        progress = _read_progress(note)
-        if progress["problem"] != signature:
-            raise GraphsynthError(
-                f"{note} belongs to another question ({progress['title']}): give the same options, or delete it"
-            )
-        if not path.exists() or path.stat().st_size < progress["bytes"]:
-            raise GraphsynthError(f"{path} is shorter than {note} says ({progress['bytes']} bytes): delete both")
-        return progress["pieces"], progress["bytes"], progress["graphs"]
-    if resume and path.exists():
-        raise GraphsynthError(f"{path} is complete, or was not written by graphsynth: nothing to resume")
-    if note.exists() and not overwrite:
-        raise GraphsynthError(f"{path} is an interrupted listing: go on with --resume, or start anew with --force")
-    if path.exists() and not overwrite:
-        raise GraphsynthError(f"{path} exists: name another file, or replace it with --force")
-    return 0, 0, 0
+def _blocks(pieces: Sequence[Piece], form: str, executor: Executor | None) -> Iterator[tuple[bytes, int]]:
+    return parallel.in_order(executor, _json_lines, pieces) if form == "jsonl" else parallel.texts(pieces, executor)
+
+
+def _cut_back(file: BinaryIO, journal: Journal, pieces: int) -> int:
+    """Cut a file, and the journal of it, back to the whole pieces that are in it; return the number of its lines."""
+    graphs = place = 0
+    noted = [json.loads(entry) for entry in journal.entries[:pieces]]
+    kept = 0
+    for size, lines, check in noted:
+        data = file.read(size)
+        if len(data) < size or zlib.crc32(data) != check:
+            break
+        kept, place, graphs = kept + 1, place + size, graphs + lines
+    journal.keep(kept)
+    file.seek(place)
+    file.truncate()
+    return graphs
+
+
+def _graphs_of_complete(path: Path, pieces: Sequence[Piece], form: str) -> int:
+    """Return the number of lines of a file that is the whole listing, as far as its first and last lines tell.
+
+    Raises
+    ------
+    GraphsynthError
+        If it is not.
+    """
+    with path.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        ends = [next((data for data, _ in _blocks(some, form, None) if data), b"") for some in (pieces, pieces[::-1])]
+        for data, place in zip(ends, (0, size - len(ends[1]))):
+            file.seek(max(0, place))
+            if file.read(len(data)) != data or (size and not data):
+                raise GraphsynthError(
+                    f"{path} was not written by this question, or is not complete: name another file, or replace it "
+                    "with --force"
+                )
+        file.seek(0)
+        return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
 
 
 def count_with_checkpoint(
@@ -188,50 +204,21 @@ def count_with_checkpoint(
     Raises
     ------
     GraphsynthError
-        If the checkpoint belongs to another problem.
+        If the checkpoint belongs to another problem, or another process writes it.
+    FormatError
+        If it is no checkpoint, or somebody changed it.
     """
     pieces = shard_of(problem.pieces(listing=False), shard)
     total = sum(piece.weight for piece in pieces) or 1.0
-    signature = _signature(problem, shard, "count")
-    known = _read_counts(checkpoint, signature, problem.title) if checkpoint else []
-    count = sum(known)
-    done = sum(piece.weight for piece in pieces[: len(known)])
-    rest = pieces[len(known) :]
-    file = checkpoint.open("a") if checkpoint else None
-    try:
-        if file and not known and file.tell() == 0:
-            file.write(json.dumps({"problem": signature, "title": problem.title}) + "\n")
+    with Journal(checkpoint, _work(problem, pieces, "count", "name another file")) as journal:
+        known = [int(entry) for entry in journal.entries]
+        count = sum(known)
+        done = sum(piece.weight for piece in pieces[: len(known)])
+        rest = pieces[len(known) :]
         for piece, found in zip(rest, parallel.counts(rest, executor)):
             count += found
             done += piece.weight
-            if file:
-                file.write(f"{found}\n")
-                file.flush()
+            journal.append(str(found))
             if watch:
                 watch(Step(count, done / total))
-    finally:
-        if file:
-            file.close()
     return count
-
-
-def _read_counts(checkpoint: Path, signature: str, title: str) -> list[int]:
-    if not checkpoint.exists():
-        return []
-    data = checkpoint.read_text()
-    whole = data[: data.rfind("\n") + 1]  # a line cut short by a crash does not count
-    if whole != data:
-        checkpoint.write_text(whole)
-    lines = whole.splitlines()
-    if not lines:
-        return []
-    try:
-        head = json.loads(lines[0])
-        owner, counts = head["problem"], [int(line) for line in lines[1:]]
-    except (ValueError, KeyError, TypeError):
-        raise FormatError("is not a checkpoint of graphsynth; name another file", str(checkpoint)) from None
-    if owner != signature:
-        raise GraphsynthError(
-            f"{checkpoint} belongs to another question ({head.get('title')}), not to {title}: name another file"
-        )
-    return counts

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from graphsynth.errors import FormatError, SceneError
+from graphsynth.journal import Journal, Work
 from graphsynth.scenes.runner import run
 
 FULL = OSError(errno.ENOSPC, "No space left on device")
@@ -95,7 +96,7 @@ def test_another_question_or_a_strange_file_is_refused_and_fresh_replaces_it(spr
         run(springs, out=tmp_path)
     for junk in (b"\xff\xfe\n", b"{}\n", b"[1]\n", b"5\n"):
         path.write_bytes(junk)
-        with pytest.raises(FormatError, match="not a file of results; add --fresh"):
+        with pytest.raises(FormatError, match="not a journal of graphsynth; add --fresh"):
             run(springs, out=tmp_path)
     springs.write_text(springs.read_text(encoding="utf-8").replace("count = 21", "count = 20"), "utf-8")
     lines = whole.splitlines(keepends=True)
@@ -122,8 +123,12 @@ def test_a_scene_changed_in_python_is_another_question(springs: Path, tmp_path: 
 def test_other_candidates_behind_the_same_question_are_noticed(springs: Path, tmp_path: Path) -> None:
     run(springs, out=tmp_path)
     path = tmp_path / "candidates.jsonl"
-    stop_after(path, 3)
-    path.write_bytes(path.read_bytes().replace(b"spring-2", b"spring-9"))
+    head, *lines = path.read_text(encoding="utf-8").splitlines()
+    path.unlink()
+    digest, values = json.loads(head)["question"], [json.dumps(json.loads(line)["value"]) for line in lines[:2]]
+    with Journal(path, Work("run", "springs", digest)) as journal:
+        for value in values:
+            journal.append(value.replace("spring-2", "spring-9"))
     with pytest.raises(SceneError, match=r"candidate 2 of the interrupted run \(spring-9\) is not candidate 2"):
         run(springs, out=tmp_path)
 
@@ -176,7 +181,7 @@ def test_a_full_disk_while_candidates_come_leaves_what_is_stored(
     def append(self: Journal, line: str) -> None:
         nonlocal count
         count += 1
-        if count == 9:
+        if count == 8:
             self._stream.close()
             self._stream = Full()
         usual(self, line)

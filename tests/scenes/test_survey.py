@@ -270,7 +270,7 @@ def test_rows_are_stored_by_shards_and_are_those_of_the_sets_that_pass(tmp_path:
     assert [int(row[0]) for row in rows] == np.flatnonzero(whole.passes).tolist()
     assert {row[4] for row in rows} <= {"crank-rocker", "double crank"}
     assert "rows" in report.products and len(list(tmp_path.glob("rows/*.csv"))) == 6
-    first = json.loads((tmp_path / "candidates.jsonl").read_text().splitlines()[-3])
+    first = json.loads((tmp_path / "candidates.jsonl").read_text().splitlines()[-3])["value"]
     assert first["products"]["rows"]["~"] == "Part"
 
 
