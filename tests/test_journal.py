@@ -6,6 +6,7 @@ import errno
 import json
 import random
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -228,3 +229,15 @@ def test_a_full_disk_names_the_file_and_the_remedy(tmp_path: Path, monkeypatch, 
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and str(path) in said and "free some space and give the same command again" in said
     assert main(["enumerate", "--links", "10", "-o", str(path), "--resume"]) == 0
+
+
+@pytest.mark.parametrize(("free", "status"), [(200_000, 0), (50_000, 2)])
+def test_a_listing_is_refused_only_if_it_cannot_fit(
+    tmp_path: Path, monkeypatch, capsys, free: int, status: int
+) -> None:
+    """The listing has 89 kB; its bound has more than a megabyte."""
+    path = tmp_path / "a.g6"
+    monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=free))
+    assert main(["enumerate", "--links", "12", "-o", str(path)]) == status
+    said = capsys.readouterr().err
+    assert ("need about 0.0891 MB, and 0.05 MB are free for " + str(path) in said) == (status == 2)

@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
                 f"{options.output.suffix} is written in one piece: use .g6 or .jsonl with --resume or --json"
             )
         if not options.force:
-            _check_disk(problem, options, weight)
+            _check_disk(problem, options)
         from graphsynth.synthesis.writing import write_listing
 
         if entry is not None:
@@ -106,21 +106,23 @@ def _write_whole(problem: Problem, options: argparse.Namespace, executor: Execut
     return write((graph for data, _ in blocks for graph in read_stream(BytesIO(data), "text")), options.output)
 
 
-def _check_disk(problem: Problem, options: argparse.Namespace, weight: float) -> None:
-    """Refuse at once a listing that cannot fit the disk.
+def _check_disk(problem: Problem, options: argparse.Namespace) -> None:
+    """Refuse at once a listing that cannot fit the disk."""
+    from graphsynth.synthesis.writing import estimated_size
 
-    About a quarter of the labellings bounded by the weights are admissible (a third for 12 to 18 links).
-    """
-    links = max((family.links for family in problem.families), default=1)
-    share = options.shard[1] if options.shard else 1
-    graphs = weight / 4 / share
-    needed = graphs * (links * links / 12 + 24)
-    free = shutil.disk_usage(options.output.absolute().parent).free if options.output.absolute().parent.is_dir() else 0
-    if options.resume and options.output.exists():
-        needed -= options.output.stat().st_size
+    folder = options.output.absolute().parent
+    free = shutil.disk_usage(folder).free if folder.is_dir() else 0
+    if options.output.exists():
+        free += options.output.stat().st_size
+    graphs, needed = estimated_size(problem, options.output, options.shard, enough=free)
     if free and needed > free:
         raise TooLargeError(
-            f"about {graphs:.0e} graphs need about {needed / 1e9:.0f} GB and {free / 1e9:.0f} GB are free: list a part "
-            f"with --shard i/{int(needed / free * 2) + 1} --force, or only count them",
+            f"about {graphs:.2g} graphs need about {_bytes(needed)}, and {_bytes(free)} are free for {options.output}: "
+            f"list a part with --shard i/{int(needed / free) + 1}, name a file on another disk, or only count them; "
+            "--force writes as much as fits",
             graphs,
         )
+
+
+def _bytes(size: float) -> str:
+    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{size / 1e6:.3g} MB"

@@ -19,10 +19,14 @@ from typing import Any, BinaryIO
 
 from graphsynth.errors import GraphsynthError, SpecError
 from graphsynth.journal import Journal, Work, digest_of, writing
+from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import parallel
-from graphsynth.synthesis.problem import Piece, Problem, graphs_of_piece
+from graphsynth.synthesis.problem import Piece, Problem, graphs_of_piece, text_of_piece
+from graphsynth.synthesis.units import Unit
 
-__all__ = ["Step", "count_with_checkpoint", "shard_of", "write_listing"]
+__all__ = ["Step", "count_with_checkpoint", "estimated_size", "shard_of", "write_listing"]
+
+_SAMPLED = 16  # pieces made to estimate the size of a listing
 
 
 @dataclass(frozen=True)
@@ -68,14 +72,16 @@ def _work(problem: Problem, pieces: Sequence[Piece], form: str, remedy: str) -> 
     return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy)
 
 
+def _json_line(graph: MechanismGraph) -> str:
+    record: dict[str, Any] = {"key": graph.key, "links": graph.links, "space": graph.space, "frame": graph.frame}
+    record["joints"] = [list(joint) for joint in graph.joints]
+    if graph.frame is not None:
+        record["levels"] = [list(level) for level in graph.levels]
+    return json.dumps(record) + "\n"
+
+
 def _json_lines(piece: Piece) -> tuple[bytes, int]:
-    lines = []
-    for graph in graphs_of_piece(piece):
-        record: dict[str, Any] = {"key": graph.key, "links": graph.links, "space": graph.space, "frame": graph.frame}
-        record["joints"] = [list(joint) for joint in graph.joints]
-        if graph.frame is not None:
-            record["levels"] = [list(level) for level in graph.levels]
-        lines.append(json.dumps(record) + "\n")
+    lines = list(map(_json_line, graphs_of_piece(piece)))
     return "".join(lines).encode(), len(lines)
 
 
@@ -113,7 +119,7 @@ def write_listing(
     GraphsynthError
         If the file exists and is neither resumed nor overwritten, or belongs to another problem.
     """
-    form = "jsonl" if path.suffix == ".jsonl" else "text"
+    form = _form(path)
     note = path.with_name(path.name + ".progress")
     pieces = shard_of(problem.pieces(listing=True), shard)
     if not path.parent.is_dir():
@@ -151,6 +157,36 @@ def write_listing(
 
 def _blocks(pieces: Sequence[Piece], form: str, executor: Executor | None) -> Iterator[tuple[bytes, int]]:
     return parallel.in_order(executor, _json_lines, pieces) if form == "jsonl" else parallel.texts(pieces, executor)
+
+
+def estimated_size(
+    problem: Problem, path: Path, shard: tuple[int, int] | None = None, *, enough: float = 0.0
+) -> tuple[float, float]:
+    """Return about how many graphs, and bytes, a listing to a file has; their bounds if these bytes are enough.
+
+    The bounds on the graphs are sure; pieces all over the listing, made for that, tell what share of them there is.
+    What is made one by one (rings, fractionated chains) is little and left out.
+    """
+    units = [piece for piece in shard_of(problem.pieces(listing=True), shard) if isinstance(piece, Unit)]
+    weight = sum(unit.weight for unit in units)
+    links = max((unit.family.links for unit in units), default=1)
+    line = links * links / 12 + 24 if _form(path) == "text" else 60.0 * links  # bytes at most
+    if weight * line <= enough or not units:
+        return weight, weight * line
+    chosen = units[:: max(1, len(units) // _SAMPLED)]
+    made = [sum(lines for _, lines in text_of_piece(unit)) for unit in chosen]
+    some = [next(parallel.graphs([unit], None)) for unit, lines in zip(chosen, made) if lines]
+    size = sum(map(len, map(_json_line if _form(path) == "jsonl" else _text_line, some))) / max(len(some), 1)
+    graphs = weight * sum(made) / sum(unit.weight for unit in chosen)
+    return graphs, graphs * size
+
+
+def _text_line(graph: MechanismGraph) -> str:
+    return f"{graph.to_text()}\n"
+
+
+def _form(path: Path) -> str:
+    return "jsonl" if path.suffix == ".jsonl" else "text"
 
 
 def _cut_back(file: BinaryIO, journal: Journal, pieces: int) -> int:
