@@ -65,11 +65,13 @@ def _from_file(place: Path, options: argparse.Namespace) -> _Found:
 
     from graphsynth.drawing.reach import motion_over_reach
     from graphsynth.kinematics.simulation import simulate
+    from graphsynth.mechanism.files import JSON_MAX
     from graphsynth.mechanism.model import Mechanism
+    from graphsynth.textfiles import read_bytes
 
     if options.driver:
         raise SpecError("--driver belongs to a graph: a dimensioned mechanism names its drivers in its file")
-    text = place.read_bytes()
+    text = read_bytes(place, JSON_MAX, "a mechanism")
     try:
         mechanism = Mechanism.from_toml(text) if place.suffix.lower() == ".toml" else Mechanism.from_json(text)
     except FormatError as error:

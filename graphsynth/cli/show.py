@@ -66,15 +66,22 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
 
     path = Path(text)
     if len(text) < 1000 and path.is_file():
-        from graphsynth.formats.registry import FORMATS, read
+        from graphsynth.formats.registry import FORMATS, LINE_MAX, read
 
         if any(path.suffix.lower() in entry.suffixes for entry in FORMATS.values() if not entry.line):
             item = read(path, number=line)
             return item if isinstance(item, MechanismGraph) else item.graph
-        lines = path.read_text(errors="replace").splitlines()
-        if not 1 <= line <= len(lines):
-            raise FormatError(f"line {line} does not exist, the file has {len(lines)}: choose another --line", text)
-        return _one(lines[line - 1].strip(), f"{text} line {line}")
+        count = 0
+        with path.open("rb") as file:
+            while row := file.readline(LINE_MAX + 1):
+                count += 1
+                if len(row) > LINE_MAX:
+                    raise FormatError(
+                        f"more than {LINE_MAX} bytes on one line; no graph is so long", f"{text} line {count}"
+                    )
+                if count == line:
+                    return _one(row.decode(errors="replace").strip(), f"{text} line {line}")
+        raise FormatError(f"line {line} does not exist, the file has {count}: choose another --line", text)
     if text.startswith("1") and " " not in text:
         return MechanismGraph.from_key(text)
     try:

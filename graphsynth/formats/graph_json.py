@@ -8,9 +8,9 @@ from typing import Any
 
 from graphsynth.errors import FormatError, GraphError
 from graphsynth.mechanism import files
-from graphsynth.mechanism.files import json_value
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.textfiles import json_value
 
 __all__ = ["compose", "compose_lines", "graph_of", "parse", "parse_line", "record_of"]
 

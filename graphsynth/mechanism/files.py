@@ -8,8 +8,6 @@ second is refused before it is read.
 from __future__ import annotations
 
 import json
-import re
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from typing import Any, TypeVar
@@ -19,9 +17,10 @@ from graphsynth.mechanism.joints import KINDS, JointGeometry
 from graphsynth.mechanism.laws import LAWS, Linear
 from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.textfiles import json_value, text_of, toml_tables
 
 __all__ = [
-    "JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "json_value", "to_dict", "to_json", "to_toml",
+    "JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "to_dict", "to_json", "to_toml",
 ]  # fmt: skip
 
 FORMAT = "graphsynth mechanism"
@@ -30,8 +29,6 @@ _KEYS = {"format", "version", "graph", "joints", "drivers", "points", "pose"}
 #: Longest texts that are read, in characters.
 JSON_MAX = 3_000_000
 TOML_MAX = 400_000
-_STRING = re.compile(r'"(?:[^"\\\n]|\\.)*+"' "|'[^'\n]*+'")
-_LONG_KEY = re.compile(r'(?<![\w"-])(?:[\w"-]++[ \t]*+\.[ \t]*+){12}', re.ASCII)
 _T = TypeVar("_T")
 
 
@@ -131,57 +128,7 @@ def _toml(value: Any) -> str:
 def _decoded(text: str | bytes, most: int, name: str) -> str:
     if len(text) > most:
         raise FormatError(f"{len(text)} characters; a mechanism in {name} is read up to {most}", "length")
-    if isinstance(text, str):
-        return text.removeprefix("\ufeff")
-    try:
-        return text.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"not UTF-8 text ({error.reason})", f"byte {error.start}") from None
-
-
-def json_value(text: str, place: str = "") -> Any:
-    """Read JSON as plain values.
-
-    Parameters
-    ----------
-    text : str
-        The document.
-    place : str, optional
-        What messages call it.
-
-    Returns
-    -------
-    dict, list, str, number, bool or None
-
-    Raises
-    ------
-    FormatError
-        For anything else, NaN and keys given twice too, whatever the depth.
-    """
-    try:
-        return json.loads(text, parse_constant=_no_constant, object_pairs_hook=_pairs)
-    except json.JSONDecodeError as error:
-        where = f"line {error.lineno}, column {error.colno}"
-        raise FormatError(f"not JSON ({error.msg})", f"{place}, {where}" if place else where) from None
-    except FormatError as error:
-        raise FormatError(str(error), place) from None
-    except (RecursionError, ValueError) as error:
-        raise FormatError(f"not JSON that can be read ({error})", place or "text") from None
-
-
-def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        left = set(found)
-        for name, _ in pairs:
-            if name not in left:
-                raise FormatError(f"the key {name[:24]!r} is there twice")
-            left.remove(name)
-    return found
-
-
-def _no_constant(name: str) -> Any:
-    raise FormatError(f"{name} is not a number of JSON")
+    return text_of(text)
 
 
 def from_json(text: str | bytes) -> Mechanism:
@@ -207,8 +154,6 @@ def from_json(text: str | bytes) -> Mechanism:
 def from_toml(text: str | bytes) -> Mechanism:
     """Read TOML; anything that is not a mechanism is a `FormatError` with the line or key.
 
-    A key of many parts is refused: the time of the parser grows with the square of their number.
-
     Parameters
     ----------
     text : str or bytes
@@ -223,16 +168,7 @@ def from_toml(text: str | bytes) -> Mechanism:
     FormatError
         For anything that is not TOML of a mechanism, with the line or key.
     """
-    decoded = _decoded(text, TOML_MAX, "TOML")
-    if match := _LONG_KEY.search(_STRING.sub('""', decoded)):
-        raise FormatError(f"the key {match[0][:24]!r}... has too many parts", "text")
-    try:
-        data = tomllib.loads(decoded)
-    except tomllib.TOMLDecodeError as error:
-        raise FormatError(f"not TOML ({error})", "text") from None
-    except (RecursionError, ValueError) as error:
-        raise FormatError(f"not TOML that can be read ({error})", "text") from None
-    return from_dict(data)
+    return from_dict(toml_tables(_decoded(text, TOML_MAX, "TOML")))
 
 
 def from_dict(data: Any) -> Mechanism:

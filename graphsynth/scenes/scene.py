@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from graphsynth.errors import FormatError, SceneError
+from graphsynth.errors import SceneError
 from graphsynth.scenes.family import Family, family, family_names
 from graphsynth.scenes.stages import RANK, STRUCTURE, Stage
 from graphsynth.scenes.tables import Place, read_table, require, suggest
 from graphsynth.structure.variables import nearest
+from graphsynth.textfiles import read_bytes, text_of, toml_tables
 
 __all__ = [
     "TABLES",
@@ -321,34 +321,6 @@ def find_scene(name_or_path: str | Path) -> Path:
     )
 
 
-_LARGEST_FILE = 1 << 20
-
-
-def _read_bytes(path: Path) -> bytes:
-    """Read a scene file; one of more than a megabyte is no scene."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(_LARGEST_FILE + 1)
-    except OSError as error:
-        raise FormatError(f"cannot be read: {error.strerror}", path.name) from None
-    if len(data) > _LARGEST_FILE:
-        raise FormatError(f"has more than {_LARGEST_FILE} bytes; a scene is a short text", path.name)
-    return data
-
-
-#: A dotted key of a hundred parts: reading many more takes time and memory that grow with their square.
-_DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){100}""")
-
-
-def _refuse_deep_keys(text: str, path: Path) -> None:
-    found = _DEEP.search(text)
-    if found:
-        line = text.count("\n", 0, found.start()) + 1
-        raise FormatError(
-            "a key of more than 100 parts; no key of a scene has more than ten", f"{path.name}, line {line}"
-        )
-
-
 def load_scene(name_or_path: str | Path) -> Scene:
     """Read a scene by name or path.
 
@@ -365,15 +337,8 @@ def load_scene(name_or_path: str | Path) -> Scene:
     True
     """
     path = find_scene(name_or_path)
-    data = _read_bytes(path)
-    try:
-        text = data.decode("utf-8-sig")  # some editors put a mark before the first letter
-    except UnicodeDecodeError as error:
-        raise FormatError("not UTF-8 text; save the scene as UTF-8", f"{path.name}, byte {error.start}") from None
-    _refuse_deep_keys(text, path)
-    try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # ValueError: TOMLDecodeError, and integers of thousands of digits
-        raise FormatError(f"not TOML: {error}", path.name) from None
+    data = read_bytes(path, what="a scene", place=path.name)
+    text = text_of(data, path.name, "the scene")
+    tables = toml_tables(text, path.name)
     scene = Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest(), text)
     return replace(scene, folder=path.parent)

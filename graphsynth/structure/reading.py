@@ -220,16 +220,10 @@ def changed_question(question: Mapping[str, Any], changes: Mapping[str, Any]) ->
 
 def load_toml(path: Path) -> dict[str, Any]:
     """Parse a TOML file; FormatError with the file name if it cannot be read."""
-    import tomllib
+    from graphsynth.textfiles import read_bytes, text_of, toml_tables
 
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise FormatError(f"cannot be read ({error.strerror})", str(path)) from error
-    except UnicodeDecodeError as error:
-        raise FormatError(f"is not UTF-8 text (byte {error.start})", str(path)) from error
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise FormatError(f"is not TOML: {error}", str(path)) from error
+    place = str(path)
+    return toml_tables(text_of(read_bytes(path, what="a structural question"), place), place)
 
 
 def toml_of(

@@ -49,11 +49,14 @@ def decode(data: bytes) -> Layers:
         If the data are not a list of contracted graphs.
     """
     try:
-        raw = lzma.decompress(data)
-    except lzma.LZMAError as error:
-        raise FormatError(f"not a list of contracted graphs ({error})", "contracted graphs") from None
+        return _unpacked(lzma.decompress(data))
+    except (lzma.LZMAError, IndexError, ValueError) as error:  # ValueError: FormatError, or fewer bytes than said
+        raise FormatError(f"not a list of contracted graphs ({error}): make it anew", "contracted graphs") from None
+
+
+def _unpacked(raw: bytes) -> Layers:
     if raw[:4] != _MAGIC:
-        raise FormatError(f"starts with {raw[:4]!r}, expected {_MAGIC!r}", "contracted graphs")
+        raise FormatError(f"starts with {raw[:4]!r}, expected {_MAGIC!r}")
     at, layers = 5, Layers()
     for _ in range(raw[4]):
         k, count = raw[at], int.from_bytes(raw[at + 1 : at + 5], "little")
@@ -76,7 +79,9 @@ def _layers(loops: int) -> Layers:
     else:
         data = (Path(os.environ[FOLDER_VARIABLE]) / name).read_bytes()
     layers = decode(data)
-    for mults in layers.values():
+    for k, mults in layers.items():
+        if loops > SHIPPED_LOOPS and (mults.sum(axis=(1, 2), dtype=np.int64) != 2 * (loops + k - 1)).any():
+            raise FormatError(f"holds graphs with other numbers of loops than {loops}: make it anew", name)
         mults.setflags(write=False)
     return layers
 

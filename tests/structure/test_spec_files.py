@@ -64,9 +64,9 @@ def test_toml_forms_of_a_range(tmp_path):
         ("n = 5\nN = 7", ["'N'", "given twice"]),
         ("W = 2024-01-01", ["'W'", "not an integer"]),
         ("[levels]\nlast = 3", ["'levels'", "'last'"]),
-        ("W = ", ["is not TOML"]),
-        ("W = 1\nW = 2", ["is not TOML"]),
-        ("[" * 5000, ["is not TOML"]),
+        ("W = ", [": not TOML"]),
+        ("W = 1\nW = 2", [": not TOML"]),
+        ("[" * 5000, [": not TOML"]),
     ],
 )
 def test_a_bad_file_names_the_file_the_key_and_the_remedy(tmp_path, text, words):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import tomllib
 from importlib.resources import files
 from pathlib import Path
@@ -129,6 +130,17 @@ def test_bad_data_are_named():
     good = files("graphsynth.synthesis").joinpath("data", "contracted-4.xz").read_bytes()
     with pytest.raises(FormatError, match="contracted graphs"):
         decode(good[:-20])
+    for raw in (b"gsH1", b"gsH1\x05\x02", b"gsH1\x01\x09\xff\xff\xff\xff"):  # less than it says
+        with pytest.raises(FormatError, match="make it anew"):
+            decode(lzma.compress(raw))
+
+
+def test_a_list_of_other_loops_is_not_taken(monkeypatch, tmp_path):
+    data = files("graphsynth.synthesis").joinpath("data", "contracted-4.xz").read_bytes()
+    (tmp_path / "contracted-9.xz").write_bytes(data)
+    monkeypatch.setenv("GRAPHSYNTH_CONTRACTED", str(tmp_path))
+    with pytest.raises(FormatError, match=r"contracted-9.xz: .*other numbers of loops than 9"):
+        contracted_graphs(9, 4)
 
 
 def test_more_loops_than_shipped_is_refused(monkeypatch):

@@ -6,7 +6,6 @@ import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.errors import FormatError, GraphsynthError
@@ -21,9 +20,6 @@ if TYPE_CHECKING:
     from graphsynth.scenes.steps.planar_loads import Driven, Jammed
 
 __all__ = ["Built", "FileCandidate", "Moved", "embody", "judge", "mechanisms", "move", "scaled", "take", "write"]
-
-
-_LARGEST_FILE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,36 +78,23 @@ def take(context: Context) -> Iterator[Candidate | FileCandidate]:
 
 
 def _read(context: Context, place: int, name: str) -> FileCandidate:
+    from graphsynth.mechanism.files import JSON_MAX
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.scenes.steps.structural import assortment_text
+    from graphsynth.textfiles import read_bytes
 
     at = context.scene.place / "mechanism" / "files" / str(place)
     path = context.scene.folder / name
     try:
-        data = _bytes_of(path)
+        data = read_bytes(path, JSON_MAX, "a mechanism", path.name)
+    except FormatError as error:
+        raise at.error(f"names {name!r}, which {str(error).removeprefix(f'{path.name}: ')}") from error
+    try:
         mechanism = Mechanism.from_json(data) if path.suffix == ".json" else Mechanism.from_toml(data)
-    except OSError as error:
-        raise at.error(f"names {name!r}, which cannot be read: {error.strerror}") from error
     except GraphsynthError as error:  # FormatError: no mechanism as text; others: one that nobody can build
         raise at.error(f"names {name!r}, which is no mechanism: {error}") from error
     key = f"{mechanism.graph.key} {hashlib.sha256(data).hexdigest()[:12]}"
     return FileCandidate(place + 1, path.stem, mechanism, key, assortment_text(mechanism.graph))
-
-
-def _bytes_of(path: Path) -> bytes:
-    """Read a file of a mechanism; neither a device nor a file that never ends.
-
-    Raises
-    ------
-    OSError, FormatError
-    """
-    if path.exists() and not path.is_file():
-        raise FormatError("not a file", path.name)
-    with path.open("rb") as stream:
-        data = stream.read(_LARGEST_FILE + 1)
-    if len(data) > _LARGEST_FILE:
-        raise FormatError(f"more than {_LARGEST_FILE} bytes", path.name)
-    return data
 
 
 def embody(context: Context, design: Candidate | FileCandidate) -> Built:
