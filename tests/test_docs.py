@@ -229,7 +229,7 @@ def test_dotted_names_exist():
 def test_pictures_are_drawn_by_documented_modules():
     """Every public module of `graphsynth.drawing` that draws something is named in the reference."""
     text = reference_text()
-    helpers = {"bodies", "figures", "lettering", "moving", "palette", "shapes", "svg", "symbols"}
+    helpers = {"bodies", "figures", "lettering", "moving", "pages", "palette", "shapes", "svg", "symbols"}
     drawing = {path.stem for path in (ROOT / "graphsynth" / "drawing").glob("*.py")} - {"__init__"}
     assert [name for name in sorted(drawing - helpers) if f"{name}." not in text and f"`{name}`" not in text] == []
 

@@ -13,6 +13,7 @@ from graphsynth.drawing.animation import animated_svg
 from graphsynth.drawing.coupled_pictures import clearance_picture
 from graphsynth.drawing.frames import with_trace_points
 from graphsynth.drawing.graphs import graph_sketch
+from graphsynth.drawing.svg import bare, painted, picture
 from graphsynth.jamming.coupled import JointLimits, Misalignment
 
 CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
@@ -23,23 +24,18 @@ def chains_picture(chains: list[gs.MechanismGraph]) -> str:
     """All chains of eight links side by side, the chosen one framed."""
     rows = -(-len(chains) // COLUMNS)
     width, height = COLUMNS * (CELL + GAP) + GAP, rows * (CELL + GAP) + GAP
-    parts, style = [], ""
+    parts = []
     for k, chain in enumerate(chains):
         x, y = GAP + k % COLUMNS * (CELL + GAP), GAP + k // COLUMNS * (CELL + GAP)
         sketch, pose = graph_sketch(chain, width=480.0, height=480.0, numbers=False)
-        found = re.fullmatch(r"<svg [^>]*viewBox=\"([^\"]*)\"[^>]*>(.*)</svg>", sketch.svg(pose), re.DOTALL)
+        found = re.fullmatch(r"<svg [^>]*viewBox=\"([^\"]*)\"[^>]*>(.*)</svg>", bare(sketch.svg(pose)), re.DOTALL)
         assert found is not None
         body = re.sub(r"<title>.*?</title>", "", found[2])
-        style = style or re.search(r"<style>.*?</style>", body, re.DOTALL)[0]  # type: ignore[index]
-        body = re.sub(r"<style>.*?</style>", "", body, flags=re.DOTALL)
         if k == CHOSEN:
-            parts.append(
-                f'<rect x="{x}" y="{y}" width="{CELL}" height="{CELL}" rx="8" fill="none" stroke="var(--b)" '
-                'stroke-width="3"/>'
-            )
+            frame = painted(stroke="b", width=3.0)
+            parts.append(f'<rect x="{x}" y="{y}" width="{CELL}" height="{CELL}" rx="8" {frame}/>')
         parts.append(f'<svg x="{x}" y="{y}" width="{CELL}" height="{CELL}" viewBox="{found[1]}">{body}</svg>')
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" class="gs" viewBox="0 0 {width} {height}" role="img">'
-    return f"{head}<title>The sixteen chains of eight links with mobility 1</title>{style}{''.join(parts)}</svg>\n"
+    return picture(parts, width, height, "The sixteen chains of eight links with mobility 1") + "\n"
 
 
 def make(folder: Path) -> list[Path]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
 from graphsynth.accuracy.choice import seconds_text
 from graphsynth.accuracy.rows import Problem, Row
+from graphsynth.drawing.pages import whole_page
+from graphsynth.drawing.palette import STYLE
+from graphsynth.drawing.svg import bare
 
 if TYPE_CHECKING:
     from graphsynth.accuracy.report import AccuracyReport
@@ -25,7 +27,7 @@ main{max-width:62rem;margin:0 auto;padding:1.2rem 1rem 3rem}
 h1{font-size:1.6rem;line-height:1.2}
 h2{font-size:1.2rem;margin:2.4rem 0 .5rem;border-top:1px solid var(--rule);padding-top:.9rem}
 p,li{max-width:48rem}.soft{color:var(--soft);font-size:.875rem}
-figure{margin:.8rem 0;background:#fff;border-radius:.5rem;padding:.4rem}
+figure{margin:.8rem 0}
 figure svg{display:block;width:100%;height:auto;max-width:56rem;margin:0 auto}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-size:.85rem;font-variant-numeric:tabular-nums}
 th,td{text-align:left;vertical-align:top;padding:.25rem .9rem .25rem 0;border-bottom:1px solid var(--rule)}
@@ -48,38 +50,23 @@ def page(report: AccuracyReport, pictures: Mapping[str, str]) -> str:
         f"<h1>{escape(title)}</h1>",
         f'<p class="soft">{escape(report.machine)}. Measured in {report.seconds:.0f} s. Times are wall times, '
         "the best of the rounds, with everything compiled. Every sentence is computed from the rows below it.</p>",
-        *(_problem(report, problem, k, pictures[problem.name]) for k, problem in enumerate(report.problems)),
+        *(_problem(report, problem, pictures[problem.name]) for problem in report.problems),
     ]
     if report.left_out:
         items = "".join(f"<li><b>{escape(name)}</b>: {escape(reason)}</li>" for name, reason in report.left_out)
         parts.append(f"<h2>Left out</h2><ul>{items}</ul>")
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{_CSS}</style></head><body><main>"
-        + "\n".join(parts)
-        + "</main></body></html>\n"
-    )
+    return whole_page(title, _CSS + STYLE, "\n".join(parts))
 
 
-def _problem(report: AccuracyReport, problem: Problem, number: int, svg: str) -> str:
+def _problem(report: AccuracyReport, problem: Problem, svg: str) -> str:
     sentences = "".join(f"<li>{escape(text)}</li>" for text in report.advice[problem.name].values())
     defaults = "".join(f"<li>{escape(k.sentence)}</li>" for k in report.knees[problem.name] if k.default)
     note = f'<p class="soft">{escape(problem.note)}</p>' if problem.note else ""
     kept = f'<p class="soft">Defaults:</p><ul>{defaults}</ul>' if defaults else ""
     return (
         f"<h2>{escape(problem.name)}</h2><p>{escape(problem.question)}</p>"
-        f"<figure>{_inline(svg, f'p{number}-')}</figure><ul>{sentences}</ul>{kept}{note}{_rows(problem)}"
+        f"<figure>{bare(svg)}</figure><ul>{sentences}</ul>{kept}{note}{_rows(problem)}"
     )
-
-
-def _inline(svg: str, prefix: str) -> str:
-    """Cut the XML prologue, and make the ids of a picture different from those of the others on the page."""
-    body = svg[svg.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
-    body = re.sub(r'\bid="', f'id="{prefix}', body)
-    body = re.sub(r'href="#', f'href="#{prefix}', body)
-    return body.replace("url(#", f"url(#{prefix}")
 
 
 def _rows(problem: Problem) -> str:

@@ -207,6 +207,7 @@ def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
     """
     from graphsynth.accuracy.page import page
     from graphsynth.accuracy.pictures import work_precision_picture
+    from graphsynth.drawing.figures import themed_svg
 
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / "accuracy.csv", folder / "accuracy.json", folder / "accuracy.html"]
@@ -215,10 +216,10 @@ def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
     pictures = {}
     for problem in report.problems:
         figure = work_precision_picture(problem)
-        for suffix in ("png", "svg"):
-            files.append(folder / f"{problem.name}.{suffix}")
-            figure.savefig(files[-1], dpi=150, metadata={"Date": None} if suffix == "svg" else None)
-        pictures[problem.name] = files[-1].read_text(encoding="utf-8")
+        pictures[problem.name] = themed_svg(figure)
+        files += [folder / f"{problem.name}.{suffix}" for suffix in ("png", "svg")]
+        figure.savefig(files[-2], dpi=150)
+        files[-1].write_text(pictures[problem.name], encoding="utf-8")
     files[2].write_text(page(report, pictures), encoding="utf-8")
     return tuple(files)
 

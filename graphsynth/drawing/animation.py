@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import math
-from hashlib import sha256
+import re
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from itertools import groupby
@@ -21,10 +22,12 @@ from numpy.typing import NDArray
 from graphsynth.drawing.bodies import bodies
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.frames import Frames, frames_of, shown_coordinate
-from graphsynth.drawing.palette import STYLE, TRACE_COLOURS
-from graphsynth.drawing.shapes import FIXED, Point, Shape
+from graphsynth.drawing.moving import Moving
+from graphsynth.drawing.pages import policy
+from graphsynth.drawing.palette import STYLE, TRACE_COLOURS, VARIABLES
+from graphsynth.drawing.shapes import FIXED, Point, Shape, Text
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.drawing.svg import element, number, picture
+from graphsynth.drawing.svg import element, number, picture, words
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Revolute
 
@@ -54,35 +57,45 @@ class _Stage:
         offset = (point - self.middle[link]) * self.sketch.scale
         return offset.real, -offset.imag
 
-    def track(self, link: int) -> Array:
-        """Place (pixels) and turn (degrees clockwise) of a link's group in every frame, shape (n, 3)."""
+    def track(self, link: int, at: Point | None = None) -> Array:
+        """Place (pixels) and turn (degrees clockwise) of a link's group, or of a point, in all frames, shape (n, 3)."""
         pose = self.frames.poses[:, link]
-        z = pose[:, 0] + 1j * pose[:, 1] + np.exp(1j * pose[:, 2]) * self.middle[link]
+        z = pose[:, 0] + 1j * pose[:, 1] + np.exp(1j * pose[:, 2]) * (self.middle[link] if at is None else at)
         x, y = np.array([self.sketch.xy(complex(value)) for value in z]).T
         return np.column_stack([x, y, -np.degrees(pose[:, 2])])
 
-    def groups(self, moving: str, letters: str, grip: int) -> list[str]:
-        """Markup of all shapes, back to front; ``moving`` and ``letters`` are attributes with the link as ``{}``."""
-        found = []
-        for (layer, link), run in groupby(self.sketch.ordered(), key=lambda shape: (shape.layer, shape.link)):
-            shapes = list(run)
-            if link == FIXED:
-                body = "".join(element(s, self.sketch.xy, self.sketch.scale, self.sketch.symbol) for s in shapes)
-                found.append(f'<g data-layer="{layer}">{body}</g>')
-            else:
-                found.append(self._group(link, layer, shapes, moving, letters, grip == link))
-        return found
+    def layers(self) -> list[tuple[str, int, list[Shape]]]:
+        """Layer and link of all shapes, back to front; the frame stands still."""
+        found = groupby(self.sketch.ordered(), key=lambda shape: (shape.layer, shape.link))
+        return [(layer, link, list(run)) for (layer, link), run in found]
 
-    def _group(self, link: int, layer: str, shapes: list[Shape], moving: str, letters: str, grip: bool) -> str:
-        x, y, turn = self.track(link)[0]
-        upright = f'{letters.format(link)} transform="rotate({number(-turn)})"'
-        body = "".join(
+    def still(self, shapes: Sequence[Shape]) -> str:
+        """Markup of shapes that do not move."""
+        return "".join(element(s, self.sketch.xy, self.sketch.scale, self.sketch.symbol) for s in shapes)
+
+    def about(self, link: int, shapes: Sequence[Shape], upright: str = "") -> str:
+        """Markup of shapes about the origin of a link's group."""
+        return "".join(
             element(s, lambda p: self.local(link, p), self.sketch.scale, self.sketch.symbol, upright) for s in shapes
         )
+
+    def groups(self, grip: int) -> list[str]:
+        """Markup for the player, back to front: what it moves is marked with the number of the link."""
+        found = []
+        for layer, link, shapes in self.layers():
+            if link == FIXED:
+                found.append(f'<g data-layer="{layer}">{self.still(shapes)}</g>')
+            else:
+                found.append(self._group(link, layer, shapes, grip == link))
+        return found
+
+    def _group(self, link: int, layer: str, shapes: list[Shape], grip: bool) -> str:
+        x, y, turn = self.track(link)[0]
+        body = self.about(link, shapes, f'data-r="{link}" transform="rotate({number(-turn)})"')
         if grip and layer == "label":
             body += self._grip(link)
         where = f"translate({number(x)} {number(y)}) rotate({number(turn)})"
-        return f'<g {moving.format(link)} data-layer="{layer}" transform="{where}">{body}</g>'
+        return f'<g data-k="{link}" data-layer="{layer}" transform="{where}">{body}</g>'
 
     def _grip(self, link: int) -> str:
         """Write an invisible thick line along the driven link, to take hold of."""
@@ -136,14 +149,16 @@ def animation_html(
     name = title or f"Mechanism with {motion.mechanism.graph.links} links"
     stage = _Stage(shown, width, height, name)
     driver = _driver_link(shown)
-    svg = picture(stage.groups('data-k="{}"', 'data-r="{}"', driver), stage.sketch.width, stage.sketch.height, "", name)
+    svg = picture(stage.groups(driver), stage.sketch.width, stage.sketch.height, name, style="")
     notes = "".join(
         f'<p class="{css}">{escape(words)}</p>' for css, words in (("", note), ("stop", shown.note)) if words
     )
     template = files("graphsynth.drawing").joinpath("player.html").read_text("utf-8")
+    template = template.replace("@STYLE@", VARIABLES + STYLE)
+    allowed = policy(*(re.findall(f"<{tag}>(.*?)</{tag}>", template, re.DOTALL) for tag in ("style", "script")))
     data = json.dumps(_data(stage, seconds, driver), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {"STYLE": STYLE, "SVG": svg, "NOTES": notes, "DATA": data, "TITLE": escape(name)}
-    pieces = template.split("@")
+    parts = {"POLICY": allowed, "SVG": svg, "NOTES": notes, "DATA": data, "TITLE": escape(name)}
+    pieces = re.split("@([A-Z]+)@", template)
     return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
 
 
@@ -205,7 +220,7 @@ def animated_svg(
     width: float = 560.0,
     height: float = 480.0,
 ) -> str:
-    """One SVG that moves by itself (CSS key frames), for pages and slides where no script runs.
+    """One SVG that moves by itself (SMIL, one clock), for pages and slides where no script runs.
 
     Parameters
     ----------
@@ -225,35 +240,24 @@ def animated_svg(
     _check_seconds(seconds)
     shown = frames_of(motion, frames)
     stage = _Stage(shown, width, height, title)
-    moving = sorted({shape.link for shape in stage.sketch.shapes} - {FIXED, shown.mechanism.frame})
-    way = "normal" if shown.loops else "alternate"
-    tracks = {link: stage.track(link) for link in moving}
-    # styles count for the whole page: names of this picture's own keep several pictures on one page apart
-    mark = sha256(b"".join([repr((title, seconds)).encode(), *map(bytes, tracks.values())])).hexdigest()[:8]
-    every = f"[class^=k{mark}],[class^=r{mark}]"
-    rules = [f"{every}{{animation:{number(seconds)}s linear infinite {way}}}"]
-    for link, track in tracks.items():
-        places = [f"translate({x:.1f}px,{y:.1f}px) rotate({a:.2f}deg)" for x, y, a in track]
-        rules.append(_key_frames(f"k{mark}-{link}", places))
-        rules.append(_key_frames(f"r{mark}-{link}", [f"rotate({-a:.2f}deg)" for a in track[:, 2]]))
-    rules.append(f"@media (prefers-reduced-motion:reduce){{{every}{{animation:none}}}}")
-    body = stage.groups(f'class="k{mark}-{{}}"', f'class="r{mark}-{{}}"', FIXED)
+    last = len(shown.poses) - 1
+    # round, or to and fro: one clock moves everything, so it runs over the whole period
+    order = list(range(last + 1)) if shown.loops else [*range(last + 1), *range(last - 1, -1, -1)]
     lines = wrap(shown.note, max(20, int(stage.sketch.width / 6.6)))
     tall = stage.sketch.height + _LINE * len(lines) + (8.0 if lines else 0.0)
-    body += [
-        f'<text x="12" y="{number(stage.sketch.height + _LINE * k + 6)}" font-size="12.5" '
-        f'fill="var(--b)">{escape(line)}</text>'
-        for k, line in enumerate(lines)
-    ]
-    return picture(body, stage.sketch.width, tall, STYLE + "".join(rules), title)
-
-
-def _key_frames(name: str, transforms: list[str]) -> str:
-    """Rules that carry class ``name`` through the transforms, evenly spaced; runs of equal ones are kept short."""
-    last = max(len(transforms) - 1, 1)
-    steps = "".join(
-        f"{number(100.0 * k / last)}%{{transform:{transform}}}"
-        for k, transform in enumerate(transforms)
-        if k in (0, last) or not transforms[k - 1] == transform == transforms[k + 1]
-    )
-    return f".{name}{{animation-name:{name}}}@keyframes {name}{{{steps}}}"
+    drawing = Moving(stage.sketch.width, tall, seconds if shown.loops else 2.0 * seconds)
+    for layer, link, shapes in stage.layers():
+        if link == FIXED:
+            drawing.fixed(stage.still(shapes))
+            continue
+        name = f' data-link="{link}" data-layer="{layer}"'
+        rigid = [shape for shape in shapes if not isinstance(shape, Text)]
+        if rigid:
+            drawing.carried(stage.track(link)[order], stage.about(link, rigid), name)
+        for shape in shapes:
+            if isinstance(shape, Text):  # letters stay upright
+                mark = element(shape, lambda point: (0.0, 0.0), stage.sketch.scale, stage.sketch.symbol)
+                drawing.carried(stage.track(link, shape.at)[order, :2], mark, name)
+    for k, line in enumerate(lines):
+        drawing.fixed(words(line, 12.0, stage.sketch.height + _LINE * k + 6.0, size=12.5, colour="b"))
+    return drawing.svg(title)

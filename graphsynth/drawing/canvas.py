@@ -211,15 +211,12 @@ def beside(pictures: Sequence[str], sketches: Sequence[Sketch]) -> str:
     """Put SVG pictures side by side in one."""
     if len(pictures) == 1:
         return pictures[0]
-    from graphsynth.drawing.svg import number
+    from graphsynth.drawing.svg import bare, number, picture
 
     width, height = sum(s.width for s in sketches), max(s.height for s in sketches)
     body, left = [], 0.0
     for text, sketch in zip(pictures, sketches):
         top = (height - sketch.height) / 2
-        body.append(text.replace("<svg ", f'<svg x="{number(left)}" y="{number(top)}" ', 1))
+        body.append(bare(text).replace("<svg ", f'<svg x="{number(left)}" y="{number(top)}" ', 1))
         left += sketch.width
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" '
-        f'width="{number(width)}" height="{number(height)}">{"".join(body)}</svg>'
-    )
+    return picture(body, width, height)

@@ -25,48 +25,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "drive_curves", "reduction_picture", "resistance_picture", "ripple_map_picture", "ripple_picture", "sensor_picture",
-    "start_up_picture", "themed_svg",
+    "start_up_picture",
 ]  # fmt: skip
 
 #: Readable in grey and by colour-blind readers (Okabe and Ito 2008).
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 _STYLES = ("-", (0, (5, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2)), (0, (2, 2)))
 _JOINTS = ("O1: frame on crank", "A: crank on coupler", "B: coupler on rocker", "O2: frame on rocker")
-
-
-def themed_svg(figure: Figure) -> str:
-    """Return a picture of this module as one ``<svg class="gs">`` whose lines and letters follow a light or dark page.
-
-    Examples
-    --------
-    >>> svg = themed_svg(new_figure((2.0, 1.0)))
-    >>> svg.startswith("<svg class="), "<?xml" in svg
-    (True, False)
-    """
-    import io
-    import re
-    from hashlib import sha256
-
-    import matplotlib
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    from graphsynth.drawing.palette import LIGHT, STYLE
-
-    stream = io.StringIO()
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "graphsynth"}):
-        FigureCanvasSVG(figure)
-        figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    svg = stream.getvalue()
-    mark = sha256(svg.encode()).hexdigest()[:8]
-    body = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :].strip(), flags=re.DOTALL)
-    for name in ("a", "b", "c", "d"):
-        body = body.replace(LIGHT[name], f"var(--{name})")
-    body = body.replace("#000000", "var(--ink)").replace("#b0b0b0", "var(--soft)")
-    for identifier in set(re.findall(r'id="([^"]+)"', body)):
-        body = re.sub(rf'(id="|#){re.escape(identifier)}(?=["\)])', rf"\g<1>{mark}-{identifier}", body)
-    body = re.sub(r"font: ([0-9.]+)px [^;\"]*", r"font-size: \1px; font-family: inherit", body)
-    rules = f"<style>{STYLE}.gs text{{fill:var(--ink)}}</style>"
-    return body.replace("<svg ", '<svg class="gs" ', 1).replace(">", f">{rules}", 1)
 
 
 def _panel(axes: Any, title: str, x: str, y: str) -> None:

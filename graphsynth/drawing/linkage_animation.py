@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.drawing.svg import element
+from graphsynth.drawing.svg import element, painted, words
 
 __all__ = ["Bar", "linkage_animation"]
 
@@ -79,9 +79,9 @@ def linkage_animation(
     for name in joints:
         drawing.circle(frames[name], 5.0 * background.symbol, _paint("link", 2.0, "paper"))
     for name in dots:
-        drawing.circle(frames[name], 4.5 * background.symbol, 'fill="var(--a)"')
+        drawing.circle(frames[name], 4.5 * background.symbol, painted("a"))
     for text, when in (notes or {}).items():
-        drawing.shown(list(when), f'<text x="12" y="22" font-size="14" fill="var(--ink)">{text}</text>')
+        drawing.shown(list(when), words(text, 12.0, 22.0, colour="ink"))
     return drawing.svg(title)
 
 
@@ -105,5 +105,4 @@ def _through(frames: Mapping[str, Points], names: Sequence[str]) -> Points:
 
 
 def _paint(stroke: str, width: float, fill: str = "", opacity: float = 1.0) -> str:
-    inside = f'fill="var(--{fill})" fill-opacity="{opacity:g}"' if fill else 'fill="none"'
-    return f'{inside} stroke="var(--{stroke})" stroke-width="{width:g}" stroke-linecap="round" stroke-linejoin="round"'
+    return f'{painted(fill, stroke, width, opacity=opacity)} stroke-linecap="round" stroke-linejoin="round"'

@@ -1,6 +1,8 @@
 """Shapes of an SVG that move by themselves: every shape holds its own frames, no script runs.
 
-Readers who ask for reduced motion see the shapes as they stand at a chosen frame.
+All of them begin with the picture and take the same time, so the one clock of the ``<svg>`` keeps them in step however
+slowly the page around it is read.  Readers who ask for reduced motion see the shapes as they stand at a chosen frame;
+programs that show no motion see the first.
 """
 
 from __future__ import annotations
@@ -10,7 +12,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.drawing.palette import STYLE
 from graphsynth.drawing.svg import number, picture
 
 __all__ = ["Moving"]
@@ -31,8 +32,9 @@ class Moving:
 
     Examples
     --------
+    >>> from graphsynth.drawing.svg import painted
     >>> drawing = Moving(100.0, 50.0, 2.0)
-    >>> drawing.circle([[10.0, 20.0], [90.0, 30.0]], 4.0, 'fill="var(--a)"')
+    >>> drawing.circle([[10.0, 20.0], [90.0, 30.0]], 4.0, painted("a"))
     >>> drawing.svg("A dot").count("<animate ")
     2
     """
@@ -68,29 +70,54 @@ class Moving:
         self._resting.append(f'<rect x="{left[self.frame]}" {size}/>')
         self._moving.append(f'<rect x="{left[0]}" {size}>{self._animate("x", left)}</rect>')
 
+    def carried(self, track: Points, markup: str, more: str = "") -> None:
+        """Add a group that is shifted and turned as a whole.
+
+        Parameters
+        ----------
+        track : ndarray, shape (frames, 2) or (frames, 3)
+            Place of its origin in pixels, and its turn in degrees clockwise.
+        markup : str
+            What is carried, drawn about the origin.
+        more : str
+            Attributes of the group.
+        """
+        moving = resting = markup
+        for kind, columns, digits, extra in (("rotate", track[:, 2:], 2, ""), ("translate", track[:, :2], 1, more)):
+            values = [" ".join(map(number, place)) for place in columns.round(digits).tolist()]
+            if not values[0]:  # upright
+                continue
+            steps = self._animate("transform", values, f' type="{kind}"', "animateTransform")
+            moving, resting = (
+                f'<g{extra} transform="{kind}({values[frame]})">{inside}</g>'
+                for frame, inside in ((0, moving + steps), (self.frame, resting))
+            )
+        self._moving.append(moving)
+        self._resting.append(resting)
+
     def shown(self, when: Sequence[bool], markup: str) -> None:
         """Add something that is seen in some frames only."""
-        values = ["visible" if seen else "hidden" for seen in when]
-        self._resting.append(f'<g visibility="{values[self.frame]}">{markup}</g>')
-        steps = self._animate("visibility", values, ' calcMode="discrete"')
-        self._moving.append(f'<g visibility="{values[0]}">{markup}{steps}</g>')
+        # not visibility: Inkscape does not hand it down to what is in the group
+        values = ["inline" if seen else "none" for seen in when]
+        self._resting.append(f'<g display="{values[self.frame]}">{markup}</g>')
+        steps = self._animate("display", values, ' calcMode="discrete"')
+        self._moving.append(f'<g display="{values[0]}">{markup}{steps}</g>')
 
-    def _animate(self, attribute: str, values: Sequence[str], more: str = "") -> str:
+    def _animate(self, attribute: str, values: Sequence[str], more: str = "", element: str = "animate") -> str:
         if len(set(values)) == 1:
             return ""
-        return (
-            f'<animate attributeName="{attribute}" dur="{number(self.seconds)}s" repeatCount="indefinite"{more} '
-            f'values="{";".join(values)}"/>'
-        )
+        time = f'dur="{max(self.seconds, 1e-3):.3f}s" repeatCount="indefinite"'
+        return f'<{element} attributeName="{attribute}" {time}{more} values="{";".join(values)}"/>'
 
     def svg(self, title: str) -> str:
-        """Return one ``<svg class="gs">`` in the colours of the page it is put in."""
-        rules = (
-            ".gs .rest{display:none}"
-            "@media (prefers-reduced-motion:reduce){.gs .move{display:none}.gs .rest{display:inline}}"
-        )
-        body = [f'<g class="move">{"".join(self._moving)}</g>', f'<g class="rest">{"".join(self._resting)}</g>']
-        return picture(body, self.width, self.height, STYLE + rules, title)
+        """Return one ``<svg class="gs">``, light or dark with the page."""
+        if self._moving == self._resting:
+            return picture(self._moving, self.width, self.height, title)
+        body = [
+            f'<g class="move">{"".join(self._moving)}</g>',
+            f'<g class="rest" display="none">{"".join(self._resting)}</g>',
+        ]
+        return picture(body, self.width, self.height, title)
 
 
 def _data(points: Points, closed: bool) -> str:

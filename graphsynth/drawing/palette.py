@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-__all__ = ["DARK", "LIGHT", "STYLE", "TRACE_COLOURS"]
+__all__ = ["DARK", "LIGHT", "STYLE", "TRACE_COLOURS", "VARIABLES"]
 
-#: Values on a light page, and of pictures without pages (PNG, PDF, GIF).
+#: Values on a light page, and of pictures without pages (PNG, PDF, GIF).  SVG elements carry them as plain attributes.
 LIGHT = {
     "ink": "#1b2733", "soft": "#8794a1", "note": "#55626f", "paper": "#ffffff", "link": "#1b2733", "fill": "#dbe4ee",
     "a": "#0072b2", "b": "#d55e00", "c": "#009e73", "d": "#aa4499", "jam": "#d55e00",
 }  # fmt: skip
-#: Values on a dark page.
+#: Values on a dark page; names that share a value of `LIGHT` share it here.
 DARK = {
     "ink": "#e6edf3", "soft": "#8b98a5", "note": "#a5b1bd", "paper": "#12181f", "link": "#e6edf3", "fill": "#2b3a49",
-    "a": "#56b4e9", "b": "#f0a060", "c": "#3ecf9f", "d": "#dd88cc", "jam": "#f0883e",
+    "a": "#56b4e9", "b": "#f0a060", "c": "#3ecf9f", "d": "#dd88cc", "jam": "#f0a060",
 }  # fmt: skip
 #: Colours of paths, in order of use.
 TRACE_COLOURS = ("a", "c", "d", "b")
@@ -22,8 +22,22 @@ def _variables(colours: dict[str, str]) -> str:
     return ";".join(f"--{name}:{value}" for name, value in colours.items())
 
 
-#: Style sheet of every SVG: colours are variables, so that a picture follows the page it is put in.
+def _recoloured() -> str:
+    """Rules that give every element with a light colour its dark one."""
+    pairs = {LIGHT[name]: DARK[name] for name in LIGHT}
+    return "".join(
+        f'.gs [{what}="{light}"]{{{what}:{dark}}}' for light, dark in pairs.items() for what in ("fill", "stroke")
+    )
+
+
+#: Style sheet of every SVG.  The attributes alone are a right picture, on white paper, for programs that read no style
+#: sheets; these rules follow readers who ask for dark pages or for reduced motion (see `graphsynth.drawing.moving`).
 STYLE = (
-    f".gs{{{_variables(LIGHT)};font-family:system-ui,-apple-system,'Segoe UI',Roboto,sans-serif}}"
-    f"@media (prefers-color-scheme:dark){{.gs{{{_variables(DARK)}}}}}"
+    f"@media (prefers-color-scheme:dark){{svg.gs:root{{color-scheme:dark}}{_recoloured()}}}"
+    "@media (prefers-reduced-motion:reduce){.gs .move{display:none}.gs .rest{display:inline}}"
+)
+#: The same colours by name, for the style sheet of a page.
+VARIABLES = (
+    f":root{{color-scheme:light dark;{_variables(LIGHT)}}}"
+    f"@media (prefers-color-scheme:dark){{:root{{{_variables(DARK)}}}}}"
 )

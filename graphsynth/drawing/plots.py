@@ -1,14 +1,12 @@
-"""Line plots as inline SVG, drawn by matplotlib and recoloured so that they follow the light or dark page.
+"""Line plots as inline SVG, drawn by matplotlib in colours that follow the light or dark page.
 
 matplotlib is imported when a plot is drawn, through the figure interface (no pyplot, no display, no global state).
 """
 
 from __future__ import annotations
 
-import io
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,16 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from graphsynth.drawing.palette import LIGHT
+
 __all__ = ["Band", "Chart", "Line", "Mark", "line_plot"]
 
-# Colours that stand for CSS variables: matplotlib writes them into the SVG, `_themed` replaces them there.
-_COLOURS = {
-    "ink": "#010203", "soft": "#010204", "a": "#010205", "b": "#010206", "c": "#010207", "jam": "#010208",
-    "d": "#010209", "note": "#01020a",
-}  # fmt: skip
 _RC = {
-    "svg.fonttype": "none",  # text stays text: readable by screen readers and in the page's font
-    "svg.hashsalt": "graphsynth",  # the same bytes for the same plot
     "font.family": "sans-serif",
     "font.size": 10,
     "axes.spines.top": False,
@@ -102,28 +95,23 @@ class Chart:
 
     def draw(self, ax: Any = None) -> Any:
         """Draw on matplotlib axes (of a new figure by default), in the colours of a light page; return the axes."""
-        from graphsynth.drawing.palette import LIGHT
-
         if ax is None:
-            from matplotlib.figure import Figure
+            from graphsynth.drawing.figures import new_figure
 
-            ax = Figure(figsize=self.size, layout="constrained").add_subplot()
-        self._draw(ax, LIGHT)
+            ax = new_figure(self.size).add_subplot()
+        self._draw(ax)
         return ax
 
     def svg(self) -> str:
         """Return one ``<svg class="gs">`` element with unique ids, whose colours follow the page it is put in."""
         import matplotlib
-        from matplotlib.backends.backend_svg import FigureCanvasSVG
-        from matplotlib.figure import Figure
+
+        from graphsynth.drawing.figures import new_figure, themed_svg
 
         with matplotlib.rc_context(_RC):
-            figure = Figure(figsize=self.size, layout="constrained")
-            FigureCanvasSVG(figure)
-            self._draw(figure.add_subplot(), _COLOURS)
-            stream = io.StringIO()
-            figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-        return _themed(stream.getvalue())
+            figure = new_figure(self.size)
+            self._draw(figure.add_subplot())
+        return themed_svg(figure, _RC)
 
     def save(self, path: str | Path) -> None:
         """Write to a file, as its suffix says: ``.svg`` themed, ``.png``, ``.pdf`` and what else matplotlib writes."""
@@ -132,20 +120,20 @@ class Chart:
         else:
             self.draw().figure.savefig(path, dpi=200)
 
-    def _draw(self, axes: Any, colours: Mapping[str, str]) -> None:
+    def _draw(self, axes: Any) -> None:
         for band in self.bands:
-            axes.axvspan(band.start, band.stop, color=colours[band.colour], alpha=0.16, lw=0, label=band.label or None)
+            axes.axvspan(band.start, band.stop, color=LIGHT[band.colour], alpha=0.16, lw=0, label=band.label or None)
         for line in self.lines:
-            axes.plot(line.x, line.y, line.style, color=colours[line.colour], lw=1.7, label=line.label or None)
+            axes.plot(line.x, line.y, line.style, color=LIGHT[line.colour], lw=1.7, label=line.label or None)
         for level in self.levels:
             height = float(np.ravel(np.asarray(level.y))[0])
-            axes.axhline(height, ls=level.style, lw=1.2, color=colours[level.colour], label=level.label or None)
+            axes.axhline(height, ls=level.style, lw=1.2, color=LIGHT[level.colour], label=level.label or None)
         seen: set[str] = set()
         for mark in self.marks:
             label = None if mark.label in seen else mark.label or None
             seen.add(mark.label)
-            axes.axvline(mark.x, ls=mark.style, lw=1.4, color=colours[mark.colour], label=label)
-        _dress(axes, self, colours)
+            axes.axvline(mark.x, ls=mark.style, lw=1.4, color=LIGHT[mark.colour], label=label)
+        _dress(axes, self)
 
 
 def line_plot(
@@ -163,9 +151,9 @@ def line_plot(
     return Chart(lines, xlabel, ylabel, bands, (), levels, xticks, equal, size=size).svg()
 
 
-def _dress(axes: Any, chart: Chart, colours: Mapping[str, str]) -> None:
+def _dress(axes: Any, chart: Chart) -> None:
     """Label the axes, put a light grid behind and a legend above the curves."""
-    ink, soft = colours["ink"], colours["soft"]
+    ink, soft = LIGHT["ink"], LIGHT["soft"]
     axes.set_xlabel(chart.xlabel, color=ink)
     axes.set_ylabel(chart.ylabel, color=ink)
     axes.tick_params(colors=ink, which="both")
@@ -215,24 +203,3 @@ def _in_pi(halves: int) -> str:
         return f"{halves}π/2".replace("1π", "π") if abs(halves) == 1 else f"{halves}π/2"
     whole = halves // 2
     return "0" if whole == 0 else f"{whole}π" if abs(whole) != 1 else ("π" if whole > 0 else "-π")
-
-
-_COUNTER = re.compile(r'id="([^"]+)"')
-
-
-def _themed(svg: str) -> str:
-    """Cut the XML prologue, make colours CSS variables, and make ids unique to this picture."""
-    from hashlib import sha256
-
-    from graphsynth.drawing.palette import STYLE
-
-    mark = sha256(svg.encode()).hexdigest()[:8]
-    body = svg[svg.index("<svg") :].strip()
-    for name, colour in _COLOURS.items():
-        body = body.replace(colour, f"var(--{name})")
-    for identifier in set(_COUNTER.findall(body)):
-        body = re.sub(rf'(id="|#){re.escape(identifier)}(?=["\)])', rf"\g<1>{mark}-{identifier}", body)
-    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
-    # Without this the generic family would win over the page's font.
-    body = re.sub(r"font: ([0-9.]+)px [^;\"]*", r"font-size: \1px; font-family: inherit", body)
-    return body.replace("<svg ", '<svg class="gs" ', 1).replace(">", f"><style>{STYLE}</style>", 1)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.drawing.moving import Moving
+from graphsynth.drawing.svg import painted, words
 from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["pointing_animation", "project"]
 
 Array = NDArray[np.float64]
-_LINE = 'fill="none" stroke-linecap="round" stroke-linejoin="round"'
+_ROUND = 'stroke-linecap="round" stroke-linejoin="round"'
 _CIRCLE = 48
 
 
@@ -113,36 +114,29 @@ class _Space:
         """Add everything from the back to the front."""
         l1, R = self.l1, self.R
         fixed = np.array([0.0, 1.25 * l1, 0.0]) if self.order == "YX" else np.array([1.25 * l1, 0.0, 0.0])
-        drawing.fixed(_still(self.page(np.array([-fixed, fixed])), 'stroke="var(--soft)" stroke-dasharray="9 4 2 4"'))
+        drawing.fixed(_still(self.page(np.array([-fixed, fixed])), "soft", dash="9 4 2 4"))
         for circle, colour in zip(self.circles, "ab"):
-            drawing.fixed(_still(self.page(circle), f'stroke="var(--{colour})" stroke-dasharray="2 4"', True))
-        drawing.fixed(_still(self.page(self.rim), 'stroke="var(--soft)" stroke-dasharray="2 4"', True))
+            drawing.fixed(_still(self.page(circle), colour, dash="2 4", closed=True))
+        drawing.fixed(_still(self.page(self.rim), "soft", dash="2 4", closed=True))
         for k, colour in enumerate("ab"):
             pivot = np.broadcast_to(self.pivot[k], self.ball[k].shape)
-            self._lines(drawing, pivot, self.ball[k], f'stroke="var(--{colour})" stroke-width="6"')
-            self._lines(drawing, self.ball[k], self.cardan[k], f'stroke="var(--{colour})" stroke-width="3"')
+            self._lines(drawing, pivot, self.ball[k], colour, 6.0)
+            self._lines(drawing, self.ball[k], self.cardan[k], colour, 3.0)
         disc = np.einsum("nij,pj->npi", R, self.rim)
-        drawing.path(
-            self.page(disc),
-            'fill="var(--fill)" fill-opacity="0.72" stroke="var(--ink)" stroke-width="1.6" stroke-linejoin="round"',
-            closed=True,
-        )
+        drawing.path(self.page(disc), f"{painted('fill', 'ink', 1.6, opacity=0.72)} {_ROUND}", closed=True)
         centre = np.zeros((len(R), 3))
         for k in (0, 1):
-            self._lines(drawing, centre, self.cardan[k], 'stroke="var(--ink)" stroke-width="1.2"')
-        self._lines(drawing, centre, l1 * R[..., :, 2], 'stroke="var(--c)" stroke-width="2.4"')
+            self._lines(drawing, centre, self.cardan[k], "ink", 1.2)
+        self._lines(drawing, centre, l1 * R[..., :, 2], "c", 2.4)
         for k, colour in enumerate("ab"):
-            x, y = self.page(self.pivot[k])
-            drawing.fixed(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" fill="var(--{colour})"/>')
-            ring = f'fill="var(--paper)" stroke="var(--{colour})" stroke-width="2"'
-            drawing.circle(self.page(self.ball[k]), 5.0, ring)
-            drawing.circle(self.page(self.cardan[k]), 4.0, ring)
-        for k, name in enumerate(("leg Y", "leg X")):
-            x, y = self.page(self.pivot[k])
-            drawing.fixed(_text(float(x) + 10.0, float(y) + 16.0, name, f"var(--{'ab'[k]})"))
+            x, y = map(float, self.page(self.pivot[k]))
+            drawing.fixed(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="6" {painted(colour)}/>')
+            drawing.circle(self.page(self.ball[k]), 5.0, painted("paper", colour, 2.0))
+            drawing.circle(self.page(self.cardan[k]), 4.0, painted("paper", colour, 2.0))
+            drawing.fixed(words(("leg Y", "leg X")[k], x + 10.0, y + 16.0, size=13.0, colour=colour, halo=3.0))
 
-    def _lines(self, drawing: Moving, start: Array, end: Array, paint: str) -> None:
-        drawing.path(self.page(np.stack([start, end], 1)), f"{_LINE} {paint}")
+    def _lines(self, drawing: Moving, start: Array, end: Array, colour: str, width: float) -> None:
+        drawing.path(self.page(np.stack([start, end], 1)), f"{painted(stroke=colour, width=width)} {_ROUND}")
 
 
 def _beam(drawing: Moving, azimuth: Array, elevation: Array) -> None:
@@ -151,29 +145,28 @@ def _beam(drawing: Moving, azimuth: Array, elevation: Array) -> None:
     middle, half = np.array([490.0, 200.0]), 105.0
     points = middle + half / largest * np.stack([azimuth, -elevation], -1)
     for reach in (np.array([half, 0.0]), np.array([0.0, half])):
-        drawing.fixed(_still(np.stack([middle - reach, middle + reach]), 'stroke="var(--soft)"'))
-    drawing.fixed(_still(points, 'stroke="var(--c)" stroke-opacity="0.6" stroke-width="1.5"', True))
-    drawing.circle(points, 5.0, 'fill="var(--c)"')
+        drawing.fixed(_still(np.stack([middle - reach, middle + reach]), "soft"))
+    drawing.fixed(_still(points, "c", 1.5, closed=True, opacity=0.6))
+    drawing.circle(points, 5.0, painted("c"))
     x, y = middle
-    drawing.fixed(_text(x + half, y + 18.0, "azimuth", anchor="end"))
-    drawing.fixed(_text(x + 6.0, y - half + 4.0, "elevation"))
+    drawing.fixed(words("azimuth", x + half, y + 18.0, size=13.0, anchor="end"))
+    drawing.fixed(words("elevation", x + 6.0, y - half + 4.0, size=13.0))
     step = _nice(largest)
     for sign in (-1, 1):
         at = half * step / largest * sign
-        drawing.fixed(_still(np.array([[x + at, y - 4], [x + at, y + 4]]), 'stroke="var(--soft)"'))
-        drawing.fixed(_still(np.array([[x - 4, y - at], [x + 4, y - at]]), 'stroke="var(--soft)"'))
-        drawing.fixed(_text(x + at, y - 9.0, f"{sign * step:g}°", "var(--note)", "middle"))
-        drawing.fixed(_text(x - 9.0, y - at + 4.0, f"{sign * step:g}°", "var(--note)", "end"))
+        drawing.fixed(_still(np.array([[x + at, y - 4], [x + at, y + 4]]), "soft"))
+        drawing.fixed(_still(np.array([[x - 4, y - at], [x + 4, y - at]]), "soft"))
+        drawing.fixed(words(f"{sign * step:g}°", x + at, y - 9.0, size=13.0, anchor="middle"))
+        drawing.fixed(words(f"{sign * step:g}°", x - 9.0, y - at + 4.0, size=13.0, anchor="end"))
 
 
 def _nice(largest: float) -> float:
     return max((s for s in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 90.0) if s <= 0.85 * largest), default=0.5)
 
 
-def _still(points: Array, paint: str, closed: bool = False) -> str:
+def _still(
+    points: Array, colour: str, width: float = 1.0, *, dash: str = "", closed: bool = False, opacity: float = 1.0
+) -> str:
     data = "M" + " L".join(f"{x:.1f} {y:.1f}" for x, y in points) + ("Z" if closed else "")
-    return f'<path d="{data}" {_LINE} {paint}/>'
-
-
-def _text(x: float, y: float, words: str, colour: str = "var(--note)", anchor: str = "start") -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="13" text-anchor="{anchor}" fill="{colour}">{words}</text>'
+    more = (f' stroke-dasharray="{dash}"' if dash else "") + (f' stroke-opacity="{opacity:g}"' if opacity < 1.0 else "")
+    return f'<path d="{data}" {painted(stroke=colour, width=width)} {_ROUND}{more}/>'

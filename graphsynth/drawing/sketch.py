@@ -15,11 +15,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from graphsynth.drawing.palette import STYLE
 from graphsynth.drawing.shapes import FIXED, LAYERS, Circle, Path, Placement, Point, Shape, Style, Text, placement
-from graphsynth.drawing.svg import element, number, picture
+from graphsynth.drawing.svg import element, picture
 
-__all__ = ["STYLE", "Sketch", "degrees", "number"]
+__all__ = ["Sketch", "degrees"]
 
 _CHAIN = (8.0, 3.0, 2.0, 3.0)  # dash-dotted: pitch circles
 
@@ -246,7 +245,7 @@ class Sketch:
         """
         place = placement(pose)
         body = [self._element(shape, place) for shape in self.ordered()]
-        return picture(body, self.width, self._height, STYLE, self.title)
+        return picture(body, self.width, self._height, self.title)
 
     def _element(self, shape: Shape, place: Placement) -> str:
         return element(shape, lambda point: self.xy(place(shape.link, point)), self._scale, self.symbol)

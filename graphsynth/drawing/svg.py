@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from html import escape
 
+from graphsynth.drawing.palette import LIGHT, STYLE
 from graphsynth.drawing.shapes import Circle, Path, Point, Shape, Style, Text
 
-__all__ = ["element", "number", "picture"]
+__all__ = ["FONT", "bare", "element", "number", "painted", "picture", "words"]
 
 ToPage = Callable[[Point], tuple[float, float]]
+
+#: Typefaces of the root element, the first that is there.
+FONT = "system-ui,-apple-system,'Segoe UI',Roboto,sans-serif"
+#: Half the height of a capital or a digit in units of the size: few programs know another baseline than the letters'.
+_HALF_CAPITAL = 0.36
 
 
 def number(value: float) -> str:
@@ -63,44 +69,81 @@ def _data(path: Path, xy: ToPage) -> str:
 
 
 def _paint(style: Style, symbol: float) -> str:
-    """Fill and stroke attributes."""
-    paint = f' fill="var(--{style.fill})"' if style.fill else ' fill="none"'
-    if style.fill and style.fill_opacity < 1.0:
-        paint += f' fill-opacity="{number(style.fill_opacity)}"'
+    paint = painted(style.fill, style.stroke if style.width else "", style.width * symbol, opacity=style.fill_opacity)
     if style.stroke and style.width:
-        paint += f' stroke="var(--{style.stroke})" stroke-width="{number(style.width * symbol)}"'
         paint += ' stroke-linecap="round"' if style.round_ends else ""
         paint += ' stroke-linejoin="round"' if style.round_joins else ""
         paint += f' stroke-dasharray="{" ".join(map(number, style.dash))}"' if style.dash else ""
-    return paint
+    return f" {paint}"
+
+
+def painted(fill: str = "", stroke: str = "", width: float = 1.0, *, opacity: float = 1.0) -> str:
+    """Write fill and stroke as plain attributes; colours are names of the palette, none if empty.
+
+    Examples
+    --------
+    >>> painted("a"), painted(stroke="b", width=2.5)
+    ('fill="#0072b2"', 'fill="none" stroke="#d55e00" stroke-width="2.5"')
+    """
+    paint = f'fill="{LIGHT[fill]}"' if fill else 'fill="none"'
+    if fill and opacity < 1.0:
+        paint += f' fill-opacity="{number(opacity)}"'
+    return paint + (f' stroke="{LIGHT[stroke]}" stroke-width="{number(width)}"' if stroke else "")
+
+
+def words(
+    text: str,
+    x: float,
+    y: float,
+    *,
+    size: float = 14.0,
+    colour: str = "note",
+    anchor: str = "start",
+    halo: float = 0.0,
+    more: str = "",
+) -> str:
+    """Write a line of text that stands at height ``y``.
+
+    A halo is the same text with a thick edge underneath: not every program paints an edge before the letters.
+    """
+    at = f'<text x="{number(x)}" y="{number(y)}"'
+    look = f' {painted(colour)} font-size="{number(size)}" text-anchor="{anchor}"{more}'
+    if not halo:
+        return f"{at}{look}>{escape(text)}</text>"
+    edge = f'stroke="{LIGHT["paper"]}" stroke-width="{number(halo)}" stroke-linejoin="round" aria-hidden="true"'
+    return f"<g{look}>{at} {edge}>{escape(text)}</text>{at}>{escape(text)}</text></g>"
 
 
 def _text(shape: Text, xy: ToPage, part: str, upright: str) -> str:
     x, y = xy(shape.at)
-    dx, dy = shape.offset.real, -shape.offset.imag
     around = ("", "")
     if upright:
         around = (f'<g transform="translate({number(x)} {number(y)})"><g {upright}>', "</g></g>")
         x = y = 0.0
-    halo = (
-        f' stroke="var(--paper)" stroke-width="{number(shape.halo)}" paint-order="stroke" stroke-linejoin="round"'
-        if shape.halo
-        else ""
+    written = words(
+        shape.text,
+        x + shape.offset.real,
+        y - shape.offset.imag + _HALF_CAPITAL * shape.size,
+        size=shape.size,
+        colour=shape.colour,
+        anchor=shape.anchor,
+        halo=shape.halo,
+        more=(f' font-weight="{shape.weight}"' if shape.weight else "") + part,
     )
-    weight = f' font-weight="{shape.weight}"' if shape.weight else ""
-    return (
-        f'{around[0]}<text x="{number(x + dx)}" y="{number(y + dy)}" text-anchor="{shape.anchor}" '
-        f'dominant-baseline="central" font-size="{number(shape.size)}"{weight} '
-        f'fill="var(--{shape.colour})"{halo}{part}>'
-        f"{escape(shape.text)}</text>{around[1]}"
-    )
+    return f"{around[0]}{written}{around[1]}"
 
 
-def picture(body: Iterable[str], width: float, height: float, style: str, title: str = "", attributes: str = "") -> str:
-    """Wrap elements in one ``<svg>`` that needs nothing else."""
+def picture(body: Iterable[str], width: float, height: float, title: str = "", *, style: str = STYLE) -> str:
+    """Wrap elements in one ``<svg>`` that needs nothing else; without ``style`` the page has the rules."""
     name = f"<title>{escape(title)}</title>" if title else ""
+    rules = f"<style>{style}</style>" if style else ""
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="gs" viewBox="0 0 {number(width)} {number(height)}" '
-        f'width="{number(width)}" height="{number(height)}" role="img"{attributes}>{name}<style>{style}</style>'
+        f'width="{number(width)}" height="{number(height)}" role="img" font-family="{FONT}">{name}{rules}'
         f"{''.join(body)}</svg>"
     )
+
+
+def bare(svg: str) -> str:
+    """Return a picture without its rules, for a page or a picture that has them."""
+    return svg.replace(f"<style>{STYLE}</style>", "", 1)

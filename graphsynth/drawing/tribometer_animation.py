@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.drawing.moving import Moving
+from graphsynth.drawing.svg import painted, words
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -18,8 +19,7 @@ __all__ = ["tribometer_animation", "tribometer_sketch"]
 
 Array = NDArray[np.float64]
 _WIDTH, _SCENE, _CURVES = 640.0, 200.0, 130.0
-_LINE = 'fill="none" stroke="var(--ink)" stroke-linecap="round" stroke-linejoin="round"'
-_LOWER, _UPPER = 'fill="var(--a)" fill-opacity="0.55"', 'fill="var(--b)"'
+_LOWER, _UPPER = painted("a", opacity=0.55), painted("b")
 
 
 def tribometer_sketch(motion: StickSlipMotion, at: float = 0.0) -> str:
@@ -77,6 +77,10 @@ def tribometer_animation(motion: StickSlipMotion, *, frames: int = 240, seconds:
     return drawing.svg("Tribometer in motion")
 
 
+def _line(width: float, colour: str = "ink") -> str:
+    return f'{painted(stroke=colour, width=width)} stroke-linecap="round" stroke-linejoin="round"'
+
+
 def _known(motion: StickSlipMotion) -> NDArray[np.intp]:
     known = np.flatnonzero(np.isfinite(motion.x2))
     if known.size < 2:
@@ -111,22 +115,19 @@ class _Stage:
         wall = self.zero + 3.4 * unit
         ground = np.linspace(20.0, _WIDTH - 20.0, 45)
         hatch = "".join(f"M{x:.1f} {floor + 1:.1f} l-6 8 " for x in ground)
-        drawing.fixed(f'<path d="M14 {floor:.1f} H{_WIDTH - 14:.1f} {hatch}" {_LINE} stroke-width="1.2"/>')
+        drawing.fixed(f'<path d="M14 {floor:.1f} H{_WIDTH - 14:.1f} {hatch}" {_line(1.2)}/>')
         if self.belt:
             self._belt(drawing, frames)
         else:
             drawing.box(x1 - 1.8 * unit, floor - 34.0, 3.6 * unit, 28.0, _LOWER)
             for side in (-1.4, 1.4):
-                drawing.circle(
-                    np.stack([x1 + side * unit, np.full_like(x1, floor - 4.0)], -1), 4.0, 'fill="var(--ink)"'
-                )
+                drawing.circle(np.stack([x1 + side * unit, np.full_like(x1, floor - 4.0)], -1), 4.0, painted("ink"))
         top = floor - 34.0
         drawing.box(x2 - 0.8 * unit, top - 34.0, 1.6 * unit, 34.0, _UPPER)
         stuck = (self.motion.state[frames] == 0).tolist()
-        marks = f'<text x="{_WIDTH - 20:.0f}" y="22" font-size="14" text-anchor="end" fill="var(--ink)">'
-        drawing.shown(stuck, f"{marks}stick</text>")
-        drawing.shown([not now for now in stuck], f"{marks}slip</text>")
-        drawing.fixed(f'<path d="M{wall:.1f} {top - 50:.1f} V{floor:.1f}" {_LINE} stroke-width="4"/>')
+        for word, when in (("stick", stuck), ("slip", [not now for now in stuck])):
+            drawing.shown(when, words(word, _WIDTH - 20.0, 22.0, colour="ink", anchor="end"))
+        drawing.fixed(f'<path d="M{wall:.1f} {top - 50:.1f} V{floor:.1f}" {_line(4)}/>')
         self._spring(drawing, x2 + 0.8 * unit, wall, top - 25.0)
         if self.motion.model.damping > 0.0:
             self._damper(drawing, x2 + 0.8 * unit, wall, top - 8.0)
@@ -137,15 +138,15 @@ class _Stage:
         turns = np.array([0.0, 0.12, *np.linspace(0.17, 0.83, 11), 0.88, 1.0])
         side = np.array([0.0, 0.0, *(8.0 * (-1.0) ** k for k in range(11)), 0.0, 0.0])
         frames = [np.stack([x + turns * (wall - x), height + side], -1) for x in left]
-        drawing.path(frames, f'{_LINE} stroke-width="1.5"')
+        drawing.path(frames, _line(1.5))
 
     def _damper(self, drawing: Moving, left: Array, wall: float, height: float) -> None:
         body = 0.55 * (wall - float(left.min()))
         start = wall - 0.3 * (wall - float(left.max())) - body
         cup = f"M{start + body:.1f} {height - 6:.1f} H{start:.1f} V{height + 6:.1f} H{start + body:.1f}"
-        drawing.fixed(f'<path d="M{wall:.1f} {height:.1f} H{start:.1f} {cup}" {_LINE} stroke-width="1.2"/>')
+        drawing.fixed(f'<path d="M{wall:.1f} {height:.1f} H{start:.1f} {cup}" {_line(1.2)}/>')
         piston = [np.array([[x, height], [start + 0.5 * body + 0.5 * (x - left.mean()), height]]) for x in left]
-        drawing.path(piston, f'{_LINE} stroke-width="1.2"')
+        drawing.path(piston, _line(1.2))
 
     def _crank(self, drawing: Moving, frames: NDArray[np.intp], pin: Array) -> None:
         """Crank and rod to scale, or for a pure cosine only the arrow of the drive."""
@@ -153,7 +154,7 @@ class _Stage:
         if not self.rod:
             arrow = [np.array([[x - 26.0, height], [x, height], [x - 7, height - 5], [x, height], [x - 7, height + 5]])
                      for x in pin]  # fmt: skip
-            drawing.path(arrow, f'{_LINE} stroke-width="1.6"')
+            drawing.path(arrow, _line(1.6))
             return
         angle = self.drive.speed * self.motion.t[frames]
         centre = pin[0] - self.scale * (self.rod + float(self.motion.x1[frames][0]))
@@ -161,14 +162,14 @@ class _Stage:
                         height - self.scale * self.radius * np.sin(angle)], -1)  # fmt: skip
         end = np.stack([pin, np.full_like(pin, height)], -1)
         drawing.fixed(
-            f'<circle cx="{centre:.1f}" cy="{height:.1f}" r="{self.scale * self.radius:.1f}" fill="none" '
-            'stroke="var(--soft)" stroke-dasharray="2 4"/>'
+            f'<circle cx="{centre:.1f}" cy="{height:.1f}" r="{self.scale * self.radius:.1f}" '
+            f'{painted(stroke="soft")} stroke-dasharray="2 4"/>'
         )
         middle = np.broadcast_to([centre, height], tip.shape)
-        drawing.path(np.stack([middle, tip], 1), f'{_LINE} stroke-width="5"')
-        drawing.path(np.stack([tip, end], 1), f'{_LINE} stroke-width="2.4"')
+        drawing.path(np.stack([middle, tip], 1), _line(5))
+        drawing.path(np.stack([tip, end], 1), _line(2.4))
         for points in (middle, tip, end):
-            drawing.circle(points, 4.0, 'fill="var(--paper)" stroke="var(--ink)" stroke-width="1.6"')
+            drawing.circle(points, 4.0, painted("paper", "ink", 1.6))
 
     def _belt(self, drawing: Moving, frames: NDArray[np.intp]) -> None:
         """Add a belt whose marks run along and start anew."""
@@ -178,7 +179,7 @@ class _Stage:
         gap = length / 8.0
         for k in range(8):
             x = 30.0 + np.remainder(shift + k * gap, length)
-            drawing.circle(np.stack([x, np.full_like(x, top + 5.0)], -1), 3.0, 'fill="var(--ink)"')
+            drawing.circle(np.stack([x, np.full_like(x, top + 5.0)], -1), 3.0, painted("ink"))
 
     def names(self, drawing: Moving, k: int) -> None:
         """Name the parts."""
@@ -186,19 +187,17 @@ class _Stage:
         x1, x2 = (float(x[k]) for x in (self.at(self.motion.x1), self.at(self.motion.x2)))
         model = self.motion.model
         spring = f"{model.stiffness:g} N/m" + (f", {model.damping:g} N s/m" if model.damping else "")
-        words = [
+        named = [
             (x2, floor - 76.0, f"upper platform, {model.mass:g} kg", "middle"),
             (self.zero + 2.2 * unit, floor - 92.0, spring, "middle"),
         ]
         if self.belt:
-            words.append((60.0, floor + 26.0, "belt", "start"))
+            named.append((60.0, floor + 26.0, "belt", "start"))
         else:
-            words.append((x1, floor + 26.0, "lower platform", "middle"))
-            words.append((24.0, floor + 26.0, "crank and rod" if self.rod else "cosine", "start"))
-        for x, y, text, anchor in words:
-            drawing.fixed(
-                f'<text x="{x:.1f}" y="{y:.1f}" font-size="14" text-anchor="{anchor}" fill="var(--note)">{text}</text>'
-            )
+            named.append((x1, floor + 26.0, "lower platform", "middle"))
+            named.append((24.0, floor + 26.0, "crank and rod" if self.rod else "cosine", "start"))
+        for x, y, text, anchor in named:
+            drawing.fixed(words(text, x, y, anchor=anchor))
 
 
 def _curves(drawing: Moving, motion: StickSlipMotion, known: NDArray[np.intp], chosen: NDArray[np.intp]) -> None:
@@ -216,20 +215,14 @@ def _curves(drawing: Moving, motion: StickSlipMotion, known: NDArray[np.intp], c
     axis = (
         f"M{left:.1f} {middle - 0.5 * _CURVES:.1f} V{middle + 0.5 * _CURVES:.1f} M{left:.1f} {middle:.1f} h{width:.1f}"
     )
-    drawing.fixed(f'<path d="{axis}" {_LINE.replace("--ink", "--soft")}/>')
+    drawing.fixed(f'<path d="{axis}" {_line(1.0, "soft")}/>')
     for x, colour in shown:
         data = "M" + " L".join(f"{a:.1f} {b:.1f}" for a, b in place(t[thin], x[thin]))
-        drawing.fixed(f'<path d="{data}" fill="none" stroke="var(--{colour})" stroke-width="1.6"/>')
-        drawing.circle(place(t[chosen], x[chosen]), 4.0, f'fill="var(--{colour})"')
+        drawing.fixed(f'<path d="{data}" {painted(stroke=colour, width=1.6)}/>')
+        drawing.circle(place(t[chosen], x[chosen]), 4.0, painted(colour))
     label = f"{1e3 * largest:.3g} mm"
     for text, y in ((label, middle - 0.46 * _CURVES), (f"-{label}", middle + 0.46 * _CURVES)):
-        drawing.fixed(
-            f'<text x="{left + 6:.1f}" y="{y + 4:.1f}" font-size="12" fill="var(--note)">{text}</text>'
-        )  # fmt: skip
+        drawing.fixed(words(text, left + 6.0, y + 4.0, size=12.0))
     for k in range(6):
-        at = left + width * k / 5.0
-        words = f"{t[0] + (t[-1] - t[0]) * k / 5.0:.3g} s"
-        drawing.fixed(
-            f'<text x="{at:.1f}" y="{_SCENE + _CURVES + 20:.1f}" font-size="12" text-anchor="middle" '
-            f'fill="var(--note)">{words}</text>'
-        )
+        time = f"{t[0] + (t[-1] - t[0]) * k / 5.0:.3g} s"
+        drawing.fixed(words(time, left + width * k / 5.0, _SCENE + _CURVES + 20.0, size=12.0, anchor="middle"))

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.drawing.pages import whole_page
+from graphsynth.drawing.palette import LIGHT, STYLE
+from graphsynth.drawing.svg import bare
 from graphsynth.scenes.headline import facts, sentences
 from graphsynth.scenes.products import Finding, Picture, Record, Table
 from graphsynth.scenes.summary import summary_tables
@@ -50,7 +53,6 @@ figure.small{grid-column:span 4}
 .facts b{font-size:1.05rem}.verdict b{font-size:1rem}table{font-size:.8rem}td:not(.num){min-width:6.5rem}
 figure{grid-column:1/-1}
 figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
-figure .gs{--paper:var(--card)}
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}
 .pictures:not(.sheet) svg{width:100%}
 figure.wide svg{max-width:min(100%,44rem);max-height:32rem}
@@ -58,6 +60,10 @@ figcaption{margin-top:auto;padding-top:.4rem}figcaption b{color:var(--ink)}
 details{margin:.6rem 0}summary{cursor:pointer;font-weight:600}
 code{font-size:.85em;overflow-wrap:anywhere}
 """
+#: The rules of the pictures, once, and the colour of the cards for what is paper in them.
+_PICTURES = STYLE + "".join(
+    f'figure .gs [{what}="{LIGHT["paper"]}"]{{{what}:var(--card)}}' for what in ("fill", "stroke")
+)
 
 
 def report_html(report: Report) -> str:
@@ -80,13 +86,7 @@ def report_html(report: Report) -> str:
     if any(r.key for r in products.get("records", ())):
         parts.append(_records(products["records"]))
     parts.append(_provenance(report))
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(scene.title)}</title><style>{_CSS}</style></head><body><main>"
-        + "\n".join(part for part in parts if part)
-        + "</main></body></html>\n"
-    )
+    return whole_page(scene.title, _CSS + _PICTURES, "\n".join(part for part in parts if part))
 
 
 #: Headings of the galleries, in the order of the page; other products that are pictures follow under their names.
@@ -129,7 +129,7 @@ def _strong(finding: Finding) -> str:
 
 def _figure(picture: Picture) -> str:
     return (
-        f'<figure class="{picture.size}">{picture.svg}<figcaption><b>{escape(picture.title)}</b>'
+        f'<figure class="{picture.size}">{bare(picture.svg)}<figcaption><b>{escape(picture.title)}</b>'
         f"{'. ' if picture.caption else ''}{escape(picture.caption)}</figcaption></figure>"
     )
 

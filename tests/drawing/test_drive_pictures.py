@@ -17,8 +17,9 @@ from graphsynth.drawing.drive_pictures import (
     ripple_picture,
     sensor_picture,
     start_up_picture,
-    themed_svg,
 )
+from graphsynth.drawing.figures import themed_svg
+from graphsynth.drawing.palette import DARK, LIGHT
 from graphsynth.dynamics.braider.model import Braider
 from graphsynth.dynamics.braider.reactions import reactions
 from graphsynth.dynamics.motors import DCMotor
@@ -115,7 +116,10 @@ def test_themed_svg_follows_the_page() -> None:
     study = DRIVE.inductance_study([0.0, 0.05], [1e-4, 1e-6])
     one, two = (themed_svg(reduction_picture(study)) for _ in range(2))
     assert one == two and one.startswith('<svg class="gs"')
-    assert "var(--a)" in one and "#0072b2" not in one.split("</style>", 1)[1].lower()
+    rules, drawn = one.split("</style>", 1)
+    assert LIGHT["a"] in drawn and LIGHT["ink"] in drawn and LIGHT["soft"] in drawn
+    assert "#000000" not in drawn and "style" not in drawn and "var(" not in one
+    assert f'[stroke="{LIGHT["a"]}"]{{stroke:{DARK["a"]}}}' in rules
     ids = re.findall(r'id="([^"]+)"', one)
     assert len(ids) == len(set(ids)) and all(re.match(r"[0-9a-f]{8}-", name) for name in ids)
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', one))

@@ -9,6 +9,7 @@ import pytest
 from graphsynth import LambdaLinkage
 from graphsynth.drawing.lambda_linkage import lambda_animation
 from graphsynth.drawing.linkage_animation import Bar, linkage_animation
+from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.errors import GeometryError
 
@@ -21,7 +22,7 @@ def test_a_bar_ends_where_its_joints_are():
     sketch = Sketch(-1 - 1j, 1 + 1j, 300)
     A = np.exp(1j * np.linspace(0.0, 3.0, 7))
     svg = linkage_animation(sketch, {"O": 0j, "A": A}, bars=[Bar("O", "A", "b", 5)])
-    frames = frames_of(svg, 'stroke="var\\(--b\\)"')
+    frames = frames_of(svg, f'stroke="{LIGHT["b"]}"')
     assert len(frames) == 7
     for frame, point in zip(frames, A):
         numbers = [float(x) for x in re.findall(r"-?\d+\.?\d*", frame)]
@@ -39,8 +40,8 @@ def test_tracks_of_other_lengths_and_places_that_do_not_exist_are_refused():
 
 def test_the_lambda_linkage_says_where_it_jams():
     svg = lambda_animation(LambdaLinkage(2.0, 1.0, 2.5, 2.5), lambda f: f < math.pi, frames=12)
-    shown = re.search(r'B jams</text><animate attributeName="visibility"[^>]*values="([^"]*)"', svg)[1].split(";")
-    assert shown == ["visible"] * 6 + ["hidden"] * 7
+    shown = re.search(r'B jams</text><animate attributeName="display"[^>]*values="([^"]*)"', svg)[1].split(";")
+    assert shown == ["inline"] * 6 + ["none"] * 7
 
 
 def test_a_linkage_that_cannot_be_assembled_does_not_move():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 
+from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.plots import Band, Line, line_plot
 
 
@@ -26,8 +27,9 @@ def test_same_plot_same_bytes() -> None:
 def test_colours_follow_the_page_and_text_stays_text() -> None:
     svg = plot()
     ET.fromstring(svg)
-    assert not re.search(r"#01020[0-9]", svg)
-    assert "var(--ink)" in svg and "var(--jam)" in svg
+    used = set(re.findall(r' (?:fill|stroke)="(#\w+)"', svg))
+    assert used == {LIGHT[name] for name in ("a", "ink", "jam", "soft")}  # each with its rule for dark pages
+    assert all(f'[stroke="{colour}"]{{stroke:' in svg for colour in used)
     texts = {"".join(t.itertext()) for t in ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")}
     assert {"x [mm]", "y", "curve <1>", "jams", "limit"} <= texts
 

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graphsynth.drawing.levels import draw_levels, level_order
-from graphsynth.drawing.sketch import Sketch, number
+from graphsynth.drawing.sketch import Sketch
+from graphsynth.drawing.svg import number
 from graphsynth.structure.graph import MechanismGraph
 
 FIGURE_3 = MechanismGraph(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import graphsynth
 from graphsynth.accuracy.stress.catalogue import PAGES
 from graphsynth.accuracy.stress.checks import SEVERITY, Check, Status
+from graphsynth.drawing.pages import whole_page
 
 if TYPE_CHECKING:
     from graphsynth.accuracy.stress.running import Outcome, StressReport
@@ -70,10 +71,10 @@ def stress_html(report: StressReport) -> str:
         if (chosen := [o for o in report.outcomes if o.case.page == page])
     ]
     left, lost = (", ".join(case.name for case in cases) for cases in (report.left_out, report.not_reached))
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>Stress cases</title><style>{_CSS}</style></head><body><main><h1>Stress cases</h1>"
+    return whole_page(
+        "Stress cases",
+        _CSS,
+        "<h1>Stress cases</h1>"
         f"<p>{escape(report.statement)}</p>"
         + "<p>Each case compares what the library gives with what is right: a printed value, a closed form, many "
         "digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: the situation is extreme, and "
@@ -82,7 +83,7 @@ def stress_html(report: StressReport) -> str:
         + (f'<p class="not-run">Interrupted, not reached: {escape(lost)}.</p>' if lost else "")
         + f'<ul class="facts">{facts}<li><b>{report.seconds:.0f} s</b>run time</li></ul>'
         + "".join(pages)
-        + f'<p class="soft">graphsynth {escape(graphsynth.__version__)}</p></main></body></html>\n'
+        + f'<p class="soft">graphsynth {escape(graphsynth.__version__)}</p>',
     )
 
 

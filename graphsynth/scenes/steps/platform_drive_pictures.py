@@ -110,7 +110,8 @@ def plots(
     study: ReductionStudy | None,
 ) -> tuple[Picture, ...]:
     """Torque, speed and phase portraits; the model without inertia; the claim; the limit L -> 0."""
-    from graphsynth.drawing.drive_pictures import reduction_picture, ripple_map_picture, ripple_picture, themed_svg
+    from graphsynth.drawing.drive_pictures import reduction_picture, ripple_map_picture, ripple_picture
+    from graphsynth.drawing.figures import themed_svg
 
     pictures = [*run_pictures(runs), *_bare_pictures(context, bare)]
     map_caption = (

@@ -45,7 +45,7 @@ def _figure(width: float, height: float) -> Figure:
 
 
 def _svg(figure: Figure) -> str:
-    from graphsynth.drawing.drive_pictures import themed_svg
+    from graphsynth.drawing.figures import themed_svg
 
     return themed_svg(figure)
 

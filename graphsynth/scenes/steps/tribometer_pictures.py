@@ -19,7 +19,7 @@ _MOST_NODES = 4000
 
 
 def _svg(figure: Any) -> str:
-    from graphsynth.drawing.drive_pictures import themed_svg
+    from graphsynth.drawing.figures import themed_svg
 
     return themed_svg(figure)
 

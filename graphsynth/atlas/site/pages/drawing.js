@@ -7,9 +7,11 @@
     g1: ["#0072b2", "#56b4e9"], g2: ["#a34700", "#f0a060"], g3: ["#007a59", "#3ecf9f"], g4: ["#aa4499", "#dd88cc"],
     drive: ["#b3261e", "#ff8a7a"],
   };
-  const names = k => Object.entries(COLOURS).map(([name, both]) => `--${name}:${both[k]}`).join(";");
-  // for files: on the page the style sheet gives the same names
-  const STYLE = `<style>svg{${names(0)};font-family:system-ui,sans-serif}@media(prefers-color-scheme:dark){svg{${names(1)}}}</style>`;
+  // for files: plain colours, which every program reads, and rules for dark pages on top; on the page the style sheet
+  // gives the names
+  const DARK = Object.values(COLOURS).flatMap(([light, dark]) => ["fill", "stroke"].map(what => `[${what}="${light}"]{${what}:${dark}}`));
+  const STYLE = `<style>@media (prefers-color-scheme:dark){svg:root{color-scheme:dark}${DARK.join("")}}</style>`;
+  const plain = body => body.replace(/var\(--(\w+)\)/g, (_, name) => COLOURS[name][0]);
   const short = value => String(Math.round(value * 10) / 10);
   let pictures = 0;
 
@@ -82,9 +84,9 @@
         cx += out * -dy / long * (fixed ? 17 : 11);
         cy += out * dx / long * (fixed ? 17 : 11);
       }
-      if (numbers && !small) letters.push(
-        `<text x="${short(cx)}" y="${short(cy)}" text-anchor="middle" dominant-baseline="central" font-size="13" fill="var(--${fixed ? "ink" : colour(link)})" ` +
-        `stroke="var(--paper)" stroke-width="3.5" stroke-linejoin="round" paint-order="stroke">${link}</text>`);
+      // the halo is a text of its own: not every program paints an edge before the letters
+      if (numbers && !small) letters.push(...['stroke="var(--paper)" stroke-width="3.5" stroke-linejoin="round" aria-hidden="true"', ""].map(edge =>
+        letter(cx, cy, link, 13, `text-anchor="middle" fill="var(--${fixed ? "ink" : colour(link)})" ${edge}`)));
     });
     const joints = graph.joints.map(([a, b], k) =>
       `<circle data-joint="${a}-${b}" cx="${short(at[k][0])}" cy="${short(at[k][1])}" r="${radius}" fill="var(--paper)" stroke="var(--ink)" stroke-width="${small ? 1.1 : 1.8}"/>`);
@@ -95,6 +97,9 @@
     return wrap(width, height, title, options.file, pattern + [...plates, ...bars, ...joints, ...arrows, ...letters].join(""));
   };
 
+  /** Text whose capitals and digits have their middle at a point. */
+  const letter = (x, y, text, size, more) => `<text x="${short(x)}" y="${short(y + .36 * size)}" font-size="${size}" ${more}>${text}</text>`;
+
   function arrow([x, y]) {
     const r = 14, a = -2.4, b = .5, tip = [x + r * Math.cos(b), y + r * Math.sin(b)];
     return `<path d="M${short(x + r * Math.cos(a))} ${short(y + r * Math.sin(a))}A${r} ${r} 0 0 1 ${tip.map(short).join(" ")}" fill="none" stroke="var(--drive)" stroke-width="2"/>` +
@@ -104,8 +109,8 @@
   function wrap(width, height, title, file, body) {
     const name = title.replace(/[&<>"]/g, c => `&#${c.charCodeAt(0)};`);
     const about = title ? ` role="img" aria-label="${name}"` : ' aria-hidden="true"';
-    return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${short(width)} ${short(height)}" width="${short(width)}" height="${short(height)}"${about}>` +
-      `${file ? STYLE : ""}${title ? `<title>${name}</title>` : ""}${body}</svg>`;
+    return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${short(width)} ${short(height)}" width="${short(width)}" height="${short(height)}"${about}` +
+      `${file ? ' font-family="system-ui,sans-serif"' : ""}>${title ? `<title>${name}</title>` : ""}${file ? STYLE + plain(body) : body}</svg>`;
   }
 
   /** Levels with their links sorted so that joints cross little (barycentres, Sugiyama, Tagawa and Toda 1981). */
@@ -154,11 +159,11 @@
     const nodes = [...where].map(([link, [x, y]]) => {
       const fixed = link === graph.frame;
       return `<g data-link="${link}"><circle cx="${short(x)}" cy="${short(y)}" r="${radius}" fill="var(--${fixed ? "ink" : "paper"})" stroke="var(--${fixed ? "ink" : colour(link)})" stroke-width="2"/>` +
-        `<text x="${short(x)}" y="${short(y)}" text-anchor="middle" dominant-baseline="central" font-size="12" fill="var(--${fixed ? "paper" : colour(link)})">${link}</text></g>`;
+        `${letter(x, y, link, 12, `text-anchor="middle" fill="var(--${fixed ? "paper" : colour(link)})"`)}</g>`;
     });
     const [fx, fy] = where.get(graph.frame), base = [[fx + 16, fy - radius - 4], [fx - 16, fy - radius - 4]];
     const earth = `<path d="M${short(base[0][0])} ${short(base[0][1])}L${short(base[1][0])} ${short(base[1][1])}${ground(base[1], base[0], [fx, fy], 8)}" fill="none" stroke="var(--ink)" stroke-width="1.4"/>`;
-    const rows = levels.map((level, k) => `<text x="4" y="${short(2 * radius + 8 + row * k)}" dominant-baseline="central" font-size="11" fill="var(--soft)">${k}</text>`);
+    const rows = levels.map((level, k) => letter(4, 2 * radius + 8 + row * k, k, 11, 'fill="var(--soft)"'));
     return wrap(width, height, title, options.file, rows.join("") + edges.join("") + earth + nodes.join(""));
   };
 })();
