@@ -7,7 +7,23 @@ from typing import Any
 
 import pytest
 
+from graphsynth.scenes import report as reports
+from graphsynth.scenes.page import report_html
 from graphsynth.scenes.scene import find_scene
+
+from ..plain_svg import faults, pictures_of
+
+
+@pytest.fixture(autouse=True)
+def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every picture of every report that is written is right in programs without style sheets."""
+
+    def checked(report: Any) -> str:
+        page = report_html(report)
+        assert [(k, found) for k, svg in enumerate(pictures_of(page)) if (found := faults(svg))] == []
+        return page
+
+    monkeypatch.setattr(reports, "report_html", checked)
 
 
 @pytest.fixture
