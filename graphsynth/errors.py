@@ -7,6 +7,7 @@
     │   └── InfeasibleSpecError      a question without any answer; names the equations that clash
     ├── FormatError (ValueError)     unreadable input; carries ``place`` (line, column, byte or key)
     ├── GraphError (ValueError)      a graph that is not what the operation needs (no frame, disconnected, ...)
+    ├── MissingExtraError (ImportError)  an optional package that is not installed; names the command that installs it
     ├── TooLargeError                an enumeration that cannot finish; carries an estimate and the remedy
     ├── SceneError (ValueError)      a scene file with an unknown key, a wrong unit or a missing section
     ├── IntervalError (ValueError)   bounds, boxes or functions that interval arithmetic cannot take
@@ -25,6 +26,7 @@ __all__ = [
     "GraphsynthError",
     "InfeasibleSpecError",
     "IntervalError",
+    "MissingExtraError",
     "SceneError",
     "SpecError",
     "TooLargeError",
@@ -89,6 +91,10 @@ class TooLargeError(GraphsynthError):
     def __init__(self, message: str, estimate: float = float("nan")) -> None:
         super().__init__(message)
         self.estimate = estimate
+
+
+class MissingExtraError(GraphsynthError, ImportError):
+    """A part of the work needs an optional package that is not installed; the sentence says how to install it."""
 
 
 class SceneError(GraphsynthError, ValueError):

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor
 from contextlib import contextmanager
 
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.errors import GraphsynthError
+from graphsynth.extras import need
 from graphsynth.ordered import RETRIES, Again
 
 __all__ = ["dask_executor"]
@@ -25,16 +26,15 @@ def dask_executor(address: str, timeout: float = 20.0) -> Iterator[Executor]:
 
     Raises
     ------
-    SpecError
+    MissingExtraError
         If the extra ``cluster`` is not installed.
     GraphsynthError
         If the scheduler does not answer, or has a different graphsynth.
     """
-    try:
-        from distributed import Client, KilledWorker
-        from distributed.comm import CommClosedError
-    except ImportError:
-        raise SpecError("dask needs the extra: pip install 'graphsynth[cluster]'") from None
+    need("distributed", "cluster", "a dask cluster")
+    from distributed import Client, KilledWorker
+    from distributed.comm import CommClosedError
+
     try:
         client = Client(address, timeout=timeout)
     except (OSError, TimeoutError, ValueError) as error:

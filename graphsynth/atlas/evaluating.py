@@ -251,7 +251,7 @@ def _embody(graph: MechanismGraph, **options: Any) -> Embodiment:
 
 
 def turn_is_proved(motion: Motion) -> bool:
-    """Whether the motion is proved to be one regular branch that closes; False also without the extra ``certified``."""
+    """Whether the motion is proved to be one regular branch that closes."""
     from graphsynth.kinematics.certified.poses import certify
 
     try:

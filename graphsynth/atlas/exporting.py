@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.extras import need
 
 __all__ = ["FORMS", "TABLES", "digest", "export"]
 
@@ -134,11 +135,9 @@ _INTEGERS = (
 
 
 def _write_parquet(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
-        raise SpecError("Parquet needs the extra: pip install 'graphsynth[parquet]', or choose csv or jsonl") from None
+    parquet = need("pyarrow.parquet", "parquet", "Parquet (csv and jsonl need nothing)")
+    import pyarrow
+
     kinds = {"value": pyarrow.float64()} | dict.fromkeys(_INTEGERS, pyarrow.int64())
     schema = pyarrow.schema([(name, kinds.get(name, pyarrow.string())) for name in columns])
     with parquet.ParquetWriter(path, schema, compression="zstd") as writer:

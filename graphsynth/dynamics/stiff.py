@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
-from importlib import import_module
 from io import StringIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import GeometryError
+from graphsynth.extras import need
 
 __all__ = ["CvodeStepper"]
 
@@ -56,17 +55,14 @@ class CvodeStepper:
 
     Raises
     ------
-    GeometryError
+    MissingExtraError
         If scikit-sundae is not installed.
     """
 
     def __init__(
         self, rates: Callable[[float, Array], Array], t: float, y: Array, bound: float, rtol: float, atol: Array | float
     ) -> None:
-        try:
-            CVODE = import_module("sksundae.cvode").CVODE
-        except ImportError as error:
-            raise GeometryError("method 'CVODE' needs scikit-sundae; install graphsynth[stiff]") from error
+        CVODE = need("sksundae.cvode", "stiff", "method 'CVODE'").CVODE
 
         def right_hand_side(time: float, state: Array, found: Array) -> None:
             found[:] = rates(time, np.array(state))

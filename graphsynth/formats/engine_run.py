@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError, GraphsynthError
+from graphsynth.errors import GeometryError
+from graphsynth.extras import need
 
 __all__ = ["EngineRun", "load_engine", "steps_between", "turn"]
 
@@ -58,11 +58,8 @@ class EngineRun:
 
 
 def load_engine(name: str) -> Any:
-    """Import an engine; `GraphsynthError` with the remedy if it is not installed."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise GraphsynthError(f"{name} is not installed; pip install 'graphsynth[crosscheck]'") from error
+    """Import an engine; `MissingExtraError` if it is not installed."""
+    return need(name, "crosscheck", "a run in another engine")
 
 
 def steps_between(times: ArrayLike, step: float) -> tuple[Array, list[int]]:

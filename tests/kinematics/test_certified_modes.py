@@ -9,15 +9,12 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
+import flint
 import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-pytest.importorskip("flint")
-
-import flint
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.certified import (
@@ -30,8 +27,8 @@ from graphsynth.kinematics.certified import (
     certify_direct_batch,
 )
 from graphsynth.kinematics.certified.exact_modes import exact_roots
-from graphsynth.kinematics.certified.extra import precision
 from graphsynth.kinematics.certified.numbers import ball, complex_ball, gaussian, rational
+from graphsynth.kinematics.certified.precision import precision
 from graphsynth.kinematics.certified.sextic_balls import sextic_balls
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 

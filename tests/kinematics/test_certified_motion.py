@@ -11,8 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-pytest.importorskip("flint")
-
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.certified import certify, certify_four_bar

@@ -11,9 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-pytest.importorskip("flint")
-
-from graphsynth.errors import GeometryError, GraphsynthError
+from graphsynth.errors import GeometryError
 from graphsynth.kinematics.certified import (
     TurnVerdict,
     certify_four_bar,
@@ -21,7 +19,6 @@ from graphsynth.kinematics.certified import (
     certify_inverted_slider_crank,
     certify_slider_crank,
 )
-from graphsynth.kinematics.certified import extra as extra_module
 from graphsynth.kinematics.certified.balls import Balls, exact
 from graphsynth.kinematics.certified.platform_equations import PlatformSystem
 from graphsynth.kinematics.drive import FourBarDrive
@@ -237,13 +234,3 @@ def test_sliders() -> None:
     assert certify_inverted_slider_crank(1, 1, 3).kind == "never assembled"
     with pytest.raises(GeometryError, match="positive"):
         certify_slider_crank(0, 1)
-
-
-def test_without_flint_one_sentence_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> None:
-        raise ImportError(name)
-
-    monkeypatch.setattr(extra_module, "import_module", missing)
-    for call in (lambda: certify_four_bar(1, 2, 3, 4), lambda: certify_full_turn(SingleMotorPlatform())):
-        with pytest.raises(GraphsynthError, match=r"graphsynth\[certified\]"):
-            call()

@@ -140,7 +140,6 @@ def test_loop_closure_of_a_cam() -> None:
 
 
 def test_no_certificate_for_cams() -> None:
-    pytest.importorskip("flint")
     from graphsynth.kinematics.certified import certify
 
     with pytest.raises(GeometryError, match="cam"):

@@ -27,7 +27,7 @@ from graphsynth.accuracy.stress.checks import exact
 from graphsynth.accuracy.stress.page import stress_html, write_report
 from graphsynth.accuracy.stress.running import Outcome, StressReport
 from graphsynth.cli import main
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.errors import GraphsynthError, MissingExtraError, SpecError
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -125,7 +125,7 @@ def test_a_case_that_breaks_is_wrong(monkeypatch):
 
 
 def test_a_missing_extra_is_no_result(monkeypatch):
-    found = outcome_of(monkeypatch, lambda check: raises(GraphsynthError("pip install 'graphsynth[certified]'"))())
+    found = outcome_of(monkeypatch, lambda check: raises(MissingExtraError("pip install 'graphsynth[stiff]'"))())
     assert found.status is Status.NOT_RUN
 
 
@@ -134,7 +134,7 @@ def test_a_missing_extra_after_a_check(monkeypatch):
 
         def late(check, right=right):
             check.value("one", 1, right)
-            raise GraphsynthError("pip install 'graphsynth[certified]'")
+            raise MissingExtraError("pip install 'graphsynth[stiff]'")
 
         assert outcome_of(monkeypatch, late).status is status
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.accuracy.stress.catalogue import PAGES, Case, stress_cases
 from graphsynth.accuracy.stress.checks import SEVERITY, Check, Checks, Status
-from graphsynth.errors import GraphsynthError
+from graphsynth.errors import GraphsynthError, MissingExtraError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -180,8 +180,9 @@ def run_case(case: Case) -> Outcome:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             case.load()(checks)
+    except MissingExtraError as error:
+        missing, reason = True, str(error)
     except GraphsynthError as error:
-        missing = "pip install" in str(error)
         reason = f"{type(error).__name__}: {error}"
     except Exception as error:  # a defect of the library is a result of a stress run, not its end
         reason = f"{type(error).__name__}: {error}"

@@ -12,7 +12,7 @@ from typing import Any
 
 from graphsynth.drawing.shapes import LAYERS, Circle, Path, Placement, Point, Shape, Text, placement
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.errors import GraphsynthError
+from graphsynth.extras import need
 
 __all__ = ["dxf", "save_dxf"]
 
@@ -33,13 +33,10 @@ def dxf(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None, *, unit: 
 
     Raises
     ------
-    GraphsynthError
+    MissingExtraError
         If ezdxf is not installed.
     """
-    try:
-        import ezdxf
-    except ImportError:
-        raise GraphsynthError("DXF needs ezdxf: pip install 'graphsynth[dxf]'") from None
+    ezdxf = need("ezdxf", "dxf", "DXF")
     drawing = ezdxf.new("R2010", setup=True, units=4)
     space, place = drawing.modelspace(), placement(pose)
     for number, layer in enumerate(LAYERS, 1):

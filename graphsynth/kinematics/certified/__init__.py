@@ -1,4 +1,4 @@
-"""Certificates: statements on poses, motions and turns that are proved in ball arithmetic (extra ``certified``).
+"""Certificates: statements on poses, motions and turns that are proved in ball arithmetic.
 
 This file loads nothing: every name is resolved on first use.
 """

@@ -9,14 +9,15 @@ from fractions import Fraction
 from time import perf_counter
 from typing import Any
 
+import flint
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import three
 from graphsynth.kinematics.certified.exact_modes import exact_roots, parallel_positions, self_motion
-from graphsynth.kinematics.certified.extra import need_flint, precision
 from graphsynth.kinematics.certified.numbers import Gaussian, ball, complex_ball, gaussian, rational
+from graphsynth.kinematics.certified.precision import precision
 from graphsynth.kinematics.certified.sextic_balls import SexticBalls, isolate, mirror_count, refine, sextic_balls
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
@@ -130,7 +131,6 @@ class _Problem:
         vertices, lengths = [complex_ball(v) for v in self.vertices], [ball(v) for v in self.lengths]
         if self.arms is None:
             return [complex_ball(v) for v in self.anchors], vertices, lengths
-        flint = need_flint()
         anchors = []
         for pivot, arm, angle in zip(*self.arms):
             s, c = ball(angle).sin_cos()
@@ -168,8 +168,6 @@ def certify_assembly_modes(
 
     Raises
     ------
-    GraphsynthError
-        If python-flint (extra ``certified``) is not installed.
     GeometryError
         Data that are not three points and lengths, a negative length.
 
@@ -217,7 +215,6 @@ def certify_direct(
     >>> len(certify_direct(ParallelPlatform.mock(), [0.239804666389671, 2.334199768783167, -1.854590436003224]))
     2
     """
-    need_flint()
     angles = [rational(f"theta of leg {k}", value) for k, value in enumerate(three("theta", theta), 1)]
     arms = ([gaussian("D", v) for v in platform.D], [rational("l1", v) for v in platform.l1], angles)
     problem = _Problem(_points("b", platform.b), _lengths(platform.l2), [], arms)
@@ -225,13 +222,13 @@ def certify_direct(
 
 
 def _points(name: str, values: Sequence[Any]) -> list[Any]:
-    acb = need_flint().acb
+    acb = flint.acb
     return [v if isinstance(v, acb) else gaussian(f"{name} {k}", v) for k, v in enumerate(three(name, values), 1)]
 
 
 def _lengths(values: Sequence[Any]) -> list[Any]:
     values = three("lengths", values)
-    arb = need_flint().arb
+    arb = flint.arb
     found = [v if isinstance(v, arb) else rational(f"length of leg {k}", v) for k, v in enumerate(values, 1)]
     for k, value in enumerate(found, 1):
         if value < 0:
@@ -285,7 +282,6 @@ def _subdivide(problem: _Problem, bits: int) -> tuple[list[ModeEnclosure] | None
 
 def _pose(s: SexticBalls, A: list[Any], b: list[Any], alpha: Any) -> ModeEnclosure | None:
     """Pose of a root; None if Delta may be zero."""
-    flint = need_flint()
     sine, cosine = alpha.sin_cos()
     z, back = flint.acb(cosine, sine), flint.acb(cosine, -sine)
     n2, n1, n0, nm = s.n
@@ -298,7 +294,6 @@ def _pose(s: SexticBalls, A: list[Any], b: list[Any], alpha: Any) -> ModeEnclosu
 
 def _enclosure(A: list[Any], b: list[Any], p: Any, z: Any, alpha: Any) -> ModeEnclosure:
     """Mode at the position p and the orientation z, with ``det JX``."""
-    flint = need_flint()
     rows = []
     for k in range(3):
         arm = z * b[k]

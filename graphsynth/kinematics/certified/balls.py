@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import flint
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GraphsynthError
-from graphsynth.kinematics.certified.extra import need_flint, precision
+from graphsynth.kinematics.certified.precision import precision
 
 __all__ = ["UP", "Balls", "check_rounding", "exact", "stack", "tau_times", "unit"]
 
@@ -27,6 +28,8 @@ U = 2.0**-53
 UP = 1.0 + 64.0 * U
 #: More than anything lost by underflow in one operation.
 TINY = 2.0**-1000
+#: The smallest positive number: more than a product that leaves the normal range loses.
+SMALLEST = 2.0**-1074
 #: Entries of the table of directions.
 _STEPS = 1024
 #: Checked bound of the error of a cosine or sine in the table.
@@ -77,11 +80,12 @@ class Balls:
 
     def __truediv__(self, other: Balls) -> Balls:
         """Quotient; of infinite radius where the divisor may be zero.  Real balls only."""
-        least = np.abs(other.mid) * (1.0 - 4.0 * U) - other.rad
+        # products below the normal range lose up to SMALLEST each, which a small divisor would blow up
+        least = np.abs(other.mid) * (1.0 - 4.0 * U) - SMALLEST - other.rad
         with np.errstate(all="ignore"):
             mid = self.mid / other.mid
             size = np.abs(mid) * UP
-            rad = ((self.rad + size * other.rad) / least + 4.0 * U * size) * UP + TINY
+            rad = ((self.rad + size * other.rad + SMALLEST) / least + 4.0 * U * size) * UP + TINY
         good = (least > 0.0) & np.isfinite(mid) & np.isfinite(rad)
         return Balls(np.where(good, mid, 0.0), np.where(good, rad, np.inf))
 
@@ -148,7 +152,6 @@ def tau_times(turns: ArrayLike) -> Balls:
 @cache
 def _table() -> Balls:
     """``exp(2 pi i j / 1024)``, from balls of python-flint."""
-    flint = need_flint()
     mid = np.zeros(_STEPS, dtype=np.complex128)
     with precision(128):
         for j in range(_STEPS):

@@ -6,7 +6,8 @@ from fractions import Fraction
 from math import lcm
 from typing import Any, NamedTuple
 
-from graphsynth.kinematics.certified.extra import need_flint
+import flint
+
 from graphsynth.kinematics.certified.numbers import Gaussian, ball, complex_ball
 from graphsynth.kinematics.certified.sextic_balls import sextic_balls
 
@@ -30,7 +31,6 @@ def exact_roots(A: list[Gaussian], b: list[Gaussian], lengths: list[Fraction]) -
     the modes, and the drop of its degree is the multiplicity of alpha = pi.  Multiplicities come from the factors over
     the rationals, and flint proves which roots are real.
     """
-    flint = need_flint()
     coefficients = _half_angle(A, b, lengths)
     if not any(coefficients):
         return None
@@ -71,7 +71,6 @@ def parallel_positions(A: list[Gaussian], b: list[Gaussian], lengths: list[Fract
     rest = (L - w[k] ** 2 / (4 * sizes[k])) / sizes[k]
     if w[1 - k] != factor * w[k] or rest < 0:
         return []
-    flint = need_flint()
     across = ball(rest).sqrt()
     origin = complex_ball(A[0]) - complex_ball(z) * complex_ball(b[0])
     sides = (across, -across) if rest > 0 else (flint.arb(0),)

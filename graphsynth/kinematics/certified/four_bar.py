@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+import flint
+
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics.certified.extra import need_flint, precision
 from graphsynth.kinematics.certified.numbers import ball, rational
+from graphsynth.kinematics.certified.precision import precision
 
 __all__ = [
     "CrankCertificate",
@@ -99,7 +101,6 @@ def certify_four_bar(ground: Any, crank: Any, coupler: Any, rocker: Any) -> Cran
     >>> [round(limit.low, 9) for limit in limited.limits], limited.limits[0].place
     ([1.186399552], 'stretched')
     """
-    need_flint()
     g, a, b, c = (
         _length(n, v) for n, v in zip(("ground", "crank", "coupler", "rocker"), (ground, crank, coupler, rocker))
     )
@@ -153,7 +154,6 @@ def certify_slider_crank(crank: Any, coupler: Any, offset: Any = 0) -> CrankCert
     >>> certify_slider_crank(1, 3, 1).kind, certify_slider_crank(1, 2, 1).change_angles
     ('full turn', ('pi/2',))
     """
-    need_flint()
     a, b, e = _length("crank", crank), _length("coupler", coupler), rational("offset", offset)
     nearest = max(abs(e) - a, Fraction(0))
     kind = _kind(nearest, abs(e) + a, Fraction(-1), b)
@@ -189,7 +189,6 @@ def certify_inverted_slider_crank(crank: Any, ground: Any, offset: Any = 0) -> C
     >>> certify_inverted_slider_crank(1, 2, "0.5").kind, certify_inverted_slider_crank(1, 1, 0).kind
     ('full turn', 'change point')
     """
-    need_flint()
     a, g, e = _length("crank", crank), _length("ground", ground), abs(rational("offset", offset))
     kind = _kind(abs(g - a), g + a, e, g + a + 1)
     limits = []
@@ -218,7 +217,6 @@ def _kind(nearest: Fraction, farthest: Fraction, least: Fraction, most: Fraction
 
 def _cosine(place: str, cosine: Fraction) -> LimitAngle:
     with precision(_BITS):
-        flint = need_flint()
         if abs(cosine) == 1:
             return LimitAngle(place, *outward(flint.arb(0) if cosine == 1 else flint.arb.pi()))
         return LimitAngle(place, *outward(ball(cosine).acos()))
@@ -227,7 +225,7 @@ def _cosine(place: str, cosine: Fraction) -> LimitAngle:
 def _sine(place: str, sine: Fraction) -> LimitAngle:
     with precision(_BITS):
         if abs(sine) == 1:
-            return LimitAngle(place, *outward(int(sine) * need_flint().arb.pi() / 2))
+            return LimitAngle(place, *outward(int(sine) * flint.arb.pi() / 2))
         return LimitAngle(place, *outward(ball(sine).asin()))
 
 

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.certified.balls import TINY, UP, Balls, check_rounding, exact, tau_times
 from graphsynth.kinematics.certified.cover import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
-from graphsynth.kinematics.certified.extra import need_flint
 from graphsynth.kinematics.certified.krawczyk import Boxes
 from graphsynth.kinematics.certified.platform_equations import PlatformSystem
 from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
@@ -131,8 +130,6 @@ def certify_full_turn(
 
     Raises
     ------
-    GraphsynthError
-        If python-flint (extra ``certified``) is not installed.
     GeometryError
         For anything but a `SingleMotorPlatform`.
 
@@ -147,7 +144,6 @@ def certify_full_turn(
     (True, (-1, -1, -1), True)
     """
     begin = perf_counter()
-    need_flint()
     check_rounding()
     if not isinstance(mechanism, SingleMotorPlatform):
         raise GeometryError(f"{type(mechanism).__name__} is not a SingleMotorPlatform; certify proves other motions")

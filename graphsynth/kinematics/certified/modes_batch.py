@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import triples
 from graphsynth.kinematics.certified.balls import TINY, UP, Balls, check_rounding, exact, tau_times, unit
-from graphsynth.kinematics.certified.extra import need_flint
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
 __all__ = ["AssemblyCertificateBatch", "certify_assembly_modes_batch", "certify_direct_batch"]
@@ -108,8 +107,6 @@ def certify_assembly_modes_batch(
 
     Raises
     ------
-    GraphsynthError
-        If python-flint (extra ``certified``) is not installed.
     GeometryError
         Numbers that are not finite, a negative length, shapes that do not fit.
 
@@ -166,7 +163,6 @@ def certify_direct_batch(platform: ParallelPlatform, theta: ArrayLike) -> Assemb
 def _batch(
     A: Balls, vertices: ArrayLike, lengths: ArrayLike, given: tuple[ParallelPlatform, Array] | None = None
 ) -> AssemblyCertificateBatch:
-    need_flint()
     check_rounding()
     try:
         b = np.broadcast_to(np.asarray(vertices, dtype=np.complex128), A.mid.shape)

@@ -7,10 +7,10 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
+import flint
 import numpy as np
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics.certified.extra import need_flint
 
 __all__ = ["Gaussian", "ball", "complex_ball", "gaussian", "rational"]
 
@@ -81,7 +81,6 @@ def gaussian(name: str, value: Any) -> Gaussian:
 
 def ball(value: Any) -> Any:
     """Enclose a rational number in an ``arb`` at the precision set; an ``arb`` stays as it is."""
-    flint = need_flint()
     if not isinstance(value, Fraction):
         return flint.arb(value)
     return flint.arb(flint.fmpq(value.numerator, value.denominator))
@@ -90,5 +89,5 @@ def ball(value: Any) -> Any:
 def complex_ball(value: Any) -> Any:
     """Enclose a complex number in an ``acb`` at the precision set; an ``acb`` stays as it is."""
     if not isinstance(value, Gaussian):
-        return need_flint().acb(value)
-    return need_flint().acb(ball(value.real), ball(value.imag))
+        return flint.acb(value)
+    return flint.acb(ball(value.real), ball(value.imag))

@@ -16,7 +16,6 @@ from graphsynth.kinematics._checks import positive, whole
 from graphsynth.kinematics.certified.balls import Balls, check_rounding, exact, tau_times
 from graphsynth.kinematics.certified.cover import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
 from graphsynth.kinematics.certified.equations import MechanismSystem
-from graphsynth.kinematics.certified.extra import need_flint
 from graphsynth.kinematics.certified.laws import enclosed, whole_periods
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.joints import Gear, Prismatic
@@ -112,8 +111,6 @@ def certify(
 
     Raises
     ------
-    GraphsynthError
-        If python-flint (extra ``certified``) is not installed.
     GeometryError
         If the drivers do not fit the mobility, or there is a cam.
 
@@ -141,7 +138,6 @@ def certify(
 
 def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate:
     begin = perf_counter()
-    need_flint()
     check_rounding()
     system = MechanismSystem(motion.mechanism)
     reached = motion.assembled & np.isfinite(motion.poses).all(axis=(1, 2))

@@ -12,7 +12,8 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from graphsynth.kinematics.certified.extra import need_flint
+import flint
+
 from graphsynth.kinematics.certified.numbers import Gaussian
 
 __all__ = ["Isolation", "SexticBalls", "isolate", "mirror_count", "refine", "sextic_balls"]
@@ -70,7 +71,7 @@ def sextic_balls(A: list[Any], b: list[Any], lengths: list[Any]) -> SexticBalls:
     n0 = -w20 * a3 + conj(w21) * b3 + w30 * a2 - conj(w31) * b2
     nm = conj(w31) * a2 - conj(w21) * a3
     twice = 2 * (conj(b2) * b3 + conj(a2) * a3).imag
-    d0 = Gaussian(Fraction(0), twice) if isinstance(b2, Gaussian) else need_flint().acb(0, twice)
+    d0 = Gaussian(Fraction(0), twice) if isinstance(b2, Gaussian) else flint.acb(0, twice)
     de = b2 * conj(a3) - conj(a2) * b3
     g3 = n2 * conj(nm)
     g2 = n2 * conj(n0) + n1 * conj(nm) + L * de * de
@@ -82,7 +83,7 @@ def sextic_balls(A: list[Any], b: list[Any], lengths: list[Any]) -> SexticBalls:
 def _conjugate(z: Any) -> Any:
     if isinstance(z, Gaussian):
         return z.conj
-    return need_flint().acb(z.real, -z.imag)
+    return flint.acb(z.real, -z.imag)
 
 
 def _square(z: Any) -> Any:
@@ -91,21 +92,19 @@ def _square(z: Any) -> Any:
 
 def _point(t: Any) -> Any:
     """``exp(2 pi i t)`` for a rational t."""
-    flint = need_flint()
     s, c = flint.arb.sin_cos_pi_fmpq(2 * t)
     return flint.acb(c, s)
 
 
 @lru_cache(maxsize=16)
 def _nodes(bits: int) -> tuple[tuple[Any, Any], ...]:
-    fmpq = need_flint().fmpq
+    fmpq = flint.fmpq
     turns = [fmpq(k, _NODES) + fmpq(1, _NODES * _SHIFT) for k in range(_NODES)]
     return tuple((t, _point(t)) for t in turns)
 
 
 def isolate(s: SexticBalls, bits: int, *, halvings: int = 4000) -> Isolation:
     """Prove the number of real roots by halving arcs of the circle; every node must have a proved sign."""
-    flint = need_flint()
     signed = [(t, s.value(z)) for t, z in _nodes(bits)]
     if any(value.contains(0) for _, value in signed):
         return Isolation([], "the sign of G at a node is not decided", 0)
@@ -140,7 +139,6 @@ def isolate(s: SexticBalls, bits: int, *, halvings: int = 4000) -> Isolation:
 
 def refine(s: SexticBalls, low: Any, high: Any, bits: int) -> Any:
     """Enclose the only root between two turns: interval Newton steps in alpha, within the known bracket."""
-    flint = need_flint()
     arb = flint.arb
     two_pi = 2 * arb.pi()
     start = arb(low).union(arb(high)) * two_pi
@@ -165,7 +163,6 @@ def refine(s: SexticBalls, low: Any, high: Any, bits: int) -> Any:
 
 def _halved(s: SexticBalls, box: Any) -> Any:
     """Half of the box that has the root, by the signs at the ends; the box itself if they do not decide."""
-    flint = need_flint()
     low, high = flint.arb(box.lower()), flint.arb(box.upper())
     middle = flint.arb(box.mid())
     signs = []
@@ -187,7 +184,6 @@ def mirror_count(s: SexticBalls) -> int | None:
 
     A root whose mirror image ``1/conj(R)`` meets only its own ball R is its own mirror image.
     """
-    flint = need_flint()
     g0, g1, g2, g3 = s.g
     conj = _conjugate
     coefficients = [conj(g3), conj(g2), conj(g1), flint.acb(g0), g1, g2, g3]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.errors import MissingExtraError, SpecError
 
 __all__ = ["assume", "check_range", "ready", "st"]
 
@@ -12,7 +12,7 @@ try:
     from hypothesis import assume
     from hypothesis import strategies as st
 except ImportError as error:  # pragma: no cover - tested in a process of its own
-    raise GraphsynthError(
+    raise MissingExtraError(
         "graphsynth.testing draws its examples with hypothesis, which is not installed; pip install hypothesis"
     ) from error
 

@@ -88,9 +88,12 @@ def mechanisms(min_links: int = 4, max_links: int = 8, *, prismatic: bool = Fals
 
     Examples
     --------
-    >>> from hypothesis import find
-    >>> find(mechanisms(4, 4), lambda m: True).graph.links
-    4
+    >>> from hypothesis import given, settings
+    >>> @settings(max_examples=5)
+    ... @given(mechanisms(4, 4))
+    ... def four_links(m):
+    ...     assert m.graph.links == 4
+    >>> four_links()
     """
     check_range("links", min_links, max_links, 4, 10)
     of = mechanism_graphs(min_links, max_links)
@@ -133,10 +136,12 @@ def four_bar_mechanisms(*types: str) -> st.SearchStrategy[tuple[Mechanism, str]]
 
     Examples
     --------
-    >>> from hypothesis import find
-    >>> mechanism, kind = find(four_bar_mechanisms("double crank"), lambda found: True)
-    >>> kind
-    'double crank'
+    >>> from hypothesis import given, settings
+    >>> @settings(max_examples=5)
+    ... @given(four_bar_mechanisms("double crank"))
+    ... def is_double_crank(found):
+    ...     assert found[1] == "double crank"
+    >>> is_double_crank()
     """
     for kind in types:
         if kind not in CLASSES:

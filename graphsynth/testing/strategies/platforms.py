@@ -50,10 +50,12 @@ def platforms(*, degenerate: bool = True) -> st.SearchStrategy[ParallelPlatform]
 
     Examples
     --------
-    >>> from hypothesis import find
-    >>> platform = find(platforms(), lambda p: p.b[0] == p.b[1])
-    >>> platform.b[0] == platform.b[1]
-    True
+    >>> from hypothesis import given, settings
+    >>> @settings(max_examples=5)
+    ... @given(platforms())
+    ... def three_legs(platform):
+    ...     assert len(platform.b) == 3
+    >>> three_legs()
     """
     return _platforms(degenerate)
 
@@ -109,9 +111,11 @@ def platform_poses(
 
     Examples
     --------
-    >>> from hypothesis import find
-    >>> platform, pose, sigma = find(platform_poses(reached=True), lambda found: True)
-    >>> bool(platform.inverse(pose, sigma).reachable)
-    True
+    >>> from hypothesis import given, settings
+    >>> @settings(max_examples=5)
+    ... @given(platform_poses(reached=True))
+    ... def legs_reach(found):
+    ...     assert found[0].inverse(*found[1:]).reachable
+    >>> legs_reach()
     """
     return _reached(degenerate) if reached else _platform_poses(degenerate)

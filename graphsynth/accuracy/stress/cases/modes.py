@@ -95,8 +95,8 @@ def _elbows(theta: tuple[str, ...]) -> list[Any]:
     """Anchors of G1 at decimal angles, as balls."""
     import flint
 
-    from graphsynth.kinematics.certified.extra import precision
     from graphsynth.kinematics.certified.numbers import ball, complex_ball, gaussian, rational
+    from graphsynth.kinematics.certified.precision import precision
 
     with precision(1000):
         found = []
