@@ -7,6 +7,7 @@ import os
 import signal
 import socket
 
+import distributed
 import pytest
 
 from graphsynth.atlas import pieces
@@ -17,8 +18,6 @@ from graphsynth.errors import GraphsynthError
 
 #: A bound on pieces that cuts ten links into many.
 FINE = 10.0
-
-distributed = pytest.importorskip("distributed")
 
 
 @pytest.fixture(scope="module")

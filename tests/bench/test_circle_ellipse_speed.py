@@ -7,6 +7,7 @@ Run by the normal suite once each, without timing; with times: ``pytest tests/be
 
 from __future__ import annotations
 
+import flint
 import mpmath
 import numpy as np
 import pytest
@@ -16,8 +17,6 @@ from graphsynth.jamming.area_curve import area_curve
 from graphsynth.jamming.areas_enclosed import enclose_lid_area
 from graphsynth.jamming.circle_ellipse import circle_ellipse, exact_hull, kernels, krawczyk_boxes
 from graphsynth.jamming.circle_ellipse.boxes import krawczyk_data
-
-flint = pytest.importorskip("flint")
 
 B = "17.4617879639289313590283215334"
 X0, Y0 = 13.11490802879096276551727, 11.58659515976778845911871

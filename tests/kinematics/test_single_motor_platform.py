@@ -238,7 +238,6 @@ def test_other_assembly_mode_can_be_followed():
 
 
 def test_graph_is_figure_three():
-    pytest.importorskip("graphsynth.structure.graph")
     graph = REFERENCE.graph()
     assert graph.links == 15
     assert len(graph.joints) == 22

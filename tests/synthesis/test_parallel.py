@@ -64,7 +64,8 @@ def test_the_pool_of_the_command_line(alone):
 
 
 def test_dask_cluster(alone):
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     cluster = distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
     )
