@@ -19,6 +19,8 @@ def run(options: argparse.Namespace) -> int:
 
     begin = time.perf_counter()
     problem = problem_of(options)
+    if problem.reason:
+        console.note(f"nothing to count: {problem.reason}")
     size = sum(len(family.graphs) for family in problem.families)
     try:
         with processes(workers_for(options.workers, size > 100_000)) as executor, console.progress("counting") as watch:
@@ -32,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     seconds = time.perf_counter() - begin
     shard = f"{options.shard[0]}/{options.shard[1]}" if options.shard else None
     if options.json:
-        console.put_json({"question": problem.title, "shard": shard, "count": count, "seconds": round(seconds, 3)})
+        document = {"question": problem.title, "shard": shard, "count": count, "seconds": round(seconds, 3)}
+        console.put_json(document | ({"reason": problem.reason} if problem.reason else {}))
         return 0
     console.put(f"{problem.title}{f' shard {shard}' if shard else ''} ({seconds:.2f} s)")
     console.put(str(count))

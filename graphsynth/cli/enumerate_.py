@@ -27,14 +27,17 @@ BIG = 5e7  # labellings (before sparsity) from which all cores are used
 
 def run(options: argparse.Namespace) -> int:
     """List to a file, or to standard output."""
-    if options.json and (options.output is None or options.output.suffix != ".jsonl"):
+    if options.json and (options.output is None or options.output.suffix.lower() not in (".jsonl", ".ndjson")):
         raise SpecError("--json needs -o FILE.jsonl here: the graphs go to the file, a summary to standard output")
     if options.output is None and (options.resume or options.force):
         raise SpecError("--resume and --force need -o FILE")
     from graphsynth.synthesis.parallel import processes
 
     begin = time.perf_counter()
+    entry = _other_format(options.output) if options.output else None
     problem = problem_of(options)
+    if problem.reason:
+        console.note(f"nothing to list: {problem.reason}")
     weight = sum(piece.weight for piece in problem.pieces(listing=True))
     with processes(workers_for(options.workers, weight > BIG)) as executor:
         if options.output is None:
@@ -44,7 +47,6 @@ def run(options: argparse.Namespace) -> int:
             for data, _ in texts(shard_of(problem.pieces(listing=True), options.shard), executor):
                 sys.stdout.buffer.write(data)
             return 0
-        entry = _other_format(options.output)
         if entry is not None and (options.resume or options.json):
             raise SpecError(
                 f"{options.output.suffix} is written in one piece: use .g6 or .jsonl with --resume or --json"
@@ -83,15 +85,24 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _other_format(path: Path) -> str | None:
-    """Return the name of a format that is not written line by line, None for lines of text or JSON."""
+    """Return the name of a format that is not written line by line, None for lines of text or JSON.
+
+    Raises
+    ------
+    SpecError
+        For a suffix that names no format, or one that holds a single graph.
+    """
     from graphsynth.formats.registry import FORMATS
 
-    for entry in FORMATS.values():
-        if path.suffix.lower() in entry.suffixes and not entry.line:
-            if not entry.many:
-                raise SpecError(f"{path.suffix} holds one graph; use .g6, .jsonl, .json, .graphml, .dot or .csv")
-            return entry.name
-    return None
+    suffix = path.suffix.lower()
+    if not suffix:
+        return None
+    entry = next((entry for entry in FORMATS.values() if suffix in entry.suffixes), None)
+    if entry is None or not entry.many:
+        able = ", ".join(suffix for other in FORMATS.values() if other.many for suffix in other.suffixes)
+        why = "names no format of graphs" if entry is None else "holds one graph"
+        raise SpecError(f"{path.name}: {path.suffix} {why}; use one of {able}")
+    return None if entry.line else entry.name
 
 
 def _write_whole(problem: Problem, options: argparse.Namespace, executor: Executor | None) -> int:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 from graphsynth.errors import SpecError
-from graphsynth.structure.variables import Counts
+from graphsynth.structure.variables import LARGEST, Counts, shown, whole
 
 __all__ = ["LinkAssortment", "solutions_table"]
 
@@ -158,8 +158,9 @@ class LinkAssortment:
         Raises
         ------
         SpecError
-            Naming the first equation that does not hold.
+            Naming the first equation that does not hold, or the value that is no whole number.
         """
+        self._check_types()
         freedoms = [(mobility, number) for mobility, number in enumerate(self.p_i, start=1)]
         kinds = list(self.n_a.items())
         equations = (
@@ -180,6 +181,19 @@ class LinkAssortment:
         for text, holds in equations:
             if not holds:
                 raise SpecError(f"the assortment {self} breaks {text}; solutions of StructuralSpec.solve() never do")
+
+    def _check_types(self) -> None:
+        for part in fields(self):
+            value = getattr(self, part.name)
+            values = [value]
+            if part.name in ("p_i", "n_a"):
+                if not isinstance(value, tuple if part.name == "p_i" else Mapping):
+                    raise SpecError(
+                        f"{part.name} = {shown(value)}: give a tuple p_i and a mapping n_a, as solve() does"
+                    )
+                values = [*value, *(value.values() if isinstance(value, Mapping) else ())]
+            for number in values:
+                whole(number, part.name, -LARGEST, LARGEST)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data by symbol, ready for JSON."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from operator import index
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from graphsynth.errors import FormatError, GraphError
@@ -268,6 +269,10 @@ class MechanismGraph:
         GraphError
             If the argument is not a permutation of ``0..links-1``.
         """
+        try:
+            permutation = list(map(index, permutation))
+        except Exception:  # no sequence, no integers
+            permutation = []
         if sorted(permutation) != list(range(self.links)):
             raise GraphError(f"relabelling {self.links} links needs a permutation of 0..{self.links - 1}")
         packed = self.packed

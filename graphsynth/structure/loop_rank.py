@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.errors import TooLargeError
 from graphsynth.structure.levels import bits
+from graphsynth.structure.variables import whole
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -98,7 +99,7 @@ def generic_mobility(graph: MechanismGraph, seed: int = 0) -> GenericMobility:
             f"the loop matrix has {entries} entries, more than {_ENTRIES_MAX}; use rigid_subchain(), which counts",
             float(entries),
         )
-    matrix = _loop_matrix(graph, seed)
+    matrix = _loop_matrix(graph, whole(seed, "seed", 0, 10**100))
     rank = _rank(matrix)
     parts = len(graph.components)
     return GenericMobility(

@@ -8,7 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from graphsynth.errors import FormatError, SpecError
-from graphsynth.structure.variables import ALIASES, LARGEST, Range, is_variable, nearest, read_range, show_range
+from graphsynth.structure.variables import (
+    ALIASES,
+    LARGEST,
+    Range,
+    is_variable,
+    nearest,
+    read_range,
+    show_range,
+    shown,
+    whole,
+)
 
 __all__ = [
     "assigned_question",
@@ -33,10 +43,12 @@ _Read = tuple[dict[str, Range], dict[str, Any], dict[int, Range]]
 
 def symbol_of(name: str) -> str:
     """Return the symbol of a variable given by symbol or by name; SpecError with the nearest name if unknown."""
+    if not isinstance(name, str):
+        raise SpecError(f"{shown(name)} is not the name of a variable: give a text such as 'W' or 'links'")
     symbol = ALIASES.get(name, name)
     if symbol == "N" or is_variable(symbol):
         return symbol
-    raise SpecError(f"unknown variable {name!r}{nearest(name, _KNOWN)}")
+    raise SpecError(f"unknown variable {shown(name)}{nearest(name, _KNOWN)}")
 
 
 def is_single(name: str) -> bool:
@@ -72,7 +84,8 @@ def _add(ranges: dict[str, Range], name: str, symbol: str, value: Any) -> None:
         own = None if own[0] is None else own[0] - 1, None if own[1] is None else own[1] - 1
     if ranges.get(symbol, own) != own:
         raise SpecError(
-            f"{symbol} is given twice: {show_range(ranges[symbol])} and {show_range(own)} (from {name!r}); keep one"
+            f"{symbol} is given twice: {show_range(ranges[symbol])} and {show_range(own)} (from {shown(name)}); "
+            "keep one"
         )
     # An unbounded p_i (i >= 2) still says that joints of this mobility may occur.
     if own != (None, None) or (symbol[0] == "p" and symbol not in ("p", "p1")):
@@ -82,12 +95,12 @@ def _add(ranges: dict[str, Range], name: str, symbol: str, value: Any) -> None:
 def _add_family(ranges: dict[str, Range], name: str, value: Any) -> None:
     letter = _FAMILIES[ALIASES.get(name, name)]
     if not isinstance(value, Mapping):
-        raise SpecError(f"{name} = {value!r}: give a mapping such as {{2: 3}}")
+        raise SpecError(f"{name} = {shown(value)}: give a mapping such as {{2: 3}}")
     for kind, number in value.items():
-        symbol = f"{letter}{kind}"
-        if isinstance(kind, bool) or not is_variable(symbol):
+        symbol = f"{letter}{kind if isinstance(kind, str) else whole(kind, f'{name}: a kind', 1, LARGEST)}"
+        if not is_variable(symbol):
             least, most = (2, LARGEST) if letter == "n" else (1, 5)
-            raise SpecError(f"{name}: unknown kind {kind!r}; give an integer between {least} and {most}")
+            raise SpecError(f"{name}: unknown kind {shown(kind)}; give an integer between {least} and {most}")
         if number is not None:
             _add(ranges, name, symbol, number)
 
@@ -96,32 +109,32 @@ def _add_option(options: dict[str, Any], name: str, value: Any) -> None:
     if name == "simple_joints":
         if value is not True:
             raise SpecError(
-                f"simple_joints = {value!r}: only true is possible; a pin that joins k links is k - 1 simple joints"
+                f"simple_joints = {shown(value)}: only true is possible; "
+                "a pin that joins k links is k - 1 simple joints"
             )
         return  # always so
     if name == "fractionated":
         if not isinstance(value, bool):
-            raise SpecError(f"fractionated = {value!r}: give true or false")
+            raise SpecError(f"fractionated = {shown(value)}: give true or false")
         if value:
             options[name] = True
         return
-    if name == "max_link_joints" and value == "all" and isinstance(value, str):
+    if name == "max_link_joints" and isinstance(value, str) and value == "all":
         options[name] = value
         return
     least, most = (1, 5) if name == "max_joint_mobility" else (2, LARGEST)
     lo, hi = read_range(name, value)
     if lo is None or lo != hi or not least <= lo <= most:
-        raise SpecError(f"{name} = {value!r}: give one integer between {least} and {most}")
+        raise SpecError(f"{name} = {shown(value)}: give one integer between {least} and {most}")
     options[name] = lo
 
 
 def _levels(value: Any) -> dict[int, Range]:
     if not isinstance(value, Mapping):
-        raise SpecError(f"levels = {value!r}: give a mapping level -> size such as {{-1: 3}}")
+        raise SpecError(f"levels = {shown(value)}: give a mapping level -> size such as {{-1: 3}}")
     read: dict[int, Range] = {}
     for level, size in value.items():
-        if isinstance(level, bool) or not isinstance(level, int) or abs(level) > LARGEST:
-            raise SpecError(f"levels: {level!r} is not a level; give an integer, -1 for the last level")
+        level = whole(level, "levels: a level, -1 for the last,", -LARGEST, LARGEST)
         own = read_range(f"levels[{level}]", size)
         if level == 0 and own != (1, 1):
             raise SpecError(f"levels: level 0 is the frame alone, its size is 1 and not {show_range(own)}")
@@ -138,9 +151,9 @@ def plain_question(mapping: Mapping[str, Any], place: str, check: Callable[..., 
         raise FormatError(f"a structural question is a table of variables, not {type(mapping).__name__}", place)
     question: dict[str, Any] = {}
     for key, value in mapping.items():
-        here = f"{place}: key {key!r}" if place else f"key {key!r}"
+        here = f"{place}: key {shown(key)}" if place else f"key {shown(key)}"
         if not isinstance(key, str) or not (is_single(key) or key in _KNOWN or key in _FAMILIES):
-            raise FormatError(f"unknown key {key!r}{nearest(str(key), _KNOWN)}", here)
+            raise FormatError(f"unknown key {shown(key)}{nearest(key if isinstance(key, str) else '', _KNOWN)}", here)
         try:
             question[key] = _plain_value(key, value)
             check(**question)
@@ -162,11 +175,9 @@ def _plain_value(key: str, value: Any) -> Any:
 
 
 def _level_or_kind(key: str, inner: Any) -> int:
-    if isinstance(inner, int) and not isinstance(inner, bool):
-        return inner
     if isinstance(inner, str) and _NUMBER.fullmatch(inner):
         return int(inner)
-    raise SpecError(f"{key}: {inner!r} is not an integer key")
+    return whole(inner, f"a key of {key}", -LARGEST, LARGEST)
 
 
 def _parse_value(name: str, text: str) -> int | Range:
@@ -181,17 +192,25 @@ def _parse_value(name: str, text: str) -> int | Range:
 def assigned_question(assignments: Iterable[str]) -> dict[str, Any]:
     """Turn ``name=value`` texts into keywords; SpecError for anything else."""
     question: dict[str, Any] = {}
-    for text in assignments:
+    try:
+        texts = None if isinstance(assignments, str | bytes) else list(assignments)
+    except TypeError:
+        texts = None
+    if texts is None:
+        raise SpecError(f"{shown(assignments)} is not a list of assignments: give a list such as ['W=1', 'links=8']")
+    for text in texts:
+        if not isinstance(text, str):
+            raise SpecError(f"{shown(text)} is not an assignment: write name=value, for example W=1 or n4=0..2")
         name, equals, value = text.partition("=")
         name, value = name.strip(), value.strip()
         if not equals or not name or not value:
-            raise SpecError(f"{text!r} is not an assignment: write name=value, for example W=1 or n4=0..2")
+            raise SpecError(f"{shown(text)} is not an assignment: write name=value, for example W=1 or n4=0..2")
         if name.startswith("levels.") and _NUMBER.fullmatch(name[7:]):
             question.setdefault("levels", {})[int(name[7:])] = _parse_value(name, value)
             continue
         if name in ("fractionated", "simple_joints"):
             if value not in ("true", "false"):
-                raise SpecError(f"{name} = {value!r}: write true or false")
+                raise SpecError(f"{name} = {shown(value)}: write true or false")
             own: Any = value == "true"
         elif name == "max_link_joints" and value == "all":
             own = value
@@ -200,7 +219,7 @@ def assigned_question(assignments: Iterable[str]) -> dict[str, Any]:
                 symbol_of(name)
             own = _parse_value(name, value)
         if question.get(name, own) != own:
-            raise SpecError(f"{name} is given twice: {question[name]!r} and {own!r}; keep one")
+            raise SpecError(f"{name} is given twice: {shown(question[name])} and {shown(own)}; keep one")
         question[name] = own
     return question
 

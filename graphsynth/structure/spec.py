@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from graphsynth.errors import SpecError, TooLargeError
+from graphsynth.errors import FormatError, SpecError, TooLargeError
 from graphsynth.structure import reading
 from graphsynth.structure.assortment import LinkAssortment, solutions_table
 from graphsynth.structure.clash import explain
 from graphsynth.structure.equations import Problem
 from graphsynth.structure.system import solutions
-from graphsynth.structure.variables import SPACES, Range, order_key, show_range
+from graphsynth.structure.variables import SPACES, Range, order_key, show_range, shown, whole
 
 __all__ = ["LinkAssortment", "StructuralSpec", "solutions_table"]
 
@@ -124,6 +125,8 @@ class StructuralSpec:
         FormatError
             If the file cannot be read, is not TOML, or has an unknown key or a bad value.
         """
+        if not isinstance(path, str | PathLike):
+            raise FormatError(f"{shown(path)} is not the path of a file", "path")
         return cls.from_mapping(reading.load_toml(Path(path)), str(path))
 
     @classmethod
@@ -218,6 +221,7 @@ class StructuralSpec:
         TooLargeError
             If there are more than ``limit``.
         """
+        limit = whole(limit, "limit", 0, 10**12)
         found = list(islice(self.iter_solutions(), limit + 1))
         if len(found) > limit:
             raise TooLargeError(

@@ -59,6 +59,7 @@ def order_key(symbol: str) -> tuple[int, int]:
 
 def nearest(word: str, words: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the nearest of ``words``, or nothing."""
+    word = word[:60]
     close = difflib.get_close_matches(word, list(words), n=1, cutoff=0.5)
     return f"; did you mean {close[0]!r}?" if close else ""
 
@@ -89,14 +90,14 @@ def read_range(symbol: str, value: Any) -> Range:
     """
     if isinstance(value, (tuple, list)):
         if len(value) != 2:
-            raise SpecError(f"{symbol} = {_show(value)}: bounds are a pair (lowest, highest), either may be None")
+            raise SpecError(f"{symbol} = {shown(value)}: bounds are a pair (lowest, highest), either may be None")
         lo, hi = (None if side is None else _integer(symbol, side) for side in value)
     else:
         lo = hi = _integer(symbol, value)
     least, most = _natural(symbol)
     for side in (lo, hi):
         if side is not None and not least <= side <= most:
-            raise SpecError(f"{symbol} = {_show(side)} is out of range: {symbol} must be between {least} and {most}")
+            raise SpecError(f"{symbol} = {shown(side)} is out of range: {symbol} must be between {least} and {most}")
     if lo is not None and hi is not None and lo > hi:
         raise SpecError(f"{symbol}: the lowest value {lo} is above the highest value {hi}; swap them")
     return lo, hi
@@ -110,19 +111,49 @@ def _natural(symbol: str) -> tuple[int, int]:
     return _LEAST.get(symbol, 0), LARGEST
 
 
+def whole(value: Any, name: str, least: int, most: int | None = None) -> int:
+    """Return a whole number of any integer type as an int.
+
+    Raises
+    ------
+    SpecError
+        For anything else, a truth value too, and for a number out of its bounds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> whole(np.uint8(4), "links", 2, 255)
+    4
+    """
+    number = None if isinstance(value, bool) else _index(value)
+    if number is None or number < least or (most is not None and number > most):
+        bounds = f", at least {least}" if most is None else f" from {least} to {most}"
+        raise SpecError(f"{name} = {shown(value)} must be a whole number{bounds}")
+    return number
+
+
+def _index(value: Any) -> int | None:
+    try:
+        return operator.index(value)
+    except Exception:  # whatever a foreign __index__ raises
+        return None
+
+
 def _integer(symbol: str, value: Any) -> int:
-    if not isinstance(value, bool):
-        try:
-            return operator.index(value)
-        except TypeError:
-            pass
-    raise SpecError(f"{symbol} = {_show(value)} is not an integer: give an integer or a pair (lowest, highest)")
+    number = None if isinstance(value, bool) else _index(value)
+    if number is not None:
+        return number
+    raise SpecError(f"{symbol} = {shown(value)} is not an integer: give an integer or a pair (lowest, highest)")
 
 
-def _show(value: Any) -> str:
+def shown(value: Any) -> str:
+    """Write a value for a message, shortly."""
     if isinstance(value, int) and value.bit_length() > 200:
         return f"a number of {value.bit_length()} bits"
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception:  # whatever a foreign __repr__ raises; of an integer of thousands of digits inside, ValueError
+        text = f"a value of type {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -166,7 +197,7 @@ class Counts(Mapping[int, int]):
         for candidate, number in self._items:
             if candidate == kind:
                 return number
-        if isinstance(kind, int):
+        if _index(kind) is not None:
             return 0
         raise KeyError(kind)
 

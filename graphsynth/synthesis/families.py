@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import SpecError
 from graphsynth.structure.spec import LinkAssortment
+from graphsynth.structure.variables import shown, whole
 from graphsynth.synthesis.alphabet import Alphabet, alphabet_for
 from graphsynth.synthesis.contracted import contracted_graphs
 from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
 
-__all__ = ["Family", "chain_families", "chain_joints", "mechanism_families", "truss_families"]
+__all__ = ["Family", "chain_families", "chain_joints", "chain_numbers", "mechanism_families", "truss_families"]
+
+MOST_LINKS = 255
 
 Levels = tuple[tuple[int, int, int], ...]
 """Wanted sizes of adjacency levels: (level, lowest, highest); negative levels count from the last."""
@@ -97,24 +101,35 @@ def _graphs(loops: int, vertices: int, degrees: tuple[int, ...] | None) -> NDArr
     return chosen
 
 
-def chain_joints(links: int, mobility: int, space: int, higher: Mapping[int, int]) -> int | None:
-    """Return p_1 of a chain from W = Pi (N - 1) - sum_i p_i (Pi - i), or None when it is not a whole number >= 0.
+def chain_numbers(
+    links: Any, mobility: Any, space: Any, joints_by_mobility: Any, *, least: int = 1
+) -> tuple[int, int, int, dict[int, int]]:
+    """Return N, W >= ``least``, Pi and the numbers of joints by mobility as plain integers within their bounds.
 
     Raises
     ------
     SpecError
-        For values out of their bounds.
+        For anything else.
     """
-    for name, value, low, high in (("links", links, 2, 255), ("mobility", mobility, 0, 50), ("space", space, 2, 6)):
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise SpecError(f"{name} = {value!r} must be a whole number from {low} to {high}")
-    for i, count in higher.items():
-        if isinstance(i, bool) or not isinstance(i, int) or not 1 <= i <= space - 1:
-            raise SpecError(
-                f"a joint of mobility {i!r} does not exist in a space of mobility {space}: use 1..{space - 1}"
-            )
-        if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= 100:
-            raise SpecError(f"p{i} = {count!r} must be a whole number from 0 to 100")
+    links = whole(links, "links", 2, MOST_LINKS)
+    if least and whole(mobility, "mobility", 0, 50) == 0:
+        raise SpecError("mobility = 0 must be at least 1: Baranov trusses are the structures without mobility")
+    mobility = whole(mobility, "mobility", least, 50)
+    space = whole(space, "space", 2, 6)
+    if not isinstance(joints_by_mobility, Mapping | None):
+        raise SpecError(
+            f"joints_by_mobility = {shown(joints_by_mobility)} must be a mapping from the mobility of a joint to a "
+            "number of joints, as in {2: 1}"
+        )
+    higher: dict[int, int] = {}
+    for kind, count in (joints_by_mobility or {}).items():
+        i = whole(kind, "joints_by_mobility: the mobility of a joint", 1, space - 1)
+        higher[i] = whole(count, f"p{i}", 0, 100)
+    return links, mobility, space, higher
+
+
+def chain_joints(links: int, mobility: int, space: int, higher: Mapping[int, int]) -> int | None:
+    """Return p_1 of a chain from W = Pi (N - 1) - sum_i p_i (Pi - i), or None when it is not a whole number >= 0."""
     rest = space * (links - 1) - mobility - sum(count * (space - i) for i, count in higher.items() if i > 1)
     joints, remainder = divmod(rest, space - 1)
     if remainder or joints < 0 or higher.get(1, joints) != joints:

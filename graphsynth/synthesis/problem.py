@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import lru_cache
 from hashlib import sha256
 
@@ -11,12 +12,15 @@ from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.levels import components_of
 from graphsynth.structure.spec import LinkAssortment, StructuralSpec
+from graphsynth.structure.variables import shown, whole
 from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
 from graphsynth.synthesis.families import (
+    MOST_LINKS,
     Family,
     Levels,
     chain_families,
     chain_joints,
+    chain_numbers,
     mechanism_families,
     truss_families,
 )
@@ -115,12 +119,15 @@ class Problem:
         What is made one by one; listed first.
     symmetry : int
         0, or the prime order of a required automorphism.
+    reason : str
+        Why there is nothing, where the structural formula says so already.
     """
 
     title: str
     families: tuple[Family, ...]
     handfuls: tuple[Handful, ...] = ()
     symmetry: int = 0
+    reason: str = field(default="", repr=False, compare=False)
 
     @property
     def signature(self) -> str:
@@ -153,22 +160,16 @@ class Problem:
         TooLargeError
             More loops than there are contracted graphs.
         """
-        if mobility == 0 and not isinstance(mobility, bool):
-            raise SpecError("mobility = 0 must be at least 1: Baranov trusses are the structures without mobility")
-        if not isinstance(joints_by_mobility, Mapping | None):
-            raise SpecError(
-                f"joints_by_mobility = {joints_by_mobility!r} must be a mapping from the mobility of a joint to a "
-                "number of joints, as in {2: 1}"
-            )
-        higher = dict(joints_by_mobility or {})
+        links, mobility, space, higher = chain_numbers(links, mobility, space, joints_by_mobility)
+        fractionated, order = _truth(fractionated, "fractionated"), check_symmetry(symmetry)
         joints = chain_joints(links, mobility, space, higher)
         placed = tuple(sorted((i, count) for i, count in higher.items() if i > 1 and count))
         title = f"W={mobility} N={links} Pi={space}" + "".join(f" p{i}={count}" for i, count in placed)
         title += (" framed" if framed else "") + (" fractionated" if fractionated else "")
-        if joints is None:
-            return cls(title, ())
-        check_loops(joints + sum(count for _, count in placed) - links + 1, links)
-        order = check_symmetry(symmetry)
+        loops = -1 if joints is None else joints + sum(count for _, count in placed) - links + 1
+        if loops < (links > 2):
+            return cls(title, (), reason=_reason(links, mobility, space, higher))
+        check_loops(loops, links)
         common = (links, mobility, space, placed, framed)
         handfuls = [Handful("rings", *common, symmetry=order)]
         if fractionated and mobility > 1:
@@ -191,6 +192,7 @@ class Problem:
         levels: Levels = ()
         fractionated = False
         if isinstance(question, LinkAssortment):
+            question.check()
             assortments = [question]
             fractionated = question.frame_parts > 1
         elif isinstance(question, StructuralSpec):
@@ -198,7 +200,9 @@ class Problem:
             fractionated = question.fractionated
             levels = tuple((at, low or 0, 255 if high is None else high) for at, (low, high) in question.levels.items())
         else:
-            raise SpecError(f"{question!r} is not a structural question: give a StructuralSpec or a LinkAssortment")
+            raise SpecError(
+                f"{shown(question)} is not a structural question: give a StructuralSpec or a LinkAssortment"
+            )
         families: list[Family] = []
         handfuls: list[Handful] = []
         for assortment in assortments:
@@ -229,9 +233,7 @@ class Problem:
         TooLargeError
             More loops than there are contracted graphs.
         """
-        if isinstance(moving, bool) or not isinstance(moving, int):
-            raise SpecError(f"moving links = {moving!r} must be a whole number, at least 1")
-        return cls.trusses(moving + 1, space, True)
+        return cls.trusses(whole(moving, "moving links", 1, MOST_LINKS - 1) + 1, space, True)
 
     @classmethod
     def trusses(cls, links: int, space: int, framed: bool) -> Problem:
@@ -244,12 +246,11 @@ class Problem:
         TooLargeError
             More loops than there are contracted graphs.
         """
-        if framed and isinstance(links, int) and links < 2:
-            raise SpecError(f"moving links = {links - 1} must be a whole number, at least 1")
+        links, _, space, _ = chain_numbers(links, 0, space, None, least=0)
         joints = chain_joints(links, 0, space, {})
         title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
         if joints is None:
-            return cls(title, ())
+            return cls(title, (), reason=_reason(links, 0, space, {}))
         check_loops(joints - links + 1, links)
         return cls(title, tuple(truss_families(links, space, framed)), (Handful("rings", links, 0, space, (), framed),))
 
@@ -269,12 +270,41 @@ def check_symmetry(symmetry: int | None) -> int:
     """
     if symmetry is None:
         return 0
-    if isinstance(symmetry, bool) or symmetry not in _PRIMES:
-        raise SpecError(
-            f"symmetry = {symmetry!r} must be a prime {_PRIMES}; for a composite order take its prime factors and "
-            "look at automorphism_order"
-        )
-    return int(symmetry)
+    try:
+        if (order := whole(symmetry, "symmetry", 2)) in _PRIMES:
+            return order
+    except SpecError:
+        pass
+    raise SpecError(
+        f"symmetry = {shown(symmetry)} must be a prime {_PRIMES}; for a composite order take its prime factors and "
+        "look at automorphism_order"
+    )
+
+
+def _truth(value: object, name: str) -> bool:
+    if value is True or value is False:
+        return value
+    if type(value).__name__ in ("bool", "bool_"):  # of numpy
+        return bool(value)
+    raise SpecError(f"{name} = {shown(value)} must be True or False")
+
+
+def _reason(links: int, mobility: int, space: int, higher: Mapping[int, int]) -> str:
+    """Say why the structural formula leaves no chain, in one sentence."""
+    rest = Fraction(space * (links - 1) - mobility - sum(n * (space - i) for i, n in higher.items() if i > 1))
+    lower = rest / (space - 1)
+    joints = f"{float(lower):.6g} joints of mobility 1" + (" besides the others" if sum(higher.values()) else "")
+    asked = f"W = {mobility} with {links} links in a space of mobility {space} takes {joints}"
+    if lower < 0:
+        return f"{asked}: there are too many others"
+    if lower.denominator > 1:
+        near = [n for n in range(max(3, links - space), links + space + 1) if chain_joints(n, mobility, space, higher)]
+        below, above = max((n for n in near if n < links), default=0), min((n for n in near if n > links), default=0)
+        others = " or ".join(str(n) for n in (below, above) if n)
+        return f"{asked}, no whole number" + (f": ask for {others} links" if others else "")
+    if higher.get(1, lower) != lower:
+        return f"{asked}, not {higher[1]}: leave p1 out"
+    return f"{asked}, too few for a loop: ask for more links or a smaller mobility"
 
 
 # 1-DOF planar chains, N = 4, 6, ..., 18 (published and recomputed); the ratios grow by about 15.7 a step

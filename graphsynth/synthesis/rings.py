@@ -35,7 +35,7 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
 
     Joint i connects links i and i + 1 modulo N, so with the frame at link 0 the only symmetry left is the reflection.
     Any two links of a ring are apart by at least one joint, so every ring of mobility W >= 1 is admissible; mobility 0
-    gives the ring that is a Baranov truss.
+    gives the ring that is a Baranov truss.  Two links and their only joint count as the smallest chain.
 
     Examples
     --------
@@ -43,10 +43,13 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
     ['Cl f0']
     """
     lower = chain_joints(links, mobility, space, higher)
-    if lower is None or links < 3:
+    if lower is None:
         return
     content = {1: lower} | {i: count for i, count in higher.items() if i > 1}
-    if sum(content.values()) != links:
+    if sum(content.values()) == 1 and links == 2:
+        mobility = next(i for i, count in content.items() if count)
+        yield MechanismGraph(2, [(0, 1, mobility)], frame=0 if framed else None, space=space)
+    if links < 3 or sum(content.values()) != links:
         return
     for word in _words(content):
         if _is_first(word, framed):

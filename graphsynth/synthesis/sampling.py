@@ -17,6 +17,7 @@ import numpy as np
 
 from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.structure.variables import whole
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.kernels.drawing_lots import decode_fixed, fixed_table, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed
@@ -40,10 +41,7 @@ def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
     InfeasibleSpecError
         If there is nothing to draw from.
     """
-    if isinstance(k, bool) or not isinstance(k, int) or k < 0:
-        raise SpecError(f"k = {k!r} must be a whole number >= 0")
-    if isinstance(seed, bool) or not isinstance(seed, int):  # None would draw others every time
-        raise SpecError(f"seed = {seed!r} must be a whole number; the same one gives the same draws")
+    k, seed = whole(k, "k", 0, 10**9), whole(seed, "seed", -(10**100), 10**100)  # None would draw others every time
     if problem.symmetry or any(family.levels for family in problem.families):
         raise SpecError("sampling with a required symmetry or wanted levels is not supported: list them and choose")
     listed = [graph for handful in problem.handfuls for graph in handful.graphs()]

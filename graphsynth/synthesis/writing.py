@@ -186,7 +186,7 @@ def _text_line(graph: MechanismGraph) -> str:
 
 
 def _form(path: Path) -> str:
-    return "jsonl" if path.suffix == ".jsonl" else "text"
+    return "jsonl" if path.suffix.lower() in (".jsonl", ".ndjson") else "text"
 
 
 def _cut_back(file: BinaryIO, journal: Journal, pieces: int) -> int:
