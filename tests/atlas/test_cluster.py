@@ -55,6 +55,7 @@ def test_the_command_line_on_a_cluster(alone, cluster, fine, tmp_path, capsys):
         assert content(catalogue, tmp_path / "one") == content(alone, tmp_path / "two")
 
 
+@pytest.mark.slow
 def test_lost_workers_are_replaced_and_their_pieces_done_again(alone, cluster, fine, tmp_path):
     """While the pieces are under way, two of the three workers are killed."""
     assert len(cluster.workers) == 3
@@ -82,6 +83,7 @@ def test_a_scheduler_that_does_not_answer():
         pass
 
 
+@pytest.mark.slow
 def test_workers_with_another_version_are_refused(cluster, monkeypatch):
     monkeypatch.setattr("graphsynth.__version__", "0.0.1")
     with (

@@ -63,6 +63,7 @@ def test_the_pool_of_the_command_line(alone):
         assert executor is None
 
 
+@pytest.mark.slow
 def test_dask_cluster(alone):
     import distributed
 
