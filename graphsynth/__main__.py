@@ -1,8 +1,13 @@
-"""``python -m graphsynth``."""
+"""``python -m graphsynth``, and the program ``graphsynth``."""
 
+import signal
 import sys
 
-from graphsynth.cli import main
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C before the command line is there just ends the program
+
+from graphsynth.cli import main  # noqa: E402
+
+__all__ = ["main"]
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -55,7 +55,7 @@ def kernel(function: Callable[..., Any] | None = None, *, signature: Any = None,
 _listeners: list[Callable[[], None]] = []
 
 
-def announce(listener: Callable[[], None]) -> None:
+def announce(listener: Callable[[], None], unkept: Callable[[str], None] | None = None) -> None:
     """Call ``listener`` once, before the first kernel of this process that is not kept on disk is compiled."""
     _listeners[:] = [listener]
 

@@ -258,6 +258,9 @@ def _begin_worker(*_: Any) -> None:
     from multiprocessing.util import Finalize
     from threading import Thread
 
+    from graphsynth.compilation import announce
+
+    announce(lambda: None, lambda text: None)  # this process tells nothing
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _die_with_parent()
     Thread(target=_end_with_parent, daemon=True).start()

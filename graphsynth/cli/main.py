@@ -33,10 +33,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: done; 2: bad input or a place that cannot be written, told in one sentence on standard error; 130: interrupted;
     143: told to end (SIGTERM), which does the same.
     """
-    options = _parser().parse_args(arguments)
-    announce(lambda: note("compiling kernels (first use only, some seconds) ..."))
     with _interrupts(at_exit=arguments is None) as received:
+        options = argparse.Namespace()
         try:
+            options = _parser().parse_args(arguments)
+            announce(lambda: note("compiling kernels (first use only, some seconds) ..."), note)
             # each verb lives in a module of its own, imported when it is used
             status: int = import_module(f"graphsynth.cli.{options.module}").run(options)
             sys.stdout.flush()

@@ -60,6 +60,7 @@ def _document(report: Report, explained: bool) -> dict[str, Any]:
         "scene": report.scene.scene.name,
         "folder": str(report.folder),
         "seconds": {time.stage: round(time.import_seconds + time.seconds, 3) for time in report.times},
+        "run_seconds": round(report.seconds, 3),
         "notes": list(report.notes),
     }
     if explained:

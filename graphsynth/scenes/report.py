@@ -71,6 +71,7 @@ def scene_json(report: Report) -> str:
         "seed": scene.scene.seed,
         "versions": dict(report.versions),
         "platform": f"{platform.system()} {platform.machine()}",
+        "seconds": round(report.seconds, 6),
         "stages": [
             {
                 "stage": t.stage,

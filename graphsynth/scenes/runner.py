@@ -44,6 +44,8 @@ class Report:
         That ran, in order.
     notes : tuple of str
         What a reader must know: a budget that was used up, candidates taken over from an interrupted run.
+    seconds : float
+        Wall clock of the run; the stages of candidates that several processes share take longer together.
     """
 
     scene: Scene
@@ -53,6 +55,7 @@ class Report:
     folder: Path | None = None
     stages: tuple[Stage, ...] = ()
     notes: tuple[str, ...] = ()
+    seconds: float = 0.0
 
     def __getitem__(self, product: str) -> Any:
         """Return one output.
@@ -157,4 +160,5 @@ def execute(
         MappingProxyType(loaded_versions()),
         stages=done.stages,
         notes=tuple(done.notes),
+        seconds=done.seconds,
     )

@@ -43,6 +43,8 @@ class Running:
         In the order of running.
     times : list of StageTime
     notes : list of str
+    seconds : float
+        Wall clock of all together.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class Running:
         self._aside: dict[str, Future[tuple[Any, StageTime]]] = {}  # by stage
         self.times: list[StageTime] = []
         self.notes: list[str] = []
+        self.seconds = 0.0
 
     def run(self) -> dict[str, Any]:
         """Run all stages and return the wanted products.
@@ -90,6 +93,7 @@ class Running:
             needed = {need for later in self.stages[done + 1 :] for need in later.needs} | set(self._wanted)
             self._products = {name: value for name, value in self._products.items() if name in needed}
         self._gather_aside()
+        self.seconds = time.perf_counter() - self._started
         self._tell("done", len(self.stages))
         return {name: self._products[name] for name in self._wanted}
 

@@ -36,7 +36,10 @@ def _times_table(report: Report) -> Table:
     rows = [(t.stage, str(t.runs), f"{t.import_seconds:.3f}", f"{t.seconds:.3f}", _mb(t.peak_mb)) for t in report.times]
     imports, seconds = math.fsum(t.import_seconds for t in report.times), math.fsum(t.seconds for t in report.times)
     rows.append(("total", "", f"{imports:.3f}", f"{seconds:.3f}", ""))
-    note = "Wall clock and resident memory, one measurement; of stages for each candidate, the sum over candidates."
+    note = (
+        "Wall clock and resident memory, one measurement; of stages for each candidate, the sum over candidates, in "
+        f"whichever process. The run took {report.seconds:.1f} s."
+    )
     return Table("Time per stage", ("stage", "runs", "import [s]", "run [s]", "peak [MB]"), tuple(rows), note)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -12,12 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graphsynth.scenes.headline import facts, sentences
+from graphsynth.scenes.measure import StageTime
 from graphsynth.scenes.page import report_html
 from graphsynth.scenes.products import Finding, Objective, Quantity, Record, Table
 from graphsynth.scenes.report import print_summary
-from graphsynth.scenes.runner import Report, execute
+from graphsynth.scenes.runner import Report, execute, run
 from graphsynth.scenes.scene import Scene
 from graphsynth.scenes.steps.rank import ranking_of
+from graphsynth.scenes.summary import summary_tables
 
 
 def record(number: int, mass: float, stroke: float, good: bool | None = True, **more: Any) -> Record:
@@ -177,3 +182,22 @@ def test_the_margins_of_the_only_one_that_is_known_are_shown(lambda_tables: dict
     assert "mass (estimated)" in alone and not any("candidate" in text or text == "assessed" for text in alone)
     stopped = {fact.text for fact in facts(report_of(lambda_tables, (record(1, 1.5, 2.0), rejected(2, "slow")), False))}
     assert "mass (estimated)" not in stopped and "candidate mechanisms" in stopped
+
+
+def test_the_time_of_a_run_is_that_of_the_clock(lambda_tables: dict[str, Any]) -> None:
+    """Stages of candidates that two processes shared took longer together than the run."""
+    report = replace(
+        report_of(lambda_tables, (record(1, 1.0, 1.0),)), times=(StageTime("move", 0.0, 545.0),), seconds=282.0
+    )
+    assert [fact.value for fact in facts(report) if fact.text == "run time"] == ["282.0 s"]
+    assert "The run took 282.0 s." in summary_tables(report)[-1].note
+
+
+def test_a_run_measures_its_time(springs: Path, tmp_path: Path) -> None:
+    springs.write_text(springs.read_text("utf-8").replace("count = 20\n", "count = 20\npause_s = 0.02\n"), "utf-8")
+    start = time.perf_counter()
+    with ThreadPoolExecutor(4) as executor:
+        report = run(springs, out=tmp_path, executor=executor)
+    slept = sum(stage.seconds for stage in report.times if stage.stage == "bend")
+    assert slept > 0.25 and report.seconds <= time.perf_counter() - start
+    assert json.loads((tmp_path / "scene.json").read_text("utf-8"))["seconds"] == round(report.seconds, 6)

@@ -26,24 +26,32 @@ def slowly(springs: Path) -> Path:
     return springs
 
 
-def interrupt(springs: Path, out: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    """Run the command line until three candidates are stored, then press Ctrl-C."""
+def interrupt(springs: Path, out: Path, *options: str, number: int = signal.SIGINT) -> subprocess.CompletedProcess[str]:
+    """Run the command line until three candidates are stored, then press Ctrl-C, or tell it to end."""
     command = [sys.executable, "-m", "graphsynth", "run", str(springs), "--out", str(out), *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     journal, start = out / "candidates.jsonl", time.monotonic()
     while not (journal.exists() and journal.read_bytes().count(b"\n") > 3):
         assert process.poll() is None and time.monotonic() - start < 30
         time.sleep(0.01)
-    os.kill(process.pid, signal.SIGINT)
+    os.kill(process.pid, number)
     out_text, error = process.communicate(timeout=30)
     return subprocess.CompletedProcess(command, process.returncode, out_text, error)
 
 
-@pytest.mark.parametrize("options", [("--workers", "1"), ("--workers", "2"), ()])
-def test_ctrl_c_and_again(springs: Path, tmp_path: Path, options: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("options", "number"),
+    [
+        (("--workers", "1"), signal.SIGINT),
+        (("--workers", "2"), signal.SIGINT),
+        ((), signal.SIGINT),
+        (("--workers", "2"), signal.SIGTERM),
+    ],
+)
+def test_ctrl_c_and_again(springs: Path, tmp_path: Path, options: tuple[str, ...], number: int) -> None:
     slowly(springs)
-    done = interrupt(springs, tmp_path / "out", *options)
-    assert done.returncode == 130, done.stderr
+    done = interrupt(springs, tmp_path / "out", *options, number=number)
+    assert done.returncode == 128 + number, done.stderr
     assert "the same command goes on from there" in done.stderr and "Traceback" not in done.stderr
     stored = (tmp_path / "out" / "candidates.jsonl").read_bytes()
     assert stored.endswith(b"\n") and 4 <= stored.count(b"\n") < 21
