@@ -1,10 +1,15 @@
-"""Draw the three pictures of the README anew: ``python docs/pictures/make.py [FOLDER]``."""
+"""Draw the pictures of the README and of the pages anew: ``python docs/pictures/make.py [FOLDER]``.
+
+Those of the pages are taken from the reports of shipped scenes, three minutes in all; tribometer-error-time.svg is
+measured on a quiet machine, by ``graphsynth accuracy tribometer``.
+"""
 
 from __future__ import annotations
 
 import re
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -15,9 +20,37 @@ from graphsynth.drawing.frames import with_trace_points
 from graphsynth.drawing.graphs import graph_sketch
 from graphsynth.drawing.svg import bare, painted, picture
 from graphsynth.jamming.coupled import JointLimits, Misalignment
+from graphsynth.scenes.products import Picture
+from graphsynth.scenes.runner import run
 
 CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
 CELL, GAP, COLUMNS = 150, 10, 8
+#: Pictures of the pages: scene, file, title in the report.
+FROM_SCENES = {
+    "antenna": {
+        "antenna-scan": "A scan",
+        "antenna-in-space": "The mechanism in space, cranks at 35° and 25°",
+        "antenna-two-models": "Figure 4: two models over equal crank angles",
+        "antenna-difference-map": "Map of the difference of the two models",
+        "antenna-tolerances": "Map of the certified deviations",
+    },
+    "braider": {
+        "braider-mechanism": "The mechanism",
+        "braider-start-up": "Start-up: crank speed",
+        "braider-reactions": "Sensors: polar plot of the reactions",
+    },
+    "didenko_drive": {
+        "drive-torque": "Motor torque",
+        "drive-speed": "Crank speed",
+        "drive-dead-centres": "Without inertia: speed of the platform",
+        "drive-claim": "The claim about the resistance as a map",
+    },
+    "tribometer": {
+        "tribometer-motion": "In motion",
+        "tribometer-figure-7b": "Figure 7b: both platforms over time",
+        "tribometer-limit-cycle": "Limit cycle",
+    },
+}
 
 
 def chains_picture(chains: list[gs.MechanismGraph]) -> str:
@@ -38,6 +71,20 @@ def chains_picture(chains: list[gs.MechanismGraph]) -> str:
     return picture(parts, width, height, "The sixteen chains of eight links with mobility 1") + "\n"
 
 
+def scene_pictures(scene: str, wanted: dict[str, str]) -> dict[str, str]:
+    """Run a scene; return the chosen pictures of its report by file name."""
+    with TemporaryDirectory() as place:
+        products = run(scene, out=Path(place)).products.values()
+    found = {
+        item.title: item.svg
+        for product in products
+        if isinstance(product, tuple)
+        for item in product
+        if isinstance(item, Picture)
+    }
+    return {f"{name}.svg": found[title] + "\n" for name, title in wanted.items()}
+
+
 def make(folder: Path) -> list[Path]:
     """Write the pictures; return their paths."""
     chains = list(gs.enumerate_chains(8))
@@ -51,6 +98,8 @@ def make(folder: Path) -> list[Path]:
         "readme-chains.svg": chains_picture(chains),
         "readme-motion.svg": animated_svg(motion, frames=60, title="One of them, with dimensions, turning"),
     }
+    for scene, wanted in FROM_SCENES.items():
+        pictures |= scene_pictures(scene, wanted)
     written = [folder / "readme-verdict.png"]
     clearance_picture(report).savefig(written[0], dpi=110, metadata={"Software": None})
     for name, text in pictures.items():

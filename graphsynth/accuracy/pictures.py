@@ -7,6 +7,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.accuracy.rows import FLOOR, Problem, Row, RowStatus
+from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ __all__ = ["work_precision_picture"]
 #: Okabe and Ito's colours, told apart by colour-blind readers, and markers.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9", "#b8860b", "#1b2733", "#7f7f7f", "#e66fb0")
 _MARKERS = "osD^vPXp*"
-_SOFT = "#8794a1"
+_SOFT = LIGHT["soft"]
 
 
 def work_precision_picture(problem: Problem) -> Figure:
@@ -203,7 +204,7 @@ def _dress(axes: Any, problem: Problem, top: float) -> None:
     axes.margins(0.12, 0.1)
     _decades(axes, "x", 2.3)
     _decades(axes, "y", 3.0)
-    axes.grid(which="major", color="#e8ebef", lw=0.8)
+    axes.grid(which="major", color=LIGHT["pale"], lw=0.8)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.drawing.figures import legend_place, new_figure
+from graphsynth.drawing.palette import LIGHT, WHITE
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def resistance_picture(
     for label, effect in effects.items():
         chart.plot(np.full(effect.damping.size, effect.frequency_ratio), effect.damping, "o-", ms=3, lw=0.8, color="k")
         chart.annotate(label, (effect.frequency_ratio, effect.damping.max()), xytext=(3, 3), fontsize=7,
-                       color="white", textcoords="offset points")  # fmt: skip
+                       color=WHITE, textcoords="offset points")  # fmt: skip
     _ripples(ripples, effects, "speed")
     return figure
 
@@ -203,9 +204,9 @@ def _gain_map(figure: Figure, axes: Any) -> None:
     drawn = axes.contourf(nu, zeta, gain, levels=np.linspace(-1.0, 1.6, 14), cmap="viridis", extend="both")
     bar = figure.colorbar(drawn, ax=axes)
     bar.set_label("log10 of the speed gain")
-    axes.axvline(1.0 / math.sqrt(2.0), color="white", lw=2.0)
+    axes.axvline(1.0 / math.sqrt(2.0), color=WHITE, lw=2.0)
     for x, text in ((0.26, "ripple rises with r"), (1.4, "ripple falls with r")):
-        axes.text(x, 0.024, text, color="white", fontsize=8, ha="center")
+        axes.text(x, 0.024, text, color=WHITE, fontsize=8, ha="center")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(nu[0], nu[-1])
@@ -253,7 +254,7 @@ def start_up_picture(
     """
     figure = new_figure(size)
     speed, current, links = figure.subplots(3, 1, sharex=True)
-    speed.axhspan(target * (1 - band), target * (1 + band), color="#DDE6EE")
+    speed.axhspan(target * (1 - band), target * (1 + band), color=LIGHT["pale"])
     speed.plot(run.time, run.speed, color=_COLOURS[0], lw=1.5)
     outside = np.nonzero(~(np.abs(run.speed / target - 1.0) <= band))[0]
     if outside.size and outside[-1] + 1 < run.time.size:

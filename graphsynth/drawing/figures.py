@@ -73,6 +73,8 @@ def themed_svg(figure: Figure, settings: Mapping[str, Any] | None = None) -> str
     body = re.sub(r"<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>", "", body, flags=re.DOTALL)
     body = re.sub(r' style="([^"]*)"', lambda found: _attributes(found[1]), body)
     body = body.replace("#000000", LIGHT["ink"]).replace("#b0b0b0", LIGHT["soft"])
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
+    body = re.sub(r' id="([^"]+)"', lambda found: found[0] if found[1] in used else "", body)
     body = re.sub(r'( id="| xlink:href="#|url\(#)', rf"\g<1>{mark}-", body)
     head, inside = body.removesuffix("</svg>").split(">", 1)
     return (

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.drawing.figures import new_figure
+from graphsynth.drawing.palette import LIGHT, WHITE
 from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ __all__ = ["harmonics_picture", "loci_picture", "map_picture", "workspace_pictur
 
 #: One colour for each leg, readable in grey and by colour-blind readers (Okabe and Ito 2008).
 _LEGS = ("#0072B2", "#D55E00", "#009E73")
-_SINGULAR = "#AA0044"
+_SINGULAR = LIGHT["bad"]
 _TINTS = ("#F6DCC8", "#D3E4F2")  # det JX < 0, > 0
 _STYLES = {"outer": "-", "inner": (0, (5, 2)), "lower limit": (0, (1, 1)), "upper limit": (0, (3, 1, 1, 1))}
 #: name of a map -> title, colour map, unit
@@ -69,7 +70,7 @@ def _path(work: Workspace) -> Any:
     return Path(corners, codes) if corners else None
 
 
-def _fill(axes: Any, work: Workspace, colour: str = "#DDE6EE") -> None:
+def _fill(axes: Any, work: Workspace, colour: str = LIGHT["pale"]) -> None:
     from matplotlib.patches import PathPatch
 
     path = _path(work)
@@ -256,7 +257,7 @@ def map_picture(
         bar.set_label(_axis(title, unit if measured == "length" else "–"))
         determinant = found.quality.determinant.T
         if bool((determinant > 0.0).any()) and bool((determinant < 0.0).any()):
-            axes.contour(found.x, found.y, determinant, levels=[0.0], colors="white", linewidths=1.2)
+            axes.contour(found.x, found.y, determinant, levels=[0.0], colors=WHITE, linewidths=1.2)
     for arc in work.arcs:
         p = arc.point(np.linspace(arc.start, arc.stop, max(8, math.ceil(60 * (arc.stop - arc.start)))))
         axes.plot(p.real, p.imag, color="#333333", lw=1.2)

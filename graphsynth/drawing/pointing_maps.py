@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.drawing.figures import new_figure
+from graphsynth.drawing.palette import LIGHT, WHITE
 from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def difference_map_picture(
     for axes, drawn, name in zip(figure.subplots(1, 2, sharey=True), values, ("means", "beams")):
         largest = max(float(np.nanmax(np.abs(drawn), initial=0.0)), 1e-9)
         low, colours = (-largest, "RdBu_r") if name == "means" else (0.0, "magma_r")
-        axes.set_facecolor("#dddddd")
+        axes.set_facecolor(LIGHT["pale"])
         image = axes.pcolormesh(degrees, degrees, drawn.T, cmap=colours, vmin=low, vmax=largest, rasterized=True)
         figure.colorbar(image, ax=axes, label="arc-minutes")
         axes.set_title("difference of the means" if name == "means" else "angle between the two beams", fontsize=10)
@@ -159,9 +160,9 @@ def _singular_points(axes: Any, mechanism: PointingMechanism, grid: Array, s_y: 
             dead += [(p.phi_x, p.phi_y) for p in points if (p.s_y, p.s_x) == wanted]
         for pairs, marker, size, kind in ((folded, "s", 2.2, "folds"), (dead, ".", 2.0, "dead points")):
             if pairs:
-                shade = colour if kind == "folds" else ("#ffffff" if leg == "Y" else "#ff66cc")
+                shade = colour if kind == "folds" else (WHITE if leg == "Y" else "#ff66cc")
                 x, y = np.degrees(np.array(pairs)).T
-                edge = {"mec": "#555555", "mew": 0.3} if shade == "#ffffff" else {}
+                edge = {"mec": "#555555", "mew": 0.3} if shade == WHITE else {}
                 axes.plot(x, y, marker, ms=size + 1.5 * bool(edge), color=shade, label=f"{kind} of leg {leg}", **edge)
 
 
@@ -203,7 +204,7 @@ def tolerance_map_picture(
     figure = new_figure(size)
     degrees = np.degrees(grid)
     for axes, values, name in zip(figure.subplots(1, 2, sharey=True), worst, ("elevation", "azimuth")):
-        axes.set_facecolor("#dddddd")
+        axes.set_facecolor(LIGHT["pale"])
         axes.patch.set_hatch("////")
         image = axes.pcolormesh(degrees, degrees, values.T, cmap="magma_r", shading="nearest", rasterized=True)
         figure.colorbar(image, ax=axes, label="largest certified deviation [arc-seconds]")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.drawing.figures import legend_place, new_figure
+from graphsynth.drawing.palette import LIGHT
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ __all__ = [
 Array = NDArray[np.float64]
 #: Readable in grey and by colour-blind readers (Okabe and Ito 2008).
 _LOWER, _UPPER, _THIRD, _FOURTH = "#0072B2", "#D55E00", "#009E73", "#AA4499"
-_STICK, _FAIL, _SOFT = "#E3E7EC", "#AA0044", "#8794A1"
+_STICK, _FAIL, _SOFT = LIGHT["pale"], LIGHT["bad"], LIGHT["soft"]
 _COLOURS = (_LOWER, _UPPER, _THIRD, _FOURTH, "#56B4E9", "#E69F00", "#555555")
 #: Points of a path drawn at most.
 _MOST_NODES = 20_000
@@ -102,7 +103,7 @@ def platforms_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (9
     for side in (-bound, bound):
         below.axhline(side, color=_SOFT, ls=":", lw=1)
     below.annotate("largest static friction", (motion.t[-1], bound), xytext=(0, 3), textcoords="offset points",
-                   ha="right", va="bottom", fontsize=8, color="#55626F")  # fmt: skip
+                   ha="right", va="bottom", fontsize=8, color=LIGHT["note"])  # fmt: skip
     below.set(xlabel="time [s]", ylabel="friction force [N]", xlim=(motion.t[0], motion.t[-1]))
     below.set_ylim(-1.3 * bound, 1.3 * bound)
     if not motion.complete:
@@ -232,7 +233,7 @@ def error_picture(
     name = "regularisation speed [m/s]" if speeds else "regularisation speed [m/s], step [s] or tolerance"
     axes.set(xlabel="run time [s]" if over == "time" else name, ylabel="largest error of the position [m]")
     axes.margins(0.08, 0.12)
-    axes.grid(which="major", color="#E8EBEF", lw=0.8)
+    axes.grid(which="major", color=LIGHT["pale"], lw=0.8)
     axes.legend(frameon=False, fontsize=8)
     return figure
 

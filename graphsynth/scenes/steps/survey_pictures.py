@@ -6,6 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.drawing.palette import WHITE
 from graphsynth.scenes.products import Picture, Ranking, Record
 from graphsynth.scenes.stages import Context
 from graphsynth.scenes.steps.survey import evaluate_sets
@@ -132,7 +133,7 @@ def _best_angle(lattice: Lattice, survey: Survey) -> Picture:
 
 def _contour(ax: Axes, lattice: Lattice, grid: Any, levels: list[float]) -> None:
     low, high, bottom, top = _extent(lattice)
-    lines = ax.contour(grid, levels=levels, colors="#ffffff", linewidths=0.7, extent=(low, high, bottom, top))
+    lines = ax.contour(grid, levels=levels, colors=WHITE, linewidths=0.7, extent=(low, high, bottom, top))
     ax.clabel(lines, fontsize=8, fmt="%g°")
 
 

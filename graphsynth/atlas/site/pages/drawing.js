@@ -93,7 +93,7 @@
     const arrows = small ? [] : graph.joints.flatMap(([a, b], k) =>
       (a === frame && drivers.includes(b)) || (b === frame && drivers.includes(a)) ? [arrow(at[k])] : []);
     const pattern = frame !== null && outlines[frame].length > 2
-      ? `<defs><pattern id="${hatch}" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M0 0V6" stroke="var(--soft)" stroke-width="1.6"/></pattern></defs>` : "";
+      ? `<defs><pattern id="${hatch}" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><path d="M0 0V6" fill="none" stroke="var(--soft)" stroke-width="1.6"/></pattern></defs>` : "";
     return wrap(width, height, title, options.file, pattern + [...plates, ...bars, ...joints, ...arrows, ...letters].join(""));
   };
 
