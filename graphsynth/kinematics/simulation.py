@@ -13,13 +13,14 @@ from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
-from graphsynth.kinematics.engine.events import dead_centres, ending, touches
+from graphsynth.kinematics.engine.events import ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.inputs import coordinates, fine_grid, full_turn, monotonic
 from graphsynth.kinematics.engine.pivots import pivot_passes, refined
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
-from graphsynth.kinematics.engine.start import initial, sign_table
+from graphsynth.kinematics.engine.reversals import dead_centres
+from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, with_turns
 from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["BatchMotion", "Motion", "simulate", "simulate_batch"]
@@ -89,16 +90,19 @@ def simulate(
     signs = sign_table(program, modes or {})
     tracker = Tracker(program, signs)
     if guess is not None:
+        first = tracker.values(u[:1])[:, 0, 0]
+        counted, centres = with_turns(program, guess[None], first), lines_of_centres(program, guess[None])[0]
+        tracker = Tracker(counted, signs, centres, guess[:, 2])
         _signs_from(tracker, float(u[0]), guess, modes or {})
-    grid, where = fine_grid(mechanism, u)
+    grid = fine_grid(mechanism, u)
     seed, code, step = initial(tracker, float(u[0]), modes or {}, guess)
     if code == codes.DONE:
-        trace, where = refined(tracker, tracker.follow(grid, seed), where)
+        trace = refined(tracker, tracker.follow(grid, seed))
     else:
         trace = tracker.blank(grid)
         trace.stop = Stop(code, step, float(u[0]), 0.0)
-    found = _events(tracker, trace, events)
-    return _motion(tracker, trace, where, found, begin)
+    trace, found = _events(tracker, trace, events)
+    return _motion(tracker, trace, u, found, begin)
 
 
 def _poses(start: ArrayLike, mechanism: Mechanism) -> Array:
@@ -130,21 +134,23 @@ def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, i
         tracker.modes[k] = 1.0 if errors[0] <= errors[1] else -1.0
 
 
-def _events(tracker: Tracker, trace: Trace, wanted: bool) -> list[MotionEvent]:
-    """Events in order; shortens the trace where a branch ends between samples."""
+def _events(tracker: Tracker, trace: Trace, wanted: bool) -> tuple[Trace, list[MotionEvent]]:
+    """Events in order, and the trace up to the end of the branch."""
     found: list[MotionEvent] = []
+    sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
     if trace.stop is not None:
         found.append(ending(tracker, trace))
-    sense = 1.0 if trace.u[-1] >= trace.u[0] else -1.0
     for touch in _touched(tracker, trace, sense):
         if touch.ends_motion:
             found = [event for event in found if not event.ends_motion] + [touch]
             trace.done = int(np.sum(sense * trace.u < sense * touch.input))
         elif not any(event.kind == "fold" and event.input == touch.input for event in found):
             found.append(touch)
-    if wanted:
+    if wanted and trace.done:
+        for end in [event.input for event in found if event.ends_motion]:
+            trace = tracker.approach(trace, end)
         found += dead_centres(tracker, trace)
-    return sorted(found, key=lambda event: sense * event.input)
+    return trace, sorted(found, key=lambda event: sense * event.input)
 
 
 def _touched(tracker: Tracker, trace: Trace, sense: float) -> list[MotionEvent]:
@@ -158,15 +164,16 @@ def _touched(tracker: Tracker, trace: Trace, sense: float) -> list[MotionEvent]:
     return [e for e in found if not e.ends_motion and sense * e.input < sense * first.input] + [first]
 
 
-def _motion(tracker: Tracker, trace: Trace, where: NDArray[np.intp], events: list[MotionEvent], begin: float) -> Motion:
+def _motion(tracker: Tracker, trace: Trace, u: Array, events: list[MotionEvent], begin: float) -> Motion:
     program = tracker.program
+    where = np.searchsorted(trace.u, u) if u[-1] >= u[0] else np.searchsorted(-trace.u, -u)
     poses, velocities, accelerations, margins, modes = _arrays(tracker, trace)
     reached = where < trace.done
     last = next((event for event in reversed(events) if event.ends_motion), None)
     completed = bool(reached.all()) and last is None
     closure = _closure(tracker, trace, completed, events)
     return Motion(
-        mechanism=program.mechanism, inputs=trace.u[where], poses=poses[where], velocities=velocities[where],
+        mechanism=program.mechanism, inputs=u, poses=poses[where], velocities=velocities[where],
         accelerations=accelerations[where], modes=modes[where], margins=margins[where], assembled=reached,
         steps=program.steps, events=tuple(events), completed=completed, reason="" if last is None else last.statement,
         stopped_at=math.nan if last is None else last.input, closure=closure, Lc=program.Lc,
@@ -180,6 +187,8 @@ def _arrays(tracker: Tracker, trace: Trace) -> tuple[Array, Array, Array, Array,
     angle = np.arctan2(trace.X[:, :, 3], trace.X[:, :, 2])
     kept = np.where(program.need_angle, trace.TH, angle)
     kept[:n] = np.where(program.need_angle, kept[:n], np.unwrap(kept[:n], axis=0) if n else kept[:n])
+    if n and tracker.turned is not None:
+        kept[:n] += math.tau * np.round((tracker.turned - kept[0]) / math.tau)
     poses = np.concatenate([trace.X[:, :, :2], kept[:, :, None]], axis=2)
     groups = [k for k, step in enumerate(program.steps) if step.group >= 0]
     margins = trace.M[:, groups]

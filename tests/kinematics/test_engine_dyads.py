@@ -172,7 +172,7 @@ def test_sliding_directions_that_become_parallel_stop_the_motion() -> None:
         [Driver(0, 1, Linear(1.0, 0.5))],
     )
     motion = simulate(mechanism, np.linspace(0.0, 3.0, 31))
-    assert not motion.completed and motion.events[-1].kind == "singular"
+    assert not motion.completed and motion.events[-1].kind == "escape"
     assert motion.stopped_at == pytest.approx(math.pi - 0.5, abs=1e-12)
     assert "parallel" in motion.reason
     assert np.isnan(motion.poses[motion.inputs > motion.stopped_at]).all()

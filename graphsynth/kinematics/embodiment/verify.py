@@ -63,7 +63,7 @@ def verify(mechanism: Mechanism, goals: Goals) -> tuple[Motion, Figures, tuple[s
         reasons.append("the range is not completed")
     elif goals.full_turn and not (motion.closure.tested and motion.closure.closed):
         reasons.append("not closed after the turn")
-    if any(event.kind in ("change point", "near fold", "fold", "singular") for event in motion.events):
+    if any(event.kind in ("change point", "near fold", "fold", "escape", "singular") for event in motion.events):
         reasons.append("two assembly modes meet or nearly meet")
     if motion.completed and (motion.modes != motion.modes[0]).any():
         reasons.append("an assembly mode changes")

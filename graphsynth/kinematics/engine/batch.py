@@ -14,7 +14,7 @@ from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, workspace
 from graphsynth.kinematics.engine.inputs import monotonic
 from graphsynth.kinematics.engine.program import Program, compile_program
-from graphsynth.kinematics.engine.start import initial, sign_table
+from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, with_turns
 from graphsynth.mechanism.checks import link_number
 from graphsynth.mechanism.joints import COLUMNS, Gear
 from graphsynth.mechanism.model import Mechanism
@@ -175,7 +175,11 @@ def simulate_batch(
     program = compile_program(mechanism, sizes)
     signs = sign_table(program, modes or {})
     poses, found = _starts(program, signs, float(u[0]), modes or {}, start)
-    return _run(program, signs, u, poses, found, rates, _kept(mechanism, keep))
+    centres = np.zeros((len(sizes), max(1, len(program.gears))))
+    if start is not None or mechanism.pose is not None:
+        program = with_turns(program, poses, Tracker(program, signs).values(u[:1])[:, 0, 0])
+        centres = lines_of_centres(program, poses)
+    return _run(program, signs, u, poses, centres, found, rates, _kept(mechanism, keep))
 
 
 def _kept(mechanism: Mechanism, keep: Sequence[int] | None) -> list[int]:
@@ -228,8 +232,9 @@ def _starts(
 
 
 def _run(
-    program: Program, signs: Array, u: Array, poses: Array, found: NDArray[np.bool_], rates: bool, kept: list[int]
-) -> BatchMotion:
+    program: Program, signs: Array, u: Array, poses: Array, centres: Array, found: NDArray[np.bool_], rates: bool,
+    kept: list[int],
+) -> BatchMotion:  # fmt: skip
     sets, n = len(poses), len(u)
     poses[:, program.mechanism.frame] = 0.0
     needed = rates or any(step.iterative for step in program.steps)
@@ -237,7 +242,7 @@ def _run(
     width = n if rates else 0
     links = kept or [program.mechanism.frame]  # the kernel delivers margins with links only
     out = Delivery(
-        poses, np.array(links, dtype=np.int64), groups, np.empty((sets, len(links), 4, n)),
+        poses, centres, np.array(links, dtype=np.int64), groups, np.empty((sets, len(links), 4, n)),
         np.empty((sets, len(links), 3, width)), np.empty((sets, len(links), 3, width)),
         np.empty((sets, len(groups), n)),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Events along a branch: where it ends and why, change points that samples step over, dead centres."""
+"""Events along a branch: where it ends and why, change points that samples step over."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.escapes import between, blow_up, centres_meet, closed_limit, escape, escape_at
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Step
 from graphsynth.kinematics.engine.result import MotionEvent
-from graphsynth.mechanism.joints import Prismatic, Revolute
 
-__all__ = ["dead_centres", "ending", "touches"]
+__all__ = ["ending", "flattest", "touches"]
 
 Array = NDArray[np.float64]
 
 #: A margin that dips below this between samples is examined.
 _NEAR = 0.2
+#: ... and always below this; otherwise only if its parabola falls to half of it.
+_FLAT = 1e-3
 #: A smallest margin below this is reported: half the digits of the pose are lost there.
 _CLOSE = 1e-8
 #: A smallest margin below this is a change point: the modes meet to rounding.
 _TOUCH = 1e-13
 #: Margin of a dyad whose two outer points, or whose pin and pivot, coincide exactly.
 _COINCIDE = -5e-324
-#: A speed whose least value is below this part of the largest is examined for a dwell.
-_SLOW = 1e-2
 
 
 def ending(tracker: Tracker, trace: Trace) -> MotionEvent:
@@ -92,7 +92,7 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     assert trace.stop is not None
     source, at, good = trace, trace.done - 1, float(trace.u[trace.done - 1])
     unreachable, step_index, other = bad, trace.stop.step, None
-    while (middle := _middle(trace, good, bad)) is not None:
+    while (middle := between(trace, good, bad)) is not None:
         pair, stop = tracker.reach(source, at, middle)
         if stop is None:
             good = middle
@@ -107,7 +107,7 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     if other is not None and abs(unreachable - good) > 1e-9:
         return _singular(tracker, other)  # a larger group ends before the closed form does
     if other is not None:  # groups that hang on the limit cannot be followed to its last bits
-        good, bad = _closed_limit(tracker, source, at, step_index, unreachable)
+        good, bad = closed_limit(tracker, source, at, step_index, unreachable)
     step = tracker.program.steps[step_index]
     if step.has_two_modes and tracker.near(source, at, bad)[0].M[1, step_index] == _COINCIDE:
         text = (
@@ -122,56 +122,38 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
         )
         return MotionEvent("fold", good, step.group, step.links, 2, abs(bad - good), True, text)
     why = "its sliding directions become parallel" if step.code == codes.P_LINE else "two of its points coincide"
+    if step.code == codes.P_LINE:
+        gone = escape_at(tracker.program, step, tracker.reach(source, at, good)[0], good, abs(bad - good), why)
+        if gone is not None:
+            return gone
     text = f"group {step.group} ({step.kind}, links {_list(step.links)}) has no place at the input {good:.12g}: {why}"
     return MotionEvent("singular", good, step.group, step.links, 0, abs(bad - good), True, text)
 
 
-def _middle(trace: Trace, good: float, bad: float) -> float | None:
-    """Input between two others; None where no double lies between, or none that matters (beside the input 0)."""
-    middle = 0.5 * (good + bad)
-    last = abs(bad - good) <= 1e-18 * abs(float(trace.u[-1] - trace.u[0]))
-    return None if last or middle in (good, bad) else middle
-
-
-def _closed_limit(tracker: Tracker, source: Trace, at: int, step: int, bad: float) -> tuple[float, float]:
-    """Bisect for the limit of one closed form alone."""
-    good = float(source.u[at])
-    while (middle := _middle(source, good, bad)) is not None:
-        _, code, where = tracker.near(source, at, middle)
-        if code == codes.UNREACHABLE and where == step:
-            bad = middle
-        else:
-            good = middle
-    return good, bad
-
-
 def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:
-    """Judge where a Newton group stopped: a fold if the square of the determinant goes to zero linearly."""
+    """Judge where a Newton group stopped: a fold if the square of a determinant goes to zero linearly.
+
+    The group that folds may be one before: speeds grow without bound there, and what hangs on it is lost first.
+    """
+    known = escape(tracker, stop) or centres_meet(tracker.program, stop)
+    if known is not None:
+        return known
+    way = stop.way
+    for k, step in enumerate(tracker.program.steps[: stop.step + 1] if way is not None else ()):
+        assert way is not None
+        found = blow_up(way.u, 1.0 / np.abs(way.margins[:, k]), 3.0, (0.5,)) if step.iterative else None
+        if found is not None:
+            at, uncertainty, power = found
+            text = (
+                f"group {step.group} ({step.kind}, links {_list(step.links)}) is singular at the input {at:.12g}: two "
+                "assembly modes merge and the branch ends "
+                f"(the determinant goes to zero like the power {power:.2f} of the distance)"
+            )
+            return MotionEvent("fold", at, step.group, step.links, 2, uncertainty, True, text)
     step = tracker.program.steps[stop.step]
     where = f"group {step.group} ({step.kind}, links {_list(step.links)})"
-    points = stop.history
-    if len(points) >= 4:
-        (u0, d0), (u1, d1) = points[-3], points[-1]
-        if d0 * d0 > d1 * d1 > 0.0:
-            at = u1 + d1 * d1 * (u1 - u0) / (d0 * d0 - d1 * d1)
-            power = _power(points, at)
-            if abs(power - 0.5) < 0.1:
-                text = (
-                    f"{where} is singular at the input {at:.12g}: two assembly modes merge and the branch ends "
-                    f"(the determinant goes to zero like the power {power:.2f} of the distance)"
-                )
-                return MotionEvent("fold", at, step.group, step.links, 2, abs(at - u1), True, text)
     text = f"{where} becomes singular near the input {stop.at:.12g}: modes meet and the branch after it is ambiguous"
     return MotionEvent("singular", stop.at, step.group, step.links, 0, stop.uncertainty, True, text)
-
-
-def _power(points: tuple[tuple[float, float], ...], at: float) -> float:
-    """Exponent of the determinant in the distance from ``at``, from the farther points."""
-    (u0, d0), (u1, d1) = points[0], points[2]
-    if at in (u0, u1) or d0 == 0.0 or d1 == 0.0:
-        return math.nan
-    ratio = math.log(abs((at - u0) / (at - u1)))
-    return math.log(abs(d0 / d1)) / ratio if ratio else math.nan
 
 
 def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
@@ -180,14 +162,24 @@ def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
     for s, step in enumerate(tracker.program.steps):
         if not step.has_two_modes:
             continue
-        M = trace.M[: trace.done, s]
+        M, u = trace.M[: trace.done, s], trace.u[: trace.done]
         middle = M[1:-1]
-        low = np.flatnonzero((middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])) + 1
+        low = (middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])
+        low = np.flatnonzero(low & (_vertex(u, M) < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
         events = (_touch(tracker, trace, int(k), s) for k in low)
         found += [event for event in events if event is not None]
         ends = {0, len(M) - 1} if trace.stop is None else {0}  # the stop has an event of its own
         found += [_at_end(trace, k, step) for k in sorted(ends) if len(M) and M[k] <= _TOUCH]
     return found
+
+
+def _vertex(u: Array, y: Array) -> Array:
+    """Least value of the parabola through every sample and its two neighbours (the middle one is the least of them)."""
+    left, right = u[1:-1] - u[:-2], u[2:] - u[1:-1]
+    a, b = (y[:-2] - y[1:-1]) / left, (y[2:] - y[1:-1]) / right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope, bend = (b * left - a * right) / (left + right), (a + b) / (left + right)
+        return np.asarray(np.nan_to_num(y[1:-1] - 0.25 * slope**2 / bend, nan=-math.inf, posinf=-math.inf))
 
 
 def _at_end(trace: Trace, k: int, step: Step) -> MotionEvent:
@@ -218,7 +210,7 @@ def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None
         return MotionEvent("fold", at, step.group, step.links, 2, uncertainty, True, text)
     if not least <= _CLOSE:
         return None
-    at = _flat(margin, at, 0.25 * (high - low))
+    at = flattest(margin, at, 0.25 * (high - low))
     if least > _TOUCH:
         text = f"{name} comes close to a fold at the input {at:.12g}: its two modes nearly meet (margin {least:.2g})"
         return MotionEvent("near fold", at, step.group, step.links, 2, 1e-9, False, text)
@@ -229,7 +221,7 @@ def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None
     return MotionEvent("change point", at, step.group, step.links, 2, 1e-12, True, text)
 
 
-def _flat(value: Callable[[float], float], at: float, width: float) -> float:
+def flattest(value: Callable[[float], float], at: float, width: float) -> float:
     """Where the derivative vanishes: far better than a search for the smallest value, which is flat."""
     h = min(width, 1e-3)
 
@@ -246,113 +238,3 @@ def _flat(value: Callable[[float], float], at: float, width: float) -> float:
         if abs(x1 - x0) < 1e-15:
             break
     return x1 if math.isfinite(x1) and abs(x1 - at) < h else at
-
-
-def dead_centres(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
-    """Where the coordinate of an undriven joint on the frame reverses, and where it stands still without reversing."""
-    mechanism = tracker.program.mechanism
-    driven = {driver.pair for driver in mechanism.drivers}
-    found: list[MotionEvent] = []
-    for joint in mechanism.joints:
-        if mechanism.frame not in joint.pair or joint.pair in driven:
-            continue
-        link = joint.b if joint.a == mechanism.frame else joint.a
-        group = next((step.group for step in tracker.program.steps if link in step.links), -1)
-        if isinstance(joint, Revolute):
-            rate = _angular(link)
-        elif isinstance(joint, Prismatic):
-            at, angle = (joint.at_b, joint.angle_a) if link == joint.b else (joint.at_a, joint.angle_b)
-            rate = _along(link, at, angle)
-        else:
-            continue
-        values = np.array([rate(trace, k) for k in range(trace.done)])
-        events = [_reversal(tracker, trace, *ends, rate, group, link) for ends in _sign_changes(values)]
-        events += [_dwell(tracker, trace, k, rate, group, link) for k in _near_stops(values)]
-        found += [event for event in events if event is not None]
-    return found
-
-
-Rate = Callable[[Trace, int], float]
-
-
-def _angular(link: int) -> Rate:
-    return lambda trace, k: float(trace.V[k, link, 2])
-
-
-def _along(link: int, at: tuple[float, float], angle: float) -> Rate:
-    direction = np.exp(1j * angle)
-
-    def rate(trace: Trace, k: int) -> float:
-        x, v = trace.X[k, link], trace.V[k, link]
-        arm = complex(x[2], x[3]) * complex(*at)
-        return float((np.conj(direction) * (complex(v[0], v[1]) + 1j * v[2] * arm)).real)
-
-    return rate
-
-
-def _sign_changes(values: Array) -> list[tuple[int, int]]:
-    """Find samples next to each other, zeros left out, whose signs differ."""
-    kept = np.flatnonzero(values != 0.0)
-    turns = np.flatnonzero(values[kept[1:]] * values[kept[:-1]] < 0.0)
-    return [(int(kept[k]), int(kept[k + 1])) for k in turns]
-
-
-def _near_stops(values: Array) -> list[int]:
-    """Inner samples of least speed, small against the largest, with neighbours of their own sign."""
-    if values.size < 3 or not np.isfinite(values).all():
-        return []
-    size = np.abs(values)
-    low = (size[1:-1] <= size[:-2]) & (size[1:-1] < size[2:]) & (size[1:-1] < _SLOW * size.max())
-    return [int(k) + 1 for k in np.flatnonzero(low & (values[:-2] * values[2:] > 0.0))]
-
-
-def _rate_from(tracker: Tracker, trace: Trace, k: int, rate: Rate) -> Callable[[float], float]:
-    def at(u: float) -> float:
-        pair, stop = tracker.reach(trace, k, u)
-        return rate(pair, 1) if stop is None else math.nan
-
-    return at
-
-
-def _reversal(
-    tracker: Tracker, trace: Trace, k: int, after: int, rate: Rate, group: int, link: int
-) -> MotionEvent | None:
-    from scipy.optimize import brentq
-
-    low, high = float(trace.u[k]), float(trace.u[after])
-    at = _rate_from(tracker, trace, k, rate)
-    ends = at(low), at(high)
-    if not ends[0] * ends[1] < 0.0:
-        return None
-    try:
-        where = float(brentq(at, low, high, xtol=1e-14 * min(1.0, abs(high - low)), rtol=1e-15))
-    except ValueError:  # NaN inside: the branch cannot be followed there, and that has an event of its own
-        return None
-    if not math.isfinite(at(where)) or abs(at(where)) > max(abs(ends[0]), abs(ends[1])):
-        return None  # a pole, not a zero
-    order = _order(at, where, (high - low) / 8.0)
-    text = f"link {link} reverses on the frame at the input {where:.12g}"
-    uncertainty = (1e-13 if order == 2 else 1e-15 ** (1.0 / (order - 1))) * max(1.0, abs(where))
-    return MotionEvent("dead centre", where, group, (link,), order, uncertainty, False, text)
-
-
-def _order(at: Callable[[float], float], where: float, h: float) -> int:
-    """First derivative of the coordinate that does not vanish at a reversal: even; 2 unless the rate is flat there."""
-    near, far = abs(at(where + h)), abs(at(where + 2.0 * h))
-    if not (near > 0.0 and 0.0 < far < math.inf):
-        return 2
-    return 2 + 2 * max(0, round((math.log2(far / near) - 1.0) / 2.0))
-
-
-def _dwell(tracker: Tracker, trace: Trace, k: int, rate: Rate, group: int, link: int) -> MotionEvent | None:
-    from scipy.optimize import minimize_scalar
-
-    at = _rate_from(tracker, trace, k - 1, rate)
-    low, high = sorted((float(trace.u[k - 1]), float(trace.u[k + 1])))
-    best = minimize_scalar(lambda u: abs(at(u)), bounds=(low, high), method="bounded", options={"xatol": 1e-10})
-    where = _flat(at, float(best.x), 0.25 * (high - low))
-    ends = abs(rate(trace, k - 1)), abs(rate(trace, k + 1))
-    if not abs(at(where)) <= 1e-9 * max(ends):
-        return None
-    text = f"link {link} stands still on the frame at the input {where:.12g} and goes on in the same sense"
-    return MotionEvent("dwell", where, group, (link,), 3, 1e-9, False, text)

@@ -23,6 +23,23 @@ Array = NDArray[np.float64]
 #: Smallest step, relative to the length of the whole range.
 _SMALLEST = 1e-13
 _TRIALS = 4000
+#: Samples of the trace before a stop that are kept with those on the way to it.
+_BEFORE = 64
+#: Samples added before the end of a branch.
+_CLOSER = 24
+
+
+@dataclass(frozen=True)
+class Way:
+    """Samples on the way to a stop: inputs (n,), margins (n, steps), distances of the links from the origin (n, links).
+
+    ``last`` are the trace and its sample that came closest.
+    """
+
+    u: Array
+    margins: Array
+    distances: Array
+    last: tuple[Trace, int]
 
 
 @dataclass(frozen=True)
@@ -33,7 +50,7 @@ class Stop:
     step: int
     at: float
     uncertainty: float
-    history: tuple[tuple[float, float], ...] = ()
+    way: Way | None = None
 
 
 @dataclass
@@ -67,11 +84,19 @@ class Trace:
 
 
 class Tracker:
-    """Runs a program; everything about one mechanism on one choice of assembly modes."""
+    """Runs a program; everything about one mechanism on one choice of assembly modes.
 
-    def __init__(self, program: Program, modes: Array) -> None:
+    ``centres`` (gears,) are the directions of the lines of centres, turns included, near which a start is looked for;
+    ``turned`` (links,) the angles of a start pose, whose turns a motion goes on to count.
+    """
+
+    def __init__(
+        self, program: Program, modes: Array, centres: Array | None = None, turned: Array | None = None
+    ) -> None:
+        self.turned = turned
         self.program = program
         self.modes = modes
+        self.centres = np.zeros(max(1, len(program.gears))) if centres is None else centres
 
     def values(self, u: Array) -> Array:
         """Driver coordinates, first and second derivatives, cosine and sine, shape (drivers, 5, n)."""
@@ -118,8 +143,7 @@ class Tracker:
         trace.X[0, :, :2] = poses[:, :2]
         trace.X[0, :, 2], trace.X[0, :, 3] = np.cos(poses[:, 2]), np.sin(poses[:, 2])
         trace.TH[0] = poses[:, 2]
-        if phi is not None:
-            trace.PHI[0] = phi
+        trace.PHI[0] = self.centres if phi is None else phi
 
     def near(self, trace: Trace, k: int, u: float) -> tuple[Trace, int, int]:
         """Evaluate at ``u`` from sample ``k`` of a trace in one step; returns a two-sample trace, code and step."""
@@ -141,19 +165,45 @@ class Tracker:
             return pair, Stop(code, step, u, 0.0)
         return pair, self._bridge(pair, 1, code)
 
+    def approach(self, trace: Trace, end: float) -> Trace:
+        """Insert samples between the last one reached and the end of the branch, each four times as close to it.
+
+        What happens there would not be seen otherwise, and near a fold much does: speeds grow without bound.
+        """
+        k = trace.done - 1
+        gap = end - float(trace.u[k])
+        source, at, pairs = trace, k, []
+        lost = 0.0 if trace.stop is None else abs(end - trace.stop.at)
+        while abs(gap := 0.25 * gap) > max(lost, 8.0 * np.spacing(abs(end))) and len(pairs) < _CLOSER:
+            pair, stop = self.reach(source, at, end - gap)
+            if stop is not None:
+                break
+            pairs.append(pair)
+            source, at = pair, 1
+        if not pairs:
+            return trace
+
+        def joined(whole: Array, *parts: Array) -> Array:
+            new = [part[..., 1:] for part in parts]
+            return np.concatenate([whole[..., : k + 1], *new, whole[..., k + 1 :]], axis=-1)
+
+        memory = tuple(joined(*parts) for parts in zip(trace.memory, *(pair.memory for pair in pairs)))
+        u, q = joined(trace.u, *(pair.u for pair in pairs)), joined(trace.q, *(pair.q for pair in pairs))
+        return Trace(u, q, memory, trace.done + len(pairs), trace.stop)
+
     def _bridge(self, trace: Trace, k: int, code: int) -> Stop | None:
         """Reach sample k from sample k - 1 by smaller steps; the reason if that is not possible."""
         total = abs(float(trace.u[-1] - trace.u[0])) or 1.0
         here, goal = float(trace.u[k - 1]), float(trace.u[k])
         source, at = trace, k - 1
         step, failed = 0.5 * (goal - here), (code, -1)
-        history: list[tuple[int, float, Array]] = []
+        way = [(trace, near) for near in range(max(0, at - _BEFORE), k)]
         for _ in range(_TRIALS):
             target = goal if abs(step) >= abs(goal - here) else here + step
             pair, why, where = self.near(source, at, target)
             if why == codes.DONE:
-                history.append((where, target, pair.M[1].copy()))
                 source, at, here = pair, 1, target
+                way.append((pair, 1))
                 if target == goal:
                     for final, reached in zip(trace.row(k), pair.row(1)):
                         final[...] = reached
@@ -165,8 +215,8 @@ class Tracker:
             if abs(step) < _SMALLEST * total or here + step == here:
                 break
         why, where = failed
-        margins = tuple((target, float(M[where])) for _, target, M in history[-6:])
-        return Stop(why, where, here, abs(2.0 * step), margins)
+        u, M, X = (np.array(part) for part in zip(*((one.u[j], one.M[j], one.X[j]) for one, j in way)))
+        return Stop(why, where, here, abs(2.0 * step), Way(u, M, np.hypot(X[:, :, 0], X[:, :, 1]), (source, at)))
 
 
 def workspace(program: Program, n: int, derivs: bool = True) -> tuple[Array, ...]:
@@ -187,9 +237,13 @@ def workspace(program: Program, n: int, derivs: bool = True) -> tuple[Array, ...
 
 @dataclass(frozen=True)
 class Delivery:
-    """What a run keeps of every dimension set: start poses (sets, links, 3), links, steps, where the arrays go."""
+    """What a run keeps of every dimension set: links, steps, where the arrays go.
+
+    It starts from poses (sets, links, 3) and directions of lines of centres (sets, gears).
+    """
 
     poses: Array
+    centres: Array
     links: NDArray[np.int64]
     steps: NDArray[np.int64]
     frames: Array
@@ -200,8 +254,9 @@ class Delivery:
 
 _NOWHERE = np.empty((0, 0, 0, 0))
 _NOTHING = Delivery(
-    np.empty((0, 0, 0)), np.empty(0, np.int64), np.empty(0, np.int64), _NOWHERE, _NOWHERE, _NOWHERE, np.empty((0, 0, 0))
-)
+    np.empty((0, 0, 0)), np.empty((0, 0)), np.empty(0, np.int64), np.empty(0, np.int64), _NOWHERE, _NOWHERE, _NOWHERE,
+    np.empty((0, 0, 0)),
+)  # fmt: skip
 
 
 def run_program(
@@ -219,7 +274,7 @@ def run_program(
     kernels.run(
         program.step_table, program.touched, program.rows, program.row_table, program.core, program.eliminated,
         program.eliminated_table, program.drives, program.drive_table, program.need_angle, wanted, q, u, modes,
-        out.poses, *memory, out.links, out.steps, out.frames, out.velocities, out.accelerations, out.margins, done, why,
-        first, program.Lc, derivs,
+        out.poses, out.centres, *memory, out.links, out.steps, out.frames, out.velocities, out.accelerations,
+        out.margins, done, why, first, program.Lc, program.far, derivs,
     )  # fmt: skip
     return done, why

@@ -62,8 +62,8 @@ def coordinates(driver: Driver, u: Array) -> tuple[Array, Array, Array]:
     return parts[0], parts[1], parts[2]
 
 
-def fine_grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return inputs with extra samples where a turning driver would step too far, and where the given ones are.
+def fine_grid(mechanism: Mechanism, u: Array) -> Array:
+    """Return inputs with extra samples where a turning driver would step too far.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def fine_grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
         If the range needs more samples than memory has room for, or the user's own law jumps.
     """
     if u.size < 2:
-        return u, np.zeros(u.size, dtype=np.intp)
+        return u
     parts = np.ones(u.size - 1)
     steps = np.abs(np.diff(u))
     for driver in mechanism.drivers:
@@ -86,12 +86,11 @@ def fine_grid(mechanism: Mechanism, u: Array) -> tuple[Array, NDArray[np.intp]]:
             f"of {_MOST / mechanism.graph.links:.3g} for {mechanism.graph.links} links; give a shorter range"
         )
     counts = parts.astype(np.intp)
-    where = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
-    part = np.arange(where[-1]) - np.repeat(where[:-1], counts)
+    part = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     grid = np.append(np.repeat(u[:-1], counts) + part * np.repeat(np.diff(u) / counts, counts), u[-1])
     for driver in mechanism.drivers:
         _check_jumps(driver, grid)
-    return grid, where
+    return grid
 
 
 def _travel(q: tuple[Array, Array, Array], steps: Array) -> Array:

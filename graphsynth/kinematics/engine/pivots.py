@@ -31,11 +31,8 @@ def _sudden(trace: Trace, links: slice | int) -> NDArray[np.intp]:
     return np.flatnonzero((c[1:] * c[:-1] + s[1:] * s[:-1] < _SUDDEN).any(axis=1))
 
 
-def refined(tracker: Tracker, trace: Trace, where: NDArray[np.intp]) -> tuple[Trace, NDArray[np.intp]]:
-    """Follow again with more samples where a link turns by more than 60 degrees between neighbours.
-
-    Returns the trace and where the given inputs are on its grid.
-    """
+def refined(tracker: Tracker, trace: Trace) -> Trace:
+    """Follow again with more samples where a link turns by more than 60 degrees between neighbours."""
     for _ in range(_ROUNDS):
         found = _sudden(trace, slice(None)) if trace.done > 1 else np.empty(0, dtype=np.intp)
         middle = 0.5 * (trace.u[found] + trace.u[found + 1])
@@ -44,10 +41,9 @@ def refined(tracker: Tracker, trace: Trace, where: NDArray[np.intp]) -> tuple[Tr
             break
         after = found[new] + 1
         grid = np.insert(trace.u, after, middle[new])
-        where = where + np.searchsorted(after, where, side="right")
         pose = np.column_stack([trace.X[0, :, :2], trace.angles(tracker.program, 0)])
         trace = tracker.follow(grid, pose, trace.PHI[0])
-    return trace, where
+    return trace
 
 
 def pivot_passes(tracker: Tracker, trace: Trace) -> list[MotionEvent]:

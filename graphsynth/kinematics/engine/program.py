@@ -81,7 +81,10 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Flat tables that the kernels run, and what they mean; parameter tables have the dimension sets as first axis."""
+    """Flat tables that the kernels run, and what they mean; parameter tables have the dimension sets as first axis.
+
+    ``Lc`` is the characteristic length; an origin farther out than ``far`` belongs to a link that has gone away.
+    """
 
     mechanism: Mechanism
     decomposition: Decomposition
@@ -98,6 +101,7 @@ class Program:
     need_angle: NDArray[np.bool_]
     gears: IntArray
     Lc: float
+    far: float
 
 
 def compile_program(mechanism: Mechanism, dimensions: Array | None = None) -> Program:
@@ -161,6 +165,7 @@ class _Compiler:
         for joint in self.mechanism.joints:
             if isinstance(joint, Gear):
                 need[[joint.a, joint.b]] = True
+        Lc, drawn = characteristic_length(self.mechanism), np.abs(self.mechanism.dimensions[:, _LENGTHS])
         return Program(
             mechanism=self.mechanism, decomposition=self.found, steps=tuple(self.steps),
             step_table=_ints(self.table, 10), touched=np.array(self.touched or [0], dtype=np.int64),
@@ -169,7 +174,7 @@ class _Compiler:
             core=np.array(self.core or [0], dtype=np.int64), eliminated=_ints(self.eliminated, 4),
             eliminated_table=self._floats(self.eliminated_parameters, codes.ELIM_WIDTH), drives=_ints(self.drives, 4),
             drive_table=self._floats(self.drive_parameters, codes.DRIVE_WIDTH), need_angle=need,
-            gears=np.array(self.gears, dtype=np.int64), Lc=characteristic_length(self.mechanism),
+            gears=np.array(self.gears, dtype=np.int64), Lc=Lc, far=links * Lc + 4.0 * float(drawn.max(initial=0.0)),
         )  # fmt: skip
 
     def _place_driven(self, placed: set[int]) -> None:

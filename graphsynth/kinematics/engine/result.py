@@ -27,10 +27,11 @@ class MotionEvent(NamedTuple):
     """Something that happens at one input.
 
     ``kind`` is "fold" (two assembly modes of a group merge and end), "change point" (two modes meet and both go on),
-    "near fold" (two modes nearly meet; the motion goes on), "singular" (a group is not held), "not assembled",
-    "dead centre" (the coordinate of a joint on the frame reverses), "dwell" (it stands still and goes on in the same
-    sense), or "input" (the driver has no value).  ``order`` is the number of modes that meet (0: not known), or of a
-    dead centre or dwell the first derivative that does not vanish.
+    "near fold" (two modes nearly meet; the motion goes on), "escape" (a link moves off to infinity), "singular" (a
+    group is not held, or the centres of a gear pair coincide), "not assembled", "dead centre" (the coordinate of a
+    joint on the frame reverses), "dwell" (it stands still and goes on in the same sense), or "input" (the driver has no
+    value).  ``order`` is the number of modes that meet (0: not known), or of a dead centre or dwell the first
+    derivative that does not vanish.
     ``group`` is the index of the Assur group, -1 for none; ``links`` those concerned; ``uncertainty`` the estimated
     error of ``input``; ``ends_motion`` tells whether the branch ends there.
     """

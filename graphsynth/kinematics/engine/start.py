@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,7 @@ from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program
 from graphsynth.kinematics.engine.triads import conditions, triad_modes
 
-__all__ = ["group_modes", "initial", "sign_table"]
+__all__ = ["group_modes", "initial", "lines_of_centres", "sign_table", "with_turns"]
 
 Array = NDArray[np.float64]
 
@@ -45,6 +47,37 @@ def sign_table(program: Program, modes: Mapping[int, int]) -> Array:
         if step.has_two_modes:
             signs[by_group[group]] = mode
     return signs
+
+
+def lines_of_centres(program: Program, poses: Array) -> Array:
+    """Directions of the lines of centres of all gear pairs at poses (sets, links, 3), shape (sets, gears) or (sets, 1).
+
+    A pose tells them modulo a turn; the turn is that with which the angles of the two wheels fit best.
+    """
+    if not len(program.gears):
+        return np.zeros((len(poses), 1))
+    _, a, b, _, _ = program.rows[program.gears].T
+    p, theta = program.row_table[:, program.gears], poses[..., 2]
+    place, turn = poses[..., 0] + 1j * poses[..., 1], np.exp(1j * theta)
+    on_a = place[:, a] + turn[:, a] * (p[..., codes.PAX] + 1j * p[..., codes.PAY])
+    on_b = place[:, b] + turn[:, b] * (p[..., codes.PBX] + 1j * p[..., codes.PBY])
+    phi, ra, rb = np.angle(on_b - on_a), p[..., codes.RA], p[..., codes.SIGN] * p[..., codes.RB]
+    open_by = ra * (theta[:, a] - phi) + rb * (theta[:, b] - phi - p[..., codes.H])
+    return np.asarray(phi + math.tau * np.round(open_by / (math.tau * (ra + rb))))
+
+
+def with_turns(program: Program, poses: Array, q: Array) -> Program:
+    """Count the angles of driven links from those of the poses (sets, links, 3), which may differ by whole turns.
+
+    ``q`` (drivers,) are the coordinates of the drivers there.  Only gears need turns.
+    """
+    if not len(program.gears) or not np.isfinite(q).all():
+        return program
+    table = program.drive_table.copy()
+    for k, (code, base, link, driver) in enumerate(program.drives):
+        angle = table[:, k, 7] + (table[:, k, 6] * q[driver] if code == codes.DRIVE_R else 0.0)
+        table[:, k, 7] += math.tau * np.round((poses[:, link, 2] - poses[:, base, 2] - angle) / math.tau)
+    return replace(program, drive_table=table)
 
 
 def initial(tracker: Tracker, u0: float, modes: Mapping[int, int], guess: Array | None) -> tuple[Array, int, int]:
@@ -129,7 +162,7 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
     random = np.random.default_rng(20190 + k)
     reached = trace.X[0, sorted({link for s in p.steps[:k] for link in s.links} | {p.mechanism.frame}), :2]
     centre, size = reached.mean(axis=0), 2.0 * max(p.Lc, float(np.ptp(reached, axis=0).max()))
-    J, f, g, out = np.empty((count, count)), np.empty(count), np.empty(6), np.zeros(3)
+    J, f, g, out = np.empty((count, count)), np.empty(count), np.empty(6), np.zeros(4)
     G = np.empty((count, 6))
     pivots = np.empty(count, dtype=np.int64)
     state = np.zeros((p.mechanism.graph.links, 11))

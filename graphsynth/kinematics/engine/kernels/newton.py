@@ -3,9 +3,12 @@
 import math
 
 from graphsynth.compilation import kernel
-from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, INVERSE, PAX, PAY, PBX, PBY, SIGN, SLOT, H
+from graphsynth.kinematics.engine.codes import CAM, DRIVE_ANGLE, GEAR, INVERSE, PAX, PAY, PBX, PBY, SIGN, SLOT, H
 from graphsynth.kinematics.engine.kernels.linear import back, factor, solve3
 from graphsynth.kinematics.engine.kernels.rows import gamma, row, world
+
+#: Corrections above this part of the size of the mechanism are never rounding: too few digits would be left.
+ROUNDED = 1e-4
 
 
 @kernel
@@ -41,10 +44,40 @@ def assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, moving):
 
 
 @kernel
+def noise(rows, rp, r0, nr, x, q, J, f, G, pivots, size):
+    """Length of the correction that rounding of the rows alone can cause; J holds the factors, G the gradients.
+
+    A row is a sum of terms as large as coordinates and arms, each with a few units of rounding.
+    """
+    total = 0.0
+    for column in range(nr):
+        for r in range(nr):
+            f[r] = 0.0
+        k = r0 + column
+        kind, a, b = rows[k, 0], rows[k, 1], rows[k, 2]
+        reach = abs(rp[k, PAX]) + abs(rp[k, PAY]) + abs(rp[k, PBX]) + abs(rp[k, PBY])
+        reach += abs(x[a, 0]) + abs(x[a, 1]) + abs(x[b, 0]) + abs(x[b, 1])
+        turns = abs(x[a, 4]) + abs(x[b, 4]) if kind == GEAR else 1.0
+        slide = abs(q[int(rp[k, SLOT]), 0]) if kind >= DRIVE_ANGLE and kind < CAM else 0.0
+        steep = abs(G[column, 0]) + abs(G[column, 1]) + abs(G[column, 3]) + abs(G[column, 4])
+        f[column] = 4e-16 * (steep * reach + (abs(G[column, 2]) + abs(G[column, 5])) * (1.0 + turns) + slide)
+        back(J, nr, pivots, f)
+        part = 0.0
+        for c in range(nr):
+            part += (f[c] * size) ** 2 if c % 3 == 2 else f[c] * f[c]
+        total += math.sqrt(part)
+    return total / size
+
+
+@kernel
 def newton(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots, Lc, out):
-    """Newton from x; out = (first correction, last correction, rate); returns 0 if it converged."""
+    """Newton from x; out = (first correction, last correction, rate, its rounding); returns 0 if it converged.
+
+    Corrections that no longer become smaller are rounding if rounding of the rows explains them, whatever their size;
+    only then is that computed.
+    """
     last = 0.0
-    out[2] = 0.0
+    out[2], out[3] = 0.0, 0.0
     for it in range(30):
         assemble(rows, rp, r0, nr, x, phi, q, J, f, g, G, False)
         det = factor(J, nr, pivots)
@@ -73,6 +106,10 @@ def newton(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots, Lc, ou
         out[1] = size
         if size <= 2e-16 * nr or (it > 0 and size <= 1e-8 and size <= 1e-3 * last) or (it > 2 and size <= 1e-13):
             return 0
+        if it > 2 and size >= 0.5 * last and size <= ROUNDED:
+            out[3] = noise(rows, rp, r0, nr, x, q, J, f, G, pivots, Lc)
+            if size <= out[3] <= ROUNDED:
+                return 0
         if it > 12 and size >= 0.5 * last:
             return 3
         last = size
@@ -160,14 +197,14 @@ def platform_rows(P, x, own, Q):
 
 
 @kernel
-def platform(P, x, own, Q, Lc, out, m, s):
+def platform(P, x, own, Q, Lc, reach, out, m, s):
     """Newton and rates of a link held by three distances (class III triad); returns the code of `newton`."""
     last = 0.0
-    out[2] = 0.0
+    out[2], out[3] = 0.0, 0.0
     for it in range(30):
         platform_rows(P, x, own, Q)
         det, fx, fy, ft = solve3(Q, Q[0, 3], Q[1, 3], Q[2, 3])
-        size = math.sqrt(fx * fx + fy * fy + Lc * Lc * ft * ft) / Lc
+        size = math.sqrt(fx * fx + fy * fy + reach * reach * ft * ft) / reach
         if not math.isfinite(size):
             return 4 if det == 0.0 else 3
         x[own, 0] -= fx

@@ -13,6 +13,7 @@ from graphsynth.kinematics.engine.codes import (
     NEWTON,
     NO_CONVERGENCE,
     P_LINE,
+    PLATFORM,
     R_DIST,
     R_GEAR,
     SINGULAR,
@@ -20,8 +21,18 @@ from graphsynth.kinematics.engine.codes import (
     STEP_TOO_LONG,
     UNREACHABLE,
 )  # fmt: skip
+from graphsynth.kinematics.engine.kernels.linear import factor
 from graphsynth.kinematics.engine.kernels.loops import bar_loop, drive_loop, first_bad, rrr_loop
-from graphsynth.kinematics.engine.kernels.newton import anchors, newton, platform, predict, rates
+from graphsynth.kinematics.engine.kernels.newton import (
+    ROUNDED,
+    anchors,
+    assemble,
+    newton,
+    noise,
+    platform,
+    predict,
+    rates,
+)
 from graphsynth.kinematics.engine.kernels.rows import follow_angle, nearest_turn, world
 from graphsynth.kinematics.engine.kernels.single import closed_form, pivot_rates, place_eliminated
 
@@ -85,21 +96,34 @@ def carry_centres(rows, rp, r0, nr, i, x, phi, PHI):
 
 @kernel
 def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h, warm, need, M, s, J, f, g, G, pivots,
-          out, P, Q, Lc, derivs):  # fmt: skip
+          out, P, Q, Lc, far, derivs):  # fmt: skip
     """Place the kept links of one group at one sample; returns why it failed, or 0."""
+    why = 0
     if code >= ITERATIVE_FROM:
-        travel = predict(core, c0, nc, x, h, Lc) if warm else 0.0
+        reach = Lc  # a link that goes far away moves far: its travel is measured by its distance
+        for k in range(c0, c0 + nc):
+            reach = max(reach, abs(x[core[k], 0]) + abs(x[core[k], 1]) - far)
+        travel = predict(core, c0, nc, x, h, reach) if warm else 0.0
         if not travel <= 0.5:
             return STEP_TOO_LONG
-        if code == NEWTON:
-            why = newton(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots, Lc, out)
-        else:
+        if code == PLATFORM:
             anchors(rows, rp, r0, own, x, P)
-            why = platform(P, x, own, Q, Lc, out, M, s)
+            why = platform(P, x, own, Q, Lc, reach, out, M, s)
+        if code == NEWTON or (why == NO_CONVERGENCE and out[1] <= ROUNDED):
+            first, rate = out[0], out[2]
+            why = newton(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots, reach, out)
+            if code == PLATFORM:
+                code, out[0], out[2] = NEWTON, first, rate
         if why:
             return why
-        if warm and (out[0] > 0.1 * travel + 1e-9 or out[2] > 0.1):
-            return STEP_TOO_LONG
+        if warm:
+            second = out[0] * out[2]
+            if out[2] > 0.1 and second <= ROUNDED and out[3] == 0.0:
+                assemble(rows, rp, r0, nr, x, phi, ql, J, f, g, G, False)
+                factor(J, nr, pivots)
+                out[3] = noise(rows, rp, r0, nr, x, ql, J, f, G, pivots, reach)
+            if out[0] > 0.1 * travel + 1e-9 + out[3] or (out[2] > 0.1 and second > out[3]):
+                return STEP_TOO_LONG
         if code == NEWTON:
             M[s] = rates(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots) / Lc**nc
         if M[s] == 0.0:
@@ -127,13 +151,13 @@ def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h
 
 
 @kernel
-def seat(poses, X, TH, PHI):
-    """Put the poses (x, y, theta) of all links into the first sample."""
+def seat(poses, centres, X, TH, PHI):
+    """Put the poses (x, y, theta) of all links, and directions of lines of centres, into the first sample."""
     for k in range(poses.shape[0]):
         X[k, 0, 0], X[k, 1, 0], TH[k, 0] = poses[k, 0], poses[k, 1], poses[k, 2]
         X[k, 2, 0], X[k, 3, 0] = math.cos(poses[k, 2]), math.sin(poses[k, 2])
     for k in range(PHI.shape[0]):
-        PHI[k, 0] = 0.0
+        PHI[k, 0] = centres[k]
 
 
 @kernel
@@ -149,22 +173,23 @@ def deliver(source, rows, done, target):
 
 
 @kernel
-def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, modes, poses, X, TH, V, W, PHI, M, kept,
-        groups, OX, OV, OW, OM, done, why, first, Lc, derivs):  # fmt: skip
+def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, modes, poses, centres, X, TH, V, W, PHI,
+        M, kept, groups, OX, OV, OW, OM, done, why, first, Lc, far, derivs):  # fmt: skip
     """Run a program for every dimension set over the samples first..n-1.
 
     RP, EP, DP have the dimension set as first axis.  The state is that of one set: X (links, 4, n), TH (links, n), V
     and W (links, 3, n), PHI (gears, n), M (steps, n); it stays in the cache of the core and what is asked for (``kept``
     links, ``groups`` of steps) is copied to OX (sets, kept, 4, n), OV, OW (sets, kept, 3, n) and OM (sets, groups, n).
     q (drivers, 5, n) holds the driver coordinate, its two derivatives, cosine and sine.  Sample ``first`` starts from
-    ``first - 1`` if there is one; else cold, from ``poses`` (sets, links, 3), or without them from sample 0 as it is.
+    ``first - 1`` if there is one; else cold, from ``poses`` (sets, links, 3) and
+    ``centres`` (sets, gears), or without them from sample 0 as it is.
     ``done`` gets the samples reached, ``why`` the code and the step at which it stopped.  Eliminated links are placed
     if ``wanted``.
     """
     n, links, size = u.shape[0], X.shape[0], 3
     for s in range(steps.shape[0]):
         size = max(size, steps[s, 2])
-    J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(3)
+    J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(4)
     G, pivots = np.empty((size, 6)), np.empty(size, np.int64)
     P, Q = np.empty((3, 10)), np.empty((3, 6))
     x, T = np.zeros((links, 11)), np.empty((12, n))
@@ -181,7 +206,7 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
     for b in range(done.shape[0]):
         rp, ep, dp = RP[b], EP[b], DP[b]
         if poses.shape[0] > 0:
-            seat(poses[b], X, TH, PHI)
+            seat(poses[b], centres[b], X, TH, PHI)
         stop, code, at = n, 0, -1
         for s in range(steps.shape[0]):
             kind, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
@@ -216,7 +241,7 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
                     ql[k, 0], ql[k, 1], ql[k, 2] = q[k, 0, i], q[k, 1, i], q[k, 2, i]
                 h, before = (u[i] - u[i - 1], M[s, i - 1]) if i > 0 else (0.0, 0.0)
                 reason = place(kind, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, modes[s], before, h, i > 0, need,
-                               m, s, J, f, g, G, pivots, out, P, Q, Lc, derivs)  # fmt: skip
+                               m, s, J, f, g, G, pivots, out, P, Q, Lc, far, derivs)  # fmt: skip
                 M[s, i] = m[s]
                 if reason:
                     stop, code, at = i, reason, s

@@ -1,0 +1,166 @@
+"""Links that move off to infinity: the branch ends there although no modes meet.
+
+Guides that become parallel, or wheels on them, push a link away without bound while the input approaches a finite
+value ``u``.  Its distance grows like ``|u - input| ** -p``, so three samples tell p and where the branch ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
+from graphsynth.kinematics.engine.program import Program, Step
+from graphsynth.kinematics.engine.result import MotionEvent
+
+__all__ = ["between", "blow_up", "centres_meet", "closed_limit", "escape", "escape_at"]
+
+Array = NDArray[np.float64]
+
+#: A distance is followed over this factor at least before it is called unbounded.
+_GROWTH = 1e3
+#: The measured power may differ from the true one by this part.
+_MISFIT = 0.2
+#: Centres of a gear pair closer than this, over the characteristic length, meet.
+_NEAR = 1e-6
+
+
+def escape(tracker: Tracker, stop: Stop) -> MotionEvent | None:
+    """Return the event if a link went off to infinity on the way to a stop: of the first group that has one."""
+    way = stop.way
+    if way is None:
+        return None
+    for k, step in enumerate(tracker.program.steps[: stop.step + 1]):
+        own = way.distances[:, list(step.links)].max(axis=1)
+        far = step.group >= 0 and own[-1] > max(tracker.program.far, _GROWTH * own.min())
+        found = blow_up(way.u, own, 10.0, (1.0, 0.5, 2.0)) if far else None
+        if found is not None:
+            at, uncertainty, power = found
+            if step.code == codes.P_LINE:
+                at, uncertainty = _parallel(tracker, stop, k, at, uncertainty)
+            gone = [link for link in step.links if way.distances[-1, link] > 1e-3 * own[-1]]
+            return _event(
+                step, gone, at, uncertainty, f"the distance grows like the power {-power:.2f} of the input left"
+            )
+    return None
+
+
+def _parallel(tracker: Tracker, stop: Stop, step: int, at: float, uncertainty: float) -> tuple[float, float]:
+    """Input at which the guides of a dyad become parallel, close to ``at``, and its uncertainty."""
+    assert stop.way is not None
+    source, k = stop.way.last
+    beyond = at + 0.5 * (at - stop.at)
+    _, code, where = tracker.near(source, k, beyond)
+    if code != codes.UNREACHABLE or where != step:  # another group is lost before
+        return at, uncertainty
+    good, bad = closed_limit(tracker, source, k, step, beyond)
+    return good, abs(bad - good)
+
+
+def closed_limit(tracker: Tracker, source: Trace, at: int, step: int, bad: float) -> tuple[float, float]:
+    """Bisect for the limit of one closed form alone."""
+    good = float(source.u[at])
+    while (middle := between(source, good, bad)) is not None:
+        _, code, where = tracker.near(source, at, middle)
+        if code == codes.UNREACHABLE and where == step:
+            bad = middle
+        else:
+            good = middle
+    return good, bad
+
+
+def between(trace: Trace, good: float, bad: float) -> float | None:
+    """Input between two others; None where no double lies between, or none that matters (beside the input 0)."""
+    middle = 0.5 * (good + bad)
+    last = abs(bad - good) <= 1e-18 * abs(float(trace.u[-1] - trace.u[0]))
+    return None if last or middle in (good, bad) else middle
+
+
+def escape_at(program: Program, step: Step, pair: Trace, at: float, uncertainty: float, why: str) -> MotionEvent | None:
+    """Return the event if the links of a step are far away in the last sample before a limit that is located."""
+    distances = np.hypot(pair.X[1, :, 0], pair.X[1, :, 1])
+    gone = [link for link in step.links if distances[link] > program.far + _GROWTH * program.Lc]
+    return _event(step, gone, at, uncertainty, why) if gone else None
+
+
+def _event(step: Step, gone: list[int], at: float, uncertainty: float, why: str) -> MotionEvent:
+    links = ", ".join(map(str, gone))
+    text = (
+        f"link{'s' * (len(gone) > 1)} {links} of group {step.group} ({step.kind}) move{'s' * (len(gone) == 1)} off to "
+        f"infinity at the input {at:.12g}: {why}"
+    )
+    return MotionEvent("escape", at, step.group, tuple(gone), 0, uncertainty, True, text)
+
+
+def centres_meet(program: Program, stop: Stop) -> MotionEvent | None:
+    """Return the event if a gear pair lost its line of centres at a stop: the distance of the centres goes to zero."""
+    if stop.way is None:
+        return None
+    step, (row0, count) = program.steps[stop.step], program.step_table[stop.step, 1:3]
+    trace, k = stop.way.last
+    for r in range(row0, row0 + count):
+        kind, a, b, _, _ = program.rows[r]
+        if kind != codes.GEAR:
+            continue
+        p = program.row_table[0, r]
+        (A, A1), (B, B1) = (
+            _moving(trace, k, link, complex(*p[c : c + 2])) for link, c in ((a, codes.PAX), (b, codes.PBX))
+        )
+        d, d1 = B - A, B1 - A1
+        if not abs(d) < _NEAR * program.Lc or not abs(d1) > 0.0:
+            continue
+        at = stop.at - (d * d1.conjugate()).real / abs(d1) ** 2
+        text = (
+            f"the centres of the gear pair {a}-{b} of group {step.group} ({step.kind}, links "
+            f"{', '.join(map(str, step.links))}) coincide at the input {at:.12g}: their line has no direction there"
+        )
+        return MotionEvent("singular", at, step.group, step.links, 0, abs(at - stop.at), True, text)
+    return None
+
+
+def _moving(trace: Trace, k: int, link: int, local: complex) -> tuple[complex, complex]:
+    """Place and velocity of a point of a link at sample k."""
+    x, v = trace.X[k, link], trace.V[k, link]
+    arm = complex(x[2], x[3]) * local
+    return complex(x[0], x[1]) + arm, complex(v[0], v[1]) + 1j * v[2] * arm
+
+
+def blow_up(u: Array, y: Array, ratio: float, powers: tuple[float, ...]) -> tuple[float, float, float] | None:
+    """Input at which a positive y, followed on the way there, becomes infinite; its uncertainty; the power of 1/y.
+
+    None unless y grew over the square of the ratio, like one of the powers.  The last samples may be full of rounding,
+    so that earlier ones tell more: taken is what agrees best with itself.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.log(y / y[-1]) / math.log(ratio)
+    if not np.isfinite(size).all():
+        return None
+    found: list[tuple[float, float, float]] = []
+    for before in (0.0, 0.5, 1.0):
+        # the last samples at which y was smaller by powers of the ratio
+        picks = [np.flatnonzero(size <= -before - part + 0.05) for part in (0.0, 0.7, 1.4, 1.9)]
+        if any(not pick.size for pick in picks) or len({int(pick[-1]) for pick in picks}) < len(picks):
+            break
+        k = np.array([pick[-1] for pick in picks])
+        for power in powers:
+            z = np.exp(-(size[k] - size[k[0]]) * math.log(ratio) / power)
+            at = _at_zero(z, u[k])
+            left = (at - u[k[3]]) / (at - u[k[1]]) if at != u[k[1]] else 0.0
+            measured = (size[k[1]] - size[k[3]]) * math.log(ratio) / math.log(left) if left > 1.0 else 0.0
+            if abs(measured / power - 1.0) < _MISFIT:
+                apart = max(abs(at - _at_zero(z[:3], u[k[:3]])), 1e-6 * abs(at - u[k[0]]), 1e-15 * max(1.0, abs(at)))
+                found.append((apart, at, measured))
+    if not found:
+        return None
+    apart, at, measured = min(found)
+    others = [abs(at - other) for _, other, _ in found if other != at]
+    return at, float(max(apart, min(others, default=0.0))), measured
+
+
+def _at_zero(z: Array, u: Array) -> float:
+    """Value at zero of the polynomial in z through some points."""
+    terms = [np.prod(np.delete(z, k) / (np.delete(z, k) - z[k])) for k in range(len(z))]
+    return float(np.dot(terms, u))

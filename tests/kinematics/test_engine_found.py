@@ -1,0 +1,158 @@
+"""Mechanisms on which the engine once was wrong: a start replaced or refused, an escape called a fold, events lost."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from graphsynth.kinematics import simulate, simulate_batch
+from graphsynth.mechanism.constraints import residual
+from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
+from graphsynth.mechanism.laws import Linear, Polynomial
+from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.structure.graph import MechanismGraph
+
+sys.path.insert(0, str(Path(__file__).parent))
+from random_mechanisms import random_mechanism
+
+TURN = np.linspace(0.0, -6.28, 73)
+
+
+def found(name: str) -> Mechanism:
+    return Mechanism.from_json((Path(__file__).parent / "found" / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def planet() -> Mechanism:
+    """Carrier 1 with a planet 2 on a fixed wheel, and a bar 3-4 from the planet to the frame."""
+    graph = MechanismGraph(5, [(0, 1), (1, 2), (0, 2, 2), (2, 3), (3, 4), (0, 4)], frame=0)
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (3.0, 0.0)), Gear(0, 2, radius_a=1.7, radius_b=1.3),
+        Revolute(2, 3, (0.5, 0.0)), Revolute(3, 4, (6.0, 0.0), (6.0, 0.0)), Revolute(0, 4, (6.0, 1.0)),
+    ]  # fmt: skip
+    return Mechanism(graph, joints, [Driver(0, 1)])
+
+
+# --- starts
+
+
+def test_an_exact_start_after_a_gear_is_kept() -> None:
+    mechanism = found("start_ignored")
+    moved = simulate(mechanism, TURN).poses[0] - np.array(mechanism.pose)
+    assert np.abs(moved).max() < 1e-13
+
+
+@pytest.mark.parametrize("stop", [1.0, 9.0, 40.0, -30.0])
+def test_a_motion_goes_on_from_its_last_pose_after_turns_of_a_planet(stop: float) -> None:
+    """The line of centres has turned with the carrier; a pose tells it modulo a turn only."""
+    mechanism = planet()
+    whole = simulate(mechanism, np.linspace(0.0, 2.0 * stop, 41))
+    rest = simulate(mechanism, np.linspace(stop, 2.0 * stop, 21), start=whole.poses[20])
+    np.testing.assert_allclose(rest.poses, whole.poses[20:], atol=1e-12)
+    batch = simulate_batch(
+        mechanism, np.linspace(stop, 2.0 * stop, 401), mechanism.dimensions[None], start=whole.poses[20],
+        modes={1: int(whole.modes[0, 1])},
+    )  # fmt: skip
+    assert batch.completed.all()
+    np.testing.assert_allclose(batch.poses[0, ::20, :, :2], whole.poses[20:, :, :2], atol=1e-11)
+
+
+@pytest.mark.parametrize("turns", [-3, 1, 20])
+def test_the_law_may_count_other_turns_than_the_start_pose(turns: int) -> None:
+    mechanism = planet()
+    pose = simulate(mechanism, [1.0]).poses[0]
+    other = replace(mechanism, drivers=(Driver(0, 1, Linear(1.0, math.tau * turns)),))
+    np.testing.assert_allclose(simulate(other, [1.0], start=pose).poses[0], pose, atol=1e-12)
+
+
+def test_an_ill_conditioned_start_is_judged_by_its_rounding() -> None:
+    mechanism = found("start_refused")
+    motion = simulate(mechanism, np.linspace(0.0, -1e-5, 5))  # its branch folds at -1.05e-5 and at 4.03e-5
+    assert motion.completed
+    np.testing.assert_allclose(motion.poses[0], mechanism.pose, atol=1e-11)
+
+
+# --- ends
+
+
+def test_an_escape_to_infinity_is_told_and_located() -> None:
+    """A wheel on a guide: its line of centres has a given direction, and no place where that is the guide's own."""
+    mechanism = found("infinity_as_fold")
+    slide, gear, _ = mechanism.joints
+    assert isinstance(slide, Prismatic) and isinstance(gear, Gear)
+    event = simulate(mechanism, TURN).events[-1]
+    turned = slide.angle_b - slide.angle_a
+    rate = gear.radius_b / (gear.radius_a + gear.radius_b)
+    centres = turned + (mechanism.drivers[0].law(np.array([0.0]))[0][0] - gear.offset - turned) * rate
+    exact = max(((slide.angle_b + k * math.pi - centres) / -rate for k in range(-9, 10)), key=lambda u: (u < 0.0, u))
+    assert event.kind == "escape" and event.ends_motion and event.links == (0,)
+    assert abs(event.input - exact) <= event.uncertainty < 1e-10
+    assert "infinity" in event.statement
+
+
+@pytest.mark.parametrize("seed", [202, 1141, 1292, 1478])
+def test_escapes_are_located_whatever_hangs_on_the_link(seed: int) -> None:
+    """Larger groups, parallel guides, and groups that are lost before: against the poses on the way."""
+    random = np.random.default_rng(seed)
+    mechanism = random_mechanism(random)
+    way = float(random.choice([-6.28, 6.28]))
+    event = simulate(mechanism, np.linspace(0.0, way, 73)).events[-1]
+    near = event.input * (1.0 - np.geomspace(1e-2, 1e-3, 7))
+    size = np.abs(simulate(mechanism, [0.0, *near], events=False).poses[1:, event.links[0], :2]).max(axis=1)
+    exact = sum(u * math.prod(y / (y - x) for j, y in enumerate(1.0 / size) if j != k)
+                for k, (u, x) in enumerate(zip(near, 1.0 / size)))  # fmt: skip
+    assert event.kind == "escape" and abs(event.input - exact) < 1e-8
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_centres_of_gears_that_coincide_end_the_motion(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    mechanism = random_mechanism(random)
+    way = float(random.choice([-6.28, 6.28]))
+    motion = simulate(mechanism, np.linspace(0.0, way, 73))
+    assert motion.events[-1].kind == "singular" and "centres of the gear pair" in motion.reason
+    close = simulate(mechanism, [0.0, motion.stopped_at * (1.0 - 1e-9)], events=False).poses[-1]
+    apart = []
+    for joint in mechanism.joints:
+        if isinstance(joint, Gear):
+            P, Q = (complex(*close[k, :2]) + np.exp(1j * close[k, 2]) * complex(*at)
+                    for k, at in ((joint.a, joint.at_a), (joint.b, joint.at_b)))  # fmt: skip
+            apart.append(abs(Q - P))
+    assert min(apart) < 1e-6
+
+
+# --- dead centres
+
+
+def test_a_dead_centre_in_the_last_step_is_found() -> None:
+    mechanism = found("dead_centre_lost")
+    for stop in (-6.28, -2.2235):
+        events = simulate(mechanism, np.linspace(0.0, stop, 73)).events
+        late = [event for event in events if event.kind == "dead centre" and event.input < -2.2]
+        assert len(late) == 1 and abs(late[0].input + 2.2176893325975655) < 1e-9
+
+
+@pytest.mark.parametrize("apart", [1e-4, 1e-3, 1e-2])
+def test_two_dead_centres_between_samples_are_found(apart: float) -> None:
+    """A law with the rate 3 u^2 - 3 apart^2 turns the whole mechanism back for a moment."""
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)), Revolute(0, 3, (2.0, 0.0)),
+    ]  # fmt: skip
+    law = Polynomial((1.0, -3.0 * apart**2, 0.0, 1.0))
+    events = simulate(Mechanism(graph, joints, [Driver(0, 1, law)]), np.linspace(-0.5, 0.61, 6)).events
+    at = [event.input for event in events if event.kind == "dead centre"]
+    np.testing.assert_allclose(at, [-apart, apart], atol=1e-9)
+
+
+def test_a_link_that_does_not_turn_has_no_dead_centres() -> None:
+    """Its angle is constant, and the sign of its speed is that of rounding."""
+    random = np.random.default_rng(1227)
+    motion = simulate(random_mechanism(random), np.linspace(0.0, float(random.choice([-6.28, 6.28])), 73))
+    assert np.ptp(motion.poses[motion.assembled, 1, 2]) < 1e-12
+    assert not [event for event in motion.events if event.kind == "dead centre" and event.links == (1,)]
+    assert np.abs(residual(motion.mechanism.joints, motion.poses[motion.assembled])).max() < 1e-11
