@@ -16,6 +16,7 @@ from graphsynth.dynamics.tables import Compiled
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, compile_program
+from graphsynth.kinematics.engine.start import started
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
@@ -46,6 +47,7 @@ class EngineTables(NamedTuple):
     wanted: NDArray[np.bool_]
     modes: Array
     poses: Array
+    centres: Array
     kept: IntArray
     groups: IntArray
     OX: Array
@@ -54,6 +56,7 @@ class EngineTables(NamedTuple):
     OM: Array
     first: int
     Lc: float
+    far: float
     derivs: bool
 
 
@@ -154,7 +157,6 @@ class MinimalForm:
         if obstacle:
             raise GeometryError(f"there is no minimal form: {obstacle}; use form='constrained' or form='reduced'")
         self.compiled = compiled
-        self.program = free_program(compiled.model)
         self.changes: list[tuple[float, str]] = []
         self.why = ""
         self.contraction = 0.0
@@ -169,7 +171,8 @@ class MinimalForm:
                 compiled.model.mechanism, driver.base, driver.link, start.poses, start.velocities
             )
         )
-        self.tracker = Tracker(self.program, _modes(self.program, theta, start.poses))
+        self.tracker = started(free_program(compiled.model), theta, {}, np.asarray(start.poses))
+        self.program = self.tracker.program
         self.trace = self.tracker.blank(np.array([theta, theta]))
         self.E, self.S = engine_tables(self.tracker), engine_buffers(self.trace, compiled.n)
         self._seed(theta, start.poses)
@@ -322,24 +325,14 @@ class MinimalForm:
         return np.asarray(q1 * self.rates(t, y)[1] + q2 * y[1] ** 2)
 
 
-def _modes(program: Program, theta: float, poses: Array) -> Array:
-    """Assembly modes of the start pose."""
-    from graphsynth.kinematics.engine.start import sign_table
-    from graphsynth.kinematics.simulation import _signs_from
-
-    tracker = Tracker(program, sign_table(program, {}))
-    _signs_from(tracker, theta, poses, {})
-    return tracker.modes
-
-
 def engine_tables(tracker: Tracker) -> EngineTables:
     """Pack the program for the kernel."""
     p = tracker.program
     empty4, empty3, none = np.empty((0, 0, 0, 0)), np.empty((0, 0, 0)), np.empty(0, np.int64)
     return EngineTables(
         p.step_table, p.touched, p.rows, p.row_table, p.core, p.eliminated, p.eliminated_table, p.drives,
-        p.drive_table, p.need_angle, np.ones(p.mechanism.graph.links, dtype=np.bool_), tracker.modes, empty3, none,
-        none, empty4, empty4, empty4, empty3, 1, p.Lc, True,
+        p.drive_table, p.need_angle, np.ones(p.mechanism.graph.links, dtype=np.bool_), tracker.modes, empty3,
+        np.empty((0, 0)), none, none, empty4, empty4, empty4, empty3, 1, p.Lc, p.far, True,
     )  # fmt: skip
 
 

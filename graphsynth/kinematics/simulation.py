@@ -20,7 +20,7 @@ from graphsynth.kinematics.engine.pivots import pivot_passes, refined
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
 from graphsynth.kinematics.engine.reversals import dead_centres
-from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, with_turns
+from graphsynth.kinematics.engine.start import initial, started
 from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["BatchMotion", "Motion", "simulate", "simulate_batch"]
@@ -87,13 +87,7 @@ def simulate(
     program = compile_program(mechanism)
     given = start if start is not None else mechanism.pose
     guess = None if given is None else _poses(given, mechanism)
-    signs = sign_table(program, modes or {})
-    tracker = Tracker(program, signs)
-    if guess is not None:
-        first = tracker.values(u[:1])[:, 0, 0]
-        counted, centres = with_turns(program, guess[None], first), lines_of_centres(program, guess[None])[0]
-        tracker = Tracker(counted, signs, centres, guess[:, 2])
-        _signs_from(tracker, float(u[0]), guess, modes or {})
+    tracker = started(program, float(u[0]), modes or {}, guess)
     grid = fine_grid(mechanism, u)
     seed, code, step = initial(tracker, float(u[0]), modes or {}, guess)
     if code == codes.DONE:
@@ -110,28 +104,6 @@ def _poses(start: ArrayLike, mechanism: Mechanism) -> Array:
     if poses.shape != (mechanism.graph.links, 3):
         raise GeometryError(f"start has shape {poses.shape}; give (x, y, theta) for {mechanism.graph.links} links")
     return poses
-
-
-def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, int]) -> None:
-    """Choose the sign of every dyad left open so that its links come closest to the guess."""
-    trace = tracker.blank(np.array([u0]))
-    for k, step in enumerate(tracker.program.steps):
-        if not step.has_two_modes or step.group in modes:
-            continue
-        errors = []
-        for sign in (1.0, -1.0):
-            tracker.modes[k] = sign
-            tracker.seed(trace, guess)
-            done, _, where = tracker.run(trace, 0)
-            if done == 0 and where <= k:
-                errors.append(math.inf)
-                continue
-            own = list(step.links)
-            X, pose = trace.X[0, own], guess[own]
-            turned = (X[:, 2] - np.cos(pose[:, 2])) ** 2 + (X[:, 3] - np.sin(pose[:, 2])) ** 2
-            apart = ((X[:, :2] - pose[:, :2]) ** 2).sum(axis=1) / tracker.program.Lc**2
-            errors.append(float((turned + apart).sum()))
-        tracker.modes[k] = 1.0 if errors[0] <= errors[1] else -1.0
 
 
 def _events(tracker: Tracker, trace: Trace, wanted: bool) -> tuple[Trace, list[MotionEvent]]:

@@ -54,8 +54,8 @@ def minimal_stages(T, E, S, centres, applied, y, h, A, K, low, high, out):
         S.done[0] = 0
         # E.first and E.derivs are data: literal numbers would make a second copy of the whole engine
         run(E.steps, E.touched, E.rows, E.RP, E.core, E.elim, E.EP, E.drv, E.DP, E.need, E.wanted, S.q, S.u, E.modes,
-            E.poses, S.X, S.TH, S.V, S.W, S.PHI, S.M, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM, S.done, S.why,
-            E.first, E.Lc, E.derivs)  # fmt: skip
+            E.poses, E.centres, S.X, S.TH, S.V, S.W, S.PHI, S.M, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM,
+            S.done, S.why, E.first, E.Lc, E.far, E.derivs)  # fmt: skip
         K[s, 0] = K[s, 1] = K[s, 2] = math.nan
         if S.done[0] < 2:
             out[0] = 0.0

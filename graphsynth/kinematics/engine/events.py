@@ -164,8 +164,8 @@ def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
             continue
         M, u = trace.M[: trace.done, s], trace.u[: trace.done]
         middle = M[1:-1]
-        low = (middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])
-        low = np.flatnonzero(low & (_vertex(u, M) < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
+        least = (middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])
+        low = np.flatnonzero(least & (_vertex(u, M) < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
         events = (_touch(tracker, trace, int(k), s) for k in low)
         found += [event for event in events if event is not None]
         ends = {0, len(M) - 1} if trace.stop is None else {0}  # the stop has an event of its own

@@ -172,7 +172,8 @@ class Tracker:
         """
         k = trace.done - 1
         gap = end - float(trace.u[k])
-        source, at, pairs = trace, k, []
+        source, at = trace, k
+        pairs: list[Trace] = []
         lost = 0.0 if trace.stop is None else abs(end - trace.stop.at)
         while abs(gap := 0.25 * gap) > max(lost, 8.0 * np.spacing(abs(end))) and len(pairs) < _CLOSER:
             pair, stop = self.reach(source, at, end - gap)

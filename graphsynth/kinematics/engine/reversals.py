@@ -85,7 +85,7 @@ def _dips(step: Array, v0: Array, v1: Array, w0: Array, w1: Array) -> NDArray[np
     t = np.linspace(0.0, 1.0, 17)[:, None]
     v0, v1, m0, m1 = v0[found], v1[found], m0[found], m1[found]
     cubic = v0 * (1 + 2 * t) * (1 - t) ** 2 + v1 * (3 - 2 * t) * t**2 + m0 * t * (1 - t) ** 2 - m1 * t**2 * (1 - t)
-    return found[cubic.min(axis=0, initial=math.inf) < _SLOW * np.maximum(v0, v1)]
+    return np.asarray(found[cubic.min(axis=0, initial=math.inf) < _SLOW * np.maximum(v0, v1)])
 
 
 def _speed_from(tracker: Tracker, trace: Trace, k: int, rate: Rate) -> Speed:

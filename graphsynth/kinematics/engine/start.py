@@ -15,7 +15,7 @@ from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program
 from graphsynth.kinematics.engine.triads import conditions, triad_modes
 
-__all__ = ["group_modes", "initial", "lines_of_centres", "sign_table", "with_turns"]
+__all__ = ["group_modes", "initial", "lines_of_centres", "sign_table", "started", "with_turns"]
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,39 @@ def sign_table(program: Program, modes: Mapping[int, int]) -> Array:
         if step.has_two_modes:
             signs[by_group[group]] = mode
     return signs
+
+
+def started(program: Program, u0: float, modes: Mapping[int, int], guess: Array | None) -> Tracker:
+    """Return a tracker on the modes given, or those of the pose ``guess`` (links, 3), whose turns it counts on."""
+    signs = sign_table(program, modes)
+    tracker = Tracker(program, signs)
+    if guess is not None:
+        program = with_turns(program, guess[None], tracker.values(np.array([u0]))[:, 0, 0])
+        tracker = Tracker(program, signs, lines_of_centres(program, guess[None])[0], guess[:, 2])
+        _signs_from(tracker, u0, guess, modes)
+    return tracker
+
+
+def _signs_from(tracker: Tracker, u0: float, guess: Array, modes: Mapping[int, int]) -> None:
+    """Choose the sign of every dyad left open so that its links come closest to the guess."""
+    trace = tracker.blank(np.array([u0]))
+    for k, step in enumerate(tracker.program.steps):
+        if not step.has_two_modes or step.group in modes:
+            continue
+        errors = []
+        for sign in (1.0, -1.0):
+            tracker.modes[k] = sign
+            tracker.seed(trace, guess)
+            done, _, where = tracker.run(trace, 0)
+            if done == 0 and where <= k:
+                errors.append(math.inf)
+                continue
+            own = list(step.links)
+            X, pose = trace.X[0, own], guess[own]
+            turned = (X[:, 2] - np.cos(pose[:, 2])) ** 2 + (X[:, 3] - np.sin(pose[:, 2])) ** 2
+            apart = ((X[:, :2] - pose[:, :2]) ** 2).sum(axis=1) / tracker.program.Lc**2
+            errors.append(float((turned + apart).sum()))
+        tracker.modes[k] = 1.0 if errors[0] <= errors[1] else -1.0
 
 
 def lines_of_centres(program: Program, poses: Array) -> Array:
