@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.atlas.schema import INDEXES
+from graphsynth.atlas.sealing import unseal
+from graphsynth.atlas.tables import INDEXES
 from graphsynth.errors import GraphsynthError
 
 if TYPE_CHECKING:
@@ -38,15 +39,17 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     """
     try:
         connection.execute("BEGIN IMMEDIATE")
+        unseal(connection)
         yield
         connection.execute("COMMIT")
     except BaseException as error:
         if connection.in_transaction:
             connection.execute("ROLLBACK")
         if isinstance(error, sqlite3.OperationalError):
+            path = connection.execute("PRAGMA database_list").fetchone()[2]
             raise GraphsynthError(
-                f"the catalogue cannot be written ({error}); what is there stays: make room or wait for the other "
-                "writer, then give the same command to go on"
+                f"the catalogue cannot be written ({error}): {path}; what is there stays: make room or wait for the "
+                "other writer, then give the same command to go on"
             ) from None
         raise
 

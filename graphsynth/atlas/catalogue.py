@@ -146,10 +146,10 @@ class Catalogue(OpenCatalogue):
             return MechanismGraph.from_key(self._fetch(name)["key"])
 
     def _fetch(self, name: str) -> dict[str, Any]:
-        columns, rows = self._rows("SELECT * FROM chains WHERE key = ? OR label = ?", (name, name))
-        if not rows:
+        found = self._ask("SELECT * FROM chains WHERE key = ? OR label = ?", (name, name))
+        if not found.rows:
             raise SpecError(f"no chain {name!r} in {self.path.name}; give a key or a label such as 1.8.4-4.1")
-        return dict(zip(columns, rows[0]))
+        return dict(zip(found.columns, found.rows[0]))
 
     def entry(self, name: str) -> dict[str, Any]:
         """Return everything the catalogue knows of a chain, given by key or label, ready for JSON.
@@ -194,10 +194,11 @@ class Catalogue(OpenCatalogue):
         finally:
             real = self.path.resolve()
             if real.with_name(real.name + "-wal").exists():
-                self.connection.close()
-                with closing(connect(self.path)) as connection:
-                    settle(connection)
-                self.connection = connect(self.path, readonly=True)
+                with self._turn:
+                    self.connection.close()
+                    with closing(connect(self.path)) as connection:
+                        settle(connection)
+                    self.connection = connect(self.path, readonly=True)
 
     def evaluate(
         self,
@@ -317,14 +318,16 @@ class Catalogue(OpenCatalogue):
         with self.reading():
             return completeness(self.connection)
 
-    def verify(self, *, chains: int | None = None, seed: int = 0) -> Verification:
-        """Recompute every stored field by another route and compare (exact).
+    def verify(self, *, chains: int | None = None, seed: int = 0, quick: bool = False) -> Verification:
+        """Recompute every stored field by another route and compare (exact), and the file with its seal.
 
         Parameters
         ----------
         chains : int, optional
             Only so many chains of each family, drawn at random; default all.
         seed : int
+        quick : bool
+            Compare the file with its seal only: every change of a byte is found, nothing is recomputed.
 
         Returns
         -------
@@ -333,7 +336,8 @@ class Catalogue(OpenCatalogue):
         """
         from graphsynth.atlas.verifying import verify
 
-        return verify(self.connection, chains, seed)
+        with self._turn:
+            return verify(self.connection, chains, seed, quick)
 
     def digest(self) -> str:
         """Return a SHA-256 of the whole structural content, without internal numbers.
@@ -343,17 +347,17 @@ class Catalogue(OpenCatalogue):
         """
         from graphsynth.atlas.exporting import digest
 
-        with self.reading():
+        with self.reading(screened=True):
             return digest(self.connection)
 
-    def export(self, folder: str | Path, form: str = "parquet") -> list[Path]:
+    def export(self, folder: str | Path, form: str = "csv") -> list[Path]:
         """Write the tables to a folder, one file each; equal catalogues give equal bytes.
 
         Parameters
         ----------
         folder : str or Path
             Made if it does not exist; files of the same name are replaced.
-        form : {"parquet", "csv", "jsonl"}
+        form : {"csv", "jsonl", "parquet"}
             Parquet needs the extra ``parquet``.
 
         Returns
@@ -364,8 +368,12 @@ class Catalogue(OpenCatalogue):
         ------
         SpecError
             For another form, or a missing extra.
+        FormatError
+            If the file is damaged, or holds values of another form than its columns have.
+        GraphsynthError
+            If a file cannot be written.
         """
         from graphsynth.atlas.exporting import export
 
-        with self.reading():
+        with self.reading(screened=True):
             return export(self.connection, Path(folder), form)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.evaluations import Evaluation, store
-from graphsynth.atlas.schema import connect, readable, settle
+from graphsynth.atlas.schema import GARBAGE, connect, readable, screen, settle
 from graphsynth.atlas.stored import fingerprint, mechanism_in
 from graphsynth.errors import GraphError, GraphsynthError, SpecError
 
@@ -123,7 +123,8 @@ def evaluate(
         raise SpecError("the numbers of mechanisms must be 0 or more")
     with closing(connect(path)) as connection:
         try:
-            with readable(path, ValueError, LookupError, TypeError):
+            screen(connection, path)
+            with readable(path, *GARBAGE):
                 wanted = list(islice(tasks(connection, links, mobility, per_chain, settings), limit))
             found = 0
             for done, evaluations in enumerate(in_order(executor, evaluate_task, wanted), 1):

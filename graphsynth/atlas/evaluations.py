@@ -89,9 +89,10 @@ class Evaluation:
 def record(path: Path, evaluations: Iterable[Evaluation]) -> int:
     """Store evaluations in one transaction; see :meth:`graphsynth.atlas.catalogue.Catalogue.record`."""
     with closing(connect(path)) as connection:
-        count = store(connection, evaluations)
-        settle(connection)
-    return count
+        try:
+            return store(connection, evaluations)
+        finally:
+            settle(connection)
 
 
 def store(connection: sqlite3.Connection, evaluations: Iterable[Evaluation]) -> int:

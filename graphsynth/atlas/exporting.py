@@ -42,7 +42,7 @@ TABLES = {
         f"e.data FROM chains c JOIN evaluations e USING (chain_id) ORDER BY {_CHAIN}, e.frame, e.driver, e.kind"
     ),
 }
-FORMS = ("parquet", "csv", "jsonl")
+FORMS = ("csv", "jsonl", "parquet")
 _ROWS = 100_000
 
 _RANKS = """
@@ -94,19 +94,24 @@ def export(connection: sqlite3.Connection, folder: Path, form: str) -> list[Path
         raise SpecError(f"there is no form {form!r}; choose one of {', '.join(FORMS)}")
     write = {"parquet": _write_parquet, "csv": _write_csv, "jsonl": _write_jsonl}[form]
     _prepare(connection)
-    written = []
+    written: list[Path] = []
+    unfinished = folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for table, select in TABLES.items():
             path = folder / f"{table}.{form}"
             unfinished = path.with_name(path.name + ".new")
             cursor = connection.execute(select)
-            write(unfinished, [column[0] for column in cursor.description], _blocks(cursor))
-            unfinished.replace(path)
+            try:
+                write(unfinished, [column[0] for column in cursor.description], _blocks(cursor))
+                unfinished.replace(path)
+            except BaseException:
+                unfinished.unlink(missing_ok=True)
+                raise
             written.append(path)
     except OSError as error:
         raise GraphsynthError(
-            f"{error.filename or folder} cannot be written ({error.strerror or error}): make room or take another"
+            f"{error.filename or unfinished} cannot be written ({error.strerror or error}): make room or take another"
         ) from None
     return written
 

@@ -14,8 +14,10 @@ from graphsynth.atlas.building import build_family, finish_family, open_family, 
 from graphsynth.atlas.facts import GroupRow, Rows
 from graphsynth.atlas.making import expected_of
 from graphsynth.atlas.pieces import problem_of
-from graphsynth.atlas.schema import connect, readable, settle
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.atlas.schema import GARBAGE, connect, readable, screen, settle
+from graphsynth.atlas.sealing import broken_seal
+from graphsynth.atlas.statement import PUBLISHED
+from graphsynth.errors import FormatError, GraphsynthError, SpecError
 
 __all__ = ["merge"]
 
@@ -33,12 +35,14 @@ def merge(path: Path, parts: list[Path]) -> None:
     # everything is checked before the file is made
     plans = _plans(parts)
     with closing(_Shards()) as shards, closing(connect(path, create=True)) as target:
-        for plan in plans:
-            _merge_family(target, plan, shards)
-        for part in parts:
-            with readable(part):
-                _copy_evaluations(shards.open(part), target)
-        settle(target)
+        try:
+            for plan in plans:
+                _merge_family(target, plan, shards)
+            for part in parts:
+                with readable(part):
+                    _copy_evaluations(shards.open(part), target)
+        finally:
+            settle(target)
 
 
 class _Shards:
@@ -87,7 +91,8 @@ def _plans(parts: list[Path]) -> list[_Plan]:
     """
     plans: dict[tuple[int, int, int], _Plan] = {}
     for part in parts:
-        with closing(connect(part, readonly=True)) as shard, readable(part):
+        with closing(connect(part, readonly=True)) as shard, readable(part, *GARBAGE):
+            _trust(shard, part)
             for number, *question, pieces, cut, name in shard.execute(
                 "SELECT family_id, mobility, links, fractionated, pieces, cut, shard FROM families"
             ).fetchall():
@@ -104,6 +109,25 @@ def _plans(parts: list[Path]) -> list[_Plan]:
             )
         _check_all_there(plan)
     return [plans[key] for key in sorted(plans)]
+
+
+def _trust(shard: sqlite3.Connection, part: Path) -> None:
+    """Refuse a shard that was not copied whole, or changed: what is merged gets a new seal.
+
+    Raises
+    ------
+    FormatError
+        If its bytes are not those of its seal, or it holds values of another form than its columns have.
+    """
+    found = broken_seal(shard)
+    if found:
+        raise FormatError(f"{found}: copy the shard again, or give the command that built it again", str(part))
+    screen(shard, part)
+    loose = shard.execute("PRAGMA foreign_key_check").fetchone()
+    if loose:
+        raise FormatError(
+            f"a row of its table {loose[0]} names one of {loose[2]} that is not there: build it anew", str(part)
+        )
 
 
 def _add_pieces(plan: _Plan, part: Path, shard: sqlite3.Connection, number: int) -> None:
@@ -123,6 +147,13 @@ def _add_pieces(plan: _Plan, part: Path, shard: sqlite3.Connection, number: int)
 def _merge_family(target: sqlite3.Connection, plan: _Plan, shards: _Shards) -> None:
     """Write the pieces of a family in their order; count it, once for all shards."""
     mobility, links, fractionated = plan.question
+    held = sum(chains for _, _, chains in plan.where.values())
+    published = PUBLISHED.get((mobility, links))
+    if published and held != published[fractionated]:  # counting may take a minute
+        raise GraphsynthError(
+            f"the shards hold {held} chains of mobility {mobility} with {links} links, there are "
+            f"{published[fractionated]}: build them anew"
+        )
     expected = expected_of(problem_of(links, mobility, bool(fractionated)), None)
     if not expected:
         return
@@ -134,7 +165,7 @@ def _merge_family(target: sqlite3.Connection, plan: _Plan, shards: _Shards) -> N
     def results(places: list[int]) -> Iterator[Rows]:
         for piece in places:
             part, first, chains = plan.where[piece]
-            with readable(part, TypeError, ValueError, LookupError):
+            with readable(part, *GARBAGE):
                 rows = _read(shards.open(part), first, chains)
             yield rows
 

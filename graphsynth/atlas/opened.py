@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Any, Self
 
-from graphsynth.atlas.schema import connect, readable
+from graphsynth.atlas.asking import SECONDS, Answer, ask, columns
+from graphsynth.atlas.schema import GARBAGE, connect, readable, screen
 from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["OpenCatalogue"]
+__all__ = ["TABLES", "OpenCatalogue"]
 
-_TABLES = (
+TABLES = (
     "chains", "inversions", "mechanisms", "groups", "structures", "contracted", "dyads", "relatives", "evaluations",
     "families",
 )  # fmt: skip
@@ -24,6 +26,8 @@ _TABLES = (
 
 class OpenCatalogue:
     """What an open file answers whatever its tables mean; base of :class:`graphsynth.Catalogue`.
+
+    One may be used from several threads: they take turns.
 
     Parameters
     ----------
@@ -39,6 +43,7 @@ class OpenCatalogue:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self.connection: sqlite3.Connection = connect(self.path, readonly=True)
+        self._turn = RLock()
 
     def __enter__(self) -> Self:
         return self
@@ -48,28 +53,47 @@ class OpenCatalogue:
 
     def close(self) -> None:
         """Close the file."""
-        self.connection.close()
+        with self._turn:
+            self.connection.close()
 
     def __len__(self) -> int:
         """Return the number of chains."""
-        return int(self._rows("SELECT COUNT(*) FROM chains", ())[1][0][0])
+        return int(self._ask("SELECT COUNT(*) FROM chains", (), seconds=None).rows[0][0])
 
-    def _rows(self, text: str, parameters: Sequence[Any]) -> tuple[list[str], list[tuple[Any, ...]]]:
-        from graphsynth.atlas.asking import ask
+    def _ask(
+        self, text: str, parameters: Sequence[Any], limit: int | None = None, seconds: float | None = SECONDS
+    ) -> Answer:
+        with self._turn:
+            return ask(self.connection, self.path, text, parameters, limit, seconds)
 
-        return ask(self.connection, self.path, text, parameters)
+    @contextmanager
+    def reading(self, *, screened: bool = False) -> Iterator[None]:
+        """Tell of what a damaged file holds, whatever that is, in one sentence; other threads wait.
 
-    def reading(self) -> AbstractContextManager[None]:
-        """Tell of what a damaged file holds, whatever that is, in one sentence.
+        Parameters
+        ----------
+        screened : bool
+            Hold every value of the file against what its column may hold, before anything is done with them.
 
-        Returns
-        -------
-        context manager
-            Errors of SQLite, and those that values cause which nobody wrote, leave it as `FormatError`.
+        Yields
+        ------
+        None
+            Errors of SQLite, and those that values cause which nobody wrote, leave the block as `FormatError`.
         """
-        return readable(self.path, ValueError, TypeError, LookupError, ArithmeticError)
+        with self._turn, readable(self.path, *GARBAGE):
+            if screened:
+                screen(self.connection, self.path)
+            yield
 
-    def query(self, table: str = "chains", where: str = "1", parameters: Sequence[Any] = ()) -> pd.DataFrame:
+    def query(
+        self,
+        table: str = "chains",
+        where: str = "1",
+        parameters: Sequence[Any] = (),
+        *,
+        limit: int | None = None,
+        seconds: float | None = SECONDS,
+    ) -> pd.DataFrame:
         """Return the rows of a table that fulfil an SQL condition.
 
         Parameters
@@ -80,6 +104,9 @@ class OpenCatalogue:
             SQL condition; values as ``?``.
         parameters : sequence
             The values.
+        limit : int, optional
+        seconds : float, optional
+            As for :meth:`sql`.
 
         Raises
         ------
@@ -88,28 +115,49 @@ class OpenCatalogue:
         FormatError
             If the file is damaged.
         """
-        from graphsynth.atlas.asking import columns
-
-        if table not in _TABLES:
-            raise SpecError(f"there is no table {table!r}; choose one of {', '.join(_TABLES)}")
+        if table not in TABLES:
+            raise SpecError(f"there is no table {table!r}; choose one of {', '.join(TABLES)}")
         try:
-            return self.sql(f"SELECT * FROM {table} WHERE {where}", parameters)
+            return self.sql(f"SELECT * FROM {table} WHERE {where}", parameters, limit=limit, seconds=seconds)
         except SpecError as error:
             if "no such column" not in str(error):
                 raise
-            raise SpecError(f"{error}; {table} has {', '.join(columns(self.connection, table))}") from None
+            with self.reading():
+                known = ", ".join(columns(self.connection, table))
+            raise SpecError(f"{error}; {table} has {known}") from None
 
-    def sql(self, text: str, parameters: Sequence[Any] = ()) -> pd.DataFrame:
+    def sql(
+        self,
+        text: str,
+        parameters: Sequence[Any] = (),
+        *,
+        limit: int | None = None,
+        seconds: float | None = SECONDS,
+    ) -> pd.DataFrame:
         """Return the result of any SQL question that only reads.
+
+        Parameters
+        ----------
+        text : str
+        parameters : sequence
+            Values for ``?``.
+        limit : int, optional
+            Read so many rows at most; ``attrs["more"]`` of the table says whether there are more.
+        seconds : float, optional
+            Longest time, 60 s by default; None: no bound.
 
         Raises
         ------
         SpecError
-            If SQLite refuses it, or it would write or attach a file.
+            If SQLite refuses it, it would write or attach a file, it takes longer, or its rows take more than 400 MB.
         FormatError
             If the file is damaged.
         """
         import pandas as pd
 
-        columns, rows = self._rows(text, parameters)
-        return pd.DataFrame(rows, columns=columns)
+        if limit is not None and limit < 0:
+            raise SpecError(f"limit = {limit} must be 0 or more")
+        answer = self._ask(text, parameters, limit, seconds)
+        frame = pd.DataFrame(answer.rows, columns=answer.columns)
+        frame.attrs["more"] = answer.more
+        return frame

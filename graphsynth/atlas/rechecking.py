@@ -55,9 +55,14 @@ class _Recheck:
     ) -> None:
         from graphsynth.mechanism.model import Mechanism
 
-        self.same, self.where, self.reference = same, where, reference
+        self._same, self.where, self.reference, self.right = same, where, reference, True
         self.frame, self.drivers, self.data = frame, drivers, data
         self.mechanism: Mechanism = Mechanism.from_json(json.dumps(data["mechanism"]))
+
+    def same(self, field: str, where: str, stored: Any, wanted: Any) -> None:
+        """Compare; proofs are not repeated for dimensions that are wrong."""
+        self.right = self.right and stored == wanted
+        self._same(field, where, stored, wanted)
 
     def run(self, guarantee: str | None, kinds: dict[str, tuple[Any, ...]]) -> None:
         """Compare dimensions, transmission and verdict."""
@@ -71,12 +76,12 @@ class _Recheck:
         self.same(
             "evaluations: length ratio in bounds", self.where, ratio <= self._goal("max_length_ratio", 1e-6), True
         )
-        if guarantee == "certified" and _has_flint():
+        if guarantee == "certified" and self.right and _has_flint():
             proved = turn_is_proved(motion_of(self.mechanism, 721))
             self.same("evaluations: turn proved", self.where, proved, True)
         self._ties(kinds)
         jamming = kinds.get("jamming")
-        if jamming is not None and jamming[4] is not None:
+        if self.right and jamming is not None and jamming[4] is not None:
             self._jamming(jamming[0], jamming[3], json.loads(jamming[4]))
 
     def _ties(self, kinds: dict[str, tuple[Any, ...]]) -> None:

@@ -103,6 +103,13 @@ class Reference:
             count[1 << link : 2 << link] = count[: 1 << link] + sizes[np.arange(1 << link) & near]
         return count
 
+    def is_chain(self) -> bool:
+        """Whether it hangs together, has two joints on each link, and no part of it is rigid."""
+        import networkx
+
+        near = [degree for _, degree in self.graph.degree()]
+        return min(near, default=0) >= 2 and bool(networkx.is_connected(self.graph)) and self.no_rigid_subchain()
+
     def no_rigid_subchain(self) -> bool:
         """Test every set of two or more links: DOF = 3 (|S| - 1) - 2 joints >= 1."""
         sizes = _sizes(self.links)

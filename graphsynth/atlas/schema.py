@@ -1,4 +1,4 @@
-"""Tables of a catalogue file, and opening one."""
+"""Opening a catalogue file, which may come from anywhere, and leaving it whole."""
 
 from __future__ import annotations
 
@@ -6,92 +6,40 @@ import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 
+from graphsynth.atlas.sealing import broken_seal, seal
+from graphsynth.atlas.tables import APPLICATION_ID, INDEXES, SCHEMA, SCHEMA_VERSION, wrong_rows
 from graphsynth.errors import FormatError, GraphsynthError
+from graphsynth.wording import plain
 
-__all__ = ["APPLICATION_ID", "INDEXES", "SCHEMA", "SCHEMA_VERSION", "connect", "readable", "settle"]
+__all__ = [
+    "APPLICATION_ID",
+    "GARBAGE",
+    "INDEXES",
+    "SCHEMA",
+    "SCHEMA_VERSION",
+    "connect",
+    "readable",
+    "screen",
+    "settle",
+]
 
-#: In the header of every catalogue file ("GSyn"), so that another SQLite file is not taken for one.
-APPLICATION_ID = 0x4753796E
-SCHEMA_VERSION = 3
-
-SCHEMA = """
-CREATE TABLE meta (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
--- a family: all chains of one mobility and number of links
-CREATE TABLE families (
-  family_id INTEGER PRIMARY KEY,
-  mobility INTEGER NOT NULL, links INTEGER NOT NULL, fractionated INTEGER NOT NULL,
-  pieces INTEGER NOT NULL,      -- units of work
-  cut TEXT NOT NULL,            -- fingerprint of the question and of its cut into pieces
-  shard TEXT NOT NULL,          -- 'i/m': the part of the family this file holds
-  expected INTEGER,             -- chains of the whole family by counting without listing; a shard is not counted
-  complete INTEGER NOT NULL,    -- 1 when every piece is there and labels are given
-  UNIQUE (mobility, links));
--- a piece that is written stands here, in the same transaction as its chains, which have consecutive numbers
-CREATE TABLE pieces (
-  family_id INTEGER NOT NULL REFERENCES families, piece INTEGER NOT NULL, first_chain INTEGER NOT NULL,
-  chains INTEGER NOT NULL, PRIMARY KEY (family_id, piece)) WITHOUT ROWID;
-CREATE TABLE contracted (
-  contracted_id INTEGER PRIMARY KEY, vertices INTEGER NOT NULL,
-  edges TEXT NOT NULL UNIQUE,   -- 'a-b', or 'a-bxm' for m parallel paths
-  planar INTEGER NOT NULL);
-CREATE TABLE groups (
-  group_id INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, -- canonical key, the base as frame
-  links INTEGER NOT NULL, "order" INTEGER NOT NULL, class INTEGER NOT NULL);
--- how a mechanism is assembled: the groups, and the highest class and order among them
-CREATE TABLE structures (
-  structure_id INTEGER PRIMARY KEY, groups TEXT NOT NULL UNIQUE, -- group_id of each group in the order of assembly
-  class INTEGER NOT NULL, "order" INTEGER NOT NULL);
-CREATE TABLE chains (
-  chain_id INTEGER PRIMARY KEY, family_id INTEGER NOT NULL REFERENCES families,
-  key TEXT NOT NULL UNIQUE, label TEXT UNIQUE, -- F.links.assortment.rank, given when the family is complete
-  graph6 TEXT NOT NULL, mobility INTEGER NOT NULL, links INTEGER NOT NULL, joints INTEGER NOT NULL,
-  loops INTEGER NOT NULL, assortment TEXT NOT NULL, -- numbers of links with 2, 3, ... joints: '4-4'
-  automorphisms INTEGER NOT NULL, link_orbits TEXT NOT NULL, inversions INTEGER NOT NULL,
-  planar INTEGER NOT NULL, girth INTEGER NOT NULL, fractionated INTEGER NOT NULL,
-  contracted_id INTEGER NOT NULL REFERENCES contracted);
--- removing a dyad of two binary links from the chain leaves the parent
-CREATE TABLE dyads (chain_id INTEGER NOT NULL REFERENCES chains, parent_key TEXT NOT NULL,
-  PRIMARY KEY (chain_id, parent_key)) WITHOUT ROWID;
--- one row for each orbit of links: the chain with that link as frame
-CREATE TABLE inversions (
-  chain_id INTEGER NOT NULL REFERENCES chains, frame INTEGER NOT NULL,
-  frame_joints INTEGER NOT NULL, levels TEXT NOT NULL, -- links on each adjacency level: '1-2-3'
-  PRIMARY KEY (chain_id, frame)) WITHOUT ROWID;
--- one row for each orbit of (frame, as many driven links jointed to it as the mobility) that can be moved so
-CREATE TABLE driven (
-  chain_id INTEGER NOT NULL, frame INTEGER NOT NULL,
-  driver NOT NULL,              -- driven link; text such as '1,3' for several
-  structure_id INTEGER NOT NULL REFERENCES structures,
-  PRIMARY KEY (chain_id, frame, driver)) WITHOUT ROWID;
-CREATE VIEW mechanisms AS
-  SELECT d.chain_id, d.frame, d.driver, s.class, s."order", s.groups, i.levels
-  FROM driven d JOIN structures s USING (structure_id) JOIN inversions i USING (chain_id, frame);
-CREATE VIEW relatives AS
-  SELECT p.chain_id AS parent_id, d.chain_id AS child_id, d.parent_key, c.key AS child_key
-  FROM dyads d JOIN chains c USING (chain_id) LEFT JOIN chains p ON p.key = d.parent_key;
--- what somebody evaluated: 'dimensions', 'transmission', 'jamming', ...; a row that is absent was not computed
-CREATE TABLE evaluations (
-  chain_id INTEGER NOT NULL REFERENCES chains, frame INTEGER NOT NULL, driver NOT NULL,
-  kind TEXT NOT NULL, status TEXT NOT NULL, value REAL, unit TEXT, guarantee TEXT, data TEXT,
-  PRIMARY KEY (chain_id, frame, driver, kind)) WITHOUT ROWID;
-"""
-
-#: Made when a family is complete: building them row by row would slow the writing.
-INDEXES = """
-CREATE INDEX IF NOT EXISTS chains_by_family ON chains (family_id, assortment);
-CREATE INDEX IF NOT EXISTS dyads_by_parent ON dyads (parent_key);
-"""
+#: Longest text or row that is read, in bytes; the longest that a catalogue may hold is a fifth of it.
+_LONGEST = 5_000_000
+#: What values that nobody wrote may cause in a reader, beside the errors of SQLite.
+GARBAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError, MemoryError)
 
 
 def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqlite3.Connection:
-    """Open a catalogue file.
+    """Open a catalogue file; it holds the tables of this version and nothing else, no triggers or other views.
 
     Raises
     ------
     FormatError
-        If the file is missing, is no catalogue, or was written by another version.
+        If the file is missing, is no catalogue, or was written by another version; when it is opened for writing, also
+        if it was changed by another program.
     """
     if not create and not path.is_file():
         raise FormatError("there is no such catalogue: build one with 'graphsynth catalog build'", str(path))
@@ -102,15 +50,20 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
     if readonly and _is_still(path):
         mode = "ro&immutable=1"
     try:
-        connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None)
+        connection = sqlite3.connect(
+            f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
+        )
+        _distrust(connection)
         _check(connection, path, create)
         if not readonly:
+            _check_seal(connection, path)
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
-    except sqlite3.Error as error:
+    except (sqlite3.Error, MemoryError, UnicodeError) as error:
         if connection:
             connection.close()
-        raise FormatError(f"cannot be opened as a catalogue ({error})", str(path)) from None
+        remedy = ": make room, or name another file" if create else ""
+        raise FormatError(f"cannot be opened as a catalogue ({plain(str(error))[:300]}){remedy}", str(path)) from None
     except FormatError:
         if connection:
             connection.close()
@@ -121,6 +74,14 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
 def _is_still(path: Path) -> bool:
     """Whether nobody can write the file, as on a read-only medium: SQLite then needs no files beside it."""
     return not os.access(path, os.W_OK) and not os.access(path.resolve().parent, os.W_OK)
+
+
+def _distrust(connection: sqlite3.Connection) -> None:
+    """Let nothing in the file decide what is called or how much memory is taken."""
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LONGEST)
+    connection.execute("PRAGMA trusted_schema = OFF")
+    connection.execute("PRAGMA cell_size_check = ON")
+    connection.execute("PRAGMA mmap_size = 0")
 
 
 @contextmanager
@@ -144,10 +105,34 @@ def readable(path: Path, *garbage: type[Exception]) -> Iterator[None]:
     except GraphsynthError:
         raise
     except damage as error:
+        if "closed database" in str(error):
+            raise GraphsynthError(f"the catalogue {path} is closed: open it again") from None
         raise FormatError(
-            f"the file is damaged or cannot be read ({error}): 'graphsynth catalog verify' says where; build it anew",
+            f"the file is damaged or cannot be read ({plain(str(error))[:300]}): 'graphsynth catalog verify' says "
+            "where; build it anew",
             str(path),
         ) from None
+
+
+def screen(connection: sqlite3.Connection, path: Path) -> None:
+    """Read the whole file and hold every value against what its column may hold: labels, keys, edges, numbers.
+
+    Raises
+    ------
+    FormatError
+        If a value is of another form; the sentence names the table.
+    """
+    with readable(path, *GARBAGE):
+        found = [str(row[0]) for row in connection.execute("PRAGMA quick_check(1)")]
+        if found == ["ok"]:
+            for table, question in wrong_rows():
+                found += [f"{row[0]} in {table}" for row in connection.execute(question)]
+    if found != ["ok"]:
+        raise FormatError(
+            f"is damaged or holds values that no catalogue holds ({' '.join(found[-1:])}): 'graphsynth catalog verify' "
+            "says more; build it anew, or take it from its source again",
+            str(path),
+        )
 
 
 def _check(connection: sqlite3.Connection, path: Path, create: bool) -> None:
@@ -170,13 +155,48 @@ def _check(connection: sqlite3.Connection, path: Path, create: bool) -> None:
         raise FormatError(
             f"has schema version {version}, this graphsynth reads {SCHEMA_VERSION}: build it anew", str(path)
         )
+    always, sometimes = _wanted()
+    held = set(connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master LIMIT ?", (len(always) + 100,)))
+    others = sorted({str(row[1]) for row in held - always - sometimes} | {str(row[1]) for row in always - held})
+    if others:
+        raise FormatError(
+            f"its tables are not those of a catalogue ({plain(', '.join(others))[:200]} differs): build it anew, or "
+            "take it from its source again",
+            str(path),
+        )
+
+
+@lru_cache(maxsize=1)
+def _wanted() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[str, ...]]]:
+    """Everything that the schema of a file must name, and what it may name beside that."""
+    own = sqlite3.connect(":memory:")
+    rows = "SELECT type, name, tbl_name, sql FROM sqlite_master"
+    own.executescript(SCHEMA)
+    always = frozenset(own.execute(rows))
+    own.executescript(INDEXES)
+    every = frozenset(own.execute(rows))
+    own.close()
+    return always, every - always
+
+
+def _check_seal(connection: sqlite3.Connection, path: Path) -> None:
+    """Take no changes of others over into a file that will have a new seal."""
+    connection.execute("BEGIN IMMEDIATE")  # nobody is in the middle of writing
+    found = broken_seal(connection) if connection.execute("SELECT COUNT(*) FROM meta").fetchone()[0] else ""
+    connection.execute("ROLLBACK")
+    if found:
+        raise FormatError(f"{found}: nothing is written; take it from its source again, or build it anew", str(path))
 
 
 def settle(connection: sqlite3.Connection) -> None:
-    """Leave one plain file that can be read from anywhere: no write-ahead log beside it (unless others read it now)."""
+    """Leave one plain file that can be read from anywhere: no write-ahead log beside it (unless others read it now).
+
+    It carries a seal, see :mod:`graphsynth.atlas.sealing`.
+    """
     try:
         connection.execute("PRAGMA busy_timeout = 200")
         connection.execute("PRAGMA journal_mode = DELETE")
         connection.execute("PRAGMA busy_timeout = 5000")
-    except sqlite3.Error:
-        pass  # it stays as it is: whole, with a log beside it
+        seal(connection)
+    except (sqlite3.Error, OSError):
+        pass  # it stays as it is: whole, with a log beside it or without a seal

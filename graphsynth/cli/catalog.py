@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.cli import console
 from graphsynth.cli.workers import workers_for
 from graphsynth.errors import SpecError
+from graphsynth.wording import plain
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -102,17 +103,18 @@ def _query(options: argparse.Namespace) -> int:
         if options.entry is not None:
             _put_entry(catalogue, options)
             return 0
+        limit, seconds = options.limit or None, options.seconds or None
         if options.sql is not None:
-            frame = catalogue.sql(options.sql)
+            frame = catalogue.sql(options.sql, limit=limit, seconds=seconds)
         else:
-            frame = catalogue.query(options.table, options.where)
-    shown = frame.head(options.limit) if options.limit else frame
+            frame = catalogue.query(options.table, options.where, limit=limit, seconds=seconds)
+    more = frame.attrs["more"]
     if options.json:
-        console.put_json({"rows": len(frame), "shown": _records(shown)})
+        console.put_json({"rows": None if more else len(frame), "shown": _records(frame)})
         return 0
-    _put_frame(shown)
-    more = f", {len(shown)} shown: --limit 0 shows all" if len(shown) < len(frame) else ""
-    console.put(f"{len(frame)} row{'s' * (len(frame) != 1)}{more}")
+    _put_frame(frame)
+    rows = f"{'more than ' * more}{len(frame)} row{'s' * (len(frame) != 1)}"
+    console.put(f"{rows}, {len(frame)} shown: --limit 0 shows all" if more else rows)
     return 0
 
 
@@ -127,14 +129,14 @@ def _put_entry(catalogue: Catalogue, options: argparse.Namespace) -> None:
         plain[relation] = " ".join(entry[relation]) or "none in this catalogue"
     width = max(map(len, plain))
     for name, value in plain.items():
-        console.put(f"{name:{width}}  {value}")
+        _put(f"{name:{width}}  {value}")
     for inversion in entry["inversions"]:
-        console.put(f"frame {inversion['frame']}: {inversion['frame_joints']} joints, levels {inversion['levels']}")
+        _put(f"frame {inversion['frame']}: {inversion['frame_joints']} joints, levels {inversion['levels']}")
         for own in entry["mechanisms"]:
             if own["frame"] == inversion["frame"]:
                 groups = ", ".join(f"{g['links']} links class {g['class']} order {g['order']}" for g in own["groups"])
                 known = "; ".join(f"{kind} {_evaluated(value)}" for kind, value in own["evaluations"].items())
-                console.put(f"  driver {own['driver']}: class {own['class']}, order {own['order']}: {groups}; {known}")
+                _put(f"  driver {own['driver']}: class {own['class']}, order {own['order']}: {groups}; {known}")
 
 
 def _evaluated(value: Any) -> str:
@@ -149,7 +151,7 @@ def _verify(options: argparse.Namespace) -> int:
     from graphsynth.atlas.catalogue import Catalogue
 
     with Catalogue(options.file) as catalogue:
-        found = catalogue.verify(chains=options.chains, seed=options.seed)
+        found = catalogue.verify(chains=options.chains, seed=options.seed, quick=options.quick)
     if options.json:
         console.put_json(
             {"passed": found.passed, "compared": found.compared, "differences": list(found.differences),
@@ -157,7 +159,7 @@ def _verify(options: argparse.Namespace) -> int:
         )  # fmt: skip
     else:
         for difference in found.differences:
-            console.put(difference)
+            _put(difference)
         console.put(f"{options.file}: {found.statement}")
     return 0 if found.passed else DIFFERENT
 
@@ -186,15 +188,28 @@ def _merge(options: argparse.Namespace) -> int:
     return _summary(options, begin)
 
 
-def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows as plain values for JSON."""
-    import json
+def _put(text: str) -> None:
+    """Print a line that may come from a file: nothing in it steers the terminal."""
+    console.put(plain(text))
 
-    records: list[dict[str, Any]] = json.loads(frame.to_json(orient="records", double_precision=15))
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows as plain values for JSON; bytes as hexadecimal digits, and columns of one name numbered."""
+    import json
+    from collections import Counter
+
+    seen: Counter[str] = Counter()
+    names = []
+    for name in frame.columns:
+        seen[name] += 1
+        names.append(name if seen[name] == 1 else f"{name}:{seen[name]}")
+    shown = frame.set_axis(names, axis="columns").map(lambda value: value.hex() if isinstance(value, bytes) else value)
+    records: list[dict[str, Any]] = json.loads(shown.to_json(orient="records", double_precision=15))
     return records
 
 
 def _put_frame(frame: pd.DataFrame) -> None:
     """Print a table as text that scripts can cut, whatever the width of the terminal."""
     if len(frame.columns) and len(frame):
-        console.put(frame.to_string(index=False, max_colwidth=60))
+        shown = frame.map(lambda value: plain(value) if isinstance(value, str) else value)
+        console.put(shown.rename(columns=plain).to_string(index=False, max_colwidth=60))

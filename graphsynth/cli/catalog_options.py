@@ -70,7 +70,14 @@ def _add_query(own: Parsers[argparse.ArgumentParser]) -> None:
     parser.add_argument("--table", default="chains", metavar="NAME", help="table (default chains)")
     parser.add_argument("--sql", metavar="TEXT", help="any SQL question instead")
     parser.add_argument("--entry", metavar="KEY|LABEL", help="everything about one chain instead")
-    parser.add_argument("--limit", type=_limit, default=20, metavar="N", help="rows shown (default 20; 0: all)")
+    parser.add_argument("--limit", type=_limit, default=20, metavar="N", help="rows read (default 20; 0: all)")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=60.0,
+        metavar="S",
+        help="longest time of the question (default 60; 0: no bound)",
+    )
 
 
 def _add_verify(own: Parsers[argparse.ArgumentParser]) -> None:
@@ -78,13 +85,18 @@ def _add_verify(own: Parsers[argparse.ArgumentParser]) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
     parser.add_argument("--chains", type=_limit, metavar="N", help="only N chains of each family, drawn at random")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the draw (default 0)")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="compare the file with its seal only: every change is found, nothing recomputed",
+    )
 
 
 def _add_export(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "export", "Write the tables to files, the same bytes for the same content.")
     parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for the files")
-    parser.add_argument("--form", choices=("parquet", "csv", "jsonl"), default="parquet", help="default parquet")
+    parser.add_argument("--form", choices=("csv", "jsonl", "parquet"), default="csv", help="default csv")
 
 
 def _add_merge(own: Parsers[argparse.ArgumentParser]) -> None:

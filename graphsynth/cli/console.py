@@ -23,7 +23,7 @@ def put(text: str) -> None:
 
 def put_json(document: Any) -> None:
     """Print a result as one JSON document."""
-    put(json.dumps(document, ensure_ascii=False))
+    put("".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in json.dumps(document, ensure_ascii=False)))
 
 
 def note(text: str) -> None:

@@ -21,6 +21,7 @@ from graphsynth.cli.question import add_question
 from graphsynth.cli.stress import add_stress
 from graphsynth.compilation import announce
 from graphsynth.errors import GraphsynthError
+from graphsynth.wording import plain
 
 __all__ = ["main"]
 
@@ -63,7 +64,7 @@ def _failed(error: Exception, options: argparse.Namespace) -> int:
         text = _of_the_system(error, options)
     else:
         raise error
-    note(f"graphsynth: {' '.join(text.split())}")
+    note(f"graphsynth: {plain(' '.join(text.split()))}")
     return USAGE_ERROR
 
 

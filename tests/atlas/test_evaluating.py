@@ -15,6 +15,7 @@ import pytest
 from graphsynth.atlas import evaluating
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.references import Reference
+from graphsynth.atlas.sealing import seal
 from graphsynth.atlas.turning import Turning
 from graphsynth.cli import main
 from graphsynth.errors import SpecError
@@ -214,7 +215,9 @@ def spoil(path, change):
     connection.execute(
         "UPDATE evaluations SET data = ? WHERE chain_id = 1 AND kind = 'dimensions'", (json.dumps(data),)
     )
+    connection.execute("DELETE FROM meta")
     connection.commit()
+    seal(connection)
     connection.close()
 
 
@@ -258,12 +261,10 @@ def test_wrong_dimensions_are_found(four, tmp_path, change, named):
         pytest.param("UPDATE evaluations SET guarantee = NULL WHERE kind = 'jamming'", marks=pytest.mark.slow),
     ],
 )
-def test_wrong_values_are_found(four, judged, tmp_path, statement):
+def test_wrong_values_are_found(four, judged, tmp_path, altered, statement):
     path = copied(judged if "jamming" in statement else four, tmp_path)
-    connection = sqlite3.connect(path)
-    assert connection.execute(statement).rowcount
-    connection.commit()
-    connection.close()
+    with altered(path) as connection:
+        assert connection.execute(statement).rowcount
     with Catalogue(path) as catalogue:
         assert not catalogue.verify().passed
 

@@ -197,7 +197,7 @@ def test_the_parquet_export_holds_what_the_catalogue_holds(small, tmp_path):
     pytest.importorskip("pyarrow")
     import pandas as pd
 
-    small.export(tmp_path)
+    small.export(tmp_path, "parquet")
     chains = pd.read_parquet(tmp_path / "chains.parquet")
     own = small.sql("SELECT * FROM chains ORDER BY mobility, links, key")
     for column in ("key", "label", "graph6", "loops", "automorphisms", "girth", "planar"):

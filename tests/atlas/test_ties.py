@@ -10,6 +10,7 @@ import pytest
 from graphsynth.atlas import evaluating
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
+from graphsynth.atlas.sealing import seal
 from graphsynth.atlas.stored import fingerprint, stored_mechanisms
 from graphsynth.errors import SpecError
 from graphsynth.mechanism.joints import Revolute
@@ -91,6 +92,8 @@ def test_verification_tells_of_results_of_other_dimensions(catalogue):
     with sqlite3.connect(catalogue.path) as raw:
         statement = "UPDATE evaluations SET data = replace(data, ?, ?) WHERE kind = 'jamming'"
         assert raw.execute(statement, (fingerprint(own), "0" * 32)).rowcount == 1
+        raw.execute("DELETE FROM meta")
+    seal(raw)
     raw.close()
     with Catalogue(catalogue.path) as again:
         assert sum(field in words and "0" * 32 in words for words in again.verify().differences) == 1

@@ -18,14 +18,12 @@ def right(tmp_path_factory):
     return path
 
 
-def spoiled(right, folder, statement, parameters=()):
+def spoiled(right, folder, altered, statement, *, sealed=True):
+    """What verification says of one change; with a new seal, so that recomputation has to find it."""
     path = folder / "x.sqlite"
     shutil.copy(right, path)
-    connection = sqlite3.connect(path)
-    changed = connection.execute(statement, parameters).rowcount
-    connection.commit()
-    connection.close()
-    assert changed >= 1
+    with altered(path, sealed=sealed) as connection:
+        assert connection.execute(statement).rowcount >= 1
     with Catalogue(path) as catalogue:
         return catalogue.verify()
 
@@ -81,8 +79,8 @@ WRONG = {
 
 
 @pytest.mark.parametrize("statement", WRONG.values(), ids=WRONG)
-def test_a_single_wrong_value_is_found(right, tmp_path, statement):
-    found = spoiled(right, tmp_path, statement)
+def test_a_single_wrong_value_is_found(right, tmp_path, altered, statement):
+    found = spoiled(right, tmp_path, altered, statement)
     assert not found.passed
     assert len(found.differences) >= 1
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from graphsynth.atlas.site.families import (
     relatives_script,
 )
 from graphsynth.atlas.site.motions import MotionTask, motion_of
+from graphsynth.atlas.site.place import MARK, replaced, unwritten
 from graphsynth.atlas.site.sketches import PER_FILE, sketch_scripts
 from graphsynth.atlas.stored import stored_mechanisms
 from graphsynth.errors import GraphsynthError, SpecError
@@ -30,12 +30,17 @@ __all__ = ["SCRIPTS", "SiteReport", "build_site"]
 
 #: Scripts of the page, in the order in which they are loaded.
 SCRIPTS = (
-    "graph", "canonical", "groups", "reading", "drawing", "store", "glossary", "writing", "browse", "entry", "editor",
-    "find", "about", "main",
+    "graph", "markup", "canonical", "groups", "reading", "drawing", "store", "glossary", "writing", "browse", "entry",
+    "editor", "find", "about", "main",
 )  # fmt: skip
+#: What the page may do, whatever its data hold: its own scripts run, and none else.  Opened from a disk it has no origin in
+#: some browsers: then its files are those of "file:".
+_POLICY = (
+    "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'self' file: 'unsafe-inline'; "
+    "script-src 'self' file:; frame-src 'self' file:; img-src 'self' file: data:"
+)
 #: Data of the first load in bytes; families beyond it are loaded when they are asked for.
 _FIRST_LOAD = 450_000
-_MARK = "atlas-page.txt"
 #: Told ``(what is done now, steps done, steps in all)``.
 Watch = Callable[[str, int, int], None]
 
@@ -79,7 +84,8 @@ def build_site(
     ----------
     catalogue : Catalogue
     folder : str or Path
-        Made if it does not exist; a page that is there is replaced, anything else is refused.
+        Made if it does not exist; a page that is there is replaced, anything else is refused.  A symbolic link is
+        followed.
     motion_links : int
         Chains of at most so many links are given dimensions and shown in motion (0: none at all).  Where the catalogue
         holds dimensions these are shown, for chains of any size.
@@ -97,37 +103,19 @@ def build_site(
     SpecError
         If ``motion_links`` is negative.
     FormatError
-        If the catalogue is damaged.
+        If the catalogue is damaged, or holds values of another form than its columns have.
     GraphsynthError
-        If the catalogue has no finished family, or the folder holds something else.
+        If the catalogue has no finished family, the folder holds something else, or it cannot be written.
     """
     if motion_links < 0:
         raise SpecError(f"motion_links = {motion_links} must be 0 (no motions) or more")
-    target = Path(folder)
-    _check_place(target)
-    with catalogue.reading():
-        found = families(catalogue.connection)
-    if not found:
-        raise GraphsynthError(f"{catalogue.path.name} has no finished family: finish building it first")
-    building = target.with_name(target.name + ".building")
-    shutil.rmtree(building, ignore_errors=True)
-    try:
+    with replaced(Path(folder)) as (target, building):
+        with catalogue.reading(screened=True):
+            found = families(catalogue.connection)
+        if not found:
+            raise GraphsynthError(f"{catalogue.path.name} has no finished family: finish building it first")
         report = _write(catalogue, found, building, motion_links, executor, watch)
-        shutil.rmtree(target, ignore_errors=True)
-        building.rename(target)
-    except BaseException:
-        shutil.rmtree(building, ignore_errors=True)
-        raise
     return SiteReport(target / "index.html", *report)
-
-
-def _check_place(target: Path) -> None:
-    if not target.absolute().parent.is_dir():
-        raise GraphsynthError(f"{target}: the folder {target.absolute().parent} does not exist; make it first")
-    if target.exists() and not target.is_dir():
-        raise GraphsynthError(f"{target} is a file; name a folder")
-    if target.is_dir() and any(target.iterdir()) and not (target / _MARK).is_file():
-        raise GraphsynthError(f"{target} holds other files; name an empty or a new folder")
 
 
 class _Progress:
@@ -152,7 +140,7 @@ def _write(
 ) -> tuple[int, int, int, int, int]:
     """Write all files; return what a report holds after its page."""
     data = folder / "data"
-    data.mkdir(parents=True)
+    data.mkdir()
     stored = _best_stored(catalogue) if motion_links else {}
     tasks = [
         MotionTask(row["label"], row["key"], stored.get(row["chain_id"]), family.links <= motion_links)
@@ -177,7 +165,7 @@ def _write(
     _put(data / "contents.js", known)
     _put(data / "groups.js", groups)
     loaded = [*_write_pages(folder, first), data / "contents.js", *(data / f"family-{name}.js" for name in first)]
-    _put(folder / _MARK, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")
+    _put(folder / MARK, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")
     everything = [path for path in folder.rglob("*") if path.is_file()]
     shown = sum("frame" in facts for facts in motions.values())
     return (
@@ -234,9 +222,14 @@ def _write_pages(folder: Path, first: list[str]) -> list[Path]:
     data = "".join(
         f'<script src="data/{name}.js"></script>\n' for name in ("contents", *(f"family-{n}" for n in first))
     )
-    _put(folder / "index.html", source.joinpath("index.html").read_text("utf-8").replace("@DATA@", data))
-    return [folder / name for name in ("index.html", "style.css", "atlas.js")]
+    _put(folder / "theme.js", source.joinpath("theme.js").read_text("utf-8"))
+    page = source.joinpath("index.html").read_text("utf-8").replace("@POLICY@", _POLICY).replace("@DATA@", data)
+    _put(folder / "index.html", page)
+    return [folder / name for name in ("index.html", "style.css", "theme.js", "atlas.js")]
 
 
 def _put(path: Path, text: str) -> None:
-    path.write_text(text, "utf-8", newline="\n")
+    try:
+        path.write_text(text, "utf-8", newline="\n")
+    except OSError as error:
+        raise unwritten(error, path) from None

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import sqlite3
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
+
+from graphsynth.structure.canonical import decode_key
 
 __all__ = [
     "Family",
@@ -61,11 +64,30 @@ def families(connection: sqlite3.Connection) -> list[Family]:
     found = []
     for family in _rows(connection, "SELECT * FROM families ORDER BY mobility, links"):
         rows = sorted(_rows(connection, _CHAINS, (family["family_id"],)), key=_order)
+        for row in rows:
+            _check_key(row, family)
         if rows:
             mobility, links = family["mobility"], family["links"]
             expected = family["expected"] if family["complete"] else None
             found.append(Family(f"{mobility}-{links}", mobility, links, rows[0]["joints"], expected, tuple(rows)))
     return found
+
+
+def _check_key(row: sqlite3.Row, family: sqlite3.Row) -> None:
+    """Compare a key, which is the chain itself, with its row: links, joints, assortment, so that label and sketch fit.
+
+    Raises
+    ------
+    ValueError
+        If they are not.
+    """
+    links, joints, frame, space = decode_key(row["key"])
+    degrees = Counter(Counter(link for a, b, _ in joints for link in (a, b)).values())
+    assortment = "-".join(str(degrees[n]) for n in range(2, max(degrees, default=1) + 1))
+    own = links, len(joints), assortment, row["links"], row["mobility"]
+    wanted = row["links"], row["joints"], row["assortment"], family["links"], family["mobility"]
+    if own != wanted or sum(degrees.values()) != links or degrees[1] or frame is not None or space != 3:
+        raise ValueError(f"the key {row['key']} is not of a chain as its row says")
 
 
 def _rows(connection: sqlite3.Connection, query: str, parameters: tuple[Any, ...] = ()) -> list[sqlite3.Row]:

@@ -2,36 +2,37 @@
 "use strict";
 
 (function () {
-  const $ = id => document.getElementById(id);
+  const $ = id => document.getElementById(id), {html} = Atlas;
   const PLATE = {wide: 148, tall: 176, sketch: [132, 106]}, LINE = {tall: 56, sketch: [56, 46]};
   const shown = new Map();
   let question = {}, found = [], columns = 1, ready = false;
 
-  const option = (value, words, chosen) => `<option value="${value}"${chosen ? " selected" : ""}>${words}</option>`;
+  const option = (value, words, chosen) => html`<option value="${value}"${chosen ? " selected" : ""}>${words}</option>`;
   const select = (name, words, options, term) =>
-    `<label>${term ? Atlas.term(term, words) : words}<select name="${name}" aria-label="${words}">${options}</select></label>`;
+    html`<label>${term ? Atlas.term(term, words) : words}<select name="${name}" aria-label="${words}">${options}</select></label>`;
 
   function build() {
     const families = Atlas.contents.families, mobilities = [...new Set(families.map(f => f.mobility))];
     const sizes = [...new Map(families.map(f => [f.links, 0]))].map(([links]) => [links, families.filter(f => f.links === links).reduce((s, f) => s + f.chains, 0)]);
     const any = option("", "any");
-    $("question").innerHTML =
-      `<label class="wide">Search<input type="search" name="text" placeholder="label, key or graph6" autocomplete="off" spellcheck="false"></label>` +
-      (mobilities.length > 1 ? select("mobility", "mobility", any + mobilities.map(w => option(w, w)).join(""), "mobility") : "") +
-      `<fieldset><legend>Links</legend>${sizes.map(([n, count]) =>
-        `<label class="chip"><input type="checkbox" name="links" value="${n}"><span>${n} <small>${Atlas.count(count)}</small></span></label>`).join("")}</fieldset>` +
-      select("assortment", "assortment", any, "assortment") +
-      select("planar", "planar", any + option("yes", "planar") + option("no", "not planar"), "planar") +
-      select("symmetry", "symmetry", any + option("some", "symmetric") + option("none", "none"), "symmetry") +
-      select("girth", "shortest loop", any + [3, 4, 5, 6, 7, 8].filter(g => Atlas.rows.some(row => row.girth === g)).map(g => option(g, `${g} links`)).join(""), "girth") +
-      select("low", "class within reach", any + [2, 3, 4, 5].map(c => option(c, c === 2 ? "II" : `up to ${Atlas.roman(c)}`)).join(""), "class") +
-      (Atlas.rows.some(row => row.fractionated) ? select("fractionated", "fractionated", any + option("no", "no") + option("yes", "yes"), "fractionated") : "") +
-      `<label class="check"><input type="checkbox" name="motion" value="yes"> shown in motion</label>` +
-      select("sort", "sort by", Object.entries(Atlas.ORDERS).map(([name, [words]]) => option(name, words)).join("")) +
-      `<label class="check"><input type="checkbox" name="down" value="yes"> from the end</label>` +
-      `<fieldset><legend>Show as</legend><label class="chip"><input type="radio" name="view" value="plates" checked><span>plates</span></label>` +
-      `<label class="chip"><input type="radio" name="view" value="lines"><span>lines</span></label></fieldset>` +
-      `<input type="hidden" name="contracted"><button type="reset">Clear</button>`;
+    $("question").innerHTML = html`${[
+      html`<label class="wide">Search<input type="search" name="text" placeholder="label, key or graph6" autocomplete="off" spellcheck="false"></label>`,
+      mobilities.length > 1 && select("mobility", "mobility", [any, ...mobilities.map(w => option(w, w))], "mobility"),
+      html`<fieldset><legend>Links</legend>${sizes.map(([n, count]) =>
+        html`<label class="chip"><input type="checkbox" name="links" value="${n}"><span>${n} <small>${Atlas.count(count)}</small></span></label>`)}</fieldset>`,
+      select("assortment", "assortment", any, "assortment"),
+      select("planar", "planar", [any, option("yes", "planar"), option("no", "not planar")], "planar"),
+      select("symmetry", "symmetry", [any, option("some", "symmetric"), option("none", "none")], "symmetry"),
+      select("girth", "shortest loop", [any, ...[3, 4, 5, 6, 7, 8].filter(g => Atlas.rows.some(row => row.girth === g)).map(g => option(g, `${g} links`))], "girth"),
+      select("low", "class within reach", [any, ...[2, 3, 4, 5].map(c => option(c, c === 2 ? "II" : `up to ${Atlas.roman(c)}`))], "class"),
+      Atlas.rows.some(row => row.fractionated) && select("fractionated", "fractionated", [any, option("no", "no"), option("yes", "yes")], "fractionated"),
+      html`<label class="check"><input type="checkbox" name="motion" value="yes"> shown in motion</label>`,
+      select("sort", "sort by", Object.entries(Atlas.ORDERS).map(([name, [words]]) => option(name, words))),
+      html`<label class="check"><input type="checkbox" name="down" value="yes"> from the end</label>
+<fieldset><legend>Show as</legend><label class="chip"><input type="radio" name="view" value="plates" checked><span>plates</span></label>
+<label class="chip"><input type="radio" name="view" value="lines"><span>lines</span></label></fieldset>
+<input type="hidden" name="contracted"><button type="reset">Clear</button>`,
+    ]}`;
     $("question").addEventListener("input", changed);
     $("question").addEventListener("submit", event => event.preventDefault());
     $("question").addEventListener("reset", () => setTimeout(changed));
@@ -74,8 +75,7 @@
     const sizes = new Set((links || "").split(",").filter(Boolean).map(Number)), counts = new Map();
     for (const row of Atlas.rows)
       if (!sizes.size || sizes.has(row.links)) counts.set(row.assortment, (counts.get(row.assortment) || 0) + 1);
-    $("question").assortment.innerHTML = option("", "any") +
-      [...counts].map(([name, count]) => option(name, `${name}  (${Atlas.count(count)})`, name === chosen)).join("");
+    $("question").assortment.innerHTML = html`${option("", "any")}${[...counts].map(([name, count]) => option(name, `${name}  (${Atlas.count(count)})`, name === chosen))}`;
   }
 
   async function changed(event) {
@@ -102,8 +102,8 @@
     const all = Atlas.rows.length;
     $("count").textContent = found.length === all ? `${Atlas.count(all)} chains` : `${Atlas.count(found.length)} of ${Atlas.count(all)} chains`;
     const rest = Atlas.contents.families.filter(family => !Atlas.families.get(family.name).rows);
-    $("chosen").innerHTML = (rest.length ? `Chosen by their number of links, and loaded then: ${rest.map(f => `${Atlas.count(f.chains)} chains with ${f.links} links`).join(", ")}. ` : "") + (question.contracted
-      ? `with the contracted graph ${Atlas.contents.contracted[question.contracted] || "?"} <button type="button" id="anyshape">any</button>` : "");
+    $("chosen").innerHTML = html`${rest.length > 0 && `Chosen by their number of links, and loaded then: ${rest.map(f => `${Atlas.count(f.chains)} chains with ${f.links} links`).join(", ")}. `}${question.contracted
+      && html`with the contracted graph ${Atlas.contents.contracted[question.contracted] || "?"} <button type="button" id="anyshape">any</button>`}`;
     if (question.contracted) $("anyshape").addEventListener("click", () => { $("question").contracted.value = ""; changed(); });
   }
 
@@ -148,16 +148,15 @@
     item.setAttribute("aria-posinset", k + 1);
     item.setAttribute("aria-setsize", found.length);
     const marks = [row.symmetry > 1 ? `symmetry ${row.symmetry}` : "", row.planar ? "" : "not planar"].filter(Boolean).join(", ");
-    item.innerHTML = `<a href="#/${row.key}"><span class="thumb" style="width:${size[0]}px;height:${size[1]}px"></span>` +
-      `<span class="words"><b>${row.label}</b> <small class="key">${row.key}</small>` +
-      `<small>${row.inversions} inversion${row.inversions > 1 ? "s" : ""}</small><small>${marks}</small>` +
-      `<small class="more">shortest loop ${row.girth}</small><small class="more">class ${Atlas.classes(row)}</small></span></a>`;
+    item.innerHTML = html`<a href="#/${row.key}"><span class="thumb" style="width:${size[0]}px;height:${size[1]}px"></span><span
+ class="words"><b>${row.label}</b> <small class="key">${row.key}</small><small>${row.inversions} inversion${row.inversions > 1 ? "s" : ""}</small><small>${marks}</small><small
+ class="more">shortest loop ${row.girth}</small><small class="more">class ${Atlas.classes(row)}</small></span></a>`;
     shown.set(k, item);
     // in the order of the list, for the tab key
     const next = [...$("list").children].find(other => +other.dataset.k > k);
     $("list").insertBefore(item, next || null);
     const thumb = item.querySelector(".thumb");
-    const paint = places => { if (places && thumb.isConnected) thumb.innerHTML = Atlas.sketch(Atlas.decodeKey(row.key), places, {width: size[0], height: size[1], small: true}); };
+    const paint = places => { if (places && thumb.isConnected) thumb.innerHTML = Atlas.drawn(Atlas.sketch(Atlas.decodeKey(row.key), places, {width: size[0], height: size[1], small: true})); };
     const known = Atlas.placesOf(row);
     if (known) paint(known); else Atlas.loadPlaces(row).then(paint);
   }

@@ -107,7 +107,7 @@
   }
 
   function wrap(width, height, title, file, body) {
-    const name = title.replace(/[&<>"]/g, c => `&#${c.charCodeAt(0)};`);
+    const name = Atlas.plain(title);
     const about = title ? ` role="img" aria-label="${name}"` : ' aria-hidden="true"';
     return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${short(width)} ${short(height)}" width="${short(width)}" height="${short(height)}"${about}` +
       `${file ? ' font-family="system-ui,sans-serif"' : ""}>${title ? `<title>${name}</title>` : ""}${file ? STYLE + plain(body) : body}</svg>`;

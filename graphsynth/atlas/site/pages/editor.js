@@ -13,7 +13,7 @@
     /** `told` is called with {graph, names, frame} or {words} after every change. */
     constructor(place, told) {
       Object.assign(this, {place, told, pivots: [], links: [], frame: null, open: null, cursor: [WIDE / 2, TALL / 2], past: [], drag: null});
-      place.innerHTML = `<div class="tools" role="toolbar" aria-label="Drawing">
+      place.innerHTML = Atlas.html`<div class="tools" role="toolbar" aria-label="Drawing">
 <button type="button" data-do="end">End link</button> <button type="button" data-do="undo">Undo</button>
 <button type="button" data-do="clear">Clear</button> <button type="button" data-do="example">Example</button></div>
 <svg class="sheet" viewBox="0 0 ${WIDE} ${TALL}" tabindex="0" role="application" aria-label="Sheet: arrows move the cross, Enter puts a pivot or takes one, E ends the link, Delete removes, Shift and arrows move a pivot" aria-describedby="sheethelp"></svg>
@@ -169,9 +169,9 @@
 
     show(typing = false) {
       if (!typing) this.letters.value = this.links.map(link => link.map(letter).join("")).join(" ");
-      this.place.querySelector(".drawn").innerHTML = this.links.map((link, k) =>
-        `<li><span>link ${k}: ${link.map(letter).join(" ")}</span> <label><input type="checkbox" value="${k}"${this.frame === k ? " checked" : ""}> frame</label> ` +
-        `<button type="button" data-remove="${k}" aria-label="Remove link ${k}">remove</button></li>`).join("");
+      this.place.querySelector(".drawn").innerHTML = Atlas.html`${this.links.map((link, k) =>
+        Atlas.html`<li><span>link ${k}: ${link.map(letter).join(" ")}</span> <label><input type="checkbox" value="${k}"${this.frame === k ? " checked" : ""}> frame</label>
+<button type="button" data-remove="${k}" aria-label="Remove link ${k}">remove</button></li>`)}`;
       this.draw();
       this.told(this.result());
     }
@@ -194,7 +194,7 @@
         `<text x="${x + 10}" y="${y - 9}" font-size="13" fill="var(--ink)" stroke="var(--paper)" stroke-width="3" paint-order="stroke">${letter(k)}</text>`);
       const [x, y] = this.cursor;
       const cross = `<path class="cross" d="M${x - 9} ${y}h18M${x} ${y - 9}v18" stroke="var(--drive)" stroke-width="1.6"/>`;
-      this.sheet.innerHTML = grid + links.join("") + open + pivots.join("") + cross;
+      this.sheet.innerHTML = Atlas.drawn(grid + links.join("") + open + pivots.join("") + cross);
     }
 
     result() {

@@ -2,37 +2,37 @@
 "use strict";
 
 (function () {
-  const $ = id => document.getElementById(id);
+  const $ = id => document.getElementById(id), {html} = Atlas;
   const NAMES = ["binary", "ternary", "quaternary", "quinary"];
   let state = null;
 
   const kinds = row => row.assortment.split("-").map((count, k) => [+count, NAMES[k] || `${k + 2}-joint`])
     .filter(([count]) => count).map(([count, name]) => `${count} ${name}`).join(", ");
-  const listed = links => links.join(", ");
+  const listed = (links, between = ", ") => links.join(between);
 
   function sentence(row, graph) {
     const loops = graph.joints.length - graph.links + 1;
-    return `${graph.links} ${Atlas.term("link", "links")} (${kinds(row)}), ${graph.joints.length} ${Atlas.term("joint", "joints")}, ` +
-      `${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
+    return html`${graph.links} ${Atlas.term("link", "links")} (${kinds(row)}), ${graph.joints.length} ${Atlas.term("joint", "joints")},
+${loops} ${Atlas.term("loop")}, ${Atlas.term("mobility")} ${row.mobility}.`;
   }
 
   function header(row) {
-    const link = (other, words) => (other ? `<a href="#/${other.key}" title="${other.label}">${words}</a>` : `<span class="soft">${words}</span>`);
-    return `<p class="path"><a href="#/?links=${row.links}">${row.links} links</a> › <a href="#/?links=${row.links}&amp;assortment=${row.assortment}">${row.assortment}</a>` +
-      `<span class="turn">${link(Atlas.rows[row.id - 1], "‹ before")} ${link(Atlas.rows[row.id + 1], "next ›")}</span></p>` +
-      `<h1 tabindex="-1">${row.label}</h1><p class="keyline">${Atlas.term("key")} <code>${row.key}</code> <button type="button" id="copy">copy</button></p>`;
+    const link = (other, words) => (other ? html`<a href="#/${other.key}" title="${other.label}">${words}</a>` : html`<span class="soft">${words}</span>`);
+    return html`<p class="path"><a href="#/?links=${row.links}">${row.links} links</a> › <a href="#/?links=${row.links}&amp;assortment=${row.assortment}">${row.assortment}</a><span
+ class="turn">${link(Atlas.rows[row.id - 1], "‹ before")} ${link(Atlas.rows[row.id + 1], "next ›")}</span></p>
+<h1 tabindex="-1">${row.label}</h1><p class="keyline">${Atlas.term("key")} <code>${row.key}</code> <button type="button" id="copy">copy</button></p>`;
   }
 
   function properties(row, label) {
     const orbits = orbitsOf(label).filter(orbit => orbit.length > 1);
     const items = [
-      ["symmetry", `${row.symmetry === 1 ? "none" : `order ${row.symmetry}`}${orbits.length ? `; ${Atlas.term("orbit", "orbits")} ${orbits.map(orbit => `{${listed(orbit)}}`).join(" ")}` : ""}`],
+      ["symmetry", html`${row.symmetry === 1 ? "none" : `order ${row.symmetry}`}${orbits.length > 0 && html`; ${Atlas.term("orbit", "orbits")} ${orbits.map(orbit => `{${listed(orbit)}}`).join(" ")}`}`],
       ["inversion", `${row.inversions}`, "inversions"], ["planar", row.planar ? "yes" : "no"], ["girth", `${row.girth} links`],
       ["fractionated", row.fractionated ? "yes" : "no"], ["class", `${Atlas.classes(row)} over all frames and drivers`],
-      ["contracted", `<span class="shape">${(Atlas.contents.contracted[row.contracted] || "not computed").replace(/x/g, "×")}</span> <a href="#/?contracted=${row.contracted}">all with it</a>`],
-      ["graph6", `<code>${Atlas.toGraph6(Atlas.decodeKey(row.key)).replace(/[&<>]/g, c => `&#${c.charCodeAt(0)};`)}</code>`],
+      ["contracted", html`<span class="shape">${(Atlas.contents.contracted[row.contracted] || "not computed").replace(/x/g, "×")}</span> <a href="#/?contracted=${row.contracted}">all with it</a>`],
+      ["graph6", html`<code>${Atlas.toGraph6(Atlas.decodeKey(row.key))}</code>`],
     ];
-    return `<dl>${items.map(([term, words, shown]) => `<div><dt>${Atlas.term(term, shown)}</dt><dd>${words}</dd></div>`).join("")}</dl>`;
+    return html`<dl>${items.map(([term, words, shown]) => html`<div><dt>${Atlas.term(term, shown)}</dt><dd>${words}</dd></div>`)}</dl>`;
   }
 
   function orbitsOf(label) {
@@ -42,18 +42,18 @@
   }
 
   const matrixTable = (rows, caption, heads) =>
-    `<div class="scroll"><table class="matrix"><caption>${caption}</caption><thead><tr><td></td>${heads.map(h => `<th scope="col">${h}</th>`).join("")}</tr></thead>` +
-    `<tbody>${rows.map((row, k) => `<tr><th scope="row">${k}</th>${row.map(v => `<td${v ? ' class="one"' : ""}>${v || "·"}</td>`).join("")}</tr>`).join("")}</tbody></table></div>`;
+    html`<div class="scroll"><table class="matrix"><caption>${caption}</caption><thead><tr><td></td>${heads.map(h => html`<th scope="col">${h}</th>`)}</tr></thead>
+<tbody>${rows.map((row, k) => html`<tr><th scope="row">${k}</th>${row.map(v => (v ? html`<td class="one">${v}</td>` : html`<td>·</td>`))}</tr>`)}</tbody></table></div>`;
 
   const motionOf = row => Atlas.contents.motions[row.label];
 
   function motion(row) {
     const facts = motionOf(row);
-    if (!facts) return `<p class="soft">Not computed${Atlas.contents.motionLinks ? `: this atlas gives dimensions to chains of up to ${Atlas.contents.motionLinks} links` : " in this atlas"}.</p>`;
-    if (!facts.drivers) return `<p class="soft">No dimensions were accepted: ${facts.statement}.</p>`;
-    return `<p>Frame ${facts.frame}, driver ${listed(facts.drivers)}, ${facts.statement.startsWith("dimensions of") ? "dimensions of the catalogue" : "dimensions found for this page"}; smallest ${Atlas.term("transmission")} ${(facts.transmission * 180 / Math.PI).toFixed(1)}°, ` +
-      `longest link over shortest ${facts.ratio}. Drag the driven link. <a href="motions/${row.label}.html">On a page of its own</a> · <a href="motions/${row.label}.toml" download>dimensions, TOML</a></p>` +
-      `<iframe src="motions/${row.label}.html" title="Chain ${row.label} in motion" loading="lazy"></iframe>`;
+    if (!facts) return html`<p class="soft">Not computed${Atlas.contents.motionLinks ? `: this atlas gives dimensions to chains of up to ${Atlas.contents.motionLinks} links` : " in this atlas"}.</p>`;
+    if (!facts.drivers) return html`<p class="soft">No dimensions were accepted: ${facts.statement}.</p>`;
+    return html`<p>Frame ${facts.frame}, driver ${listed(facts.drivers)}, ${facts.statement.startsWith("dimensions of") ? "dimensions of the catalogue" : "dimensions found for this page"}; smallest ${Atlas.term("transmission")} ${(facts.transmission * 180 / Math.PI).toFixed(1)}°,
+longest link over shortest ${facts.ratio}. Drag the driven link. <a href="motions/${row.label}.html">On a page of its own</a> · <a href="motions/${row.label}.toml" download>dimensions, TOML</a></p>
+<iframe src="motions/${row.label}.html" title="Chain ${row.label} in motion" loading="lazy"></iframe>`;
   }
 
   /** Best choice to begin with: that of the motion, or the first driver that gives the lowest class. */
@@ -89,19 +89,19 @@
       const frame = orbit[0], framed = {...graph, frame};
       const sets = driverSets(graph, frame).map(drivers => {
         const groups = Atlas.groups(framed, drivers), own = groups && classOf(groups);
-        return `<button type="button" class="pick" data-frame="${frame}" data-drivers="${drivers}"${groups ? "" : " disabled"}>${listed(drivers)} <small>${groups ? Atlas.roman(own) : "locked"}</small></button>`;
+        return html`<button type="button" class="pick" data-frame="${frame}" data-drivers="${listed(drivers, ",")}"${groups ? "" : " disabled"}>${listed(drivers)} <small>${groups ? Atlas.roman(own) : "locked"}</small></button>`;
       });
-      return `<tr><th scope="row">${frame}${orbit.length > 1 ? ` <small class="soft">like ${listed(orbit.slice(1))}</small>` : ""}</th>` +
-        `<td>${Atlas.levels(framed).map(level => level.length).join("-")}</td><td>${sets.join(" ")}</td></tr>`;
+      return html`<tr><th scope="row">${frame}${orbit.length > 1 && html` <small class="soft">like ${listed(orbit.slice(1))}</small>`}</th>
+<td>${Atlas.levels(framed).map(level => level.length).join("-")}</td><td>${sets.map(set => html`${set} `)}</td></tr>`;
     });
-    return `<div class="scroll"><table class="inversions"><thead><tr><th scope="col">frame</th><th scope="col">${Atlas.term("levels", "levels")}</th>` +
-      `<th scope="col">${Atlas.term("driver", "drivers")} and the ${Atlas.term("class", "class")} they give</th></tr></thead><tbody>${lines.join("")}</tbody></table></div>`;
+    return html`<div class="scroll"><table class="inversions"><thead><tr><th scope="col">frame</th><th scope="col">${Atlas.term("levels", "levels")}</th>
+<th scope="col">${Atlas.term("driver", "drivers")} and the ${Atlas.term("class", "class")} they give</th></tr></thead><tbody>${lines}</tbody></table></div>`;
   }
 
   function controls(graph) {
-    const frames = [...Array(graph.links).keys()].map(link => `<option value="${link}">link ${link}</option>`).join("");
-    return `<div class="controls"><label>Frame <select id="frame"><option value="">none</option>${frames}</select></label>` +
-      `<fieldset id="drivers"><legend>${Atlas.term("driver")}</legend></fieldset><span class="soft">or click a link to hold it</span></div>`;
+    const frames = [...Array(graph.links).keys()].map(link => html`<option value="${link}">link ${link}</option>`);
+    return html`<div class="controls"><label>Frame <select id="frame"><option value="">none</option>${frames}</select></label>
+<fieldset id="drivers"><legend>${Atlas.term("driver")}</legend></fieldset><span class="soft">or click a link to hold it</span></div>`;
   }
 
   function pictures() {
@@ -118,13 +118,14 @@
     const {graph, frame, drivers} = state, near = frame === null ? [] : Atlas.neighbours(graph)[frame];
     state.groups = frame === null ? null : Atlas.groups({...graph, frame}, drivers);
     const shown = pictures();
-    $("sketch").innerHTML = shown.sketch(false) || '<p class="soft">This sketch could not be loaded.</p>';
-    $("levelsketch").innerHTML = shown.levels(false) || '<p class="soft">Choose a frame: levels are counted from it.</p>';
+    const picture = (svg, words) => (svg ? Atlas.drawn(svg) : html`<p class="soft">${words}</p>`);
+    $("sketch").innerHTML = picture(shown.sketch(false), "This sketch could not be loaded.");
+    $("levelsketch").innerHTML = picture(shown.levels(false), "Choose a frame: levels are counted from it.");
     $("frame").value = frame === null ? "" : frame;
     const one = Atlas.mobility(graph) === 1;
     $("drivers").hidden = frame === null;
-    $("drivers").innerHTML = `<legend>${Atlas.term("driver")}</legend>` + near.map(link =>
-      `<label class="chip"><input type="${one ? "radio" : "checkbox"}" name="driver" value="${link}"${drivers.includes(link) ? " checked" : ""}><span>${link}</span></label>`).join("");
+    $("drivers").innerHTML = html`<legend>${Atlas.term("driver")}</legend>${near.map(link =>
+      html`<label class="chip"><input type="${one ? "radio" : "checkbox"}" name="driver" value="${link}"${drivers.includes(link) ? " checked" : ""}><span>${link}</span></label>`)}`;
     $("groups").innerHTML = groupList();
     document.querySelectorAll("#entry .pick").forEach(button =>
       button.setAttribute("aria-pressed", button.dataset.frame === String(frame) && button.dataset.drivers === String(drivers)));
@@ -133,22 +134,21 @@
 
   function groupList() {
     const {graph, frame, drivers, groups} = state;
-    if (frame === null) return '<p class="soft">Choose a frame and a driver.</p>';
+    if (frame === null) return html`<p class="soft">Choose a frame and a driver.</p>`;
     if (!groups) {
       const wanted = Atlas.mobility(graph);
-      return `<p class="soft">${drivers.length === wanted ? "These drivers do not move the mechanism." : `Choose ${wanted} driver${wanted > 1 ? "s" : ""}.`}</p>`;
+      return html`<p class="soft">${drivers.length === wanted ? "These drivers do not move the mechanism." : `Choose ${wanted} driver${wanted > 1 ? "s" : ""}.`}</p>`;
     }
     const items = groups.map((group, k) =>
-      `<li><span class="swatch g${k % 4 + 1}"></span>links ${listed(group.links)}: ${Atlas.term("class")} ${Atlas.roman(Atlas.classOf(group.key))}, ${Atlas.term("order")} ${group.order}` +
-      `${group.links.length === 2 ? " (dyad)" : ""}</li>`);
-    return `<p>Driver ${listed(drivers)} on frame ${frame}, then</p><ol>${items.join("")}</ol><p>Mechanism of class ${Atlas.roman(classOf(groups))}.</p>`;
+      html`<li><span class="swatch g${k % 4 + 1}"></span>links ${listed(group.links)}: ${Atlas.term("class")} ${Atlas.roman(Atlas.classOf(group.key))}, ${Atlas.term("order")} ${group.order}${group.links.length === 2 && " (dyad)"}</li>`);
+    return html`<p>Driver ${listed(drivers)} on frame ${frame}, then</p><ol>${items}</ol><p>Mechanism of class ${Atlas.roman(classOf(groups))}.</p>`;
   }
 
   function saveButtons(shown) {
     const {graph, row, frame} = state, svgs = {};
     for (const what of ["sketch", "levels"]) { const text = shown[what](true); if (text) svgs[what] = text; }
     const files = Atlas.filesOf({...graph, frame}, row, svgs);
-    $("files").innerHTML = files.map(([name, what], k) => `<button type="button" data-file="${k}" title="${name}">${what}</button>`).join(" ");
+    $("files").innerHTML = html`${files.map(([name, what], k) => html`<button type="button" data-file="${k}" title="${name}">${what}</button> `)}`;
     $("files").onclick = event => {
       const button = event.target.closest("[data-file]");
       if (button) { const [name, , type, text] = files[+button.dataset.file]; Atlas.save(name, type, text); }
@@ -186,21 +186,22 @@
     });
   }
 
-  const card = row => (typeof row === "string" ? `<li><code>${row}</code></li>`
-    : `<li><a href="#/${row.key}"><span class="thumb" data-key="${row.key}"></span><small>${row.label}</small></a></li>`);
+  const card = row => (typeof row === "string" ? html`<li><code>${row}</code></li>`
+    : html`<li><a href="#/${row.key}"><span class="thumb" data-key="${row.key}"></span><small>${row.label}</small></a></li>`);
 
   async function relatives(row) {
     const {parents, children} = await Atlas.relativesOf(row);
     if (state.row !== row) return;
-    const most = 24, strip = list => `<ul class="strip">${list.map(card).join("")}</ul>`;
+    const most = 24, strip = list => html`<ul class="strip">${list.map(card)}</ul>`;
     const rest = children.slice(most);
-    $("relatives").innerHTML =
-      (parents.length ? `<h3>${parents.length} parent${parents.length > 1 ? "s" : ""}</h3>${strip(parents)}` : `<p class="soft">No parent: no dyad can be taken out so that a chain is left.</p>`) +
-      (children.length ? `<h3>${children.length} child${children.length > 1 ? "ren" : ""}</h3>${strip(children.slice(0, most))}` +
-        (rest.length ? `<details><summary>${rest.length} more</summary>${strip(rest)}</details>` : "") : `<p class="soft">No children in this catalogue.</p>`);
+    $("relatives").innerHTML = html`${[
+      parents.length ? html`<h3>${parents.length} parent${parents.length > 1 && "s"}</h3>${strip(parents)}` : html`<p class="soft">No parent: no dyad can be taken out so that a chain is left.</p>`,
+      children.length ? html`<h3>${children.length} child${children.length > 1 && "ren"}</h3>${strip(children.slice(0, most))}` : html`<p class="soft">No children in this catalogue.</p>`,
+      rest.length > 0 && html`<details><summary>${rest.length} more</summary>${strip(rest)}</details>`,
+    ]}`;
     const paint = async box => {
       const other = await Atlas.find(box.dataset.key), places = await Atlas.loadPlaces(other);
-      if (places) box.innerHTML = Atlas.sketch(Atlas.decodeKey(other.key), places, {width: 84, height: 68, small: true});
+      if (places) box.innerHTML = Atlas.drawn(Atlas.sketch(Atlas.decodeKey(other.key), places, {width: 84, height: 68, small: true}));
     };
     const seen = new IntersectionObserver(entries => entries.filter(one => one.isIntersecting).forEach(one => { seen.unobserve(one.target); paint(one.target); }), {rootMargin: "200px"});
     $("relatives").querySelectorAll(".thumb").forEach(box => seen.observe(box));
@@ -212,8 +213,8 @@
   async function evaluations(row) {
     const rows = await Atlas.evaluationsOf(row);
     if (state.row !== row || !rows.length) return;
-    const heads = ["frame", "driver", "what", "result", "value", "guarantee"].map(words => `<th scope="col">${words}</th>`).join("");
-    const cells = words => words.map(one => `<td>${Atlas.plain(String(one))}</td>`).join("");
+    const heads = ["frame", "driver", "what", "result", "value", "guarantee"].map(words => html`<th scope="col">${words}</th>`);
+    const cells = words => words.map(one => html`<td>${String(one)}</td>`);
     const mechanisms = new Map();
     for (const [frame, drivers, ...rest] of rows) {
       const name = `${frame}|${drivers}`;
@@ -223,10 +224,10 @@
       const [frame, drivers] = name.split("|");
       const missing = KINDS.filter(kind => !own.some(one => one[0] === kind)).map(kind => [kind, "not computed", null, null, null]);
       return [...own, ...missing].map(([kind, status, value, unit, guarantee], k) =>
-        `<tr>${k ? "<td></td><td></td>" : cells([frame, drivers])}${cells([kind, status, measure(value, unit), guarantee || ""])}</tr>`);
+        html`<tr>${k ? cells(["", ""]) : cells([frame, drivers])}${cells([kind, status, measure(value, unit), guarantee || ""])}</tr>`);
     });
-    $("evaluations").innerHTML = `<div class="scroll"><table class="inversions"><thead><tr>${heads}</tr></thead><tbody>${lines.join("")}</tbody></table></div>` +
-      `<p class="soft">Other frames and drivers: not computed in this catalogue.</p>`;
+    $("evaluations").innerHTML = html`<div class="scroll"><table class="inversions"><thead><tr>${heads}</tr></thead><tbody>${lines}</tbody></table></div>
+<p class="soft">Other frames and drivers: not computed in this catalogue.</p>`;
   }
 
   function choiceIn(parameters, row, graph, label) {
@@ -244,7 +245,7 @@
     const row = await Atlas.find(name);
     if (state !== mark) return null;
     if (!row) {
-      entry.innerHTML = `<h1 tabindex="-1">Not in this atlas</h1><p>No chain here has the key or label <code>${Atlas.plain(name)}</code>. <a href="#/find">Find my mechanism</a> says why.</p>`;
+      entry.innerHTML = html`<h1 tabindex="-1">Not in this atlas</h1><p>No chain here has the key or label <code>${name}</code>. <a href="#/find">Find my mechanism</a> says why.</p>`;
       return "Not in this atlas";
     }
     const [places] = await Promise.all([Atlas.loadPlaces(row), Atlas.loadClasses()]);
@@ -252,17 +253,17 @@
     const graph = Atlas.decodeKey(row.key), label = Atlas.label(graph);
     state = {row, graph, label, places, ...choiceIn(parameters, row, graph, label)};
     const joints = graph.joints.map(([a, b]) => `${a}-${b}`);
-    entry.innerHTML = header(row) + `<p class="lead">${sentence(row, graph)}</p>` +
-      `<div class="plate"><figure><div id="sketch" class="picture"></div><figcaption>Kinematic diagram</figcaption></figure>` +
-      `<figure><div id="levelsketch" class="picture"></div><figcaption>Graph by ${Atlas.term("levels")}</figcaption></figure></div>` + controls(graph) +
-      `<div class="columns"><section><h2>${Atlas.term("group", "Structural groups")}</h2><div id="groups"></div></section><section><h2>Properties</h2>${properties(row, label)}</section></div>` +
-      `<h2>${Atlas.term("inversion", "Inversions")} and drivers</h2>${inversions(graph, label)}` +
-      `<h2>Motion</h2>${motion(row)}` +
-      `<h2>Evaluations</h2><div id="evaluations"><p class="soft">Dimensions, transmission, jamming: not computed in this catalogue.</p></div>` +
-      `<h2>Matrices</h2><div class="columns">${matrixTable(Atlas.matrix(graph), Atlas.term("adjacency"), [...Array(graph.links).keys()])}` +
-      `${matrixTable(Atlas.incidence(graph), Atlas.term("incidence"), joints)}</div>` +
-      `<h2>${Atlas.term("parent", "Parents and children")}</h2><div id="relatives" class="relatives"></div>` +
-      `<h2>Save</h2><div id="files" class="files"></div>`;
+    entry.innerHTML = html`${header(row)}<p class="lead">${sentence(row, graph)}</p>
+<div class="plate"><figure><div id="sketch" class="picture"></div><figcaption>Kinematic diagram</figcaption></figure>
+<figure><div id="levelsketch" class="picture"></div><figcaption>Graph by ${Atlas.term("levels")}</figcaption></figure></div>${controls(graph)}
+<div class="columns"><section><h2>${Atlas.term("group", "Structural groups")}</h2><div id="groups"></div></section><section><h2>Properties</h2>${properties(row, label)}</section></div>
+<h2>${Atlas.term("inversion", "Inversions")} and drivers</h2>${inversions(graph, label)}
+<h2>Motion</h2>${motion(row)}
+<h2>Evaluations</h2><div id="evaluations"><p class="soft">Dimensions, transmission, jamming: not computed in this catalogue.</p></div>
+<h2>Matrices</h2><div class="columns">${matrixTable(Atlas.matrix(graph), Atlas.term("adjacency"), [...Array(graph.links).keys()])}
+${matrixTable(Atlas.incidence(graph), Atlas.term("incidence"), joints)}</div>
+<h2>${Atlas.term("parent", "Parents and children")}</h2><div id="relatives" class="relatives"></div>
+<h2>Save</h2><div id="files" class="files"></div>`;
     listen();
     showChoice();
     relatives(row);

@@ -2,11 +2,11 @@
 "use strict";
 
 (function () {
-  const $ = id => document.getElementById(id);
+  const $ = id => document.getElementById(id), {html} = Atlas;
   let built = false, asked = 0;
 
   function build() {
-    $("find").innerHTML = `<h1 tabindex="-1">Find my mechanism</h1>
+    $("find").innerHTML = html`<h1 tabindex="-1">Find my mechanism</h1>
 <p class="lead">Paste it or draw it; the numbering does not matter.</p>
 <div class="answer" id="answer" aria-live="polite"><p class="soft">What is found appears here.</p></div>
 <div class="columns"><section><h2>Paste</h2>
@@ -31,7 +31,7 @@
     });
   }
 
-  const say = words => { asked++; $("answer").innerHTML = `<p>${Atlas.plain(words)}</p>`; };
+  const say = words => { asked++; $("answer").innerHTML = html`<p>${words}</p>`; };
 
   async function fromText() {
     const text = $("pasted").value;
@@ -55,8 +55,8 @@
     const own = [...Array(graph.links).keys()];
     const same = own.every(link => to[link] === (names ? names[link] : link));
     if (same) return "";
-    return `<div class="scroll"><table class="matrix"><tbody><tr><th scope="row">your link</th>${own.map(link => `<td>${names ? names[link] : link}</td>`).join("")}</tr>` +
-      `<tr><th scope="row">here</th>${own.map(link => `<td>${to[link]}</td>`).join("")}</tr></tbody></table></div>`;
+    return html`<div class="scroll"><table class="matrix"><tbody><tr><th scope="row">your link</th>${own.map(link => html`<td>${names ? names[link] : link}</td>`)}</tr>
+<tr><th scope="row">here</th>${own.map(link => html`<td>${to[link]}</td>`)}</tr></tbody></table></div>`;
   }
 
   async function tell(graph, how, names) {
@@ -71,14 +71,14 @@
         : `It is fractionated: it falls apart at link ${names ? names[cut] : cut}, and this family lists no such chains.`;
       const why = fault || (held ? apart
         : `This atlas does not reach chains of mobility ${mobility} with ${graph.links} links.`);
-      $("answer").innerHTML = `<p>${Atlas.plain(head)} <strong>Not in this atlas.</strong> ${Atlas.plain(why)}</p><p>${Atlas.term("key")} <code>${label.key}</code></p>`;
+      $("answer").innerHTML = html`<p>${head} <strong>Not in this atlas.</strong> ${why}</p><p>${Atlas.term("key")} <code>${label.key}</code></p>`;
       return;
     }
     const address = `#/${row.key}${graph.frame === null ? "" : `?frame=${label.to[graph.frame]}`}`;
-    $("answer").innerHTML = `<div class="hit"><a class="thumb" href="${address}" tabindex="-1" aria-hidden="true" style="width:132px;height:106px"></a><div><p>${Atlas.plain(head)}</p>` +
-      `<p>It is <a class="found" href="${address}"><b>${row.label}</b></a>, ${Atlas.term("key")} <code>${row.key}</code>.</p>${numbering(graph, label.to, names)}</div></div>`;
+    $("answer").innerHTML = html`<div class="hit"><a class="thumb" href="${address}" tabindex="-1" aria-hidden="true" style="width:132px;height:106px"></a><div><p>${head}</p>
+<p>It is <a class="found" href="${address}"><b>${row.label}</b></a>, ${Atlas.term("key")} <code>${row.key}</code>.</p>${numbering(graph, label.to, names)}</div></div>`;
     const places = await Atlas.loadPlaces(row), box = $("answer").querySelector(".thumb");
-    if (mine === asked && places && box) box.innerHTML = Atlas.sketch(label.canonical, places, {width: 132, height: 106, small: true});
+    if (mine === asked && places && box) box.innerHTML = Atlas.drawn(Atlas.sketch(label.canonical, places, {width: 132, height: 106, small: true}));
   }
 
   Atlas.openFind = function () { if (!built) build(); return "Find my mechanism"; };

@@ -30,7 +30,7 @@
   };
 
   Atlas.term = (name, shown = Atlas.TERMS[name][0]) =>
-    `<button type="button" class="term" data-term="${name}" aria-expanded="false">${shown}</button>`;
+    Atlas.html`<button type="button" class="term" data-term="${name}" aria-expanded="false">${shown}</button>`;
 
   let open = null;
   function close(focus) {
@@ -46,7 +46,7 @@
     note.className = "definition";
     note.id = "definition";
     note.setAttribute("role", "note");
-    note.innerHTML = `<strong>${name}</strong> ${words}`;
+    note.innerHTML = Atlas.html`<strong>${name}</strong> ${words}`;
     document.body.append(note);
     const at = button.getBoundingClientRect(), wide = document.documentElement.clientWidth;
     note.style.left = `${Math.max(8, Math.min(at.left, wide - note.offsetWidth - 8)) + scrollX}px`;

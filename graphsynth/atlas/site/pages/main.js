@@ -6,7 +6,6 @@
   Atlas.roman = own => (own === undefined ? "not computed" : ROMAN[own] || String(own));
   Atlas.count = value => String(value).replace(/\B(?=(\d{3})+$)/g, "\u202f");
   Atlas.classes = row => (!row.low ? "not computed" : row.low === row.high ? Atlas.roman(row.low) : `${Atlas.roman(row.low)}–${Atlas.roman(row.high)}`);
-  Atlas.plain = text => text.replace(/[&<>"]/g, c => `&#${c.charCodeAt(0)};`);
 
   let first = true;
 
@@ -37,7 +36,7 @@
     first = false;
   }
 
-  Atlas.start = function () {
+  addEventListener("DOMContentLoaded", function () {
     const theme = document.getElementById("theme"), root = document.documentElement;
     theme.value = root.dataset.theme || "auto";
     theme.addEventListener("change", () => {
@@ -52,5 +51,5 @@
     Atlas.startGlossary();
     addEventListener("hashchange", route);
     route();
-  };
+  });
 })();

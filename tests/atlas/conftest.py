@@ -1,0 +1,48 @@
+"""What the tests of catalogues share: a way to put anything into a file."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import contextmanager
+
+import pytest
+
+from graphsynth.atlas.sealing import seal
+
+
+@contextmanager
+def loosened(path, *, sealed=True, anything=False):
+    """Give a connection that writes whatever it is told, past the checks of the columns; the tables are as before.
+
+    ``sealed``: put a new seal on the file, as somebody who wants to deceive would; ``anything``: past the types, too.
+    """
+    text = "UPDATE sqlite_master SET sql = "
+    loose = text + "replace(replace(sql, ') STRICT, WITHOUT', ') WITHOUT'), ') STRICT', ')')"
+    kept = []
+    for step in ("before", "after"):
+        raw = sqlite3.connect(path, isolation_level=None)
+        if anything:
+            raw.execute("PRAGMA writable_schema = ON")
+        if step == "before" and anything:
+            kept = raw.execute("SELECT sql, name FROM sqlite_master").fetchall()
+            raw.execute(loose)
+        elif step == "after":
+            if anything:
+                raw.executemany(f"{text} ? WHERE name = ?", kept)
+            if sealed and raw.execute("SELECT COUNT(*) FROM sqlite_master WHERE name = 'meta'").fetchone()[0]:
+                raw.execute("DELETE FROM meta")
+                seal(raw)
+        raw.close()
+        if step == "before":
+            raw = sqlite3.connect(path, isolation_level=None)
+            raw.execute("PRAGMA ignore_check_constraints = ON")
+            try:
+                yield raw
+            finally:
+                raw.close()
+
+
+@pytest.fixture(scope="session")
+def altered():
+    """:func:`loosened`, for tests."""
+    return loosened
