@@ -33,8 +33,8 @@ SCRIPTS = (
     "graph", "markup", "canonical", "groups", "reading", "drawing", "store", "glossary", "writing", "browse", "entry",
     "editor", "find", "about", "main",
 )  # fmt: skip
-#: What the page may do, whatever its data hold: its own scripts run, and none else.  Opened from a disk it has no origin in
-#: some browsers: then its files are those of "file:".
+#: What the page may do, whatever its data hold: its own scripts run, and none else.  Opened from a disk it has no
+#: origin in some browsers: then its files are those of "file:".
 _POLICY = (
     "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'self' file: 'unsafe-inline'; "
     "script-src 'self' file:; frame-src 'self' file:; img-src 'self' file: data:"
