@@ -154,10 +154,16 @@ def animation_html(
         f'<p class="{css}">{escape(words)}</p>' for css, words in (("", note), ("stop", shown.note)) if words
     )
     template = files("graphsynth.drawing").joinpath("player.html").read_text("utf-8")
-    template = template.replace("@STYLE@", VARIABLES + STYLE)
-    allowed = policy(*(re.findall(f"<{tag}>(.*?)</{tag}>", template, re.DOTALL) for tag in ("style", "script")))
+    allowed = policy(re.findall("<script>(.*?)</script>", template, re.DOTALL))
     data = json.dumps(_data(stage, seconds, driver), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {"POLICY": allowed, "SVG": svg, "NOTES": notes, "DATA": data, "TITLE": escape(name)}
+    parts = {
+        "POLICY": allowed,
+        "STYLE": VARIABLES + STYLE,
+        "SVG": svg,
+        "NOTES": notes,
+        "DATA": data,
+        "TITLE": escape(name),
+    }
     pieces = re.split("@([A-Z]+)@", template)
     return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
 

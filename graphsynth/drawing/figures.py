@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -59,14 +60,16 @@ def themed_svg(figure: Figure, settings: Mapping[str, Any] | None = None) -> str
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     from graphsynth.drawing.palette import LIGHT, STYLE
-    from graphsynth.drawing.svg import FONT
+    from graphsynth.drawing.svg import FONT, sound
 
     stream = io.StringIO()
     # text stays text: readable by screen readers and in the page's font; the same bytes for the same figure
-    with matplotlib.rc_context({**(settings or {}), "svg.fonttype": "none", "svg.hashsalt": "graphsynth"}):
+    own = {**(settings or {}), "svg.fonttype": "none", "svg.hashsalt": "graphsynth"}
+    with matplotlib.rc_context(own), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")  # the reader's typeface may have the letter
         FigureCanvasSVG(figure)
         figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    svg = stream.getvalue()
+    svg = sound(stream.getvalue())
     mark = sha256(svg.encode()).hexdigest()[:8]
     body = svg[svg.index("<svg") :].strip()
     # matplotlib's rules for `*` would count for the whole page

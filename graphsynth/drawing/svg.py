@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import html
+import re
 from collections.abc import Callable, Iterable
-from html import escape
 
 from graphsynth.drawing.palette import LIGHT, STYLE
 from graphsynth.drawing.shapes import Circle, Path, Point, Shape, Style, Text
 
-__all__ = ["FONT", "bare", "element", "number", "painted", "picture", "words"]
+__all__ = ["FONT", "bare", "element", "escape", "number", "painted", "picture", "sound", "words"]
 
 ToPage = Callable[[Point], tuple[float, float]]
 
@@ -16,6 +17,19 @@ ToPage = Callable[[Point], tuple[float, float]]
 FONT = "system-ui,-apple-system,'Segoe UI',Roboto,sans-serif"
 #: Half the height of a capital or a digit in units of the size: few programs know another baseline than the letters'.
 _HALF_CAPITAL = 0.36
+
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def escape(text: str) -> str:
+    """Write text for XML."""
+    return html.escape(sound(text))
+
+
+def sound(text: str) -> str:
+    """Return text in which characters that no XML file may hold are the replacement character."""
+    return _NOT_XML.sub("\ufffd", text)
 
 
 def number(value: float) -> str:

@@ -22,6 +22,7 @@ from graphsynth.drawing.figures import new_figure, themed_svg
 from graphsynth.drawing.graphs import graph_svg
 from graphsynth.drawing.lambda_linkage import lambda_animation, lambda_sketch, lambda_sketch_3d
 from graphsynth.drawing.levels import draw_levels
+from graphsynth.drawing.pages import whole_page
 from graphsynth.drawing.palette import DARK, LIGHT, STYLE
 from graphsynth.drawing.piston_pictures import piston_sketch
 from graphsynth.drawing.plots import Band, Chart, Line, Mark
@@ -99,6 +100,17 @@ def written(motions: dict[str, Any]) -> dict[str, str]:
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_writer_keeps_to_what_all_programs_read(written: dict[str, str], name: str) -> None:
     assert faults(written[name]) == []
+
+
+def test_letters_that_no_file_may_hold_are_replaced(motions: dict[str, Any]) -> None:
+    wrong = "a\x00b\x0b\ud800"
+    for svg in (
+        mechanism_svg(motions["lambda"], 0, title=wrong),
+        animated_svg(motions["lambda"], frames=4, title=wrong),
+    ):
+        assert faults(svg) == [] and "a\ufffdb\ufffd\ufffd" in svg
+    curve = Chart([Line([0.0, 1.0], [0.0, 1.0], "a\x01b 長")], "x", "y").svg()
+    assert faults(curve) == [] and "a\ufffdb 長" in curve
 
 
 def test_files_of_the_command_line_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,6 +202,20 @@ def test_dark_pages_and_reduced_motion_are_followed(window: Any, written: dict[s
     assert window.execute_script(shown) == ["none", "inline"]
     in_chromium(window, path, (620, 400), **{"reduced-motion": "no-preference"})
     assert window.execute_script(shown) == ["inline", "none"]
+
+
+def test_a_page_runs_nothing_and_loads_nothing(window: Any, tmp_path: Path) -> None:
+    (tmp_path / "other.svg").write_text(chart(), "utf-8")
+    body = (
+        "<script>document.title = 'ran'</script><img src=other.svg onload=\"document.title = 'loaded'\">"
+        "<svg onload=\"document.title = 'ran'\"><circle r='5' style='fill: #010203'/></svg>"
+    )
+    (tmp_path / "page.html").write_text(whole_page("a < b", "p{color:#040506}", f"{body}<p>text</p>"), "utf-8")
+    window.get((tmp_path / "page.html").as_uri())
+    assert window.title == "a < b"
+    shown = "return ['p', 'circle', 'img'].map(name => document.querySelector(name)).map(e => e.naturalWidth ?? "
+    colours = window.execute_script(f"{shown} [getComputedStyle(e).color, getComputedStyle(e).fill])")
+    assert colours == [["rgb(4, 5, 6)", "rgb(0, 0, 0)"], ["rgb(0, 0, 0)", "rgb(1, 2, 3)"], 0]
 
 
 #: The largest distance, in pixels, of a joint from the ends of the bars it joins, over all pictures of the page.
