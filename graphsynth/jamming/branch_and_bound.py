@@ -269,7 +269,7 @@ def _either(switch: Dual, low: Dual, high: Dual) -> Dual:
     return Dual(pick(low.value, high.value), pick(low.grad, high.grad))
 
 
-def largest_gap(box: ToleranceBox, condition: Condition = "general", **options: Any) -> Supremum:
+def largest_gap(box: ToleranceBox, condition: Condition = "A", **options: Any) -> Supremum:
     """Enclose the largest gap (mm) over a turn and a tolerance box by branch and bound.
 
     Slower than the two corners of `certify_jamming`, and independent of the monotonicity that they rest on.
@@ -291,11 +291,11 @@ def largest_gap(box: ToleranceBox, condition: Condition = "general", **options: 
     Raises
     ------
     GeometryError
-        For a range of axes, or the rod of the source.
+        For a range of axes, or the rod of the source; "general" without a hole length.
 
     Examples
     --------
-    >>> box = ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003", hole_length=8)
+    >>> box = ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003")
     >>> found = largest_gap(box, decide_sign=True)
     >>> found.upper < 0, found.boxes < 100
     (True, True)

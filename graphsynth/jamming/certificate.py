@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = ["JamCertificate", "Witness"]
 
+#: What the verdict is about, and what that neglects.
+MODEL = "L0 with exact tilts: the bearing at B takes the whole misalignment, the other joints none; rigid parts"
+
 
 @dataclass(frozen=True)
 class Witness:
@@ -82,6 +85,7 @@ class JamCertificate:
     boxes: int
     seconds: float = field(default=0.0, compare=False)
     method: str = METHOD_CERTIFIED
+    model: str = MODEL
 
     @property
     def clearance_left(self) -> Enclosure:
@@ -143,6 +147,7 @@ class JamCertificate:
             "verdict": self.verdict.name,
             "statement": self.statement,
             "method": self.method,
+            "model": self.model,
             "condition": self.condition,
             "parameters": self.box.describe(),
             "exact_input": self.exact_input,

@@ -35,8 +35,13 @@ class Samples:
         Parameter vectors with a crank angle, uniform in the box and over the turn.
     largest_gap : float
         Largest gap seen, mm (estimated).
-    jamming_fraction : float
-        Part of the samples with a positive gap.
+    jamming_positions : float
+        Part of the samples with a positive gap: the share of crank positions, over all parameter vectors.
+    jamming_mechanisms : float
+        Part of the parameter vectors that have a positive gap somewhere in the turn: the probability that a mechanism
+        drawn from the box jams (estimated), whether that position can be assembled or not.
+    jamming_mechanisms_range : (float, float)
+        Confidence interval of that probability, 95 %, exact for the binomial distribution (Clopper and Pearson 1934).
     corner_gap : float
         Largest gap over all corners of the box at the worst angle, mm (estimated).
     corners : int
@@ -51,7 +56,9 @@ class Samples:
 
     count: int
     largest_gap: float
-    jamming_fraction: float
+    jamming_positions: float
+    jamming_mechanisms: float
+    jamming_mechanisms_range: tuple[float, float]
     corner_gap: float
     corners: int
     bound: float
@@ -81,7 +88,7 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     Returns
     -------
     Samples
-        Largest gap met, mm, and whether it respects the certified bound.
+        Largest gap met, mm, whether it respects the certified bound, and how often positions and mechanisms jam.
 
     Raises
     ------
@@ -92,24 +99,38 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     --------
     >>> box = ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003")
     >>> seen = sample_gaps(box, count=2000)
-    >>> seen.outside, seen.jamming_fraction, 0 <= seen.overestimation < 1e-15
-    (0, 0.0, True)
+    >>> seen.outside, seen.jamming_positions, seen.jamming_mechanisms, 0 <= seen.overestimation < 1e-15
+    (0, 0.0, 0.0, True)
+    >>> seen.jamming_mechanisms_range[1] < 0.002
+    True
     """
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise GeometryError(f"count = {count!r} must be a positive integer; 200000 is usual")
     begin = perf_counter()
     bound = certify_jamming(box, condition).largest_gap.hi
     generator = np.random.default_rng(seed)
-    best, jams, outside = -math.inf, 0, 0
+    best, jams, ever, outside = -math.inf, 0, 0, 0
     for start in range(0, count, _BATCH):
         size = min(_BATCH, count - start)
         values = {name: _uniform(generator, box, name, size) for name in box.ranges}
         gap = _gaps(box, condition, values, np.sin(generator.uniform(0.0, math.tau, size)))
         best = max(best, float(gap.max()))
         jams += int((gap > 0.0).sum())
+        ever += int((_gaps(box, condition, values, np.ones(size)) > 0.0).sum())  # the tilt is largest there
         outside += int((gap > bound).sum())
     corner, tried = _corners(box, condition)
-    return Samples(count, best, jams / count, corner, tried, bound, outside, perf_counter() - begin)
+    return Samples(
+        count, best, jams / count, ever / count, _binomial_range(ever, count), corner, tried, bound, outside,
+        perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _binomial_range(hits: int, count: int) -> tuple[float, float]:
+    """Clopper and Pearson's interval of a probability, 95 %."""
+    from scipy.special import betaincinv
+
+    low = 0.0 if hits == 0 else float(betaincinv(hits, count - hits + 1, 0.025))
+    return low, 1.0 if hits == count else float(betaincinv(hits + 1, count - hits, 0.975))
 
 
 def _uniform(generator: np.random.Generator, box: ToleranceBox, name: str, size: int) -> Array:

@@ -32,4 +32,4 @@ def statement(found: JamCertificate) -> str:
             text = f"the parts cannot be assembled: {found.reason}"
         case _:
             text = f"undecided: {found.reason}"
-    return f"{text} (condition {found.condition}){given}"
+    return f"{text} (condition {found.condition}; exact tilt, all of it taken by this bearing){given}"

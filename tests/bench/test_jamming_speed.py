@@ -36,7 +36,9 @@ def test_times_beside_plain_floats(capsys: pytest.CaptureFixture[str]) -> None:
     report = best(lambda: assess_jamming(box=DECK))
     crossing = circle_ellipse("17.5", "17.53", "17.4617879639289313590283215334")
     boxes = best(lambda: krawczyk_boxes(crossing), 200)
-    search = largest_gap(BOX.replace(hole_length=8, Rb="[5, 40]", alpha="[0, 1]"), tolerance=1e-7, max_boxes=50_000)
+    search = largest_gap(
+        BOX.replace(hole_length=8, Rb="[5, 40]", alpha="[0, 1]"), "general", tolerance=1e-7, max_boxes=50_000
+    )
     sweep = sweep_linkage(DECK, resolution=1e-9)
     with capsys.disabled():
         print(f"\nclosed form in doubles       {plain:8.3f} ms")

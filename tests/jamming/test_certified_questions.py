@@ -8,6 +8,7 @@ from fractions import Fraction as F
 import mpmath
 import numpy as np
 import pytest
+from scipy import stats
 
 from graphsynth.errors import GeometryError
 from graphsynth.intervals import Interval, sin
@@ -28,6 +29,7 @@ from graphsynth.jamming import (
     largest_gap,
     maximise,
     sample_gaps,
+    sampling,
     spread,
     sweep_linkage,
     sweep_turn,
@@ -351,9 +353,26 @@ def test_samples_stay_below_the_bound():
     )  # fmt: skip
     seen = sample_gaps(jammed, seed=3)
     assert seen.outside == 0 and seen.count == 200_000
-    assert seen.jamming_fraction == pytest.approx(0.70, abs=0.005)  # 10.3
+    assert seen.jamming_positions == pytest.approx(0.70, abs=0.005)  # 10.3
+    assert seen.jamming_mechanisms == 1.0 and seen.jamming_mechanisms_range[0] > 0.9999
     assert seen.largest_gap == pytest.approx(0.0384, abs=1e-4)
     assert 0 <= seen.overestimation < 1e-15 and seen.corners == 2**7
+
+
+def test_the_share_of_mechanisms_is_not_that_of_positions():
+    """Clearance uniform, the rest fixed: the probability of a jam anywhere is a length over a length, exactly."""
+    box = ToleranceBox(alpha="0.0145", clearance="0.03 +- 0.003", l2=1, l3="2.5", Rb="17.5", Hb=10)
+    S = 1 / 2.5 * math.sin(0.0145)
+    needed = 5 * S - 17.5 * S * S / (1 + math.sqrt(1 - S * S))  # clearance with which the gap closes at 90 degrees
+    exact = (needed - 0.027) / 0.006
+    seen = sample_gaps(box, count=50_000, seed=2)
+    low, high = seen.jamming_mechanisms_range
+    assert low < exact < high and high - low < 0.01
+    assert seen.jamming_mechanisms == pytest.approx(exact, abs=0.008)
+    assert seen.jamming_positions < 0.3 * seen.jamming_mechanisms
+    for hits, count in ((0, 50), (17, 50), (50, 50)):
+        wanted = stats.binomtest(hits, count).proportion_ci(0.95, "exact")
+        assert sampling._binomial_range(hits, count) == pytest.approx((wanted.low, wanted.high), abs=1e-12)
 
 
 def test_a_million_samples():

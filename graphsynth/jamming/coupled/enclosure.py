@@ -9,7 +9,7 @@ Specification, sections 9.4 and 9.5.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,10 @@ from graphsynth.jamming.coupled.closure import PITCH, ROLL, ROUND, Layout, momen
 from graphsynth.jamming.coupled.linear import enclosed_solve, points
 from graphsynth.jamming.coupled.program import PoseSolution, Units
 
-__all__ = ["Moving", "Pieces", "factor_bounds", "lower_bounds", "shifts_enclosed", "upper_bounds"]
+if TYPE_CHECKING:
+    from graphsynth.jamming.coupled.exact import Neglected
+
+__all__ = ["Moving", "Pieces", "factor_bounds", "lower_bounds", "shifts_enclosed", "start_tilts", "upper_bounds"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -88,25 +91,36 @@ def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Arra
     return lower_bounds(layout, at, found), upper_bounds(layout, at, found)
 
 
-def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> Array:
-    """Bounds from equilibrium; see `factor_bounds`."""
+def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
+    """Bounds from equilibrium; see `factor_bounds`.  With ``exact`` above 1 only where exact tilts jam too."""
+    if layout.loops == 0:
+        return np.zeros(len(at.r))
+    length = found.units.length
+    if exact is not None:
+        at = Pieces(_around(at.r, exact.r), _around(at.e, exact.e), _around(at.d, exact.d))
+    with np.errstate(all="ignore"):
+        value = _lower(layout, (at.r - Interval(found.units.centre)) / length, at, found, length, exact)
+    return value if exact is None else np.where(exact.sound, value, 0.0)
+
+
+def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
+    """Bounds from closure; see `factor_bounds`.  With ``exact`` below 1 only where exact tilts are free too."""
     if layout.loops == 0:
         return np.zeros(len(at.r))
     length = found.units.length
     with np.errstate(all="ignore"):
-        return _lower(layout, (at.r - Interval(found.units.centre)) / length, at, found, length)
+        value = _upper(layout, (at.r - Interval(found.units.centre)) / length, at, found, length, exact)
+    return value if exact is None else np.where(exact.sound, value, np.inf)
 
 
-def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> Array:
-    """Bounds from closure; see `factor_bounds`."""
-    if layout.loops == 0:
-        return np.zeros(len(at.r))
-    length = found.units.length
-    with np.errstate(all="ignore"):
-        return _upper(layout, (at.r - Interval(found.units.centre)) / length, at, found, length)
+def _around(values: Interval, radius: Array) -> Interval:
+    """Widen pairs (N, joints, 2) by (N, joints)."""
+    return values + Interval.from_bounds(-radius, radius).reshape(*radius.shape, 1)
 
 
-def _lower(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float) -> Array:
+def _lower(
+    layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float, exact: Neglected | None
+) -> Array:
     y, fine = _without_forbidden(layout, r, at.e, found.y)
     wrench = _by_joint(layout, y)
     m = (wrench[:, :, 0] - wrench[:, :, 2] * r[:, :, 1], wrench[:, :, 1] + wrench[:, :, 2] * r[:, :, 0])
@@ -114,15 +128,19 @@ def _lower(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length:
     for place, _, _ in layout.misalignments:
         work = work + m[0][:, place] * at.d[:, place, 0] + m[1][:, place] * at.d[:, place, 1]
     cost = Interval.zeros((len(found.y),))
+    limits = np.broadcast_to(layout.limit_range[1], (len(y), len(layout.limit))) if exact is None else exact.wide
     for block, place in enumerate(layout.block_joint.tolist()):
-        limit = float(layout.limit_range[1, block])
-        if limit == 0.0 or np.isinf(layout.limit[block]):  # rigid costs nothing; without limit the moment is zero
+        limit = limits[:, block]
+        if not limit.any() or np.isinf(layout.limit[block]):  # rigid costs nothing; without limit the moment is zero
             continue
         size = _size(layout.block_axis[block], (m[0][:, place], m[1][:, place]), at.e[:, place])
-        cost = cost + size * Interval.from_bounds(0.0, limit)
+        cost = cost + size * Interval.from_bounds(np.zeros(len(y)), limit)
     for place, play in enumerate(layout.play_range[1].tolist()):
         if play > 0.0 and np.isfinite(layout.play[place]):
             cost = cost + abs(wrench[:, place, 2]) * Interval.from_bounds(0.0, play) / length
+    if exact is not None:
+        rest = Interval.from_bounds(np.zeros_like(exact.lift), exact.lift)
+        cost = cost + (abs(y[:, 2::3]) * rest).sum(-1) / length
     least = work.mig
     quotient = (Interval.from_bounds(least, least) / Interval.from_bounds(cost.hi, cost.hi)).lo
     quotient = np.where((cost.hi == 0.0) & (least > 0.0), np.inf, quotient)
@@ -205,45 +223,82 @@ def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
     return Interval.from_bounds(np.stack(lo, axis=1), np.stack(hi, axis=1))
 
 
-def _upper(layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float) -> Array:
+def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
+    """Tilts (N, blocks, 2) and slips (N, joints) from which a closed system is sought, in floats."""
     tau, zeta = np.nan_to_num(found.tau), np.nan_to_num(found.zeta)
     tau[:, layout.limit == 0.0], zeta[:, layout.play == 0.0] = 0.0, 0.0
     tau[:, layout.block_axis != ROUND, 1] = 0.0
+    length = found.units.length
+    return _fill_free(layout, (at.r.mid - found.units.centre) / length, at, (tau, zeta), length)
+
+
+def _upper(
+    layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float, exact: Neglected | None
+) -> Array:
+    tau, zeta = start_tilts(layout, at, found)
     tilts, slips = _directions(layout, r.mid, at.e.mid, found, length)
-    tau, zeta = _fill_free(layout, r.mid, at, (tau, zeta), length)
+    off = _off(layout, at, r, points(tau), points(zeta), found.units)
+    e = at.e
+    if exact is not None:
+        rest = _disturbed(layout, r, at, tau, length, exact)
+        off = off + Interval.from_bounds(-rest, rest)
+        r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
     columns = tilts.shape[-1]
-    places, guides = _columns(r), _columns(at.e)
+    places, guides = _columns(r), _columns(e)
     parts = [
         _stacked(_closure(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length))
         for c in range(columns)
     ]
     matrix = Interval.stack(parts, axis=-1)
-    off = _off(layout, at, r, points(tau), points(zeta), found.units)
     step, fine = enclosed_solve(matrix, -off)
     tau_all = points(tau) + (points(tilts) * step.reshape(len(step), 1, 1, columns)).sum(-1)
     zeta_all = points(zeta) + (points(slips) * step.reshape(len(step), 1, columns)).sum(-1)
     worst = np.zeros(len(step))
+    count = len(step)
+    limits = np.broadcast_to(layout.limit_range[0], (count, len(layout.limit))) if exact is None else exact.narrow
+    plays = np.broadcast_to(layout.play_range[0], (count, len(layout.joints))) if exact is None else exact.play
     for block in range(len(layout.limit)):
-        least = float(layout.limit_range[0, block])
-        if layout.limit[block] == 0.0 or np.isinf(least):
+        if layout.limit[block] == 0.0 or np.isinf(limits[:, block]).any():
             continue
         if layout.block_axis[block] == ROUND:
             size = (tau_all[:, block, 0].sqr() + tau_all[:, block, 1].sqr()).sqrt()
         else:
             size = abs(tau_all[:, block, 0])
-        worst = np.maximum(worst, _ratio(size.hi, least))
+        worst = np.maximum(worst, _ratio(size.hi, limits[:, block]))
     for place in range(len(layout.joints)):
-        least = float(layout.play_range[0, place])
-        if layout.play[place] > 0.0 and np.isfinite(least):
-            worst = np.maximum(worst, _ratio(zeta_all[:, place].mag, least))
+        if layout.play[place] > 0.0 and np.isfinite(layout.play_range[0, place]):
+            worst = np.maximum(worst, _ratio(zeta_all[:, place].mag, plays[:, place]))
     return np.where(fine & ~np.isnan(worst), worst, np.inf)
 
 
-def _ratio(size: Array, limit: float) -> Array:
+def _disturbed(layout: Layout, r: Interval, at: Pieces, tau: Array, length: float, exact: Neglected) -> Array:
+    """Bound what exact tilts add to the closure of given tilts, (N, 3 loops).
+
+    The closure is linear in the tilts and bilinear with the positions: ``(r + dr) x (t + dt) - r x t``.
+    """
+    count = len(tau)
+    lean, change = np.zeros((2, count, len(layout.joints)))
+    for block, place in enumerate(layout.block_joint.tolist()):
+        size = np.abs(tau[:, block]).sum(axis=-1)
+        lean[:, place] += size
+        if layout.block_axis[block] != ROUND:
+            change[:, place] += size * exact.e[:, place]
+    lean += at.d.mag.sum(axis=-1)
+    change += exact.d
+    move = exact.r / length
+    lift = move * (lean + change) + r.mag.sum(axis=-1) * change
+    through = np.abs(layout.incidence).T
+    rest = np.empty((count, 3 * layout.loops))
+    rest[:, 0::3] = rest[:, 1::3] = change @ through
+    rest[:, 2::3] = lift @ through + exact.lift / length
+    return rest * (1.0 + 1e-12)  # for the rounding of a few dozen nonnegative terms
+
+
+def _ratio(size: Array, limit: Array) -> Array:
     """Upper bound of size over limit; infinite for a limit that may be zero, unless the size is zero too."""
-    if limit == 0.0:
-        return np.where(size > 0.0, np.inf, 0.0)
-    return np.asarray((points(size) / limit).hi)
+    positive = limit > 0.0
+    quotient = (points(size) / points(np.where(positive, limit, 1.0))).hi
+    return np.where(positive, quotient, np.where(size > 0.0, np.inf, 0.0))
 
 
 def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length: float) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Verdict and reason of a range of inputs, from what is proved about its pieces."""
+"""Verdict and reason of a range of inputs, from what is proved about its pieces; by small tilts and by exact ones."""
 
 from __future__ import annotations
 
@@ -10,20 +10,27 @@ from graphsynth.jamming.coupled.pieces import Found, Work
 from graphsynth.jamming.coupled.witness import Witness
 from graphsynth.jamming.verdict import Verdict
 
-__all__ = ["judge", "states"]
+__all__ = ["MODEL", "judge", "states"]
 
 States = NDArray[np.int8]
+Mask = NDArray[np.bool_]
+
+#: What the verdict is about, for certificates and reports.
+MODEL = (
+    "L1 with exact tilts: the small-tilt closure (first order) with bounds of the terms of second order that it "
+    "neglects; the factors are those of small tilts"
+)
 
 
 def states(pieces: Found) -> States:
-    """+1 where every member of the boxes is free, -1 where every one jams, 0 elsewhere."""
+    """+1 where with small tilts every member of the boxes is free, -1 where every one jams, 0 elsewhere."""
     return np.where(pieces.lower > 1.0, -1, np.where(pieces.upper < 1.0, 1, 0)).astype(np.int8)
 
 
 def judge(
     work: Work, pieces: Found, state: States, stopped: str, branch: bool, witness: Witness | None
 ) -> tuple[Verdict, str]:
-    """Return the strongest verdict that the pieces prove, and one sentence on it."""
+    """Return the strongest verdict that the pieces in these states prove, and one sentence on it."""
     width = pieces.hi - pieces.lo
     share = [float(width[state == s].sum() / width.sum()) for s in (-1, 0, 1)]
     open_text = _why_open(pieces, state, stopped)
@@ -51,11 +58,24 @@ def _why_open(pieces: Found, state: States, stopped: str) -> str:
     if not left.any():
         return ""
     lost = left & ~pieces.proved
+    near = left & (states(pieces) != 0)
     if stopped:
         return stopped
     if lost.any():
         u = float(pieces.lo[lost][0])
         return f"the positions are not proved near the input {u:.9g} (a singularity, or two modes that nearly meet)"
+    if near.any():
+        at = int(np.flatnonzero(near)[np.argmin(np.maximum(pieces.lower[near] - 1.0, 1.0 - pieces.upper[near]))])
+        side = "jams" if pieces.lower[at] > 1.0 else "is free"
+        text = (
+            f"near the input {pieces.lo[at]:.9g} it {side} with small tilts (first order), but the terms of second "
+            "order that they neglect may change that"
+        )
+        return text if (near == left).all() else f"{text}; {_widest(pieces, left & ~near)}"
+    return _widest(pieces, left)
+
+
+def _widest(pieces: Found, left: Mask) -> str:
     worst = int(np.flatnonzero(left)[np.argmax(pieces.upper[left] - pieces.lower[left])])
     below, above = shortened(float(pieces.lower[worst]), -1, 9), shortened(float(pieces.upper[worst]), 1, 9)
     return (

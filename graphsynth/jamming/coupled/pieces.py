@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,19 @@ from graphsynth.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
 from graphsynth.jamming.coupled.closure import Layout
 from graphsynth.jamming.coupled.corners import corner_layouts
-from graphsynth.jamming.coupled.enclosure import Moving, Pieces, lower_bounds, shifts_enclosed, upper_bounds
+from graphsynth.jamming.coupled.enclosure import (
+    Moving,
+    Pieces,
+    lower_bounds,
+    shifts_enclosed,
+    start_tilts,
+    upper_bounds,
+)
+from graphsynth.jamming.coupled.exact import neglected
 from graphsynth.jamming.coupled.linear import points
 from graphsynth.jamming.coupled.positions import Positions
 from graphsynth.jamming.coupled.problem import Problem, check_motion
+from graphsynth.jamming.coupled.program import PoseSolution
 from graphsynth.jamming.coupled.slopes import slopes
 from graphsynth.jamming.coupled.tubes import Tubes, linked, prove_tubes
 from graphsynth.kinematics._checks import finite
@@ -31,10 +40,18 @@ Mask = NDArray[np.bool_]
 
 #: Pieces of a whole turn at first, of any range at least, and parts into which one is cut.
 FIRST, FEWEST, PARTS = 128, 16, 4
+#: In a proof of freedom a joint may tilt so much more than the tilt found, in its own share and that of the largest.
+_ROOM, _SHARE, _LEAST = 1.25, 0.25, 1e-4
+
+#: Layout, pieces and solution that a bound starts from.
+_Bound: TypeAlias = tuple[Layout, Pieces, PoseSolution]
 
 
 class Found(NamedTuple):
-    """Pieces evaluated: inputs, bounds of the factor, whether positions are proved, and the boxes they lie in."""
+    """Pieces evaluated: inputs, bounds of the factor, whether positions are proved, and the boxes they lie in.
+
+    ``sure`` tells what exact tilts prove: +1 free, -1 jams, 0 nothing; the bounds of the factor are of first order.
+    """
 
     lo: Array
     hi: Array
@@ -43,12 +60,13 @@ class Found(NamedTuple):
     proved: Mask
     box_lo: Array
     box_hi: Array
+    sure: NDArray[np.int8]
 
     def take(self, rows: Mask | NDArray[np.intp]) -> Found:
         """Return some of the pieces."""
         return Found(
             self.lo[rows], self.hi[rows], self.lower[rows], self.upper[rows], self.proved[rows],
-            self.box_lo[rows], self.box_hi[rows],
+            self.box_lo[rows], self.box_hi[rows], self.sure[rows],
         )  # fmt: skip
 
     @staticmethod
@@ -59,10 +77,10 @@ class Found(NamedTuple):
 
 
 class Work:
-    """Evaluation of pieces of one problem along one motion."""
+    """Evaluation of pieces of one problem along one motion; without ``exact`` by small tilts alone."""
 
-    def __init__(self, given: Problem, motion: Motion, tolerance: float) -> None:
-        self.given, self.motion, self.tolerance = given, motion, tolerance
+    def __init__(self, given: Problem, motion: Motion, tolerance: float, exact: bool = True) -> None:
+        self.given, self.motion, self.tolerance, self.exact = given, motion, tolerance, exact
         self.system = Positions(motion.mechanism, tolerance)
         self.corners = corner_layouts(given.layout)
         keep = np.flatnonzero(motion.assembled)
@@ -91,7 +109,7 @@ class Work:
         at[order] = back[1:]
         lower, upper = np.zeros(count), np.full(count, np.inf)
         proved = np.zeros(count, dtype=bool)
-        box = np.full((2, count, size), np.nan)
+        box, sure = np.full((2, count, size), np.nan), np.zeros(count, dtype=np.int8)
         keep = np.flatnonzero(found.assembled[at] & np.isfinite(found.velocities[at]).all(axis=(1, 2)))
         if keep.size:
             poses = found.poses[at[keep]]
@@ -106,11 +124,17 @@ class Work:
                     self.system, self.given.layout.joints, points(u.mid[keep[rows]]), x[rows], rate[rows], counted[rows]
                 )
                 whole = u[keep[rows]], tubes.take(rows), at_middle, counted[rows]
-                lower[keep[rows]], upper[keep[rows]] = self._bounds(poses[rows], *whole)
-        return Found(lo, hi, lower, upper, proved, box[0], box[1])
+                lower[keep[rows]], upper[keep[rows]], sure[keep[rows]] = self._bounds(poses[rows], *whole)
+        return Found(lo, hi, lower, upper, proved, box[0], box[1], sure)
 
-    def _bounds(self, poses: Array, u: Interval, tubes: Tubes, middle: Tubes, counted: Array) -> tuple[Array, Array]:
-        """Bound the factor: below over the whole boxes, above at the corners of the misalignments."""
+    def _bounds(
+        self, poses: Array, u: Interval, tubes: Tubes, middle: Tubes, counted: Array
+    ) -> tuple[Array, Array, NDArray[np.int8]]:
+        """Bound the factor: below over the whole boxes, above at the corners of the misalignments.
+
+        And where small tilts decide, tell what exact tilts prove.  A combination of corners closes with the combination
+        of their tilts, and what exact tilts add to it is the combination of what they add at the corners.
+        """
         layout = self.given.layout
         rates = slopes(self.system, layout.joints, u, tubes, counted)
         step = u - points(u.mid)
@@ -125,13 +149,41 @@ class Work:
             return Pieces(tubes.r, tubes.e, shifts_enclosed(own, tubes.base), moving)
 
         upper = np.zeros(len(poses))
+        above = []
         for corner in self.corners:
             found = replace(self.given, layout=corner).solve(poses, "scale")
-            upper = np.maximum(upper, upper_bounds(corner, pieces(corner), found))
+            above.append((corner, pieces(corner), found))
+            upper = np.maximum(upper, upper_bounds(*above[-1]))
         if len(self.corners) > 1:  # one alone differs by a factor at most, which the bound from below does not see
             found = self.given.solve(poses, "scale")
-        lower = lower_bounds(layout, pieces(layout), found)
-        return lower, upper
+        below = layout, pieces(layout), found
+        lower = lower_bounds(*below)
+        if not self.exact:
+            return lower, upper, np.zeros(len(poses), dtype=np.int8)
+        return lower, upper, self._sure(lower, upper, below, above, tubes, u, counted)
+
+    def _sure(
+        self, lower: Array, upper: Array, below: _Bound, above: list[_Bound], tubes: Tubes, u: Interval, counted: Array
+    ) -> NDArray[np.int8]:
+        """Tell where exact tilts prove a jam (-1) or freedom (+1), among the pieces that small tilts decide."""
+        sure = np.zeros(len(lower), dtype=np.int8)
+        rows = np.flatnonzero(lower > 1.0)
+        if rows.size:
+            layout, at, found = below[0], _take(below[1], rows), _take(below[2], rows)
+            none = np.full((rows.size, len(layout.limit)), np.inf)
+            exact = neglected(self.system, layout, tubes.take(rows), u[rows], counted[rows], none)
+            sure[rows[lower_bounds(layout, at, found, exact) > 1.0]] = -1
+        rows = np.flatnonzero(upper < 1.0)
+        if rows.size:
+            free = np.ones(rows.size, dtype=bool)
+            for layout, whole, found in above:
+                at, found = _take(whole, rows), _take(found, rows)
+                tilts = np.abs(start_tilts(layout, at, found)[0]).sum(axis=-1)
+                tilts = _ROOM * tilts + _SHARE * tilts.max(axis=1, keepdims=True, initial=0.0) + _LEAST
+                exact = neglected(self.system, layout, tubes.take(rows), u[rows], counted[rows], tilts)
+                free &= upper_bounds(layout, at, found, exact) < 1.0
+            sure[rows[free]] = 1
+        return sure
 
     def estimate(self, inputs: Array) -> Array:
         """Factor at inputs in ascending order (estimated); 0 where there is no pose."""
@@ -201,6 +253,17 @@ class Work:
         order = np.lexsort((away, place))
         rows, first = np.unique(place[order], return_index=True)
         return rows, keep[inside[order[first]]]
+
+
+def _take(value: Any, rows: NDArray[np.intp]) -> Any:
+    """Return some of the pieces of a named tuple of arrays and intervals; its other entries as they are."""
+    parts = []
+    for part in value:
+        if isinstance(part, tuple):
+            parts.append(_take(part, rows) if isinstance(part, Moving) else part)
+        else:
+            parts.append(part[rows] if isinstance(part, np.ndarray | Interval) else part)
+    return type(value)(*parts)
 
 
 def cut(lo: Array, hi: Array) -> tuple[Array, Array]:

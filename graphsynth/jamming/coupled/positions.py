@@ -7,7 +7,7 @@ equations those of the joints outside it, so a mechanism with L loops of turning
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,12 @@ from graphsynth.mechanism.rank import characteristic_length
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Placement", "Positions", "Unsupported", "law_enclosed"]
+__all__ = ["Moved", "Placement", "Positions", "Unsupported", "law_enclosed"]
 
 Array = NDArray[np.float64]
 Pair = tuple[Any, Any]
+#: Disturbances of every joint: offset of its point in the plane (x, y), and twist that it prescribes amiss.
+Moved: TypeAlias = list[tuple[Any, Any, Any]]
 
 
 class Unsupported(Exception):  # noqa: N818 - never leaves the package: it becomes an UNDECIDED with this reason
@@ -90,7 +92,7 @@ class Positions:
     """
 
     def __init__(self, mechanism: Mechanism, tolerance: float = 0.0) -> None:
-        self.mechanism = mechanism
+        self.mechanism, self.tolerance = mechanism, tolerance
         if any(isinstance(joint, Cam) for joint in mechanism.joints):
             raise Unsupported("the positions of a cam mechanism are not enclosed between samples")
         self.local = [(_box(j.at_a, tolerance), _box(j.at_b, tolerance)) for j in mechanism.joints]
@@ -165,8 +167,8 @@ class Positions:
                 x[:, edge.slide], v[:, edge.slide] = _slide(joint, poses, rates)
         return x, v
 
-    def place(self, x: list[Any], q: list[Any]) -> Placement:
-        """Place every link for unknowns x and driven coordinates q."""
+    def place(self, x: list[Any], q: list[Any], moved: Moved | None = None) -> Placement:
+        """Place every link for unknowns x and driven coordinates q; ``moved`` disturbs the joints."""
         links = self.mechanism.graph.links
         angle: list[Any] = [Interval(0)] * links
         turn: list[Pair] = [(Interval(1), Interval(0))] * links
@@ -183,6 +185,8 @@ class Positions:
                 angle[edge.child] = angle[edge.parent] + (value if driver.link == edge.child else -value)
             else:
                 angle[edge.child] = x[edge.angle]
+            if moved is not None and (edge.driver >= 0 or isinstance(joint, Prismatic)):
+                angle[edge.child] = angle[edge.child] + moved[edge.joint][2]
             turn[edge.child] = (cos(angle[edge.child]), sin(angle[edge.child]))
             here, there = (at_a, at_b) if forward else (at_b, at_a)
             P = _plus(origin[edge.parent], _turned(turn[edge.parent], here))
@@ -194,6 +198,7 @@ class Positions:
                     s = x[edge.slide]
                 t = self._guide(joint, turn)
                 P = (P[0] + t[0] * s, P[1] + t[1] * s) if forward else (P[0] - t[0] * s, P[1] - t[1] * s)
+            P = P if moved is None else _plus(P, moved[edge.joint][:2])
             arm = _turned(turn[edge.child], there)
             origin[edge.child] = (P[0] - arm[0], P[1] - arm[1])
         return Placement(angle, turn, origin)
@@ -208,24 +213,27 @@ class Positions:
         A = _plus(at.origin[joint.a], _turned(at.turn[joint.a], at_a))
         return A, _plus(at.origin[joint.b], _turned(at.turn[joint.b], at_b))
 
-    def equations(self, x: list[Any], q: list[Any], counted: Array) -> list[Any]:
+    def equations(self, x: list[Any], q: list[Any], counted: Array, moved: Moved | None = None) -> list[Any]:
         """Return the closing equations; ``counted`` (N, closing) from `count`."""
-        at = self.place(x, q)
+        at = self.place(x, q, moved)
         rows: list[Any] = []
         for column, k in enumerate(self.closing):
             joint = self.mechanism.joints[k]
             A, B = self.ends(k, at)
             d = (B[0] - A[0], B[1] - A[1])
+            twist: Any = 0
+            if moved is not None:
+                d, twist = _plus(d, moved[k][:2]), moved[k][2]
             if isinstance(joint, Revolute):
                 rows += [d[0], d[1]]
             elif isinstance(joint, Gear):
-                rows.append(_gear(joint, at, d, counted[:, column]))
+                rows.append(_gear(joint, at, d, counted[:, column]) + twist * (joint.radius_a + joint.radius_b))
             elif isinstance(joint, Prismatic | PinSlot):
                 t = self._guide(joint, at.turn)
                 rows.append(t[0] * d[1] - t[1] * d[0])
                 if isinstance(joint, Prismatic):
                     lean = at.angle[joint.b] + joint.angle_b - at.angle[joint.a] - joint.angle_a
-                    rows.append(lean - pi() * (2.0 * counted[:, column]))
+                    rows.append(lean - pi() * (2.0 * counted[:, column]) + twist)
         return rows
 
     def count(self, poses: Array) -> Array:

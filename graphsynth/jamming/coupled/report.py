@@ -100,7 +100,12 @@ class CoupledReport:
     certificate: TurnCertificate | None = None
     notes: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
-    model: str = "L1: all joints, small-tilt closure (error of relative order alpha squared)"
+    small_tilts: str = "L1 with small tilts (first order): neglects terms of relative order alpha squared"
+
+    @property
+    def model(self) -> str:
+        """What the verdict is about and what that neglects; the tables are those of small tilts."""
+        return self.small_tilts if self.certificate is None else self.certificate.model
 
     @property
     def method(self) -> str:

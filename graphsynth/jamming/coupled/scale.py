@@ -1,4 +1,7 @@
-"""The largest misalignment over the range of a motion, between two proved bounds: branch and bound over the input."""
+"""The largest misalignment over the range of a motion, between two proved bounds: branch and bound over the input.
+
+Both bounds are about the small-tilt model (first order), in which the factor grows in proportion to the misalignments.
+"""
 
 from __future__ import annotations
 
@@ -30,11 +33,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ScaleCertificate:
-    """Largest factor on all misalignments that leaves the whole range free, between two proved bounds.
+    """Largest factor on all misalignments that leaves the whole range free with small tilts, between two proved bounds.
 
     ``low``: with a smaller factor every input is proved free, for all members of the tolerance boxes.  ``high``: with a
     larger one the input ``at`` is proved to jam, again for all of them; tolerances keep the two apart.
-    ``relative_gap`` is ``high / low - 1``; ``reason`` says why it is not smaller, or is empty.
+    ``relative_gap`` is ``high / low - 1``; ``reason`` says why it is not smaller, or is empty.  Free and jammed are
+    those of the small-tilt model, whose error, of relative order alpha squared, is not in the bounds; `certify_coupled`
+    judges a given misalignment with exact tilts.
     """
 
     low: float
@@ -43,6 +48,10 @@ class ScaleCertificate:
     evaluated: int
     reason: str
     seconds: float
+    model: str = (
+        "L1 with small tilts (first order): the terms of second order that it neglects, of relative order alpha "
+        "squared, are not in the bounds"
+    )
 
     @property
     def relative_gap(self) -> float:
@@ -75,8 +84,8 @@ def largest_scale(
     Returns
     -------
     ScaleCertificate
-        Certified (branch and bound over the input).  With one misalignment the largest allowed alpha lies between
-        ``low * alpha`` and ``high * alpha``.
+        Certified for the small-tilt model (branch and bound over the input).  With one misalignment its largest alpha
+        lies between ``low * alpha`` and ``high * alpha``.
 
     Raises
     ------
@@ -87,7 +96,7 @@ def largest_scale(
     check_range(motion, length_tolerance, relative_gap=relative_gap, max_pieces=max_pieces, seconds=seconds)
     given = problem(motion.mechanism, bearings, tilts, condition)
     try:
-        work = Work(given, motion, length_tolerance)
+        work = Work(given, motion, length_tolerance, exact=False)
         budget = Budget(1e-9 * (work.high - work.low), max_pieces, seconds, begin)
         found = _enclosed(work, budget, *_branch_and_bound(work, budget, relative_gap))
         if found.reason or found.relative_gap <= relative_gap or found.high == math.inf == found.low:

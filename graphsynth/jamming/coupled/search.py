@@ -52,14 +52,14 @@ def search(work: Work, budget: Budget) -> tuple[Found, str]:
             parts.append(_open(lo, hi, work.system.size))
             break
         found = work.evaluate(lo, hi)
-        again = _straddles(found) & (hi - lo > budget.smallest)
+        again = (_straddles(found) | _unsure(found)) & (hi - lo > budget.smallest)
         if not first and not budget.over:
             again &= ~_hopeless(work, found, again)
         first = False
         parts.append(found.take(~again))
         lo, hi = cut(lo[again], hi[again])
     pieces = Found.join(parts)
-    if not (pieces.lower > 1.0).any() and not ((pieces.upper < 1.0) | ~pieces.proved).all():
+    if not (pieces.sure == -1).any() and not ((pieces.upper < 1.0) | ~pieces.proved).all():
         pieces = _with_peak(work, pieces)
     return pieces, stopped
 
@@ -68,11 +68,16 @@ def _straddles(found: Found) -> Mask:
     return np.asarray(~((found.lower > 1.0) | (found.upper < 1.0)))
 
 
-def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
-    """Tell the pieces that no cut decides: at both ends and in the middle the bounds straddle 1 without any width.
+def _unsure(found: Found) -> Mask:
+    """Decided by small tilts, not by exact ones."""
+    return np.asarray(~_straddles(found) & (found.sure == 0))
 
-    Tolerances of which some jam and some do not, or a factor of 1 all along.  A guess about what to leave undecided; it
-    proves nothing.
+
+def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
+    """Tell the pieces that no cut decides: at both ends and in the middle they are as undecided without any width.
+
+    Tolerances of which some jam and some do not, a factor of 1 all along, or a distance from 1 that exact tilts may
+    close.  A guess about what to leave undecided; it proves nothing.
     """
     stuck = again & found.proved
     rows = np.flatnonzero(stuck)
@@ -81,7 +86,8 @@ def _hopeless(work: Work, found: Found, again: Mask) -> Mask:
     lo, hi = found.lo[rows], found.hi[rows]
     inputs, back = np.unique(np.concatenate([lo, 0.5 * (lo + hi), hi]), return_inverse=True)
     at = work.evaluate(inputs, inputs)
-    stuck[rows] = (at.proved & _straddles(at))[back].reshape(3, -1).all(axis=0)
+    same = np.where(_straddles(found)[rows], _straddles(at)[back].reshape(3, -1), _unsure(at)[back].reshape(3, -1))
+    stuck[rows] = (at.proved[back].reshape(3, -1) & same).all(axis=0)
     return stuck
 
 
@@ -105,7 +111,8 @@ def _with_peak(work: Work, pieces: Found) -> Found:
     left = np.flatnonzero((pieces.upper >= 1.0) & pieces.proved)
     inputs = peak_inputs(work, pieces, left)
     points = work.evaluate(inputs, inputs)
-    jams = np.flatnonzero(points.lower > 1.0)
+    jams = np.flatnonzero(points.sure == -1)
+    jams = jams if jams.size else np.flatnonzero(points.lower > 1.0)
     if jams.size == 0:
         return pieces
     top = jams[[int(np.argmax(points.lower[jams]))]]
@@ -121,4 +128,4 @@ def _open(lo: Array, hi: Array, size: int) -> Found:
     """Pieces about which nothing is known."""
     none = np.zeros(len(lo))
     box = np.full((len(lo), size), np.nan)
-    return Found(lo, hi, none, none + np.inf, none > 1.0, box, box)
+    return Found(lo, hi, none, none + np.inf, none > 1.0, box, box, none.astype(np.int8))

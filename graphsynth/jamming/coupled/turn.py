@@ -2,7 +2,8 @@
 
 A piece is free if the tilts found at its middle can be corrected to close every loop, inside the limits, for every
 input, position and tolerance in it; it jams if the wrenches found at its middle prove so for all of them.  The
-positions are proved by `graphsynth.jamming.coupled.tubes`.  Statements are about the small-tilt model L1.
+positions are proved by `graphsynth.jamming.coupled.tubes`.  The search is that of the small-tilt model L1; the verdict
+counts only pieces for which the terms of second order, which that model neglects, are proved not to change it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.jamming.bearing import Condition
-from graphsynth.jamming.coupled.judgement import judge, states
+from graphsynth.jamming.coupled.judgement import MODEL, judge, states
 from graphsynth.jamming.coupled.limits import Misalignment
 from graphsynth.jamming.coupled.pieces import Found, Work, check_range
 from graphsynth.jamming.coupled.positions import Unsupported
@@ -35,21 +36,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class TurnCertificate:
-    """What is proved about the range of inputs (certified: rounding, positions and tolerances included).
+    """What is proved about the range of inputs (certified: rounding, positions, tolerances and exact tilts included).
 
     Attributes
     ----------
     verdict : Verdict
         CERTIFIED_FREE: no jam at any input of the range (between the samples too), for any value in the tolerance
         boxes.  CERTIFIED_JAMMED: at every input of the pieces marked so it jams, for every value in the boxes.
-        CERTIFIED_JAMMED_FOR_SOME: the member ``witness`` of the boxes jams.  UNDECIDED otherwise.
+        CERTIFIED_JAMMED_FOR_SOME: the member ``witness`` of the boxes jams.  UNDECIDED otherwise, also where small
+        tilts would decide but the terms of second order that they neglect may change it.
     reason : str
     low, high : ndarray, shape (pieces,)
         Pieces of the input, ascending.
     state : ndarray of int8, shape (pieces,)
-        +1 free, -1 jammed, 0 undecided.
+        +1 free, -1 jammed, 0 undecided; with exact tilts.
     lower, upper : ndarray, shape (pieces,)
-        Proved bounds of the factor on limits and plays together (the inverse of the allowed scale).
+        Proved bounds of the factor on limits and plays together (the inverse of the allowed scale), in the small-tilt
+        model (first order).
+    small_tilts : Verdict
+        What is proved in the small-tilt model alone, which neglects terms of second order in the tilts.
     one_branch : bool
         All pieces are proved to belong to one continuous branch.
     witness : Witness or None
@@ -70,6 +75,8 @@ class TurnCertificate:
     witness: Witness | None
     evaluated: int
     seconds: float
+    small_tilts: Verdict = Verdict.UNDECIDED
+    model: str = MODEL
 
     @property
     def certified(self) -> bool:
@@ -96,6 +103,8 @@ class TurnCertificate:
         return {
             "verdict": self.verdict.name,
             "reason": self.reason,
+            "model": self.model,
+            "small_tilts": self.small_tilts.name,
             "free": self.arcs(1),
             "jammed": self.arcs(-1),
             "undecided": self.arcs(0),
@@ -143,7 +152,7 @@ def certify_coupled(
     Returns
     -------
     TurnCertificate
-        Certified, in the small-tilt model; UNDECIDED with a reason rather than a guess.
+        Certified, with exact tilts; UNDECIDED with a reason rather than a guess.
 
     Raises
     ------
@@ -182,17 +191,24 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
     branch = bool(own.all() and links.all())
     lost = np.flatnonzero(pieces.proved & ~own)
     # of another branch, perhaps: nothing is said about the motion
-    pieces = pieces._replace(lower=np.where(own, pieces.lower, 0.0), upper=np.where(own, pieces.upper, np.inf))
+    pieces = pieces._replace(
+        lower=np.where(own, pieces.lower, 0.0), upper=np.where(own, pieces.upper, np.inf),
+        sure=np.where(own, pieces.sure, 0).astype(np.int8),
+    )  # fmt: skip
     if lost.size and not stopped:
         stopped = (
             f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
         )
-    state = states(pieces)
+    state = pieces.sure
     witness = None if (state == -1).any() or (state == 1).all() else jamming_member(work, pieces, own)
-    verdict, reason = judge(work, pieces, state, stopped, branch, witness)
+    proved = witness if witness is not None and witness.exact else None
+    verdict, reason = judge(work, pieces, state, stopped, branch, proved)
+    small, first_order = judge(work, pieces, states(pieces), stopped, branch, witness)
+    if small.is_certified and small is not verdict:
+        reason = f"{reason}; with small tilts (first order): {first_order}"
     return TurnCertificate(
         verdict, reason, pieces.lo, pieces.hi, state, pieces.lower, pieces.upper, branch, witness, work.evaluated,
-        perf_counter() - budget.begin,
+        perf_counter() - budget.begin, small,
     )  # fmt: skip
 
 

@@ -47,6 +47,8 @@ class Witness:
         Of this member, without tolerance; limits in the order of ``mechanism.joints``.
     mechanism : Mechanism
         With the dimensions of this member.
+    exact : bool
+        Whether it is proved with exact tilts; else with small ones only (first order).
     """
 
     input: float
@@ -54,12 +56,14 @@ class Witness:
     misalignments: tuple[Misalignment, ...]
     limits: tuple[Limits, ...]
     mechanism: Mechanism
+    exact: bool = True
 
     def summary(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "input": self.input,
             "factor": self.factor,
+            "exact": self.exact,
             "misalignments": [
                 {"base": m.base, "link": m.link, "alpha": m.alpha, "direction": m.direction} for m in self.misalignments
             ],
@@ -72,8 +76,9 @@ class Witness:
         """What is proved."""
         tilts = ", ".join(f"alpha = {m.alpha:.9g} at {m.direction:.9g} rad" for m in self.misalignments)
         return (
-            f"a member of the tolerance boxes ({tilts}) jams at the input {self.input!r}, proved: its limits would "
-            f"have to be {shortened(self.factor, -1, 9)} times as large or more"
+            f"a member of the tolerance boxes ({tilts}) jams at the input {self.input!r}, proved"
+            f"{'' if self.exact else ' with small tilts (first order) only'}: its limits would "
+            f"have to be {shortened(self.factor, -1, 9)} times as large or more with small tilts"
         )
 
 
@@ -98,12 +103,13 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> Witness | None:
     place = np.clip(np.searchsorted(pieces.lo, at, side="right") - 1, 0, None)
     inside = own[place] & points.proved & (at <= pieces.hi[place])
     inside &= ((points.box_lo >= pieces.box_lo[place]) & (points.box_hi <= pieces.box_hi[place])).all(axis=1)
-    factor = np.where(inside, points.lower, 0.0)
+    exact = bool((inside & (points.sure == -1)).any())
+    factor = np.where(inside & ((points.sure == -1) | (not exact)), points.lower, 0.0)
     top = int(np.argmax(factor))
     if factor[top] <= 1.0:
         return None
     given = member.given
-    return Witness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism)
+    return Witness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism, exact)
 
 
 def _has_tolerance(work: Work) -> bool:

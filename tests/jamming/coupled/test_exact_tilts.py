@@ -1,0 +1,198 @@
+"""Exact tilts: no certificate contradicts that of a single bearing, or links placed in space by brute force."""
+
+import math
+
+import numpy as np
+import pytest
+from coupled_oracles import embodied, four_bar
+from spatial_oracle import spatial
+
+from graphsynth import Driver, Mechanism, MechanismGraph, Prismatic, Revolute, simulate
+from graphsynth.intervals import Interval
+from graphsynth.jamming import Bearing, ToleranceBox, Verdict, certify_jamming
+from graphsynth.jamming.coupled import (
+    RIGID,
+    SPHERICAL,
+    JointLimits,
+    Misalignment,
+    SlideLimits,
+    assess_coupled,
+    certify_coupled,
+    largest_scale,
+)
+from graphsynth.jamming.coupled.exact import neglected
+from graphsynth.jamming.coupled.pieces import Work
+from graphsynth.jamming.coupled.problem import problem
+from graphsynth.jamming.coupled.tubes import prove_tubes
+
+FREE, JAMMED = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED
+NEAR_WORST = np.linspace(1.5, 1.64, 3)
+
+
+def bearing_with(tilt, large):
+    """A bearing whose critical tilt (condition A) is the one wanted."""
+    R, H = (17.5, 60.0) if large else (17.5, 10.0)
+    S, C = math.sin(tilt), math.cos(tilt)
+    return Bearing(Rb=R, Hb=H, clearance=H / 2 * S - R * S * S / (1 + C))
+
+
+@pytest.mark.parametrize(
+    ("lengths", "alpha"),
+    [((1, 3, 2, 3.5), 0.02), ((1, 3, 2, 3.5), 0.05), ((1, 3, 2, 3.5), 0.2), ((1, 3, 2, 3.5), 0.4),
+     ((2, 1, 2.5, 2.5), 1 / 30), ((2, 1, 2.5, 2.5), 0.3)],
+)  # fmt: skip
+def test_two_certificates_of_one_bearing_never_contradict(lengths, alpha):
+    """Spherical at A and rigid at C leave all to B, whose critical tilt lies between the exact and the linear one."""
+    linear, exact = lengths[1] / lengths[2] * alpha, math.asin(lengths[1] / lengths[2] * math.sin(alpha))
+    motion = simulate(four_bar(*lengths), NEAR_WORST)
+    bearing = bearing_with(0.5 * (linear + exact), alpha > 0.1)
+    joints = {(0, 1): RIGID, (1, 2): SPHERICAL, (2, 3): bearing, (0, 3): RIGID}
+    shared = certify_coupled(motion, joints, Misalignment(0, 1, alpha), resolution=1e-2)
+    alone = certify_jamming(ToleranceBox(*lengths, alpha=alpha, Rb=bearing.Rb, Hb=bearing.Hb,
+                                         clearance=bearing.clearance))  # fmt: skip
+    assert alone.verdict in (FREE, JAMMED)
+    assert shared.verdict is Verdict.UNDECIDED and shared.small_tilts not in (alone.verdict, Verdict.UNDECIDED)
+    assert "second order" in shared.reason and "small tilts (first order)" in shared.reason
+    report = assess_coupled(motion, joints, Misalignment(0, 1, alpha), certify=True, seconds=1.0)
+    assert report.verdict is Verdict.UNDECIDED and "exact tilts" in report.model == report.summary()["model"]
+    assert "small tilts" in assess_coupled(motion, joints, Misalignment(0, 1, alpha)).model
+
+
+@pytest.mark.parametrize(("alpha", "margin"), [(1 / 30, 0.01), (0.1, 0.06)])
+def test_outside_the_margin_both_are_certified(alpha, margin):
+    exact = math.asin(0.4 * math.sin(alpha))
+    motion = simulate(four_bar(), NEAR_WORST)
+    for side, wanted in ((1, FREE), (-1, JAMMED)):
+        bearing = bearing_with(exact * (1 + side * margin), False)
+        joints = {(0, 1): RIGID, (1, 2): SPHERICAL, (2, 3): bearing, (0, 3): RIGID}
+        shared = certify_coupled(motion, joints, Misalignment(0, 1, alpha))
+        alone = certify_jamming(ToleranceBox(2, 1, 2.5, 2.5, alpha=alpha, Rb=bearing.Rb, Hb=bearing.Hb,
+                                             clearance=bearing.clearance))  # fmt: skip
+        assert shared.verdict is alone.verdict is shared.small_tilts is wanted
+        assert "exact tilts" in shared.summary()["model"] and "exact tilt" in alone.statement
+        assert "L0" in alone.summary()["model"]
+
+
+def test_the_margin_is_of_the_order_of_alpha_squared():
+    """Lambda linkage with equal bearings: decided at ten times alpha squared, on both sides."""
+    motion = simulate(four_bar(), NEAR_WORST)
+    critical = Bearing().critical_tilt("A").angle
+    margin = 10.0 * (2 * critical) ** 2
+    for side, wanted in ((-1, FREE), (1, JAMMED)):
+        tilt = Misalignment(0, 1, 2 * critical * (1 + side * margin))
+        assert certify_coupled(motion, Bearing(), tilt).verdict is wanted
+    assert "small tilts (first order)" in largest_scale(motion, Bearing(), tilt, relative_gap=0.1).model
+
+
+def case(rng, kind):
+    """A four-bar with random limits, its pose, and the first-order factor."""
+    while True:
+        mechanism = four_bar(rng.uniform(1.5, 3.0), 1.0, rng.uniform(2.0, 3.5), rng.uniform(2.0, 3.5))
+        u = rng.uniform(0.0, 6.28)
+        motion = simulate(mechanism, [u, u + 0.01])
+        if not motion.assembled.all():
+            continue
+        alpha = rng.choice([0.05, 0.1, 0.2])
+        tilt = Misalignment(0, 1, alpha, rng.uniform(0.0, 6.28))
+        limits = {j.pair: (rng.uniform(0.15, 0.6) * alpha, rng.choice([0.0, rng.uniform(0.0, 0.3) * alpha]))
+                  for j in mechanism.joints}  # fmt: skip
+        if kind == "spherical":
+            limits[1, 2] = (math.inf, limits[1, 2][1])
+        if kind == "rigid":
+            limits[0, 3] = (0.0, 0.0)
+        given = problem(mechanism, joint_limits(limits), tilt)
+        factor = given.solve(motion.poses[:1], "scale").lower[0]
+        if 0.1 < factor < 10.0:
+            return mechanism, motion, tilt, limits, float(factor)
+
+
+def joint_limits(limits, scale=1.0):
+    return {pair: JointLimits(t * scale, s * scale) for pair, (t, s) in limits.items() if pair != (0, 1)}
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 12))])
+@pytest.mark.parametrize("kind", ["bearings", "spherical", "rigid"])
+def test_links_placed_in_space_agree(kind, seed):
+    """Near the verge, where exact and small tilts differ: what is proved is what optimization in space finds."""
+    rng = np.random.default_rng([seed, len(kind)])
+    mechanism, motion, tilt, limits, factor = case(rng, kind)
+    for away in (rng.uniform(-3, 3), rng.choice([-15.0, 15.0])):
+        scale = factor * (1.0 + away * tilt.alpha**2)
+        given = problem(mechanism, joint_limits(limits, scale), tilt)
+        u = motion.inputs[:1]
+        sure = int(Work(given, motion, 0.0).evaluate(u, u).sure[0])
+        own = {pair: (t * scale, s * scale) for pair, (t, s) in limits.items()}
+        least, missed = spatial(mechanism, motion.poses[0], tilt, own).least_factor()
+        assert missed < 1e-6
+        assert sure == 0 or (least < 1.0 + 1e-7 if sure > 0 else least > 1.0 - 1e-7)
+        if abs(away) == 15.0 and kind == "rigid":
+            assert sure == np.sign(away)
+
+
+def bounds_at(given, motion):
+    """What exact tilts change at the first pose, for a proof of a jam."""
+    work = Work(given, motion, 0.0)
+    u = Interval.from_bounds(motion.inputs[:1], motion.inputs[:1])
+    x, rate = work.system.coordinates(motion.poses[:1], motion.velocities[:1])
+    counted = work.system.count(motion.poses[:1])
+    tubes = prove_tubes(work.system, given.layout.joints, u, x, rate, counted)
+    none = np.full((1, len(given.layout.limit)), math.inf)
+    return tubes, neglected(work.system, given.layout, tubes, u, counted, none)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_joints_move_no_further_than_bounded(seed):
+    """Exact positions within the limits: joints, tilts and the rest of the closure stay inside the bounds."""
+    rng = np.random.default_rng([7, seed])
+    mechanism, motion, tilt, limits, factor = case(rng, "bearings")
+    scale = 1.05 * factor
+    given = problem(mechanism, joint_limits(limits, scale), tilt)
+    tubes, exact = bounds_at(given, motion)
+    assert exact.sound.all()
+    own = {pair: (t * scale, s * scale) for pair, (t, s) in limits.items()}
+    here = spatial(mechanism, motion.poses[0], tilt, own)
+    x, least = here.solve()
+    assert least <= 1.0  # a member of what the bounds are about
+    links = here.links(x)
+    normals = {k: R.apply([0.0, 0.0, 1.0]) for k, (R, _) in links.items()}
+    for place, k in enumerate(given.layout.joints):
+        joint = mechanism.joints[k]
+        R, p = links[joint.b]
+        centre = (p + R.apply([*joint.at_b, 0.0]))[:2]
+        assert math.dist(centre, tubes.r.mid[0, place]) <= exact.r[0, place] + 1e-9
+        if joint.pair == (0, 1):
+            continue
+        block = list(given.layout.block_joint).index(place)
+        change = normals[joint.b][:2] - normals[joint.a][:2]
+        angle = math.acos(min(1.0, normals[joint.b] @ normals[joint.a]))
+        assert np.hypot(*change) <= exact.wide[0, block] + 1e-9
+        assert exact.narrow[0, block] <= given.layout.limit[block] and angle <= given.layout.limit[block] * (1 + 1e-7)
+    assert (exact.r < 5.0 * tilt.alpha**2 * 10.0).all()  # and they are of second order
+
+
+def test_a_link_without_any_limit_leaves_a_jam_unproved():
+    """Nothing bounds the roll of a link between two spherical joints: a jam of small tilts is not certified."""
+    motion = simulate(four_bar(), NEAR_WORST)
+    joints = {(1, 2): SPHERICAL, (2, 3): JointLimits(math.inf, 0.0), (0, 3): RIGID}
+    tilt = Misalignment(0, 1, 0.05)
+    found = certify_coupled(motion, {**joints, (2, 3): SPHERICAL}, tilt, resolution=1e-2)
+    assert found.verdict is found.small_tilts is FREE  # the heights of A are taken by the coupler
+    steep = certify_coupled(motion, JointLimits(0.7), Misalignment(0, 1, 0.001), resolution=1e-2)
+    assert steep.verdict is FREE  # the limits are wide, the tilts that are needed are not
+
+
+def test_guides_and_more_loops_are_decided_too():
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), Prismatic(0, 3, (0.0, 0.2))]
+    pins = {(1, 2): JointLimits(0.01, 0.01), (2, 3): JointLimits(0.01), (0, 3): SlideLimits(0.01, 0.008, 0.002)}
+    slider = Mechanism(graph, joints, [Driver(0, 1)]), pins, Misalignment(0, 1, 0.01, 0.8)
+    chain = embodied(6, 1)
+    base, link = chain.drivers[0].pair
+    watt = chain, {j.pair: JointLimits(0.006, 0.001) for j in chain.joints}, Misalignment(base, link, 0.01, 0.3)
+    for mechanism, limits, tilt in (slider, watt):
+        motion = simulate(mechanism, np.linspace(0.3, 0.5, 3))
+        scale = assess_coupled(motion, limits, tilt).smallest_scale
+        for change, wanted in ((0.98, FREE), (1.02, JAMMED)):
+            own = Misalignment(tilt.base, tilt.link, tilt.alpha * scale * change, tilt.direction)
+            found = certify_coupled(motion, limits, own, resolution=1e-2)
+            assert found.verdict is wanted, found.reason
