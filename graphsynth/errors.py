@@ -11,7 +11,8 @@
     ├── TooLargeError                an enumeration that cannot finish; carries an estimate and the remedy
     ├── SceneError (ValueError)      a scene file with an unknown key, a wrong unit or a missing section
     ├── IntervalError (ValueError)   bounds, boxes or functions that interval arithmetic cannot take
-    └── GeometryError (ValueError)   dimensions that no mechanism can have (negative length, zero axis, ...)
+    ├── GeometryError (ValueError)   dimensions that no mechanism can have (negative length, zero axis, ...)
+    └── UnitWarning (UserWarning)    a warning: numbers that look like degrees where radians are meant
 
 A message names the value, the bound and the remedy.  Outcomes of a computation (a pose that cannot be
 assembled, a bearing that jams) are values, not exceptions.
@@ -30,6 +31,7 @@ __all__ = [
     "SceneError",
     "SpecError",
     "TooLargeError",
+    "UnitWarning",
 ]
 
 
@@ -107,3 +109,7 @@ class IntervalError(GraphsynthError, ValueError):
 
 class GeometryError(GraphsynthError, ValueError):
     """Dimensions that no mechanism can have."""
+
+
+class UnitWarning(GraphsynthError, UserWarning):  # noqa: N818  # a warning that can be made an error
+    """Numbers that look as if they were in another unit than the one meant; they are taken as they are."""

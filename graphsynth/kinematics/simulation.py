@@ -15,7 +15,7 @@ from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.kinematics.engine.events import ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
-from graphsynth.kinematics.engine.inputs import coordinates, fine_grid, full_turn, monotonic
+from graphsynth.kinematics.engine.inputs import coordinates, fine_grid, full_turn, monotonic, warn_of_degrees
 from graphsynth.kinematics.engine.pivots import pivot_passes, refined
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
@@ -47,7 +47,8 @@ def simulate(
         With as many drivers as its mobility.
     inputs : array_like, shape (n,)
         Inputs u in the order of the motion, strictly increasing or decreasing; each driver's law turns u into its
-        coordinate (the input itself by default: radians or lengths).
+        coordinate (the input itself by default: radians or lengths; a `UnitWarning` is shown where turning inputs look
+        like degrees, as 0 to 360 do).
     modes : mapping of int to int, optional
         Assembly mode by group index: +1 or -1 for a dyad, the rank among all its modes at the first input for a
         larger group (0 by default).  The sign is that of the third point left of the way from the lower link's
@@ -85,6 +86,7 @@ def simulate(
     begin = perf_counter()
     u = monotonic(inputs)
     program = compile_program(mechanism)
+    warn_of_degrees(mechanism, u)
     given = start if start is not None else mechanism.pose
     guess = None if given is None else _poses(given, mechanism)
     tracker = started(program, float(u[0]), modes or {}, guess)

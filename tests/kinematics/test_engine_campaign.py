@@ -52,7 +52,7 @@ def coordinates(mechanism: Mechanism, poses: np.ndarray) -> dict[int, np.ndarray
             continue
         link = joint.b if joint.a == mechanism.frame else joint.a
         if isinstance(joint, Revolute):
-            found[link] = np.unwrap(poses[:, link, 2])
+            found[link] = poses[:, link, 2]
         elif isinstance(joint, Prismatic):
             angle = joint.angle_a if joint.a == mechanism.frame else joint.angle_b
             d = place(poses, joint.b, joint.at_b) - place(poses, joint.a, joint.at_a)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from graphsynth.errors import GeometryError
+from graphsynth.errors import GeometryError, UnitWarning
 from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.events import _touch
@@ -70,6 +70,33 @@ def test_pin_close_to_the_pivot_goes_on(gap: float) -> None:
 def test_kite_at_its_coincidence_is_not_called_impossible() -> None:
     motion = simulate(four_bar(1.0, 2.0, 2.0, 1.0), TURN)
     assert "coincide" in motion.reason
+
+
+# --- inputs in degrees
+
+
+@pytest.mark.parametrize(
+    "inputs", [np.linspace(0, 360), np.arange(0, 360, 5), np.linspace(-180.0, 180.0, 721), np.arange(90.0, -1.0, -1.0)]
+)
+def test_inputs_that_look_like_degrees_are_told(inputs: np.ndarray) -> None:
+    mechanism = four_bar(1.0, 2.5, 2.5, 2.0)
+    with pytest.warns(UnitWarning, match="as radians.*numpy.radians"):
+        motion = simulate(mechanism, inputs, events=False)
+    assert motion.poses[-1, 1, 2] == pytest.approx(inputs[-1] - math.tau * round(inputs[0] / math.tau))
+    with pytest.warns(UnitWarning, match="as radians"):
+        simulate_batch(mechanism, inputs, mechanism.dimensions[None])
+
+
+@pytest.mark.parametrize("inputs", [TURN, 50.0 * TURN, np.linspace(0.0, 100.0, 11), np.radians(np.arange(0, 720, 5))])
+def test_inputs_of_many_turns_are_not_taken_for_degrees(inputs: np.ndarray) -> None:
+    assert simulate(four_bar(1.0, 2.5, 2.5, 2.0), inputs, events=False).completed
+
+
+def test_only_angles_can_be_degrees() -> None:
+    """The piston of a slider-crank in millimetres, and a crank whose input is the time."""
+    slider = [Prismatic(0, 1), Revolute(1, 2), Revolute(2, 3, (250.0, 0.0), (200.0, 0.0)), Revolute(0, 3, (500.0, 0.0))]
+    simulate(Mechanism(CYCLE, slider, [Driver(0, 1)]), np.linspace(100.0, 190.0, 5), events=False)
+    simulate(four_bar(1.0, 2.5, 2.5, 2.0, Linear(0.1)), np.linspace(0.0, 90.0, 5), events=False)
 
 
 # --- change points and folds on samples

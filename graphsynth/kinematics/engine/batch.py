@@ -12,7 +12,7 @@ from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, workspace
-from graphsynth.kinematics.engine.inputs import monotonic
+from graphsynth.kinematics.engine.inputs import monotonic, warn_of_degrees
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, with_turns
 from graphsynth.mechanism.checks import link_number
@@ -171,6 +171,7 @@ def simulate_batch(
         raise GeometryError(
             f"dimensions have shape {sizes.shape}; give (sets, {', '.join(map(str, mechanism.dimensions.shape))})"
         )
+    warn_of_degrees(mechanism, u)
     _check_gears(mechanism, sizes)
     program = compile_program(mechanism, sizes)
     signs = sign_table(program, modes or {})

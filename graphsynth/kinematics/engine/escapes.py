@@ -99,25 +99,23 @@ def centres_meet(program: Program, stop: Stop) -> MotionEvent | None:
     """Return the event if a gear pair lost its line of centres at a stop: the distance of the centres goes to zero."""
     if stop.way is None:
         return None
-    step, (row0, count) = program.steps[stop.step], program.step_table[stop.step, 1:3]
     trace, k = stop.way.last
-    for r in range(row0, row0 + count):
-        kind, a, b, _, _ = program.rows[r]
-        if kind != codes.GEAR:
-            continue
-        p = program.row_table[0, r]
-        (A, A1), (B, B1) = (
-            _moving(trace, k, link, complex(*p[c : c + 2])) for link, c in ((a, codes.PAX), (b, codes.PBX))
-        )
-        d, d1 = B - A, B1 - A1
-        if not abs(d) < _NEAR * program.Lc or not abs(d1) > 0.0:
-            continue
-        at = stop.at - (d * d1.conjugate()).real / abs(d1) ** 2
-        text = (
-            f"the centres of the gear pair {a}-{b} of group {step.group} ({step.kind}, links "
-            f"{', '.join(map(str, step.links))}) coincide at the input {at:.12g}: their line has no direction there"
-        )
-        return MotionEvent("singular", at, step.group, step.links, 0, abs(at - stop.at), True, text)
+    for s, step in enumerate(program.steps[: stop.step + 1]):
+        row0, count = program.step_table[s, 1:3]
+        for r in range(row0, row0 + count if step.group >= 0 else row0):
+            kind, a, b, _, _ = program.rows[r]
+            p = program.row_table[0, r]
+            A, A1 = _moving(trace, k, a, complex(*p[codes.PAX : codes.PAY + 1]))
+            B, B1 = _moving(trace, k, b, complex(*p[codes.PBX : codes.PBY + 1]))
+            d, d1 = B - A, B1 - A1
+            if kind != codes.GEAR or not abs(d) < _NEAR * program.Lc or not abs(d1) > 0.0:
+                continue
+            at = stop.at - (d * d1.conjugate()).real / abs(d1) ** 2
+            text = (
+                f"the centres of the gear pair {a}-{b} of group {step.group} ({step.kind}, links "
+                f"{', '.join(map(str, step.links))}) coincide at the input {at:.12g}: their line has no direction there"
+            )
+            return MotionEvent("singular", at, step.group, step.links, 0, abs(at - stop.at), True, text)
     return None
 
 
@@ -139,11 +137,11 @@ def blow_up(u: Array, y: Array, ratio: float, powers: tuple[float, ...]) -> tupl
     if not np.isfinite(size).all():
         return None
     found: list[tuple[float, float, float]] = []
-    for before in (0.0, 0.5, 1.0):
+    for before in (0.0, 0.5, 1.0, 1.5):
         # the last samples at which y was smaller by powers of the ratio
         picks = [np.flatnonzero(size <= -before - part + 0.05) for part in (0.0, 0.7, 1.4, 1.9)]
         if any(not pick.size for pick in picks) or len({int(pick[-1]) for pick in picks}) < len(picks):
-            break
+            continue
         k = np.array([pick[-1] for pick in picks])
         for power in powers:
             z = np.exp(-(size[k] - size[k[0]]) * math.log(ratio) / power)
@@ -151,7 +149,7 @@ def blow_up(u: Array, y: Array, ratio: float, powers: tuple[float, ...]) -> tupl
             left = (at - u[k[3]]) / (at - u[k[1]]) if at != u[k[1]] else 0.0
             measured = (size[k[1]] - size[k[3]]) * math.log(ratio) / math.log(left) if left > 1.0 else 0.0
             if abs(measured / power - 1.0) < _MISFIT:
-                apart = max(abs(at - _at_zero(z[:3], u[k[:3]])), 1e-6 * abs(at - u[k[0]]), 1e-15 * max(1.0, abs(at)))
+                apart = max(abs(at - _at_zero(z[:3], u[k[:3]])), 1e-6 * abs(at - u[k[0]]), 1e-14 * max(1.0, abs(at)))
                 found.append((apart, at, measured))
     if not found:
         return None

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 #: A margin that dips below this between samples is examined.
 _NEAR = 0.2
 #: ... and always below this; otherwise only if its parabola falls to half of it.
-_FLAT = 1e-3
+_FLAT = 1e-7
 #: A smallest margin below this is reported: half the digits of the pose are lost there.
 _CLOSE = 1e-8
 #: A smallest margin below this is a change point: the modes meet to rounding.
@@ -179,7 +179,8 @@ def _vertex(u: Array, y: Array) -> Array:
     a, b = (y[:-2] - y[1:-1]) / left, (y[2:] - y[1:-1]) / right
     with np.errstate(divide="ignore", invalid="ignore"):
         slope, bend = (b * left - a * right) / (left + right), (a + b) / (left + right)
-        return np.asarray(np.nan_to_num(y[1:-1] - 0.25 * slope**2 / bend, nan=-math.inf, posinf=-math.inf))
+        drop = np.nan_to_num(slope**2 / bend, posinf=math.inf)  # 0 / 0: three values that are the same
+        return np.asarray(y[1:-1] - 0.25 * drop)
 
 
 def _at_end(trace: Trace, k: int, step: Step) -> MotionEvent:

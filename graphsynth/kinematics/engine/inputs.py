@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
+from graphsynth.errors import GeometryError, UnitWarning
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.joints import Prismatic
-from graphsynth.mechanism.laws import LAWS
+from graphsynth.mechanism.laws import LAWS, Linear
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Driver, Mechanism
 
-__all__ = ["coordinates", "fine_grid", "full_turn", "monotonic"]
+__all__ = ["coordinates", "fine_grid", "full_turn", "monotonic", "warn_of_degrees"]
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,28 @@ def monotonic(inputs: ArrayLike) -> Array:
     if not ((steps > 0.0).all() or (steps < 0.0).all()):
         raise GeometryError("inputs must increase or decrease strictly; sort them and remove duplicates")
     return u
+
+
+def warn_of_degrees(mechanism: Mechanism, u: Array) -> None:
+    """Warn where the angle of a driver runs over quarters of 360: 0 to 360 radians are 57.3 turns, hardly meant.
+
+    Whole turns are multiples of ``2 pi``, never of 90; ranges without their end, like ``range(0, 360, 5)``, count too.
+    """
+    if u.size < 2:
+        return
+    span, step = abs(float(u[-1] - u[0])), abs(float(u[-1] - u[-2]))
+    if not any(whole >= 89.0 and abs(whole - 90.0 * round(whole / 90.0)) < 1e-9 for whole in (span, span + step)):
+        return
+    for driver in mechanism.drivers:
+        turns = not isinstance(mechanism.joint(*driver.pair), Prismatic)
+        if turns and isinstance(driver.law, Linear) and abs(driver.law.rate) == 1.0:
+            warnings.warn(
+                f"the inputs run from {u[0]:g} to {u[-1]:g}, and driver {driver.base}-{driver.link} takes them as "
+                f"radians ({span / math.tau:.3g} turns); if they are degrees, give numpy.radians(inputs)",
+                UnitWarning,
+                stacklevel=3,
+            )
+            return
 
 
 def coordinates(driver: Driver, u: Array) -> tuple[Array, Array, Array]:
