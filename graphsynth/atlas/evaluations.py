@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sqlite3
 from collections.abc import Iterable
 from contextlib import closing
@@ -26,6 +27,9 @@ __all__ = ["GUARANTEES", "KINDS", "NOT_COMPUTED", "Evaluation", "record", "store
 KINDS = ("dimensions", "transmission", "jamming")
 GUARANTEES = ("exact", "certified", "estimated")
 NOT_COMPUTED = "not computed"
+#: As the columns of the table ask for, see :mod:`graphsynth.atlas.tables`.
+_WORD = re.compile(r"(?![=+@-])[^\x00-\x1f\x7f-\x9f]{1,200}")
+_MOST_DATA = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +44,8 @@ class Evaluation:
     driver : int or str
         As in the table of mechanisms; text such as ``'1,3'`` for several.
     kind : str
-        ``'dimensions'``, ``'transmission'``, ``'jamming'``, or another word.
+        ``'dimensions'``, ``'transmission'``, ``'jamming'``, or another word, of at most 200 characters, as are the
+        next two.
     status : str
         One word: ``'found'``, ``'free'``, ``'undecided'``, ...
     value : float, optional
@@ -53,7 +58,8 @@ class Evaluation:
     Raises
     ------
     SpecError
-        For a value that is not finite, an unknown guarantee, or data that JSON does not hold.
+        For a value that is not finite, an unknown guarantee, no words, or data that JSON does not hold or that are
+        longer than a million characters.
     """
 
     chain: str
@@ -71,9 +77,16 @@ class Evaluation:
             raise SpecError(f"the value {self.value!r} of {self.kind!r} is not finite; give None and say why in status")
         if self.guarantee is not None and self.guarantee not in GUARANTEES:
             raise SpecError(f"there is no guarantee {self.guarantee!r}; choose one of {', '.join(GUARANTEES)}")
-        if not self.kind or not self.status:
-            raise SpecError("an evaluation needs a kind and a status; give both as one word")
-        _ = self.text
+        for name, word in (("kind", self.kind), ("status", self.status), ("unit", self.unit)):
+            if word is not None and not _WORD.fullmatch(word):
+                raise SpecError(
+                    f"{name} = {word!r} must be 1 to 200 characters without control characters, and begin with none of "
+                    "=+@-; give one word"
+                )
+        if len(self.text or "") > _MOST_DATA:
+            raise SpecError(
+                f"the data of {self.kind!r} take more than {_MOST_DATA} characters of JSON; keep them in a file"
+            )
 
     @property
     def text(self) -> str | None:

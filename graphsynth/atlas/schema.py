@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from graphsynth.atlas.sealing import broken_seal, seal
-from graphsynth.atlas.tables import APPLICATION_ID, INDEXES, SCHEMA, SCHEMA_VERSION, wrong_rows
+from graphsynth.atlas.tables import APPLICATION_ID, EDGES, INDEXES, SCHEMA, SCHEMA_VERSION, wrong_rows
 from graphsynth.errors import FormatError, GraphsynthError
 from graphsynth.wording import plain
 
@@ -127,6 +127,8 @@ def screen(connection: sqlite3.Connection, path: Path) -> None:
         if found == ["ok"]:
             for table, question in wrong_rows():
                 found += [f"{row[0]} in {table}" for row in connection.execute(question)]
+            for (edges,) in connection.execute("SELECT edges FROM contracted"):
+                found += [] if EDGES.fullmatch(edges) else ["edges in contracted"]
     if found != ["ok"]:
         raise FormatError(
             f"is damaged or holds values that no catalogue holds ({' '.join(found[-1:])}): 'graphsynth catalog verify' "

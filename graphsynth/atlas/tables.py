@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-__all__ = ["APPLICATION_ID", "INDEXES", "SCHEMA", "SCHEMA_VERSION", "wrong_rows"]
+__all__ = ["APPLICATION_ID", "EDGES", "INDEXES", "SCHEMA", "SCHEMA_VERSION", "wrong_rows"]
 
 #: In the header of every catalogue file ("GSyn"), so that another SQLite file is not taken for one.
 APPLICATION_ID = 0x4753796E
 SCHEMA_VERSION = 4
+#: Edges of a contracted graph; none for a ring.
+EDGES = re.compile(r"(\d{1,2}-\d{1,2}(x\d{1,2})?( (?!$)|$))*", re.ASCII)
 
 _KEY = "{0} GLOB '1[A-Za-z0-9]*' AND {0} NOT GLOB '*[^A-Za-z0-9_-]*' AND length({0}) < 60"
 _LINK = "frame BETWEEN 0 AND 17"

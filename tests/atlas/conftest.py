@@ -17,7 +17,7 @@ def loosened(path, *, sealed=True, anything=False):
     ``sealed``: put a new seal on the file, as somebody who wants to deceive would; ``anything``: past the types, too.
     """
     text = "UPDATE sqlite_master SET sql = "
-    loose = text + "replace(replace(sql, ') STRICT, WITHOUT', ') WITHOUT'), ') STRICT', ')')"
+    loose = text + "replace(replace(replace(sql, ') STRICT, WITHOUT', ') WITHOUT'), ') STRICT', ')'), ' NOT NULL', '')"
     kept = []
     for step in ("before", "after"):
         raw = sqlite3.connect(path, isolation_level=None)

@@ -295,3 +295,20 @@ def test_a_trial_of_the_helper(path, altered):
     with sqlite3.connect(path) as raw, pytest.raises(sqlite3.IntegrityError):
         raw.execute("UPDATE chains SET girth = 'y' WHERE chain_id = 1")
     raw.close()
+
+
+@pytest.mark.parametrize(
+    ("own", "words"),
+    [
+        ({"kind": ""}, "kind = ''"),
+        ({"status": "=1+1"}, "status = '=1"),
+        ({"unit": ""}, "unit = ''"),
+        ({"kind": "a\x1b[2J"}, "kind = 'a"),
+        ({"status": "x" * 201}, "1 to 200 characters"),
+        ({"data": ["x" * 1_000_000]}, "more than 1000000 characters"),
+    ],
+)
+def test_evaluations_that_no_catalogue_holds_are_refused_when_they_are_made(own, words):
+    usual = {"chain": "1.4.4.1", "frame": 0, "driver": 2, "kind": "mass", "status": "found"}
+    with pytest.raises(SpecError, match=words):
+        Evaluation(**usual | own)
