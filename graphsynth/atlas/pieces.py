@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
+from itertools import accumulate
 from math import ceil
 from typing import TYPE_CHECKING
 
@@ -114,10 +115,13 @@ def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
     SpecError
         For i out of 1..m.
     """
-    from graphsynth.synthesis.writing import shard_of
+    from graphsynth.synthesis.shards import checked
 
-    own = {id(piece) for piece in shard_of([task.piece for task in tasks], shard)}
-    return [task for task in tasks if id(task.piece) in own]
+    if shard is None or not tasks:
+        return tasks
+    i, m = checked(shard)
+    sums = list(accumulate(task.weight for task in tasks))
+    return [task for task, upto in zip(tasks, sums) if min(m, int((upto - task.weight / 2) / sums[-1] * m) + 1) == i]
 
 
 def rows_of_task(task: Task) -> Rows:

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     with processes(workers_for(options.workers, weight > BIG)) as executor:
         if options.output is None:
             from graphsynth.synthesis.parallel import texts
-            from graphsynth.synthesis.writing import shard_of
+            from graphsynth.synthesis.shards import shard_of
 
             for data, _ in texts(shard_of(problem.pieces(listing=True), options.shard), executor):
                 sys.stdout.buffer.write(data)
@@ -109,7 +109,7 @@ def _write_whole(problem: Problem, options: argparse.Namespace, executor: Execut
     """Write all graphs in another format; the file appears when it is complete."""
     from graphsynth.formats.registry import read_stream, write
     from graphsynth.synthesis.parallel import texts
-    from graphsynth.synthesis.writing import shard_of
+    from graphsynth.synthesis.shards import shard_of
 
     if options.output.exists() and not options.force:
         raise GraphsynthError(f"{options.output} exists; choose another name, or replace it with --force")

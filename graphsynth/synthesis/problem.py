@@ -62,9 +62,14 @@ class Handful:
             if self._fits(graph):
                 yield graph
 
+    @property
+    def restricted(self) -> bool:
+        """Whether only some of the chains are wanted."""
+        return bool(self.assortment or self.levels or self.symmetry)
+
     def count(self) -> int:
         """Count the graphs; fractionated chains without any restriction are not made."""
-        if self.kind == "fractionated" and not (self.assortment or self.levels or self.symmetry):
+        if self.kind == "fractionated" and not self.restricted:
             return count_fractionated(self.links, self.mobility, self.space, self.higher, self.framed)
         return sum(1 for _ in self.graphs())
 

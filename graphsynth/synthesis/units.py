@@ -19,7 +19,18 @@ from graphsynth.synthesis.kernels.expanding import Spelling, expand_packed, expa
 from graphsynth.synthesis.kernels.layout import Work, make_work
 from graphsynth.synthesis.kernels.listing import HEADER, list_rows, rewind
 
-__all__ = ["Unit", "count_each", "count_unit", "cut", "estimates", "graphs_of", "packed_of", "spelling_of", "text_of"]
+__all__ = [
+    "Unit",
+    "count_each",
+    "count_unit",
+    "cut",
+    "estimates",
+    "graphs_of",
+    "packed_of",
+    "spelling_of",
+    "text_of",
+    "workspace",
+]
 
 LISTING_SIZE = 200_000.0  # bound on the labellings of a unit to list, before sparsity and symmetry
 COUNTING_SIZE = 512  # contracted graphs in a unit to count
@@ -44,6 +55,11 @@ class Unit:
 @lru_cache(maxsize=1)  # twenty megabytes
 def _work(resources: int, key_words: int) -> Work:
     return make_work(resources, key_words=key_words)
+
+
+def workspace(alphabet: Alphabet, key_words: int = 1 << 18) -> Work:
+    """Return the workspace of this process, large enough for an alphabet."""
+    return _work(max(1024, 1 << (alphabet.resources - 1).bit_length()), key_words)
 
 
 def estimates(family: Family) -> NDArray[np.float64]:
@@ -103,7 +119,7 @@ def count_each(family: Family, start: int, stop: int) -> NDArray[np.int64]:
     out = np.zeros(stop - start, np.int64)
     key_words = 1 << 18
     while True:
-        work = _work(max(1024, 1 << (alphabet.resources - 1).bit_length()), key_words)
+        work = workspace(alphabet, key_words)
         outcome = count_block(
             family.vertices, family.graphs, start, stop, family.frames, family.frame_degree, alphabet.tables, work, out
         )

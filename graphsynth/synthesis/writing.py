@@ -13,15 +13,15 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.errors import GraphsynthError
 from graphsynth.journal import Journal, Work, digest_of, writing
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import parallel
 from graphsynth.synthesis.problem import Piece, Problem, graphs_of_piece, text_of_piece
+from graphsynth.synthesis.shards import shard_of
 from graphsynth.synthesis.units import Unit
 
 __all__ = ["Step", "count_with_checkpoint", "estimated_size", "shard_of", "write_listing"]
@@ -43,27 +43,6 @@ class Step:
 
     graphs: int
     done: float
-
-
-def shard_of(pieces: Sequence[Piece], shard: tuple[int, int] | None) -> list[Piece]:
-    """Return shard i of m (1 <= i <= m): a run of consecutive pieces; the shards one after the other are the whole.
-
-    Raises
-    ------
-    SpecError
-        For i out of 1..m.
-    """
-    if shard is None:
-        return list(pieces)
-    i, m = shard
-    if m < 1 or not 1 <= i <= m:
-        raise SpecError(f"shard {i}/{m} must be i/m with 1 <= i <= m")
-    sums = list(accumulate(piece.weight for piece in pieces))
-    if not sums:
-        return []
-    return [
-        piece for piece, upto in zip(pieces, sums) if min(m, int((upto - piece.weight / 2) / sums[-1] * m) + 1) == i
-    ]
 
 
 def _work(problem: Problem, pieces: Sequence[Piece], form: str, remedy: str) -> Work:
@@ -244,7 +223,7 @@ def count_with_checkpoint(
     FormatError
         If it is no checkpoint, or somebody changed it.
     """
-    pieces = shard_of(problem.pieces(listing=False), shard)
+    pieces = shard_of(problem.pieces(listing=False), shard, listing=False)
     total = sum(piece.weight for piece in pieces) or 1.0
     with Journal(checkpoint, _work(problem, pieces, "count", "name another file")) as journal:
         known = [int(entry) for entry in journal.entries]

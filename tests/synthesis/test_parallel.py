@@ -15,7 +15,8 @@ from graphsynth.cli import main
 from graphsynth.errors import GraphsynthError, SpecError
 from graphsynth.synthesis import parallel
 from graphsynth.synthesis.problem import Problem
-from graphsynth.synthesis.writing import count_with_checkpoint, shard_of, write_listing
+from graphsynth.synthesis.shards import shard_of
+from graphsynth.synthesis.writing import count_with_checkpoint, write_listing
 
 QUESTION = StructuralSpec(W=1, links=10)
 LONG = Problem.mechanisms(StructuralSpec(W=1, links=12), None)  # 75397 lines

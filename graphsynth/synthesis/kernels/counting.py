@@ -237,3 +237,25 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
                 total += fixed // kept
         out[h - start] = total
     return 0
+
+
+@kernel
+def weigh_block(k, mults, chosen, listing, tables, work, out):
+    """Estimate the work that contracted graphs cost, in microseconds or so; a whole number for each of ``chosen``.
+
+    Listing visits every labelling, which is counted here, and writes out one of each orbit; counting grows with the
+    critical sets and with the automorphisms.  A graph that is too large is given -1.
+    """
+    for i in range(chosen.shape[0]):
+        mult = mults[chosen[i]]
+        out[i] = -1.0
+        order = automorphisms(k, mult, work.perms)
+        m, sets = load_graph(k, mult, tables, work)
+        if order < 0 or sets < 0:
+            continue
+        if not listing:
+            out[i] = np.floor(20.0 + (np.int64(1) << k) / 50.0 + 2.0 * sets * (sets + order))
+            continue
+        labellings = fixed_by(np.int64(0), m, sets, tables, work)
+        if labellings >= 0:
+            out[i] = np.floor(24.0 + labellings * (0.5 + 0.4 / order) * (14 + k) / 25.0)

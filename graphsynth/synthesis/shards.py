@@ -1,0 +1,166 @@
+"""Sharing the pieces of a problem out: runs of contracted graphs that cost about the same work.
+
+The work of a contracted graph is estimated from its critical sets, its symmetries and the number of its labellings;
+of a family of many graphs only some are looked at, and the others take the work of those alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.errors import SpecError
+from graphsynth.structure.variables import shown, whole
+from graphsynth.synthesis.families import Family
+from graphsynth.synthesis.joined import count_fractionated
+from graphsynth.synthesis.kernels.counting import weigh_block
+from graphsynth.synthesis.problem import Handful, Piece
+from graphsynth.synthesis.units import Unit, estimates, workspace
+
+__all__ = ["checked", "shard_of", "works"]
+
+Shard = tuple[int, int]
+Costs = NDArray[np.float64]
+_WEIGHED = 20_000  # contracted graphs of a problem whose work is estimated one by one
+_MADE = 1000.0  # work of a chain that is made one by one, as the kernel weighs
+
+
+def shard_of(pieces: Sequence[Piece], shard: Shard | None, *, listing: bool = True) -> list[Piece]:
+    """Return shard i of m (1 <= i <= m): a run of the work; the shards one after the other are the whole.
+
+    Parameters
+    ----------
+    pieces : sequence of Piece
+        All pieces of a problem; one of several contracted graphs may be cut between them.
+    shard : (int, int) or None
+        Which share; None is everything.
+    listing : bool
+        Whether the pieces are to be listed, not counted.
+
+    Raises
+    ------
+    SpecError
+        For i out of 1..m.
+    """
+    if shard is None:
+        return list(pieces)
+    i, m = checked(shard)
+    atoms = _atoms(tuple(pieces), listing)
+    ends = np.cumsum([0, *map(len, atoms)])
+    first, last = _run(np.concatenate([*atoms, np.zeros(0)]), i, m)
+    return [
+        _trimmed(piece, max(first - start, 0), min(last, stop) - start, costs)
+        for piece, start, stop, costs in zip(pieces, ends[:-1].tolist(), ends[1:].tolist(), atoms)
+        if start < last and first < stop
+    ]
+
+
+def checked(shard: Shard) -> Shard:
+    """Return i and m of shard i of m; SpecError for i out of 1..m."""
+    try:
+        i, m = (whole(number, "shard", 1, 10**6) for number in shard)
+    except (TypeError, ValueError):
+        i, m = 1, 0
+    if not 1 <= i <= m:
+        text = f"{shard[0]}/{shard[1]}" if isinstance(shard, tuple) and len(shard) == 2 else shown(shard)
+        raise SpecError(f"shard {text} must be i/m with 1 <= i <= m <= 1000000")
+    return i, m
+
+
+def _trimmed(piece: Piece, start: int, stop: int, costs: Costs) -> Piece:
+    if not isinstance(piece, Unit) or stop - start == len(costs):
+        return piece
+    share = float(costs[start:stop].sum() / costs.sum())
+    return replace(piece, start=piece.start + start, stop=piece.start + stop, weight=piece.weight * share)
+
+
+def _run(costs: Costs, i: int, m: int) -> tuple[int, int]:
+    """Return the i-th of m runs such that the largest is as small as can be; none is empty if there are m costs."""
+    sums = np.concatenate([[0.0], np.cumsum(costs)])
+    if m >= len(costs):
+        return min(i - 1, len(costs)), min(i, len(costs))
+    low, high = max(float(costs.max()), sums[-1] / m), float(sums[-1])
+    for _ in range(50):
+        middle = (low + high) / 2
+        low, high = (low, middle) if len(_ends(sums, middle, m)) <= m else (middle, high)
+    ends = [0, *_ends(sums, high, m)]
+    ends += [len(costs)] * (m + 1 - len(ends))
+    return ends[i - 1], ends[i]
+
+
+def _ends(sums: Costs, most: float, m: int) -> list[int]:
+    """Fill runs up to ``most`` from the front, leaving one cost for each of m; more than m runs do not fit."""
+    ends: list[int] = []
+    at, count = 0, len(sums) - 1
+    while at < count and len(ends) <= m:
+        stop = int(np.searchsorted(sums, sums[at] + most * (1 + 1e-12), side="right")) - 1
+        at = max(at + 1, min(stop, count - (m - len(ends) - 1)))
+        ends.append(at)
+    return ends
+
+
+@lru_cache(maxsize=4)
+def _atoms(pieces: tuple[Piece, ...], listing: bool) -> list[Costs]:
+    """Estimate the work of each piece, contracted graph by contracted graph where it may be cut."""
+    graphs = sum(piece.stop - piece.start for piece in pieces if isinstance(piece, Unit))
+    share = min(1.0, _WEIGHED / max(graphs, 1))
+    known: dict[Family, Costs] = {}
+    atoms = []
+    for piece in pieces:
+        if isinstance(piece, Handful):
+            atoms.append(np.array([_made(piece, listing)]))
+            continue
+        if piece.symmetry:  # few labellings are searched; nobody knows how many
+            atoms.append(np.ceil([piece.weight]))
+            continue
+        family = piece.family
+        if family not in known:
+            known[family] = works(family, share, listing=listing or bool(family.levels))
+        costs = known[family][piece.start : piece.stop]
+        atoms.append(costs if piece.parts == 1 else np.ceil(costs / piece.parts))
+    return atoms
+
+
+def _made(handful: Handful, listing: bool) -> float:
+    """Estimate the work of what is made one by one."""
+    if handful.kind == "rings" or not (listing or handful.restricted):
+        return 100.0
+    numbers = handful.links, handful.mobility, handful.space, handful.higher
+    return 100.0 + _MADE * count_fractionated(*numbers, handful.framed)
+
+
+def works(family: Family, share: float, *, listing: bool) -> Costs:
+    """Estimate the work of each contracted graph of a family; look at a share of them."""
+    bounds = estimates(family)
+    graphs = family.graphs
+    if not len(graphs):
+        return bounds
+    kinds = np.unique(_features(graphs, bounds), axis=0, return_inverse=True)[1].ravel()
+    sizes = np.bincount(kinds)
+    order = np.argsort(kinds, kind="stable")
+    rank = np.arange(len(kinds)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    every = max(1, round(1 / share))
+    chosen = order[rank % every == 0]  # of each kind the first, and every so many
+    found = np.empty(len(chosen))
+    alphabet = family.alphabet
+    weigh_block(family.vertices, graphs, chosen, listing, alphabet.tables, workspace(alphabet), found)
+    found = np.where(found < 0, np.ceil(bounds[chosen]), found)
+    per_kind = np.bincount(kinds[chosen], found, len(sizes)) / np.bincount(kinds[chosen], minlength=len(sizes))
+    costs: Costs = np.rint(per_kind[kinds])  # whole numbers: sums are exact, and the same on every machine
+    costs[chosen] = found
+    return costs * family.links if family.framed else costs
+
+
+def _features(graphs: NDArray[np.uint8], bounds: Costs) -> Costs:
+    """Return what graphs alike have in common: the bound, triangles, triangles with a double side, squares."""
+    joined = (graphs > 0).astype(np.float32)
+    double = (graphs > 1).astype(np.float32)
+    paths = joined @ joined
+    triangles = (paths * joined).sum((1, 2))
+    doubles = (paths * double).sum((1, 2))
+    pairs = paths * (1 - np.eye(graphs.shape[1], dtype=np.float32))
+    return np.stack([bounds, triangles, doubles, (pairs * (pairs - 1)).sum((1, 2))], axis=1)
