@@ -16,8 +16,8 @@ __all__ = ["ONE_STAGE", "Stages", "compiled_stepper"]
 
 Array = NDArray[np.float64]
 
-#: ``(y, h, A, K) -> new state``: fills the rows of K after the first with the rates at ``y + h A[s] K``.
-Stages = Callable[[Array, float, Array, Array], Array]
+#: ``(t, y, h, A, K) -> new state``: fills the rows of K after the first with the rates at ``y + h A[s] K``.
+Stages = Callable[[float, Array, float, Array, Array], Array]
 #: The table of a "step" that only evaluates the rates at a state.
 ONE_STAGE: Array = np.zeros((1, 1))
 
@@ -53,7 +53,7 @@ def _stepper_class() -> Any:
                 h = fresh_t - t
                 size = abs(h)
                 self.K[0] = self.f
-                fresh = self.stages(y, h, A, self.K)
+                fresh = self.stages(t, y, h, A, self.K)
                 self.trail.evaluations += self.n_stages
                 scale = self.atol + np.maximum(np.abs(y), np.abs(fresh)) * self.rtol
                 error = self._estimate_error_norm(self.K, h, scale)
@@ -73,7 +73,7 @@ def compiled_stepper(
     stages: Stages, rates: Callable[[float, Array], Array], t: float, y: Array, bound: float, rtol: float,
     atol: Array | float, first: float | None, trail: Trail,
 ) -> Any:  # fmt: skip
-    """Return a stepper like `scipy.integrate.DOP853` for equations that do not depend on time.
+    """Return a stepper like `scipy.integrate.DOP853` for equations without loads given as functions.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.compiled_steps import ONE_STAGE, Stages
+from graphsynth.dynamics.friction_problem import NO_LOADS
 from graphsynth.dynamics.leap import GaussStep, HermiteLeap, gauss_step
 from graphsynth.dynamics.passing import passed_singular_pose
 from graphsynth.dynamics.start import StartReport
@@ -101,33 +102,40 @@ class ConstrainedForm:
         return applied_loads(self.compiled, t, y[:n], y[n : 2 * n]) if self.compiled.applied else self._none
 
     def rates(self, t: float, y: Array) -> Array:
-        """Return the derivative of the state; NaN where the friction iteration does not contract."""
+        """Return the derivative of the state; NaN where no friction loads fit."""
         self._run(t, np.ascontiguousarray(y), 0.0, ONE_STAGE, self._one, 0, 1, self.applied(t, y))
         return np.array(self._one[0])
 
     def _run(self, t: float, y: Array, h: float, A: Array, K: Array, low: int, high: int, applied: Array) -> Array:
         fresh, _ = self._kernels.constrained_stages(
-            self.compiled.tables, y, h, A, K, low, high, self.slots, self.driven(t), applied, self.out
+            self.compiled.tables,
+            y,
+            h,
+            A,
+            K,
+            low,
+            high,
+            self.slots,
+            self.compiled.driven_at(t + h * A.sum(axis=1)),
+            applied,
+            self.out,
         )
         self._look()
         return np.asarray(fresh)
 
     @property
     def stages(self) -> Stages | None:
-        """A compiled Runge-Kutta step, if neither loads nor motions are given as functions."""
-        if self.compiled.applied or self.compiled.laws:
+        """A compiled Runge-Kutta step, if no load is given as a function."""
+        if self.compiled.applied:
             return None
-        return lambda y, h, A, K: self._run(0.0, y, h, A, K, 1, len(A), self._none)
+        return lambda t, y, h, A, K: self._run(t, y, h, A, K, 1, len(A), self._none)
 
     def _look(self) -> None:
         """Note what the kernel found wrong."""
         if self.out[6] == 1.0:
             self.why = "a spring has length 0, so its direction is not defined"
         elif self.out[6] == 2.0:
-            self.why = (
-                "the friction iteration does not contract: the reactions are not determined, there may be no solution "
-                "or several; reduce the friction coefficient"
-            )
+            self.why = NO_LOADS
         else:
             self.contraction = max(self.contraction, float(self.out[3]))
         self.out[6] = 0.0

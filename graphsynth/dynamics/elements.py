@@ -205,12 +205,14 @@ class TorqueSource:
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Dry friction in an R or P joint, regularised: ``mu(v) = (mu_k + (mu_s - mu_k) exp(-(v/v_s)^2)) tanh(v/v_0)``.
+    """Dry friction in an R or P joint: at rest up to ``static`` times the load, sliding ``mu(v)`` times the load.
 
-    In a turning pair v is ``radius`` times the relative speed and the friction torque ``mu(v) radius |F|`` with F the
-    pin force; in a sliding pair the friction force is ``mu(v) (|N1| + |N2|)``, N1 and N2 the normal forces at the
-    ends of a shoe of the given ``length`` that carry the guide's force and couple (0: the force alone).  The
-    friction depends on the reactions and they on it: solved by iteration, see ``docs/explanation/planar-dynamics.md``.
+    ``mu(v) = kinetic + (static - kinetic) exp(-(v/stribeck_speed)^2)``; with ``stribeck_speed=0`` the coefficient falls
+    at once.  In a turning pair v is ``radius`` times the relative speed and the friction torque ``mu radius |F|`` with
+    F the pin force; in a sliding pair the friction force is ``mu (|N1| + |N2|)``, N1 and N2 the normal forces at the
+    ends of a shoe of the given ``length`` that carry the guide's force and couple (0: the force alone).  Sticking is a
+    state with events, see ``docs/explanation/planar-dynamics.md``; ``regular_speed > 0`` asks for the smooth law
+    ``mu(v) tanh(v/regular_speed)`` instead, which never sticks.
 
     Raises
     ------
@@ -225,7 +227,7 @@ class JointFriction:
     radius: float = 0.0
     length: float = 0.0
     stribeck_speed: float = math.inf
-    regular_speed: float = 1e-3
+    regular_speed: float = 0.0
 
     def __post_init__(self) -> None:
         _pair(self, "joint friction")
@@ -237,11 +239,17 @@ class JointFriction:
             raise GeometryError(
                 f"kinetic {name} = {self.kinetic} is above static = {static}; exchange them or make them equal"
             )
-        for part in ("radius", "length"):
+        for part in ("radius", "length", "regular_speed"):
             object.__setattr__(self, part, not_negative(f"{part} {name}", getattr(self, part)))
-        object.__setattr__(self, "regular_speed", nonzero(f"regular_speed {name}", self.regular_speed))
-        if static > self.kinetic and not 0.0 < self.stribeck_speed < math.inf:
-            raise GeometryError(f"static {name} above kinetic needs stribeck_speed, the speed at which friction falls")
+        if static > self.kinetic and not 0.0 <= self.stribeck_speed < math.inf:
+            raise GeometryError(
+                f"static {name} above kinetic needs stribeck_speed, the speed at which friction falls (0: at once)"
+            )
+        if static > self.kinetic and self.stribeck_speed == 0.0 < self.regular_speed:
+            raise GeometryError(
+                f"regular_speed {name} cannot represent a coefficient that falls at once; leave it out, or give a "
+                "stribeck_speed"
+            )
 
 
 Element = Spring | TorsionSpring | Force | Torque | TorqueSource | JointFriction

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.result import Checks
+from graphsynth.dynamics.friction_history import FrictionAt
+from graphsynth.dynamics.result import Checks, FrictionHistory
 from graphsynth.dynamics.tables import Compiled
 
 __all__ = ["Balance", "balance_at", "checks_of", "warnings_of"]
@@ -32,7 +33,9 @@ class Balance(NamedTuple):
     bodies: Array
 
 
-def balance_at(compiled: Compiled, t: float, q: Array, v: Array, slots: Array, own: Array | None) -> Balance:
+def balance_at(
+    compiled: Compiled, t: float, q: Array, v: Array, slots: Array, own: Array | None, fit: FrictionAt | None = None
+) -> Balance:
     """Evaluate one state; ``own`` are accelerations of another formulation, used where masses vanish."""
     from graphsynth.dynamics import kernels
 
@@ -42,15 +45,17 @@ def balance_at(compiled: Compiled, t: float, q: Array, v: Array, slots: Array, o
     applied = applied_loads(compiled, t, q, v)
     Q, Qc, V, P, _ = kernels.load_vector(T, x, applied)
     C, J, gam, vel = kernels.constraint_system(T, x, slots, driven)
-    out = np.zeros(7)
-    if T.lower.size:
-        a, lam = kernels.accelerate(T, x, J, gam, Q, out)
+    rubbing, rubbed = np.zeros_like(Q), 0.0
+    if fit is not None:
+        a, lam, rubbing, rubbed = fit.a, fit.multipliers, fit.rubbing, float(fit.forces @ fit.rates)
+    elif T.friction.size:
+        a, lam = np.full_like(Q, np.nan), np.full(len(C), np.nan)
+    elif T.lower.size:
+        a, lam = kernels.accelerate(T, x, J, gam, Q, np.zeros(7))
     else:
         assert own is not None  # massless links: minimal form only
         a = own
         lam = np.linalg.lstsq(J.T, Q - T.mass @ a, rcond=1e-12)[0]
-    rubbing = np.zeros_like(Q)
-    rubbed = kernels.friction_loads(T, x, J, lam, rubbing) if T.friction.size else 0.0
     inertial = T.mass @ a
     drivers = -float(lam @ vel)
     power = float(P + rubbed + drivers)
@@ -114,9 +119,13 @@ def checks_of(
     )  # fmt: skip
 
 
-def warnings_of(checks: Checks, rtol: float) -> tuple[str, ...]:
+def warnings_of(checks: Checks, rtol: float, friction: FrictionHistory | None = None) -> tuple[str, ...]:
     """Say which checks are worse than expected, each in a sentence."""
-    found = []
+    found = [
+        f"{', '.join(names)} stick together in a loop: how they share their friction is not determined, and the "
+        "reactions there are those in which all are used to the same part of their limits"
+        for names in (() if friction is None else friction.shared)
+    ]
     unknown = [name for name in ("position_drift", "energy", "power", "dalembert") if np.isnan(getattr(checks, name))]
     if unknown:
         found.append(f"no value of {', '.join(unknown)}: a state reached has no accelerations, or none was reached")

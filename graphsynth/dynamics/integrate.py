@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.energies import Balance, balance_at, checks_of, warnings_of
+from graphsynth.dynamics.friction_history import FrictionAt, friction_at, friction_history
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
 from graphsynth.dynamics.second import newton_euler_difference, second_accelerations
 from graphsynth.dynamics.start import StartReport, start_compiled
-from graphsynth.dynamics.stepping import Trail, integrate
+from graphsynth.dynamics.stepping import StepOptions, Trail, integrate
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.checks import finite
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.friction_problem import Senses
+    from graphsynth.dynamics.friction_rows import FrictionRows
 
 __all__ = ["simulate_dynamics"]
 
@@ -98,7 +103,7 @@ def simulate_dynamics(
     grid = _times(times)
     compiled = compile_model(model)
     report = start or start_compiled(compiled, pose, rates, keep or {}, keep_rates or {}, modes, float(grid[0]))
-    if not report.consistent:
+    if not report.consistent and not report.status.startswith("friction"):
         raise GeometryError(report.message)
     _check_start(report, model)
     options = _options(method, rtol, atol, outputs, project, max_steps)
@@ -123,23 +128,13 @@ def _times(times: ArrayLike) -> Array:
     return grid
 
 
-@dataclass(frozen=True)
-class _Options:
-    method: str
-    rtol: float
-    atol: float | None
-    exact: bool
-    project: bool
-    max_steps: int
-
-
 def _options(
     method: str, rtol: float, atol: float | None, outputs: str, project: bool, max_steps: int
-) -> _Options:  # fmt: skip
+) -> StepOptions:  # fmt: skip
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise GeometryError(f"max_steps = {max_steps!r} is not a number of steps; give an integer of at least 1")
     absolute = None if atol is None else finite("atol", atol)
-    return _Options(method, finite("rtol", rtol), absolute, outputs == "exact", project, max_steps)
+    return StepOptions(method, finite("rtol", rtol), absolute, outputs == "exact", project, max_steps)
 
 
 def _check_start(report: StartReport, model: DynamicModel) -> None:
@@ -154,7 +149,7 @@ def _check_start(report: StartReport, model: DynamicModel) -> None:
             )
 
 
-def _check_options(form: str, outputs: str, options: _Options) -> None:
+def _check_options(form: str, outputs: str, options: StepOptions) -> None:
     from graphsynth.dynamics.stepping import METHODS
 
     if form not in FORMS:
@@ -201,6 +196,8 @@ class _Run:
     form: Form
     seconds: float
     events: list[DynamicEvent] = field(default_factory=list)
+    rows: FrictionRows | None = None
+    senses: list[Senses | None] = field(default_factory=list)
 
 
 def make_form(compiled: Compiled, report: StartReport, name: str, project: bool) -> Form:
@@ -218,7 +215,7 @@ def make_form(compiled: Compiled, report: StartReport, name: str, project: bool)
     return ConstrainedForm(compiled, report, project)
 
 
-def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, options: _Options) -> _Run:
+def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, options: StepOptions) -> _Run:
     """Integrate once; in the form "auto" beyond a fold again in the constrained form."""
     from graphsynth.dynamics.minimal import minimal_obstacle
 
@@ -243,29 +240,34 @@ def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, optio
     return run
 
 
-def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, options: _Options) -> _Run:
+def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, options: StepOptions) -> _Run:
     begin = perf_counter()
     form = make_form(compiled, report, name, options.project)
     n, count = compiled.n, len(grid)
     run = _Run(
         name, np.full((count, n), np.nan), np.full((count, n), np.nan), [None] * count,
         np.zeros((count, len(report.slots))), np.full(count, np.nan), 0, Trail(), form, 0.0,
+        senses=[None] * count,
     )  # fmt: skip
 
-    def output(k: int, t: float, y: Array) -> None:
+    def show(form: Form, k: int, t: float, y: Array, senses: Senses | None) -> None:
         run.q[k], run.v[k] = form.state(t, y)
         run.slots[k] = getattr(form, "slots", report.slots)
         run.work[k] = y[-1]
         own = getattr(form, "accelerations", None)
         run.own[k] = None if own is None else own(t, y)
+        run.senses[k] = senses
         run.done = k + 1
 
     with np.errstate(all="ignore"):
-        run.trail = integrate(
-            form, grid, compiled.model.breaks, options.method, options.rtol,
-            scales(compiled, report, form) * options.rtol * 0.01 if options.atol is None else options.atol,
-            options.exact, options.max_steps, output,
-        )  # fmt: skip
+        if compiled.tables.friction.size:
+            _with_friction(compiled, report, grid, options, run, show)
+        else:
+            run.trail = integrate(
+                form, grid, compiled.model.breaks, options.method, options.rtol,
+                scales(compiled, report, form) * options.rtol * 0.01 if options.atol is None else options.atol,
+                options.exact, options.max_steps, lambda k, t, y: show(form, k, t, y, None),
+            )  # fmt: skip
     run.seconds = perf_counter() - begin
     lost = np.flatnonzero(~np.isfinite(run.q[: run.done]).all(axis=1) | ~np.isfinite(run.v[: run.done]).all(axis=1))
     if lost.size:  # an interpolated state that the formulation cannot place is a failure, not a gap
@@ -274,8 +276,27 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
         run.trail.message = f"the state at the output time {float(grid[run.done]):.9g} s has no pose"
         run.q[run.done :], run.v[run.done :], run.work[run.done :] = np.nan, np.nan, np.nan
     run.events += run.trail.events
-    run.events += [DynamicEvent("change of coordinates", t, 0.0, text) for t, text in form.changes]
+    run.events += [DynamicEvent("change of coordinates", t, 0.0, text) for t, text in run.form.changes]
     return run
+
+
+def _with_friction(
+    compiled: Compiled, report: StartReport, grid: Array, options: StepOptions, run: _Run,
+    show: Callable[[Form, int, float, Array, Senses | None], None],
+) -> None:  # fmt: skip
+    """Integrate a model with friction in its joints."""
+    from graphsynth.dynamics.dry_motion import DryMotion
+    from graphsynth.dynamics.friction_rows import FrictionRows
+
+    run.rows = FrictionRows(compiled)
+    dry = DryMotion(
+        run.rows, report, lambda piece, start: make_form(piece, start, run.name, options.project),
+        lambda form: scales(compiled, report, form), show,
+    )  # fmt: skip
+    run.trail = dry.go(grid, compiled.model.breaks, options)
+    assert dry.form is not None
+    run.form = dry.form
+    run.form.loss, run.form.contraction, run.form.changes = dry.loss, dry.contraction, dry.changes
 
 
 def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
@@ -295,18 +316,22 @@ def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
 
 
 def _result(
-    compiled: Compiled, report: StartReport, grid: Array, run: _Run, options: _Options, estimate: Array | None
+    compiled: Compiled, report: StartReport, grid: Array, run: _Run, options: StepOptions, estimate: Array | None
 ) -> DynamicMotion:
     begin = perf_counter()
     count, done = len(grid), run.done
     balances: list[Balance] = []
+    fits: list[FrictionAt | None] = []
     for k in range(done):
         slots = run.slots[k]
         if run.name != "constrained":
             from graphsynth.dynamics.values import initial_slots
 
             slots = initial_slots(compiled, run.q[k])
-        balances.append(balance_at(compiled, float(grid[k]), run.q[k], run.v[k], slots, run.own[k]))
+        t = float(grid[k])
+        fit = None if run.rows is None else friction_at(run.rows, t, run.q[k], run.v[k], slots, run.senses[k])
+        balances.append(balance_at(compiled, t, run.q[k], run.v[k], slots, run.own[k], fit))
+        fits.append(fit)
     a, lam = np.full((count, compiled.n), np.nan), np.full((count, len(compiled.info)), np.nan)
     kinetic, potential = np.full(count, np.nan), np.full(count, np.nan)
     for k, b in enumerate(balances):
@@ -330,18 +355,19 @@ def _result(
     completed = done == count
     message = "completed" if completed else _failure(run, grid)
     events = tuple(sorted(run.events, key=lambda event: event.time))
-    warnings, backend = warnings_of(checks, options.rtol), _backend(options.method)
+    friction = None if run.rows is None else friction_history(run.rows, count, fits)
+    warnings, backend = warnings_of(checks, options.rtol, friction), _backend(options.method)
     return DynamicMotion(
         compiled.model, compiled, grid, poses, velocities, accelerations, run.q, run.v, a, lam, run.slots, kinetic,
         potential, run.work, "completed" if completed else "failed", message, run.trail.time,
         events, report, checks, warnings, estimate, run.name, options.method, backend, options.rtol,
         run.trail.evaluations, run.trail.steps, run.seconds,
-        perf_counter() - begin,
+        perf_counter() - begin, friction,
     )  # fmt: skip
 
 
 def _failure(run: _Run, grid: Array) -> str:
-    why = run.form.why or run.trail.message
+    why = run.trail.message if run.rows is not None and run.trail.message else run.form.why or run.trail.message
     return f"the integration stopped at t = {run.trail.time:.9g} of {grid[-1]:.9g} s: {why}"
 
 

@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.compiled_steps import ONE_STAGE, Stages
+from graphsynth.dynamics.friction_problem import NO_LOADS, FrictionProblem
+from graphsynth.dynamics.friction_rows import FrictionRows
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.values import initial_slots
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, compile_program
@@ -163,6 +166,7 @@ class MinimalForm:
         self.pivot = 1.0
         self.inertia = float("nan")
         self._slopes: dict[int, float] = {}
+        self._rows: FrictionRows | None = None
         self._kernels = kernels
         driver = compiled.model.mechanism.drivers[0]
         theta, omega = (
@@ -221,7 +225,7 @@ class MinimalForm:
         if self.compiled.applied or self.compiled.tables.friction.size:
             return None
 
-        def run(y: Array, h: float, A: Array, K: Array) -> Array:
+        def run(t: float, y: Array, h: float, A: Array, K: Array) -> Array:
             fresh = self._run(y, h, A, K, 1, len(A))
             if not np.isfinite(K).all():
                 self.rates(0.0, fresh)  # says why
@@ -266,18 +270,33 @@ class MinimalForm:
         inertia = float(Mq @ q1)
         self._out[0], self._out[3] = inertia, float(good)
         if T.friction.size:
-            slots = np.zeros(max(1, int(T.slots.max(initial=-1)) + 1))
-            _, J, gam, _ = self._kernels.constraint_system(T, x, slots, np.zeros((1, 3)))
-            out = np.zeros(7)
-            _, lam = self._kernels.accelerate(T, x, J, gam, Q, out)
-            self.contraction = max(self.contraction, float(out[3]))
-            if out[3] >= 1.0:
-                self.why = "the friction iteration does not contract: there may be no solution or several"
+            rubbed = self._rub(t, q, v, x, Q)
+            if not np.isfinite(rubbed):
+                self.why = NO_LOADS
                 return np.full(3, np.nan)
-            P += self._kernels.friction_loads(T, x, J, lam, Q)
+            P += rubbed
         if not self._good():
             return self._failed(y)
         return np.array([w, float(Q @ q1 - Mq @ q2 * w * w) / inertia, P])
+
+    def _rub(self, t: float, q: Array, v: Array, x: Array, Q: Array) -> float:
+        """Add friction to the generalised forces; returns its power, NaN if there is none that fits."""
+        T = self.compiled.tables
+        slots = initial_slots(self.compiled, q)
+        if not T.lower.size:  # links without mass
+            if self._rows is None:
+                self._rows = FrictionRows(self.compiled)
+            problem = FrictionProblem(self._rows, t, q, v, slots)
+            fit = problem.at(tuple(int(s) if abs(s) <= 1.0 else 0 for s in T.friction_table[:, 6]))
+            if fit is None:
+                return float("nan")
+            Q += problem.W.T @ fit.forces
+            return float(problem.rates @ fit.forces)
+        _, J, gam, _ = self._kernels.constraint_system(T, x, slots, np.zeros((1, 3)))
+        out = np.zeros(7)
+        _, lam = self._kernels.accelerate(T, x, J, gam, Q, out)
+        self.contraction = max(self.contraction, float(out[3]))
+        return float(self._kernels.friction_loads(T, x, J, lam, Q)) if out[4] >= 0.0 else float("nan")
 
     def refuses(self, t: float, y: Array) -> bool:
         """Whether two assembly modes met within the step: the sign of a mode says nothing of how it goes on there.

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.compiled_steps import Stages
+from graphsynth.dynamics.friction_problem import NO_LOADS
 from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import initial_slots
@@ -22,7 +23,7 @@ _NAMES = ("x", "y", "theta")
 _WRONG = (
     "",
     "a spring has length 0, so its direction is not defined",
-    "the friction iteration does not contract: there may be no solution or several",
+    NO_LOADS,
     "the dependent coordinates cannot be solved: the mechanism cannot be assembled there",
 )
 
@@ -138,14 +139,14 @@ class ReducedForm:
 
     @property
     def stages(self) -> Stages | None:
-        """A compiled Runge-Kutta step, if neither loads nor motions are given as functions."""
-        if self.compiled.applied or self.compiled.laws:
+        """A compiled Runge-Kutta step, if no load is given as a function."""
+        if self.compiled.applied:
             return None
 
-        def run(y: Array, h: float, A: Array, K: Array) -> Array:
+        def run(t: float, y: Array, h: float, A: Array, K: Array) -> Array:
             fresh = self._kernels.reduced_stages(
                 self.compiled.tables, y, h, A, K, 1, len(A), self.chosen, self._near, self._metric, self.slots,
-                self._fixed, self._none, self.out,
+                self.compiled.driven_at(t + h * A.sum(axis=1)), self._none, self.out,
             )  # fmt: skip
             self._look()
             return np.asarray(fresh)

@@ -15,18 +15,38 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.reactions import Reactions
     from graphsynth.dynamics.tables import Compiled
 
-__all__ = ["Checks", "DynamicEvent", "DynamicMotion"]
+__all__ = ["Checks", "DynamicEvent", "DynamicMotion", "FrictionHistory"]
 
 Array = NDArray[np.float64]
 
 
 class DynamicEvent(NamedTuple):
-    """Something at one time: "singular pose", "fold", "change of coordinates", "break", "failure"."""
+    """Something at one time.
+
+    Kinds: "singular pose", "fold", "change of coordinates", "break", and of dry friction "stick", "slip", "reversal".
+    """
 
     kind: str
     time: float
     uncertainty: float
     statement: str
+
+
+class FrictionHistory(NamedTuple):
+    """Dry friction of all elements over n output times.
+
+    ``names`` of the joints in the order of the elements; ``state`` (n, elements) 0 sticking, +1 and -1 sliding;
+    ``rate`` of the joint's second link relative to the first (m/s, rad/s), exactly 0 while sticking; ``force`` on the
+    second link along it (N, N m); ``load`` of the sliding surfaces (N).  ``shared``: joints that stick together in a
+    loop, whose shares of the friction are not determined.
+    """
+
+    names: tuple[str, ...]
+    state: NDArray[np.int64]
+    rate: Array
+    force: Array
+    load: Array
+    shared: tuple[tuple[str, ...], ...]
 
 
 class Checks(NamedTuple):
@@ -38,7 +58,8 @@ class Checks(NamedTuple):
     equations with the reported reactions over the largest force.  ``second_form``: largest difference of the
     accelerations of two formulations over their largest size, counted at regular poses.  ``newton_euler``: the same
     of the reactions, against body-by-body equilibrium.  ``projection_loss``: energy taken by projection (J).
-    ``contraction``: of the friction iteration, 0 without friction.
+    ``contraction``: the largest factor with which a load that friction makes returned to it; 0 without friction, below
+    1 a motion is the only one.
     """
 
     position_drift: float
@@ -84,6 +105,8 @@ class DynamicMotion:
         Right-hand sides, accepted steps.
     seconds : float
         Of the integration; ``seconds_checks`` of the checks.
+    friction : FrictionHistory or None
+        Friction of the joints that have it.
     """
 
     model: Any
@@ -116,6 +139,7 @@ class DynamicMotion:
     steps: int
     seconds: float
     seconds_checks: float
+    friction: FrictionHistory | None = None
 
     #: How the numbers were had.
     label = "estimated"

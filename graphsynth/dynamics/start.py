@@ -39,7 +39,8 @@ class StartReport:
     Attributes
     ----------
     status : str
-        "consistent", "violated" (positions do not close), "contradicting rates" (velocities do not fit).
+        "consistent", "violated" (positions do not close), "contradicting rates" (velocities do not fit), or what dry
+        friction leaves: "friction: none", "friction: several", "friction: undetermined", "friction: not decided".
     message : str
         The result in one sentence.
     time : float
@@ -344,11 +345,11 @@ def _velocities(
             f"{_row_units(values, kept)[worst]}/s; keep fewer rates or correct them",
         )  # fmt: skip
     moved = float(np.abs(step / values.column_scale).max(initial=0.0))
-    a, lam, text = values.accelerations(report.q, v, applied_loads(compiled, values.time, report.q, v))
+    a, lam, text, status = values.accelerations(report.q, v, applied_loads(compiled, values.time, report.q, v))
     pose, rate, second = compiled.to_links(report.q, v, a)
-    message = _sentence(report) + text
+    message = _sentence(report) + text if status == "consistent" else text
     return replace(
-        report, v=v, a=a, multipliers=lam, velocities=rate, accelerations=second, poses=pose,
+        report, status=status, v=v, a=a, multipliers=lam, velocities=rate, accelerations=second, poses=pose,
         velocity_correction=moved, message=message,
     )  # fmt: skip
 

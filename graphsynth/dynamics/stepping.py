@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from graphsynth.dynamics.result import DynamicEvent
 
 if TYPE_CHECKING:
+    from graphsynth.dynamics.dry_guard import Guard
     from graphsynth.dynamics.integrate import Form
 
-__all__ = ["METHODS", "Trail", "integrate"]
+__all__ = ["METHODS", "StepOptions", "Stepper", "Trail", "integrate"]
 
 Array = NDArray[np.float64]
 Output = Callable[[int, float, Array], None]
@@ -25,6 +26,18 @@ _RUNGE_KUTTA = ("DOP853", "RK45", "RK23")
 _STALL, _STALLED = 1e-2, 200
 #: The same for steps shorter than this part of the whole time.
 _TINY = 1e-5
+
+
+@dataclass(frozen=True)
+class StepOptions:
+    """What the integrator is told."""
+
+    method: str
+    rtol: float
+    atol: float | None
+    exact: bool
+    project: bool
+    max_steps: int
 
 
 @dataclass
@@ -62,7 +75,7 @@ def integrate(
         trail.events.append(DynamicEvent("break", t, 0.0, f"loads are not smooth at t = {t:.9g} s"))
     ends = [*inner, float(grid[-1])]
     for end in ends:
-        stepper = _Stepper(form, trail, method, rtol, atol, exact, end, at_break=end in inner)
+        stepper = Stepper(form, trail, method, rtol, atol, exact, end, at_break=end in inner)
         last = stepper.run(y, grid, max_steps, output)
         if last is None:
             break
@@ -70,17 +83,17 @@ def integrate(
     return trail
 
 
-class _Stepper:
+class Stepper:
     """Integration over one smooth piece."""
 
     def __init__(
         self, form: Form, trail: Trail, method: str, rtol: float, atol: Array | float, exact: bool, end: float,
-        at_break: bool,
+        at_break: bool, guard: Guard | None = None,
     ) -> None:  # fmt: skip
         self.form, self.trail, self.method, self.rtol, self.atol = form, trail, method, rtol, atol
         self.longest, self.stalled, self.lost = 0.0, 0, False
         self.exact = exact or method not in (*_RUNGE_KUTTA, "Radau")
-        self.end = end
+        self.end, self.guard = end, guard
         self.latest = float(np.nextafter(end, -np.inf)) if at_break else np.inf
 
     def rates(self, t: float, y: Array) -> Array:
@@ -90,7 +103,8 @@ class _Stepper:
         self.lost = self.lost or not np.isfinite(found).all()
         return found
 
-    def _solver(self, t: float, y: Array, bound: float, first: float | None) -> Any:
+    def solver(self, t: float, y: Array, bound: float, first: float | None) -> Any:
+        """Return a solver of the method from a state to a bound."""
         from scipy import integrate as scipy_integrate
 
         if self.method == "CVODE":
@@ -108,7 +122,7 @@ class _Stepper:
         return getattr(scipy_integrate, self.method)(self.rates, t, y, bound, **options)
 
     def run(self, y: Array, grid: Array, max_steps: int, output: Output) -> Array | None:
-        """Integrate to the end of the piece; None if that fails."""
+        """Integrate to the end of the piece, or to where the guard ends it; None if that fails."""
         trail = self.trail
         if not np.isfinite(self.rates(trail.time, y)).all():
             trail.message = "the equations of motion have no value at the start"
@@ -129,6 +143,8 @@ class _Stepper:
                     k += 1
                 step, solver = trail.last_step or None, None
                 continue
+            if self.guard is not None and hasattr(solver, "h_abs"):
+                solver.h_abs = min(solver.h_abs, self.guard.longest())
             message = self._step(solver)
             trail.steps += 1
             if solver.status == "failed" or not np.isfinite(solver.y).all():
@@ -140,6 +156,15 @@ class _Stepper:
             if trail.steps >= max_steps:
                 trail.message = f"more than {max_steps} steps"
                 return None
+            if self.guard is not None:
+                found = self.guard.look(self, before, y, solver)
+                if found.message:
+                    trail.message = found.message
+                    return None
+                if found.step is not None:  # again from here, shorter; to the event if there is one
+                    self.end = self.end if found.event is None else found.event
+                    solver, step = None, found.step
+                    continue
             if self._refused(solver):
                 trail.message = "the formulation does not hold beyond this time"
                 return None
@@ -188,7 +213,7 @@ class _Stepper:
             if step is not None:
                 solver.h_abs = max(solver.h_abs, step)
             return solver
-        return self._solver(t, y, bound, step)
+        return self.solver(t, y, bound, step)
 
     def _outputs(self, solver: Any, before: float, grid: Array, k: int, output: Output) -> int:
         dense = None

@@ -28,6 +28,8 @@ IntArray = NDArray[np.int64]
 
 #: Kind of a rack row, beside those of :mod:`graphsynth.kinematics.engine.codes`.
 RACK = 20
+#: Sense of sliding of a friction element that is given by the speed itself.
+BY_SPEED = 2.0
 
 
 class Tables(NamedTuple):
@@ -50,7 +52,7 @@ class Tables(NamedTuple):
     sources: IntArray  #: (torques, 2) links
     source_table: Array  #: torque behind the train, efficiency
     friction: IntArray  #: (frictions, 4) first row, rows, a, b
-    friction_table: Array  #: kinetic, static, Stribeck speed, regular speed, radius, length
+    friction_table: Array  #: kinetic, static, Stribeck speed, regular speed, radius, length, sense of sliding
     size: float  #: characteristic length
 
 
@@ -79,6 +81,8 @@ class Compiled:
     centres: Array
     laws: tuple[Callable[[Array], tuple[Array, Array, Array]], ...]
     applied: tuple[Force | Torque | TorqueSource, ...]
+    #: Values at which further coordinates are held, after those of the laws: joints that stick.
+    held: tuple[float, ...] = ()
 
     @property
     def links(self) -> int:
@@ -129,10 +133,31 @@ class Compiled:
 
     def driven(self, t: float) -> Array:
         """Prescribed coordinates and their two derivatives, shape (drivers, 3); at least one row."""
-        found = np.zeros((max(1, len(self.laws)), 3))
+        return np.asarray(self.driven_at(np.array([t]))[0])
+
+    def driven_at(self, times: Array) -> Array:
+        """Return `driven` at several times, shape (times, drivers, 3); one for all if nothing depends on time."""
+        count = len(self.laws)
+        found = np.zeros((len(times) if count else 1, max(1, count + len(self.held)), 3))
+        found[:, count : count + len(self.held), 0] = self.held
         for k, law in enumerate(self.laws):
-            found[k] = [float(part[0]) for part in law(np.array([t]))]
+            for c, part in enumerate(law(times)):
+                found[:, k, c] = part
         return found
+
+
+class _Remembered:
+    """A motion law that keeps its last single values: the same time is asked for several times in a row."""
+
+    def __init__(self, law: Callable[[Array], tuple[Array, Array, Array]]) -> None:
+        self._law, self._last = law, (math.nan, (np.empty(0),) * 3)
+
+    def __call__(self, times: Array) -> tuple[Array, Array, Array]:
+        if len(times) > 1:
+            return self._law(times)
+        if self._last[0] != times[0]:
+            self._last = float(times[0]), self._law(times)
+        return self._last[1]
 
 
 def compile_model(model: DynamicModel) -> Compiled:
@@ -169,7 +194,7 @@ def compile_model(model: DynamicModel) -> Compiled:
     )  # fmt: skip
     return Compiled(
         model, tables, tuple(info), tuple(joints), tuple(first), centres,
-        tuple(driver.law for driver in model.prescribed), applied,
+        tuple(_Remembered(driver.law) for driver in model.prescribed), applied,
     )  # fmt: skip
 
 
@@ -372,6 +397,6 @@ def _frictions(model: DynamicModel, joints: list[Any], first: list[int]) -> tupl
         joint = joints[index]
         ints.append([first[index], 2 if isinstance(joint, Revolute) else 1, joint.a, joint.b])
         stribeck = e.stribeck_speed if math.isfinite(e.stribeck_speed) else 1e300
-        floats.append([e.kinetic, e.static, stribeck, e.regular_speed, e.radius, e.length])
-    table = np.array(floats, dtype=np.float64).reshape(-1, 6)
+        floats.append([e.kinetic, e.static, stribeck, e.regular_speed, e.radius, e.length, BY_SPEED])
+    table = np.array(floats, dtype=np.float64).reshape(-1, 7)
     return np.array(ints, dtype=np.int64).reshape(-1, 4), table

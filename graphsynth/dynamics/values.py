@@ -124,24 +124,31 @@ class Values:
         Ck, Jk = self.extra(q, kept[0], kept[1])
         return np.concatenate([C, Ck]), np.vstack([J, Jk])
 
-    def accelerations(self, q: Array, v: Array, applied: Array) -> tuple[Array, Array, str]:
-        """Accelerations and multipliers, and what to say about them; NaN with massless links."""
+    def accelerations(self, q: Array, v: Array, applied: Array) -> tuple[Array, Array, str, str]:
+        """Accelerations and multipliers, what to say about them, and the status of a start from there.
+
+        NaN with massless links, and where friction leaves no or several motions.
+        """
         from graphsynth.dynamics import kernels
 
         T = self.compiled.tables
-        m = len(self.compiled.info)
+        nothing = np.full(len(q), np.nan), np.full(len(self.compiled.info), np.nan)
         if not T.lower.size:
-            return np.full(len(q), np.nan), np.full(m, np.nan), "; accelerations of massless links: minimal form only"
-        out = np.zeros(7)
+            return *nothing, "; accelerations of massless links: minimal form only", "consistent"
         x = kernels.state_rows(T, q, v)
         Q, _, _, _, good = kernels.load_vector(T, x, applied)
-        _, J, gam, _ = kernels.constraint_system(T, x, self.slots, self.driven)
-        a, lam = kernels.accelerate(T, x, J, gam, Q, out)
-        text = "; the friction iteration does not contract: no or several solutions" if out[3] >= 1.0 else ""
         if not good:
-            return (
-                np.full(len(q), np.nan),
-                np.full(m, np.nan),
-                "; a spring has length 0, so its direction is not defined",
-            )
-        return a, lam, text
+            return *nothing, "; a spring has length 0, so its direction is not defined", "consistent"
+        if T.friction.size:
+            from graphsynth.dynamics.dry_state import decide
+            from graphsynth.dynamics.friction_problem import FrictionProblem
+            from graphsynth.dynamics.friction_rows import FrictionRows
+
+            problem = FrictionProblem(FrictionRows(self.compiled), self.time, q, v, self.slots)
+            found = decide(problem, problem.moving(), problem.resting)
+            if found.solution is None:
+                return *nothing, found.message, f"friction: {found.kind}"
+            return found.solution.a, found.solution.multipliers, "", "consistent"
+        _, J, gam, _ = kernels.constraint_system(T, x, self.slots, self.driven)
+        a, lam = kernels.accelerate(T, x, J, gam, Q, np.zeros(7))
+        return a, lam, "", "consistent"

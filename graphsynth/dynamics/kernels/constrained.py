@@ -51,16 +51,18 @@ def project_state(T, q, v, phi, qd):
 
 
 @kernel
-def constrained_stages(T, y, h, A, K, low, high, phi, qd, applied, out):
+def constrained_stages(T, y, h, A, K, low, high, phi, driven, applied, out):
     """Rates of (q, v, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state, multipliers.
 
+    ``driven`` holds the prescribed coordinates of every stage, or one set for all.
     ``out`` as in `accelerate`, then potential energy and a flag.  The flag is set, and the rates are NaN, for a spring
-    of length 0 (1) and where the friction iteration does not contract (2).
+    of length 0 (1) and where no friction loads were found (2).
     """
     n = T.mass.shape[0]
     state, lam = y, np.zeros(T.rows.shape[0])
     for s in range(low, high):
         state = combined(y, h, K, A[s], s)
+        qd = driven[min(s, driven.shape[0] - 1)]
         q, v = state[:n], state[n : 2 * n]
         for attempt in range(2):
             x = state_rows(T, q, v)
@@ -75,7 +77,7 @@ def constrained_stages(T, y, h, A, K, low, high, phi, qd, applied, out):
         for k in range(lam.shape[0]):
             P -= lam[k] * vel[k]  # what drivers do; the other joints do nothing
         out[5] = V
-        if not good or out[3] >= 1.0:
+        if not good or out[4] < 0.0:
             out[6] = 1.0 if not good else 2.0
             P = math.nan
         for j in range(n):

@@ -6,14 +6,8 @@ import numpy as np
 
 from graphsynth.compilation import kernel
 from graphsynth.dynamics.kernels.combining import combined
-from graphsynth.dynamics.kernels.solving import (
-    accelerate,
-    back_lower,
-    factor_rows,
-    forth_lower,
-    friction_loads,
-    least_step,
-)
+from graphsynth.dynamics.kernels.rubbing import friction_loads
+from graphsynth.dynamics.kernels.solving import accelerate, back_lower, factor_rows, forth_lower, least_step
 from graphsynth.dynamics.kernels.systems import constraint_system, load_vector, state_rows
 from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE
 
@@ -121,7 +115,7 @@ def accelerate_reduced(T, q, v, chosen, metric, phi, qd, applied, out):
                 for j in range(n):
                     P += T.mass[i, j] * a[j] * v[i]
             break
-    if not good or out[3] >= 1.0:
+    if not good or out[4] < 0.0:
         out[6] = 1.0 if not good else 2.0
         for i in range(n):
             a[i] = P = math.nan
@@ -129,12 +123,16 @@ def accelerate_reduced(T, q, v, chosen, metric, phi, qd, applied, out):
 
 
 @kernel
-def reduced_stages(T, y, h, A, K, low, high, chosen, near, metric, phi, qd, applied, out):
-    """Rates of (z, dz/dt, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state."""
+def reduced_stages(T, y, h, A, K, low, high, chosen, near, metric, phi, driven, applied, out):
+    """Rates of (z, dz/dt, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state.
+
+    ``driven`` holds the prescribed coordinates of every stage, or one set for all.
+    """
     c = chosen.shape[0]
     state = y
     for s in range(low, high):
         state = combined(y, h, K, A[s], s)
+        qd = driven[min(s, driven.shape[0] - 1)]
         q, v, pivot = place_reduced(T, state, chosen, near, metric, phi, qd)
         if pivot < 0.0:
             out[6] = 3.0

@@ -5,12 +5,10 @@ import math
 import numpy as np
 
 from graphsynth.compilation import kernel
-from graphsynth.dynamics.kernels.systems import pull, twist
+from graphsynth.dynamics.kernels.rubbing import friction_unit, slide_loads
 
 #: Diagonal entries of R below this part of the first count as zero (columns have length 1).
 RANK = 1e-10
-#: Friction iteration: rounds, and the change that counts as none.
-ROUNDS, STATIONARY = 200, 1e-14
 
 
 @kernel
@@ -166,80 +164,48 @@ def solve_rows(L, diagonal, J, d):
 
 
 @kernel
-def friction_loads(T, x, J, lam, Q):
-    """Add friction forces for multipliers ``lam``; returns their power."""
-    P = 0.0
-    for f in range(T.friction.shape[0]):
-        r, kind, a, b = T.friction[f, 0], T.friction[f, 1], T.friction[f, 2], T.friction[f, 3]
-        p = T.friction_table[f]
-        kb, ka = T.column[b], T.column[a]
-        if kind == 2:
-            speed = p[4] * (x[b, 7] - x[a, 7])
-            load = math.hypot(lam[r], lam[r + 1])
-        else:
-            # the direction of the guide from the normal in the row's gradient
-            nx, ny = (J[r, kb], J[r, kb + 1]) if kb >= 0 else (-J[r, ka], -J[r, ka + 1])
-            tx, ty = ny, -nx
-            px, py = T.table[r, 2], T.table[r, 3]
-            wx, wy = x[b, 2] * px - x[b, 3] * py, x[b, 3] * px + x[b, 2] * py
-            bx, by = x[b, 0] + wx, x[b, 1] + wy
-            ax, ay = bx - x[a, 0], by - x[a, 1]
-            speed = (tx * (x[b, 5] - x[b, 7] * wy - x[a, 5] + x[a, 7] * ay)
-                     + ty * (x[b, 6] + x[b, 7] * wx - x[a, 6] - x[a, 7] * ax))  # fmt: skip
-            couple = lam[r + 1] / p[5] if p[5] > 0.0 else 0.0
-            load = abs(0.5 * lam[r] + couple) + abs(0.5 * lam[r] - couple)
-        mu = (p[0] + (p[1] - p[0]) * math.exp(-((speed / p[2]) ** 2))) * math.tanh(speed / p[3])
-        if kind == 2:
-            P += twist(T, Q, x, a, b, -mu * p[4] * load)
-        else:
-            P += pull(T, Q, x, b, wx, wy, -mu * load * tx, -mu * load * ty)
-            P += pull(T, Q, x, a, ax, ay, mu * load * tx, mu * load * ty)
-    return P
+def multipliers_of(T, J, gam, B, R, order, size, rank, load, held):
+    """Accelerations and multipliers under generalised forces; ``held`` leaves the side ``gam`` of the rows in place."""
+    n, m = T.mass.shape[0], J.shape[0]
+    d = np.zeros(m)
+    forth_lower(T.lower, T.diagonal, load)
+    back_lower(T.lower, T.diagonal, load)
+    for k in range(m):
+        if held:
+            d[k] = gam[k]
+        for i in range(n):
+            d[k] -= J[k, i] * load[i]
+    y, z = least_step(T.lower, T.diagonal, B, R, order, size, rank, d)
+    for i in range(n):
+        y[i] += load[i]
+    return y, least_multipliers(B, R, order, size, rank, z)
 
 
 @kernel
 def accelerate(T, x, J, gam, Q, out):
     """Accelerations and multipliers of ``M a + J^T lam = Q, J a = gam``, with friction.
 
-    ``out``: rank, smallest pivot, power of friction, contraction factor (0 without friction), rounds; the contraction
-    factor is the ratio of the last two changes, 1 or more if the iteration did not become stationary.
+    ``out``: rank, smallest pivot, power of friction, factor of the friction's return through the reactions (0 without
+    friction, see `slide_loads`), rounds; rounds are -1 if no loads were found.
     """
-    n, m = T.mass.shape[0], J.shape[0]
     B, R, order, size, rank = factor_rows(T.lower, T.diagonal, J)
     out[0], out[1] = rank, abs(R[rank - 1]) if rank > 0 else 1.0
     out[2], out[3], out[4] = 0.0, 0.0, 0.0
-    a, lam, d, before = np.zeros(n), np.zeros(m), np.zeros(m), 0.0
-    for step in range(ROUNDS):
-        free = Q.copy()
-        if T.friction.shape[0] > 0 and step > 0:
-            out[2] = friction_loads(T, x, J, lam, free)
-        forth_lower(T.lower, T.diagonal, free)
-        back_lower(T.lower, T.diagonal, free)
-        for k in range(m):
-            d[k] = gam[k]
-            for i in range(n):
-                d[k] -= J[k, i] * free[i]
-        y, z = least_step(T.lower, T.diagonal, B, R, order, size, rank, d)
-        fresh = least_multipliers(B, R, order, size, rank, z)
+    count, n, m = T.friction.shape[0], T.mass.shape[0], J.shape[0]
+    a, lam = multipliers_of(T, J, gam, B, R, order, size, rank, Q.copy(), True)
+    if count == 0:
+        return a, lam
+    shares, powers = np.empty((count, n)), np.empty(count)
+    parts = np.empty((count, m))
+    for f in range(count):
+        unit = np.zeros(n)
+        powers[f] = friction_unit(T, x, J, f, unit)
+        shares[f], parts[f] = multipliers_of(T, J, gam, B, R, order, size, rank, unit, False)
+    loads, out[3], out[4] = slide_loads(T, lam, parts)
+    for f in range(count):
+        out[2] += loads[f] * powers[f]
         for i in range(n):
-            a[i] = free[i] + y[i]
-        change, scale = 0.0, 0.0
+            a[i] += loads[f] * shares[f, i]
         for k in range(m):
-            change = max(change, abs(fresh[k] - lam[k]))
-            scale = max(scale, abs(fresh[k]))
-        lam = fresh
-        if T.friction.shape[0] == 0:
-            break
-        out[4] = step
-        if step > 0:
-            if step > 1 and before > 0.0:
-                out[3] = change / before
-            if change <= STATIONARY * scale:
-                if not out[3] < 1.0:
-                    out[3] = 0.0
-                break
-            if not math.isfinite(change) or step == ROUNDS - 1:
-                out[3] = max(1.0, out[3])
-                break
-        before = change
+            lam[k] += loads[f] * parts[f, k]
     return a, lam
