@@ -27,10 +27,10 @@ def _variables(colours: dict[str, str]) -> str:
 
 
 def _recoloured() -> str:
-    """Rules that give every element with a light colour its dark one."""
+    """Rules that give every element with a light colour its dark one; nothing above it counts, for copies by `use`."""
     pairs = {LIGHT[name]: DARK[name] for name in LIGHT}
     return "".join(
-        f'.gs [{what}="{light}"]{{{what}:{dark}}}' for light, dark in pairs.items() for what in ("fill", "stroke")
+        f'[{what}="{light}"]{{{what}:{dark}}}' for light, dark in pairs.items() for what in ("fill", "stroke")
     )
 
 

@@ -129,7 +129,7 @@ def test_dark_pages_recolour_every_colour_of_the_palette() -> None:
     assert DARK.keys() == LIGHT.keys()
     for name, light in LIGHT.items():
         for what in ("fill", "stroke"):
-            assert STYLE.count(f'.gs [{what}="{light}"]{{{what}:{DARK[name]}}}') == 1
+            assert STYLE.count(f'[{what}="{light}"]{{{what}:{DARK[name]}}}') == 1
 
 
 # --- as drawn by others
@@ -187,6 +187,18 @@ def test_librsvg_draws_what_chromium_draws(window: Any, written: dict[str, str],
         assert len(picture.convert("RGB").getcolors(1 << 24)) > 8, name
         apart[name] = difference(picture, in_chromium(window, path, picture.size, **{"color-scheme": "light"}))
     assert max(apart.values()) < 0.5, apart
+
+
+def test_dark_pages_recolour_copies_of_marks_too(window: Any, tmp_path: Path) -> None:
+    figure = new_figure((3.0, 2.0))
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    axes.plot([0.0, 1.0], [0.0, 1.0], "o", ms=40.0, color=LIGHT["a"])
+    path = tmp_path / "x.svg"
+    path.write_text(themed_svg(figure), "utf-8")
+    shown = in_chromium(window, path, (288, 192), **{"color-scheme": "dark"}).convert("RGB")
+    seen = {f"#{r:02x}{g:02x}{b:02x}" for _, (r, g, b) in shown.getcolors(1 << 24)}
+    assert DARK["a"] in seen and LIGHT["a"] not in seen
 
 
 def test_dark_pages_and_reduced_motion_are_followed(window: Any, written: dict[str, str], tmp_path: Path) -> None:
