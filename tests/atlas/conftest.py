@@ -17,7 +17,8 @@ def loosened(path, *, sealed=True, anything=False):
     ``sealed``: put a new seal on the file, as somebody who wants to deceive would; ``anything``: past the types, too.
     """
     text = "UPDATE sqlite_master SET sql = "
-    loose = text + "replace(replace(replace(sql, ') STRICT, WITHOUT', ') WITHOUT'), ') STRICT', ')'), ' NOT NULL', '')"
+    plain = "replace(replace(sql, ') STRICT, WITHOUT', ') WITHOUT'), ') STRICT', ')')"
+    loose = f"{text} replace(replace({plain}, 'INTEGER NOT NULL', 'INTEGER'), 'TEXT NOT NULL', 'TEXT')"
     kept = []
     for step in ("before", "after"):
         raw = sqlite3.connect(path, isolation_level=None)

@@ -302,7 +302,7 @@ def memory():
 
 def test_mutants(right, altered, tmp_path, monkeypatch):
     """A fixed few."""
-    faults, statuses, _ = campaign(right, altered, tmp_path, monkeypatch, range(60))
+    faults, statuses, _ = campaign(right, altered, tmp_path, monkeypatch, range(16))
     assert faults == []
     assert {(name, status) for name in COMMANDS for status in (0, 2)} - set(statuses) <= {("quick", 0)}
 
