@@ -183,6 +183,7 @@ def _wanted() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[str, ...]]]:
 
 def _check_seal(connection: sqlite3.Connection, path: Path) -> None:
     """Take no changes of others over into a file that will have a new seal."""
+    connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # what a killed process left is taken in, or dropped
     connection.execute("BEGIN IMMEDIATE")  # nobody is in the middle of writing
     found = broken_seal(connection) if connection.execute("SELECT COUNT(*) FROM meta").fetchone()[0] else ""
     connection.execute("ROLLBACK")

@@ -52,7 +52,7 @@ def broken_seal(connection: sqlite3.Connection) -> str:
     if not rows:
         return "it has no seal, as after a command that was killed (the same command goes on and seals it)"
     if _log(connection):
-        return "another program has written to it, and left a log beside it"
+        return "a log lies beside it: another program writes to it, or was stopped while it did"
     with _path(connection).open("rb", buffering=0) as file:
         if rows != [("seal", _digest(file, *_place(connection)))]:
             return "it was changed after graphsynth wrote it: its bytes are not those of its seal"

@@ -172,7 +172,23 @@ def test_a_log_that_others_left_is_found(path):
     )
     subprocess.run([sys.executable, "-c", script, path], check=True)
     with Catalogue(path) as catalogue:
-        assert "left a log" in catalogue.verify(quick=True).differences[0]
+        assert "a log lies beside it" in catalogue.verify(quick=True).differences[0]
+    with pytest.raises(FormatError, match="changed after graphsynth wrote it"):
+        Catalogue.build(path, [8])
+
+
+def test_a_log_of_what_was_never_done_is_dropped(path):
+    """A process is killed in its first transaction, when it has written so much that a part is in the log."""
+    script = (
+        "import sqlite3, os, sys\nraw = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+        "raw.execute('PRAGMA journal_mode = WAL')\nraw.execute('PRAGMA cache_size = 1')\nraw.execute('BEGIN')\n"
+        "raw.execute('DELETE FROM meta')\nraw.execute('UPDATE chains SET girth = girth - 1')\n"
+        "raw.execute('DELETE FROM driven')\nraw.execute('DELETE FROM inversions')\nos._exit(0)"
+    )
+    subprocess.run([sys.executable, "-c", script, path], check=True)
+    assert path.with_name("x.sqlite-wal").stat().st_size > 0
+    with Catalogue.build(path, [4, 6]) as catalogue:
+        assert catalogue.verify().passed
 
 
 # --- questions
