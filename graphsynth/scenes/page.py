@@ -54,8 +54,8 @@ figure.small{grid-column:span 4}
 figure{grid-column:1/-1}
 figure.small{grid-column:span 6}.sheet figure.small{grid-column:span 6}}
 figure svg{display:block;max-width:100%;height:auto;margin:0 auto}
-.pictures:not(.sheet) svg{width:100%}
 figure.wide svg{max-width:min(100%,44rem);max-height:32rem}
+.pictures:not(.sheet) figure.wide svg{width:100%}
 figcaption{margin-top:auto;padding-top:.4rem}figcaption b{color:var(--ink)}
 details{margin:.6rem 0}summary{cursor:pointer;font-weight:600}
 code{font-size:.85em;overflow-wrap:anywhere}
