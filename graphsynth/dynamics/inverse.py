@@ -14,6 +14,7 @@ from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
 from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -31,7 +32,8 @@ class InverseDynamics:
 
     Attributes
     ----------
-    inputs : ndarray, shape (n,)
+    inputs, times : ndarray, shape (n,)
+        Input and time of every sample.
     efforts : ndarray, shape (n, drivers)
         Torque (N m) or force (N) of every driver on its ``link``, against its ``base``.
     reactions : Reactions
@@ -45,6 +47,7 @@ class InverseDynamics:
     """
 
     inputs: Array
+    times: Array
     efforts: Array
     reactions: Reactions
     power: Array
@@ -53,7 +56,12 @@ class InverseDynamics:
 
 
 def inverse_dynamics(
-    model: DynamicModel, motion: Motion, speed: ArrayLike = 1.0, acceleration: ArrayLike = 0.0
+    model: DynamicModel,
+    motion: Motion,
+    speed: ArrayLike = 1.0,
+    acceleration: ArrayLike = 0.0,
+    *,
+    times: ArrayLike | None = None,
 ) -> InverseDynamics:
     """Find the efforts of the mechanism's drivers, and the reactions, for a motion of the planar engine.
 
@@ -65,6 +73,9 @@ def inverse_dynamics(
         Of :func:`graphsynth.kinematics.simulate` for ``model.mechanism``.
     speed, acceleration : array_like, scalar or shape (n,)
         First and second time derivative of the input at every sample.
+    times : array_like, scalar or shape (n,), optional
+        Time of every sample, s, at which loads given as functions are taken.  By default ``input / speed``, the time
+        since the input was 0, if the speed is constant (0 at rest); at a speed that varies it must be given.
 
     Returns
     -------
@@ -74,7 +85,8 @@ def inverse_dynamics(
     Raises
     ------
     GeometryError
-        If the motion is of another mechanism, or friction does not settle.
+        If the motion is of another mechanism, numbers have another shape, loads are functions and their times are not
+        known, or friction does not settle.
 
     Examples
     --------
@@ -89,12 +101,13 @@ def inverse_dynamics(
     >>> inverse_dynamics(model, simulate(arm, [0.0]), speed=0.0).efforts.round(6).tolist()
     [[4.905]]
     """
-    if motion.mechanism.graph != model.mechanism.graph or motion.mechanism.joints != model.mechanism.joints:
-        raise GeometryError("the motion is of another mechanism than the model; simulate model.mechanism")
+    _check(model, motion)
     compiled = compile_model(replace(model, prescribed=(*model.prescribed, *motion.mechanism.drivers)))
     n = len(motion.inputs)
-    rate = np.broadcast_to(np.asarray(speed, dtype=np.float64), (n,))[:, None, None]
-    second = np.broadcast_to(np.asarray(acceleration, dtype=np.float64), (n,))[:, None, None]
+    rate, second = (
+        _by_sample(name, given, n)[:, None, None] for name, given in (("speed", speed), ("acceleration", acceleration))
+    )
+    instants = _times(compiled, motion, rate.ravel(), second.ravel(), times)
     q = compiled.to_coordinates(motion.poses)
     rates = motion.velocities * rate
     v = compiled.to_rates(q, rates)
@@ -102,16 +115,53 @@ def inverse_dynamics(
     lam = np.full((n, len(compiled.info)), np.nan)
     error, scale = 0.0, 1e-300
     for k in np.flatnonzero(motion.assembled & np.isfinite(a).all(axis=1)):
-        lam[k], wrong, size = _multipliers(compiled, float(motion.inputs[k]), q[k], v[k], a[k])
+        lam[k], wrong, size = _multipliers(compiled, float(instants[k]), q[k], v[k], a[k])
         error, scale = max(error, wrong), max(scale, size)
-    reactions = reactions_from_multipliers(compiled, q, v, lam, motion.inputs)
+    reactions = reactions_from_multipliers(compiled, q, v, lam, instants)
     efforts, power = _efforts(compiled, reactions, motion, rates)
     good = np.flatnonzero(np.isfinite(lam).all(axis=1))
     chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good
     return InverseDynamics(
-        motion.inputs, efforts, reactions, power, error / scale,
-        newton_euler_difference(compiled, motion.inputs[chosen], q[chosen], v[chosen], a[chosen], lam[chosen]),
+        motion.inputs, instants, efforts, reactions, power, error / scale,
+        newton_euler_difference(compiled, instants[chosen], q[chosen], v[chosen], a[chosen], lam[chosen]),
     )  # fmt: skip
+
+
+def _check(model: DynamicModel, motion: Motion) -> None:
+    from graphsynth.kinematics.engine.result import Motion as Moved
+
+    if not isinstance(model, DynamicModel):
+        raise GeometryError(
+            f"model is {type(model).__name__}, not a DynamicModel; build one from a mechanism and bodies"
+        )
+    if not isinstance(motion, Moved):
+        raise GeometryError(
+            f"motion is {type(motion).__name__}, not a Motion; give that of graphsynth.kinematics.simulate for "
+            "model.mechanism"
+        )
+    if motion.mechanism.graph != model.mechanism.graph or motion.mechanism.joints != model.mechanism.joints:
+        raise GeometryError("the motion is of another mechanism than the model; simulate model.mechanism")
+
+
+def _by_sample(name: str, given: ArrayLike, n: int) -> Array:
+    """Return one finite number for each of n samples."""
+    values = finite_array(name, given)
+    if values.shape not in ((), (1,), (n,)):
+        raise GeometryError(f"{name} has the shape {values.shape}; give one number, or one for each of {n} samples")
+    return np.broadcast_to(values, (n,))
+
+
+def _times(compiled: Compiled, motion: Motion, rate: Array, second: Array, given: ArrayLike | None) -> Array:
+    """Return the times at which loads are taken."""
+    if given is not None:
+        return _by_sample("times", given, len(rate))
+    steady = bool((rate == rate[:1]).all()) and not second.any()
+    if not steady and compiled.applied:
+        raise GeometryError(
+            "the speed of the motion varies and loads are functions of time; give times=, the time of every sample"
+        )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(rate == 0.0, 0.0, motion.inputs / rate) if steady else np.full(len(rate), np.nan)
 
 
 def _accelerations(compiled: Compiled, poses: Array, rates: Array, seconds: Array) -> Array:

@@ -136,7 +136,8 @@ def check_by_multipliers(machine: PistonMachine, angle: ArrayLike) -> Multiplier
     model = dynamic_model(machine, "sliding")
     crowned = machine.mechanism.mechanism("crowned", float(np.atleast_1d(np.asarray(angle, dtype=np.float64))[0]))
     motion = replace(simulate(crowned, angle, events=False), mechanism=model.mechanism)
-    general = inverse_dynamics(model, motion, machine.speed, machine.acceleration)
+    # the law of the gas reads the crank angle where a load has its time
+    general = inverse_dynamics(model, motion, machine.speed, machine.acceleration, times=motion.inputs)
     loads = machine.loads(motion.inputs)
     pairs = _pairs(machine, loads, general, model.mechanism)
     size = max(float(np.abs(own).max()) for own, _ in pairs)
