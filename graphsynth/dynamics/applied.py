@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from graphsynth.dynamics.elements import Force, TorqueSource
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import called
 
 __all__ = ["applied_loads"]
 
@@ -35,12 +36,13 @@ def applied_loads(compiled: Compiled, t: float, q: Array, v: Array) -> Array:
         angle = (q[b + 2] if b >= 0 else 0.0) - (q[a + 2] if a >= 0 else 0.0)
         speed = (v[b + 2] if b >= 0 else 0.0) - (v[a + 2] if a >= 0 else 0.0)
         law: Any = element.torque
+        name = f"the torque {element.a}-{element.b}"
         if isinstance(element, TorqueSource):
             G = element.ratio
-            torque = G * _number(law(t, G * angle, G * speed), element)
+            torque = G * _number(called(name, law, t, G * angle, G * speed), element)
             torque *= element.efficiency if torque * speed >= 0.0 else 1.0 / element.efficiency
         else:
-            torque = _number(law(t, angle, speed), element)
+            torque = _number(called(name, law, t, angle, speed), element)
         for k, sign in ((a, -1.0), (b, 1.0)):
             if k >= 0:
                 Q[k + 2] += sign * torque
@@ -57,7 +59,7 @@ def _force(compiled: Compiled, element: Force, k: int, t: float, q: Array, v: Ar
     place = (float(q[k] + ux), float(q[k + 1] + uy))
     speed = (float(v[k] - v[k + 2] * uy), float(v[k + 1] + v[k + 2] * ux))
     law: Any = element.force
-    found = law(t, place, speed)
+    found = called(f"the force on link {element.link}", law, t, place, speed)
     try:
         fx, fy = (_number(part, element) for part in found)
     except (TypeError, ValueError) as error:

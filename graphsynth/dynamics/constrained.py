@@ -67,6 +67,8 @@ class ConstrainedForm:
                 f"links {list(compiled.model.massless)} have no mass or no inertia; give them some, or use "
                 "form='minimal', where the effective inertia may stay positive"
             )
+        if start.message.endswith(compiled.spread_words):  # the start could not tell the accelerations
+            raise GeometryError(compiled.spread_words)
         self.compiled = compiled
         self.project = project
         self.slots = start.slots.copy()

@@ -15,6 +15,7 @@ from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics._checks import finite_array
+from graphsynth.mechanism.model import Driver
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -102,7 +103,8 @@ def inverse_dynamics(
     [[4.905]]
     """
     _check(model, motion)
-    compiled = compile_model(replace(model, prescribed=(*model.prescribed, *motion.mechanism.drivers)))
+    held = tuple(Driver(d.base, d.link) for d in (*model.prescribed, *motion.mechanism.drivers))  # laws are not asked
+    compiled = compile_model(replace(model, prescribed=held))
     n = len(motion.inputs)
     rate, second = (
         _by_sample(name, given, n)[:, None, None] for name, given in (("speed", speed), ("acceleration", acceleration))

@@ -235,6 +235,8 @@ class MinimalForm:
 
     def _failed(self, y: Array) -> Array:
         """Say why; the integrator tries a shorter step, and gives up where none is short enough."""
+        if not np.isfinite(y).all():  # asked by a solver that has lost its way: no word on the mechanism
+            return np.full(3, np.nan)
         if self.S.done[0] == 2:
             self.why = (
                 "a spring has length 0, so its direction is not defined" if self._out[3] == 0.0

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.elements import not_negative
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import check_fields, finite, nonzero
+from graphsynth.kinematics._checks import finite_array
+from graphsynth.mechanism.checks import called, check_fields, finite, nonzero
 
 __all__ = ["CompressorCycle", "ConstantForce", "GasLaw", "GivenForce"]
 
@@ -79,7 +80,9 @@ class GivenForce:
 
     def force(self, angle: Array, gap: Array, towards_head: NDArray[np.bool_], stroke: float) -> Array:
         """See :class:`GasLaw`; `GeometryError` if the function gives no finite force at every angle."""
-        found = np.asarray(self.law(angle, gap, towards_head), dtype=np.float64)
+        found = finite_array(
+            "the gas force", called("the law of the gas", self.law, angle, gap, towards_head), nan=True
+        )
         if found.shape not in ((), np.shape(gap)) or not np.isfinite(found).all():
             raise GeometryError("the gas force must be one finite number for every crank angle; correct the function")
         return np.broadcast_to(found, np.shape(gap)).copy()

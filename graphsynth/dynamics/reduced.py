@@ -113,7 +113,7 @@ class ReducedForm:
         """Accelerations, and the power of the non-conservative loads and drivers."""
         q, v, pivot = self._place(t, y, self._near)
         if pivot < 0.0:
-            self.out[6] = 3.0
+            self.out[6] = 3.0 if np.isfinite(y).all() else 0.0  # a state that is none says nothing of the mechanism
             self._look()
             return q, float("nan")
         applied = applied_loads(self.compiled, t, q, v) if self.compiled.applied else self._none

@@ -320,20 +320,11 @@ def _velocities(
     _, Jk = values.extra(report.q, rows, np.zeros(len(rows)))
     matrix, right = np.vstack([J, Jk]), np.concatenate([vel, wanted])
     unit = _units(values, kept)
-    weight = values.mass_root_inverse
-    scaled = (matrix @ weight) / unit[:, None]
-    d = (right - matrix @ v0) / unit
-    size = np.linalg.norm(scaled, axis=1, keepdims=True)
-    size[size == 0.0] = 1.0
-    step = weight @ (np.linalg.pinv(scaled / size, rcond=RANK) @ (d / size[:, 0]))
+    step = _nearest_rates(values, (matrix * values.column_scale) / unit[:, None], (right - matrix @ v0) / unit)
     v = v0 + step
-    # contradictions are judged by plain least squares, so that the residual is that of the rates themselves
     residual = matrix @ v - right
     speed = max(float(np.abs(v / values.column_scale).max(initial=0.0)), float(np.abs(right / unit).max(initial=0.0)))
     if float(np.abs(residual / unit).max(initial=0.0)) > 1e-9 * max(speed, _REST):
-        plain = (matrix * values.column_scale) / unit[:, None]
-        v = v0 + values.column_scale * (np.linalg.pinv(plain, rcond=RANK) @ d)
-        residual = matrix @ v - right
         all_names = [*report.rows, *names]
         worst = int(np.argmax(np.abs(residual / unit)))
         found = {
@@ -352,6 +343,20 @@ def _velocities(
         report, status=status, v=v, a=a, multipliers=lam, velocities=rate, accelerations=second, poses=pose,
         velocity_correction=moved, message=message,
     )  # fmt: skip
+
+
+def _nearest_rates(values: Values, matrix: Array, right: Array) -> Array:
+    """Smallest step in the metric of the masses that satisfies ``matrix x = right`` (x in units of the coordinates).
+
+    The constraints are solved by geometry alone, however much the masses differ: what they leave free is chosen by the
+    masses.  Where they contradict each other the squares of their residuals are least.
+    """
+    U, S, Vt = np.linalg.svd(matrix)
+    rank = int(np.sum(RANK * S[0] < S)) if S.size else 0
+    step = values.column_scale * (Vt[:rank].T @ ((U.T @ right)[:rank] / S[:rank]))
+    free = values.column_scale[:, None] * Vt[rank:].T
+    root = np.linalg.solve(values.mass_root_inverse, np.column_stack([free, step]))
+    return np.asarray(step - free @ np.linalg.lstsq(root[:, :-1], root[:, -1], rcond=None)[0])
 
 
 def _sentence(report: StartReport) -> str:

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.result import DynamicEvent
+from graphsynth.dynamics.stalling import lock, stalled
+from graphsynth.errors import GraphsynthError
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.dry_guard import Guard
@@ -148,10 +150,11 @@ class Stepper:
             message = self._step(solver)
             trail.steps += 1
             if solver.status == "failed" or not np.isfinite(solver.y).all():
-                trail.message = str(message or "the solver gave no finite state")
+                said = str(message or "the solver gave no finite state").rstrip(".")
+                trail.message = ": ".join(filter(None, (said, lock(self.form, before, y))))
                 return None
             if self._stalls(float(solver.t) - before, float(grid[-1] - grid[0])):
-                trail.message = f"no way past t = {float(solver.t):.9g} s: {self.form.stall}"
+                trail.message = f"no way past t = {float(solver.t):.9g} s: {stalled(self.form, before, y)}"
                 return None
             if trail.steps >= max_steps:
                 trail.message = f"more than {max_steps} steps"
@@ -179,8 +182,8 @@ class Stepper:
         """One step; an implicit solver that meets rates without a value raises, and that is a failure like others."""
         try:
             message: str | None = solver.step()
-        except (ValueError, np.linalg.LinAlgError):
-            if not self.lost:
+        except (ValueError, np.linalg.LinAlgError) as error:
+            if not self.lost or isinstance(error, GraphsynthError):
                 raise
             solver.status, message = "failed", "the equations of motion have no value on the way"
         return message

@@ -18,6 +18,7 @@ from graphsynth.dynamics.elements import Force, JointFriction, Spring, Torque, T
 from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver
 
@@ -131,6 +132,20 @@ class Compiled:
             target[..., self.moving, 2] = part[..., 2]
         return pose, rate, second
 
+    @property
+    def spread(self) -> float:
+        """Largest mass over the smallest, inertias taken by the characteristic length; infinite without mass."""
+        sizes = np.diag(self.tables.mass) * np.tile([1.0, 1.0, self.tables.size**-2], self.n // 3)
+        return float(sizes.max() / sizes.min()) if sizes.min() > 0.0 else math.inf
+
+    @property
+    def spread_words(self) -> str:
+        """What to say where masses are too far apart."""
+        return (
+            f"masses and inertias differ by a factor of {self.spread:.1g}, too much for double precision; leave out "
+            "what hardly weighs, or use form='minimal'"
+        )
+
     def driven(self, t: float) -> Array:
         """Prescribed coordinates and their two derivatives, shape (drivers, 3); at least one row."""
         return np.asarray(self.driven_at(np.array([t]))[0])
@@ -140,8 +155,8 @@ class Compiled:
         count = len(self.laws)
         found = np.zeros((len(times) if count else 1, max(1, count + len(self.held)), 3))
         found[:, count : count + len(self.held), 0] = self.held
-        for k, law in enumerate(self.laws):
-            for c, part in enumerate(law(times)):
+        for k, driver in enumerate(self.model.prescribed if count else ()):
+            for c, part in enumerate(coordinates(driver, times)):
                 found[:, k, c] = part
         return found
 

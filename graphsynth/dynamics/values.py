@@ -124,6 +124,11 @@ class Values:
         Ck, Jk = self.extra(q, kept[0], kept[1])
         return np.concatenate([C, Ck]), np.vstack([J, Jk])
 
+    def blind(self, q: Array, rank: int) -> bool:
+        """Whether constraints look dependent to the masses (``rank`` in their metric) that geometry tells apart."""
+        S = np.linalg.svd(self.scaled_jacobian(q), compute_uv=False)
+        return bool(S.size) and rank < int(np.sum(1e-10 * S[0] < S))
+
     def accelerations(self, q: Array, v: Array, applied: Array) -> tuple[Array, Array, str, str]:
         """Accelerations and multipliers, what to say about them, and the status of a start from there.
 
@@ -150,5 +155,8 @@ class Values:
                 return *nothing, found.message, f"friction: {found.kind}"
             return found.solution.a, found.solution.multipliers, "", "consistent"
         _, J, gam, _ = kernels.constraint_system(T, x, self.slots, self.driven)
-        a, lam = kernels.accelerate(T, x, J, gam, Q, np.zeros(7))
+        out = np.zeros(7)
+        a, lam = kernels.accelerate(T, x, J, gam, Q, out)
+        if self.blind(q, int(out[0])):
+            return *nothing, f"; accelerations are not known: {self.compiled.spread_words}", "consistent"
         return a, lam, "", "consistent"

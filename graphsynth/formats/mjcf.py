@@ -134,7 +134,8 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     ------
     GeometryError
         What MuJoCo cannot say: cams, joint friction, loads that are functions, prescribed motion, massless links, a
-        loop of sliding pairs and slots alone, a gear pair without carrier; an inconsistent start.
+        loop of sliding pairs and slots alone, a gear pair without carrier, a rotor between links on different branches
+        of the tree; an inconsistent start, or one that is none.
 
     References
     ----------

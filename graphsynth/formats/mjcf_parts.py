@@ -105,6 +105,12 @@ def _torque(work: Work, element: Torque | TorqueSource, name: str, tendon: ET.El
     combined = combine(work, {element.a: -1.0, element.b: 1.0})
     if not combined:
         return
+    if rotor and not any(combined.keys() <= work.chain[link].keys() for link in (element.a, element.b)):
+        raise GeometryError(
+            f"rotor_inertia = {element.rotor_inertia:g} of torque source {element.a}-{element.b} couples links on "
+            "different branches of the tree, for which MuJoCo's inertia matrix has no entries: leave it out, or make "
+            "the rotor a link of its own with a gear pair"
+        )
     fixed(work, tendon, name, combined, damping=text(damping), armature=text(rotor))
     if torque:
         _constant(actuator, torque, tendon=name)

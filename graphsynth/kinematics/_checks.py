@@ -14,7 +14,7 @@ from graphsynth.mechanism.checks import check_fields, check_largest, check_sizes
 
 __all__ = [
     "check_fields", "check_largest", "check_sizes", "choice", "finite", "finite_array", "plane_point", "positive",
-    "sign", "three", "three_points", "triple", "triples", "unit_vector", "whole",
+    "sign", "three", "three_points", "together", "triple", "triples", "unit_vector", "whole",
 ]  # fmt: skip
 
 
@@ -57,8 +57,8 @@ def unit_vector(name: str, value: Any) -> tuple[float, float, float]:
     return (parts[0] / norm, parts[1] / norm, parts[2] / norm)
 
 
-def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return ``values`` as a float array; raise `GeometryError` if an entry is NaN or infinite."""
+def finite_array(name: str, values: ArrayLike, *, nan: bool = False) -> NDArray[np.float64]:
+    """Return ``values`` as a float array; raise `GeometryError` if an entry is NaN or infinite (unless ``nan``)."""
     try:
         given = np.asarray(values)
         if given.dtype.kind in "cSU":
@@ -69,7 +69,7 @@ def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise
     except (TypeError, ValueError, OverflowError) as error:
         raise GeometryError(f"{name} is not an array of real numbers: {error}") from error
-    bad = np.flatnonzero(~np.isfinite(array))
+    bad = np.flatnonzero(~np.isfinite(array)) if not nan else np.empty(0)
     if bad.size:
         raise GeometryError(f"{name} holds {array.flat[bad[0]]} at flat position {bad[0]}; give finite numbers only")
     return array
@@ -124,7 +124,29 @@ def triple(name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 def triples(name: str, values: ArrayLike, *, nan: bool = False) -> NDArray[np.float64]:
     """Return finite numbers (or any, if ``nan``) of shape (..., 3); raise `GeometryError` for anything else."""
-    array = np.asarray(values, dtype=np.float64) if nan else finite_array(name, values)
+    array = finite_array(name, values, nan=nan)
     if array.shape[-1:] != (3,):
         raise GeometryError(f"{name} has shape {array.shape}; its last axis must hold three numbers")
     return array
+
+
+def together(**given: ArrayLike) -> list[NDArray[np.float64]]:
+    """Return arrays whose last axis holds three numbers (NaN stays NaN) and whose others broadcast.
+
+    Raises
+    ------
+    GeometryError
+        Shapes that do not fit each other, entries that are no real numbers.
+
+    Examples
+    --------
+    >>> [array.shape for array in together(pose=[0, 0, 0], theta=np.zeros((5, 3)))]
+    [(3,), (5, 3)]
+    """
+    arrays = [triples(name, values, nan=True) for name, values in given.items()]
+    try:
+        np.broadcast_shapes(*(array.shape for array in arrays))
+    except ValueError as error:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(given, arrays))
+        raise GeometryError(f"the shapes do not fit each other: {shapes}; give as many of each, or one") from error
+    return arrays

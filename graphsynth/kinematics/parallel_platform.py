@@ -14,7 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import check_largest, positive, three, three_points, triple, triples
+from graphsynth.kinematics._checks import (
+    check_largest,
+    finite_array,
+    positive,
+    three,
+    three_points,
+    together,
+    triple,
+    triples,
+)
 from graphsynth.kinematics._plane import cross, directions
 from graphsynth.kinematics.assembly_modes import AssemblyModeBatch, AssemblyModes, assembly_modes, assembly_modes_batch
 from graphsynth.kinematics.leg import LegStatus, PlatformLegs, sensitivity
@@ -172,18 +181,19 @@ class ParallelPlatform:
         if sigma is None:
             theta, status = self._legs.solve(rows, WORKING_MODES.astype(np.float64), 8)
             return InverseSolution(theta.reshape(*X.shape[:-1], 8, 3), status.reshape(X.shape), X, self)
-        mode = np.asarray(sigma, dtype=np.float64)
+        mode = finite_array("sigma", sigma)
         if not bool(np.all(np.abs(mode) == 1)) or mode.shape[-1:] != (3,):
             raise GeometryError(f"sigma = {sigma!r} must hold three entries +1 or -1, the working mode")
         if mode.ndim > 1:
-            X, mode = np.broadcast_arrays(X, mode)
+            X, mode = np.broadcast_arrays(*together(pose=X, sigma=mode))
             rows = np.ascontiguousarray(X.reshape(-1, 3))
         theta, status = self._legs.solve(rows, np.ascontiguousarray(mode.reshape(-1, 3)), 1)
         return InverseSolution(theta.reshape(X.shape), status.reshape(X.shape), X, self)
 
     def closure(self, pose: ArrayLike, theta: ArrayLike) -> Array:
         """Residuals ``f_k = |F_k - A_k|^2 - l2_k^2``, shape (..., 3), unit length^2."""
-        gap = np.abs(self.vertices(pose) - self.elbows(theta))
+        X, theta = together(pose=pose, theta=theta)
+        gap = np.abs(self.vertices(X) - self.elbows(theta))
         l2 = np.array(self.l2)
         return np.asarray((gap - l2) * (gap + l2))
 
@@ -197,10 +207,10 @@ class ParallelPlatform:
         JT : ndarray, shape (..., 3)
             Diagonal of ``df/dtheta``; on the closure ``JT_k = sigma_k S_k``.
         """
-        X = triples("pose", pose)
+        X, theta = together(pose=triples("pose", pose), theta=theta)
         d = self.vertices(X) - self.elbows(theta)
         arm = np.exp(1j * X[..., 2:3]) * np.array(self.b)
-        rocker = np.array(self.l1) * np.exp(1j * np.asarray(theta, dtype=np.float64))
+        rocker = np.array(self.l1) * np.exp(1j * theta)
         JX = 2.0 * np.stack([d.real, d.imag, cross(arm, d)], axis=-1)
         return JX, np.asarray(-2.0 * cross(rocker, d))
 
@@ -221,10 +231,7 @@ class ParallelPlatform:
             At an exactly singular pose (type II), where J does not exist.
         """
         JX, JT = self.jacobians(pose, theta)
-        try:
-            return np.asarray(np.linalg.solve(JX, -JT[..., None, :] * np.eye(3)))
-        except np.linalg.LinAlgError as error:
-            raise GeometryError("det JX = 0: the platform is singular (type II) and has no velocity matrix") from error
+        return _solve(JX, -JT[..., None, :] * np.eye(3), "velocity matrix")
 
     def scaled_velocity_matrix(self, pose: ArrayLike, theta: ArrayLike, Lc: float) -> Array:
         """``diag(1/Lc, 1/Lc, 1) J`` with the characteristic length ``Lc`` (section 4.3), dimensionless."""
@@ -234,24 +241,35 @@ class ParallelPlatform:
     def accelerations(
         self, pose: ArrayLike, theta: ArrayLike, rate: ArrayLike, rate2: ArrayLike
     ) -> tuple[Array, Array]:
-        """X' and X'' for given theta' and theta'' with respect to any parameter (section 4.2), shapes (..., 3)."""
-        X = triples("pose", pose)
-        t1, t2 = np.asarray(rate, dtype=np.float64), np.asarray(rate2, dtype=np.float64)
-        JX, JT = self.jacobians(X, theta)
-        first = np.asarray(np.linalg.solve(JX, -(JT * t1)[..., None])[..., 0], dtype=np.float64)
-        rocker = np.array(self.l1) * np.exp(1j * np.asarray(theta, dtype=np.float64))
+        """X' and X'' for given theta' and theta'' with respect to any parameter (section 4.2), shapes (..., 3).
+
+        Raises
+        ------
+        GeometryError
+            At an exactly singular pose (type II), where there are none; shapes that do not fit each other.
+        """
+        X, angle, t1, t2 = together(pose=pose, theta=theta, rate=rate, rate2=rate2)
+        JX, JT = self.jacobians(X, angle)
+        first = _solve(JX, -(JT * t1)[..., None], "velocities")[..., 0]
+        rocker = np.array(self.l1) * np.exp(1j * angle)
         arm = np.exp(1j * X[..., 2:3]) * np.array(self.b)
         d = self.vertices(X) - self.elbows(theta)
         turn = first[..., 2:3]
         speed = _complex(first)[..., None] + 1j * arm * turn - 1j * rocker * t1  # F' - A'
         push = rocker * (1j * t2 - t1 * t1) + arm * turn * turn
         right = 2.0 * ((np.conj(d) * push).real - np.abs(speed) ** 2)
-        return first, np.asarray(np.linalg.solve(JX, right[..., None])[..., 0])
+        return first, _solve(JX, right[..., None], "accelerations")[..., 0]
 
     def rocker_torques(self, pose: ArrayLike, theta: ArrayLike, wrench: ArrayLike) -> Array:
-        """Torques ``J^T W`` at the rockers that balance the wrench W exerted by the platform (section 4.4)."""
-        J = self.velocity_matrix(pose, theta)
-        return np.asarray(np.einsum("...ij,...i->...j", J, np.asarray(wrench, dtype=np.float64)))
+        """Torques ``J^T W`` at the rockers that balance the wrench W exerted by the platform (section 4.4).
+
+        Raises
+        ------
+        GeometryError
+            As `velocity_matrix`; a wrench that is not made of three numbers.
+        """
+        X, angle, W = together(pose=pose, theta=theta, wrench=wrench)
+        return np.asarray(np.einsum("...ij,...i->...j", self.velocity_matrix(X, angle), W))
 
     def direct(self, theta: ArrayLike) -> AssemblyModes:
         """All assembly modes for rocker angles ``theta``, shape (3,) (section 5).
@@ -283,6 +301,14 @@ class ParallelPlatform:
         """
         JX, _ = self.jacobians(pose, theta)
         return np.asarray(np.linalg.cond(JX / np.array([1.0, 1.0, positive("Lc", Lc)])))
+
+
+def _solve(JX: Array, right: Array, what: str) -> Array:
+    """Solve for what an exactly singular platform does not have."""
+    try:
+        return np.asarray(np.linalg.solve(JX, right), dtype=np.float64)
+    except np.linalg.LinAlgError as error:
+        raise GeometryError(f"det JX = 0: the platform is singular (type II) and has no {what}") from error
 
 
 def _complex(X: Array) -> Complex:

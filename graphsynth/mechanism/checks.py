@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from graphsynth.errors import GeometryError, GraphsynthError
@@ -13,6 +13,7 @@ __all__ = [
     "LARGEST",
     "SMALLEST",
     "Size",
+    "called",
     "check_fields",
     "check_largest",
     "check_sizes",
@@ -42,6 +43,18 @@ def finite(name: str, value: Any) -> float:
     if not math.isfinite(number):
         raise GeometryError(f"{name} = {number} is not finite; give a finite number")
     return number
+
+
+def called(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a function that a user gave; raise `GeometryError` where it raises, with its own words."""
+    try:
+        return function(*arguments)
+    except GraphsynthError:
+        raise
+    except Exception as error:
+        at = ", ".join(str(argument) for argument in arguments)
+        words = f"{type(error).__name__}: {error}"
+        raise GeometryError(f"{name} raised {words} when called with ({at}); it must have a value there") from error
 
 
 def nonzero(name: str, value: Any) -> float:

@@ -18,11 +18,14 @@ from graphsynth.dynamics import (
     simulate_dynamics,
 )
 from graphsynth.dynamics.energies import warnings_of
+from graphsynth.dynamics.integrate import make_form
 from graphsynth.dynamics.minimal import MinimalForm
 from graphsynth.dynamics.result import Checks
 from graphsynth.dynamics.stiff import CvodeStepper
+from graphsynth.dynamics.tables import compile_model
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic, Revolute
+from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
@@ -227,10 +230,79 @@ def test_case_18_contradicting_start_is_refused():
 
 def test_spring_of_length_zero_is_a_failure():
     slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])
-    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [Spring(0, 1, stiffness=10.0)], gravity=(0.0, 0.0))
+    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [Spring(0, 1, (0, 0), (0, 0), 10.0, 0.1)], gravity=(0.0, 0.0))
     for form in ("minimal", "constrained", "reduced"):
         motion = simulate_dynamics(model, [0.0, 1.0], keep={(0, 1): 0.0}, form=form)
         assert motion.status == "failed" and "length 0" in motion.message and np.isnan(motion.poses[1]).all()
+
+
+@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("damping", [0.0, 2.0])
+def test_a_spring_without_free_length_is_smooth_at_length_zero(form, damping):
+    """From length 0 at 1 m/s: exp(-d t / 2) sin(w t) / w with w^2 = 100 - d^2 / 4; and at rest it stays at rest."""
+    slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])
+    spring = Spring(0, 1, (0.0, 0.0), (0.0, 0.0), 100.0, 0.0, damping)
+    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [spring], gravity=(0.0, 0.0))
+    times, w = np.linspace(0.0, 1.0, 5), np.sqrt(100.0 - damping**2 / 4.0)
+    motion = simulate_dynamics(model, times, keep={(0, 1): 0.0}, keep_rates={(0, 1): 1.0}, form=form)
+    assert motion.completed and not motion.warnings
+    assert motion.coordinate(0, 1)[0] == pytest.approx(
+        np.exp(-damping / 2.0 * times) * np.sin(w * times) / w, abs=1e-10
+    )
+    assert motion.start.accelerations[1, 0] == pytest.approx(-damping)
+    still = simulate_dynamics(model, [0.0, 1.0], keep={(0, 1): 0.0}, form=form)
+    assert still.completed and still.coordinate(0, 1)[0][-1] == 0.0
+
+
+def test_a_damper_alone_needs_no_length():
+    slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])
+    damper = Spring(0, 1, (0.0, 0.0), (0.0, 0.0), 0.0, 0.3, 2.0)
+    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [damper], gravity=(0.0, 0.0))
+    motion = simulate_dynamics(model, [0.0, 1.0], keep={(0, 1): 0.0}, keep_rates={(0, 1): 1.0})
+    assert motion.coordinate(0, 1)[1][-1] == pytest.approx(np.exp(-2.0), rel=1e-10)
+
+
+@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+def test_a_state_that_is_none_blames_nothing(form):
+    """Solvers that lose their way ask for NaN states: that is no word on springs or the mechanism."""
+    model = g1(elements=[Spring(0, 2, (0.0, 1.0), (0.1, 0.0), 10.0, 0.1)])
+    own = make_form(compile_model(model), consistent_start(model, keep={(0, 1): 0.0}, modes={0: 1}), form, True)
+    assert np.isnan(own.rates(0.0, np.full_like(own.begin(), np.nan))).all() and own.why == ""
+
+
+def driven_rocker(*elements):
+    """G1's bars with the rocker prescribed towards its dead centre at acos(-3/4), where crank and coupler fold."""
+    free = g1(elements=elements)
+    begin = consistent_start(free, keep={(0, 1): 0.7}, modes={0: 1})
+    law = Linear(2.0, float(begin.poses[3, 2]))
+    mechanism = Mechanism(free.mechanism.graph, free.mechanism.joints, [])
+    return DynamicModel(mechanism, free.bodies, free.elements, prescribed=[Driver(0, 3, law)]), begin.poses
+
+
+@pytest.mark.parametrize(("form", "method"), [("constrained", "DOP853"), ("constrained", "BDF"), ("reduced", "DOP853")])
+def test_a_lock_under_prescribed_motion_is_called_one(form, method):
+    model, pose = driven_rocker(Spring(0, 2, (0.0, 1.0), (0.1, 0.0), 1.0, 0.1))
+    motion = simulate_dynamics(model, np.linspace(0.0, 2.0, 5), pose=pose, form=form, method=method, rtol=1e-8)
+    assert motion.status == "failed"
+    dead_centre = float(np.arccos(-0.75))
+    assert motion.reached == pytest.approx((dead_centre - pose[3, 2]) / 2.0, abs=1e-6)
+    assert "the prescribed motion of joint 0-3 locks the mechanism: near 2.41886 rad" in motion.message
+    assert "branches" not in motion.message and "spring" not in motion.message
+
+
+def test_masses_too_far_apart_are_named_not_branches():
+    pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    expected = None
+    for mass in (1e10, 1e24, 1e60):  # the acceleration hardly depends on the mass
+        model = DynamicModel(pendulum, {1: Body(mass, 1.0, (0.1, 0.0))})
+        start = consistent_start(model, keep={(0, 1): 0.3})
+        motion = simulate_dynamics(model, [0.0, 0.2], start=start)
+        expected = expected or motion.poses[-1, 1, 2]
+        assert motion.form == "minimal" and motion.poses[-1, 1, 2] == pytest.approx(expected, abs=1e-6)
+        if mass > 1e20:
+            assert "accelerations are not known: masses and inertias differ by a factor of 1e" in start.message
+            with pytest.raises(GeometryError, match=r"differ by a factor of 1e.*too much for double precision"):
+                simulate_dynamics(model, [0.0, 0.2], start=start, form="constrained")
 
 
 def test_step_limit_is_a_failure():

@@ -145,3 +145,57 @@ def test_bad_input_is_one_sentence(make, text):
     with pytest.raises(GeometryError, match=text) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("power", [0, 4, 8])
+def test_rates_are_judged_by_geometry_however_much_the_masses_differ(power):
+    """Mass ratios up to 1e16: the rates are those of the crank, and the bar with the mass decides what is free."""
+    scale = 10.0**power
+    joints = [
+        Revolute(0, 1),
+        Revolute(1, 2, (0.2, 0.0)),
+        Revolute(2, 3, (0.6, 0.0), (0.4, 0.0)),
+        Revolute(0, 3, (0.6, 0.0)),
+    ]
+    mechanism = Mechanism(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), joints, [Driver(0, 1)])
+    bodies = {1: bar(1.0 / scale, 0.2), 2: bar(1.0, 0.6), 3: bar(scale, 0.4)}
+    model = DynamicModel(mechanism, bodies)
+    start = consistent_start(model, keep={(0, 1): 0.7}, keep_rates={(0, 1): 10.0}, modes={0: 1})
+    assert start.consistent and start.velocities[1, 2] == pytest.approx(10.0, rel=1e-14)
+    equal = DynamicModel(mechanism, dict.fromkeys((1, 2, 3), bar(1.0, 0.4)))
+    other = consistent_start(equal, keep={(0, 1): 0.7}, keep_rates={(0, 1): 10.0}, modes={0: 1})
+    assert np.abs(start.velocities - other.velocities).max() < 1e-12
+    # a guess that does not fit: the nearest rates in the metric of the masses keep those of the heavy bar
+    guess = 3.0 * other.velocities
+    guess[3, 2] += 1.0
+    near = consistent_start(model, pose=start.poses, rates=guess)
+    wanted = other.velocities / 10.0
+    heavy = [
+        bodies[k].mass * abs(complex(*w)) ** 2 + bodies[k].inertia * t**2 for k, w, t in centre_rates(start, wanted)
+    ]
+    against = [
+        bodies[k].mass * (np.conj(complex(*w)) * complex(*u)).real + bodies[k].inertia * t * s
+        for (k, w, t), (_, u, s) in zip(centre_rates(start, wanted), centre_rates(start, guess))
+    ]
+    assert near.velocities[1, 2] == pytest.approx(sum(against) / sum(heavy), rel=1e-9)
+
+
+def centre_rates(start, rates):
+    """(link, velocity of the centre of mass, angular speed) of the moving links."""
+    for k, body in start.model.bodies.items():
+        arm = np.exp(1j * start.poses[k, 2]) * complex(*body.centre)
+        v = complex(*rates[k, :2]) + 1j * rates[k, 2] * arm
+        yield k, (v.real, v.imag), rates[k, 2]
+
+
+def test_rates_that_contradict_are_refused_at_any_mass_ratio():
+    joints = [
+        Revolute(0, 1),
+        Revolute(1, 2, (0.2, 0.0)),
+        Revolute(2, 3, (0.6, 0.0), (0.4, 0.0)),
+        Revolute(0, 3, (0.6, 0.0)),
+    ]
+    mechanism = Mechanism(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), joints, [Driver(0, 1)])
+    model = DynamicModel(mechanism, {1: bar(1e-8, 0.2), 2: bar(1.0, 0.6), 3: bar(1e8, 0.4)})
+    found = consistent_start(model, keep={(0, 1): 0.7}, keep_rates={(0, 1): 10.0, (0, 3): 40.0}, modes={0: 1})
+    assert found.status == "contradicting rates" and max(map(abs, found.violated.values())) > 0.1

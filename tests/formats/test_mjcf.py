@@ -9,10 +9,20 @@ import numpy as np
 import pytest
 from dynamic_models import g1, g2, seven_body, seven_pose
 
-from graphsynth.dynamics import Force, JointFriction, consistent_start, simulate_dynamics
+from graphsynth.dynamics import (
+    Body,
+    DynamicModel,
+    Force,
+    JointFriction,
+    TorqueSource,
+    consistent_start,
+    simulate_dynamics,
+)
 from graphsynth.errors import GeometryError, GraphError
-from graphsynth.formats import MujocoSettings, run_mujoco, spanning_tree, to_mjcf
-from graphsynth.mechanism.model import Driver
+from graphsynth.formats import MujocoSettings, certify_export, run_mujoco, spanning_tree, to_mjcf
+from graphsynth.mechanism.joints import Prismatic, Revolute
+from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.structure.graph import MechanismGraph
 
 G1_THETA, G1_OMEGA = 19.151183313715786848, 13.058518322326194277
 
@@ -163,6 +173,86 @@ def test_refusals_are_sentences(start):
         MujocoSettings(solref=(-1.0, 1.0))
     with pytest.raises(GeometryError, match="integrator"):
         MujocoSettings(integrator="heun")
+
+
+def open_tree(random):
+    """Links hung on one another at random by turning and sliding pairs, a rotor between any two of them."""
+    links = int(random.integers(3, 7))
+    edges, joints = [], []
+    for k in range(1, links):
+        parent = int(random.integers(0, k))
+        at_a, at_b = (tuple(random.normal(size=2).round(2)) for _ in range(2))
+        edges.append((parent, k))
+        turning = Revolute(parent, k, at_a, at_b)
+        joints.append(turning if random.random() < 0.75 else Prismatic(parent, k, angle_a=float(random.normal())))
+    mechanism = Mechanism(MechanismGraph(links, edges, frame=0), joints, [])
+    a, b = (int(k) for k in random.choice(links, 2, replace=False))
+    source = TorqueSource(
+        a, b, float(random.normal()), float(random.choice([1.0, -3.0])), 1.0, random.uniform(0.01, 1.0), 0.1
+    )
+    bodies = {
+        k: Body(random.uniform(0.5, 2.0), random.uniform(0.05, 0.5), tuple(random.normal(size=2)))
+        for k in range(1, links)
+    }
+    model = DynamicModel(mechanism, bodies, [source])
+    moving = (np.arange(links) > 0)[:, None]
+    return model, consistent_start(
+        model, pose=random.normal(size=(links, 3)) * moving, rates=random.normal(size=(links, 3)) * moving
+    )
+
+
+def test_a_rotor_is_exported_exactly_or_refused():
+    """What is written has the accelerations of the model; a rotor between branches is not written at all."""
+    mujoco = pytest.importorskip("mujoco")
+    random = np.random.default_rng(1)
+    counts = {True: 0, False: 0}
+    for _ in range(60):
+        model, start = open_tree(random)
+        if not start.consistent:
+            continue
+        a, b = model.elements[0].a, model.elements[0].b
+        turning = [hinges_to(model.mechanism, link) for link in (a, b)]
+        one_branch = turning[0] <= turning[1] or turning[1] <= turning[0]
+        try:
+            export = to_mjcf(model, start)
+        except GeometryError as error:
+            assert "couples links on different branches" in str(error) and not one_branch
+            counts[False] += 1
+            continue
+        engine = mujoco.MjModel.from_xml_string(export.xml)
+        data = mujoco.MjData(engine)
+        mujoco.mj_resetDataKeyframe(engine, data, 0)
+        mujoco.mj_forward(engine, data)
+        for k, (_, base, link) in enumerate(export.coordinates):
+            if model.mechanism.joint(base, link).kind == "R":
+                expected = start.accelerations[link, 2] - start.accelerations[base, 2]
+                assert data.qacc[k] == pytest.approx(expected, rel=1e-8, abs=1e-8)
+        counts[True] += 1
+    assert counts[True] > 30 and counts[False] > 5
+
+
+def hinges_to(mechanism, link):
+    """Turning pairs between the frame and a link of an open tree."""
+    found, at = set(), link
+    while at:
+        joint = next(j for j in mechanism.joints if j.b == at)
+        found |= {joint.pair} if joint.kind == "R" else set()
+        at = joint.a
+    return found
+
+
+def test_what_no_engine_can_represent_is_refused_by_writers_and_certificate():
+    graph = MechanismGraph(3, [(0, 1), (0, 2)], frame=0)
+    mechanism = Mechanism(graph, [Revolute(0, 1), Revolute(0, 2, (0.5, 0.0))], [])
+    bodies = {k: Body.bar(1.0, (0.0, 0.0), (0.3, 0.0)) for k in (1, 2)}
+    model = DynamicModel(mechanism, bodies, [TorqueSource(1, 2, 0.0, 10.0, 1.0, 1e-3)])
+    begin = consistent_start(model, pose=[[0, 0, 0], [0, 0, 0], [0.5, 0, -np.pi / 2]])
+    words = r"rotor_inertia = 0.001 of torque source 1-2 couples links on different branches.*leave it out, or make"
+    with pytest.raises(GeometryError, match=words):
+        to_mjcf(model, begin)
+    with pytest.raises(GeometryError, match=words):
+        certify_export(model, begin, [0.0, 0.1], [MujocoSettings(step) for step in (1e-2, 5e-3, 2e-3)])
+    assert "armature" in to_mjcf(replace(model, elements=[TorqueSource(0, 2, 0.0, 10.0, 1.0, 1e-3)]), begin).xml
 
 
 def test_links_on_gears_alone_are_refused():

@@ -86,9 +86,11 @@ def twist(T, Q, x, a, b, torque):
 
 @kernel
 def load_vector(T, x, applied):
-    """Generalised forces with potential V and power P of the others; False if a spring has length 0.
+    """Generalised forces with potential V and power P of the others; False if a spring pushes without a direction.
 
-    All forces, those given as functions (``applied``, not conservative) among them, and the conservative ones.
+    That is at length 0 with a free length; without one the force is smooth there, and the damper is taken along the
+    velocity.  All forces, those given as functions (``applied``, not conservative) among them, and the conservative
+    ones.
     """
     n = T.mass.shape[0]
     Qc, Qn = np.zeros(n), applied.copy()
@@ -112,11 +114,14 @@ def load_vector(T, x, applied):
         wx, wy = x[b, 2] * p[2] - x[b, 3] * p[3], x[b, 3] * p[2] + x[b, 2] * p[3]
         dx, dy = x[b, 0] + wx - x[a, 0] - ux, x[b, 1] + wy - x[a, 1] - uy
         length = math.sqrt(dx * dx + dy * dy)
-        if not length > 0.0:
-            good = False
-        ex, ey = dx / length, dy / length
         rx = x[b, 5] - x[b, 7] * wy - x[a, 5] + x[a, 7] * uy
         ry = x[b, 6] + x[b, 7] * wx - x[a, 6] - x[a, 7] * ux
+        if length == 0.0:
+            good = good and p[4] * p[5] == 0.0
+            speed = math.sqrt(rx * rx + ry * ry)
+            ex, ey = (rx / speed, ry / speed) if speed > 0.0 else (0.0, 0.0)
+        else:
+            ex, ey = dx / length, dy / length
         f, d = p[4] * (length - p[5]), p[6] * (ex * rx + ey * ry)
         V += 0.5 * p[4] * (length - p[5]) ** 2
         pull(T, Qc, x, a, ux, uy, f * ex, f * ey)

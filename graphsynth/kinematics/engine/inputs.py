@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError, UnitWarning
 from graphsynth.kinematics._checks import finite_array
+from graphsynth.mechanism.checks import called
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.laws import LAWS, Linear
 
@@ -70,12 +71,12 @@ def coordinates(driver: Driver, u: Array) -> tuple[Array, Array, Array]:
     GeometryError
         If the law does not return three arrays of the shape of its input.
     """
-    found = driver.law(u)
     name = f"the law of driver {driver.base}-{driver.link}"
+    found = called(name, driver.law, u)
     if not isinstance(found, tuple | list) or len(found) != 3:
         what = f"{len(found)} of them" if isinstance(found, tuple | list) else f"one {type(found).__name__}"
         raise GeometryError(f"{name} must return three arrays, (q, dq/du, d2q/du2), not {what}")
-    parts = [np.asarray(part, dtype=np.float64) for part in found]
+    parts = [finite_array(f"a part of what {name} returned", part, nan=True) for part in found]
     for part in parts:
         if part.shape != u.shape:
             raise GeometryError(f"{name} returned the shape {part.shape} for inputs of shape {u.shape}; return as many")
