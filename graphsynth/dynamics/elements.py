@@ -7,7 +7,7 @@ force or torque does is counted as work of non-conservative loads, whether or no
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -39,6 +39,8 @@ def _pair(element: Any, what: str) -> None:
 
 def _times(element: Any) -> None:
     given = getattr(element, "breaks", ())
+    if not isinstance(given, Iterable):
+        raise GeometryError(f"breaks = {given!r} are not a list of times; leave them out or give ()")
     object.__setattr__(element, "breaks", tuple(finite("break", t) for t in given))
 
 
@@ -108,7 +110,7 @@ class Force:
     def __post_init__(self) -> None:
         object.__setattr__(self, "link", link_number("link of a force", self.link))
         object.__setattr__(self, "at", point("point of a force", self.at))
-        if self.frame not in ("world", "body"):
+        if not isinstance(self.frame, str) or self.frame not in ("world", "body"):
             raise GeometryError(f"frame = {self.frame!r} of a force is not known; give 'world' or 'body'")
         if not callable(self.force):
             object.__setattr__(self, "force", point(f"force on link {self.link}", self.force))
@@ -131,8 +133,8 @@ class Torque:
         _pair(self, "torque")
         if not callable(self.torque):
             object.__setattr__(self, "torque", finite(f"torque {self.a}-{self.b}", self.torque))
-        breaks = getattr(self.torque, "breaks", ())
-        object.__setattr__(self, "breaks", (*self.breaks, *breaks))
+        _times(self)
+        object.__setattr__(self, "breaks", (*self.breaks, *getattr(self.torque, "breaks", ())))
         _times(self)
 
 
@@ -241,6 +243,8 @@ class JointFriction:
             )
         for part in ("radius", "length", "regular_speed"):
             object.__setattr__(self, part, not_negative(f"{part} {name}", getattr(self, part)))
+        if not (isinstance(self.stribeck_speed, float) and self.stribeck_speed == math.inf):
+            object.__setattr__(self, "stribeck_speed", finite(f"stribeck_speed {name}", self.stribeck_speed))
         if static > self.kinetic and not 0.0 <= self.stribeck_speed < math.inf:
             raise GeometryError(
                 f"static {name} above kinetic needs stribeck_speed, the speed at which friction falls (0: at once)"

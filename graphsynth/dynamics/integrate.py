@@ -15,10 +15,11 @@ from graphsynth.dynamics.friction_history import FrictionAt, friction_at, fricti
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
 from graphsynth.dynamics.second import newton_euler_difference, second_accelerations
-from graphsynth.dynamics.start import StartReport, start_compiled
+from graphsynth.dynamics.start import StartReport, check_start, start_compiled
 from graphsynth.dynamics.stepping import StepOptions, Trail, integrate
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.checks import finite
 
 if TYPE_CHECKING:
@@ -87,7 +88,8 @@ def simulate_dynamics(
     Raises
     ------
     GeometryError
-        Times that do not increase, an inconsistent start, an unknown method, a form that the model does not have.
+        Times that do not increase, an inconsistent start or one for another time, an unknown method, a form that the
+        model does not have.
 
     Examples
     --------
@@ -102,10 +104,10 @@ def simulate_dynamics(
     """
     grid = _times(times)
     compiled = compile_model(model)
-    report = start or start_compiled(compiled, pose, rates, keep or {}, keep_rates or {}, modes, float(grid[0]))
-    if not report.consistent and not report.status.startswith("friction"):
-        raise GeometryError(report.message)
-    _check_start(report, model)
+    if start is None:
+        start = start_compiled(compiled, pose, rates, keep, keep_rates, modes, float(grid[0]))
+    report = start
+    check_start(model, report, float(grid[0]), "additional", "prescribed")
     options = _options(method, rtol, atol, outputs, project, max_steps)
     _check_options(form, outputs, options)
     run = _once(compiled, report, grid, form, options)
@@ -119,10 +121,7 @@ def simulate_dynamics(
 
 
 def _times(times: ArrayLike) -> Array:
-    try:
-        grid = np.asarray(times, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise GeometryError(f"times = {times!r} are not numbers; give a list of seconds that increase") from error
+    grid = finite_array("times", times, nan=True)
     if grid.ndim != 1 or grid.size < 1 or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
         raise GeometryError("times must be one list of finite numbers that increase; sort them and remove duplicates")
     return grid
@@ -134,29 +133,17 @@ def _options(
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise GeometryError(f"max_steps = {max_steps!r} is not a number of steps; give an integer of at least 1")
     absolute = None if atol is None else finite("atol", atol)
-    return StepOptions(method, finite("rtol", rtol), absolute, outputs == "exact", project, max_steps)
-
-
-def _check_start(report: StartReport, model: DynamicModel) -> None:
-    """Refuse a start of another mechanism: its coordinates would be taken for those of this one."""
-    own = report.model
-    if own is model:
-        return
-    for name in ("mechanism", "bodies", "additional", "prescribed"):
-        if getattr(own, name) != getattr(model, name):
-            raise GeometryError(
-                f"the start belongs to a model with another {name}; call consistent_start with this model"
-            )
+    return StepOptions(method, finite("rtol", rtol), absolute, str(outputs) == "exact", project, max_steps)
 
 
 def _check_options(form: str, outputs: str, options: StepOptions) -> None:
     from graphsynth.dynamics.stepping import METHODS
 
-    if form not in FORMS:
+    if not isinstance(form, str) or form not in FORMS:
         raise GeometryError(f"form = {form!r} is not known; give one of {', '.join(FORMS)}")
-    if outputs not in ("interpolated", "exact"):
+    if not isinstance(outputs, str) or outputs not in ("interpolated", "exact"):
         raise GeometryError(f"outputs = {outputs!r} is not known; give 'interpolated' or 'exact'")
-    if options.method not in METHODS:
+    if not isinstance(options.method, str) or options.method not in METHODS:
         raise GeometryError(f"method = {options.method!r} is not known; give one of {', '.join(METHODS)}")
     if not 2.3e-14 <= options.rtol < 1.0:
         raise GeometryError(f"rtol = {options.rtol} must be at least 2.3e-14 (rounding) and below 1; correct it")

@@ -17,6 +17,7 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import initial_slots
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import checked
 from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import started
@@ -364,6 +365,7 @@ def engine_buffers(trace: Trace, n: int) -> EngineState:
     return EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, done, why, np.zeros((3, n)))
 
 
+@checked
 def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object) -> EffectiveInertia:
     """Effective inertia ``J(theta) = sum m |r'|^2 + I psi'^2 (+ rotors)`` over the input, and its derivative.
 

@@ -57,6 +57,9 @@ class Body:
         GeometryError
             If the parts have no mass.
         """
+        for body in bodies:
+            if not isinstance(body, Body):
+                raise GeometryError(f"part {body!r} of a combined body is not a Body(mass, inertia, centre)")
         mass = sum(body.mass for body in bodies)
         if not mass > 0.0:
             raise GeometryError("the parts of a combined body have no mass; give one of them a positive mass")

@@ -106,7 +106,7 @@ class LinearCharacteristic:
 
     def torque(self, speed: float) -> float:
         """Torque at a shaft speed, N m."""
-        return self.stall - self.slope * speed
+        return self.stall - self.slope * number("speed", speed)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from graphsynth.dynamics.piston_gas import CompressorCycle, ConstantForce, GasLa
 from graphsynth.dynamics.piston_loads import PistonFriction, PistonLoads, PistonMasses
 from graphsynth.dynamics.piston_solving import Reaction, cross, one_contact, two_contacts, wedge
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
 from graphsynth.kinematics.piston.drives import CrankSlider
 from graphsynth.kinematics.piston.model import FloatingPiston, PistonMotion
 from graphsynth.mechanism.checks import Point, check_fields, check_sizes, finite, point
@@ -106,7 +107,10 @@ class PistonMachine:
         PistonLoads
             NaN where friction leaves no or several solutions: the machine jams there, or may.
         """
-        motion = self.mechanism.motion(np.atleast_1d(np.asarray(angle, dtype=np.float64)))
+        given = np.atleast_1d(finite_array("angle", angle, nan=True))
+        if given.ndim != 1:
+            raise GeometryError(f"angle has shape {given.shape}; give one list of crank angles")
+        motion = self.mechanism.motion(given)
         return _Balance(self, motion).loads()
 
 

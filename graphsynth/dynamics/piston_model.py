@@ -14,6 +14,8 @@ from graphsynth.dynamics.inverse import InverseDynamics, inverse_dynamics
 from graphsynth.dynamics.model import Body, DynamicModel
 from graphsynth.dynamics.piston import PistonLoads, PistonMachine
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import checked
+from graphsynth.kinematics.engine.inputs import monotonic
 from graphsynth.kinematics.piston.drives import CrankSlider
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.checks import Point
@@ -44,6 +46,7 @@ class MultiplierCheck:
     general: InverseDynamics
 
 
+@checked
 def dynamic_model(machine: PistonMachine, slot: Literal["sliding", "crowned"] = "crowned") -> DynamicModel:
     """Return the machine with bodies, gas, rings and friction as elements: for simulation, springs, motors, engines.
 
@@ -111,6 +114,7 @@ def _gas(machine: PistonMachine, link: int) -> Force:
     return Force(link, law)
 
 
+@checked
 def check_by_multipliers(machine: PistonMachine, angle: ArrayLike) -> MultiplierCheck:
     """Compute the loads a second time from all constraints at once, with Lagrange multipliers, and compare.
 
@@ -134,7 +138,8 @@ def check_by_multipliers(machine: PistonMachine, angle: ArrayLike) -> Multiplier
     (True, True)
     """
     model = dynamic_model(machine, "sliding")
-    crowned = machine.mechanism.mechanism("crowned", float(np.atleast_1d(np.asarray(angle, dtype=np.float64))[0]))
+    angle = monotonic(angle)
+    crowned = machine.mechanism.mechanism("crowned", float(angle[0]))
     motion = replace(simulate(crowned, angle, events=False), mechanism=model.mechanism)
     # the law of the gas reads the crank angle where a load has its time
     general = inverse_dynamics(model, motion, machine.speed, machine.acceleration, times=motion.inputs)

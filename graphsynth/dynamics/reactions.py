@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import link_number
 from graphsynth.mechanism.joints import Cam, Gear
 from graphsynth.mechanism.model import Driver
 
@@ -60,9 +61,9 @@ class JointReaction:
         GeometryError
             A link that is not in the joint, or an unknown frame.
         """
-        if link not in (self.a, self.b):
+        if link_number("link", link) not in (self.a, self.b):
             raise GeometryError(f"link {link} is not in joint {self.a}-{self.b}; name one of the two")
-        if frame not in ("world", "body"):
+        if not isinstance(frame, str) or frame not in ("world", "body"):
             raise GeometryError(f"frame = {frame!r} is not known; give 'world' or 'body'")
         sign = 1.0 if link == self.b else -1.0
         force = sign * (self.force[:, 0] + 1j * self.force[:, 1])
@@ -91,8 +92,9 @@ class Reactions:
         GeometryError
             If there is no such joint.
         """
-        found = [joint for joint in self.joints if {joint.a, joint.b} == {a, b}]
-        if index >= len(found):
+        pair = {link_number("link a", a), link_number("link b", b)}
+        found = [joint for joint in self.joints if {joint.a, joint.b} == pair]
+        if link_number("index", index) >= len(found):
             raise GeometryError(f"links {a} and {b} have {len(found)} joints; number {index} does not exist")
         return found[index]
 

@@ -16,9 +16,10 @@ from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pos
 from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
 from graphsynth.dynamics.values import Values, initial_slots
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.checks import finite
 
-__all__ = ["StartReport", "consistent_start"]
+__all__ = ["StartReport", "check_start", "consistent_start"]
 
 Array = NDArray[np.float64]
 Keys = Mapping[Any, float]
@@ -155,14 +156,15 @@ def consistent_start(
     >>> start.status, start.freedom, round(float(start.accelerations[1, 2]), 6)  # -3 g / 2
     ('consistent', 1, -14.715)
     """
-    return start_compiled(compile_model(model), pose, rates, keep or {}, keep_rates or {}, modes, float(time))
+    return start_compiled(compile_model(model), pose, rates, keep, keep_rates, modes, finite("time", time))
 
 
 def start_compiled(
-    compiled: Compiled, pose: ArrayLike | None, rates: ArrayLike | None, keep: Keys, keep_rates: Keys,
+    compiled: Compiled, pose: ArrayLike | None, rates: ArrayLike | None, keep: Keys | None, keep_rates: Keys | None,
     modes: Mapping[int, int] | None, time: float,
 ) -> StartReport:  # fmt: skip
     """Do what `consistent_start` says for a compiled model."""
+    keep, keep_rates = _keys("keep", keep), _keys("keep_rates", keep_rates)
     q0 = compiled.to_coordinates(_guess(compiled, pose, keep, modes, time))
     slots = initial_slots(compiled, q0)
     values = Values(compiled, time, slots)
@@ -186,8 +188,45 @@ def start_compiled(
     return _velocities(values, report, v0, _kept(values, keep_rates), [f"kept {key}" for key in keep_rates])
 
 
+def _keys(name: str, given: Keys | None) -> Keys:
+    if given is not None and not isinstance(given, Mapping):
+        raise GeometryError(f"{name} = {given!r} is not a mapping; give {{(base, link): value}}")
+    return given or {}
+
+
+def check_start(model: DynamicModel, start: StartReport, first: float | None = None, *parts: str) -> None:
+    """Refuse what is no consistent start of a model: its coordinates would be taken for those of this one.
+
+    Parameters
+    ----------
+    first : float, optional
+        The time that the start is to be for.
+    *parts : str
+        Of the model, besides mechanism and bodies, that must be those of the start.
+    """
+    if not isinstance(model, DynamicModel):
+        raise GeometryError(
+            f"model is {type(model).__name__}, not a DynamicModel; build one from a mechanism and bodies"
+        )
+    if not isinstance(start, StartReport):
+        raise GeometryError(f"start is {type(start).__name__}, not a StartReport; give that of consistent_start(model)")
+    if not start.consistent and not start.status.startswith("friction"):
+        raise GeometryError(start.message)
+    own = start.model
+    for name in ("mechanism", "bodies", *parts) if own is not model else ():
+        if getattr(own, name) != getattr(model, name):
+            raise GeometryError(
+                f"the start belongs to a model with another {name}; call consistent_start with this model"
+            )
+    if first is not None and abs(start.time - first) > 1e-9 * max(1.0, abs(first)):
+        raise GeometryError(
+            f"the start is for t = {start.time:.9g} s and the times begin at {first:.9g} s; call consistent_start with "
+            f"time={first:.9g}, or let the times begin at {start.time:.9g} s"
+        )
+
+
 def _checked(compiled: Compiled, given: ArrayLike, name: str) -> Array:
-    array = np.asarray(given, dtype=np.float64)
+    array = finite_array(name, given, nan=True)
     if array.shape != (compiled.links, 3) or not np.isfinite(array).all():
         raise GeometryError(f"{name} must hold three finite numbers for each of {compiled.links} links; give them all")
     return array

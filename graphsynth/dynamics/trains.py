@@ -62,6 +62,8 @@ class Train:
         SpecError
             For a stage that is not a pair of numbers of teeth, or another number of efficiencies.
         """
+        if not isinstance(stages, Sequence) or not isinstance(efficiency, Sequence):
+            raise SpecError(f"stages = {stages!r}, efficiency = {efficiency!r}: give lists, one entry for each stage")
         for stage in stages:
             if not isinstance(stage, Sequence) or len(stage) != 2:
                 raise SpecError(f"stage {stage!r} of the train must be a pair; give (driving teeth, driven teeth)")
@@ -69,14 +71,16 @@ class Train:
                 whole("teeth", teeth, "give (driving, driven)")
         if efficiency and len(efficiency) != len(stages):
             raise SpecError(f"{len(efficiency)} efficiencies for {len(stages)} stages; give one for each stage")
+        parts = [number("efficiency of a stage", part, least=0.0, above=True) for part in efficiency]
         driven_teeth, driving_teeth = math.prod(s[1] for s in stages), math.prod(s[0] for s in stages)
-        return cls(driven_teeth / driving_teeth, math.prod(efficiency), inertia)
+        return cls(driven_teeth / driving_teeth, math.prod(parts), inertia)
 
     def output_torque(self, torque: float, speed: float) -> float:
         """Torque at the output for a motor torque (N m) at a motor speed (rad/s): the sign of the power decides."""
+        torque, speed = number("torque", torque), number("speed", speed)
         eta = self.efficiency if torque * speed >= 0.0 else 1.0 / self.efficiency
         return self.ratio * eta * torque
 
     def reflected(self, inertia: float) -> float:
         """Inertia at the output of a rotor inertia at the motor, plus the train's own, kg m^2."""
-        return self.ratio**2 * inertia + self.inertia
+        return self.ratio**2 * number("inertia", inertia) + self.inertia

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.events import EventGuard
 from graphsynth.dynamics.friction import FrictionLaw, StribeckLaw, TwoCoefficientLaw, finite, positive
+from graphsynth.dynamics.motors import numbers, whole
 from graphsynth.dynamics.stick_slip import StickSlipMotion, event_driven
 from graphsynth.dynamics.stick_slip_forms import regularised, time_stepping
 from graphsynth.dynamics.tribometer_drives import CrankDrive, Drive
@@ -163,7 +164,7 @@ class Tribometer:
         duration = positive("duration", duration)
         if times is None:
             return duration, np.linspace(0.0, duration, 1001)
-        wanted = np.atleast_1d(np.asarray(times, float))
+        wanted = np.atleast_1d(numbers("times", times, "s", finite=False))
         if wanted.ndim != 1 or not wanted.size or not ((wanted >= 0.0) & (wanted <= duration)).all():
             raise SpecError(f"The times asked for must be numbers between 0 and the duration {duration:g}.")
         if (np.diff(wanted) < 0.0).any():
@@ -298,4 +299,5 @@ class Tribometer:
         if not 1e-13 <= finite("relative tolerance", rtol) <= 1e-2:
             raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-13 to 1e-2.")
         checked = solver == "LSODA" if check is None else check
-        return regularised(self, duration, wanted, speed, solver, rtol, jacobian, checked, most_calls)
+        calls = whole("most_calls", most_calls, "raise it for long runs")
+        return regularised(self, duration, wanted, speed, str(solver), rtol, jacobian, checked, calls)

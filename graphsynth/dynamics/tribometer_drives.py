@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.friction import finite, positive
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["BeltDrive", "CrankDrive", "Drive", "DriveMotion", "HarmonicDrive"]
@@ -77,7 +78,7 @@ class BeltDrive(Drive):
 
     def motion(self, t: ArrayLike) -> DriveMotion:
         """Motion of the lower platform at the times ``t``; exact."""
-        t = np.asarray(t, float)
+        t = finite_array("t", t, nan=True)
         zero = np.zeros_like(t)
         return DriveMotion(self.speed * t, zero + self.speed, zero, zero)
 
@@ -118,7 +119,7 @@ class HarmonicDrive(Drive):
     def motion(self, t: ArrayLike) -> DriveMotion:
         """Motion of the lower platform at the times ``t``; exact but for rounding."""
         w = self.speed
-        theta = w * np.asarray(t, float)
+        theta = w * finite_array("t", t, nan=True)
         C, S = self.radius * np.cos(theta), self.radius * np.sin(theta)
         return DriveMotion(C, -w * S, -w * w * C, w**3 * S)
 
@@ -166,7 +167,7 @@ class CrankDrive(Drive):
     def motion(self, t: ArrayLike) -> DriveMotion:
         """Motion of the lower platform at the times ``t``; closed form."""
         r, rod, w = self.radius, self.rod, self.speed
-        theta = w * np.asarray(t, float)
+        theta = w * finite_array("t", t, nan=True)
         C, S = np.cos(theta), np.sin(theta)
         gap = (rod - r) * (rod + r)
         square = gap + (r * C) ** 2  # nothing cancels where the crank stands across a rod hardly longer than itself

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.extras import need
+from graphsynth.kinematics._checks import finite_array
 
 __all__ = ["EngineRun", "load_engine", "steps_between", "turn"]
 
@@ -68,7 +69,7 @@ def steps_between(times: ArrayLike, step: float) -> tuple[Array, list[int]]:
     >>> steps_between([0.0, 0.5, 2.0], 0.25)[1]
     [0, 2, 8]
     """
-    grid = np.asarray(times, dtype=np.float64)
+    grid = finite_array("times", times, nan=True)
     if grid.ndim != 1 or grid.size < 2 or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
         raise GeometryError("times must be a list of two or more finite numbers that increase; sort them")
     if not (np.isfinite(step) and step > 0.0):

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from graphsynth.dynamics.elements import Torque, TorqueSource
 from graphsynth.dynamics.model import DynamicModel
-from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.start import StartReport, check_start
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Gear, Revolute
 
-__all__ = ["carrier_of", "check_common", "constant_torque", "gear_weights"]
+__all__ = ["carrier_of", "check_common", "check_settings", "constant_torque", "gear_weights"]
 
 Point = tuple[float, float]
 
 
 def check_common(model: DynamicModel, start: StartReport, engine: str) -> None:
     """Refuse what no engine here can run."""
-    if not start.consistent:
+    if isinstance(start, StartReport) and not start.consistent:
         raise GeometryError(f"the start is not consistent, so {engine} would run another mechanism: {start.message}")
-    if start.poses.shape[0] != model.mechanism.graph.links:
-        raise GeometryError(f"the start has {start.poses.shape[0]} links, the model {model.mechanism.graph.links}")
+    check_start(model, start)
     if model.massless:
         raise GeometryError(f"links {list(model.massless)} have no mass or inertia; {engine} needs both positive")
+
+
+def check_settings(settings: Any, kind: type) -> None:
+    """Refuse settings of another engine."""
+    if not isinstance(settings, kind):
+        raise GeometryError(f"settings are {type(settings).__name__}, not {kind.__name__}; give these, or none")
 
 
 def carrier_of(model: DynamicModel, gear: Gear) -> int:

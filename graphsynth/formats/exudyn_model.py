@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rigid
-from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.start import StartReport, check_start
 from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between, turn
-from graphsynth.formats.exporting import check_common, constant_torque, gear_weights
+from graphsynth.formats.exporting import check_common, check_settings, constant_torque, gear_weights
+from graphsynth.mechanism.checks import finite, nonzero
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver
 
@@ -54,13 +55,13 @@ class ExudynSettings:
     newton_tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.step) and self.step > 0.0):
-            raise GeometryError(f"step = {self.step} s must be positive; give the step of the engine")
-        if self.integrator not in INTEGRATORS:
+        nonzero("step", self.step)
+        nonzero("newton_tolerance", self.newton_tolerance)
+        if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
             raise GeometryError(
                 f"integrator = {self.integrator!r} is not offered; give one of {', '.join(INTEGRATORS)}"
             )
-        if not 0.0 <= self.spectral_radius <= 1.0:
+        if not 0.0 <= finite("spectral_radius", self.spectral_radius) <= 1.0:
             raise GeometryError(f"spectral_radius = {self.spectral_radius} must lie in 0..1; 0.9 is usual")
 
     @property
@@ -327,8 +328,10 @@ def run_exudyn(
     GraphsynthError
         exudyn is not installed.
     """
-    settings = settings or ExudynSettings()
+    settings = ExudynSettings() if settings is None else settings
+    check_settings(settings, ExudynSettings)
     grid, counts = steps_between(times, settings.step)
+    check_start(model, start, float(grid[0]))
     export = to_exudyn(model, start)
     exu = load_engine("exudyn")
     every = reduce(math.gcd, counts)

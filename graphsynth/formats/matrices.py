@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import FormatError
 from graphsynth.formats.lines import Row, head_of, read_rows, within
+from graphsynth.kinematics._checks import checked
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
 
@@ -31,6 +32,7 @@ __all__ = [
 Matrix = NDArray[np.int64]
 
 
+@checked
 def adjacency_matrix(graph: MechanismGraph) -> Matrix:
     """Return the symmetric matrix of joint mobilities, shape (links, links).
 
@@ -54,6 +56,7 @@ def adjacency_matrix(graph: MechanismGraph) -> Matrix:
     return A
 
 
+@checked
 def incidence_matrix(graph: MechanismGraph) -> Matrix:
     """Return links against joints, shape (links, joints), joints in the order of ``graph.joints``.
 

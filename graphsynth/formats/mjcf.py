@@ -17,15 +17,19 @@ from graphsynth.dynamics.model import DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport
 from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import turn
-from graphsynth.formats.exporting import check_common, gear_weights
+from graphsynth.formats.exporting import check_common, check_settings, gear_weights
 from graphsynth.formats.mjcf_parts import Work, combine, fixed, site, text, write_load
 from graphsynth.formats.trees import SpanningTree, spanning_tree
+from graphsynth.kinematics._checks import three
+from graphsynth.mechanism.checks import finite, nonzero, point
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
 __all__ = ["MjcfModel", "MujocoSettings", "to_mjcf"]
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]
+#: MuJoCo's own bound of masses and inertias.
+_LEAST = 1e-15
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
 
 
@@ -57,12 +61,14 @@ class MujocoSettings:
     solimp: tuple[float, float, float] = (0.9999, 0.9999, 0.001)
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.step) and self.step > 0.0):
-            raise GeometryError(f"step = {self.step} s must be positive; give the step of the engine")
-        if self.integrator not in INTEGRATORS:
+        nonzero("step", self.step)
+        if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
             raise GeometryError(
                 f"integrator = {self.integrator!r} is not MuJoCo's; give one of {', '.join(INTEGRATORS)}"
             )
+        if self.solref is not None:
+            object.__setattr__(self, "solref", point("solref", self.solref))
+        object.__setattr__(self, "solimp", tuple(finite("solimp", part) for part in three("solimp", self.solimp)))
         if self.solref is not None and not (min(self.solref) > 0.0 or max(self.solref) < 0.0):
             raise GeometryError(f"solref = {self.solref}: give two positive or two negative numbers")
 
@@ -151,8 +157,15 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     >>> export.coordinates, export.qpos.tolist(), export.tree.cuts
     ((('j0_1', 0, 1),), [0.5], ())
     """
-    settings = settings or MujocoSettings()
+    settings = MujocoSettings() if settings is None else settings
+    check_settings(settings, MujocoSettings)
     check_common(model, start, "MuJoCo")
+    for link, body in model.bodies.items():
+        if min(body.mass, body.inertia) <= _LEAST:
+            raise GeometryError(
+                f"mass = {body.mass:g} kg and inertia = {body.inertia:g} kg m^2 of link {link}: MuJoCo takes none "
+                f"below {_LEAST:g}; change the units, or leave out what hardly weighs"
+            )
     if model.prescribed:
         pair = model.prescribed[0].pair
         raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")

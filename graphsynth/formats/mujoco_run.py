@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.model import DynamicModel
-from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.start import StartReport, check_start
 from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between
+from graphsynth.formats.exporting import check_settings
 from graphsynth.formats.mjcf import MjcfModel, MujocoSettings, to_mjcf
 
 __all__ = ["run_mujoco"]
@@ -45,8 +46,10 @@ def run_mujoco(
     GraphsynthError
         MuJoCo is not installed.
     """
-    settings = settings or MujocoSettings()
+    settings = MujocoSettings() if settings is None else settings
+    check_settings(settings, MujocoSettings)
     grid, counts = steps_between(times, settings.step)
+    check_start(model, start, float(grid[0]))
     export = to_mjcf(model, start, settings)
     mujoco = load_engine("mujoco")
     engine = mujoco.MjModel.from_xml_string(export.xml)

@@ -173,7 +173,7 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
     ('graphml', 'dot')
     """
     if name is not None:
-        if name not in FORMATS:
+        if not isinstance(name, str) or name not in FORMATS:
             raise SpecError(f"format {name!r} is unknown; known are {', '.join(FORMATS)}")
         return FORMATS[name]
     suffix = Path(path).suffix.lower()
@@ -218,6 +218,8 @@ def read_text(text: str | bytes, format: str) -> list[Item]:
     0
     """
     entry = format_of("", format)
+    if not isinstance(text, str | bytes):
+        raise SpecError(f"text is {type(text).__name__}; give str or bytes")
     with _sentences(""):
         _check_length(len(text), entry)
         return _bounded(_fed(io.BytesIO(_encoded(text)), entry))

@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from graphsynth.errors import GraphError
+from graphsynth.kinematics._checks import checked
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 
@@ -32,6 +33,7 @@ class SpanningTree:
         return tuple((child, joint) for parent, child, joint in self.edges if parent == link)
 
 
+@checked
 def spanning_tree(mechanism: Mechanism) -> SpanningTree:
     """Choose the tree: sliding pairs and slots stay in it, turning pairs are cut, the depth is small (exact).
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import operator
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +16,79 @@ from graphsynth.errors import GeometryError
 from graphsynth.mechanism.checks import check_fields, check_largest, check_sizes, finite
 
 __all__ = [
-    "check_fields", "check_largest", "check_sizes", "choice", "finite", "finite_array", "plane_point", "positive",
-    "sign", "three", "three_points", "together", "triple", "triples", "unit_vector", "whole",
+    "check_fields", "check_largest", "check_sizes", "checked", "choice", "finite", "finite_array", "plane_point",
+    "positive", "sign", "three", "three_points", "together", "triple", "triples", "unit_vector", "whole",
 ]  # fmt: skip
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+#: Classes of the package that public functions take; an annotation that names one is kept by `checked`.
+_OWN = {
+    "Braider", "DynamicModel", "DynamicMotion", "EngineSettings", "ExudynSettings", "Mechanism", "MechanismGraph",
+    "MotorDrivenPlatform", "MujocoSettings", "ParallelPlatform", "PistonMachine", "SingleMotorPlatform", "StartReport",
+    "Sweep", "Tribometer",
+}  # fmt: skip
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Let a function keep what its annotations say: a `GeometryError` names the argument that is something else.
+
+    Kept are classes of the package, ``float`` (finite), ``int`` and ``ArrayLike`` (numbers, NaN among them), each
+    also with ``| None``; other annotations are left to the function.
+
+    Examples
+    --------
+    >>> @checked
+    ... def half(size: "float") -> "float":
+    ...     return size / 2
+    >>> half("x")
+    Traceback (most recent call last):
+        ...
+    graphsynth.errors.GeometryError: size = 'x' is not a real number; give a finite one
+    """
+    signature = inspect.signature(function)
+    kinds = {
+        name: set(str(parameter.annotation).split(" | "))
+        for name, parameter in signature.parameters.items()
+        if isinstance(parameter.annotation, str)
+    }
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name, value in signature.bind(*args, **kwargs).arguments.items():
+            _keep(name, value, kinds.get(name, set()))
+        return function(*args, **kwargs)
+
+    return call
+
+
+def _keep(name: str, value: Any, kinds: set[str]) -> None:
+    """Raise `GeometryError` unless a value is of one of the kinds."""
+    if value is None and "None" in kinds:
+        return
+    own = kinds & _OWN
+    if own:
+        if not own & {base.__name__ for base in type(value).__mro__}:
+            names = " or ".join(sorted(own))
+            raise GeometryError(f"{name} is {type(value).__name__}, not a {names}; give one")
+    elif "ArrayLike" in kinds:
+        _numbers(name, value)
+    elif kinds - {"None"} == {"float"}:
+        finite(name, value)
+    elif kinds - {"None"} == {"int"}:
+        whole(name, value, -(2**63), 2**63)
+
+
+def _numbers(name: str, value: Any) -> None:
+    """Raise `GeometryError` unless a value is an array of real or complex numbers."""
+    try:
+        kind = np.asarray(value).dtype.kind
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{name} is not an array of numbers: {error}") from error
+    if kind not in "biufc":
+        raise GeometryError(f"{name} = {str(value)[:60]!r} is not an array of numbers; give finite ones")
 
 
 def positive(name: str, value: Any, *, zero: bool = False) -> float:
@@ -29,14 +102,14 @@ def positive(name: str, value: Any, *, zero: bool = False) -> float:
 
 def sign(name: str, value: Any) -> int:
     """Return +1 or -1; raise `GeometryError` for anything else."""
-    if value not in (1, -1):
+    if not isinstance(value, int | float | np.number) or value not in (1, -1):
         raise GeometryError(f"{name} = {value!r} must be +1 or -1 (the assembly branch)")
     return int(value)
 
 
 def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
     """Return ``value`` if it is one of ``allowed``; raise `GeometryError` otherwise."""
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         raise GeometryError(f"{name} = {value!r} is unknown; use one of {', '.join(map(repr, allowed))}")
     return str(value)
 
@@ -64,6 +137,8 @@ def finite_array(name: str, values: ArrayLike, *, nan: bool = False) -> NDArray[
         if given.dtype.kind in "cSU":
             kind = "complex numbers" if given.dtype.kind == "c" else "text"
             raise GeometryError(f"{name} holds {kind}; give real numbers")
+        if given.dtype.kind == "O" and any(part is None for part in given.flat):
+            raise GeometryError(f"{name} holds None; give real numbers")
         array = given.astype(np.float64, copy=False)
     except GeometryError:
         raise

@@ -216,11 +216,12 @@ class ParallelPlatform:
 
     def determinant(self, pose: ArrayLike, theta: ArrayLike) -> Array:
         """``det JX``, shape (...), unit length^4; zero at a type-II singularity."""
-        return np.asarray(np.linalg.det(self.jacobians(pose, theta)[0]))
+        with np.errstate(invalid="ignore"):  # NaN stays NaN
+            return np.asarray(np.linalg.det(self.jacobians(pose, theta)[0]))
 
     def working_mode(self, pose: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
-        """Working mode (..., 3) of closed poses from the sign of JT; 0 on the boundary of the reach."""
-        return np.asarray(np.sign(self.jacobians(pose, theta)[1]), dtype=np.int64)
+        """Working mode (..., 3) of closed poses from the sign of JT; 0 on the boundary of the reach, and for NaN."""
+        return np.asarray(np.nan_to_num(np.sign(self.jacobians(pose, theta)[1])), dtype=np.int64)
 
     def velocity_matrix(self, pose: ArrayLike, theta: ArrayLike) -> Array:
         """``J = -JX^-1 JT``: platform velocity per unit rocker speed, shape (..., 3, 3).
@@ -289,6 +290,8 @@ class ParallelPlatform:
         from graphsynth.kinematics.kernels.modes import elbows
 
         angles = np.require(np.atleast_2d(triples("theta", theta)), requirements=["C", "W"])
+        if angles.ndim != 2:
+            raise GeometryError(f"theta has shape {angles.shape}; give (N, 3)")
         anchors = np.empty(angles.shape, dtype=np.complex128)
         elbows(angles, np.array(self.D), np.array(self.l1), anchors)
         arms = (np.array(self.D), np.array(self.l1), angles)
@@ -300,7 +303,10 @@ class ParallelPlatform:
         Infinite at a type-II singularity (section 4.3).
         """
         JX, _ = self.jacobians(pose, theta)
-        return np.asarray(np.linalg.cond(JX / np.array([1.0, 1.0, positive("Lc", Lc)])))
+        scaled = JX / np.array([1.0, 1.0, positive("Lc", Lc)])
+        known = np.isfinite(scaled).all(axis=(-2, -1))
+        found = np.linalg.cond(np.where(known[..., None, None], scaled, np.eye(3)))
+        return np.asarray(np.where(known, found, np.nan))
 
 
 def _solve(JX: Array, right: Array, what: str) -> Array:

@@ -188,6 +188,7 @@ class Mechanism:
 
     def joint(self, a: int, b: int) -> JointGeometry:
         """Return the joint between two links; `GeometryError` if there is none."""
+        a, b = link_number("link of a joint", a), link_number("link of a joint", b)
         for joint in self.joints:
             if joint.pair == (min(a, b), max(a, b)):
                 return joint

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.motors import number
 from graphsynth.errors import GeometryError, SpecError
+from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["ChangePoint", "FourBar", "FourBarState"]
@@ -88,7 +89,7 @@ class FourBar:
             except SpecError as error:
                 raise GeometryError(str(error)) from None
         check_fields(self, ("crank", "coupler", "rocker", "frame"))
-        if self.branch not in (1, -1):
+        if not isinstance(self.branch, int | float) or self.branch not in (1, -1):
             raise GeometryError(f"branch = {self.branch!r} must be +1 or -1")
 
     @property
@@ -113,7 +114,7 @@ class FourBar:
         sine that vanishes there.
         """
         a, b, c, g = self.crank, self.coupler, self.rocker, self.frame
-        angle = np.asarray(theta, dtype=np.float64)
+        angle = finite_array("theta", theta, nan=True)
         far0, near0 = self.excess
         ct, st = np.cos(angle), np.sin(angle)
         d = np.sqrt((g - a) ** 2 + 4.0 * a * g * np.sin(0.5 * angle) ** 2)

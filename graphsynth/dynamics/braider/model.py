@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.braider.linkage import FourBar
-from graphsynth.dynamics.motors import IdealSpeed, Motor, SynchronousMotor, check_motor, number
+from graphsynth.dynamics.motors import IdealSpeed, Motor, SynchronousMotor, check_motor, number, whole
 from graphsynth.dynamics.platform_drive.prescribed import prescribed_run
 from graphsynth.dynamics.platform_drive.reduction import ReductionStudy, choose_motor, inductance_study
 from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, RunStatus, run
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
+from graphsynth.kinematics._checks import checked, finite_array
 from graphsynth.mechanism.checks import check_fields, check_sizes
 
 __all__ = ["Braider", "LinkMotion", "Peak", "Settling", "Thread"]
@@ -71,6 +72,7 @@ class Thread:
         object.__setattr__(self, "guide", point)
         check_fields(self, (), SpecError, small=("weight", "height", "gravity", "guide"))
 
+    @checked
     def force(self, tip: ArrayLike) -> NDArray[np.complex128]:
         """Force (N, complex) on the switch tip at points ``tip`` (complex, m)."""
         reach = self.guide - np.asarray(tip, dtype=np.complex128)
@@ -222,13 +224,14 @@ class Braider:
 
     def acceleration(self, theta: ArrayLike, speed: ArrayLike, motor_torque: ArrayLike) -> Array:
         """Crank acceleration for a motor torque (N m) at the driving shaft, rad/s^2."""
-        w, torque = np.asarray(speed, dtype=np.float64), np.asarray(motor_torque, dtype=np.float64)
+        w, torque = finite_array("speed", speed, nan=True), finite_array("motor_torque", motor_torque, nan=True)
         J, slope = self.effective_inertia(theta)
         eta = np.where(torque * w >= 0.0, self.train.efficiency, 1.0 / self.train.efficiency)
         friction = self.train.ratio**2 * self.motor.friction * w
         load = self.load_moment(theta) * self.linkage.motion(theta).k3
         return np.asarray((self.train.ratio * eta * torque - friction + load - 0.5 * slope * w * w) / J)
 
+    @checked
     def simulate(
         self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0, currents: tuple[float, ...] | None = None,
         reduce: bool | str = "auto", rtol: float = 1e-10, estimate: bool = True, max_steps: int = 200_000,
@@ -270,6 +273,7 @@ class Braider:
                 return _cut(found, int(beyond[0]), point.theta, point.ratios)
         return found
 
+    @checked
     def inductance_study(self, times: ArrayLike, inductances: tuple[float, ...]) -> ReductionStudy:
         """Distance to the limit L -> 0 for several inductances (section 4.6), from rest.
 
@@ -289,6 +293,7 @@ class Braider:
         speed = np.stack([w, s.k2 * w, s.k3 * w], axis=-1)
         return LinkMotion(speed, np.stack([alpha, s.f2 * w * w + s.k2 * alpha, s.f3 * w * w + s.k3 * alpha], axis=-1))
 
+    @checked
     def steady_range(self, turns: int = 1, rtol: float = 1e-11, samples: int = 720) -> tuple[float, float]:
         """Least and largest crank speed over whole turns after the start-up, rad/s; estimated, NaN if a run fails.
 
@@ -334,6 +339,7 @@ class Braider:
         time = fine.time[best] + shift * (fine.time[best + 1] - fine.time[best])
         return Peak(float(time), float(middle + lift), abs(float(lift)))
 
+    @checked
     def settling(
         self, target: float, band: float = 0.02, end: float = 0.5, rtol: float = 1e-11, samples: int = 2001
     ) -> Settling:  # fmt: skip
@@ -349,7 +355,9 @@ class Braider:
         number("band", band, least=0.0, above=True)
         if number("target", target) == 0.0:
             raise SpecError("target = 0 has no relative band; give the speed that is to be reached, rad/s")
-        times = np.linspace(0.0, number("end", end, least=0.0, above=True), samples)
+        times = np.linspace(
+            0.0, number("end", end, least=0.0, above=True), whole("samples", samples, "give some hundreds")
+        )
         found = self.simulate(times, rtol=rtol, estimate=False)
         outside = np.nonzero(~(np.abs(found.speed / target - 1.0) <= band))[0]
         if not found.complete or outside.size == 0 or outside[-1] == times.size - 1:

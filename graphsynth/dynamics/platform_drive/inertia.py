@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.motors import number, numbers
 from graphsynth.errors import SpecError
+from graphsynth.kinematics._checks import finite_array
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
@@ -146,7 +147,7 @@ class EffectiveInertia:
 
     def components(self, q: ArrayLike) -> tuple[Array, Array]:
         """Return the ``v_i`` and their derivatives at angles q (...), each of shape (k, ...)."""
-        angle = np.asarray(q, dtype=np.float64)
+        angle = finite_array("q", q, nan=True)
         order = np.arange(1, self.rows.shape[1] // 2 + 1)
         phase = np.multiply.outer(order, angle)
         c, s = np.cos(phase), np.sin(phase)

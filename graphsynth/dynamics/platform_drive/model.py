@@ -22,6 +22,7 @@ from graphsynth.dynamics.platform_drive.run import DriveRun, Plant, run
 from graphsynth.dynamics.platform_drive.setup import load_coefficients
 from graphsynth.dynamics.trains import Train
 from graphsynth.errors import SpecError
+from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.checks import check_fields
 
 if TYPE_CHECKING:
@@ -158,7 +159,7 @@ class MotorDrivenPlatform:
         SpecError
             Options or numbers that make no sense; what model S cannot have (friction, L = 0, a voltage limit).
         """
-        if model not in ("auto", "J", "S"):
+        if not isinstance(model, str) or model not in ("auto", "J", "S"):
             raise SpecError(f"model = {model!r} is unknown; choose 'auto', 'J' or 'S'")
         if isinstance(self.motor, IdealSpeed):
             return prescribed_run(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
@@ -204,7 +205,7 @@ class MotorDrivenPlatform:
         >>> platform.torque_at_speed([0.0, 0.7], 20.0).round(6).tolist()
         [0.0, -0.98545]
         """
-        w, angle = number("speed", speed), np.asarray(q, dtype=np.float64)
+        w, angle = number("speed", speed), finite_array("q", q, nan=True)
         load = np.full(angle.shape, self.load)
         if self.load_series is not None:
             load += EffectiveInertia(np.atleast_2d(self.load_series)).components(angle)[0][0]

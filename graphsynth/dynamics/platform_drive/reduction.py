@@ -52,7 +52,7 @@ def choose_motor(
     SpecError
         An unknown option, L = 0 with ``reduce=False``, a motor that has no linear limit.
     """
-    if reduce not in (True, False, "auto"):
+    if not isinstance(reduce, bool | str) or reduce not in (True, False, "auto"):
         raise SpecError(f"reduce = {reduce!r} is unknown; choose 'auto', True or False")
     if not isinstance(motor, (DCMotor, SynchronousMotor)) or (reduce is False and motor.inductance > 0.0):
         return motor, ""
@@ -124,7 +124,7 @@ def inductance_study(
     if not isinstance(motor, (DCMotor, SynchronousMotor)):
         raise SpecError(f"{type(motor).__name__} has no inductance; give a DCMotor or a SynchronousMotor")
     out = output_times(times)
-    if len(inductances) == 0:
+    if not isinstance(inductances, Sequence | np.ndarray) or len(inductances) == 0:
         raise SpecError("there is no inductance to try; give at least one, in H")
     limit = run(plant, motor.reduced(), train, out, angle=angle, speed=speed, rtol=rtol, estimate=False)
     gaps, runs = [], []

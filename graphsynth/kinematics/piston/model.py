@@ -211,7 +211,7 @@ class FloatingPiston:
         GeometryError
             For another ``slot``.
         """
-        if slot not in ("sliding", "crowned"):
+        if not isinstance(slot, str) or slot not in ("sliding", "crowned"):
             raise GeometryError(f"slot = {slot!r} is not known; give 'sliding' or 'crowned'")
         joints: list[JointGeometry] = self.drive.joints()
         graph = self.graph

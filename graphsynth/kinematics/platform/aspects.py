@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite
+from graphsynth.kinematics._checks import checked, finite
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.field import determinant, pose_grid, working_mode
 
@@ -60,6 +60,7 @@ class Aspects:
         return len(self.parts)
 
 
+@checked
 def aspects(
     platform: ParallelPlatform,
     sigma: tuple[int, ...],

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array, plane_point, positive, three
+from graphsynth.kinematics._checks import checked, finite_array, plane_point, positive, three
 from graphsynth.kinematics.platform.inverse_design import Design, _wanted, assess_design
 from graphsynth.kinematics.platform.small_crank import small_crank
 
@@ -47,6 +47,7 @@ class Attainable:
     Lc: float
 
 
+@checked
 def ellipticity(phasor: ArrayLike, Lc: float) -> float:
     """Ratio of the semi-axes of the ellipse ``Re(Xi exp(i psi))`` in pose space: 0 straight, 1 circular.
 
@@ -67,6 +68,7 @@ def _gains(mechanism: SingleMotorPlatform) -> Complex:
     return np.asarray(small_crank(mechanism).gains * np.array([1.0, 1.0, mechanism.Lc])[:, None])
 
 
+@checked
 def attainable(mechanism: SingleMotorPlatform, direction: ArrayLike) -> Attainable:
     """Best straight motion along a direction in pose space with the phases of the mechanism, lengths free.
 
@@ -126,6 +128,7 @@ def attainable(mechanism: SingleMotorPlatform, direction: ArrayLike) -> Attainab
     )
 
 
+@checked
 def lengths_only_design(
     mechanism: SingleMotorPlatform, wanted: ArrayLike, *, free_phase: bool = True, samples: int = 96
 ) -> Design:

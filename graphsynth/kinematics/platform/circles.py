@@ -6,6 +6,7 @@ import cmath
 import math
 from typing import NamedTuple
 
+from graphsynth.kinematics._checks import checked
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
 __all__ = ["BoundaryCircle", "Limits", "Meeting", "leg_circles", "meet"]
@@ -37,6 +38,7 @@ class Meeting(NamedTuple):
     points: tuple[complex, ...]
 
 
+@checked
 def leg_circles(
     platform: ParallelPlatform, alpha: float, sigma: tuple[int, ...] | None, limits: tuple[Limits, ...]
 ) -> list[BoundaryCircle]:

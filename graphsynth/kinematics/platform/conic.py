@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.kinematics._checks import finite, three_points
+from graphsynth.kinematics._checks import checked, finite, three_points
 from graphsynth.kinematics._plane import cross
 
 __all__ = ["SingularConic", "singular_conic"]
@@ -40,6 +40,7 @@ class SingularConic:
         return np.asarray((a * x + b * y + d) * x + (c * y + e) * y + f)
 
 
+@checked
 def singular_conic(anchors: ArrayLike, vertices: ArrayLike, alpha: float) -> SingularConic:
     """Locus of ``det JX = 0`` over the position for fixed anchors A_k and orientation.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import positive, triple, whole
+from graphsynth.kinematics._checks import checked, positive, triple, whole
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.field import characteristic_length, determinant, scaled_rows, working_mode
 from graphsynth.kinematics.platform.tracing import CurveEquations
@@ -71,6 +71,7 @@ class SingularityDistance:
         return self.type_one
 
 
+@checked
 def singularity_distance(
     platform: ParallelPlatform, pose: ArrayLike, sigma: Sequence[int], *, Lc: float | None = None, rays: int = 400
 ) -> SingularityDistance:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics._checks import checked, finite_array
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.motion import Motion
@@ -57,6 +57,7 @@ class TwoPoseDesign:
     motion: Motion | None
 
 
+@checked
 def two_pose_design(
     mechanism: SingleMotorPlatform, first: ArrayLike, second: ArrayLike, *, samples: int = 96
 ) -> TwoPoseDesign:

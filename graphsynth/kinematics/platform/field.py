@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import whole
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
 __all__ = ["characteristic_length", "cofactors", "determinant", "pose_grid", "scaled_rows", "working_mode"]
@@ -36,6 +37,7 @@ def pose_grid(platform: ParallelPlatform, alpha: float | None, nodes: int) -> tu
 
     The nodes are the centres of ``nodes`` equal strips, so none lies on the edge.
     """
+    nodes = whole("nodes", nodes, 1)
     b, D = np.array(platform.b), np.array(platform.D)
     reach = np.array(platform.l1) + np.array(platform.l2)
     if alpha is None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array, positive
+from graphsynth.kinematics._checks import checked, finite_array, positive
 
 __all__ = ["Harmonics", "harmonics"]
 
@@ -69,6 +69,7 @@ class Harmonics:
             return float(np.sqrt(size[1:].sum() / size[0].sum()))
 
 
+@checked
 def harmonics(samples: ArrayLike) -> Harmonics:
     """Analyse samples at ``psi = 2 pi j / N``, j = 0 to N - 1 (the end of the turn left out).
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.kinematics._checks import finite, plane_point, three
+from graphsynth.kinematics._checks import checked, finite, plane_point, three
 from graphsynth.kinematics.platform.harmonics import Harmonics, harmonics
 from graphsynth.kinematics.platform.small_crank import SmallCrank, small_crank
 from graphsynth.kinematics.platform.sweep import Sweep, cold_sweep, pose_derivatives, warm_sweep
@@ -107,6 +107,7 @@ def _linear(mechanism: SingleMotorPlatform, theory: SmallCrank, wanted: Complex)
     return _with(mechanism, theory.rocker * theory.sine * kappa * np.exp(1j * theory.coupler_direction))
 
 
+@checked
 def linear_design(mechanism: SingleMotorPlatform, wanted: ArrayLike, *, samples: int = 96) -> Design:
     """Crank lengths and phases for a wanted first harmonic, from the small-crank theory.
 
@@ -141,6 +142,7 @@ def linear_design(mechanism: SingleMotorPlatform, wanted: ArrayLike, *, samples:
     return assess_design(_linear(mechanism, theory, target), target, theory.home, samples=samples)
 
 
+@checked
 def refine_design(
     mechanism: SingleMotorPlatform,
     wanted: ArrayLike,
@@ -274,6 +276,7 @@ def _equations(sweep: Sweep, home: Array, target: Complex, weight: Array, unknow
     return np.concatenate(residual), np.concatenate(matrix)
 
 
+@checked
 def assess_design(
     mechanism: SingleMotorPlatform, wanted: ArrayLike, home: ArrayLike, *, samples: int = 96, iterations: int = 0
 ) -> Design:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array, positive, whole
+from graphsynth.kinematics._checks import checked, finite, finite_array, positive, whole
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.field import (
     characteristic_length,
@@ -92,6 +92,7 @@ class PlatformMap:
         return table[table["determinant"].notna()].reset_index(drop=True)
 
 
+@checked
 def quality(platform: ParallelPlatform, poses: ArrayLike, sigma: Sequence[int], *, Lc: float | None = None) -> Quality:
     """Dexterity, force and velocity transmission at poses (..., 3) of one working mode.
 
@@ -164,6 +165,7 @@ def _values(platform: ParallelPlatform, rows: Array, JT: Array, Lc: float) -> li
     return [np.asarray(array, dtype=np.float64) for array in found]
 
 
+@checked
 def platform_map(
     platform: ParallelPlatform,
     alpha: float,

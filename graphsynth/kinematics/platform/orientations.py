@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, plane_point, positive
+from graphsynth.kinematics._checks import checked, finite, plane_point, positive
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 
 __all__ = ["RegionArea", "orientations", "reachable_workspace", "total_orientation_workspace"]
@@ -53,6 +53,7 @@ class RegionArea:
     statement: str
 
 
+@checked
 def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[float, float], ...]:
     """Orientations at which all legs reach a position: closed intervals (start, stop), radians, 0 <= start < 2 pi.
 
@@ -83,6 +84,7 @@ def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[floa
     return tuple(joined)
 
 
+@checked
 def reachable_workspace(platform: ParallelPlatform, resolution: float = 2e-3) -> RegionArea:
     """Positions that the platform reaches at one orientation or more.
 
@@ -113,6 +115,7 @@ def reachable_workspace(platform: ParallelPlatform, resolution: float = 2e-3) ->
     return _cover(platform, test, resolution, "positions reached at one orientation or more")
 
 
+@checked
 def total_orientation_workspace(
     platform: ParallelPlatform, start: float, stop: float, resolution: float = 2e-3
 ) -> RegionArea:

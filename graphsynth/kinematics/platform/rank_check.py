@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array, triple
+from graphsynth.kinematics._checks import checked, finite, finite_array, triple
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ class LoopClosure:
         return np.asarray(self.motions[:, self.columns.index(column)])
 
 
+@checked
 def link_poses(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> Array:
     """Pose ``(x, y, angle)`` of all 15 links, in the frames used by `as_mechanism`; shape (15, 3).
 
@@ -96,6 +97,7 @@ def link_poses(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> Ar
     return poses
 
 
+@checked
 def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLike | None = None) -> Mechanism:
     """Build the 15-link mechanism with 19 turning pairs and 3 gear pairs.
 
@@ -169,6 +171,7 @@ def _pair(z: complex) -> tuple[float, float]:
     return (float(z.real), float(z.imag))
 
 
+@checked
 def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, tolerance: float = TOLERANCE) -> LoopClosure:
     """Loop-closure matrix of any planar mechanism at a configuration, with rank and instantaneous motions.
 
@@ -218,6 +221,7 @@ def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, toleran
     return LoopClosure(matrix, tuple(names), values, rank, rows[rank:], tolerance, Lc)
 
 
+@checked
 def platform_loop_closure(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> LoopClosure:
     """Loop-closure matrix (24 x 25) of the single-motor mechanism at one configuration.
 

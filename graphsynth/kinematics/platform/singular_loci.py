@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, whole
+from graphsynth.kinematics._checks import checked, finite, whole
 from graphsynth.kinematics.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.kinematics.platform.circles import BoundaryCircle, leg_circles
 from graphsynth.kinematics.platform.field import characteristic_length, determinant, pose_grid, working_mode
@@ -92,14 +92,16 @@ class SingularLoci:
 
     def of_mode(self, sigma: tuple[int, ...]) -> tuple[SingularCurve, ...]:
         """Curves of one working mode."""
-        return tuple(curve for curve in self.curves if curve.sigma == tuple(sigma))
+        return tuple(curve for curve in self.curves if curve.sigma == working_mode(sigma))
 
 
+@checked
 def type_one_circles(platform: ParallelPlatform, alpha: float) -> tuple[BoundaryCircle, ...]:
     """Circles on which a leg is stretched ("outer") or folded ("inner"); exact."""
     return tuple(leg_circles(platform, finite("alpha", alpha), None, (None, None, None)))
 
 
+@checked
 def singular_loci(platform: ParallelPlatform, alpha: float, *, nodes: int = 120) -> SingularLoci:
     """Type-I circles and the type-II curves of all eight working modes at orientation ``alpha`` (radians).
 
@@ -115,6 +117,7 @@ def singular_loci(platform: ParallelPlatform, alpha: float, *, nodes: int = 120)
     return SingularLoci(float(alpha), type_one_circles(platform, alpha), tuple(curves), tuple(points), nodes)
 
 
+@checked
 def type_two_curves(
     platform: ParallelPlatform, alpha: float, sigma: tuple[int, ...], *, nodes: int = 120
 ) -> tuple[SingularCurve, ...]:
@@ -185,6 +188,7 @@ def _repeated(curves: list[SingularCurve], new: SingularCurve, unit: float) -> b
     return sum(_known(loops, state, unit) for state in sample) > 0.7 * len(sample)
 
 
+@checked
 def isolated_singular_points(
     platform: ParallelPlatform, alpha: float, sigma: tuple[int, ...], *, nodes: int = 120
 ) -> tuple[complex, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array, positive
+from graphsynth.kinematics._checks import checked, finite_array, positive
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.field import characteristic_length, scaled_rows
 
@@ -67,6 +67,7 @@ class Singularity:
     tolerance: float
 
 
+@checked
 def closed_pose(platform: ParallelPlatform, pose: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
     """Check one pose with its rocker angles: finite, and closed to 1e-6 of the longest link.
 
@@ -88,6 +89,7 @@ def closed_pose(platform: ParallelPlatform, pose: ArrayLike, theta: ArrayLike) -
     return X, t
 
 
+@checked
 def singularity(
     platform: ParallelPlatform,
     pose: ArrayLike,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics._checks import checked, finite_array
 from graphsynth.kinematics.platform.harmonics import harmonics
 
 if TYPE_CHECKING:
@@ -79,18 +79,20 @@ class SmallCrank:
         tilt = self.cosine / self.rocker - np.exp(2j * np.arctan2(self.sine, self.cosine)) / self.coupler
         return np.asarray(self.crank * np.abs(tilt) / (4.0 * self.sine**2))
 
+    @checked
     def rockers(self, psi: ArrayLike) -> Array:
         """Rocker motion ``phi - phi_home`` at wheel angles, shape (..., 3); error of third order in the cranks."""
-        eta = np.asarray(psi, dtype=np.float64)[..., None] + self.phase - self.coupler_direction
+        eta = finite_array("psi", psi, nan=True)[..., None] + self.phase - self.coupler_direction
         gamma = np.arctan2(self.sine, self.cosine)
         first = self.crank * np.cos(eta) / (self.rocker * self.sine)
         bracket = self.cosine * np.cos(eta) ** 2 / self.rocker**2
         bracket = bracket - np.cos(eta + gamma) ** 2 / (self.coupler * self.rocker)
         return np.asarray(first + self.crank**2 / (2.0 * self.sine**3) * bracket)
 
+    @checked
     def poses(self, psi: ArrayLike) -> Array:
         """Platform motion of first order, shape (..., 3): an ellipse about the home pose."""
-        turn = np.exp(1j * np.asarray(psi, dtype=np.float64))[..., None]
+        turn = np.exp(1j * finite_array("psi", psi, nan=True))[..., None]
         return np.asarray(self.home + (turn * self.first_harmonic).real)
 
 
@@ -109,6 +111,7 @@ class CrankScale(NamedTuple):
     mean: float
 
 
+@checked
 def small_crank(mechanism: SingleMotorPlatform) -> SmallCrank:
     """Evaluate the small-crank theory at the home pose.
 
@@ -150,6 +153,7 @@ def small_crank(mechanism: SingleMotorPlatform) -> SmallCrank:
     )  # fmt: skip
 
 
+@checked
 def crank_scaling(
     mechanism: SingleMotorPlatform, scales: Sequence[float] = (1.0, 0.5, 0.25, 0.125), *, samples: int = 64
 ) -> tuple[CrankScale, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array
+from graphsynth.kinematics._checks import checked, finite, finite_array
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.singularity import TOLERANCE, Singularity, closed_pose, singularity
 
@@ -75,6 +75,7 @@ class CrankStatics:
     platform: Statics
 
 
+@checked
 def statics(
     platform: ParallelPlatform,
     pose: ArrayLike,
@@ -134,6 +135,7 @@ def statics(
     return Statics("indeterminate", -JT * factor, 2.0 * np.array(platform.l2) * factor, power, found)
 
 
+@checked
 def crank_statics(
     mechanism: SingleMotorPlatform, psi: float, pose: ArrayLike, wrench: ArrayLike, *, tolerance: float = TOLERANCE
 ) -> CrankStatics:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import whole
+from graphsynth.kinematics._checks import checked, whole
 from graphsynth.kinematics.platform.field import determinant
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def _failed(mechanism: SingleMotorPlatform, reason: str) -> Sweep:
     return Sweep(mechanism, np.zeros(0), empty, empty, empty, (), 0, reason)
 
 
+@checked
 def cold_sweep(mechanism: SingleMotorPlatform, samples: int) -> Sweep:
     """Follow the home branch over a turn with step control."""
     samples = whole("samples", samples, 4, 100_000)
@@ -74,6 +75,7 @@ def _drives(mechanism: SingleMotorPlatform) -> str:
     return ""
 
 
+@checked
 def warm_sweep(mechanism: SingleMotorPlatform, near: Sweep) -> Sweep:
     """Solve all samples by Newton from the poses of a neighbouring design; checked against its branch label."""
     reason = _drives(mechanism)
@@ -111,6 +113,7 @@ def _followed(mechanism: SingleMotorPlatform, near: Sweep) -> Sweep:
     return found
 
 
+@checked
 def pose_derivatives(sweep: Sweep) -> Array:
     """Return the derivatives of the poses by the design, shape (N, 3, 9).
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite, finite_array, positive, three
+from graphsynth.kinematics._checks import checked, finite, finite_array, positive, three
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
 from graphsynth.kinematics.platform.circles import BoundaryCircle, Limits, leg_circles, meet
 from graphsynth.kinematics.platform.field import working_mode
@@ -31,9 +31,10 @@ class Arc(NamedTuple):
     start: float
     stop: float
 
+    @checked
     def point(self, t: ArrayLike) -> NDArray[np.complex128]:
         """Points of the circle at angles ``t``."""
-        return np.asarray(self.circle.centre + self.circle.radius * np.exp(1j * np.asarray(t, dtype=np.float64)))
+        return np.asarray(self.circle.centre + self.circle.radius * np.exp(1j * finite_array("t", t, nan=True)))
 
     @property
     def length(self) -> float:
@@ -113,6 +114,7 @@ class Workspace:
         """True if no position is reachable."""
         return self.dimension < 0
 
+    @checked
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Tell which positions (complex, any shape) belong to the workspace, its boundary included.
 
@@ -139,6 +141,7 @@ class Workspace:
         return min(x), max(x), min(y), max(y)
 
 
+@checked
 def constant_orientation_workspace(
     platform: ParallelPlatform,
     alpha: float,
