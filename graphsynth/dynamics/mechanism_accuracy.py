@@ -15,6 +15,7 @@ from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.platform_drive.accuracy import WorkRow
 from graphsynth.dynamics.start import StartReport
 from graphsynth.errors import GeometryError
+from graphsynth.kinematics._checks import finite, whole
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.result import DynamicMotion
@@ -79,10 +80,12 @@ def dynamics_work_precision(
     >>> [row.method for row in rows], rows[0].error > rows[1].error
     (['constrained, DOP853', 'constrained, DOP853'], True)
     """
-    if not tolerances or min(tolerances) < 1e-12:
+    for name, given in (("forms", forms), ("methods", methods), ("tolerances", tolerances)):
+        if not isinstance(given, Sequence) or isinstance(given, str):
+            raise GeometryError(f"{name} = {given!r} is not a list; give one")
+    if not tolerances or min(finite("tolerance", given) for given in tolerances) < 1e-12:
         raise GeometryError(f"tolerances = {tuple(tolerances)} must be 1e-12 or more; the reference must be tighter")
-    if rounds < 1:
-        raise GeometryError(f"rounds = {rounds} measures nothing; give 1 or more")
+    whole("rounds", rounds, 1, 1000)
     references = {
         "constrained": _reference(model, start, times, "reduced"),
         "reduced": _reference(model, start, times, "constrained"),

@@ -14,11 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.dynamics.elements import Spring, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicMotion
-from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.start import StartReport, check_start
 from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import EngineRun
 from graphsynth.formats.exudyn_model import ExudynSettings
 from graphsynth.formats.mjcf import MujocoSettings, to_mjcf
+from graphsynth.kinematics._checks import finite, finite_array
 
 __all__ = ["ExportCertificate", "Trial", "certify_export"]
 
@@ -199,7 +200,8 @@ def certify_export(
     Specification of instruments and dynamics, sections 7.4 and 8.
     """
     trials = _checked(settings, tolerance)
-    grid = np.asarray(times, dtype=np.float64)
+    grid = np.atleast_1d(finite_array("times", times))
+    check_start(model, start)
     names = _names(model, start, trials[0])
     version = _version(names["engine"])
     common = {**names, "engine_version": version, "tolerance": float(tolerance), "times": tuple(grid.tolist())}
@@ -225,12 +227,14 @@ def _nothing(settings: Settings, status: str, message: str, seconds: float) -> T
 
 
 def _checked(settings: Sequence[Settings], tolerance: float) -> list[Settings]:
+    if not isinstance(settings, Sequence) or not all(isinstance(s, MujocoSettings | ExudynSettings) for s in settings):
+        raise GeometryError(f"settings = {settings!r} is not a list of MujocoSettings or of ExudynSettings; give one")
     trials = sorted(settings, key=lambda s: -s.step)
     if len({type(s) for s in trials}) != 1:
         raise GeometryError("settings must all be MujocoSettings or all ExudynSettings; make one certificate for each")
     if len({s.step for s in trials}) < 3:
         raise GeometryError("settings have fewer than three different steps; give three or more to see the order")
-    if not tolerance > 0.0:
+    if not finite("tolerance", tolerance) > 0.0:
         raise GeometryError(f"tolerance = {tolerance} must be positive; give the error that is allowed")
     return trials
 

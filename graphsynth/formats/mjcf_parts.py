@@ -107,7 +107,7 @@ def _torque(work: Work, element: Torque | TorqueSource, name: str, tendon: ET.El
         return
     if rotor and not any(combined.keys() <= work.chain[link].keys() for link in (element.a, element.b)):
         raise GeometryError(
-            f"rotor_inertia = {element.rotor_inertia:g} of torque source {element.a}-{element.b} couples links on "
+            f"the rotor of torque source {element.a}-{element.b}, {rotor:g} kg m^2 at its output, couples links on "
             "different branches of the tree, for which MuJoCo's inertia matrix has no entries: leave it out, or make "
             "the rotor a link of its own with a gear pair"
         )

@@ -106,7 +106,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "force": (Force, {"link": 1, "force": (1, 0), "at": (0, 0), "frame": "world", "breaks": ()}),
     "torque": (Torque, {"a": 0, "b": 1, "torque": 1.0, "breaks": ()}),
     "source": (dynamics.TorqueSource, {"a": 0, "b": 1, "ratio": 1.0, "breaks": ()}),
-    "friction": (dynamics.JointFriction, {"a": 0, "b": 1, "kinetic": 0.1, "static": 0.1, "radius": 0.1, "stribeck_speed": 1.0}),
+    "friction": (dynamics.JointFriction, {"a": 0, "b": 1, "kinetic": 0.1, "static": 0.2, "stribeck_speed": 1.0}),
     "model": (DynamicModel, {"mechanism": ARM, "bodies": MODEL.bodies, "elements": (), "additional": ()}),
     "start": (consistent_start, {
         "model": MODEL, "pose": START.poses, "rates": START.velocities, "keep": {(0, 1): 0.3},

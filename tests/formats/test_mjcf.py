@@ -247,7 +247,7 @@ def test_what_no_engine_can_represent_is_refused_by_writers_and_certificate():
     bodies = {k: Body.bar(1.0, (0.0, 0.0), (0.3, 0.0)) for k in (1, 2)}
     model = DynamicModel(mechanism, bodies, [TorqueSource(1, 2, 0.0, 10.0, 1.0, 1e-3)])
     begin = consistent_start(model, pose=[[0, 0, 0], [0, 0, 0], [0.5, 0, -np.pi / 2]])
-    words = r"rotor_inertia = 0.001 of torque source 1-2 couples links on different branches.*leave it out, or make"
+    words = r"the rotor of torque source 1-2, 0.1 kg m\^2 .* couples links on different branches.*leave it out, or make"
     with pytest.raises(GeometryError, match=words):
         to_mjcf(model, begin)
     with pytest.raises(GeometryError, match=words):
