@@ -121,7 +121,10 @@ def simulate_dynamics(
 
 
 def _times(times: ArrayLike) -> Array:
-    grid = finite_array("times", times, nan=True)
+    try:
+        grid = finite_array("times", times, nan=True)
+    except GeometryError as error:
+        raise GeometryError(f"times = {times!r} are not numbers; give a list of seconds that increase") from error
     if grid.ndim != 1 or grid.size < 1 or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
         raise GeometryError("times must be one list of finite numbers that increase; sort them and remove duplicates")
     return grid
