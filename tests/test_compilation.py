@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import errno
+import importlib.util
+import os
+import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from types import FunctionType
 
-from graphsynth.compilation import source_digest
+import pytest
+
+import graphsynth
+from graphsynth import compilation
+from graphsynth.compilation import kernel, source_digest
 
 BELOW = "from graphsynth.compilation import kernel\n\n@kernel\ndef below(x):\n    return x + {}\n"
 ABOVE = """
@@ -83,3 +93,175 @@ def test_every_kernel_module_depends_on_what_it_imports() -> None:
     import graphsynth.synthesis.kernels.variables as variables
 
     assert source_digest(Path(listing.__file__)) != source_digest(Path(variables.__file__))
+
+
+# -- every state of the cache ----------------------------------------------------------------------------------------
+
+
+class Place:
+    """A module with one function, the folders where it may be kept, and what was told."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.told: list[str] = []
+        self.home = folder / "home"
+        self.beside = folder / "package" / "__pycache__"
+        (folder / "package").mkdir()
+        self.source = folder / "package" / "small.py"
+        self.source.write_text("def twice(x):\n    return x + x\n")
+        monkeypatch.setattr(compilation, "_listeners", [])
+        monkeypatch.setattr(compilation, "_warners", [self.told.append])
+        monkeypatch.setattr("numba.misc.appdirs.AppDirs.user_cache_dir", str(self.home))
+
+    def function(self) -> FunctionType:
+        spec = importlib.util.spec_from_file_location("small", self.source)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules["small"] = module
+        spec.loader.exec_module(module)
+        return module.twice
+
+    def hits(self) -> int:
+        """Call the function as a new process would; whether it was found."""
+        compiled = kernel(self.function())
+        assert compiled(21.0) == 42.0
+        return sum(compiled.stats.cache_hits.values())
+
+    def kept(self) -> list[Path]:
+        return [path for folder in (self.beside, self.home) for path in folder.rglob("*.nbc*")]
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Place:
+    return Place(tmp_path, monkeypatch)
+
+
+def test_a_kernel_is_kept_beside_its_module(place: Place) -> None:
+    assert [place.hits(), place.hits()] == [0, 1]
+    assert [path.parent for path in place.kept()] == [place.beside] and not place.told
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda data: b"",
+        lambda data: data[:7],
+        lambda data: data[:-1],
+        lambda data: data[:200] + bytes([data[200] ^ 1]) + data[201:],
+        lambda data: data[:-200] + bytes([data[-200] ^ 64]) + data[-199:],
+        lambda data: bytes(len(data)),
+        lambda data: data + b"more",
+        lambda data: b"\x80\x04N.",
+    ],
+)
+def test_a_damaged_file_is_made_anew(place: Place, spoil) -> None:
+    place.hits()
+    (path,) = place.kept()
+    data = path.read_bytes()
+    path.write_bytes(spoil(data))
+    assert [place.hits(), place.hits()] == [0, 1]
+    assert not place.told and place.kept() == [path]
+
+
+def test_a_file_of_another_function_numba_or_machine_is_not_taken(place: Place, monkeypatch) -> None:
+    import numba
+
+    place.hits()
+    (path,) = place.kept()
+    data = path.read_bytes()
+    place.source.write_text("def twice(x):\n    return 2.0 * x\n")
+    source_digest.cache_clear()
+    assert place.hits() == 0
+    (other,) = set(place.kept()) - {path}
+    other.write_bytes(data)  # under the name of the new one
+    assert [place.hits(), place.hits()] == [0, 1]
+    monkeypatch.setattr(numba, "__version__", "0.0.0")
+    assert [place.hits(), place.hits()] == [0, 1]
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO, errno.EROFS, errno.EACCES, errno.EDQUOT])
+def test_without_a_place_to_keep_it_a_kernel_is_compiled_in_memory_with_one_notice(
+    place: Place, monkeypatch, code: int
+) -> None:
+    def full(path: Path, data: bytes) -> int:
+        path.touch()
+        raise OSError(code, os.strerror(code))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        assert [place.hits(), place.hits()] == [0, 0]
+    assert len(place.told) == 1 and "compiled in memory" in place.told[0] and "NUMBA_CACHE_DIR" in place.told[0]
+    assert not place.kept()
+    assert [place.hits(), place.hits()] == [0, 1]
+
+
+def test_folders_that_are_files_are_passed_over(place: Place, monkeypatch, tmp_path: Path) -> None:
+    place.beside.touch()
+    assert [place.hits(), place.hits()] == [0, 1]
+    assert [place.home in path.parents for path in place.kept()] == [True] and not place.told
+    (chosen := tmp_path / "chosen").touch()
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(chosen))
+    monkeypatch.setattr("numba.misc.appdirs.AppDirs.user_cache_dir", "~/.cache/numba")  # nobody's home
+    monkeypatch.chdir(tmp_path)
+    assert [place.hits(), place.hits()] == [0, 0]
+    assert len(place.told) == 1 and not (tmp_path / "~").exists()
+    chosen.unlink()
+    assert [place.hits(), place.hits()] == [0, 1]
+
+
+def test_what_is_kept_where_nobody_may_write_is_found(place: Place, monkeypatch) -> None:
+    place.hits()
+    monkeypatch.setattr(Path, "write_bytes", lambda path, data: pytest.fail("nothing is to be written"))
+    assert place.hits() == 1
+
+
+def test_many_processes_at_once_and_many_versions(place: Place) -> None:
+    wrong: list[object] = []
+
+    def write() -> None:
+        if not all(compilation._write(place.beside, "a.nbc", b"x" * 10_000) for _ in range(300)):
+            wrong.append("not written")
+
+    def read() -> None:
+        for _ in range(300):
+            try:
+                data = (place.beside / "a.nbc").read_bytes()
+            except FileNotFoundError:
+                continue
+            if len(data) != 10_032:
+                wrong.append(len(data))
+
+    workers = [threading.Thread(target=work) for work in (write, read, read)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert not wrong
+    for number in range(20):
+        place.source.write_text(f"def twice(x):\n    return x + x  # {number}\n")
+        source_digest.cache_clear()
+        compilation._write(place.beside, f"small.twice-0.{number}.nbc", b"")
+        compilation._drop_old(place.beside, "small.twice-0")
+    assert len(list(place.beside.glob("small.*"))) == compilation._VERSIONS
+
+
+def test_a_library_warns_once(place: Place, monkeypatch) -> None:
+    monkeypatch.undo()
+    monkeypatch.setattr(compilation, "_warners", list(compilation._warners))
+    monkeypatch.setattr(compilation, "_write", lambda *_: False)
+    with pytest.warns(RuntimeWarning, match="compiled in memory") as told:
+        place.hits()
+        place.hits()
+    assert len(told) == 1
+
+
+@pytest.mark.slow  # compiles in memory
+def test_verbs_where_nothing_can_be_kept(tmp_path: Path) -> None:
+    """A package whose folders take no new files, and a home that is none."""
+    package = Path(graphsynth.__file__).parent
+    shutil.copytree(package, tmp_path / "graphsynth", ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in [path for path in (tmp_path / "graphsynth").rglob("*") if path.is_dir()]:
+        (folder / "__pycache__").touch()
+    own = {"PYTHONPATH": str(tmp_path), "HOME": "/dev/null", "NUMBA_CACHE_DIR": "/dev/null", "PATH": os.environ["PATH"]}
+    command = [sys.executable, "-m", "graphsynth", "count", "--links", "8", "--workers", "2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=own, cwd=tmp_path)
+    assert done.returncode == 0 and done.stdout.endswith("\n16\n"), done.stderr
+    assert done.stderr.count("kernels are compiled in memory") == 1 and done.stderr.count("\n") == 2
