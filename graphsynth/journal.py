@@ -13,9 +13,10 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import accumulate, takewhile
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Self
@@ -50,6 +51,10 @@ class Work:
         Says that a journal is of something else.
     remedy : str
         What to do then.
+    place : str
+        What to do if the file cannot be written.
+    again : str
+        What goes on with interrupted work.
     error : type
         Of what is raised.
     """
@@ -60,6 +65,8 @@ class Work:
     piece: str = "piece"
     foreign: str = "belongs to another question or version"
     remedy: str = "give the same options, or name another file"
+    place: str = "name another file"
+    again: str = "the same command"
     error: type[GraphsynthError] = GraphsynthError
 
 
@@ -69,7 +76,9 @@ def digest_of(*parts: object) -> str:
 
 
 @contextmanager
-def writing(what: object, remedy: str, kind: type[GraphsynthError] = GraphsynthError) -> Iterator[None]:
+def writing(
+    what: object, remedy: str, kind: type[GraphsynthError] = GraphsynthError, again: str = "the same command"
+) -> Iterator[None]:
     """Turn what the system says of a place that cannot be written into one sentence with the remedy.
 
     Examples
@@ -82,7 +91,7 @@ def writing(what: object, remedy: str, kind: type[GraphsynthError] = GraphsynthE
     try:
         yield
     except OSError as error:
-        full = "free some space and give the same command again, or " if error.errno in FULL else ""
+        full = f"free some space and give {again} again, or " if error.errno in FULL else ""
         raise kind(f"cannot write {what}: {error.strerror or error}; {full}{remedy}") from error
 
 
@@ -123,7 +132,7 @@ class Journal:
         self.path = path
         self.work = work
         self.entries: tuple[str, ...] = ()
-        self._ends: list[int] = []  # where the lines of the entries end
+        self._ends: list[int] = []  # of the first line and of each entry in the file
         self._stream: BinaryIO | None = None
         if path is None:
             return
@@ -137,7 +146,7 @@ class Journal:
     def _opened(self, path: Path) -> BinaryIO:
         """Open the file and lock it; another one may have taken its place before it was locked."""
         while True:
-            with writing(path, self.work.remedy, self.work.error):
+            with self.writing(path):
                 stream = path.open("a+b")
             if not _lock(stream):
                 stream.close()
@@ -156,17 +165,31 @@ class Journal:
         if whole:
             owner, title = _owner(whole, path, self.work)
             entries = _entries(whole, owner, path, self.work)
-            if not over([entry for entry, _ in entries]):
+            if not over(entries):
                 if owner != self.work.digest:
                     raise self.work.error(f"{path} (of {title}) {self.work.foreign}; {self.work.remedy}")
-                self.entries, self._ends = tuple(entry for entry, _ in entries), [end for _, end in entries]
-                if len(whole) < len(data):
-                    self._cut(len(whole))
+                self._take(data, whole[: whole.index(b"\n") + 1], entries)
                 return
         elif not self._head().startswith(data):
             raise FormatError(f"not a journal of graphsynth; {self.work.remedy}", str(path))
         self._cut(0)
         self._write(self._head())
+        self._ends = [len(self._head())]
+
+    def _take(self, data: bytes, head: bytes, entries: list[str]) -> None:
+        """Go on with these entries; what is torn or doubled leaves the file."""
+        lines = [self._line(number, entry) for number, entry in enumerate(entries, 1)]
+        self.entries, self._ends = tuple(entries), list(accumulate(map(len, lines), initial=len(head)))
+        clean = head + b"".join(lines)
+        if data != clean:
+            same = takewhile(lambda pair: pair[0] == pair[1], zip(data.splitlines(keepends=True)[1:], lines))
+            kept = len(head) + sum(len(line) for line, _ in same)
+            self._cut(kept)
+            self._write(clean[kept:])
+
+    def _line(self, number: int, value: str) -> bytes:
+        check = _check(self.work.digest, number, value.encode())
+        return f'{{"piece": {number}, "check": "{check}", "value": {value}}}\n'.encode()
 
     def _head(self) -> bytes:
         """Return the first line."""
@@ -183,16 +206,19 @@ class Journal:
             If it cannot be written, such as on a full disk; what is there stays, and the same command goes on from it.
         """
         if self._stream is not None:
-            number = len(self._ends) + 1
-            line = _check(self.work.digest, number, value.encode())
-            self._write(f'{{"piece": {number}, "check": "{line}", "value": {value}}}\n'.encode())
-            self._ends.append(self._stream.tell())
+            line = self._line(len(self._ends), value)
+            self._write(line)
+            self._ends.append(self._ends[-1] + len(line))
 
     def keep(self, count: int) -> None:
         """Drop the results behind the first ones that were there when the file was opened."""
         if count < len(self.entries):
-            self._cut(self._ends[count - 1] if count else len(self._head()))
-            self.entries, self._ends = self.entries[:count], self._ends[:count]
+            self._cut(self._ends[count])
+            self.entries, self._ends = self.entries[:count], self._ends[: count + 1]
+
+    def writing(self, path: Path) -> AbstractContextManager[None]:
+        """Say in one sentence why a file of the work cannot be written."""
+        return writing(path, self.work.place, self.work.error, self.work.again)
 
     def close(self) -> None:
         """Let others write the file."""
@@ -209,13 +235,13 @@ class Journal:
 
     def _write(self, data: bytes) -> None:
         assert self._stream is not None and self.path is not None
-        with writing(self.path, self.work.remedy, self.work.error):
+        with self.writing(self.path):
             self._stream.write(data)
             self._stream.flush()
 
     def _cut(self, size: int) -> None:
         assert self._stream is not None and self.path is not None
-        with writing(self.path, self.work.remedy, self.work.error):
+        with self.writing(self.path):
             self._stream.truncate(size)
 
     def __enter__(self) -> Self:
@@ -236,25 +262,21 @@ def _owner(data: bytes, path: Path, work: Work) -> tuple[str, str]:
     raise FormatError(f"not a journal of graphsynth; {work.remedy}", str(path))
 
 
-def _entries(data: bytes, owner: str, path: Path, work: Work) -> list[tuple[str, int]]:
-    """Return the results of the pieces, and where their lines end."""
-    found: list[tuple[str, int]] = []
+def _entries(data: bytes, owner: str, path: Path, work: Work) -> list[str]:
+    """Return the results of the pieces."""
+    found: list[str] = []
     checks: list[str] = []
     head, *lines = data.split(b"\n")[:-1]
-    end = len(head) + 1
     for place, line in enumerate(lines, 2):
-        end += len(line) + 1
         match = _LINE.fullmatch(line)
         number, check = (int(match[1]), match[2].decode()) if match else (0, "")
         if line == head or (0 < number <= len(checks) and check == checks[number - 1]):
             continue  # written twice
         if not match or number != len(found) + 1 or check != _check(owner, number, match[3]):
-            told = (
-                f"not the result of {work.piece} {len(found) + 1}; {work.remedy}, or delete this line and all behind it"
-            )
-            raise FormatError(told, f"{path}, line {place}")
+            remedy = f"{work.remedy}, or delete this line and all behind it"
+            raise FormatError(f"not the result of {work.piece} {len(found) + 1}; {remedy}", f"{path}, line {place}")
         checks.append(check)
-        found.append((match[3].decode(), end))
+        found.append(match[3].decode())
     return found
 
 

@@ -75,6 +75,7 @@ def test_a_line_that_stands_there_twice_counts_once(tmp_path: Path, change) -> N
     head, *lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(change(head, lines)))
     assert read(path) == VALUES
+    assert path.read_text() == "".join([head, *lines])
     with Journal(path, WORK) as journal:
         journal.append("25")
     assert read(path) == (*VALUES, "25")
@@ -220,14 +221,18 @@ def test_a_full_disk_names_the_file_and_the_remedy(tmp_path: Path, monkeypatch, 
     path = tmp_path / "a.g6"
 
     def full(self: Journal, value: str) -> None:
-        with journals.writing(self.path, self.work.remedy):
+        with self.writing(self.path):
             raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
         patch.setattr(Journal, "append", full)
         assert main(["enumerate", "--links", "10", "-o", str(path)]) == 2
     said = capsys.readouterr().err
-    assert said.count("\n") == 1 and str(path) in said and "free some space and give the same command again" in said
+    assert (
+        said.count("\n") == 1
+        and str(path) in said
+        and "free some space and give the same command with --resume again, or name another file" in said
+    )
     assert main(["enumerate", "--links", "10", "-o", str(path), "--resume"]) == 0
 
 

@@ -52,7 +52,7 @@ def signature(scene: Scene, stages: Sequence[Stage], kept: Sequence[str]) -> str
 def _work(scene: str, digest: str) -> Work:
     foreign = "holds an interrupted run of another question or version"
     remedy = f"add --fresh to start anew, or {REMEDY}"
-    return Work("run", scene, digest, "candidate", foreign, remedy, SceneError)
+    return Work("run", scene, digest, "candidate", foreign, remedy, REMEDY, error=SceneError)
 
 
 class Candidates(Journal):

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from graphsynth.errors import GraphsynthError
-from graphsynth.journal import Journal, Work, digest_of, writing
+from graphsynth.journal import Journal, Work, digest_of
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import parallel
 from graphsynth.synthesis.problem import Piece, Problem, graphs_of_piece, text_of_piece
@@ -45,10 +45,10 @@ class Step:
     done: float
 
 
-def _work(problem: Problem, pieces: Sequence[Piece], form: str, remedy: str) -> Work:
+def _work(problem: Problem, pieces: Sequence[Piece], form: str, remedy: str, again: str = "the same command") -> Work:
     """State what a journal is of: the question and its cut."""
     cut = [(repr(piece.weight), *(getattr(piece, name, 0) for name in ("start", "stop", "part"))) for piece in pieces]
-    return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy)
+    return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy, again=again)
 
 
 def _json_line(graph: MechanismGraph) -> str:
@@ -107,20 +107,20 @@ def write_listing(
         if not resume:
             raise GraphsynthError(f"{path} exists: name another file, or replace it with --force")
         return _graphs_of_complete(path, pieces, form)
-    remedy = "give the same options, or start anew with --force"
-    with Journal(note, _work(problem, pieces, form, remedy), fresh=overwrite and not resume) as journal:
+    remedy, again = "give the same options, or start anew with --force", "the same command with --resume"
+    with Journal(note, _work(problem, pieces, form, remedy, again), fresh=overwrite and not resume) as journal:
         if journal.entries and not resume:
             raise GraphsynthError(f"{path} is an interrupted listing: go on with --resume, or start anew with --force")
-        with writing(path, remedy):
+        with journal.writing(path):
             file = path.open("r+b" if path.exists() else "w+b")
         with closing(file):
-            with writing(path, remedy):
+            with journal.writing(path):
                 graphs = _cut_back(file, journal, len(pieces))
             done = sum(piece.weight for piece in pieces[: len(journal.entries)])
             total = sum(piece.weight for piece in pieces) or 1.0
             rest = pieces[len(journal.entries) :]
             for piece, (data, lines) in zip(rest, _blocks(rest, form, executor)):
-                with writing(path, remedy):
+                with journal.writing(path):
                     file.write(data)
                     file.flush()
                 journal.append(json.dumps([len(data), lines, zlib.crc32(data)]))
@@ -128,7 +128,7 @@ def write_listing(
                 done += piece.weight
                 if watch:
                     watch(Step(graphs, done / total))
-            with writing(path, remedy):
+            with journal.writing(path):
                 os.fsync(file.fileno())
         journal.remove()
     return graphs

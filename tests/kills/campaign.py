@@ -35,7 +35,7 @@ PATIENCE = 60.0  # seconds for any one command
 REFUSALS = (
     "is being written by another process",
     "another process writes this catalogue",
-    "the catalogue cannot be written (database is locked)",
+    "cannot be written (database is locked)",
     "cannot be opened as a catalogue (database is locked)",
     "killed while they worked, again and again",
 )
@@ -324,7 +324,7 @@ class Campaign:
             if job.journal and self.chance.random() < 0.4:
                 self.spoil(job)
         for _ in range(8):
-            command = self.begin(job, self.chance.random() < 0.2)
+            command = self.begin(job, self.chance.random() < 0.05)
             if command.wait(PATIENCE) is None:
                 os.kill(command.pid, signal.SIGKILL)
                 command.wait(5)
@@ -341,8 +341,8 @@ class Campaign:
 
     def disturb(self, job: Job) -> None:
         """Start the command and do something to it."""
-        what = self.chance.choice(["kill", "kill", "term", "int", "worker", "twice"])
-        shared = what == "worker" or self.chance.random() < 0.15
+        what = self.chance.choice(["kill", "kill", "kill", "term", "term", "int", "twice", "worker"])
+        shared = what == "worker" or self.chance.random() < 0.08
         command = self.begin(job, shared)
         wait = self.chance.random() * 1.1 * job.seconds
         if shared:
