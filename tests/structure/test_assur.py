@@ -229,6 +229,42 @@ def test_decomposition_against_all_subsets():
     assert several > 100
 
 
+def brute_stages(graph, driver):
+    """Links, stage and order of every group: in each round all smallest sets that what is placed already places."""
+    placed, found, stage = {0, driver}, [], 0
+    while len(placed) < graph.links:
+        stage += 1
+        left, now = sorted(set(range(graph.links)) - placed), []
+        for size in range(1, len(left) + 1):
+            for chosen in map(set, itertools.combinations(left, size)):
+                if any(smaller <= chosen for smaller, _ in now):
+                    continue
+                inner = [m for a, b, m in graph.joints if {a, b} <= chosen]
+                outer = [m for a, b, m in graph.joints if len({a, b} & chosen) == 1 and {a, b} & placed]
+                if graph.space * size == sum(graph.space - m for m in inner + outer):
+                    now.append((chosen, len(outer)))
+        found += [(tuple(sorted(chosen)), stage, order) for chosen, order in now]
+        placed |= set().union(*(chosen for chosen, _ in now))
+    return found
+
+
+def test_stage_and_order_of_groups_against_all_subsets():
+    rng = random.Random(33)
+    stages = []
+    for _ in range(300):
+        graph = random_mechanism(rng)
+        groups = decompose(graph, [1]).groups
+        assert sorted((g.links, g.stage, g.order) for g in groups) == sorted(brute_stages(graph, 1))
+        # of the groups that could come next, the one with the smallest link comes first
+        left, placed = list(groups), {0, 1}
+        while left:
+            ready = [g for g in left if {end for j in g.outer for end in j[:2]} <= placed | set(g.links)]
+            assert left[0] == min(ready, key=lambda g: g.links)
+            placed |= set(left.pop(0).links)
+        stages += [g.stage for g in groups]
+    assert stages.count(2) > 50 and stages.count(3) > 10 and max(stages) > 3
+
+
 def test_decomposition_does_not_depend_on_labels():
     rng = random.Random(32)
     for _ in range(100):
