@@ -7,6 +7,7 @@ value ``u``.  Its distance grows like ``|u - input| ** -p``, so three samples te
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, Step
 from graphsynth.kinematics.engine.result import MotionEvent
 
-__all__ = ["between", "blow_up", "centres_meet", "closed_limit", "escape", "escape_at"]
+__all__ = ["between", "blow_up", "centres_that_meet", "closed_limit", "escape_at", "escapes"]
 
 Array = NDArray[np.float64]
 
@@ -28,12 +29,11 @@ _MISFIT = 0.2
 _NEAR = 1e-6
 
 
-def escape(tracker: Tracker, stop: Stop) -> MotionEvent | None:
-    """Return the event if a link went off to infinity on the way to a stop: of the first group that has one."""
+def escapes(tracker: Tracker, stop: Stop) -> Iterator[MotionEvent]:
+    """Links that went off to infinity on the way to a stop, group by group."""
     way = stop.way
-    if way is None:
-        return None
-    for k, step in enumerate(tracker.program.steps[: stop.step + 1]):
+    for k, step in enumerate(tracker.program.steps[: stop.step + 1] if way is not None else ()):
+        assert way is not None
         own = way.distances[:, list(step.links)].max(axis=1)
         far = step.group >= 0 and own[-1] > max(tracker.program.far, _GROWTH * own.min())
         found = blow_up(way.u, own, 10.0, (1.0, 0.5, 2.0)) if far else None
@@ -42,10 +42,8 @@ def escape(tracker: Tracker, stop: Stop) -> MotionEvent | None:
             if step.code == codes.P_LINE:
                 at, uncertainty = _parallel(tracker, stop, k, at, uncertainty)
             gone = [link for link in step.links if way.distances[-1, link] > 1e-3 * own[-1]]
-            return _event(
-                step, gone, at, uncertainty, f"the distance grows like the power {-power:.2f} of the input left"
-            )
-    return None
+            why = f"the distance grows like the power {-power:.2f} of the input left"
+            yield _event(step, gone, at, uncertainty, why)
 
 
 def _parallel(tracker: Tracker, stop: Stop, step: int, at: float, uncertainty: float) -> tuple[float, float]:
@@ -95,10 +93,10 @@ def _event(step: Step, gone: list[int], at: float, uncertainty: float, why: str)
     return MotionEvent("escape", at, step.group, tuple(gone), 0, uncertainty, True, text)
 
 
-def centres_meet(program: Program, stop: Stop) -> MotionEvent | None:
-    """Return the event if a gear pair lost its line of centres at a stop: the distance of the centres goes to zero."""
+def centres_that_meet(program: Program, stop: Stop) -> Iterator[MotionEvent]:
+    """Gear pairs that lost their line of centres at a stop: the distance of the centres goes to zero."""
     if stop.way is None:
-        return None
+        return
     trace, k = stop.way.last
     for s, step in enumerate(program.steps[: stop.step + 1]):
         row0, count = program.step_table[s, 1:3]
@@ -115,8 +113,7 @@ def centres_meet(program: Program, stop: Stop) -> MotionEvent | None:
                 f"the centres of the gear pair {a}-{b} of group {step.group} ({step.kind}, links "
                 f"{', '.join(map(str, step.links))}) coincide at the input {at:.12g}: their line has no direction there"
             )
-            return MotionEvent("singular", at, step.group, step.links, 0, abs(at - stop.at), True, text)
-    return None
+            yield MotionEvent("singular", at, step.group, step.links, 0, abs(at - stop.at), True, text)
 
 
 def _moving(trace: Trace, k: int, link: int, local: complex) -> tuple[complex, complex]:

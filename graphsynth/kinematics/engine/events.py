@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.escapes import between, blow_up, centres_meet, closed_limit, escape, escape_at
+from graphsynth.kinematics.engine.escapes import between, blow_up, centres_that_meet, closed_limit, escape_at, escapes
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Step
 from graphsynth.kinematics.engine.result import MotionEvent
@@ -105,7 +105,7 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
         else:
             other = stop
     if other is not None and abs(unreachable - good) > 1e-9:
-        return _singular(tracker, other)  # a larger group ends before the closed form does
+        return _singular(tracker, other.after(trace.stop))  # a larger group ends before the closed form does
     if other is not None:  # groups that hang on the limit cannot be followed to its last bits
         good, bad = closed_limit(tracker, source, at, step_index, unreachable)
     step = tracker.program.steps[step_index]
@@ -131,13 +131,23 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
 
 
 def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:
-    """Judge where a Newton group stopped: a fold if the square of a determinant goes to zero linearly.
+    """Judge where a Newton group stopped: of all that happens ahead, what is nearest.
 
-    The group that folds may be one before: speeds grow without bound there, and what hangs on it is lost first.
+    It may happen to a group before: speeds grow without bound there, and what hangs on it is lost first.
     """
-    known = escape(tracker, stop) or centres_meet(tracker.program, stop)
-    if known is not None:
-        return known
+    program = tracker.program
+    ahead = [*escapes(tracker, stop), *centres_that_meet(program, stop), *_folds(tracker, stop)]
+    if ahead:
+        nearest = min(abs(event.input - stop.at) for event in ahead)
+        return next(event for event in ahead if abs(event.input - stop.at) <= 1.5 * nearest)
+    step = program.steps[stop.step]
+    where = f"group {step.group} ({step.kind}, links {_list(step.links)})"
+    text = f"{where} becomes singular near the input {stop.at:.12g}: modes meet and the branch after it is ambiguous"
+    return MotionEvent("singular", stop.at, step.group, step.links, 0, stop.uncertainty, True, text)
+
+
+def _folds(tracker: Tracker, stop: Stop) -> Iterator[MotionEvent]:
+    """Folds of groups: the square of the determinant goes to zero linearly on the way to a stop."""
     way = stop.way
     for k, step in enumerate(tracker.program.steps[: stop.step + 1] if way is not None else ()):
         assert way is not None
@@ -149,11 +159,7 @@ def _singular(tracker: Tracker, stop: Stop) -> MotionEvent:
                 "assembly modes merge and the branch ends "
                 f"(the determinant goes to zero like the power {power:.2f} of the distance)"
             )
-            return MotionEvent("fold", at, step.group, step.links, 2, uncertainty, True, text)
-    step = tracker.program.steps[stop.step]
-    where = f"group {step.group} ({step.kind}, links {_list(step.links)})"
-    text = f"{where} becomes singular near the input {stop.at:.12g}: modes meet and the branch after it is ambiguous"
-    return MotionEvent("singular", stop.at, step.group, step.links, 0, stop.uncertainty, True, text)
+            yield MotionEvent("fold", at, step.group, step.links, 2, uncertainty, True, text)
 
 
 def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:

@@ -7,7 +7,7 @@ halved.  A step that becomes too small is a singularity, never a jump.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,18 @@ class Stop:
     uncertainty: float
     way: Way | None = None
 
+    def after(self, earlier: Stop) -> Stop:
+        """Return the same stop with the samples on the way to another one before its own."""
+        if self.way is None or earlier.way is None:
+            return self
+        own, first = self.way, earlier.way
+        before = np.flatnonzero((own.u[0] - first.u) * (own.u[-1] - first.u[0]) > 0.0)
+        u, margins, distances = (
+            np.concatenate([a[before], b])
+            for a, b in ((first.u, own.u), (first.margins, own.margins), (first.distances, own.distances))
+        )
+        return replace(self, way=Way(u, margins, distances, own.last))
+
 
 @dataclass
 class Trace:
@@ -94,6 +106,7 @@ class Tracker:
         self, program: Program, modes: Array, centres: Array | None = None, turned: Array | None = None
     ) -> None:
         self.turned = turned
+        self._passed: tuple[Trace, int, list[tuple[Trace, int]]] | None = None
         self.program = program
         self.modes = modes
         self.centres = np.zeros(max(1, len(program.gears))) if centres is None else centres
@@ -198,7 +211,11 @@ class Tracker:
         here, goal = float(trace.u[k - 1]), float(trace.u[k])
         source, at = trace, k - 1
         step, failed = 0.5 * (goal - here), (code, -1)
-        way = [(trace, near) for near in range(max(0, at - _BEFORE), k)]
+        way = [(trace, near) for near in range(max(0, at - _BEFORE), at)]
+        if self._passed is not None and self._passed[0] is trace and self._passed[1] == at:
+            way += self._passed[2]  # the step before was bridged too
+        way.append((trace, at))
+        begun = len(way)
         for _ in range(_TRIALS):
             target = goal if abs(step) >= abs(goal - here) else here + step
             pair, why, where = self.near(source, at, target)
@@ -208,6 +225,7 @@ class Tracker:
                 if target == goal:
                     for final, reached in zip(trace.row(k), pair.row(1)):
                         final[...] = reached
+                    self._passed = trace, k, way[begun:-1]
                     return None
                 step *= 2.0
                 continue
