@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 from typing import Any
 
 from graphsynth.atlas.evaluations import KINDS, NOT_COMPUTED
+from graphsynth.atlas.stored import data_of
 
 __all__ = ["entry"]
 
@@ -51,7 +51,7 @@ def _mechanisms(connection: sqlite3.Connection, number: int) -> list[dict[str, A
     ):
         evaluated.setdefault((frame, driver), {})[kind] = {
             "status": status, "value": value, "unit": unit, "guarantee": guarantee,
-            "data": None if data is None else json.loads(data),
+            "data": None if data is None else data_of(data),
         }  # fmt: skip
     found = []
     for frame, driver, own_class, order, groups, levels in connection.execute(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.evaluations import Evaluation, store
 from graphsynth.atlas.schema import GARBAGE, connect, readable, screen, settle
-from graphsynth.atlas.stored import fingerprint, mechanism_in
+from graphsynth.atlas.stored import data_of, fingerprint, mechanism_in
 from graphsynth.errors import GraphError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _task(
 def _has(row: tuple[str, str | None] | None, wanted: dict[str, Any]) -> bool:
     """Whether a stored evaluation was made with these settings."""
     try:
-        data = json.loads(row[1]) if row and row[1] else {}
+        data = data_of(row[1]) if row and row[1] else {}
     except ValueError:
         return False
     return isinstance(data, dict) and all(data.get(name) == value for name, value in wanted.items())
@@ -273,7 +273,7 @@ def motion_of(mechanism: Mechanism, samples: int = _SAMPLES) -> Motion:
 
 def _question(settings: Settings, dimensions: str) -> dict[str, Any]:
     """Return what a verdict is about: tilt, what the joints take up, and the name of the dimensions."""
-    mechanism = mechanism_in(json.loads(dimensions))
+    mechanism = mechanism_in(data_of(dimensions))
     named = None if mechanism is None else fingerprint(mechanism)
     return {"tilt": settings.tilt, "joint_limit": settings.joint_limit, "dimensions": named}
 
@@ -285,7 +285,7 @@ def _jamming(task: Task, text: str) -> Evaluation:
 
     settings = task.settings
     assert settings.tilt is not None
-    mechanism = Mechanism.from_json(json.dumps(json.loads(text)["mechanism"]))
+    mechanism = Mechanism.from_json(json.dumps(data_of(text)["mechanism"]))
     proof = jamming_proof(mechanism, settings.tilt, settings.joint_limit)
     status, guarantee = VERDICTS.get(proof.verdict.name, ("undecided", None))
     data = {**_question(settings, text), "reason": proof.reason, "version": graphsynth.__version__}

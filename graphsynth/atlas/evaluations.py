@@ -18,7 +18,7 @@ from typing import Any
 
 from graphsynth.atlas.building import transaction
 from graphsynth.atlas.schema import connect, settle
-from graphsynth.atlas.stored import TIED, fingerprint, fingerprint_at, mechanism_in
+from graphsynth.atlas.stored import TIED, data_of, fingerprint, fingerprint_at, mechanism_in
 from graphsynth.errors import SpecError
 
 __all__ = ["GUARANTEES", "KINDS", "NOT_COMPUTED", "Evaluation", "record", "store"]
@@ -83,7 +83,12 @@ class Evaluation:
                     f"{name} = {word!r} must be 1 to 200 characters without control characters, and begin with none of "
                     "=+@-; give one word"
                 )
-        if len(self.text or "") > _MOST_DATA:
+        text = self.text or "null"
+        try:
+            data_of(text)
+        except ValueError as error:
+            raise SpecError(f"of the evaluation {self.kind!r}, {error}; give flatter ones") from None
+        if len(text) > _MOST_DATA:
             raise SpecError(
                 f"the data of {self.kind!r} take more than {_MOST_DATA} characters of JSON; keep them in a file"
             )
@@ -95,7 +100,7 @@ class Evaluation:
             return None
         try:
             return json.dumps(self.data, allow_nan=False, sort_keys=True)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, RecursionError) as error:
             raise SpecError(f"the data of {self.kind!r} are not JSON ({error}); give numbers, text and lists") from None
 
 

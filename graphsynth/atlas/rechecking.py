@@ -13,7 +13,7 @@ import numpy as np
 
 from graphsynth.atlas.evaluating import VERDICTS, jamming_proof, motion_of, turn_is_proved
 from graphsynth.atlas.references import Reference
-from graphsynth.atlas.stored import TIED, fingerprint
+from graphsynth.atlas.stored import TIED, data_of, fingerprint
 from graphsynth.atlas.turning import Turning
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def recheck(connection: sqlite3.Connection, same: Same, number: int, reference: 
         if status == "found":
             drivers = tuple(int(link) for link in str(driver).split(","))
             where = f"chain {number}, frame {frame}, driver {driver}"
-            _Recheck(same, where, reference, frame, drivers, json.loads(text)).run(guarantee, kinds)
+            _Recheck(same, where, reference, frame, drivers, data_of(text)).run(guarantee, kinds)
 
 
 class _Recheck:
@@ -82,13 +82,13 @@ class _Recheck:
         self._ties(kinds)
         jamming = kinds.get("jamming")
         if self.right and jamming is not None and jamming[4] is not None:
-            self._jamming(jamming[0], jamming[3], json.loads(jamming[4]))
+            self._jamming(jamming[0], jamming[3], data_of(jamming[4]))
 
     def _ties(self, kinds: dict[str, tuple[Any, ...]]) -> None:
         """Results that name their dimensions name these."""
         named = fingerprint(self.data["mechanism"])
         for kind in TIED:
-            data = json.loads(kinds[kind][4]) if kind in kinds and kinds[kind][4] else None
+            data = data_of(kinds[kind][4]) if kind in kinds and kinds[kind][4] else None
             if isinstance(data, dict) and "dimensions" in data:
                 self.same(f"evaluations: dimensions of {kind}", self.where, data["dimensions"], named)
 

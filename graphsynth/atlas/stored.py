@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
-__all__ = ["TIED", "StoredMechanism", "fingerprint", "fingerprint_at", "mechanism_in", "stored_mechanisms"]
+__all__ = ["TIED", "StoredMechanism", "data_of", "fingerprint", "fingerprint_at", "mechanism_in", "stored_mechanisms"]
 
 #: Kinds of evaluations that hold for one set of dimensions only.
 TIED = ("transmission", "jamming")
+_DEEPEST = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,33 @@ class StoredMechanism:
     frame: int
     driver: int | str
     text: str
+
+
+def data_of(text: str) -> Any:
+    """Return the data of an evaluation, as :func:`json.loads` does.
+
+    Raises
+    ------
+    ValueError
+        If the text is not JSON, or lists and objects lie more than a hundred deep in one another: whoever writes such
+        data out again would run out of stack.
+    """
+    try:
+        data = json.loads(text)
+    except RecursionError:
+        raise ValueError("its data are too deep") from None
+    level, depth = [data] if isinstance(data, dict | list) else [], 0
+    while level:
+        depth += 1
+        if depth > _DEEPEST:
+            raise ValueError(f"its data are more than {_DEEPEST} lists and objects deep")
+        level = [
+            own
+            for one in level
+            for own in (one.values() if isinstance(one, dict) else one)
+            if isinstance(own, dict | list)
+        ]
+    return data
 
 
 def mechanism_in(data: Any) -> dict[str, Any] | None:
@@ -74,7 +102,7 @@ def fingerprint_at(connection: sqlite3.Connection, place: tuple[int, int, int | 
     row = connection.execute(
         "SELECT data FROM evaluations WHERE (chain_id, frame, driver, kind) = (?, ?, ?, 'dimensions')", place
     ).fetchone()
-    mechanism = mechanism_in(json.loads(row[0])) if row and row[0] else None
+    mechanism = mechanism_in(data_of(row[0])) if row and row[0] else None
     return None if mechanism is None else fingerprint(mechanism)
 
 
@@ -101,6 +129,6 @@ def stored_mechanisms(connection: sqlite3.Connection, chain_id: int | None = Non
         If a row is not JSON: the file is damaged.
     """
     for number, frame, driver, data in connection.execute(_SELECT, (chain_id, chain_id)):
-        mechanism = mechanism_in(json.loads(data))
+        mechanism = mechanism_in(data_of(data))
         if mechanism is not None:
             yield StoredMechanism(number, frame, driver, json.dumps(mechanism))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 import sqlite3
 import time
@@ -17,7 +16,7 @@ from graphsynth.atlas.rechecking import recheck
 from graphsynth.atlas.recutting import check_families
 from graphsynth.atlas.references import Reference, wanted_class
 from graphsynth.atlas.sealing import broken_seal
-from graphsynth.atlas.stored import mechanism_in
+from graphsynth.atlas.stored import data_of, mechanism_in
 from graphsynth.atlas.tables import wrong_rows
 from graphsynth.structure.assur import is_assur_group
 
@@ -229,14 +228,14 @@ def _check_evaluations(connection: sqlite3.Connection, checks: _Checks) -> None:
         checks.same("evaluations.guarantee", where, guarantee is None or guarantee in GUARANTEES, True)
         checks.same("evaluations.data", where, text is None or _is_json(text), True)
         if kind == "dimensions" and text is not None and _is_json(text):
-            has = mechanism_in(json.loads(text)) is not None
+            has = mechanism_in(data_of(text)) is not None
             checks.same("evaluations: dimensions found", where, status == "found", has)
 
 
 def _is_json(text: str) -> bool:
     try:
-        json.loads(text)
-    except (ValueError, RecursionError):
+        data_of(text)
+    except ValueError:
         return False
     return True
 

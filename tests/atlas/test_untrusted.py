@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sqlite3
 import subprocess
@@ -92,6 +93,21 @@ def test_values_of_another_form_are_not_worked_with(path, altered, tmp_path, sta
     with Catalogue(path) as catalogue:
         assert not catalogue.verify().passed
     assert {own.name for own in tmp_path.rglob("*") if own.is_file()} <= {"x.sqlite"}
+
+
+def test_data_that_are_too_deep_are_one_sentence(path, altered, capsys):
+    for depth in (101, 900, 100_000):
+        with altered(path) as raw:
+            raw.execute(
+                "UPDATE evaluations SET kind = 'dimensions', data = ? WHERE kind != 'jamming'",
+                ("[" * depth + "]" * depth,),
+            )
+        assert main(["catalog", "query", str(path), "--entry", "1.4.4.1", "--json"]) == 2
+        assert main(["catalog", "site", str(path), "-o", str(path.parent / "page")]) == 2
+        assert capsys.readouterr().err.count(" deep") == 2
+        assert main(["catalog", "verify", str(path)]) == 1
+        with Catalogue(path) as catalogue:
+            catalogue.record([Evaluation("1.4.4.1", 0, 2, "jamming", "undecided")])
 
 
 def test_nothing_in_a_file_steers_the_terminal(path, altered, capsys):
@@ -322,6 +338,7 @@ def test_a_trial_of_the_helper(path, altered):
         ({"kind": "a\x1b[2J"}, "kind = 'a"),
         ({"status": "x" * 201}, "1 to 200 characters"),
         ({"data": ["x" * 1_000_000]}, "more than 1000000 characters"),
+        ({"data": json.loads("[" * 150 + "]" * 150)}, "100 lists and objects deep"),
     ],
 )
 def test_evaluations_that_no_catalogue_holds_are_refused_when_they_are_made(own, words):
