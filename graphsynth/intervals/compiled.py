@@ -74,7 +74,8 @@ def pave_compiled(
     Raises
     ------
     IntervalError
-        For a box that is empty, unbounded or no vector, budgets and tolerances that are not positive.
+        For a box that is empty, unbounded or no vector, budgets and tolerances that are not positive, a system that
+        is not compiled.
     GraphsynthError
         If the processor's rounding has been changed.
 
@@ -98,6 +99,8 @@ def pave_compiled(
     (['UNIQUE', 'UNIQUE'], True)
     """
     check_rounding()
+    if not hasattr(system, "py_func"):
+        raise IntervalError(f"the system {system!r} is not compiled; decorate it with compiled_system")
     from graphsynth.intervals.kernels import paving
 
     begin = perf_counter()

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from graphsynth.errors import IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
 
@@ -115,6 +116,9 @@ def variables(box: Interval) -> list[Dual]:
     list of Dual
         Of length n.
     """
+    box = interval(box)
+    if box.ndim == 0:
+        raise IntervalError("one interval is no box; give a vector of them, shape (n,) or (N, n)")
     n = box.shape[-1]
     unit = np.zeros((n, n) + (1,) * (box.ndim - 1))
     for i in range(n):

@@ -300,7 +300,7 @@ def minimum(x: Any, y: Any) -> Any:
     if isinstance(x, Dual) or isinstance(y, Dual):
         x, y = _dual(x, y), _dual(y, x)
         return _selected(minimum(x.value, y.value), x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo)
-    x, y = interval(x), interval(y)
+    x, y = _both(x, y)
     return _combined(x, y, np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi))
 
 
@@ -320,8 +320,15 @@ def maximum(x: Any, y: Any) -> Any:
     if isinstance(x, Dual) or isinstance(y, Dual):
         x, y = _dual(x, y), _dual(y, x)
         return _selected(maximum(x.value, y.value), x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi)
-    x, y = interval(x), interval(y)
+    x, y = _both(x, y)
     return _combined(x, y, np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi))
+
+
+def _both(x: Any, y: Any) -> tuple[Interval, Interval]:
+    """Read two operands whose shapes must fit."""
+    x, y = interval(x), interval(y)
+    common_shape(x.lo, y.lo)
+    return x, y
 
 
 def _combined(x: Interval, y: Interval, lo: Array, hi: Array) -> Interval:
@@ -375,7 +382,7 @@ def divide_extended(a: Any, b: Any) -> tuple[Interval, Interval]:
     >>> divide_extended(Interval(1), Interval(-2, 4))
     (Interval([-inf, -0.5]), Interval([0.25, inf]))
     """
-    a, b = interval(a), interval(b)
+    a, b = _both(a, b)
     split = (b.lo < 0.0) & (b.hi > 0.0) & ((a.lo > 0.0) | (a.hi < 0.0)) & ~a.is_empty
     whole = a / b
     left = a / _make(np.where(split, b.lo, 1.0), np.where(split, 0.0, 1.0))

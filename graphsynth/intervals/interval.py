@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import IntervalError
+from graphsynth.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
 from graphsynth.intervals.measures import Measures
 from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, Decoration, decimal_outward, read_bounds, read_points
@@ -107,7 +107,11 @@ class Interval(Measures):
         >>> Interval.from_bounds([0.0, 1.0], [1.0, float("inf")]).width.tolist()
         [1.0, inf]
         """
-        return cls(np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64))
+        try:
+            low, high = np.asarray(lo, dtype=np.float64), np.asarray(hi, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise FormatError(f"bounds that are no floats ({error}); give floats, or Interval(lower, upper)") from error
+        return cls(low, high)
 
     @classmethod
     def midrad(cls, mid: Any, rad: Any) -> Interval:
@@ -147,7 +151,14 @@ class Interval(Measures):
     @classmethod
     def stack(cls, parts: Iterable[Interval], axis: int = 0) -> Interval:
         """Join intervals of one shape along a new axis."""
-        parts = list(parts)
+        if not isinstance(parts, Iterable):
+            raise IntervalError(f"{parts!r} is no list of intervals; give a list")
+        parts = [interval(part) for part in parts]
+        if not parts:
+            raise IntervalError("nothing to stack; give one interval at least")
+        common_shape = operations.common_shape(*[p.lo for p in parts])
+        if not isinstance(axis, int | np.integer) or not -len(common_shape) - 1 <= axis <= len(common_shape):
+            raise IntervalError(f"axis = {axis!r} is none of the axes 0 to {len(common_shape)}")
         lo, hi = np.broadcast_arrays(*[p.lo for p in parts]), np.broadcast_arrays(*[p.hi for p in parts])
         flags = NO_FLAGS
         if any(p.flags is not NO_FLAGS for p in parts):
@@ -259,6 +270,9 @@ class Interval(Measures):
 
     def inflate(self, relative: float = 0.1, absolute: float = 0.0) -> Interval:
         """Widen both ends by ``relative`` times the radius plus ``absolute``, and at least one step."""
+        for name, value in (("relative", relative), ("absolute", absolute)):
+            if not isinstance(value, int | float | np.number) or not 0.0 <= value < np.inf:
+                raise IntervalError(f"{name} = {value!r} must be a finite number of zero or more; correct the value")
         radius = self.rad
         radius = np.where(np.isfinite(radius), radius, 0.0)  # an infinite end stays where it is, the empty set too
         grow = _make(0.0, relative) * _make(radius, radius) + _make(absolute, absolute) + _make(5e-324, 5e-324)
@@ -318,6 +332,8 @@ class Interval(Measures):
     def __pow__(self, exponent: int) -> Interval:
         if not isinstance(exponent, int | np.integer):
             raise IntervalError(f"exponent {exponent!r} is not an integer; use exp(b * log(a)) for other powers")
+        if abs(int(exponent)) >= 2**31:
+            raise IntervalError(f"exponent {exponent} is too large; powers of at most 2^31 - 1 are taken")
         if exponent == 2:
             return self.sqr()
         flags = _clipped(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if exponent < 0 else self.flags

@@ -178,6 +178,9 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
     ['UNIQUE', 'EMPTY']
     """
     check_rounding()
+    boxes = interval(boxes)
+    if boxes.ndim != 2:
+        raise IntervalError(f"boxes of shape {boxes.shape} are no list of boxes; give shape (N, n)")
     count, n = boxes.shape
     shape = (count,)
     with np.errstate(all="ignore"):

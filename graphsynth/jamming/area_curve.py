@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.areas_enclosed import enclose_lid_area, enclose_rim_area, enclose_surrogate_areas
 from graphsynth.jamming.bearing import Bearing
 from graphsynth.kinematics._checks import finite_array
@@ -79,6 +80,7 @@ class AreaCurve:
         return pd.DataFrame(columns)
 
 
+@takes(linkage="LambdaLinkage")
 def enclose_tilt_sine(linkage: LambdaLinkage, f: ArrayLike | Interval) -> Interval:
     """Enclose the sine of the tilt of the coupler, ``A_z / l3``.
 
@@ -125,6 +127,7 @@ def _points(f: ArrayLike) -> Interval:
     return Interval.from_bounds(angles, angles)
 
 
+@takes(linkage="LambdaLinkage")
 def area_curve(
     linkage: LambdaLinkage | None = None, bearing: Bearing | None = None, f: ArrayLike | None = None
 ) -> AreaCurve:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing
 
 __all__ = [
@@ -132,6 +133,7 @@ def _tilts(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array,
     return S, C
 
 
+@takes(bearing="Bearing")
 def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> CrescentAreas:
     """Free gap and interference of the centred surrogate ellipse E4 (section 5.1), mm^2.
 
@@ -170,6 +172,7 @@ def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, 
     return np.asarray((q * thin - ring) * _segment(s1) + p * q * _segment_difference(dl, s1 + s2))
 
 
+@takes(bearing="Bearing")
 def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     """A_lid: disc of radius R outside one lid of the tilted hole (condition B, section 5.4), mm^2.
 
@@ -193,6 +196,7 @@ def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     return np.asarray(np.where(missed, disc, np.minimum(area, disc)) + 0.0 * (S + C))
 
 
+@takes(bearing="Bearing")
 def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     """A_rim: rim of the tilted bearing outside the disc of radius Rh (condition A, section 5.4), mm^2.
 
@@ -227,6 +231,7 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
     return np.asarray(area + 0.0 * (S + C)), quadrature
 
 
+@takes(bearing="Bearing")
 def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
     """Crossing point of the disc of radius R and the near side of one lid (condition B, section 5.4), mm.
 
@@ -255,6 +260,7 @@ def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[
     return np.where(there, -X, np.nan), np.where(there, y, np.nan)
 
 
+@takes(bearing="Bearing")
 def rim_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
     """Crossing point of the rim of the tilted bearing and the hole (condition A, section 5.4), mm.
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import numbers
 from graphsynth.kinematics._checks import check_fields, choice, finite, positive
 
 __all__ = ["CONDITIONS", "Bearing", "Condition", "CriticalTilt"]
@@ -130,7 +131,7 @@ class Bearing:
             Short bearing in a long hole, long shaft in a short hole, pin of height Hb in a hole of ``hole_length``.
         """
         half = self._hole_half(condition)
-        S, C = np.abs(np.asarray(sine, dtype=np.float64)), np.asarray(cosine, dtype=np.float64)
+        S, C = np.abs(numbers("sine", sine)), numbers("cosine", cosine)
         if condition == "B":
             return self._gap_b(S, C, self.h)
         gap = np.where(self.Rb * S <= self.h * C, self._gap_a(S, C), self._saturated())

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.parameters import ToleranceBox
 
@@ -58,6 +59,7 @@ class Supremum:
     seconds: float = field(default=0.0, compare=False)
 
 
+@takes(box="Interval")
 def maximise(
     function: Callable[[Sequence[Dual]], Dual],
     box: Interval,
@@ -269,6 +271,7 @@ def _either(switch: Dual, low: Dual, high: Dual) -> Dual:
     return Dual(pick(low.value, high.value), pick(low.grad, high.grad))
 
 
+@takes(box="ToleranceBox")
 def largest_gap(box: ToleranceBox, condition: Condition = "A", **options: Any) -> Supremum:
     """Enclose the largest gap (mm) over a turn and a tolerance box by branch and bound.
 

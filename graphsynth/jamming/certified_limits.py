@@ -15,10 +15,11 @@ from fractions import Fraction
 from time import perf_counter
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certificate import JamCertificate
 from graphsynth.jamming.certify import certify_jamming
-from graphsynth.jamming.corners import worst_corner
+from graphsynth.jamming.corners import check_condition, worst_corner
 from graphsynth.jamming.inverse import largest_height, largest_misalignment, smallest_clearance
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.ranges import Range
@@ -70,6 +71,7 @@ class CertifiedLimit:
         return abs(self.fails - self.works) / max(abs(self.fails), abs(self.works), 5e-324)
 
 
+@takes(box="ToleranceBox")
 def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A") -> CertifiedLimit:
     """Largest tilt alpha of the motor axis (radians) that leaves the turn free, whatever the other parameters.
 
@@ -111,6 +113,7 @@ def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A"
     return _bracket(box.replace(alpha="1/100"), condition, propose, at, milder, (0.0, 1.5), "rad", 1, "-works to works")
 
 
+@takes(box="ToleranceBox")
 def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") -> CertifiedLimit:
     """Smallest radial clearance (mm) that leaves the turn free, whatever the other parameters.
 
@@ -146,6 +149,7 @@ def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") 
     return _bracket(box.replace(clearance=0), condition, propose, at, at, (0.0, top), "mm", -1, "works and more")
 
 
+@takes(box="ToleranceBox")
 def certified_largest_height(box: ToleranceBox, condition: Condition = "A") -> CertifiedLimit:
     """Largest height Hb (mm) that leaves the turn free, whatever the other parameters.
 
@@ -202,6 +206,7 @@ def _bracket(
 ) -> CertifiedLimit:
     """Prove both sides of an edge; ``direction`` +1 if larger values are worse, -1 if smaller ones are."""
     begin = perf_counter()
+    check_condition(box, condition)
     search = _Search(condition, at, milder, direction)
     try:
         edge = propose(worst_corner(box, condition))

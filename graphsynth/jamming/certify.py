@@ -7,7 +7,7 @@ from fractions import Fraction
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certificate import JamCertificate, Witness
 from graphsynth.jamming.certified_arcs import Enclosure, arcs_from, no_arcs, whole_turn
@@ -24,6 +24,7 @@ _ANGLES = 64  # angles of the turn tried as positions of a jam
 _PIECES = 256  # pieces of the turn on which assembly is proved
 
 
+@takes(box="ToleranceBox")
 def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertificate:
     """Prove whether the bearing at B jams while the crank makes a turn, for all parameters of a box.
 
@@ -63,8 +64,6 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
 
     begin = perf_counter()
     check_rounding()
-    if not isinstance(box, ToleranceBox):
-        raise GeometryError(f"box = {box!r} is no ToleranceBox; give ToleranceBox(alpha=..., clearance=..., ...)")
     check_condition(box, condition)
     clearance = box["clearance"]
     if clearance.upper < 0:

@@ -13,6 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certify import certify_jamming
 from graphsynth.jamming.parameters import ToleranceBox
@@ -88,8 +89,10 @@ class Fit:
         Raises
         ------
         GeometryError
-            For a name that is not in the table, or a diameter outside 0 to 500 mm.
+            For a name that is no text or not in the table, or a diameter outside 0 to 500 mm.
         """
+        if not isinstance(name, str):
+            raise GeometryError(f"fit {name!r} is no text; give a name such as H7/g6")
         parts = re.fullmatch(r"H(\d+)/([a-h])(\d+)", name.strip())
         if not parts or int(parts[1]) not in _GRADES or int(parts[3]) not in _GRADES:
             raise GeometryError(
@@ -166,6 +169,7 @@ class FitVerdict:
         }  # fmt: skip
 
 
+@takes(box="ToleranceBox")
 def assess_fits(
     box: ToleranceBox, condition: Condition = "A", fits: tuple[str, ...] = STANDARD_FITS, diameter: Given | None = None
 ) -> list[FitVerdict]:
@@ -192,6 +196,8 @@ def assess_fits(
     >>> [v.fit.name for v in assess_fits(ToleranceBox(alpha="1/300")) if v.verdict.is_free][:2]
     ['H7/f7', 'H8/f7']
     """
+    if not isinstance(fits, tuple | list):
+        raise GeometryError(f"fits = {fits!r} is no list of names; give names such as H7/g6")
     if diameter is None:
         diameter = box["Rb"].lower + box["Rb"].upper
     return [_assess(box, condition, Fit.read(name, diameter)) for name in fits]
@@ -209,6 +215,7 @@ def _assess(box: ToleranceBox, condition: Condition, fit: Fit) -> FitVerdict:
     return FitVerdict(fit, Verdict.CERTIFIED_JAMMED_FOR_SOME if jams else Verdict.UNDECIDED, left)
 
 
+@takes(box="ToleranceBox")
 def tightest_free_fit(
     box: ToleranceBox, condition: Condition = "A", fits: tuple[str, ...] = STANDARD_FITS, diameter: Given | None = None
 ) -> FitVerdict | None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certified_arcs import Enclosure
 from graphsynth.jamming.parameters import ToleranceBox
@@ -57,6 +58,7 @@ class WedgingReport:
     reason: str = ""
 
 
+@takes(box="ToleranceBox")
 def wedging(box: ToleranceBox, friction: Given, condition: Condition = "A") -> WedgingReport:
     """Decide whether two-point contact can wedge for an interval of friction coefficients (section 8.1 and 8.2).
 

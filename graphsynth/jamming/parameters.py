@@ -97,7 +97,11 @@ class ToleranceBox:
     @classmethod
     def of(cls, linkage: LambdaLinkage, bearing: Bearing | None = None) -> ToleranceBox:
         """Return the box of one linkage and one bearing: their doubles as they are, marked as float input."""
+        if not isinstance(linkage, LambdaLinkage):
+            raise GeometryError(f"linkage = {linkage!r} is no LambdaLinkage; give one")
         b = Bearing() if bearing is None else bearing
+        if not isinstance(b, Bearing):
+            raise GeometryError(f"bearing = {b!r} is no Bearing; give Bearing(Rb, Hb, clearance), or none")
         k = linkage
         return cls(k.l1, k.l2, k.l3, k.l4, k.alpha, k.axis, 0, b.Rb, b.Hb, b.clearance, b.hole_length,
                    sgn=k.sgn, rod=k.rod, convention=k.convention)  # fmt: skip

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certify import certify_jamming
 from graphsynth.jamming.parameters import ToleranceBox
@@ -71,6 +72,7 @@ class Samples:
         return self.bound - max(self.largest_gap, self.corner_gap)
 
 
+@takes(box="ToleranceBox")
 def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_000, seed: int = 0) -> Samples:
     """Draw parameter vectors and crank angles, search the corners, and compare with the certified bound.
 
@@ -93,7 +95,7 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     Raises
     ------
     GeometryError
-        Unless ``count`` is a positive integer, and what `certify_jamming` raises.
+        Unless ``count`` is a positive integer and ``seed`` one of zero or more, and what `certify_jamming` raises.
 
     Examples
     --------
@@ -106,6 +108,8 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     """
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise GeometryError(f"count = {count!r} must be a positive integer; 200000 is usual")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise GeometryError(f"seed = {seed!r} must be a whole number of zero or more")
     begin = perf_counter()
     bound = certify_jamming(box, condition).largest_gap.hi
     generator = np.random.default_rng(seed)

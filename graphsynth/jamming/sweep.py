@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.circle_sets import TURN_HIGH, Span, total_length
 from graphsynth.jamming.parameters import ToleranceBox
@@ -123,6 +124,11 @@ def sweep_turn(
 
     begin = perf_counter()
     check_rounding()
+    if not callable(gap):
+        raise GeometryError(f"gap = {gap!r} cannot be called; give a function of pieces of the turn")
+    for name, value in (("resolution", resolution), ("max_pieces", max_pieces), ("max_seconds", max_seconds)):
+        if not isinstance(value, int | float | np.number):
+            raise GeometryError(f"{name} = {value!r} must be a number; correct the value")
     if not resolution >= 1e-15:
         raise GeometryError(f"resolution = {resolution} must be at least 1e-15; 1e-6 rad is usual")
     edges = np.linspace(0.0, TURN_HIGH, first + 1)
@@ -180,6 +186,7 @@ def _joined(
     return [tuple(part) for part in spans]
 
 
+@takes(box="ToleranceBox")
 def sweep_linkage(
     box: ToleranceBox,
     condition: Condition = "A",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing, Condition
 from graphsynth.jamming.verdict import METHOD_CLOSED_FORM
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
@@ -58,6 +59,7 @@ class JamArcs:
     reason: str = ""
 
 
+@takes(linkage="LambdaLinkage", bearing="Bearing")
 def jam_arcs(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> JamArcs:
     """Jam arcs of the bearing at B over one turn of the crank (section 7.1).
 

@@ -1,5 +1,6 @@
 """Krawczyk's test: what it proves, and that it never proves what is false."""
 
+import math
 from fractions import Fraction
 
 import mpmath
@@ -19,6 +20,7 @@ from graphsynth.intervals import (
     krawczyk,
     maximum,
     minimum,
+    pave,
     solve_linear,
     sqrt,
     tan,
@@ -123,6 +125,46 @@ def test_a_solution_on_a_face_needs_inflation():
     assert outside.status is Status.EMPTY
     near = krawczyk(lambda x: [x[0] ** 2 - 2], Interval.from_bounds([1.0], [float(root.hi)]))
     assert near.status in (Status.UNIQUE, Status.UNDECIDED)
+
+
+@pytest.mark.parametrize(
+    ("box", "allowed"),
+    [
+        # the only root near lies on a face, just inside, just outside, on an edge of two boxes that share it
+        (["[1, 3]"], {Status.UNIQUE, Status.EXISTS, Status.UNDECIDED}),
+        (["[-1, 1]"], {Status.UNIQUE, Status.EXISTS, Status.UNDECIDED}),
+        ([(1.0 - 1e-15, 3.0)], {Status.UNIQUE, Status.EXISTS, Status.UNDECIDED}),
+        ([(1.0 + 1e-14, 3.0)], {Status.EMPTY, Status.UNDECIDED}),
+        ([(-1.0, 1.0 - 1e-14)], {Status.EMPTY, Status.UNDECIDED}),
+        ([(1.0, 1.0)], {Status.UNIQUE, Status.EXISTS, Status.UNDECIDED}),
+        ([(math.nextafter(1.0, 2.0), 2.0)], {Status.EMPTY, Status.UNDECIDED}),
+    ],
+)
+@pytest.mark.parametrize("scale", [1, "0.1", "1/3"])
+def test_a_root_at_a_face_is_never_lost(box, allowed, scale):
+    """What an enlarged box proves about the given one: never that it is empty while the root lies in it."""
+    bounds = [Interval(b) if isinstance(b, str) else Interval.from_bounds(*b) for b in box]
+    start = Interval.stack(bounds)
+    factor = Interval(scale)
+    for f in (lambda x: [(x[0] - 1) * factor], lambda x: [(x[0] - 1) * (x[0] + 9) * factor]):
+        assert krawczyk(f, start).status in allowed
+        assert krawczyk(f, start, rounds=1).status in allowed
+        found = pave(f, start)
+        assert (found.verdict is Status.EMPTY) <= (Status.EMPTY in allowed)
+        assert (found.verdict is Status.UNIQUE) <= (Status.UNIQUE in allowed)
+
+
+@pytest.mark.parametrize("inner", [0.5, 1.0, 2.0])
+def test_inflation_around_a_corner(inner):
+    """Two unknowns: the enlarged box overlaps the corner; outside in one unknown alone is outside."""
+    corner = Interval.from_bounds([1.0, 2.0], [3.0, 4.0])
+    for root, has in (((1.0, 2.0), True), ((3.0, 4.0), True), ((1.0 - 1e-12, 3.0), False), ((2.0, 4.0 + 1e-12), False),
+                      ((2.0, 3.0), True)):  # fmt: skip
+        f = lambda x, r=root: [x[0] - r[0] + (x[1] - r[1]) * 0.125 * inner, x[1] - r[1]]  # noqa: E731
+        status = krawczyk(f, corner).status
+        assert status is not Status.EMPTY if has else status in (Status.EMPTY, Status.UNDECIDED)
+        verdict = pave(f, corner).verdict
+        assert verdict is not Status.EMPTY if has else verdict in (Status.EMPTY, Status.UNDECIDED)
 
 
 def test_clipped_and_discontinuous_systems_certify_nothing():

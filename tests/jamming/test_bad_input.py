@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 
 import numpy as np
 import pytest
 
+from graphsynth import jamming
 from graphsynth.errors import GeometryError, GraphsynthError
 from graphsynth.jamming import (
     Bearing,
+    Fit,
     ToleranceBox,
     Verdict,
     assess_fits,
@@ -17,6 +20,7 @@ from graphsynth.jamming import (
     certified_largest_misalignment,
     certified_smallest_clearance,
     certify_jamming,
+    coupled,
     largest_gap,
     sample_gaps,
     smallest_clearance,
@@ -128,3 +132,45 @@ def test_a_box_without_tolerances_can_be_sampled():
 def test_reversed_bounds_are_never_exchanged_silently():
     with pytest.raises(GeometryError):
         ToleranceBox(axis=("[1, 0]", 0, 0))
+
+
+NOTHINGS = [None, "text", math.nan, np.zeros(3), object()]
+
+
+@pytest.mark.parametrize("value", NOTHINGS, ids=["none", "text", "nan", "array", "object"])
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda v: Fit.read(v, 35), lambda v: Fit.read("H7/g6", v), lambda v: assess_fits(v),
+        lambda v: certify_jamming(v),
+        lambda v: assess_fits(box(), "A", v), lambda v: certified_largest_misalignment(v), lambda v: sample_gaps(v),
+        lambda v: certified_smallest_clearance(v), lambda v: certified_smallest_clearance(box(), v),
+        lambda v: largest_gap(v), lambda v: largest_gap(box(), v), lambda v: wedging(v, "0.1"),
+        lambda v: wedging(box(), v),
+        lambda v: smallest_clearance(v, Bearing()), lambda v: smallest_clearance(DECK, v), lambda v: sweep_linkage(v),
+        lambda v: sweep_linkage(box(), resolution=v), lambda v: krawczyk_boxes(v),
+        lambda v: surrogate_problem(v, "0.1"),
+        lambda v: surrogate_areas(v, 0.1, 1.0), lambda v: ToleranceBox.of(v),
+        lambda v: ToleranceBox.of(DECK, 0 if v is None else v),
+        lambda v: coupled.bearing_limits(v), lambda v: coupled.JointLimits(v), lambda v: coupled.SlideLimits(v, v),
+        lambda v: coupled.certify_coupled(v, Bearing(), coupled.Misalignment(0, 1, 0.01)),
+        lambda v: coupled.Misalignment(0, 1, v), lambda v: sample_gaps(box(), seed=v),
+        lambda v: sample_gaps(box(), v),
+    ],
+)  # fmt: skip
+def test_nothing_of_use_gets_a_sentence(call, value):
+    """Whatever is no argument of a public function is refused by an exception of the project, not by an accident."""
+    with pytest.raises(GraphsynthError):
+        call(value)
+
+
+def test_one_default_condition():
+    """Every function that takes a contact condition takes A unless told otherwise."""
+    found = {}
+    for module in (jamming, coupled):
+        for name in module.__all__:
+            member = getattr(module, name)
+            if inspect.isfunction(member) and "condition" in inspect.signature(member).parameters:
+                found[name] = inspect.signature(member).parameters["condition"].default
+    assert len(found) >= 15 and set(found.values()) == {"A"}, found
+    assert largest_gap(box()).upper >= largest_gap(box(), "A").lower

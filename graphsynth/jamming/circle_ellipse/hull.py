@@ -14,6 +14,7 @@ import numpy as np
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.status import Status
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.circle_ellipse.criterion import RHO_LIMIT, spectral_radius
 from graphsynth.jamming.circle_ellipse.exact import Range, outward, root_bounds
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse
@@ -64,6 +65,7 @@ class CrossingHull:
         return mirrored(self.hull)
 
 
+@takes(problem="CircleEllipse")
 def exact_hull(problem: CircleEllipse) -> CrossingHull:
     """Solve the problem exactly.
 
@@ -155,6 +157,7 @@ def _result(
     return CrossingHull(problem, status, reasons, hull, squares, tight)
 
 
+@takes(box="Interval")
 def mirrored(box: Interval) -> Interval:
     """Return the images of a box of the first quadrant in all four, copies on an axis merged.
 

@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing
 from graphsynth.jamming.circle_ellipse.exact import Range, exact_range, root_bounds
 
@@ -98,6 +99,7 @@ def circle_ellipse(R1: Any, a: Any, b: Any, e1: Any = 0, e2: Any = 0, *, eps: An
     return CircleEllipse(**ranges)
 
 
+@takes(bearing="Bearing")
 def bearing_radii(bearing: Bearing) -> tuple[Fraction, Fraction, Fraction]:
     """Return R, Rh and h as the decimals that they print as.
 
@@ -110,6 +112,7 @@ def bearing_radii(bearing: Bearing) -> tuple[Fraction, Fraction, Fraction]:
     return R, R + c, height / 2
 
 
+@takes(bearing="Bearing")
 def surrogate_problem(
     bearing: Bearing, sine: Any, e1: Any = 0, e2: Any = 0, *, eps: Any = None, bits: int = 128
 ) -> CircleEllipse:

@@ -11,7 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
+
 from graphsynth.errors import GeometryError
+from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing, Condition
 from graphsynth.kinematics._checks import choice, finite
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
@@ -26,7 +29,7 @@ _SMALLEST = 1e-150
 
 
 def _limit(name: str, value: float) -> float:
-    if not isinstance(value, bool) and value == math.inf:
+    if isinstance(value, float | np.floating) and value == math.inf:
         return math.inf
     number = finite(name, value)
     if 0.0 < number < _SMALLEST:
@@ -176,6 +179,7 @@ class Misalignment:
         return (self.alpha * math.cos(self.direction), self.alpha * math.sin(self.direction))
 
 
+@takes(bearing="Bearing")
 def bearing_limits(
     bearing: Bearing,
     condition: Condition = "A",
