@@ -20,9 +20,12 @@ from graphsynth.jamming.coupled import (
     certify_coupled,
     largest_scale,
 )
-from graphsynth.jamming.coupled.exact import neglected
+from graphsynth.jamming.coupled.closure import joint_places, shifts
+from graphsynth.jamming.coupled.enclosure import Pieces, lower_bounds, upper_bounds
+from graphsynth.jamming.coupled.exact import Neglected, neglected
 from graphsynth.jamming.coupled.pieces import Work
 from graphsynth.jamming.coupled.problem import problem
+from graphsynth.jamming.coupled.program import solve_poses
 from graphsynth.jamming.coupled.tubes import prove_tubes
 
 FREE, JAMMED = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED
@@ -196,3 +199,123 @@ def test_guides_and_more_loops_are_decided_too():
             own = Misalignment(tilt.base, tilt.link, tilt.alpha * scale * change, tilt.direction)
             found = certify_coupled(motion, limits, own, resolution=1e-2)
             assert found.verdict is wanted, found.reason
+
+
+def disturbed_bounds(given, poses, **changes):
+    """Bounds of the factor with chosen disturbances of everything, at float positions."""
+    r, e, base = joint_places(given.mechanism, given.layout.joints, poses)
+    at = Pieces(*(Interval.from_bounds(v, v) for v in (r, e, shifts(given.layout, base))))
+    layout, count = given.layout, len(poses)
+    joints = len(layout.joints)
+    none = np.zeros((count, joints))
+    values = {
+        "r": none, "e": none, "d": none, "lift": np.zeros((count, layout.loops)),
+        "wide": np.tile(layout.limit, (count, 1)), "narrow": np.tile(layout.limit, (count, 1)),
+        "play": np.tile(layout.play, (count, 1)), "sound": np.ones(count, dtype=bool), **changes,
+    }  # fmt: skip
+    found = given.solve(poses, "scale")
+    exact = Neglected(**values)
+    return lower_bounds(layout, at, found, exact), upper_bounds(layout, at, found, exact), found, (r, e, at.d.mid)
+
+
+def slider_and_four_bar():
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    guide = Prismatic(0, 3, (0.0, 0.2), (0.0, 0.0), 0.4)
+    joints = [Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0)), guide]
+    pins = {(1, 2): JointLimits(0.01, 0.01), (2, 3): JointLimits(0.01), (0, 3): SlideLimits(0.02, 0.008, 0.02)}
+    yield Mechanism(graph, joints, [Driver(0, 1)]), pins, Misalignment(0, 1, 0.03, 0.8)
+    bearings = {(1, 2): JointLimits(0.02, 0.01), (2, 3): JointLimits(0.01), (0, 3): JointLimits(0.015, 0.02)}
+    yield four_bar(), bearings, Misalignment(0, 1, 0.03, 0.3)
+
+
+@pytest.mark.parametrize("part", ["r", "e", "d"])
+def test_bounds_hold_for_every_disturbance_within(part):
+    """Positions, guides and misalignments moved by what is allowed: the factor of none lies beyond the bounds."""
+    rng = np.random.default_rng(3)
+    size, reached = {"r": 0.05, "e": 0.04, "d": 0.002}[part], False
+    for mechanism, limits, tilt in slider_and_four_bar():
+        given = problem(mechanism, limits, tilt)
+        poses = simulate(mechanism, [0.7, 1.9]).poses
+        amount = {part: np.full((2, len(given.layout.joints)), size)}
+        lower, upper, found, places = disturbed_bounds(given, poses, **amount)
+        assert (lower <= found.lower).all() and (upper >= found.upper).all()
+        least, most = found.upper.copy(), found.lower.copy()
+        for _ in range(60):
+            r, e, d = (v.copy() for v in places)
+            turned = {"r": r, "e": e, "d": d}[part]
+            angle = rng.uniform(0.0, 2.0 * np.pi, turned.shape[:2])
+            step = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * size
+            turned += step if part != "d" else step * (np.abs(d).sum(axis=-1, keepdims=True) > 0.0)
+            other = solve_poses(given.layout, r, e, d, "scale")
+            least, most = np.minimum(least, other.upper), np.maximum(most, other.lower)
+        assert (lower <= least * (1 + 1e-9)).all() and (upper >= most * (1 - 1e-9)).all()
+        reached |= bool(((least < found.lower - 0.1 * (found.lower - lower)) & (most > found.upper)).any())
+    assert reached  # samples come near: the test can fail
+
+
+def test_limits_rest_and_soundness_of_disturbed_bounds():
+    mechanism, limits, tilt = list(slider_and_four_bar())[1]
+    given = problem(mechanism, limits, tilt)
+    poses = simulate(mechanism, [0.7, 1.9]).poses
+    lower, upper, found, _ = disturbed_bounds(given, poses)
+    assert lower == pytest.approx(found.lower, rel=1e-9) and upper == pytest.approx(found.upper, rel=1e-9)
+    layout = given.layout
+    rigid = problem(mechanism, {pair: JointLimits(own.tilt) for pair, own in limits.items()}, tilt)
+    plain = disturbed_bounds(rigid, poses)
+    doubled = disturbed_bounds(rigid, poses, wide=2.0 * np.tile(layout.limit, (2, 1)))
+    assert doubled[0] == pytest.approx(0.5 * plain[0], rel=1e-9)
+    halved = disturbed_bounds(rigid, poses, narrow=0.5 * np.tile(layout.limit, (2, 1)))
+    assert halved[1] == pytest.approx(2.0 * plain[1], rel=1e-9)
+    less = disturbed_bounds(given, poses, play=0.5 * np.tile(layout.play, (2, 1)))
+    assert (less[1] >= upper).all() and (less[1] > upper * 1.0001).any()
+    rest = disturbed_bounds(rigid, poses, lift=np.full((2, layout.loops), 0.01))
+    assert (rest[0] < 0.999 * plain[0]).all() and (rest[1] > 1.001 * plain[1]).all()
+    unsound = disturbed_bounds(given, poses, sound=np.array([False, True]))
+    assert unsound[0][0] == 0.0 and unsound[1][0] == math.inf and unsound[0][1] == lower[1]
+
+
+def test_what_is_neglected_of_a_four_bar():
+    """Angles, limits, misalignment, rest and movement against the formulas, written down for one loop."""
+    alpha, tilts, slips = 0.1, {(1, 2): 0.05, (2, 3): 0.04, (0, 3): 0.03}, {(1, 2): 0.02, (2, 3): 0.0, (0, 3): 0.01}
+    motion = simulate(four_bar(), [0.7, 0.8])
+    tilt = Misalignment(0, 1, alpha, 0.4)
+    given = problem(motion.mechanism, {pair: JointLimits(t, slips[pair]) for pair, t in tilts.items()}, tilt)
+    _, exact = bounds_at(given, motion)
+    angle = {0: 0.0, 1: alpha, 2: min(alpha + 0.05, 0.03 + 0.04), 3: 0.03}
+    length = {0: 2.0, 1: 1.0, 2: 2.5, 3: 2.5}
+    short = {k: length[k] * (1.0 - math.cos(angle[k])) for k in angle}
+    slip, rest, order = 0.0, 0.0, list(given.layout.joints)
+    for place, k in enumerate(order):
+        a, b = motion.mechanism.joints[k].pair
+        if (a, b) == (0, 1):
+            assert exact.d[0, place] == pytest.approx(alpha**3 / 6, rel=1e-9)  # the frame neither tilts nor turns
+            continue
+        block, t = list(given.layout.block_joint).index(place), tilts[a, b]
+        H = min(angle[a], angle[b])
+        off = t * (H**2 + H * t) / (1.0 + math.cos(H))
+        assert exact.wide[0, block] == pytest.approx(t + off, rel=1e-9)
+        assert exact.narrow[0, block] == pytest.approx(t * (1.0 - t**2 / 5.0) - off, rel=1e-9)
+        lean = math.sin(max(angle[a], angle[b]))
+        assert exact.play[0, place] == pytest.approx(slips[a, b] * (1.0 - lean**2 / 2.0), rel=1e-9, abs=1e-15)
+        assert exact.d[0, place] == 0.0
+        rest += slips[a, b] * lean**2
+        slip = max(slip, slips[a, b] * lean)
+    rest += sum(math.sin(angle[k]) * short[k] for k in angle)
+    assert exact.lift[0, 0] == pytest.approx(rest, rel=1e-9)
+    moved = dict(zip((motion.mechanism.joints[k].pair for k in order), exact.r[0]))
+    # A lies on the crank alone, and may slip; beyond it all links are too short
+    assert moved[1, 2] >= short[1] + slips[1, 2] * math.sin(alpha)
+    assert moved[2, 3] >= max(short[2], short[3], slip) and moved[2, 3] < 20.0 * (sum(short.values()) + 2 * slip)
+
+
+def test_a_box_without_a_single_assembly_is_not_sound():
+    """Next to a dead centre the disturbed linkage may have two positions, or none."""
+    mechanism = four_bar(2.0, 1.0, 1.6, 1.5)
+    dead = math.acos((1.0 + 4.0 - 3.1**2) / 4.0) if abs((1.0 + 4.0 - 3.1**2) / 4.0) <= 1 else math.pi - 1e-4
+    motion = simulate(mechanism, [dead - 2e-3, dead - 1e-3])
+    given = problem(mechanism, JointLimits(0.1), Misalignment(0, 1, 0.1))
+    u = motion.inputs[:1]
+    assert Work(given, motion, 0.0).evaluate(u, u).sure[0] in (0, 1)
+    tight = problem(mechanism, JointLimits(0.02), Misalignment(0, 1, 0.4))
+    assert not bounds_at(problem(mechanism, JointLimits(0.3), Misalignment(0, 1, 0.4)), motion)[1].sound.any()
+    assert bounds_at(tight, motion)[1].r.max() > 0.0
