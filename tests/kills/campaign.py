@@ -39,6 +39,7 @@ REFUSALS = (
     "cannot be opened as a catalogue (database is locked)",
     "killed while they worked, again and again",
 )
+NOT_DONE = ("answers", "refused", "before the program begins")
 DAMAGED = ("not the result of", "not a journal of graphsynth")
 
 FAMILY = """
@@ -122,6 +123,13 @@ CHAINS = [
 EVALUATIONS = ["SELECT * FROM evaluations ORDER BY chain_id, frame, driver, kind"]
 
 
+def copied(eight: Path, place: Path) -> None:
+    """Lay a catalogue to evaluate into a folder."""
+    if not eight.exists():
+        run_here(["catalog", "build", "--links", "4..6", "-o", str(eight)], place, place / "o", place / "e")
+    shutil.copy(eight, place / "x.sqlite")
+
+
 def jobs(folder: Path) -> list[Job]:
     site = folder / "site"
     info = site / "campaign_beads-1.0.dist-info"
@@ -133,7 +141,6 @@ def jobs(folder: Path) -> list[Job]:
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
     scene, eight = folder / "beads.toml", folder / "eight.sqlite"
     scene.write_text(SCENE)
-    run_here(["catalog", "build", "--links", "4..6", "-o", str(eight)], folder, folder / "o", folder / "e")
     return [
         Job(
             "count", ["count", "--links", "14", "--checkpoint", "ck.txt"],
@@ -156,7 +163,7 @@ def jobs(folder: Path) -> list[Job]:
         Job(
             "evaluate", ["catalog", "evaluate", "x.sqlite", "--tries", "1", "--limit", "12"],
             lambda place, text: rows(place / "x.sqlite", EVALUATIONS),
-            first=lambda place: shutil.copy(eight, place / "x.sqlite") and None,
+            first=lambda place: copied(eight, place),
         ),
     ]  # fmt: skip
 
@@ -275,7 +282,7 @@ class Campaign:
     def prepare(self) -> None:
         """Run every command undisturbed, with the kernels of this process, for its answer and its time."""
         for job in self.jobs:
-            for _ in range(2):  # the first one compiles
+            for _ in range(1 + len(self.jobs) // 5):  # the first one compiles
                 place = self.fresh(job)
                 begun = time.monotonic()
                 status = run_here(job.words, place, place / "out-0.log", place / "err-0.log")
@@ -305,9 +312,9 @@ class Campaign:
     def judge(self, job: Job, command: Command, allowed: tuple[str, ...] = (), killed: int = 0) -> None:
         """Look at how a command ended: its status, and what it said."""
         said = command.err.read_text(errors="replace")
-        if "graphsynth" in said and (
-            "Traceback" in said or "Error:" in said
-        ):  # not in Python before the program begins
+        if killed == signal.SIGINT and starting(said):
+            self.done["before the program begins"] += 1
+        elif "Traceback" in said or "Error:" in said:
             self.fault(job, "traceback", command)
         elif command.status == 2:
             lines = [line for line in said.splitlines() if line.startswith("graphsynth: ")]
@@ -435,8 +442,13 @@ class Campaign:
         self.done[how] += 1
 
 
+def starting(said: str) -> bool:
+    """Whether Python itself was interrupted, before it had begun the program: it then shows a traceback of its own."""
+    return "Fatal Python error: init" in said or ("<frozen runpy>" in said and "__main__.py" not in said)
+
+
 def disturbances(done: Counter[str]) -> int:
-    return sum(count for name, count in done.items() if name not in ("answers", "refused"))
+    return sum(count for name, count in done.items() if name not in NOT_DONE)
 
 
 def rounds(campaign: Campaign, kills: int) -> Iterator[Job]:

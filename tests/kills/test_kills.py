@@ -28,8 +28,8 @@ def campaign(*options: str) -> dict[str, object]:
 
 def test_a_few_kills() -> None:
     """Of the quick commands."""
-    report = campaign("--kills", "5", "--seed", "5", "--only", "count", "--only", "run")
-    assert report["disturbances"] >= 5 and report["rounds"]
+    report = campaign("--kills", "4", "--seed", "8", "--only", "count", "--only", "run")
+    assert report["disturbances"] >= 4 and set(report["rounds"]) == {"count", "run"}
 
 
 @pytest.mark.slow
