@@ -9,6 +9,8 @@ from graphsynth.cli.question import spec_of
 
 __all__ = ["run"]
 
+MOST_DRAWN = 1000  # rows of a table with lines, which takes a millisecond a row
+
 
 def run(options: argparse.Namespace) -> int:
     """Print the integer solutions."""
@@ -21,5 +23,12 @@ def run(options: argparse.Namespace) -> int:
         return 0
     header, rows = solutions_table(solutions)
     console.put(spec.describe())
-    console.table(f"{len(solutions)} integer solutions", list(header), [list(map(str, row)) for row in rows])
+    title, cells = f"{len(solutions)} integer solutions", [list(map(str, row)) for row in rows]
+    if len(rows) <= MOST_DRAWN:
+        console.table(title, list(header), cells)
+        return 0
+    widths = [max(map(len, column)) for column in zip(header, *cells)]
+    console.put(title)
+    for row in (header, *cells):
+        console.put(" ".join(cell.rjust(width) for cell, width in zip(row, widths)))
     return 0

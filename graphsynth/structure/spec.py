@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from graphsynth.structure import reading
 from graphsynth.structure.assortment import LinkAssortment, solutions_table
 from graphsynth.structure.clash import explain
 from graphsynth.structure.equations import Problem
-from graphsynth.structure.system import solutions
+from graphsynth.structure.system import number_of_solutions, solutions
 from graphsynth.structure.variables import SPACES, Range, order_key, show_range, shown, whole
 
 __all__ = ["LinkAssortment", "StructuralSpec", "solutions_table"]
@@ -222,13 +221,15 @@ class StructuralSpec:
             If there are more than ``limit``.
         """
         limit = whole(limit, "limit", 0, 10**12)
-        found = list(islice(self.iter_solutions(), limit + 1))
-        if len(found) > limit:
+        chosen, _ = self._first()
+        number = 0 if chosen is None else number_of_solutions(chosen, limit)
+        if number > limit:
             raise TooLargeError(
-                f"the question has more than {limit} integer solutions: fix more variables, or use iter_solutions()",
-                float(limit + 1),
+                f"the question has {number} integer solutions at least, more than {limit}: fix more variables, or use "
+                "iter_solutions()",
+                float(number),
             )
-        return found
+        return list(self.iter_solutions())
 
     def iter_solutions(self) -> Iterator[LinkAssortment]:
         """Yield the solutions of :meth:`solve` one by one, without storing them.

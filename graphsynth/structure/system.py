@@ -15,9 +15,9 @@ from graphsynth.errors import SpecError
 from graphsynth.structure.assortment import LinkAssortment
 from graphsynth.structure.equations import Domains, Problem, Row, domains_of, kind_limit, propagate, rows_of
 from graphsynth.structure.linear import maximum
-from graphsynth.structure.variables import SPACES, Counts, Range
+from graphsynth.structure.variables import LARGEST, SPACES, Counts, Range
 
-__all__ = ["solutions"]
+__all__ = ["number_of_solutions", "solutions"]
 
 _WORDS = {"n": "n (moving links)", "p": "p (joints)", "W": "W (mobility)"}
 
@@ -105,13 +105,10 @@ def _of_size(problem: Problem, space: int, mobility: int, links: int, joints: in
     sub_edges = mobility + space * loops
     if not (_within(problem.range("v"), loops) and _within(problem.range("G"), sub_edges)):
         return
-    ranges = [
-        (lo or 0, hi) if i in problem.mobilities else (lo or 0, 0)
-        for i, (lo, hi) in ((i, problem.range(f"p{i}")) for i in range(1, space))
-    ]
+    ranges = _mobility_ranges(problem, space)
     attachments = list(_attachments(problem, mobility, links, loops))
     largest = kind_limit(problem, loops, mobility)
-    for freedoms in compositions(joints, sub_edges, 1, space - 1, dict(enumerate(ranges, start=1))):
+    for freedoms in compositions(joints, sub_edges, 1, space - 1, ranges):
         for frame_joints, parts in attachments:
             for kinds in compositions(links, 2 * joints - frame_joints, 2, largest, _kind_ranges(problem)):
                 yield LinkAssortment(
@@ -128,6 +125,79 @@ def _of_size(problem: Problem, space: int, mobility: int, links: int, joints: in
                     sub_edges=sub_edges,
                     frame_parts=parts,
                 )
+
+
+def number_of_solutions(problem: Problem, enough: int) -> int:
+    """Count the solutions without listing them: exactly, or the first number beyond ``enough`` that is found.
+
+    Parameters
+    ----------
+    problem : Problem
+    enough : int
+        A larger number need not be the exact one.
+
+    Examples
+    --------
+    >>> question = Problem((("Pi", (3, 3)), ("n", (40, 40)), ("p", (59, 59))))
+    >>> number_of_solutions(question, 10**6)
+    93339
+    """
+    boxes = {space: box for space in SPACES if (box := _box(problem, space)) is not None}
+    total = 0
+    for largest in (5, LARGEST):  # with links of few joints there may be enough already
+        total = 0
+        for space, box in boxes.items():
+            for mobility in range(box["W"][0], box["W"][1] + 1):
+                for links, joints in _sizes(problem, space, mobility, box):
+                    total += _number_of_size(problem, space, mobility, links, joints, largest)
+                    if total > enough:
+                        return total
+    return total
+
+
+def _number_of_size(problem: Problem, space: int, mobility: int, links: int, joints: int, largest: int) -> int:
+    loops = joints - links
+    sub_edges = mobility + space * loops
+    if not (_within(problem.range("v"), loops) and _within(problem.range("G"), sub_edges)):
+        return 0
+    freedoms = _counts(joints, 1, space - 1, _mobility_ranges(problem, space)).get(sub_edges, 0)
+    if not freedoms:
+        return 0
+    largest = min(largest, kind_limit(problem, loops, mobility))
+    kinds = _counts(links, 2, largest, _kind_ranges(problem), 2 * joints)
+    return freedoms * sum(kinds.get(2 * joints - t0, 0) for t0, _ in _attachments(problem, mobility, links, loops))
+
+
+def _counts(
+    number: int, smallest: int, largest: int, ranges: Mapping[int, Range], most: int | None = None
+) -> dict[int, int]:
+    """Count the ways to choose x_a >= 0 with sum x_a = number, by sum a*x_a up to ``most``; see `compositions`."""
+    if any(lo and not smallest <= a <= largest for a, (lo, _) in ranges.items()):
+        return {}
+    most = number * largest if most is None else most
+    spare = most - number * smallest
+    if any(lo for a, (lo, _) in ranges.items() if a > smallest + spare):
+        return {}
+    ways: list[dict[int, int]] = [{} for _ in range(number + 1)]  # by how many are chosen: sum above the smallest kind
+    ways[0][0] = 1
+    for a in range(smallest, min(largest, smallest + spare) + 1):
+        lo, hi = ranges.get(a, (0, None))
+        lo, step = lo or 0, a - smallest
+        grown: list[dict[int, int]] = []
+        for used in range(number + 1):  # one more of the kind a than one fewer, from lo to hi of them
+            here = _moved(ways[used - lo], lo * step, spare) if used >= lo else {}
+            for above, count in _moved(grown[-1], step, spare).items() if used else ():
+                here[above] = here.get(above, 0) + count
+            if hi is not None and used > hi:
+                for above, count in _moved(ways[used - hi - 1], (hi + 1) * step, spare).items():
+                    here[above] -= count
+            grown.append({above: count for above, count in here.items() if count})
+        ways = grown
+    return {above + number * smallest: count for above, count in ways[number].items()}
+
+
+def _moved(counts: Mapping[int, int], by: int, most: int) -> dict[int, int]:
+    return {above + by: count for above, count in counts.items() if above + by <= most}
 
 
 def _attachments(problem: Problem, mobility: int, links: int, loops: int) -> Iterator[tuple[int, int]]:
@@ -148,6 +218,11 @@ def _attachments(problem: Problem, mobility: int, links: int, loops: int) -> Ite
 def _within(bounds: Range, value: int) -> bool:
     lo, hi = bounds
     return (lo is None or lo <= value) and (hi is None or value <= hi)
+
+
+def _mobility_ranges(problem: Problem, space: int) -> dict[int, Range]:
+    ranges = {i: problem.range(f"p{i}") for i in range(1, space)}
+    return {i: (lo or 0, hi if i in problem.mobilities else 0) for i, (lo, hi) in ranges.items()}
 
 
 def _kind_ranges(problem: Problem) -> dict[int, Range]:

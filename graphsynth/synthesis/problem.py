@@ -8,12 +8,12 @@ from fractions import Fraction
 from functools import lru_cache
 from hashlib import sha256
 
-from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
+from graphsynth.errors import InfeasibleSpecError, SpecError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.levels import components_of
 from graphsynth.structure.spec import LinkAssortment, StructuralSpec
 from graphsynth.structure.variables import shown, whole
-from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
+from graphsynth.synthesis.contracted import has_contracted_graphs
 from graphsynth.synthesis.families import (
     MOST_LINKS,
     Family,
@@ -26,13 +26,12 @@ from graphsynth.synthesis.families import (
 )
 from graphsynth.synthesis.fractionated import fractionated_chains
 from graphsynth.synthesis.joined import count_fractionated
+from graphsynth.synthesis.outlook import check_loops
 from graphsynth.synthesis.rings import rings
 from graphsynth.synthesis.units import Unit, count_unit, cut, graphs_of, text_of
 
 __all__ = ["Piece", "Problem", "count_piece", "graphs_of_piece", "text_of_piece"]
 
-LISTED_PER_SECOND = 1e6  # order of magnitude, one core
-MOST_LOOPS = 10  # what the kernels are laid out for
 _PRIMES = (2, 3, 5, 7, 11, 13)
 
 
@@ -174,7 +173,7 @@ class Problem:
         loops = -1 if joints is None else joints + sum(count for _, count in placed) - links + 1
         if loops < (links > 2):
             return cls(title, (), reason=_reason(links, mobility, space, higher))
-        check_loops(loops, links)
+        check_loops(loops, links, mobility, space, higher, framed=framed)
         common = (links, mobility, space, placed, framed)
         handfuls = [Handful("rings", *common, symmetry=order)]
         if fractionated and mobility > 1:
@@ -215,9 +214,11 @@ class Problem:
                 raise InfeasibleSpecError(
                     f"W = {assortment.mobility} must be at least 1 for a mechanism: fix W, or ask for Assur groups"
                 )
-            check_loops(assortment.loops, assortment.moving_links + 1)
-            families += mechanism_families(assortment, levels)
             higher = tuple((i, count) for i, count in enumerate(assortment.p_i, 1) if i > 1 and count)
+            if not has_contracted_graphs(assortment.loops):
+                numbers = assortment.loops, assortment.links, assortment.mobility, assortment.space
+                check_loops(*numbers, dict(higher), framed=True)
+            families += mechanism_families(assortment, levels)
             common = (assortment.moving_links + 1, assortment.mobility, assortment.space, higher, True)
             if assortment.loops == 1:
                 handfuls.append(Handful("rings", *common, assortment, levels, order))
@@ -256,7 +257,7 @@ class Problem:
         title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
         if joints is None:
             return cls(title, (), reason=_reason(links, 0, space, {}))
-        check_loops(joints - links + 1, links)
+        check_loops(joints - links + 1, links, 0, space, {}, framed=framed)
         return cls(title, tuple(truss_families(links, space, framed)), (Handful("rings", links, 0, space, (), framed),))
 
 
@@ -310,48 +311,6 @@ def _reason(links: int, mobility: int, space: int, higher: Mapping[int, int]) ->
     if higher.get(1, lower) != lower:
         return f"{asked}, not {higher[1]}: leave p1 out"
     return f"{asked}, too few for a loop: ask for more links or a smaller mobility"
-
-
-# 1-DOF planar chains, N = 4, 6, ..., 18 (published and recomputed); the ratios grow by about 15.7 a step
-_KNOWN = {4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318162, 16: 19819281, 18: 1535380884}
-
-
-def extrapolated(links: int) -> float:
-    """Estimate the number of 1-DOF planar chains with more than 18 links from the growth of the known ratios."""
-    count, ratio = float(_KNOWN[18]), _KNOWN[18] / _KNOWN[16]
-    for _ in range(18, links, 2):
-        ratio += 15.7
-        count *= ratio
-    return count
-
-
-def check_loops(loops: int, links: int) -> None:
-    """Refuse at once what cannot finish.
-
-    Raises
-    ------
-    TooLargeError
-        For more loops than there are contracted graphs for.
-    """
-    if has_contracted_graphs(loops):
-        return
-    count = extrapolated(2 * loops + 2)
-    years = count / LISTED_PER_SECOND / 3.15e7
-    estimate = f"about {count:.0e} chains of mobility 1 with mobility-1 joints have so many; listing them would take "
-    estimate += f"{years:.0e} years on one core" if years >= 1 else f"{years * 365:.0f} days on one core"
-    remedy = (
-        f"work is shared out over m machines with --shard i/m, but a million would still need {years / 1e6:.0e} "
-        "years: ask for fewer links, or fix more of the question"
-    )
-    if loops <= MOST_LOOPS:
-        remedy = (
-            f"make their contracted graphs once with 'python -m graphsynth.synthesis.regenerate {loops} FOLDER', set "
-            f"{FOLDER_VARIABLE}=FOLDER, and share the work out with --shard i/m over m machines"
-        )
-    raise TooLargeError(
-        f"{links} links make {loops} independent loops, more than the bound of {SHIPPED_LOOPS}: {estimate}; {remedy}",
-        count,
-    )
 
 
 def count_piece(piece: Piece) -> int:
