@@ -95,7 +95,7 @@ class Canvas:
             shape.text, (shape.at.real, shape.at.imag), xytext=(shape.offset.real * k, shape.offset.imag * k),
             textcoords="offset points", ha=place, va="center_baseline" if len(shape.text) > 2 else "center",
             fontsize=shape.size * k, color=LIGHT[shape.colour], zorder=order, annotation_clip=False,
-            fontweight=shape.weight or "normal",
+            fontweight=shape.weight or "normal", parse_math=False,
         )  # fmt: skip
         note.set_gid(shape.part or None)
         if shape.halo:
@@ -179,7 +179,7 @@ def figure_of(
         canvases.append(Canvas(sketch, axes, pose))
         left += sketch.width
     if above:
-        figure.text(12.0 / width, 1.0 - 18.0 / height, above, fontsize=10.5, color=LIGHT["ink"])
+        figure.text(12.0 / width, 1.0 - 18.0 / height, above, fontsize=10.5, color=LIGHT["ink"], parse_math=False)
     for k, line in enumerate(below):
         figure.text(12.0 / width, (foot - 14.0 - 17.0 * k) / height, line, fontsize=9.0, color=LIGHT["b"])
     return figure, canvases

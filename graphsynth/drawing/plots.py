@@ -154,8 +154,8 @@ def line_plot(
 def _dress(axes: Any, chart: Chart) -> None:
     """Label the axes, put a light grid behind and a legend above the curves."""
     ink, soft = LIGHT["ink"], LIGHT["soft"]
-    axes.set_xlabel(chart.xlabel, color=ink)
-    axes.set_ylabel(chart.ylabel, color=ink)
+    axes.set_xlabel(chart.xlabel, color=ink, parse_math=False)  # names may hold any letters
+    axes.set_ylabel(chart.ylabel, color=ink, parse_math=False)
     axes.tick_params(colors=ink, which="both")
     for side, spine in axes.spines.items():
         spine.set_color(soft)
@@ -183,7 +183,7 @@ def _dress(axes: Any, chart: Chart) -> None:
             handlelength=1.6,
         )
         for text in legend.get_texts():
-            text.set_color(ink)
+            text.set(color=ink, parse_math=False)
 
 
 def _quarter_turns(axes: Any) -> None:

@@ -24,6 +24,7 @@ from graphsynth.drawing.animation import animated_svg, animation_html
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.frames import frames_of, with_trace_points
 from graphsynth.drawing.gif import save_gif
+from graphsynth.drawing.motion_charts import coupler_curves
 from graphsynth.drawing.reach import motion_over_reach
 from graphsynth.drawing.shapes import FIXED
 from graphsynth.errors import GeometryError
@@ -243,6 +244,14 @@ def test_gif_has_the_frames_and_the_time(motions: dict[str, Any], tmp_path: Path
     assert (first.reshape(-1, 3).mean(axis=0) > 240).all()
     assert (first.reshape(-1, 3) == 255).all(axis=1).mean() > 0.9  # the paper is white
     assert path.stat().st_size < 120_000
+
+
+def test_names_are_not_read_as_mathematics(tmp_path: Path) -> None:
+    """What matplotlib would take for a formula, and a wrong one."""
+    name = r"$\frac{a$"
+    motion = simulate(four_bar(2, 1, 2.5, 2.5, points={name: (2, (1.0, 1.0))}), TURN, modes={0: 1})
+    assert save_gif(motion, tmp_path / "x.gif", frames=2, title=name) == 2
+    assert name in coupler_curves(motion).svg()
 
 
 def test_gif_of_a_part_goes_to_and_fro(motions: dict[str, Any], tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ TURN = np.linspace(0.0, math.tau, 25)
 def chart() -> str:
     x = np.linspace(0.0, 9.0, 50)
     lines = [Line(x, np.sin(x), "a < b & c"), Line(x, np.cos(x), "ünlike", "d", "--")]
-    return Chart(lines, "x [mm]", "$y_1$", [Band(1.0, 2.0, "jams")], [Mark(3.0, "event")], in_pi=True).svg()
+    return Chart(lines, "x [mm]", "y_1 [$]", [Band(1.0, 2.0, "jams")], [Mark(3.0, "event")], in_pi=True).svg()
 
 
 def zoo() -> str:
