@@ -349,7 +349,7 @@ def indicator_chart(machine: PistonMachine) -> Chart:
     return Chart([Line(place, scale * force)], "piston from the inner dead centre [mm]", f"gas force [{unit}]")
 
 
-def piston_animation(machine: FloatingPiston, *, title: str = "", note: str = "", frames: int = 120) -> str:
+def piston_animation(machine: FloatingPiston, *, title: str = "", note: str = "", frames: int = 90) -> str:
     """Return one HTML page with the moving mechanism (see :func:`graphsynth.drawing.animation.animation_html`)."""
     from graphsynth.drawing.animation import animation_html
 

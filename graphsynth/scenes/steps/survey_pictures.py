@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["animations", "maps", "sketches"]
 
 #: Colours of `TYPES`: cranks that turn are strong, the others pale, change points dark.
-_COLOURS = ("#0072B2", "#009E73", "#E8C37B", "#D9A0BE", "#333333", "#C9CFD6", "#F3F4F6", "#7A1F1F")
+#: Not quite those of the palette: on a dark page the map would keep them, and its legend would not.
+_COLOURS = ("#0073B2", "#009E74", "#E8C37B", "#D9A0BE", "#333333", "#C9CFD6", "#F3F4F6", "#7A1F1F")
 _SKETCHED, _ANIMATED = 6, 3
 
 
@@ -185,7 +186,7 @@ def _best(context: Context, records: tuple[Record, ...], ranking: Ranking, most:
 
 def _caption(record: Record) -> str:
     margins = ", ".join(f"{m.name} {m.value:.3g}{' ' + m.unit if m.unit else ''}" for m in record.margins[:4])
-    return f"{record.solution.partition(': ')[2]}. {record.recognised_as}; {margins}. {record.verdict}."
+    return f"{record.solution.partition(': ')[2]}. {record.recognised_as}; {margins}; {record.verdict}."
 
 
 def sketches(context: Context, records: tuple[Record, ...], ranking: Ranking) -> tuple[Picture, ...]:
@@ -210,7 +211,7 @@ def animations(context: Context, records: tuple[Record, ...], ranking: Ranking) 
 
     pictures = []
     for place, (record, mechanism) in enumerate(_best(context, records, ranking, _ANIMATED), 1):
-        motion = simulate(mechanism, np.linspace(0.0, math.tau, 91), modes={0: 1})
+        motion = simulate(mechanism, np.linspace(0.0, math.tau, 61), modes={0: 1})
         svg = animated_svg(motion, frames=60, title=f"Place {place}", seconds=4, width=300, height=220)
         pictures.append(Picture(f"Place {place}", svg, record.solution.partition(": ")[2], "small"))
     return tuple(pictures)
