@@ -225,7 +225,7 @@ class StructuralSpec:
         number = 0 if chosen is None else number_of_solutions(chosen, limit)
         if number > limit:
             raise TooLargeError(
-                f"the question has {number} integer solutions at least, more than {limit}: fix more variables, or use "
+                f"the question has {number} integer solutions at least; more than {limit} are not listed: fix more variables, or use "
                 "iter_solutions()",
                 float(number),
             )

@@ -76,9 +76,9 @@ def test_solutions_are_counted_without_being_listed(question):
 
 
 def test_too_many_solutions_are_refused_with_their_number(capsys):
-    with pytest.raises(TooLargeError, match="994456202 integer solutions at least, more than 1000000"):
+    with pytest.raises(TooLargeError, match="994456202 integer solutions at least; more than 1000000"):
         StructuralSpec(n=100, p=149).solve()
-    with pytest.raises(TooLargeError, match="1471 integer solutions at least, more than 10"):
+    with pytest.raises(TooLargeError, match="1471 integer solutions at least; more than 10"):
         StructuralSpec(n=40, p=59).solve(limit=10)
     assert main(["solve", "--moving-links", "100", "--joints", "149"]) == 2
     assert "994456202 integer solutions" in capsys.readouterr().err
