@@ -225,8 +225,8 @@ class StructuralSpec:
         number = 0 if chosen is None else number_of_solutions(chosen, limit)
         if number > limit:
             raise TooLargeError(
-                f"the question has {number} integer solutions at least; more than {limit} are not listed: fix more variables, or use "
-                "iter_solutions()",
+                f"the question has {number} integer solutions at least; more than {limit} are not listed: "
+                "fix more variables, or use iter_solutions()",
                 float(number),
             )
         return list(self.iter_solutions())
