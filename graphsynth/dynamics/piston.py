@@ -106,6 +106,11 @@ class PistonMachine:
         -------
         PistonLoads
             NaN where friction leaves no or several solutions: the machine jams there, or may.
+
+        Raises
+        ------
+        GeometryError
+            Angles that are not one list of numbers.
         """
         given = np.atleast_1d(finite_array("angle", angle, nan=True))
         if given.ndim != 1:

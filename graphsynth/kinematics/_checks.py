@@ -41,7 +41,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     Examples
     --------
     >>> @checked
-    ... def half(size: "float") -> "float":
+    ... def half(size: float) -> float:
     ...     return size / 2
     >>> half("x")
     Traceback (most recent call last):

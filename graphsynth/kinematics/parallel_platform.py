@@ -286,6 +286,11 @@ class ParallelPlatform:
         """All assembly modes for many rocker angles (radians), shape (N, 3); see `assembly_modes_batch`.
 
         Flagged problems are solved again at 50 digits from the given angles unless ``escalate`` is False.
+
+        Raises
+        ------
+        GeometryError
+            Angles of another shape, or that are not finite.
         """
         from graphsynth.kinematics.kernels.modes import elbows
 
