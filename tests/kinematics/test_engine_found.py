@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,20 +52,30 @@ def test_a_motion_goes_on_from_its_last_pose_after_turns_of_a_planet(stop: float
     whole = simulate(mechanism, np.linspace(0.0, 2.0 * stop, 41))
     rest = simulate(mechanism, np.linspace(stop, 2.0 * stop, 21), start=whole.poses[20])
     np.testing.assert_allclose(rest.poses, whole.poses[20:], atol=1e-12)
-    batch = simulate_batch(
-        mechanism, np.linspace(stop, 2.0 * stop, 401), mechanism.dimensions[None], start=whole.poses[20],
-        modes={1: int(whole.modes[0, 1])},
-    )  # fmt: skip
+    inputs = np.linspace(stop, 2.0 * stop, 401)
+    batch = simulate_batch(mechanism, inputs, mechanism.dimensions[None], start=whole.poses[20])
     assert batch.completed.all()
     np.testing.assert_allclose(batch.poses[0, ::20, :, :2], whole.poses[20:, :, :2], atol=1e-11)
 
 
 @pytest.mark.parametrize("turns", [-3, 1, 20])
 def test_the_law_may_count_other_turns_than_the_start_pose(turns: int) -> None:
+    """The second wheel of a pair follows the pose; turns of the first that only the law counts do not move it."""
+    graph = MechanismGraph(3, [(0, 1), (1, 2, 2), (0, 2)], frame=0)
+    joints = [Revolute(0, 1), Gear(1, 2, radius_a=1.7, radius_b=1.3, offset=0.3), Revolute(0, 2, (3.0, 0.0))]
+    pose = simulate(Mechanism(graph, joints, [Driver(0, 1)]), [1.0]).poses[0]
+    other = Mechanism(graph, joints, [Driver(0, 1, Linear(1.0, math.tau * turns))], pose=pose)
+    np.testing.assert_allclose(simulate(other, [1.0, 1.5]).poses[0], pose, atol=1e-12)
+    batch = simulate_batch(other, [1.0, 1.5], other.dimensions[None])
+    np.testing.assert_allclose(np.exp(1j * batch.poses[0, 0, :, 2]), np.exp(1j * pose[:, 2]), atol=1e-12)
+
+
+@pytest.mark.parametrize("mode", [1, -1])
+def test_a_batch_takes_the_modes_of_the_start_pose(mode: int) -> None:
     mechanism = planet()
-    pose = simulate(mechanism, [1.0]).poses[0]
-    other = replace(mechanism, drivers=(Driver(0, 1, Linear(1.0, math.tau * turns)),))
-    np.testing.assert_allclose(simulate(other, [1.0], start=pose).poses[0], pose, atol=1e-12)
+    pose = simulate(mechanism, [0.5], modes={1: mode}).poses[0]
+    batch = simulate_batch(mechanism, [0.5, 0.51], mechanism.dimensions[None], start=pose)
+    np.testing.assert_allclose(np.exp(1j * batch.poses[0, 0, :, 2]), np.exp(1j * pose[:, 2]), atol=1e-12)
 
 
 def test_an_ill_conditioned_start_is_judged_by_its_rounding() -> None:

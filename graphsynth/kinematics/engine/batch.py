@@ -14,7 +14,7 @@ from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, workspace
 from graphsynth.kinematics.engine.inputs import monotonic, warn_of_degrees
 from graphsynth.kinematics.engine.program import Program, compile_program
-from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, with_turns
+from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, started, with_turns
 from graphsynth.mechanism.checks import link_number
 from graphsynth.mechanism.joints import COLUMNS, Gear
 from graphsynth.mechanism.model import Mechanism
@@ -131,7 +131,8 @@ def simulate_batch(
     modes : mapping of int to int, optional
         As for `simulate`, the same for every set.
     start : array_like, shape (links, 3) or (sets, links, 3), optional
-        Poses close to the branch at the first input, for groups solved by Newton.
+        Poses close to the branch at the first input; ``mechanism.pose`` by default.  The first of them gives the modes
+        of dyads that ``modes`` leaves open.
     rates : bool, optional
         Also velocities and accelerations.  They are computed anyway if a group needs Newton.
     keep : sequence of int, optional
@@ -177,7 +178,8 @@ def simulate_batch(
     signs = sign_table(program, modes or {})
     poses, found = _starts(program, signs, float(u[0]), modes or {}, start)
     centres = np.zeros((len(sizes), max(1, len(program.gears))))
-    if start is not None or mechanism.pose is not None:
+    if len(sizes) and (start is not None or mechanism.pose is not None):
+        signs = started(_one_set(program, 0), float(u[0]), modes or {}, poses[0]).modes
         program = with_turns(program, poses, Tracker(program, signs).values(u[:1])[:, 0, 0])
         centres = lines_of_centres(program, poses)
     return _run(program, signs, u, poses, centres, found, rates, _kept(mechanism, keep))
@@ -222,14 +224,15 @@ def _starts(
         poses[:] = values
     elif any(step.iterative for step in program.steps):
         for b in range(sets):
-            one = slice(b, b + 1)
-            single = replace(
-                program, row_table=program.row_table[one], eliminated_table=program.eliminated_table[one],
-                drive_table=program.drive_table[one],
-            )  # fmt: skip
-            poses[b], code, _ = initial(Tracker(single, signs), u0, modes, None)
+            poses[b], code, _ = initial(Tracker(_one_set(program, b), signs), u0, modes, None)
             found[b] = code == codes.DONE
     return poses, found
+
+
+def _one_set(program: Program, b: int) -> Program:
+    tables = (program.row_table, program.eliminated_table, program.drive_table)
+    rows, eliminated, drives = (table[b : b + 1] for table in tables)
+    return replace(program, row_table=rows, eliminated_table=eliminated, drive_table=drives)
 
 
 def _run(
