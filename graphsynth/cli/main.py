@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -43,10 +43,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             status: int = import_module(f"graphsynth.cli.{options.module}").run(options)
             sys.stdout.flush()
         except KeyboardInterrupt:
-            return _interrupted(received)
+            return _interrupted(received, at_exit=arguments is None)
         except Exception as error:
             # an interruption inside the compiler of the kernels comes out as an exception of its own
-            return _interrupted(received) if received else _failed(error, options)
+            if received:
+                return _interrupted(received, at_exit=arguments is None)
+            return _failed(error, options)
         return status
 
 
@@ -81,9 +83,14 @@ def _of_the_system(error: OSError, options: argparse.Namespace) -> str:
     return f"{name or 'input/output'}: {error.strerror}{remedy}"
 
 
-def _interrupted(received: list[int]) -> int:
+def _interrupted(received: list[int], *, at_exit: bool) -> int:
     note("graphsynth: interrupted")
-    return 128 + (received[0] if received else signal.SIGINT)
+    status = 128 + (received[0] if received else signal.SIGINT)
+    if at_exit:  # at once: Python itself would end by SIGINT, whatever the status, after some interruptions of imports
+        with suppress(OSError):
+            sys.stdout.flush()
+        os._exit(status)
+    return status
 
 
 @contextmanager
