@@ -166,7 +166,7 @@ def examine(mechanism: Mechanism, span: float, part: float) -> tuple[str, list[s
     lines = [np.abs(place(poses, j.b, j.at_b) - place(poses, j.a, j.at_a)) for j in mechanism.joints
              if isinstance(j, Gear)]  # fmt: skip
     digits = np.minimum(1.0, np.min([np.ones(len(dense)), *lines], axis=0)) / np.maximum(1.0, sizes(mechanism, poses))
-    if (np.abs(residual(mechanism.joints, poses)).max(axis=1) * digits).max() > 1e-11:
+    if (np.abs(residual(mechanism.joints, poses)).max(axis=1) * digits).max() > 1e-13:
         faults.append("open joints")
     faults += dead_centre_faults(motion, dense, poses)
     if not motion.completed:

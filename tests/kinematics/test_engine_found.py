@@ -85,6 +85,15 @@ def test_an_ill_conditioned_start_is_judged_by_its_rounding() -> None:
     np.testing.assert_allclose(motion.poses[0], mechanism.pose, atol=1e-11)
 
 
+@pytest.mark.parametrize("seed", [4, 1152])
+def test_angles_of_wheels_do_not_drift_from_their_directions(seed: int) -> None:
+    """Gears count angles, other joints use cosines and sines: after thousands of steps both tell the same pose."""
+    random = np.random.default_rng(seed)
+    mechanism, way = random_mechanism(random), float(random.choice([-6.28, 6.28]))
+    end = 0.9 * simulate(mechanism, np.linspace(0.0, way, 73)).stopped_at
+    assert simulate(mechanism, np.linspace(0.0, end, 5000), events=False).residual < 1e-14
+
+
 # --- ends
 
 

@@ -116,6 +116,9 @@ def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h
                 code, out[0], out[2] = NEWTON, first, rate
         if why:
             return why
+        for k in range(c0, c0 + nc):
+            if need[core[k]]:  # the angle that gears count and its cosine and sine must not drift apart
+                follow_angle(core[k], x, x[core[k], 4])
         if warm:
             second = out[0] * out[2]
             if out[2] > 0.1 and second <= ROUNDED and out[3] == 0.0:
