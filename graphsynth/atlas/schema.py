@@ -130,8 +130,9 @@ def screen(connection: sqlite3.Connection, path: Path) -> None:
             for (edges,) in connection.execute("SELECT edges FROM contracted"):
                 found += [] if EDGES.fullmatch(edges) else ["edges in contracted"]
     if found != ["ok"]:
+        said = plain(" ".join(found[-1].split()))[:200]
         raise FormatError(
-            f"is damaged or holds values that no catalogue holds ({' '.join(found[-1:])}): 'graphsynth catalog verify' "
+            f"is damaged or holds values that no catalogue holds ({said}): 'graphsynth catalog verify' "
             "says more; build it anew, or take it from its source again",
             str(path),
         )

@@ -101,7 +101,8 @@ def _query(options: argparse.Namespace) -> int:
         raise SpecError("give one of --where, --sql and --entry")
     with Catalogue(options.file) as catalogue:
         if options.entry is not None:
-            _put_entry(catalogue, options)
+            with catalogue.reading():  # what is printed may be of any type
+                _put_entry(catalogue, options)
             return 0
         limit, seconds = options.limit or None, options.seconds or None
         if options.sql is not None:

@@ -95,6 +95,13 @@ def test_values_of_another_form_are_not_worked_with(path, altered, tmp_path, sta
     assert {own.name for own in tmp_path.rglob("*") if own.is_file()} <= {"x.sqlite"}
 
 
+def test_an_entry_of_values_of_other_types_is_one_sentence(path, altered, capsys):
+    with altered(path, anything=True) as raw:
+        raw.execute("UPDATE evaluations SET value = 'x'")
+    assert main(["catalog", "query", str(path), "--entry", "1.4.4.1"]) == 2
+    assert "damaged" in capsys.readouterr().err
+
+
 def test_data_that_are_too_deep_are_one_sentence(path, altered, capsys):
     for depth in (101, 900, 100_000):
         with altered(path) as raw:
