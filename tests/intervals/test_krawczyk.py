@@ -167,6 +167,19 @@ def test_inflation_around_a_corner(inner):
         assert verdict is not Status.EMPTY if has else verdict in (Status.EMPTY, Status.UNDECIDED)
 
 
+@pytest.mark.parametrize("steps", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize("scale", [1, "0.1", "1/3", "[0.9, 1.1]"])
+def test_a_root_just_outside_one_face_is_not_inside(steps, scale):
+    """Inside in one unknown, some steps outside in the other: whatever an enlarged box proves, the box has no root."""
+    root = 1.0
+    for _ in range(steps):
+        root = math.nextafter(root, 0.0)
+    factor, box = Interval(scale), Interval.from_bounds([1.0, 2.0], [3.0, 4.0])
+    f = lambda x: [(x[0] - root) * factor, (x[1] - 3) * factor]  # noqa: E731
+    assert not krawczyk(f, box).status.proves_existence
+    assert not pave(f, box).verdict.proves_existence
+
+
 def test_clipped_and_discontinuous_systems_certify_nothing():
     assert krawczyk(lambda x: [sqrt(x[0]) - "0.5"], ["[-1, 1]"]).status is Status.UNDECIDED
     assert krawczyk(lambda x: [tan(x[0])], ["[1, 2]"]).status is Status.UNDECIDED

@@ -305,6 +305,9 @@ def test_what_is_neglected_of_a_four_bar():
     moved = dict(zip((motion.mechanism.joints[k].pair for k in order), exact.r[0]))
     # A lies on the crank alone, and may slip; beyond it all links are too short
     assert moved[1, 2] >= short[1] + slips[1, 2] * math.sin(alpha)
+    still = problem(motion.mechanism, {pair: JointLimits(t) for pair, t in tilts.items()}, tilt)
+    place = [motion.mechanism.joints[k].pair for k in order].index((1, 2))
+    assert moved[1, 2] - bounds_at(still, motion)[1].r[0, place] >= 0.99 * slips[1, 2] * math.sin(alpha)
     assert moved[2, 3] >= max(short[2], short[3], slip) and moved[2, 3] < 20.0 * (sum(short.values()) + 2 * slip)
 
 
