@@ -100,12 +100,14 @@ def _interrupts(*, at_exit: bool) -> Iterator[list[int]]:
     A second signal ends the process at once; so does one that comes after the block, if the program ends with it.
     """
     received: list[int] = []
+    over = False
 
     def handler(number: int, frame: FrameType | None) -> None:
         received.append(number)
-        if len(received) > 1:
+        if len(received) > 1 or (over and at_exit):
             os._exit(128 + number)
-        raise KeyboardInterrupt
+        if not over:
+            raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
         yield received
@@ -114,6 +116,7 @@ def _interrupts(*, at_exit: bool) -> Iterator[list[int]]:
     try:
         yield received
     finally:
+        over = True
         for number, old in before.items():
             signal.signal(number, signal.SIG_DFL if at_exit else old)
 
