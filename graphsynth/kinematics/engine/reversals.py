@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +90,7 @@ def _dips(step: Array, v0: Array, v1: Array, w0: Array, w1: Array) -> NDArray[np
 
 
 def _speed_from(tracker: Tracker, trace: Trace, k: int, rate: Rate) -> Speed:
+    @cache  # the ends and the zero are asked for by several
     def at(u: float) -> float:
         pair, stop = tracker.reach(trace, k, u)
         pair.done = 2
