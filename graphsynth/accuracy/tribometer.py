@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.accuracy.rows import Effort, Problem, Row, RowStatus
 
 if TYPE_CHECKING:
+    from graphsynth.dynamics.stick_slip_precise import PreciseMotion
     from graphsynth.dynamics.tribometer import Tribometer
 
 __all__ = ["event_problem", "stick_slip_problem"]
@@ -65,8 +66,37 @@ def event_problem(model: Tribometer, duration: float, effort: Effort | None = No
         _row(r, f"rtol {r.parameter:.0e}", found.reference, kind, effort.rounds, r.parameter == default)
         for r in found.rows
     )
+    rows += _general_rows(model, truth, duration, effort)
     question = f"Event-driven run over {duration:g} s: final position of the upper platform, {len(truth.events)} events"
     return Problem("events", question, "m", rows, "run")
+
+
+def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effort: Effort) -> tuple[Row, ...]:
+    """Compare the same as a model of the general dynamics, with sticking as a state of its joint."""
+    from graphsynth.dynamics.integrate import simulate_dynamics
+    from graphsynth.dynamics.tribometer_model import general_model
+
+    own = signature(simulate_dynamics).parameters["rtol"].default
+    general, start = general_model(model)
+    rows = []
+    for rtol in effort.some(sorted({1e-6, 1e-8, 1e-10, own}, reverse=True)):
+        runs = [
+            simulate_dynamics(general, [0.0, duration], start=start, form="constrained", rtol=rtol)
+            for _ in range(effort.rounds + 1)
+        ]
+        found = runs[-1]
+        why = "" if found.completed else found.message
+        same = found.completed and len(found.events) == len(truth.events)
+        gap = max((abs(e.time - float(t.time)) for e, t in zip(found.events, truth.events)), default=0.0)
+        error = abs(float(found.poses[-1, 2, 0]) - float(truth.x2)) if found.completed else math.nan
+        more = {"events": float(len(found.events)), "steps or calls": float(found.steps)}
+        rows.append(Row(
+            "general model", f"rtol {rtol:.0e}", error, min(run.seconds for run in runs[1:]), effort.rounds,
+            "error of the final position", f"Taylor series with {_DIGITS} digits",
+            RowStatus.OK if same else RowStatus.FAILED, "" if same else why or "other events than the reference",
+            rtol == own, more=more | ({"event error [s]": gap} if same else {}),
+        ))  # fmt: skip
+    return tuple(rows)
 
 
 def stick_slip_problem(

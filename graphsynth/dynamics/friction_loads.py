@@ -16,8 +16,8 @@ __all__ = ["fitting_loads"]
 
 Array = NDArray[np.float64]
 
-#: Relative residual of loads that count as solved, and difference of loads that count as equal.
-_SOLVED, _SAME = 1e-11, 1e-9
+#: Relative residual of loads that count as solved, difference of loads that count as equal, and rounding of sums.
+_SOLVED, _SAME, _ROUNDING = 1e-11, 1e-9, 1e-13
 _ROUNDS = 400
 
 
@@ -53,8 +53,10 @@ def fitting_loads(elements: Sequence[FrictionElement], start: Array, slopes: Arr
             continue
         x = _polished(elements, start, slopes, x)
         scale = max(size, float(np.abs(x).max()))
-        fits = float(np.abs(_loads(elements, start + slopes @ x) - x).max()) <= _SOLVED * scale
-        if fits and not any(float(np.abs(x - y).max()) <= _SAME * scale for y in found):
+        summed = _loads(elements, np.abs(start) + np.abs(slopes) @ np.abs(x))  # what cancels leaves its rounding
+        fits = (np.abs(_loads(elements, start + slopes @ x) - x) <= _SOLVED * np.maximum(summed, scale)).all()
+        apart = _SAME * float(np.abs(x).max()) + _ROUNDING * float(summed.max())
+        if fits and not any(float(np.abs(x - y).max()) <= apart for y in found):
             found.append(x)
     return found, known
 

@@ -19,13 +19,13 @@ from graphsynth.dynamics import (
     Pulse,
     Spring,
     Torque,
-    consistent_start,
     simulate_dynamics,
 )
 from graphsynth.dynamics.friction import TwoCoefficientLaw
 from graphsynth.dynamics.tribometer import Tribometer
 from graphsynth.dynamics.tribometer_drives import BeltDrive, HarmonicDrive
-from graphsynth.errors import GeometryError
+from graphsynth.dynamics.tribometer_model import general_model
+from graphsynth.errors import GeometryError, SpecError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear, Polynomial
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -277,44 +277,18 @@ def test_a_motion_that_starts_after_a_rest():
     assert motion.friction.force[:, 0] == pytest.approx([0.0, 0.0, -0.2 * G, -0.2 * G], rel=1e-12)
 
 
-class Drive:
-    """A drive of a tribometer as a motion law."""
-
-    def __init__(self, drive):
-        self.drive = drive
-
-    def __call__(self, u):
-        motion = self.drive.motion(u)
-        return motion.x, motion.v, motion.a
-
-
-def as_model(tribometer, stribeck):
-    law, place = tribometer.law, float(tribometer.drive.motion(0.0).x)
-    mechanism = Mechanism(
-        MechanismGraph(3, [(0, 1), (1, 2)], frame=0), [Prismatic(0, 1), Prismatic(1, 2)],
-        pose=((0, 0, 0), (place, 0, 0), (tribometer.x2, 0, 0)),
-    )  # fmt: skip
-    return DynamicModel(
-        mechanism, {1: Body(1.0, 1.0), 2: Body(tribometer.mass, 1.0)},
-        [Spring(0, 2, (-1.0, 0.0), (0.0, 0.0), tribometer.stiffness, 1.0, tribometer.damping),
-         JointFriction(1, 2, law.kinetic, law.static, stribeck_speed=stribeck)],
-        gravity=(0.0, -tribometer.normal / tribometer.mass), prescribed=[Driver(0, 1, Drive(tribometer.drive))],
-    )  # fmt: skip
-
-
 CASES = {
-    "B": (Tribometer(law=TwoCoefficientLaw(0.40, 0.25), drive=HarmonicDrive(0.03, 2.0)), 0.0),
-    "C": (Tribometer(), 0.02),
+    "B": Tribometer(law=TwoCoefficientLaw(0.40, 0.25), drive=HarmonicDrive(0.03, 2.0)),
+    "C": Tribometer(),
 }
 
 
 @pytest.mark.parametrize(("case", "form"), [("B", "constrained"), ("C", "constrained"), ("B", "reduced")])
 def test_the_tribometer_as_a_general_model(case, form):
     """Final state to 1e-10, the same events, their times to 1e-9 s, in at most 1 s of processor time."""
-    tribometer, stribeck = CASES[case]
+    tribometer = CASES[case]
     known = tribometer.event_driven(10.0, estimate=False)
-    model = as_model(tribometer, stribeck)
-    start = consistent_start(model, keep={(2, "x"): 0.0}, keep_rates={(2, "x"): float(tribometer.drive.motion(0.0).v)})
+    model, start = general_model(tribometer)
     simulate_dynamics(model, [0.0, 0.5], start=start, form=form)  # compiles
     spent = math.inf
     for _ in range(2):
@@ -334,9 +308,15 @@ def test_the_tribometer_as_a_general_model(case, form):
 def test_an_event_storm_is_said():
     """A hard spring on a belt: it is released and caught 3000 times a second."""
     belt = Tribometer(law=TwoCoefficientLaw(0.40, 0.25), damping=0.0, stiffness=1e8, drive=BeltDrive(0.02))
-    motion = simulate_dynamics(as_model(belt, 0.0), [0.0, 0.2], keep_rates={(2, "x"): 0.02}, rtol=1e-8)
+    model, start = general_model(belt)
+    motion = simulate_dynamics(model, [0.0, 0.2], start=start, rtol=1e-8)
     assert not motion.completed and "event storm" in motion.message and "regular_speed" in motion.message
     assert len(motion.events) >= 64 and {event.kind for event in motion.events} == {"stick", "slip"}
+
+
+def test_laws_that_no_joint_has_are_refused():
+    with pytest.raises(SpecError, match="no general element"):
+        general_model(Tribometer(law=TwoCoefficientLaw(0.4, 0.25, viscous=0.1)))
 
 
 def test_laws_of_friction_are_checked():

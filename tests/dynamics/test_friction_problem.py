@@ -39,7 +39,7 @@ def problem_of(model, q, v):
 
 
 @pytest.mark.parametrize("law", [{}, {"regular_speed": 1e-6}])
-@pytest.mark.parametrize("r", [0.5, 0.87, 0.95, 0.999, 1.01, 2.0, 50.0])
+@pytest.mark.parametrize("r", [0.5, 0.87, 0.999, 1.01, 2.0, 1e6])
 @pytest.mark.parametrize("push", [1.0, -1.0])
 def test_a_shoe_with_a_lever(r, push, law):
     """``a + r |a| = F/m``: the only motion is found for every r < 1; beyond there are two, or none."""

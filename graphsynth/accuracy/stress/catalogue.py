@@ -150,6 +150,9 @@ _INSTRUMENTS = _rows(
     "instruments",
     """
     2.11  | scales:rest_trap           | start of 1e-41, where a difference quotient vanishes
+    3.8   | dry_friction:tribometer    | tribometer as a general model
+    5.1   | dry_friction:rest          | block beside its friction angle by 1e-9
+    5.2   | dry_friction:jamming       | dry friction that jams, or needs an open reaction
     9.1   | antenna:singular_chart     | singular parametrisation
     9.2   | antenna:false_roots        | false orientation roots
     9.3   | antenna:all_modes          | all assembly modes

@@ -36,7 +36,8 @@ def _law() -> Any:
     return TwoCoefficientLaw(0.40, 0.25)
 
 
-def _harmonic() -> Any:
+def harmonic() -> Any:
+    """Return the tribometer of section 3.8."""
     from graphsynth.dynamics.tribometer import Tribometer
     from graphsynth.dynamics.tribometer_drives import HarmonicDrive
 
@@ -60,7 +61,7 @@ def exact_events(check: Checks) -> None:
     )
     check.equals("belt: states", [event.state for event in motion.events], [1, 0] * 17 + [1])
     check.equals("belt: guarantee", motion.guarantee, "exact")
-    found = _harmonic().event_driven(10.0, times=[0.0, 10.0])
+    found = harmonic().event_driven(10.0, times=[0.0, 10.0])
     check.equals("harmonic: events", len(found.events), 37, source="section 3.8")
     for k, (t, state, x) in EVENTS.items():
         event = found.events[k]
@@ -80,7 +81,7 @@ def refusal(check: Checks) -> None:
     from graphsynth.dynamics.friction import TwoCoefficientLaw
     from graphsynth.dynamics.tribometer import Tribometer
 
-    check.refused("two coefficients", lambda: _harmonic().regularised(), "cannot represent the two-coefficient law")
+    check.refused("two coefficients", lambda: harmonic().regularised(), "cannot represent the two-coefficient law")
     check.refused(
         "regularisation above the Stribeck velocity",
         lambda: Tribometer().regularised(1.0, speed=0.5),
