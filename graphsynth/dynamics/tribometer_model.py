@@ -13,7 +13,8 @@ from graphsynth.dynamics.model import Body, DynamicModel
 from graphsynth.dynamics.start import StartReport, consistent_start
 from graphsynth.errors import SpecError
 from graphsynth.mechanism.joints import Prismatic
-from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.structure.graph import MechanismGraph
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.tribometer import Tribometer
@@ -72,7 +73,7 @@ def general_model(tribometer: Tribometer) -> tuple[DynamicModel, StartReport]:
     pose = ((0.0, 0.0, 0.0), (float(begin.x), 0.0, 0.0), (tribometer.x2, 0.0, 0.0))
     far = 1.0 + 10.0 * tribometer.reach  # the spring never comes to length 0
     model = DynamicModel(
-        Mechanism(graph, [Prismatic(0, 1), Prismatic(1, 2)], pose=pose),
+        Mechanism(graph, (Prismatic(0, 1), Prismatic(1, 2)), pose=pose),
         {1: Body(tribometer.mass, tribometer.mass), 2: Body(tribometer.mass, tribometer.mass)},
         (
             Spring(0, 2, (-far, 0.0), (0.0, 0.0), tribometer.stiffness, far, tribometer.damping),
