@@ -19,7 +19,7 @@ from graphsynth.dynamics.friction_loads import fitting_loads
 from graphsynth.dynamics.friction_rows import FrictionRows
 from graphsynth.dynamics.tables import Compiled
 
-__all__ = ["AT_REST", "MOST", "NO_LOADS", "FrictionProblem", "FrictionSolution"]
+__all__ = ["AT_REST", "MOST", "NO_LOADS", "FrictionProblem", "FrictionSolution", "joint_names"]
 
 Array = NDArray[np.float64]
 Senses = tuple[int, ...]
@@ -127,7 +127,7 @@ class FrictionProblem:
             return (), ()
         own = np.abs(np.vstack([scaled[e.rows] for e in bad])).max(axis=0) > _OPEN
         touched = np.abs(scaled[:, own]).max(axis=1) > _OPEN
-        return tuple(dict.fromkeys(e.name for e in bad)), _joint_names(self.rows.compiled, touched)
+        return tuple(dict.fromkeys(e.name for e in bad)), joint_names(self.rows.compiled, touched)
 
     def idle(self, f: int) -> bool:
         """Whether the element's friction moves nothing, and nothing moves it: its joint is held by others."""
@@ -389,7 +389,7 @@ def _respond_massless(rows: FrictionRows, J: Array, sides: Array, loads: Array) 
     )  # fmt: skip
 
 
-def _joint_names(compiled: Compiled, touched: NDArray[np.bool_]) -> tuple[str, ...]:
+def joint_names(compiled: Compiled, touched: NDArray[np.bool_]) -> tuple[str, ...]:
     """Names of the joints of some rows."""
     names = []
     for k in np.flatnonzero(touched):

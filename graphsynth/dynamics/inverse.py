@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.friction_loads import fitting_loads
+from graphsynth.dynamics.friction_problem import joint_names
+from graphsynth.dynamics.friction_rows import FrictionElement, FrictionRows
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
 from graphsynth.dynamics.second import newton_euler_difference
@@ -23,8 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["InverseDynamics", "inverse_dynamics"]
 
 Array = NDArray[np.float64]
-
-_FRICTION_ROUNDS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,7 @@ def inverse_dynamics(
     ------
     GeometryError
         If the motion is of another mechanism, numbers have another shape, loads are functions and their times are not
-        known, or friction does not settle.
+        known, or friction leaves no loads, several, or needs an open reaction.
 
     Examples
     --------
@@ -114,10 +115,11 @@ def inverse_dynamics(
     rates = motion.velocities * rate
     v = compiled.to_rates(q, rates)
     a = _accelerations(compiled, motion.poses, rates, motion.accelerations * rate**2 + motion.velocities * second)
+    elements = FrictionRows(compiled).elements if compiled.tables.friction.size else ()
     lam = np.full((n, len(compiled.info)), np.nan)
     error, scale = 0.0, 1e-300
     for k in np.flatnonzero(motion.assembled & np.isfinite(a).all(axis=1)):
-        lam[k], wrong, size = _multipliers(compiled, float(instants[k]), q[k], v[k], a[k])
+        lam[k], wrong, size = _multipliers(compiled, float(instants[k]), q[k], v[k], a[k], elements)
         error, scale = max(error, wrong), max(scale, size)
     reactions = reactions_from_multipliers(compiled, q, v, lam, instants)
     efforts, power = _efforts(compiled, reactions, motion, rates)
@@ -177,7 +179,9 @@ def _accelerations(compiled: Compiled, poses: Array, rates: Array, seconds: Arra
     return np.asarray(found.reshape(len(poses), compiled.n))
 
 
-def _multipliers(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> tuple[Array, float, float]:
+def _multipliers(
+    compiled: Compiled, t: float, q: Array, v: Array, a: Array, elements: tuple[FrictionElement, ...]
+) -> tuple[Array, float, float]:
     """Multipliers of all rows, the drivers' included; error and size of the balance along the velocity."""
     from graphsynth.dynamics import kernels
     from graphsynth.dynamics.values import initial_slots
@@ -191,18 +195,40 @@ def _multipliers(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> 
     matrix = (J * unit).T
     lam = np.linalg.lstsq(matrix, (Q - inertial) * unit, rcond=1e-12)[0]
     rubbing = np.zeros_like(Q)
-    for _ in range(_FRICTION_ROUNDS if T.friction.size else 0):
-        rubbing[:] = 0.0
-        kernels.friction_loads(T, x, J, lam, rubbing)
-        fresh = np.linalg.lstsq(matrix, (Q + rubbing - inertial) * unit, rcond=1e-12)[0]
-        change, lam = float(np.abs(fresh - lam).max()), fresh
-        if change <= 1e-13 * float(np.abs(lam).max()):
-            break
-    else:
-        if T.friction.size:
-            raise GeometryError("the friction iteration does not contract at an input; reduce the friction coefficient")
+    if elements:
+        units = np.zeros((len(elements), compiled.n))
+        for f in range(len(elements)):
+            kernels.friction_unit(T, x, J, f, units[f])
+        parts = np.linalg.lstsq(matrix, (units * unit).T, rcond=1e-12)[0]
+        loads = _loads(compiled, elements, matrix, lam, parts, units)
+        lam, rubbing = lam + parts @ loads, loads @ units
     along = float((inertial + J.T @ lam - Q - rubbing) @ v)
     return lam, abs(along), float(np.abs(v) @ (np.abs(inertial) + np.abs(Q) + np.abs(J.T) @ np.abs(lam)))
+
+
+def _loads(
+    compiled: Compiled, elements: tuple[FrictionElement, ...], matrix: Array, lam: Array, parts: Array, units: Array
+) -> Array:
+    """Return the loads that fit the friction they make; none, several, or an open reaction in them are refused."""
+    _, S, Vt = np.linalg.svd(matrix)
+    null = Vt[int(np.sum(1e-10 * S[0] < S)) :]
+    rubbing = [e for e, unit in zip(elements, units) if unit.any()]
+    for e in rubbing:
+        shared = np.abs(null[np.abs(null[:, e.rows]).max(axis=1, initial=0.0) > 1e-8]).max(axis=0, initial=0.0) > 1e-8
+        if shared.any():
+            names = ", ".join(joint_names(compiled, shared))
+            raise GeometryError(
+                f"the friction in joint {e.name} depends on a reaction that is not determined: {names} share it; "
+                "remove one of the redundant constraints, or the friction"
+            )
+    found, known = fitting_loads(elements, lam, parts)
+    if len(found) != 1 or not known:
+        count = f"{len(found) or 'no'} sets of" if known else "it is not decided which"
+        raise GeometryError(
+            f"{count} loads fit the friction in {', '.join(e.name for e in rubbing)} at an input; reduce the friction "
+            "coefficient"
+        )
+    return found[0]
 
 
 def _efforts(compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array) -> tuple[Array, Array]:

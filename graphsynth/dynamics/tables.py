@@ -155,8 +155,8 @@ class Compiled:
         count = len(self.laws)
         found = np.zeros((len(times) if count else 1, max(1, count + len(self.held)), 3))
         found[:, count : count + len(self.held), 0] = self.held
-        for k, driver in enumerate(self.model.prescribed if count else ()):
-            for c, part in enumerate(coordinates(driver, times)):
+        for k, law in enumerate(self.laws):
+            for c, part in enumerate(law(times)):
                 found[:, k, c] = part
         return found
 
@@ -164,14 +164,15 @@ class Compiled:
 class _Remembered:
     """A motion law that keeps its last single values: the same time is asked for several times in a row."""
 
-    def __init__(self, law: Callable[[Array], tuple[Array, Array, Array]]) -> None:
-        self._law, self._last = law, (math.nan, (np.empty(0),) * 3)
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
+        self._last: tuple[float, tuple[Array, Array, Array]] = (math.nan, (np.empty(0),) * 3)
 
     def __call__(self, times: Array) -> tuple[Array, Array, Array]:
         if len(times) > 1:
-            return self._law(times)
+            return coordinates(self._driver, times)
         if self._last[0] != times[0]:
-            self._last = float(times[0]), self._law(times)
+            self._last = float(times[0]), coordinates(self._driver, times)
         return self._last[1]
 
 
@@ -209,7 +210,7 @@ def compile_model(model: DynamicModel) -> Compiled:
     )  # fmt: skip
     return Compiled(
         model, tables, tuple(info), tuple(joints), tuple(first), centres,
-        tuple(_Remembered(driver.law) for driver in model.prescribed), applied,
+        tuple(_Remembered(driver) for driver in model.prescribed), applied,
     )  # fmt: skip
 
 

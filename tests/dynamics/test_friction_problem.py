@@ -297,3 +297,35 @@ def test_a_refused_start_is_no_start_of_another_model():
     start = consistent_start(shoe(2.0, 1.0), keep={(0, 1): 0.0}, keep_rates={(0, 1): 1.0})
     with pytest.raises(GeometryError, match="another bodies"):
         simulate_dynamics(shoe(1.5, 1.0), [0.0, 1.0], start=start)
+
+
+def pushed_slider(mu, **changes):
+    """A slide driven at constant speed, with a centre of mass beside it and a shoe."""
+    return DynamicModel(
+        SLIDER, {1: Body(1.0, 0.01)}, [JointFriction(0, 1, mu), Force(1, (0.0, -5.0))], gravity=(0.0, 0.0), **changes
+    )
+
+
+def test_inverse_dynamics_solves_the_friction_problem():
+    """A slider-crank at constant speed: under the torque found it keeps it; factors above 1 are said."""
+    from graphsynth.dynamics import inverse_dynamics
+    from graphsynth.kinematics import simulate
+
+    slide = simulate(SLIDER, [0.0, 1.0])
+    assert inverse_dynamics(pushed_slider(0.3), slide, speed=2.0).efforts.ravel() == pytest.approx(
+        [1.5, 1.5], rel=1e-13
+    )
+    bodies = {1: Body.bar(0.2, (0, 0), (0.1, 0)), 2: Body.bar(0.5, (0, 0), (0.3, 0)), 3: Body(0.8, 1e-3)}
+    turn = simulate(slider_crank(), np.linspace(0.1, 6.2, 9), modes={0: 1})
+    for mu in (0.3, 0.9, 1.5):
+        model = DynamicModel(slider_crank(), bodies, [JointFriction(0, 3, mu)])
+        found = inverse_dynamics(model, turn, speed=5.0)
+        for k, (theta, torque) in enumerate(zip(found.inputs, found.efforts[:, 0])):
+            exact = slider_crank_exact(theta, 5.0, mu, torque)  # this torque leaves the crank without acceleration
+            assert min(abs(float(one[0])) for one in exact) < 1e-9 * (1.0 + abs(torque)), k
+        assert found.power_error < 1e-12
+    with pytest.raises(GeometryError, match="loads fit the friction in P 0-3"):
+        inverse_dynamics(DynamicModel(slider_crank(), bodies, [JointFriction(0, 3, 20.0)]), turn, speed=5.0)
+    twice = pushed_slider(0.3, additional=[Prismatic(0, 1, (0, 0), (0.2, 0.0))])
+    with pytest.raises(GeometryError, match="not determined: P 0-1, additional 1: P 0-1"):
+        inverse_dynamics(twice, slide, speed=2.0)

@@ -3,12 +3,12 @@
 from graphsynth.dynamics.kernels.constrained import constrained_stages, project_state
 from graphsynth.dynamics.kernels.minimal import minimal_stages
 from graphsynth.dynamics.kernels.reduced import accelerate_reduced, place_reduced, reduced_stages
-from graphsynth.dynamics.kernels.rubbing import friction_load, friction_loads
+from graphsynth.dynamics.kernels.rubbing import friction_loads, friction_unit
 from graphsynth.dynamics.kernels.solving import accelerate, factor_rows, least_step, solve_rows
 from graphsynth.dynamics.kernels.systems import constraint_system, load_vector, state_rows
 
 __all__ = [
-    "accelerate", "accelerate_reduced", "constrained_stages", "constraint_system", "factor_rows", "friction_load",
-    "friction_loads", "least_step", "load_vector", "minimal_stages", "place_reduced", "project_state", "reduced_stages",
+    "accelerate", "accelerate_reduced", "constrained_stages", "constraint_system", "factor_rows", "friction_loads",
+    "friction_unit", "least_step", "load_vector", "minimal_stages", "place_reduced", "project_state", "reduced_stages",
     "solve_rows", "state_rows",
 ]  # fmt: skip
