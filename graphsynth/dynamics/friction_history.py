@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from graphsynth.dynamics.friction_problem import FrictionProblem
 from graphsynth.dynamics.friction_rows import FrictionRows
 from graphsynth.dynamics.result import FrictionHistory
+from graphsynth.dynamics.tables import Compiled
 
-__all__ = ["FrictionAt", "friction_at", "friction_history"]
+__all__ = ["FrictionAt", "friction_at", "friction_history", "open_shares"]
 
 Array = NDArray[np.float64]
 
@@ -62,3 +63,19 @@ def friction_history(rows: FrictionRows, count: int, fits: list[FrictionAt | Non
             if fit.shared:
                 shared[fit.shared] = None
     return FrictionHistory(tuple(e.name for e in rows.elements), state, rates, forces, loads, tuple(shared))
+
+
+def open_shares(
+    compiled: Compiled, times: Array, q: Array, v: Array, slots: Array, state: NDArray[np.int64]
+) -> dict[int, Array]:
+    """Return changes of the multipliers that joints which stick together leave open, by index of the instant."""
+    rows, found = FrictionRows(compiled), {}
+    for k in range(len(times)):
+        stuck = np.flatnonzero([s == 0 and not e.smooth for s, e in zip(state[k], rows.elements)])
+        if len(stuck) < 2 or not np.isfinite(q[k]).all():
+            continue
+        problem = FrictionProblem(rows, float(times[k]), q[k], v[k], slots[k])
+        changes = problem.open_shares([int(f) for f in stuck])
+        if changes.shape[1]:
+            found[k] = changes
+    return found

@@ -298,6 +298,18 @@ class FrictionProblem:
                 return forces
         return None
 
+    def open_shares(self, stuck: list[int]) -> Array:
+        """Return changes of the multipliers that leave every motion as it is where elements stick; largest 1."""
+        kept = self._independent(stuck)
+        rest = [f for f in stuck if f not in kept and not self.idle(f)]
+        shift = np.zeros((len(self.elements), len(rest)))
+        if kept:
+            shift[kept] = -np.linalg.solve(self.A[np.ix_(kept, kept)], self.A[np.ix_(kept, rest)])
+        shift[rest, range(len(rest))] = 1.0
+        changes = self._part.B @ shift
+        size = np.abs(changes).max(axis=0, initial=0.0)
+        return np.asarray(changes[:, size > 0.0] / size[size > 0.0])
+
     def at(self, senses: Senses, *, within: bool = True) -> FrictionSolution | None:
         """Return the solution with given senses: what an integration follows; None if there is none or several.
 

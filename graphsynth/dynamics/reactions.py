@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -117,7 +118,9 @@ class Reactions:
         return np.asarray(np.column_stack([joint.apart.real, joint.apart.imag]) * size[:, None])
 
 
-def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multipliers: Array, times: Array) -> Reactions:
+def reactions_from_multipliers(
+    compiled: Compiled, q: Array, v: Array, multipliers: Array, times: Array, more: Mapping[int, Array] | None = None
+) -> Reactions:
     """Wrenches ``-C_q^T lam`` of every joint, moved to its point.
 
     Parameters
@@ -125,6 +128,8 @@ def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multiplie
     q, v : ndarray, shape (n, coordinates)
     multipliers : ndarray, shape (n, rows)
     times : ndarray, shape (n,)
+    more : mapping of int to ndarray, optional
+        At some instants, changes of the multipliers that joints which stick together leave open, shape (rows, changes).
     """
     from graphsynth.dynamics.values import Values, initial_slots
 
@@ -140,6 +145,8 @@ def reactions_from_multipliers(compiled: Compiled, q: Array, v: Array, multiplie
         values = Values(compiled, float(times[k]), initial_slots(compiled, q[k]))
         _, J, _, _ = values.system(q[k], v[k])
         left = _left_null(J * values.column_scale / values.row_scale[:, None]) / values.row_scale[:, None]
+        if more is not None and k in more:
+            left = np.hstack([left, more[k]])
         place = np.zeros((compiled.links, 3))
         place[compiled.moving] = q[k].reshape(-1, 3)
         angles[:, k] = place[:, 2]

@@ -159,7 +159,12 @@ class DynamicMotion:
         """Reactions in all joints at the output times."""
         from graphsynth.dynamics.reactions import reactions_from_multipliers
 
-        return reactions_from_multipliers(self.compiled, self.q, self.v, self.multipliers, self.times)
+        more = None
+        if self.friction is not None and self.friction.shared:
+            from graphsynth.dynamics.friction_history import open_shares
+
+            more = open_shares(self.compiled, self.times, self.q, self.v, self.slots, self.friction.state)
+        return reactions_from_multipliers(self.compiled, self.q, self.v, self.multipliers, self.times, more)
 
     def coordinate(self, base: int, link: int) -> tuple[Array, Array]:
         """Coordinate of an R or P joint and its rate over time, each (n,)."""

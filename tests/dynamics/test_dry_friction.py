@@ -250,6 +250,8 @@ def test_every_joint_of_a_slider_crank_rough():
         assert np.abs(motion.poses[-1] - runs[0].poses[-1]).max() < 1e-9
         assert np.abs([a.time - b.time for a, b in zip(motion.events, runs[0].events)]).max() < 1e-9
         assert motion.checks.energy < 1e-9 and (motion.velocities[-1] == 0.0).all()
+        crank = motion.reactions.between(0, 1)
+        assert crank.determined[0, :2].all() and not crank.determined[-1, :2].any()  # sliding; held in a loop
         assert_complementary(motion)
 
 
