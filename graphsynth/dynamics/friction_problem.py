@@ -103,7 +103,9 @@ class FrictionProblem:
         unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
         inertial = T.mass @ self._part.a0
         self._force = max(float(np.abs(part * unit).max()) for part in (Q, inertial, self._J.T @ self._part.lam0))
-        self._push = np.abs(self.W @ np.diag(1.0 / np.diag(T.mass)) @ self.W.T) if T.lower.size else np.abs(self.A)
+        inertia = np.diag(T.mass)
+        weight = np.where(inertia > 0.0, inertia, float((inertia * size**2).max()) / size**2)  # of massless links
+        self._push = np.abs(self.W @ np.diag(1.0 / weight) @ self.W.T)
 
     @property
     def resting(self) -> list[int]:

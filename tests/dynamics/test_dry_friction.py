@@ -373,3 +373,18 @@ def test_a_pulley_law_is_linear():
     motion = simulate_dynamics(model, [0.0, 1.0])
     mu = 0.1 + 0.2 * math.exp(-0.25)
     assert motion.reactions.joints[-1].force[:, 0] == pytest.approx([mu * G] * 2, rel=1e-13)
+
+
+def test_links_without_mass():
+    """The rod and the turning of the slide weigh nothing: the limit of light ones, through dead centres and to rest."""
+    friction = [JointFriction(0, 3, 0.2), JointFriction(0, 1, 0.2, radius=0.01)]
+    none, light = (
+        simulate_dynamics(
+            DynamicModel(slider_crank(), {1: Body(0.2, 1e-3), 2: Body(m, 0.01 * m), 3: Body(0.8, m)}, friction),
+            np.linspace(0.0, 1.0, 6), keep={(0, 1): 0.5}, keep_rates={(0, 1): 20.0}, modes={0: 1}, form="minimal",
+        )
+        for m in (0.0, 1e-8)
+    )  # fmt: skip
+    assert none.completed and kinds(none) == kinds(light) == ["reversal", "reversal", "stick"]
+    assert np.abs(none.poses - light.poses).max() < 1e-6
+    assert_complementary(none)
