@@ -64,12 +64,27 @@ def decide(
         found, known = problem.solutions(sliding, still, fresh)
         if len(found) != 1 or not known:
             return _refused(problem, found, known)
-        begins = {f: found[0].senses[f] for f in still if found[0].senses[f]}
-        sliding.update(begins)
-        fresh |= set(begins)
-        still = [f for f in still if f not in begins]
-        if all(problem.elements[f].onset == problem.elements[f].static for f in begins):
-            return Decision("", "", found[0])
+        falls = {
+            f: found[0].senses[f] for f in still
+            if found[0].senses[f] and problem.elements[f].onset < problem.elements[f].static
+        }  # fmt: skip
+        if not falls:
+            return _begun(problem, found[0], fresh)
+        sliding.update(falls)
+        fresh |= set(falls)
+        still = [f for f in still if f not in falls]
+
+
+def _begun(problem: FrictionProblem, fit: FrictionSolution, fresh: set[int]) -> Decision:
+    """Take a solution if all that has begun to slide goes on."""
+    for f in fresh:
+        if fit.senses[f] * problem._udot(fit.forces, f) < -problem._starting(f):
+            return Decision(
+                "not decided",
+                f"joint {problem.elements[f].name} starts under its static friction and is turned back at once under "
+                "that of sliding: what follows is not decided; give a stribeck_speed, over which friction falls",
+            )
+    return Decision("", "", fit)
 
 
 def _undetermined(names: tuple[str, ...], shared: tuple[str, ...]) -> str:

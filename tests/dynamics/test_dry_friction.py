@@ -388,3 +388,17 @@ def test_links_without_mass():
     assert none.completed and kinds(none) == kinds(light) == ["reversal", "reversal", "stick"]
     assert np.abs(none.poses - light.poses).max() < 1e-6
     assert_complementary(none)
+
+
+@pytest.mark.parametrize("form", ["constrained", "reduced"])
+def test_a_block_stays_once_the_one_on_it_slides(form):
+    """Under its static friction the upper block would take the lower one along; sliding, it no longer does."""
+    mechanism = Mechanism(
+        MechanismGraph(3, [(0, 1), (1, 2)], frame=0), [Prismatic(0, 1), Prismatic(1, 2)], pose=((0, 0, 0),) * 3
+    )
+    friction = [JointFriction(0, 1, 0.2), JointFriction(1, 2, 0.1, 0.6, stribeck_speed=0.0)]
+    model = DynamicModel(mechanism, {1: Body(1.0, 1.0), 2: Body(1.0, 1.0)}, [*friction, Force(2, (20.0, 0.0))])
+    motion = simulate_dynamics(model, [0.0, 1.0], form=form)
+    assert motion.completed and motion.friction.state.tolist() == [[0, 1]] * 2
+    assert motion.poses[1, 1:, 0] == pytest.approx([0.0, 0.5 * (20.0 - 0.1 * G)], rel=1e-12)
+    assert_complementary(motion)
