@@ -39,6 +39,8 @@ _RANK, _DEPENDENT = 1e-10, 1e-9
 _SAME, _LIMIT, _STARTS = 1e-7, 1e-10, 1e-10
 #: Part of a null vector of the multipliers in the rows of a joint from which its load is not determined.
 _OPEN = 1e-8
+#: Parts of its limit at which the friction of an element is looked at.
+_FOLLOWED = 65
 #: Rounds for how friction is shared among joints that stick together.
 _ROUNDS = 200
 
@@ -178,6 +180,8 @@ class FrictionProblem:
             if self._held(stuck, trial):
                 continue
             fits, whole, lost = self._of(moving, stuck, begun)
+            if not whole and len(stuck) == 1 and self.factor() < 1.0:
+                fits, whole = self._followed(moving, stuck[0], begun), True
             known, unsettled = known and whole, unsettled or lost
             for fit in fits:
                 starts = all(s * self._udot(fit.forces, f) > self._starting(f) for f, s in trial.items() if s)
@@ -188,6 +192,32 @@ class FrictionProblem:
                 False  # below 1, joints held in a loop that are used beyond their limits start, and nothing else fits
             )
         return found, known
+
+    def _followed(self, moving: dict[int, int], f: int, begun: set[int]) -> list[FrictionSolution]:
+        """Return the states in which one element sticks, where the loads of the others are not known to be all found.
+
+        Its friction is followed from one limit to the other; every part of the limit leaves one set of loads.
+        """
+        from scipy.optimize import brentq
+
+        D, e, at_rest = sorted({*moving, f}), self.elements[f], set(self.resting)
+        free, part = _Hold(self, []), self._part
+
+        def forces(use: float) -> Array:
+            ratio = np.array([
+                use * e.static * e.lever if g == f else self._ratio(g, moving[g], begun, g in at_rest) for g in D
+            ])  # fmt: skip
+            fits, _ = fitting_loads([self.elements[g] for g in D], part.lam0, part.B[:, D] * ratio)
+            return free.forces(ratio * fits[0], D)
+
+        uses = np.linspace(-1.0, 1.0, _FOLLOWED)
+        rates = [self._udot(forces(use), f) for use in uses]
+        found = []
+        for k in range(len(uses) - 1):
+            if rates[k] == 0.0 or rates[k] * rates[k + 1] < 0.0:
+                use = brentq(lambda at: self._udot(forces(at), f), uses[k], uses[k + 1], xtol=1e-15)
+                found.append(self._made(forces(use), moving, ()))
+        return found
 
     def _held(self, stuck: list[int], trial: Mapping[int, int]) -> bool:
         """Whether joints that stick hold one that should start: no friction can change that."""

@@ -329,3 +329,21 @@ def test_inverse_dynamics_solves_the_friction_problem():
     twice = pushed_slider(0.3, additional=[Prismatic(0, 1, (0, 0), (0.2, 0.0))])
     with pytest.raises(GeometryError, match="not determined: P 0-1, additional 1: P 0-1"):
         inverse_dynamics(twice, slide, speed=2.0)
+
+
+@pytest.mark.parametrize("push", [0.0, 2.0, 3.5, 5.0, -9.0])
+def test_sticking_found_by_following_the_friction(push):
+    """Following the friction from limit to limit finds the sticking that the equations give, or none."""
+    mechanism = Mechanism(
+        MechanismGraph(3, [(0, 1), (1, 2)], frame=0),
+        [Prismatic(0, 1), Prismatic(1, 2, angle_a=0.3, angle_b=0.3)], pose=((0, 0, 0), (0, 0, 0), (0, 0, 0)),
+    )  # fmt: skip
+    friction = [JointFriction(0, 1, 0.2), JointFriction(1, 2, 0.4)]
+    model = DynamicModel(mechanism, {1: Body(2.0, 1.0), 2: Body(1.0, 1.0)}, [*friction, Force(2, (push, 0.0))])
+    start = consistent_start(model, keep_rates={(0, 1): 1.0, (1, 2): 0.0})
+    problem = problem_of(model, start.q, start.v)
+    assert problem.resting == [1] and problem.factor() < 1.0
+    one, two = problem._of({0: 1}, [1], set())[0], problem._followed({0: 1}, 1, set())
+    assert len(one) == len(two)
+    for a, b in zip(one, two):
+        assert np.abs(a.forces - b.forces).max() < 1e-11 and a.senses == b.senses
