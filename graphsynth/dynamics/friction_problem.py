@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.friction_linear import respond
 from graphsynth.dynamics.friction_loads import fitting_loads
 from graphsynth.dynamics.friction_rows import FrictionRows
 from graphsynth.dynamics.tables import Compiled
@@ -33,8 +34,8 @@ NO_LOADS = (
 AT_REST = 1e-12
 #: Joints at rest whose states are enumerated.
 MOST = 7
-#: Singular values of the joints' rows below this part of the largest count as zero; the same of friction directions.
-_RANK, _DEPENDENT = 1e-10, 1e-9
+#: Part of their size below which friction directions depend on each other.
+_DEPENDENT = 1e-9
 #: Relative: equal accelerations, limits of sticking, accelerations that start a sliding.
 _SAME, _LIMIT, _STARTS = 1e-7, 1e-10, 1e-10
 #: Part of a null vector of the multipliers in the rows of a joint from which its load is not determined.
@@ -58,18 +59,6 @@ class FrictionSolution:
     a: Array
     multipliers: Array
     shared: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class _Linear:
-    """``a = a0 + G phi, lam = lam0 + B phi``, and the null vectors of the multipliers."""
-
-    a0: Array
-    G: Array
-    lam0: Array
-    B: Array
-    null: Array
-    sizes: Array
 
 
 class FrictionProblem:
@@ -99,7 +88,7 @@ class FrictionProblem:
         self.speed = max(speed, float(np.abs(v / size).max()))
         self.noise = AT_REST * self.speed * (np.abs(self.W) @ size) + 1e-300
         self.speeds = self.rates * np.array([e.lever for e in self.elements])
-        self._part = _respond(rows, self._J, gam, Q, self.W)
+        self._part = respond(rows, self._J, gam, Q, self.W)
         self.A = self.W @ self._part.G
         self.b = self.W @ self._part.a0 + offset
         unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
@@ -390,47 +379,6 @@ def _least_use(rows: Array, need: Array, limits: Array) -> Array | None:
         bounds=[(None, None)] * n + [(0.0, None)],
     )  # fmt: skip
     return np.asarray(limits * solved.x[:n]) if solved.status == 0 else None
-
-
-def _respond(rows: FrictionRows, J: Array, gam: Array, Q: Array, W: Array) -> _Linear:
-    """Solve ``M a + J^T lam = Q + W^T phi, J a = gam`` for loads alone and for every unit friction."""
-    T, count = rows.compiled.tables, len(W)
-    loads = np.column_stack([Q, W.T])
-    sides = np.column_stack([gam, np.zeros((len(gam), count))])
-    if not T.lower.size:
-        return _respond_massless(rows, J, sides, loads)
-    inverse = rows.lower_inverse
-    Y = inverse @ J.T
-    sizes = np.linalg.norm(Y, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    U, S, Vt = np.linalg.svd(Y / sizes)
-    rank = int(np.sum(_RANK * S[0] < S)) if S.size else 0
-    free = inverse.T @ (inverse @ loads)
-    z = (Vt[:rank] @ ((sides - J @ free) / sizes[:, None])) / S[:rank, None]
-    a = free + inverse.T @ (U[:, :rank] @ z)
-    lam = -(Vt[:rank].T @ (z / S[:rank, None])) / sizes[:, None]
-    return _Linear(a[:, 0], a[:, 1:], lam[:, 0], lam[:, 1:], Vt[rank:].T / sizes[:, None], sizes)
-
-
-def _respond_massless(rows: FrictionRows, J: Array, sides: Array, loads: Array) -> _Linear:
-    """Return the same with links without mass, from the whole system; accelerations must be determined."""
-    compiled = rows.compiled
-    T, m = compiled.tables, len(J)
-    unit = np.tile([T.size, T.size, 1.0], compiled.n // 3)
-    row = np.array([1.0 if info.angular else T.size for info in compiled.info])
-    mass = (T.mass * unit) * unit[:, None]
-    weight = float(np.abs(mass).max())
-    Js = J * unit / row[:, None]
-    n = compiled.n
-    matrix = np.block([[mass / weight, Js.T], [Js, np.zeros((m, m))]])
-    right = np.vstack([loads * unit[:, None] / weight, sides / row[:, None]])
-    found = np.linalg.lstsq(matrix, right, rcond=1e-13)[0]
-    U, S, _ = np.linalg.svd(Js)
-    rank = int(np.sum(_RANK * S[0] < S)) if S.size else 0
-    return _Linear(
-        found[:n, 0] * unit, found[:n, 1:] * unit[:, None], found[n:, 0] * weight / row,
-        found[n:, 1:] * (weight / row)[:, None], U[:, rank:] / row[:, None], row,
-    )  # fmt: skip
 
 
 def joint_names(compiled: Compiled, touched: NDArray[np.bool_]) -> tuple[str, ...]:
