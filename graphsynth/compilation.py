@@ -60,9 +60,13 @@ def kernel(function: Callable[..., Any] | None = None, *, signature: Any = None,
     return compiled
 
 
+def _warn(text: str) -> None:
+    warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
 #: At most one function each: called before the first kernel that has to be compiled; told that none can be kept.
 _listeners: list[Callable[[], None]] = []
-_warners: list[Callable[[str], None]] = [lambda text: warnings.warn(text, RuntimeWarning, stacklevel=2)]
+_warners: list[Callable[[str], None]] = [_warn]
 
 
 def announce(listener: Callable[[], None], unkept: Callable[[str], None] | None = None) -> None:

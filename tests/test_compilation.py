@@ -245,7 +245,7 @@ def test_many_processes_at_once_and_many_versions(place: Place) -> None:
 
 def test_a_library_warns_once(place: Place, monkeypatch) -> None:
     monkeypatch.undo()
-    monkeypatch.setattr(compilation, "_warners", list(compilation._warners))
+    monkeypatch.setattr(compilation, "_warners", [compilation._warn])
     monkeypatch.setattr(compilation, "_write", lambda *_: False)
     with pytest.warns(RuntimeWarning, match="compiled in memory") as told:
         place.hits()

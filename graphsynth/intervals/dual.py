@@ -115,6 +115,11 @@ def variables(box: Interval) -> list[Dual]:
     -------
     list of Dual
         Of length n.
+
+    Raises
+    ------
+    IntervalError
+        One interval instead of a vector of them.
     """
     box = interval(box)
     if box.ndim == 0:

@@ -102,6 +102,11 @@ class Interval(Measures):
     def from_bounds(cls, lo: ArrayLike, hi: ArrayLike) -> Interval:
         """Make intervals from float bounds; ``(inf, -inf)`` is the empty one.
 
+        Raises
+        ------
+        FormatError
+            Bounds that are no floats.
+
         Examples
         --------
         >>> Interval.from_bounds([0.0, 1.0], [1.0, float("inf")]).width.tolist()
@@ -150,7 +155,13 @@ class Interval(Measures):
 
     @classmethod
     def stack(cls, parts: Iterable[Interval], axis: int = 0) -> Interval:
-        """Join intervals of one shape along a new axis."""
+        """Join intervals of one shape along a new axis.
+
+        Raises
+        ------
+        IntervalError
+            Nothing to join, or an axis that there is not.
+        """
         if not isinstance(parts, Iterable):
             raise IntervalError(f"{parts!r} is no list of intervals; give a list")
         parts = [interval(part) for part in parts]
@@ -269,7 +280,13 @@ class Interval(Measures):
         return _make(np.minimum(self.lo, other.lo), np.maximum(self.hi, other.hi), _both(self.flags, other.flags))
 
     def inflate(self, relative: float = 0.1, absolute: float = 0.0) -> Interval:
-        """Widen both ends by ``relative`` times the radius plus ``absolute``, and at least one step."""
+        """Widen both ends by ``relative`` times the radius plus ``absolute``, and at least one step.
+
+        Raises
+        ------
+        IntervalError
+            A number that is negative or not finite.
+        """
         for name, value in (("relative", relative), ("absolute", absolute)):
             if not isinstance(value, int | float | np.number) or not 0.0 <= value < np.inf:
                 raise IntervalError(f"{name} = {value!r} must be a finite number of zero or more; correct the value")

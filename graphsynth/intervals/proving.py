@@ -171,6 +171,11 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
     Image
         Certified; the semantics of `Status`.
 
+    Raises
+    ------
+    IntervalError
+        Boxes that are no list of boxes.
+
     Examples
     --------
     >>> boxes = Interval([["[1, 2]"], ["[3, 4]"]])

@@ -96,7 +96,13 @@ class ToleranceBox:
 
     @classmethod
     def of(cls, linkage: LambdaLinkage, bearing: Bearing | None = None) -> ToleranceBox:
-        """Return the box of one linkage and one bearing: their doubles as they are, marked as float input."""
+        """Return the box of one linkage and one bearing: their doubles as they are, marked as float input.
+
+        Raises
+        ------
+        GeometryError
+            Something else than a linkage or a bearing.
+        """
         if not isinstance(linkage, LambdaLinkage):
             raise GeometryError(f"linkage = {linkage!r} is no LambdaLinkage; give one")
         b = Bearing() if bearing is None else bearing

@@ -26,6 +26,7 @@ def script():
     return module
 
 
+@pytest.mark.slow
 def test_verification_passes(shipped):
     """Every field of every chain with up to ten links, against networkx and brute force."""
     found = shipped.verify()

@@ -210,7 +210,7 @@ BROKEN: dict[str, tuple[bytes, str]] = {
         changed("[mechanism]\n", "[structure.generate]\nsample = 1000000000\n\n[mechanism]\n", SEARCH),
         r"sample 1000000000; draw 1 to 10000",
     ),
-    "weight nan": (changed("weight = 2", "weight = nan", SEARCH), r"weight\] must be a finite number"),
+    "weight nan": (changed('goal = "min"', 'goal = "min"\nweight = nan', SEARCH), r"weight\] must be a finite number"),
     "unknown goal": (changed('goal = "min"', 'goal = "best"', SEARCH), r"goal\] must be one of 'min', 'max'"),
 }
 
