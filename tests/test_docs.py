@@ -74,8 +74,17 @@ def run_session(source, page, line, namespace):
     assert results.failed == 0, said.getvalue()
 
 
+#: Pages whose examples search or sweep for seconds.
+SLOW_PAGES = ("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced")
+
+
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if any(is_example(*fence[:2]) for fence in fences(page))], ids=name_of
+    "page",
+    [
+        pytest.param(page, id=name_of(page), marks=pytest.mark.slow if page.stem in SLOW_PAGES else ())
+        for page in PAGES
+        if any(is_example(*fence[:2]) for fence in fences(page))
+    ],
 )
 def test_examples_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -119,6 +119,7 @@ def test_an_error_of_the_scene_stops_the_measurement():
         measure(SimpleNamespace(scene=SimpleNamespace(name="x")), [plan(scene_that_is_wrong)])
 
 
+@pytest.mark.slow
 def test_table_holds_every_row_and_column(folder):
     read = pd.read_csv(folder / "accuracy.csv")
     assert len(read) == len(PROBLEM.rows)

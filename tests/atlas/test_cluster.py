@@ -45,6 +45,7 @@ def content(catalogue, folder):
     return [path.read_bytes() for path in catalogue.export(folder, "csv")]
 
 
+@pytest.mark.slow
 def test_the_command_line_on_a_cluster(alone, cluster, fine, tmp_path, capsys):
     path = tmp_path / "x.sqlite"
     command = ["catalog", "build", "--links", "4..10", "-o", str(path), "--executor", "dask", "--json"]
@@ -75,6 +76,7 @@ def test_lost_workers_are_replaced_and_their_pieces_done_again(alone, cluster, f
             assert catalogue.digest() == alone.digest()
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

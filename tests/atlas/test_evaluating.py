@@ -162,6 +162,7 @@ def test_an_interrupted_evaluation_goes_on_to_the_same(copy, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["whole.sqlite", "x.sqlite"]
 
 
+@pytest.mark.slow
 def test_a_killed_evaluation_loses_nothing_that_was_stored(copy):
     script = (
         "import os, signal, sys\nfrom graphsynth.atlas.catalogue import Catalogue\n"

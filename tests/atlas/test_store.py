@@ -280,6 +280,7 @@ def build_and_kill(builder, path, seconds):
     return int(builder.stdout.readline()) == signal.SIGKILL
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="builds are forked")
 @pytest.mark.parametrize("moments", [pytest.param(50, marks=pytest.mark.slow), 5])
 def test_kill_at_random_moments(many, builder, tmp_path, fine, moments):

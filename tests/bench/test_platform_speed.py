@@ -107,6 +107,7 @@ def report(capsys, what, ours, theirs):
 
 
 @pytest.mark.parametrize("name", PLATFORMS)
+@pytest.mark.slow
 def test_ratio_of_all_modes(capsys, name):
     platform, few = PLATFORMS[name], ANGLES[:4000]
     ours = rate(lambda: platform.direct_batch(ANGLES), len(ANGLES))

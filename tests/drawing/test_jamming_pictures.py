@@ -51,6 +51,7 @@ def test_boxes_of_the_crossings():
     assert len(unrolled.patches) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "problem",
     [circle_ellipse(6, 6, 4), circle_ellipse(2, 2, 2), circle_ellipse(7, 6, 4), circle_ellipse(5, 6, 4, 20, "0.8")],
@@ -61,6 +62,7 @@ def test_extreme_problems_are_drawn(problem):
     drawn(region_picture(problem))
 
 
+@pytest.mark.slow
 def test_region_states_its_exaggeration():
     problem = circle_ellipse("17.5", "17.53", "17.46")
     assert "× 80" in drawn(region_picture(problem)).axes[0].get_title()

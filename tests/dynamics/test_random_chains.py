@@ -101,6 +101,7 @@ def exact_reactions(model, start, points):
         return np.array([[float(found[n + 2 * j + axis]) for axis in (0, 1)] for j in range(m // 2)])
 
 
+@pytest.mark.slow
 def test_automatic_form_goes_on_where_the_engine_does_not_start():
     model, start, _, _ = random_model(8, 8)
     motion = simulate_dynamics(model, [0.0, 0.01], start=start)

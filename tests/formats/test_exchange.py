@@ -89,6 +89,7 @@ def test_mechanisms_come_back_to_the_last_bit(name: str, mechanism: Mechanism) -
     assert back == mechanism and repr(back) == repr(mechanism)  # repr: the sign of zero too
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 def test_the_largest_graph(name: str) -> None:
     pairs = [(a, b) for b in range(255) for a in range(b)]

@@ -26,10 +26,10 @@ def campaign(*options: str) -> dict[str, object]:
     return report
 
 
-def test_a_few_kills() -> None:
-    """Of the quick commands."""
-    report = campaign("--kills", "4", "--seed", "8", "--only", "count", "--only", "run")
-    assert report["disturbances"] >= 4 and set(report["rounds"]) == {"count", "run"}
+@pytest.mark.parametrize("quick", ["count", "run"])
+def test_a_few_kills(quick: str) -> None:
+    report = campaign("--kills", "2", "--seed", "8", "--only", quick)
+    assert report["disturbances"] >= 2 and set(report["rounds"]) == {quick}
 
 
 @pytest.mark.slow

@@ -100,6 +100,7 @@ def test_every_eight_link_chain_and_inversion_moves() -> None:
         assert found.seconds < 10.0  # typically 0.2 s; the bound allows for a busy computer
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(st.integers(0, 17), st.integers(0, 7), st.integers(0, 999))
 def test_accepted_bars_keep_their_lengths(index: int, inversion: int, seed: int) -> None:

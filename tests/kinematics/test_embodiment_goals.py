@@ -47,6 +47,7 @@ def arms(mechanism: Mechanism) -> tuple[float, float]:
 # --- the straight segment
 
 
+@pytest.mark.slow
 def test_the_lambda_linkage_is_found_again() -> None:
     """A segment of 4 cranks in half a turn, drawn by a point of the coupler's line, no length over 5 cranks.
 

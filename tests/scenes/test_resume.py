@@ -39,6 +39,7 @@ def interrupt(springs: Path, out: Path, *options: str, number: int = signal.SIGI
     return subprocess.CompletedProcess(command, process.returncode, out_text, error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "number"),
     [

@@ -117,6 +117,7 @@ def test_event_storm_is_said() -> None:
     assert not any(t.title == "The other methods" for t in report["tables"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "drive", [{"kind": "harmonic", "radius_mm": 30, "speed_rad_s": 2}, {"kind": "belt", "belt_m_s": 0}]
 )

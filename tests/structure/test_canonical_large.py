@@ -68,6 +68,7 @@ def _joints(graph: nx.Graph) -> list[tuple[int, int]]:
     return [(min(a, b), max(a, b)) for a, b in graph.edges]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("graph", "order"),
     [

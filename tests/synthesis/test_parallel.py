@@ -50,6 +50,7 @@ def test_threads(alone, workers):
         assert digest(executor) == alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2, pytest.param(7, marks=pytest.mark.slow)])
 def test_processes(alone, workers):
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as executor:

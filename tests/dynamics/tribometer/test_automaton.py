@@ -189,6 +189,7 @@ def test_long_resumed_run_equals_a_run_in_one_piece(monkeypatch):
     assert np.array_equal(whole.path.nodes, pieces.path.nodes)
 
 
+@pytest.mark.slow
 def test_narrow_peak_of_friction_is_not_jumped_over():
     """Friction only near rest, passed in half a millisecond: a step from one side to the other would miss it."""
     law = StribeckLaw(0.75, 0.0, 0.0078125)
@@ -201,6 +202,7 @@ def test_narrow_peak_of_friction_is_not_jumped_over():
     assert motion.x2[0] == pytest.approx(float(reference.x2), abs=max(motion.error, 1e-14))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [PLAIN, StribeckLaw(0.4, 0.25, 0.02)], ids=["two coefficients", "Stribeck"])
 @pytest.mark.parametrize("gap", [1e-2, 1e-4])
 def test_rod_hardly_longer_than_the_crank(law, gap):

@@ -217,6 +217,7 @@ def test_allowed_misalignment_from_both_sides():
     assert one.low == math.inf  # nothing tilts against a limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("links", "number", "resolution"), [(6, 1, 1e-2), pytest.param(8, 3, 5e-4, marks=pytest.mark.slow)]
 )
@@ -248,6 +249,7 @@ def test_pieces_against_dense_samples(links, number, resolution):
         assert (value <= proof.upper[place] * (1 + 1e-12)).all()
 
 
+@pytest.mark.slow
 def test_tolerances_within_which_all_are_free_or_all_jam():
     motion = simulate(four_bar(), TURN)
     sharp = Misalignment(0, 1, 0.0120)
