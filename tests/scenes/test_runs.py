@@ -66,7 +66,7 @@ def loaded(name: str, products: str, out: Path) -> set[str]:
 
 @pytest.mark.parametrize(
     ("name", "product"),
-    [pytest.param(*case, marks=() if case[1] == "records" else pytest.mark.slow) for case in sorted(ALLOWED)],
+    [pytest.param(*case, marks=pytest.mark.slow if "pictures" in case[1] else ()) for case in sorted(ALLOWED)],
 )
 def test_a_scene_loads_no_more_than_its_outputs_need(name: str, product: str, tmp_path: Path) -> None:
     extra = loaded(name, product, tmp_path) - ALLOWED[name, product] - OF_NUMBA
