@@ -271,6 +271,7 @@ def own_times(count, seconds):
     return times
 
 
+@pytest.mark.slow
 def test_other_libraries(benchmark, capsys, monkeypatch):
     """Equal work in each library; ``--benchmark-enable -n 0`` prints times and ratios.  Without, python-flint only."""
     monkeypatch.syspath_prepend(str(PEERS.parent))

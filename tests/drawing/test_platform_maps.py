@@ -39,6 +39,7 @@ def test_empty_workspace_says_so() -> None:
     assert "no position" in figure.axes[0].texts[0].get_text()
 
 
+@pytest.mark.slow
 def test_loci_picture_has_a_panel_for_every_mode() -> None:
     loci = singular_loci(MOCK, 0.5, nodes=40)
     figure = loci_picture(MOCK, loci)

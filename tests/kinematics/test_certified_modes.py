@@ -201,6 +201,7 @@ def test_symmetric_home_position_has_two_modes() -> None:
 # --- degenerate data, exactly
 
 
+@pytest.mark.slow
 def test_exact_double_root_of_rational_data() -> None:
     """Similar triangles, legs pulled straight through one point: the twin modes have merged at alpha = 0."""
     vertices = [(3, 4), (-5, 0), (4, -3)]

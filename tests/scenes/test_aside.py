@@ -39,6 +39,7 @@ class Noted(Executor):
         return self.pool.submit(function, *arguments, **named)
 
 
+@pytest.mark.slow
 def test_pictures_drawn_elsewhere_are_the_same() -> None:
     alone = execute(survey())
     executor = Noted()

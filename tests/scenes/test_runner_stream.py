@@ -85,6 +85,7 @@ def test_the_same_bytes_under_dask(springs: Path, tmp_path: Path) -> None:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "dask" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_time_budget_stops_with_what_there_is_and_more_goes_on(springs: Path, tmp_path: Path) -> None:
     scene = with_mechanism(load_scene(springs), pause_s=0.05)
     report = run(replace(scene, budget=BudgetTable(time_s=0.2)), out=tmp_path / "out")

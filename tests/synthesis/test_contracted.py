@@ -62,6 +62,7 @@ def test_six_loops_by_vertices():
     assert {k: len(mults) for k, mults in layers(6) if len(mults)} == dict(numbers("six_loops_by_vertices"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("loops", "count"), numbers("with_chain"))
 def test_those_that_carry_a_chain(loops, count):
     families = chain_families(2 * loops + 2, 1, 3, {}, False)

@@ -160,6 +160,7 @@ def _fixed_by_order_3(graph):
     }
 
 
+@pytest.mark.slow
 def test_samples_of_the_worked_example_are_answers():
     drawn = sample_mechanisms(example("figure_3"), 20, seed=7)
     for g in drawn:

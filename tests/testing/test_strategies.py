@@ -286,6 +286,7 @@ def test_bounded_intervals_are_bounded(x):
     assert bool(x.is_bounded) and not bool(x.is_empty)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "corner",
     [
@@ -397,6 +398,7 @@ def test_scenes_are_read(text):
     assert scene.name == tables["scene"]["name"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [("lambda_linkage", "clearance_mm = 0\n"), ('kind = "belt"',), ("stribeck",), ('\\"',), ("planar = true",)],
@@ -411,6 +413,7 @@ plain = st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinit
 names = st.from_regex("[a-z]{1,4}", fullmatch=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(
     st.dictionaries(names, st.dictionaries(names, plain | st.lists(plain, max_size=3) | st.dictionaries(names, plain)))

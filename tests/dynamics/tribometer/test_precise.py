@@ -37,6 +37,7 @@ def test_every_printed_digit_of_the_belt_cycle():
         assert abs(events[1].position - (2 * mpmath.mpf("0.25") - mpmath.mpf("0.4")) * mpmath.mpf("9.81") / 400) < 1e-30
 
 
+@pytest.mark.slow
 def test_more_digits_change_nothing_that_was_given():
     low, high = precise_motion(Tribometer(), 0.8, digits=16), precise_motion(Tribometer(), 0.8, digits=24)
     with mpmath.workdps(40):
@@ -59,6 +60,7 @@ def same(model, duration, digits=20, **more):
     return motion
 
 
+@pytest.mark.slow
 def test_automaton_against_more_digits_with_crank():
     motion = same(Tribometer(), 1.0)
     for event, (t, _, x) in zip(motion.events, printed.CRANK_EVENTS):

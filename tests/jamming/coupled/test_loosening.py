@@ -32,6 +32,7 @@ def eight():
     return motion, limits, Misalignment(base, link, 0.012, 0.3)
 
 
+@pytest.mark.slow
 def test_every_row_solved_again(eight):
     """Each limit of an eight-link mechanism: the whole motion assessed anew with that limit larger, and without it."""
     motion, limits, tilt = eight
