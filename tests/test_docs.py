@@ -75,7 +75,10 @@ def run_session(source, page, line, namespace):
 
 
 #: Pages whose examples search or sweep for seconds.
-SLOW_PAGES = ("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced")
+SLOW_PAGES = (
+    *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
+    *("certificates", "stick-slip"),
+)
 
 
 @pytest.mark.parametrize(

@@ -270,6 +270,7 @@ def small(monkeypatch):
     monkeypatch.setattr("graphsynth.accuracy.registry.plans_of", lambda family, structure: PLANS[family])
 
 
+@pytest.mark.slow
 def test_command_line(small, tmp_path, capsys):
     given = ["accuracy", "lambda", "--quick", "--rounds", "1", "--out"]
     assert main([*given, str(tmp_path / "text")]) == 0
