@@ -86,10 +86,17 @@ def dead_centre_faults(motion: Motion, inputs: np.ndarray, poses: np.ndarray) ->
         before = sure[:-1][np.sign(steps[sure[1:]]) != np.sign(steps[sure[:-1]])]
         events = [sense * e.input for e in motion.events if e.kind == "dead centre" and e.links == (link,)]
         known = [sense * e.input for e in motion.events if e.kind in ("dead centre", "dwell") and e.links == (link,)]
+        windows: list[tuple[float, float, int]] = []  # those of reversals in neighbouring steps overlap: taken as one
         for first, last in zip(before, turns):
-            low, high = sense * inputs[first], sense * inputs[last + 1]
-            if not any(low <= at <= high for at in known):  # of two in neighbouring steps a window may hold both
-                faults.append(f"dead centre of link {link} lost in {inputs[first]:.9g}..{inputs[last + 1]:.9g}")
+            low, high, count = sense * inputs[first], sense * inputs[last + 1], 1
+            if windows and low < windows[-1][1]:
+                low, _, more = windows.pop()
+                count += more
+            windows.append((low, high, count))
+        for low, high, count in windows:
+            found_there = sum(low <= at <= high for at in known)
+            if found_there < count or (found_there - count) % 2:
+                faults.append(f"{count} dead centres of link {link} in {low:.9g}..{high:.9g}, {found_there} found")
         reach = sense * inputs[-1]
         if len([at for at in events if at < reach]) < len(turns):
             faults.append(f"link {link}: {len(events)} dead centres for {len(turns)} reversals")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.accuracy.stress.catalogue import PAGES, Case, stress_cases
 from graphsynth.accuracy.stress.checks import SEVERITY, Check, Checks, Status
-from graphsynth.errors import GraphsynthError, MissingExtraError
+from graphsynth.errors import MissingExtraError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -182,8 +182,6 @@ def run_case(case: Case) -> Outcome:
             case.load()(checks)
     except MissingExtraError as error:
         missing, reason = True, str(error)
-    except GraphsynthError as error:
-        reason = f"{type(error).__name__}: {error}"
     except Exception as error:  # a defect of the library is a result of a stress run, not its end
         reason = f"{type(error).__name__}: {error}"
     return Outcome(case, tuple(checks.rows), perf_counter() - start, reason, missing)
