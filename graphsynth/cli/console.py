@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from graphsynth.synthesis.writing import Step
 
-__all__ = ["note", "progress", "put", "put_json", "screen", "table"]
+__all__ = ["note", "progress", "put", "put_json", "screen", "settle", "table"]
 
 
 def put(text: str) -> None:
@@ -27,8 +29,19 @@ def put_json(document: Any) -> None:
 
 
 def note(text: str) -> None:
-    """Print a remark for people."""
-    sys.stderr.write(text + "\n")
+    """Print a remark for people; nobody need be there to read it."""
+    with suppress(OSError):
+        sys.stderr.write(text + "\n")
+    settle(sys.stderr)
+
+
+def settle(stream: TextIO) -> None:
+    """Write out what is left for a stream; if nobody takes it, it goes nowhere, as all that follows."""
+    try:
+        stream.flush()
+    except OSError:
+        with Path(os.devnull).open("wb") as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def screen(width: int | None = None) -> Console:

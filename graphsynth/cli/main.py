@@ -13,10 +13,11 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
+from typing import NoReturn
 
 import graphsynth
 from graphsynth.cli.catalog_options import add_catalog
-from graphsynth.cli.console import note
+from graphsynth.cli.console import note, settle
 from graphsynth.cli.question import add_question
 from graphsynth.cli.stress import add_stress
 from graphsynth.compilation import announce
@@ -34,10 +35,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: done; 2: bad input or a place that cannot be written, told in one sentence on standard error; 130: interrupted;
     143: told to end (SIGTERM), which does the same.
     """
+    if arguments is None:
+        _open_streams()
     with _interrupts(at_exit=arguments is None) as received:
         options = argparse.Namespace()
         try:
-            options = _parser().parse_args(arguments)
+            try:
+                options = _parser().parse_args(arguments)
+            finally:
+                sys.stdout.flush()  # the program ends here after help and the version
             announce(lambda: note("compiling kernels (first use only, some seconds) ..."), note)
             # each verb lives in a module of its own, imported when it is used
             status: int = import_module(f"graphsynth.cli.{options.module}").run(options)
@@ -49,14 +55,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if received:
                 return _interrupted(received, at_exit=arguments is None)
             return _failed(error, options)
+        finally:
+            settle(sys.stderr)
         return status
 
 
 def _failed(error: Exception, options: argparse.Namespace) -> int:
     """Say in one sentence what a user can mend; anything else is a fault of the program and is raised."""
-    if isinstance(error, BrokenPipeError):
-        # the reader (head, a pager) has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    settle(sys.stdout)
+    if isinstance(error, BrokenPipeError):  # the reader (head, a pager) has seen enough
         return 0
     if isinstance(error, GraphsynthError):
         text = str(error)
@@ -77,7 +84,6 @@ def _of_the_system(error: OSError, options: argparse.Namespace) -> str:
     full = error.errno in FULL
     name = error.filename or (getattr(options, "output", None) or getattr(options, "out", None) if full else None)
     if full and name is None:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left of it is not tried again
         name = "standard output"
     remedy = ": free some space or name another place, then give the same command" if full else ""
     return f"{name or 'input/output'}: {error.strerror}{remedy}"
@@ -121,8 +127,21 @@ def _interrupts(*, at_exit: bool) -> Iterator[list[int]]:
             signal.signal(number, signal.SIG_DFL if at_exit else old)
 
 
+def _open_streams() -> None:
+    """Open the null device for a stream that was closed (``>&-``): no file of data may get its number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        note(f"{self.format_usage()}{self.prog}: error: {message}")  # nobody may be there to read it
+        sys.exit(USAGE_ERROR)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = _Parser(
         prog="graphsynth", description="Structural synthesis and analysis of mechanisms.", allow_abbrev=False
     )
     parser.add_argument("--version", action="version", version=f"graphsynth {graphsynth.__version__}")
