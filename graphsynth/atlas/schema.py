@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
+from graphsynth.atlas.leftovers import take_back, unfinished
 from graphsynth.atlas.sealing import broken_seal, seal
 from graphsynth.atlas.tables import APPLICATION_ID, EDGES, INDEXES, SCHEMA, SCHEMA_VERSION, wrong_rows
 from graphsynth.errors import FormatError, GraphsynthError
@@ -47,9 +48,18 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
         raise FormatError("the folder of the catalogue does not exist: make it, or name another file", str(path))
     mode = "ro" if readonly else "rwc" if create else "rw"
     connection = None
+    left = unfinished(path)
     if readonly and _is_still(path):
         mode = "ro&immutable=1"
+        if left:
+            raise FormatError(
+                f"a change that was stopped half way lies beside it ({left[0]}): copy both to a folder that may be "
+                "written, and open it there",
+                str(path),
+            )
     try:
+        if readonly and any(name.endswith("-journal") for name in left):
+            take_back(path)
         connection = sqlite3.connect(
             f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
         )

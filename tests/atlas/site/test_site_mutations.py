@@ -16,6 +16,7 @@ import random
 import resource
 import shutil
 import sqlite3
+import struct
 import time
 import traceback
 from importlib import import_module
@@ -30,6 +31,7 @@ cli = import_module("graphsynth.cli.main")
 
 SECONDS, MEGABYTES = 5.0, 1000
 MARK = "ran"  # what scripts would set
+PRECIOUS = "precious"  # a file that has nothing to do with it
 TEXTS = [
     "", " ", "../../../escaped.1", "/tmp/escaped", "..", "x/../../y", "C:\\x", "CON", "a\0b", "\n", "\x1b[2J", "\u202e",
     f"<img src=x onerror=window.{MARK}=1>", f"</script><script>window.{MARK}=1</script>", f"\"><b onmouseover={MARK}>",
@@ -180,11 +182,21 @@ class Mutants:
         return "data"
 
     def beside(self, choice, path):
-        """Put something beside the file."""
+        """Put something beside the file, at times a journal that has another file deleted."""
         name = choice.choice(["-wal", "-journal", "-shm"])
         data = self.data[: choice.randrange(len(self.data))] if choice.random() < 0.5 else choice.randbytes(9000)
+        if name == "-journal" and choice.random() < 0.5:
+            data = naming(path.parents[1] / PRECIOUS)
         path.with_name(path.name + name).write_bytes(data)
         return name
+
+
+def naming(victim):
+    """A journal of SQLite that names another file; whoever takes it back deletes that file."""
+    name = str(victim).encode()
+    head = bytes.fromhex("d9d505f920a163d7") + struct.pack(">5I", 0, 0, 1, 512, 4096)
+    tail = struct.pack(">I", 2**30 // 4096 + 1) + name + struct.pack(">2I", len(name), sum(name))
+    return head.ljust(512, b"\0") + tail + bytes.fromhex("d9d505f920a163d7")
 
 
 def change(data, choice):
@@ -251,6 +263,7 @@ def campaign(right, altered, top, monkeypatch, seeds, window=None):
     monkeypatch.setattr(cli, "_parser", lambda: parser)
     faults, statuses, seen, told = [], {}, 0, 0
     out.mkdir()
+    (inside / PRECIOUS).touch()
     for words in COMMANDS.values():  # kernels are compiled once
         named = {"FILE": str(right), "MOTION": "4"}
         tried([named.get(word, word.replace("OUT", str(out))) for word in words])
@@ -272,6 +285,9 @@ def campaign(right, altered, top, monkeypatch, seeds, window=None):
             left = {own.name for own in out.iterdir()} - {"page", "tables", "merged.sqlite"}
             if outside(top) - before or {name for name in left if not name.startswith("merged.sqlite-")}:
                 faults.append(f"seed {seed} ({said}), {name}: wrote {sorted(outside(top) - before)} {sorted(left)}")
+        if not (inside / PRECIOUS).exists():
+            (inside / PRECIOUS).touch()
+            faults.append(f"seed {seed} ({said}): another file was deleted")
         if (place / "x.sqlite").read_bytes() != content and "-" not in "".join(own.name for own in place.iterdir()):
             faults.append(f"seed {seed} ({said}): the file was changed")
         page = out / "page" / "index.html"
