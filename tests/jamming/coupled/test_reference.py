@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from graphsynth import simulate
-from graphsynth.jamming import Bearing
+from graphsynth.jamming import Bearing, Verdict
 from graphsynth.jamming.coupled import RIGID, SPHERICAL, JointLimits, Misalignment, assess_coupled
 from graphsynth.jamming.coupled.problem import problem
 
@@ -58,6 +58,22 @@ def test_optimum_at_the_bearing_b(lambda_mechanism, f):
     assert report.factor[0] == pytest.approx(height / 5.0 / 30.0, rel=1e-14)
     price = dict(zip(report.names, report.price[0]))
     assert price[((2, 3), "tilt")] < 1e-12  # p = B: no moment there
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        (1e-9, Verdict.FREE_ESTIMATED),
+        (3e-13, Verdict.TOUCHING_ESTIMATED),
+        (0.0, Verdict.TOUCHING_ESTIMATED),
+        (-3e-13, Verdict.TOUCHING_ESTIMATED),
+        (-1e-9, Verdict.JAMMED_ESTIMATED),
+    ],
+)
+def test_a_limit_that_is_just_reached_is_touched(lambda_mechanism, change, verdict):
+    """At 90 degrees the least tilt is 2.5 / 5 / 30: a limit of that size leaves no clearance."""
+    report = assess(lambda_mechanism, [90], JointLimits((1.0 + change) / 60.0))
+    assert report.verdict is verdict
 
 
 def test_whole_turn_is_free_up_to_twice_the_critical_tilt(lambda_mechanism):
