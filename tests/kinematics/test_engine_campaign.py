@@ -120,17 +120,20 @@ def end_fault(motion: Motion, inputs: np.ndarray, poses: np.ndarray) -> str:
     end = next(event for event in motion.events if event.ends_motion)
     size = sizes(motion.mechanism, poses)
     left = np.abs(end.input - inputs)
-    close = (left < 1e-4 * abs(end.input)) & (left > 1e-8 * abs(end.input))
+    close = (left < 1e-6 * abs(end.input)) & (left > 1e-8 * abs(end.input))  # far from a fold much grows for a while
     if close.sum() < 5:
         return ""
     power = -np.polyfit(np.log(left[close]), np.log(size[close]), 1)[0]
     grows = bool(size[close][-1] > 30.0 * size.min() and power > 0.2)
     if grows != (end.kind == "escape"):
         return f"{end.kind} at {end.input:.9g}, but the distances grow like the power {power:.3f}"
-    if grows:  # two samples of 1/size tell where it vanishes
-        u, y = inputs[close], size[close] ** (-1.0 / round(2 * power) * 2.0)
-        at = u[-1] + y[-1] * (u[-1] - u[-5]) / (y[-5] - y[-1])
-        if abs(at - end.input) > 1e-9 * max(1.0, abs(at)) + 1e-3 * left[close][-1]:
+    if grows:  # 1/size is followed to where it vanishes, from samples that have digits
+        grown = size / size.min()
+        k = np.unique([np.argmin(np.abs(np.log(grown / part))) for part in np.geomspace(30.0, min(grown[-1], 1e4), 6)])
+        u, y = inputs[k], size[k] ** (-1.0 / round(2 * power) * 2.0)
+        terms = [np.delete(y, i) / (np.delete(y, i) - y[i]) for i in range(len(k))]
+        at = float(sum(u[i] * np.prod(term) for i, term in enumerate(terms)))
+        if abs(at - end.input) > 1e-9 * max(1.0, abs(at)):
             return f"escape at {end.input:.12g} instead of {at:.12g}"
     meet = centres_apart(motion.mechanism, poses[-1:]) < 1e-4
     if not meet and "centres of the gear" in end.statement:  # a fold would follow soon: they meet very late

@@ -8,16 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.mechanism.constraints import residual
-from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
+from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear, Polynomial
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 sys.path.insert(0, str(Path(__file__).parent))
 from random_mechanisms import random_mechanism
+from test_engine_campaign import one
 
 TURN = np.linspace(0.0, -6.28, 73)
 
@@ -174,3 +176,80 @@ def test_a_link_that_does_not_turn_has_no_dead_centres() -> None:
     assert np.ptp(motion.poses[motion.assembled, 1, 2]) < 1e-12
     assert not [event for event in motion.events if event.kind == "dead centre" and event.links == (1,)]
     assert np.abs(residual(motion.mechanism.joints, motion.poses[motion.assembled])).max() < 1e-11
+
+
+# --- between samples
+
+BETWEEN = [
+    (10606, "singular"),  # centres of gears meet between two samples
+    (18016, "singular"),
+    (12096, "singular"),
+    (11457, "fold"),  # a group folds right after the start, and another pose of it fits by chance
+    (16724, "fold"),  # a dyad cannot be assembled on a stretch after the first sample
+    (18978, "fold"),
+    (17409, "escape"),  # a dyad hangs on the link that is lost
+    (9373, "escape"),
+    (17837, "escape"),
+]
+
+
+@pytest.mark.parametrize(("seed", "kind"), BETWEEN)
+def test_what_happens_between_samples_is_told(seed: int, kind: str) -> None:
+    ended, faults = one(seed)
+    assert (ended, faults) == (kind, [])
+
+
+def rocker_with_slide(short: float) -> tuple[Mechanism, float]:
+    """Crank-rocker whose rocker guides the pin of a slide; at the outer dead centre it has passed the slide's line.
+
+    Returned is also the crank angle before the dead centre at which slot and slide are parallel, from triangles:
+    there the rocker's angle is ``short`` away from its extreme.
+    """
+    a, b, c, d = 1.0, 3.0, 2.0, 3.0
+
+    def rocker(crank: float) -> float:
+        x, y = a * math.cos(crank) - d, a * math.sin(crank)
+        r = math.hypot(x, y)
+        return math.atan2(y, x) - math.acos((c * c + r * r - b * b) / (2.0 * c * r))
+
+    dead = math.acos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
+    direction = rocker(dead) + math.copysign(short, rocker(dead - 0.1) - rocker(dead))
+    parallel = float(brentq(lambda u: rocker(u) - direction, dead - 0.3, dead, xtol=1e-15))
+    graph = MechanismGraph(5, [(0, 1), (1, 2), (2, 3), (0, 3), (0, 4), (3, 4, 2)], frame=0)
+    joints = [
+        Revolute(0, 1), Revolute(1, 2, (a, 0.0)), Revolute(2, 3, (b, 0.0), (c, 0.0)), Revolute(0, 3, (d, 0.0)),
+        Prismatic(0, 4, (1.0, 5.0), (0.0, 0.0), direction, 0.0), PinSlot(3, 4, (0.0, 0.5), (0.0, 0.0), 0.0),
+    ]  # fmt: skip
+    return Mechanism(graph, joints, [Driver(0, 1)]), parallel
+
+
+@pytest.mark.parametrize("short", [1e-3, 3e-5, 1e-6])
+@pytest.mark.parametrize("shift", [0.0, 0.3, 0.7])
+def test_guides_that_are_parallel_twice_between_samples(short: float, shift: float) -> None:
+    mechanism, parallel = rocker_with_slide(short)
+    start = parallel - 0.2 - math.radians(shift)
+    for last in (parallel + 0.3, parallel + 1e-3):
+        motion = simulate(mechanism, [start, last], modes={0: 1})
+        end = motion.events[-1]
+        assert end.kind == "escape" and 4 in end.links
+        assert end.input == pytest.approx(parallel, abs=1e-12 / math.sqrt(short) + end.uncertainty)
+
+
+def test_a_dyad_that_cannot_be_assembled_on_a_stretch_in_the_first_step() -> None:
+    """It opens where the distance of its ends exceeds its two lengths, and could be closed again soon after."""
+    a, d = 1.0, 3.0
+    for reach in (4.0 - 1e-6, 4.0 - 3e-8):  # the distance is largest, 4, at a crank angle of pi
+        graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+        joints = [Revolute(0, 1), Revolute(1, 2, (a, 0.0)), Revolute(2, 3, (reach - 1.8, 0.0), (1.8, 0.0)),
+                  Revolute(0, 3, (d, 0.0))]  # fmt: skip
+        mechanism = Mechanism(graph, joints, [Driver(0, 1)])
+        fold = math.acos((a * a + d * d - reach * reach) / (2.0 * a * d))
+        for start, last in (
+            (fold - 1e-5, fold + 0.02),
+            (2.0 * math.pi - fold + 1e-5, fold - 1e-4),
+            (fold - 0.01, 2.0 * math.pi - fold + 1e-5),
+        ):
+            motion = simulate(mechanism, [start, last], modes={0: 1})
+            first = fold if last > start else 2.0 * math.pi - fold
+            assert not motion.completed and motion.events[-1].kind == "fold"
+            assert motion.stopped_at == pytest.approx(first, abs=1e-9)

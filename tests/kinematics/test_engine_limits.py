@@ -347,6 +347,6 @@ def test_a_fold_behind_a_group_that_is_lost() -> None:
     step = SimpleNamespace(group=0, kind="RRR", links=(1, 2))
     tracker = SimpleNamespace(reach=reach, program=SimpleNamespace(steps=[step]))
     trace = SimpleNamespace(u=np.array([0.0, 1.6, 2.0]), M=np.array([[1.35], [0.07], [0.55]]))
-    event = _touch(tracker, trace, 1, 0)
+    event = _touch(tracker, trace, (0, 1, 2), 0)
     assert event.kind == "fold" and event.ends_motion
     assert event.input == 0.0 and event.uncertainty == pytest.approx(1.2, abs=0.31)

@@ -17,7 +17,7 @@ from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, Step
 from graphsynth.kinematics.engine.result import MotionEvent
 
-__all__ = ["between", "blow_up", "centres_that_meet", "closed_limit", "escape_at", "escapes"]
+__all__ = ["between", "blow_up", "centres_that_meet", "closed_limit", "escape_at", "escapes", "lost_before"]
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,10 @@ Array = NDArray[np.float64]
 _GROWTH = 1e3
 #: The measured power may differ from the true one by this part.
 _MISFIT = 0.2
+#: An escape that its speed tells to be nearer than this, in parts of the input, is at hand.
+_LEFT = 1e-9
+#: Of the distance between places found from earlier and later samples, times this, the true one is sought.
+_SAFETY = 3.0
 #: Centres of a gear pair closer than this, over the characteristic length, meet.
 _NEAR = 1e-6
 
@@ -82,6 +86,21 @@ def escape_at(program: Program, step: Step, pair: Trace, at: float, uncertainty:
     distances = np.hypot(pair.X[1, :, 0], pair.X[1, :, 1])
     gone = [link for link in step.links if distances[link] > program.far + _GROWTH * program.Lc]
     return _event(step, gone, at, uncertainty, why) if gone else None
+
+
+def lost_before(program: Program, limit: int, pair: Trace, at: float, uncertainty: float) -> MotionEvent | None:
+    """Return the escape of an earlier group that is at hand in the last sample before the limit of a step.
+
+    What hangs on a link so far away has no digits left, and is lost a little before it.
+    """
+    distances = np.hypot(pair.X[1, :, 0], pair.X[1, :, 1])
+    for step in program.steps[:limit]:
+        for link in step.links if step.group >= 0 else ():
+            speed = float(np.hypot(*pair.V[1, link, :2]))
+            left = 2.0 * float(distances[link]) / speed if speed > 0.0 else math.inf
+            if distances[link] > program.far + _GROWTH * program.Lc and left < _LEFT * max(1.0, abs(at)):
+                return escape_at(program, step, pair, at, uncertainty + left, "its distance grows without bound")
+    return None
 
 
 def _event(step: Step, gone: list[int], at: float, uncertainty: float, why: str) -> MotionEvent:
@@ -151,8 +170,8 @@ def blow_up(u: Array, y: Array, ratio: float, powers: tuple[float, ...]) -> tupl
     if not found:
         return None
     apart, at, measured = min(found)
-    others = [abs(at - other) for _, other, _ in found if other != at]
-    return at, float(max(apart, min(others, default=0.0))), measured
+    likely = [abs(at - other) for uncertainty, other, _ in found if uncertainty <= 100.0 * apart]
+    return at, float(max(apart, _SAFETY * max(likely))), measured
 
 
 def _at_zero(z: Array, u: Array) -> float:

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.escapes import between, blow_up, centres_that_meet, closed_limit, escape_at, escapes
+from graphsynth.kinematics.engine.escapes import (
+    between,
+    blow_up,
+    centres_that_meet,
+    closed_limit,
+    escape_at,
+    escapes,
+    lost_before,
+)
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Step
 from graphsynth.kinematics.engine.result import MotionEvent
@@ -22,6 +31,8 @@ Array = NDArray[np.float64]
 _NEAR = 0.2
 #: ... and always below this; otherwise only if its parabola falls to half of it.
 _FLAT = 1e-7
+#: Part of an interval after which the slope of a margin at its end is taken.
+_TINY = 1e-6
 #: A smallest margin below this is reported: half the digits of the pose are lost there.
 _CLOSE = 1e-8
 #: A smallest margin below this is a change point: the modes meet to rounding.
@@ -109,6 +120,9 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
     if other is not None:  # groups that hang on the limit cannot be followed to its last bits
         good, bad = closed_limit(tracker, source, at, step_index, unreachable)
     step = tracker.program.steps[step_index]
+    gone = lost_before(tracker.program, step_index, tracker.reach(source, at, good)[0], good, abs(bad - good))
+    if gone is not None:
+        return gone
     if step.has_two_modes and tracker.near(source, at, bad)[0].M[1, step_index] == _COINCIDE:
         text = (
             f"two points of group {step.group} ({step.kind}, links {_list(step.links)}) coincide at the input "
@@ -166,17 +180,58 @@ def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
     """Where a dyad's margin touches zero, or dips below it between samples; at most one event ends the motion."""
     found: list[MotionEvent] = []
     for s, step in enumerate(tracker.program.steps):
-        if not step.has_two_modes:
+        parallel = step.code == codes.P_LINE
+        if not (step.has_two_modes or parallel):
             continue
         M, u = trace.M[: trace.done, s], trace.u[: trace.done]
+        M = np.abs(M) if parallel else M
         middle = M[1:-1]
         least = (middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])
         low = np.flatnonzero(least & (_vertex(u, M) < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
-        events = (_touch(tracker, trace, int(k), s) for k in low)
+        around = [(int(k) - 1, int(k), int(k) + 1) for k in low] + _outer_dips(tracker, trace, M, s)
+        examine = _parallel_between if parallel else _touch
+        events = (examine(tracker, trace, where, s) for where in around)
         found += [event for event in events if event is not None]
+        if parallel:
+            continue
         ends = {0, len(M) - 1} if trace.stop is None else {0}  # the stop has an event of its own
         found += [_at_end(trace, k, step) for k in sorted(ends) if len(M) and M[k] <= _TOUCH]
     return found
+
+
+def _outer_dips(tracker: Tracker, trace: Trace, M: Array, s: int) -> list[tuple[int, int, int]]:
+    """First and last interval, if the margin falls into it from both ends and may vanish there."""
+    last = trace.done - 1
+    found = []
+    for k, other in ((0, 1), (last, last - 1)) if last > 0 else ():
+        if not M[k] < min(_NEAR, M[other]):
+            continue
+        step = float(trace.u[other] - trace.u[k])
+        pair, why, _ = tracker.near(trace, k, float(trace.u[k]) + _TINY * step)
+        rise = (abs(float(pair.M[1, s])) - M[k]) / _TINY
+        fall = 0.25 * rise**2 / (M[other] - M[k] - rise) if rise < 0.0 else 0.0  # to the vertex of a parabola
+        if why != codes.DONE or (rise < 0.0 and (M[k] < _FLAT or fall > 0.5 * M[k])):
+            found.append((min(k, other), k, max(k, other)))
+    return found
+
+
+def _parallel_between(tracker: Tracker, trace: Trace, where: tuple[int, int, int], s: int) -> MotionEvent | None:
+    """Escape of a link whose guides are parallel twice between samples."""
+    from scipy.optimize import minimize_scalar
+
+    first, _, last = where
+    sign = math.copysign(1.0, float(trace.M[first, s]))
+
+    def margin(u: float) -> float:
+        pair, code, step = tracker.near(trace, first, u)
+        return sign * float(pair.M[1, s]) if code == codes.DONE or step >= s else math.inf
+
+    low, high = sorted((float(trace.u[first]), float(trace.u[last])))
+    best = minimize_scalar(margin, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)})
+    if best.fun > codes.PARALLEL:
+        return None
+    cut = replace(trace, done=first + 1, stop=Stop(codes.UNREACHABLE, s, float(best.x), 0.0))
+    return _limit(tracker, cut, float(best.x))
 
 
 def _vertex(u: Array, y: Array) -> Array:
@@ -195,20 +250,22 @@ def _at_end(trace: Trace, k: int, step: Step) -> MotionEvent:
     return MotionEvent("change point", at, step.group, step.links, 2, 0.0, False, text)
 
 
-def _touch(tracker: Tracker, trace: Trace, k: int, s: int) -> MotionEvent | None:
+def _touch(tracker: Tracker, trace: Trace, where: tuple[int, int, int], s: int) -> MotionEvent | None:
     from scipy.optimize import brentq, minimize_scalar
 
+    first, k, last = where
+
     def margin(u: float) -> float:
-        pair, stop = tracker.reach(trace, k - 1, u)
+        pair, stop = tracker.reach(trace, first, u)
         return float(pair.M[1, s]) if stop is None or stop.step >= s else math.nan
 
-    low, high = sorted((float(trace.u[k - 1]), float(trace.u[k + 1])))
+    low, high = sorted((float(trace.u[first]), float(trace.u[last])))
     best = minimize_scalar(margin, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)})
     least, at = min((float(best.fun), float(best.x)), (float(trace.M[k, s]), float(trace.u[k])))
     step = tracker.program.steps[s]
     name = f"group {step.group} ({step.kind}, links {_list(step.links)})"
     if least < -_TOUCH:
-        start, uncertainty = float(trace.u[k - 1]), 1e-14 * max(1.0, abs(at))
+        start, uncertainty = float(trace.u[first]), 1e-14 * max(1.0, abs(at))
         try:
             at = float(brentq(margin, start, at, xtol=1e-15 * min(1.0, high - low), rtol=1e-15))
         except ValueError:  # a group before this one is lost on the way: known is only that the branch ends here

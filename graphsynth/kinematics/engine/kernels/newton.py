@@ -150,20 +150,34 @@ def rates(rows, rp, r0, nr, core, c0, nc, x, phi, q, J, f, g, G, pivots):
 
 
 @kernel(inline="always")
-def predict(core, c0, nc, x, h, Lc):
-    """Move the core links to second order; returns how far, scaled."""
+def predict(core, c0, nc, x, h, Lc, out):
+    """Move the core links to second order; returns how far, scaled.  Their expected velocities go to ``out[4:]``."""
     travel = 0.0
     for k in range(nc):
         link = core[c0 + k]
         ax, ay, at = h * x[link, 5], h * x[link, 6], h * x[link, 7]
         bx, by, bt = 0.5 * h * h * x[link, 8], 0.5 * h * h * x[link, 9], 0.5 * h * h * x[link, 10]
         travel += ax * ax + ay * ay + Lc * Lc * at * at + bx * bx + by * by + Lc * Lc * bt * bt
+        for c in range(3):
+            out[4 + 3 * k + c] = x[link, 5 + c] + h * x[link, 8 + c]
         x[link, 0] += ax + bx
         x[link, 1] += ay + by
         x[link, 4] += at + bt
         c, s = math.cos(at + bt), math.sin(at + bt)
         x[link, 2], x[link, 3] = x[link, 2] * c - x[link, 3] * s, x[link, 3] * c + x[link, 2] * s
     return math.sqrt(travel) / Lc
+
+
+@kernel(inline="always")
+def surprise(core, c0, nc, x, h, Lc, out):
+    """How far the velocities of the core links, over a step, carry from those that `predict` expected; scaled."""
+    total = 0.0
+    for k in range(nc):
+        link = core[c0 + k]
+        e = 4 + 3 * k
+        dx, dy, dt = x[link, 5] - out[e], x[link, 6] - out[e + 1], x[link, 7] - out[e + 2]
+        total += dx * dx + dy * dy + Lc * Lc * dt * dt
+    return abs(h) * math.sqrt(total) / Lc
 
 
 @kernel

@@ -39,6 +39,26 @@ def world(x, link, px, py):
     return x[link, 0] + c * px - s * py, x[link, 1] + s * px + c * py
 
 
+@kernel(inline="always")
+def upper_half(a):
+    """Return the upper 26 bits of a number (Veltkamp 1968): products of such halves are exact."""
+    big = 134217729.0 * a
+    return big - (big - a)
+
+
+@kernel
+def cross(ax, ay, bx, by):
+    """Return ax by - ay bx, right to its last digits also where the vectors are nearly parallel.
+
+    Both products are exact sums of two numbers (Dekker 1971), so that only the difference is rounded.
+    """
+    p, q = ax * by, ay * bx
+    a, b, c, d = upper_half(ax), upper_half(by), upper_half(ay), upper_half(bx)
+    dp = ((a * b - p) + a * (by - b) + (ax - a) * b) + (ax - a) * (by - b)
+    dq = ((c * d - q) + c * (bx - d) + (ay - c) * d) + (ay - c) * (bx - d)
+    return (p - q) + (dp - dq)
+
+
 @kernel
 def nearest_turn(raw, near):
     """Angle that differs from ``raw`` by whole turns and lies nearest to ``near``, for angles of any size.

@@ -16,6 +16,8 @@ from graphsynth.kinematics.engine.codes import (
     PLATFORM,
     R_DIST,
     R_GEAR,
+    RX,
+    RY,
     SINGULAR,
     SLOT,
     STEP_TOO_LONG,
@@ -32,9 +34,13 @@ from graphsynth.kinematics.engine.kernels.newton import (
     platform,
     predict,
     rates,
+    surprise,
 )
 from graphsynth.kinematics.engine.kernels.rows import follow_angle, nearest_turn, world
-from graphsynth.kinematics.engine.kernels.single import closed_form, pivot_rates, place_eliminated
+from graphsynth.kinematics.engine.kernels.single import closed_form, pin_to_neighbour, pivot_rates, place_eliminated
+
+#: Turn of a line of centres between two samples, in radians, from which on its sense is in doubt if no speed tells it.
+BACKWARD = 2.0
 
 
 @kernel
@@ -95,17 +101,51 @@ def carry_centres(rows, rp, r0, nr, i, x, phi, PHI):
 
 
 @kernel
+def centres_pass(rows, rp, r0, nr, x, phi, h, derivs):
+    """Whether the line of centres of a gear pair turns in a way that nobody can know from both ends of a step.
+
+    Centres that come close to each other turn their line by up to half a turn, in a sense that the ends of a long step
+    do not tell.  So the turn must be what the angular speed at its end says, and the distance must not change much.
+    """
+    for k in range(r0, r0 + nr):
+        if rows[k, 0] != GEAR:
+            continue
+        a, b = rows[k, 1], rows[k, 2]
+        ax, ay = world(x, a, rp[k, 0], rp[k, 1])
+        bx, by = world(x, b, rp[k, 2], rp[k, 3])
+        dx, dy = bx - ax, by - ay
+        slot = int(rp[k, SLOT])
+        turn = nearest_turn(math.atan2(dy, dx), phi[slot]) - phi[slot]
+        if not derivs:
+            if abs(turn) > BACKWARD:
+                return True
+            continue
+        vx = x[b, 5] - x[b, 7] * (by - x[b, 1]) - x[a, 5] + x[a, 7] * (ay - x[a, 1])
+        vy = x[b, 6] + x[b, 7] * (bx - x[b, 0]) - x[a, 6] - x[a, 7] * (ax - x[a, 0])
+        square = dx * dx + dy * dy
+        along, across = h * (dx * vx + dy * vy), h * (dx * vy - dy * vx)
+        if not (abs(along) <= 0.5 * square and abs(across - turn * square) <= 0.5 * square):
+            return True
+    return False
+
+
+@kernel
 def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h, warm, need, M, s, J, f, g, G, pivots,
-          out, P, Q, Lc, far, derivs):  # fmt: skip
-    """Place the kept links of one group at one sample; returns why it failed, or 0."""
+          out, P, Q, Lc, far, derivs, blur, i):  # fmt: skip
+    """Place the kept links of one group at one sample i; returns why it failed, or 0.
+
+    ``blur[i]`` is how far rounding moved the links of the groups before; rounding of this group is added to it.
+    """
     why = 0
     if code >= ITERATIVE_FROM:
         reach = Lc  # a link that goes far away moves far: its travel is measured by its distance
         for k in range(c0, c0 + nc):
             reach = max(reach, abs(x[core[k], 0]) + abs(x[core[k], 1]) - far)
-        travel = predict(core, c0, nc, x, h, reach) if warm else 0.0
+        travel = predict(core, c0, nc, x, h, reach, out) if warm else 0.0
         if not travel <= 0.5:
             return STEP_TOO_LONG
+        if warm and nc == 1 and rows[r0, 0] == RX and rows[r0 + 1, 0] == RY:
+            pin_to_neighbour(rows, rp, r0, own, x)  # far from the origin the predicted place is rough, its turn is not
         if code == PLATFORM:
             anchors(rows, rp, r0, own, x, P)
             why = platform(P, x, own, Q, Lc, reach, out, M, s)
@@ -125,6 +165,8 @@ def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h
                 assemble(rows, rp, r0, nr, x, phi, ql, J, f, g, G, False)
                 factor(J, nr, pivots)
                 out[3] = noise(rows, rp, r0, nr, x, ql, J, f, G, pivots, reach)
+            out[3] += blur[i] / reach
+            blur[i] = out[3] * reach
             if out[0] > 0.1 * travel + 1e-9 + out[3] or (out[2] > 0.1 and second > out[3]):
                 return STEP_TOO_LONG
         if code == NEWTON:
@@ -132,6 +174,11 @@ def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h
         if M[s] == 0.0:
             return SINGULAR
         if warm and not (M[s] * before > 0.0 and abs(M[s]) > 0.5 * abs(before)):
+            return STEP_TOO_LONG
+        # another branch has other speeds, even where its pose is met by chance
+        if warm and surprise(core, c0, nc, x, h, reach, out) > 0.3 * travel + 1e-9 + out[3]:
+            return STEP_TOO_LONG
+        if warm and centres_pass(rows, rp, r0, nr, x, phi, h, True):
             return STEP_TOO_LONG
         return 0
     near = x[own, 4] + (h * x[own, 7] if warm and derivs else 0.0)
@@ -150,6 +197,8 @@ def place(code, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, sign, before, h
             pivot_rates(rows, rp, r0, own, x, phi, ql, g)
         else:
             rates(rows, rp, r0, nr, core, c0, nc, x, phi, ql, J, f, g, G, pivots)
+    if code == R_GEAR and warm and centres_pass(rows, rp, r0, nr, x, phi, h, derivs):
+        return STEP_TOO_LONG
     return 0
 
 
@@ -192,11 +241,12 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
     n, links, size = u.shape[0], X.shape[0], 3
     for s in range(steps.shape[0]):
         size = max(size, steps[s, 2])
-    J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(4)
+    J, f, g, out = np.empty((size, size)), np.empty(size), np.empty(6), np.zeros(4 + size)
     G, pivots = np.empty((size, 6)), np.empty(size, np.int64)
     P, Q = np.empty((3, 10)), np.empty((3, 6))
     x, T = np.zeros((links, 11)), np.empty((12, n))
     phi, m, ql = np.empty(PHI.shape[0]), np.empty(steps.shape[0]), np.empty((q.shape[0], 3))
+    blur = np.empty(n)
     limits, angles = np.empty(steps.shape[0], np.int64), need[0]
     for k in range(1, links):
         angles = angles or need[k]
@@ -211,6 +261,7 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
         if poses.shape[0] > 0:
             seat(poses[b], centres[b], X, TH, PHI)
         stop, code, at = n, 0, -1
+        blur[:] = 0.0
         for s in range(steps.shape[0]):
             kind, r0, nr, c0, nc = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3], steps[s, 4]
             e0, ne, t0, nt = steps[s, 5], steps[s, 6], steps[s, 7], steps[s, 8]
@@ -244,7 +295,7 @@ def run(steps, touched, rows, RP, core, elim, EP, drv, DP, need, wanted, q, u, m
                     ql[k, 0], ql[k, 1], ql[k, 2] = q[k, 0, i], q[k, 1, i], q[k, 2, i]
                 h, before = (u[i] - u[i - 1], M[s, i - 1]) if i > 0 else (0.0, 0.0)
                 reason = place(kind, r0, nr, own, rows, rp, core, c0, nc, x, phi, ql, modes[s], before, h, i > 0, need,
-                               m, s, J, f, g, G, pivots, out, P, Q, Lc, far, derivs)  # fmt: skip
+                               m, s, J, f, g, G, pivots, out, P, Q, Lc, far, derivs, blur, i)  # fmt: skip
                 M[s, i] = m[s]
                 if reason:
                     stop, code, at = i, reason, s

@@ -23,7 +23,7 @@ from graphsynth.kinematics.engine.codes import (
     TY,
     H,
 )
-from graphsynth.kinematics.engine.kernels.rows import gamma, nearest_turn, row, world
+from graphsynth.kinematics.engine.kernels.rows import cross, gamma, nearest_turn, row, world
 
 
 @kernel
@@ -39,6 +39,20 @@ def pin_to(x, link, lx, ly, wx, wy):
     """Move an oriented link so that its local point lies at (wx, wy)."""
     c, s = x[link, 2], x[link, 3]
     x[link, 0], x[link, 1] = wx - (c * lx - s * ly), wy - (s * lx + c * ly)
+
+
+@kernel
+def pin_to_neighbour(rows, rp, k, own, x):
+    """Move an oriented link to the turning pair of rows k and k + 1; returns that point and its local one."""
+    a, b = rows[k, 1], rows[k, 2]
+    if own == a:
+        ax, ay = world(x, b, rp[k, PBX], rp[k, PBY])
+        hx, hy = rp[k, PAX], rp[k, PAY]
+    else:
+        ax, ay = world(x, a, rp[k, PAX], rp[k, PAY])
+        hx, hy = rp[k, PBX], rp[k, PBY]
+    pin_to(x, own, hx, hy, ax, ay)
+    return ax, ay, hx, hy
 
 
 @kernel
@@ -75,7 +89,7 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
         k = r0 + 2
         if code == P_LINE:
             sx, sy, other = line_of(rows, rp, k, x, own)
-            det = tx * sy - ty * sx
+            det = cross(tx, ty, sx, sy)
             if abs(det) <= PARALLEL:
                 return 0.0
             x[own, 0], x[own, 1] = (kappa * sx - other * tx) / det, (kappa * sy - other * ty) / det
@@ -96,13 +110,8 @@ def closed_form(code, rows, rp, r0, own, sign, x, phi, g):
         pin_to(x, own, lx, ly, bx - e * ty + along * tx, by + e * tx + along * ty)
         return margin
     # a turning pair holds the point A; rows RX, RY, then one more
-    a, b, k = rows[r0, 1], rows[r0, 2], r0 + 2
-    if own == a:
-        ax, ay = world(x, b, rp[r0, PBX], rp[r0, PBY])
-        hx, hy = rp[r0, PAX], rp[r0, PAY]
-    else:
-        ax, ay = world(x, a, rp[r0, PAX], rp[r0, PAY])
-        hx, hy = rp[r0, PBX], rp[r0, PBY]
+    k = r0 + 2
+    ax, ay, hx, hy = pin_to_neighbour(rows, rp, r0, own, x)
     margin = 1.0
     a, b = rows[k, 1], rows[k, 2]
     if own == a:
@@ -189,7 +198,7 @@ def place_eliminated(kind, e, a, b, p, r, x, derivs):
     hx, hy = c * p[r, 6] - s * p[r, 7], s * p[r, 6] + c * p[r, 7]
     tx, ty = x[a, 2] * p[r, 8] - x[a, 3] * p[r, 9], x[a, 3] * p[r, 8] + x[a, 2] * p[r, 9]
     sx, sy = x[b, 2] * p[r, 10] - x[b, 3] * p[r, 11], x[b, 3] * p[r, 10] + x[b, 2] * p[r, 11]
-    det = tx * sy - ty * sx
+    det = cross(tx, ty, sx, sy)
     k1 = -ty * (ax - fx) + tx * (ay - fy)
     k2 = -sy * (bx - hx) + sx * (by - hy)
     x[e, 0], x[e, 1] = (k1 * sx - k2 * tx) / det, (k1 * sy - k2 * ty) / det
