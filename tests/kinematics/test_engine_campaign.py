@@ -129,7 +129,9 @@ def end_fault(motion: Motion, inputs: np.ndarray, poses: np.ndarray) -> str:
         return f"{end.kind} at {end.input:.9g}, but the distances grow like the power {power:.3f}"
     if grows:  # 1/size is followed to where it vanishes, from samples that have digits
         grown = size / size.min()
-        k = np.unique([np.argmin(np.abs(np.log(grown / part))) for part in np.geomspace(30.0, min(grown[-1], 1e4), 6)])
+        first = max(30.0, grown[np.argmin(np.abs(left - 1e-3 * abs(end.input)))])
+        parts = np.geomspace(first, min(grown[-1], 300.0 * first), 6)
+        k = np.unique([np.argmin(np.abs(np.log(grown / part))) for part in parts])
         u, y = inputs[k], size[k] ** (-1.0 / round(2 * power) * 2.0)
         terms = [np.delete(y, i) / (np.delete(y, i) - y[i]) for i in range(len(k))]
         at = float(sum(u[i] * np.prod(term) for i, term in enumerate(terms)))

@@ -137,7 +137,10 @@ def _limit(tracker: Tracker, trace: Trace, bad: float) -> MotionEvent:
         return MotionEvent("fold", good, step.group, step.links, 2, abs(bad - good), True, text)
     why = "its sliding directions become parallel" if step.code == codes.P_LINE else "two of its points coincide"
     if step.code == codes.P_LINE:
-        gone = escape_at(tracker.program, step, tracker.reach(source, at, good)[0], good, abs(bad - good), why)
+        pair = tracker.reach(source, at, good)[0]
+        sines = np.abs(pair.M[:, step_index])
+        cut = codes.PARALLEL * abs(good - float(pair.u[0])) / max(float(sines[0] - sines[1]), codes.PARALLEL)
+        gone = escape_at(tracker.program, step, pair, good, abs(bad - good) + cut, why)
         if gone is not None:
             return gone
     text = f"group {step.group} ({step.kind}, links {_list(step.links)}) has no place at the input {good:.12g}: {why}"
