@@ -127,6 +127,30 @@ def test_both_modes_of_a_dyad_are_mirror_images() -> None:
         assert ax * by - ay * bx > 0.0
 
 
+@pytest.mark.parametrize(("angle", "slot"), [(0.4, 1.2), (-1.1, 2.0), (2.2, 0.5)])
+def test_a_guide_on_the_crank_and_a_slanted_slot(angle: float, slot: float) -> None:
+    """The link keeps its angle to the crank, its origin stays on the guide, and the fixed pin in its own slot."""
+    graph = MechanismGraph(3, [(0, 1), (1, 2), (0, 2, 2)], frame=0)
+    rail, seat, pin, groove = 0.3 + 0.2j, 0.1 - 0.2j, 0.5 + 0.3j, 2.0 + 0.1j
+
+    def at(z: complex) -> tuple[float, float]:
+        return z.real, z.imag
+
+    joints = [
+        Revolute(0, 1),
+        Prismatic(1, 2, at(rail), at(seat), angle, 0.1),
+        PinSlot(2, 0, at(groove), at(pin), slot),
+    ]
+    u = np.linspace(0.2, 9.0, 40)
+    poses = simulate(Mechanism(graph, joints, [Driver(0, 1)]), u).poses
+    turn, own = np.exp(1j * u), np.exp(1j * poses[:, 2, 2])
+    np.testing.assert_allclose(poses[:, 2, 2], u + angle - 0.1, atol=1e-13)
+    origin = poses[:, 2, 0] + 1j * poses[:, 2, 1]
+    off = (origin + seat * own - rail * turn) * np.exp(-1j * angle) / turn
+    np.testing.assert_allclose(off.imag, 0.0, atol=1e-13)
+    np.testing.assert_allclose(((pin - origin - groove * own) / own * np.exp(-1j * slot)).imag, 0.0, atol=1e-13)
+
+
 def test_pin_in_slot_replaces_coupler_and_slider() -> None:
     """Scotch yoke by a pin in a slot: the yoke's displacement is the cosine of the crank angle."""
     graph = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import mpmath as mp
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.assembly_modes import assembly_modes, assembly_modes_batch
 from graphsynth.kinematics.drive import FourBarDrive
+from graphsynth.kinematics.kernels.leg import cross_sum
 from graphsynth.kinematics.leg import LegStatus, solve_leg
 from graphsynth.kinematics.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.kinematics.sextic import sextic
@@ -30,6 +32,16 @@ def circle(a, b):
 
 
 # --- inverse problem --------------------------------------------------------------------------------------------------
+
+
+def test_a_sum_of_two_products_that_cancel_keeps_its_digits():
+    """``a b + c d`` to a rounding or two of the result, and to the square of a rounding of the products."""
+    rng = np.random.default_rng(3)
+    for a, b, c, more in rng.uniform(0.5, 2.0, (4000, 4)):
+        d = -a * b / c * (1.0 + (more - 1.0) * 2.0 ** rng.integers(-50, 1))
+        exact = Fraction(a) * Fraction(b) + Fraction(c) * Fraction(d)
+        missed = abs(Fraction(cross_sum(a, b, c, d)) - exact)
+        assert missed <= 2 * Fraction(math.ulp(float(exact))) + Fraction(2) ** -102
 
 
 def bare(l1, l2):

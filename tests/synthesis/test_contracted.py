@@ -15,7 +15,15 @@ from networkx.algorithms.isomorphism import GraphMatcher, numerical_edge_match
 
 from graphsynth import MechanismGraph
 from graphsynth.errors import FormatError, TooLargeError
-from graphsynth.synthesis.contracted import SHIPPED_LOOPS, contracted_graphs, decode, encode, generate
+from graphsynth.synthesis.contracted import (
+    FOLDER_VARIABLE,
+    SHIPPED_LOOPS,
+    _layers,
+    contracted_graphs,
+    decode,
+    encode,
+    generate,
+)
 from graphsynth.synthesis.families import chain_families
 from graphsynth.synthesis.units import count_each
 
@@ -142,6 +150,21 @@ def test_a_list_of_other_loops_is_not_taken(monkeypatch, tmp_path):
     monkeypatch.setenv("GRAPHSYNTH_CONTRACTED", str(tmp_path))
     with pytest.raises(FormatError, match=r"contracted-9.xz: .*other numbers of loops than 9"):
         contracted_graphs(9, 4)
+
+
+def test_a_list_of_the_user_with_the_right_numbers_is_taken(tmp_path, monkeypatch):
+    """Two vertices with ten edges between them have nine loops; nine edges or eleven have not."""
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    for edges in (9, 10, 11):
+        _layers.cache_clear()
+        graph = np.array([[[0, edges], [edges, 0]]], np.uint8)
+        (tmp_path / "contracted-9.xz").write_bytes(encode({2: graph}))
+        if edges == 10:
+            np.testing.assert_array_equal(contracted_graphs(9, 2), graph)
+        else:
+            with pytest.raises(FormatError, match="other numbers of loops than 9"):
+                contracted_graphs(9, 2)
+    _layers.cache_clear()
 
 
 def test_more_loops_than_shipped_is_refused(monkeypatch):

@@ -43,6 +43,11 @@ def test_estimates_of_trusses_and_of_frames():
         count_chains(12, joints_by_mobility={2: 12})
 
 
+def test_without_anything_smaller_to_count_every_link_may_be_the_frame():
+    question = (11, 8, 1, 3, {})  # chains of nine loops less have no links
+    assert extrapolated(*question, framed=True) == pytest.approx(8 * extrapolated(*question), rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [

@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from time import perf_counter
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from graphsynth.jamming.coupled import (
 )
 from graphsynth.jamming.coupled.closure import joint_places, shifts
 from graphsynth.jamming.coupled.enclosure import Pieces, factor_bounds
-from graphsynth.jamming.coupled.pieces import Work
+from graphsynth.jamming.coupled.pieces import FEWEST, PARTS, Work
 from graphsynth.jamming.coupled.positions import Positions
 from graphsynth.jamming.coupled.problem import problem
 from graphsynth.jamming.coupled.slopes import slopes
@@ -210,7 +211,9 @@ def test_whole_turn_of_the_lambda_linkage():
 
 def test_allowed_misalignment_from_both_sides():
     exact = 0.012128793118312840120532205597449602345
+    begin = perf_counter()
     found = largest_scale(simulate(four_bar(), TURN), Bearing(), Misalignment(0, 1, 1 / 30), relative_gap=2e-4)
+    assert 0.0 < found.seconds < perf_counter() - begin
     assert found.low / 30 < exact < found.high / 30 * (1 + 1e-15)
     assert 0.0 < found.relative_gap < 2e-4 and not found.reason
     one = largest_scale(simulate(four_bar(), TURN), SPHERICAL, Misalignment(0, 1, 0.1))
@@ -292,6 +295,14 @@ def test_some_members_jam(fit, alpha, alpha_range, tolerance):
     exact = float(single_loop(points, limits, own.vector, (0.0, 0.0), 0.0, digits=16))
     assert 1.0 < one.factor <= exact * (1 + 1e-12) and one.factor == pytest.approx(exact, rel=1e-6)
     assert found.summary()["witness"]["factor"] == one.factor and repr(one.input) in found.reason
+
+
+def test_undecided_pieces_were_cut_at_least_once():
+    """All over this range some members jam and some do not; a first piece alone would be given up too early."""
+    fit, span = bearing_limits(Bearing(), clearance_tolerance=0.003), (1.2, 1.9)
+    found = certify_coupled(simulate(four_bar(), np.linspace(*span, 5)), fit, Misalignment(0, 1, 0.0120))
+    width = (found.high - found.low)[found.state == 0]
+    assert width.size and width.max() < (span[1] - span[0]) / FEWEST / PARTS * (1 + 1e-9)
 
 
 def test_what_no_member_decides():

@@ -22,7 +22,7 @@ from graphsynth.jamming.coupled import (
 )
 from graphsynth.jamming.coupled.closure import joint_places, shifts
 from graphsynth.jamming.coupled.enclosure import Pieces, lower_bounds, upper_bounds
-from graphsynth.jamming.coupled.exact import Neglected, neglected
+from graphsynth.jamming.coupled.exact import Neglected, _movements, neglected
 from graphsynth.jamming.coupled.pieces import Work
 from graphsynth.jamming.coupled.problem import problem
 from graphsynth.jamming.coupled.program import solve_poses
@@ -333,3 +333,29 @@ def test_a_box_without_a_single_assembly_is_not_sound():
     tight = problem(mechanism, JointLimits(0.02), Misalignment(0, 1, 0.4))
     assert not bounds_at(problem(mechanism, JointLimits(0.3), Misalignment(0, 1, 0.4)), motion)[1].sound.any()
     assert bounds_at(tight, motion)[1].r.max() > 0.0
+
+
+@pytest.mark.parametrize(("lengths", "u"), [((2, 1, 1.6, 1.5), 2.5), ((2, 1, 2.5, 2.5), 1.0), ((2, 1, 1.2, 1.0), 1.0)])
+def test_movements_that_lead_out_of_the_box_are_not_sound(lengths, u):
+    """The box is twice what is expected to first order: bounds of more say nothing, the equations may be regular."""
+    motion = simulate(four_bar(*lengths), [u, u + 1e-3])
+    given = problem(motion.mechanism, JointLimits(0.1), Misalignment(0, 1, 0.1))
+    work, at = Work(given, motion, 0.0), Interval.from_bounds(motion.inputs[:1], motion.inputs[:1])
+    x, rate = work.system.coordinates(motion.poses[:1], motion.velocities[:1])
+    counted = work.system.count(motion.poses[:1])
+    tubes = prove_tubes(work.system, given.layout.joints, at, x, rate, counted)
+
+    def moved(size):
+        offset = np.full((1, 4), size)
+        r, _, sound = _movements(work.system, given.layout, tubes, at, counted, offset, 0.0 * offset)
+        return r.max() / size, bool(sound[0])
+
+    first, sound = moved(1e-6)
+    assert sound
+    beyond = 0
+    for size in np.geomspace(0.01, 0.08, 8):
+        more, sound = moved(size)
+        if 3.0 * first < more < math.inf:
+            assert not sound
+            beyond += 1
+    assert beyond
