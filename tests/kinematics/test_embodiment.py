@@ -14,6 +14,9 @@ from graphsynth.errors import GeometryError, GraphError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.embodiment import Embodiment, Goals, embody
 from graphsynth.kinematics.embodiment.choice import choices
+from graphsynth.kinematics.embodiment.design import Design
+from graphsynth.kinematics.embodiment.problem import Problem
+from graphsynth.kinematics.embodiment.sketch import layout
 from graphsynth.kinematics.embodiment.transmission import GroupForm, group_forms, transmission_sines
 from graphsynth.kinematics.embodiment.verify import length_ratio, smallest_transmission, verify
 from graphsynth.mechanism.joints import Prismatic, Revolute
@@ -353,3 +356,27 @@ def test_bar_formula_of_a_triad_against_lengthened_bars() -> None:
 def test_drivers_that_are_none_are_refused(driver: object) -> None:
     with pytest.raises(GraphError):
         embody(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0), driver=driver)  # type: ignore[arg-type]
+
+
+class Still:
+    """Random numbers that are all 0."""
+
+    def normal(self, mean: float, deviation: float, shape: tuple[int, ...]) -> np.ndarray:
+        return np.zeros(shape)
+
+
+def test_driven_links_of_a_sketch_are_shrunk_toward_their_bearing() -> None:
+    """Joints of a crank stand at three tenths of their distance, in the same direction; all others stay."""
+    for graph in (chain for links in (4, 6) for chain in enumerate_chains(links)):
+        for inversion, drivers in choices(graph, None)[:2]:
+            design = Design(inversion, drivers, ("R",) * len(inversion.joints))
+            problem = object.__new__(Problem)
+            problem.design = design
+            before, after = layout(design.graph).positions, problem._sketch(Still())
+            own = np.zeros(len(before), dtype=bool)
+            for (base, link), joint in zip(design.drivers, design.driver_joints):
+                for k in design.joints_of(link) if base == design.graph.frame else ():
+                    np.testing.assert_allclose(after[k] - before[joint], 0.3 * (before[k] - before[joint]), atol=1e-12)
+                    own[k] = True
+            np.testing.assert_array_equal(after[~own], before[~own])
+            assert own.any() and not own.all()
