@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
-from itertools import accumulate
 from math import ceil
 from typing import TYPE_CHECKING
 
@@ -115,13 +114,10 @@ def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
     SpecError
         For i out of 1..m.
     """
-    from graphsynth.synthesis.shards import checked
+    from graphsynth.synthesis import shards
 
-    if shard is None or not tasks:
-        return tasks
-    i, m = checked(shard)
-    sums = list(accumulate(task.weight for task in tasks))
-    return [task for task, upto in zip(tasks, sums) if min(m, int((upto - task.weight / 2) / sums[-1] * m) + 1) == i]
+    own = shards.share_of([task.piece for task in tasks], shard)
+    return tasks[own.start : own.stop]
 
 
 def rows_of_task(task: Task) -> Rows:

@@ -1,7 +1,8 @@
 """Sharing the pieces of a problem out: runs of contracted graphs that cost about the same work.
 
-The work of a contracted graph is estimated from its critical sets, its symmetries and the number of its labellings;
-of a family of many graphs only some are looked at, and the others take the work of those alike.
+The work of a contracted graph is estimated from the number of its labellings and its symmetries (to list), from the
+states of its dynamic program (to count), or is the number of its chains (to make a catalogue); of a family of many
+graphs only some are looked at, and the others take the work of those alike.
 """
 
 from __future__ import annotations
@@ -17,16 +18,17 @@ from graphsynth.errors import SpecError
 from graphsynth.structure.variables import shown, whole
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.joined import count_fractionated
-from graphsynth.synthesis.kernels.counting import weigh_block
+from graphsynth.synthesis.kernels.counting import COUNTING, LISTING, MAKING, weigh_block
 from graphsynth.synthesis.problem import Handful, Piece
 from graphsynth.synthesis.units import Unit, estimates, workspace
 
-__all__ = ["checked", "shard_of", "works"]
+__all__ = ["shard_of", "share_of", "works"]
 
 Shard = tuple[int, int]
 Costs = NDArray[np.float64]
 _WEIGHED = 20_000  # contracted graphs of a problem whose work is estimated one by one
 _MADE = 1000.0  # work of a chain that is made one by one, as the kernel weighs
+_EFFORT = 10.0  # the same in chains of a catalogue
 
 
 def shard_of(pieces: Sequence[Piece], shard: Shard | None, *, listing: bool = True) -> list[Piece]:
@@ -48,8 +50,8 @@ def shard_of(pieces: Sequence[Piece], shard: Shard | None, *, listing: bool = Tr
     """
     if shard is None:
         return list(pieces)
-    i, m = checked(shard)
-    atoms = _atoms(tuple(pieces), listing)
+    i, m = _checked(shard)
+    atoms = _atoms(tuple(pieces), LISTING if listing else COUNTING)
     ends = np.cumsum([0, *map(len, atoms)])
     first, last = _run(np.concatenate([*atoms, np.zeros(0)]), i, m)
     return [
@@ -59,7 +61,21 @@ def shard_of(pieces: Sequence[Piece], shard: Shard | None, *, listing: bool = Tr
     ]
 
 
-def checked(shard: Shard) -> Shard:
+def share_of(pieces: Sequence[Piece], shard: Shard | None) -> range:
+    """Return which pieces are shard i of m of a catalogue: a run of whole ones.
+
+    Raises
+    ------
+    SpecError
+        For i out of 1..m.
+    """
+    if shard is None or not pieces:
+        return range(len(pieces))
+    costs = np.array([costs.sum() for costs in _atoms(tuple(pieces), MAKING)])
+    return range(*_run(costs, *_checked(shard)))
+
+
+def _checked(shard: Shard) -> Shard:
     """Return i and m of shard i of m; SpecError for i out of 1..m."""
     try:
         i, m = (whole(number, "shard", 1, 10**6) for number in shard)
@@ -104,7 +120,7 @@ def _ends(sums: Costs, most: float, m: int) -> list[int]:
 
 
 @lru_cache(maxsize=4)
-def _atoms(pieces: tuple[Piece, ...], listing: bool) -> list[Costs]:
+def _atoms(pieces: tuple[Piece, ...], purpose: int) -> list[Costs]:
     """Estimate the work of each piece, contracted graph by contracted graph where it may be cut."""
     graphs = sum(piece.stop - piece.start for piece in pieces if isinstance(piece, Unit))
     share = min(1.0, _WEIGHED / max(graphs, 1))
@@ -112,29 +128,30 @@ def _atoms(pieces: tuple[Piece, ...], listing: bool) -> list[Costs]:
     atoms = []
     for piece in pieces:
         if isinstance(piece, Handful):
-            atoms.append(np.array([_made(piece, listing)]))
+            atoms.append(np.array([_made(piece, purpose)]))
             continue
         if piece.symmetry:  # few labellings are searched; nobody knows how many
             atoms.append(np.ceil([piece.weight]))
             continue
         family = piece.family
         if family not in known:
-            known[family] = works(family, share, listing=listing or bool(family.levels))
+            known[family] = works(family, share, LISTING if family.levels and purpose == COUNTING else purpose)
         costs = known[family][piece.start : piece.stop]
         atoms.append(costs if piece.parts == 1 else np.ceil(costs / piece.parts))
     return atoms
 
 
-def _made(handful: Handful, listing: bool) -> float:
+def _made(handful: Handful, purpose: int) -> float:
     """Estimate the work of what is made one by one."""
-    if handful.kind == "rings" or not (listing or handful.restricted):
-        return 100.0
+    if handful.kind == "rings" or (purpose == COUNTING and not handful.restricted):
+        return _EFFORT if purpose == MAKING else 100.0
     numbers = handful.links, handful.mobility, handful.space, handful.higher
-    return 100.0 + _MADE * count_fractionated(*numbers, handful.framed)
+    count = count_fractionated(*numbers, handful.framed)
+    return _EFFORT * (1 + count) if purpose == MAKING else 100.0 + _MADE * count
 
 
-def works(family: Family, share: float, *, listing: bool) -> Costs:
-    """Estimate the work of each contracted graph of a family; look at a share of them."""
+def works(family: Family, share: float, purpose: int) -> Costs:
+    """Estimate the work of each contracted graph for LISTING, COUNTING or MAKING; look at a share of them."""
     bounds = estimates(family)
     graphs = family.graphs
     if not len(graphs):
@@ -147,7 +164,7 @@ def works(family: Family, share: float, *, listing: bool) -> Costs:
     chosen = order[rank % every == 0]  # of each kind the first, and every so many
     found = np.empty(len(chosen))
     alphabet = family.alphabet
-    weigh_block(family.vertices, graphs, chosen, listing, alphabet.tables, workspace(alphabet), found)
+    weigh_block(family.vertices, graphs, chosen, purpose, alphabet.tables, workspace(alphabet), found)
     found = np.where(found < 0, np.ceil(bounds[chosen]), found)
     per_kind = np.bincount(kinds[chosen], found, len(sizes)) / np.bincount(kinds[chosen], minlength=len(sizes))
     costs: Costs = np.rint(per_kind[kinds])  # whole numbers: sums are exact, and the same on every machine

@@ -20,14 +20,19 @@ from graphsynth.synthesis.kernels.layout import (
     GAINS,
     INDEX,
     KIND,
+    LABELS,
+    LABELS_END,
     NEED,
     ONES,
     PACKED,
+    REVERSE,
     SLOT,
     STAMP,
     SUM,
     TOP,
+    VAR,
     WAYS,
+    WEIGHT,
     U,
     V,
     glue,
@@ -46,6 +51,8 @@ from graphsynth.synthesis.kernels.variables import (
 FRAME_NONE, FRAME_VERTEX, FRAME_PATH = 1, 2, 4
 TOO_LARGE = -1
 NO_ROOM = -2
+LISTING, COUNTING, MAKING = range(3)  # what contracted graphs are wanted for
+STEPS = 17  # in work.state: words of states looked at
 _LIMIT = 2.0**62
 
 
@@ -95,6 +102,7 @@ def count_states(count, sets, tables, work):
     int
         The number, TOO_LARGE when the arithmetic does not suffice, or NO_ROOM when the workspace is too small.
     """
+    work.state[STEPS] = 0
     if sets == 0:
         return work.tables[WAYS, 0, tables.target]
     needs = (sets + 7) // 8
@@ -118,6 +126,7 @@ def count_states(count, sets, tables, work):
         work.state[1] += 1
         layer = work.state[1]
         fresh = np.int64(0)
+        work.state[STEPS] += states * needs * (work.variables[ENTRY, j + 1] - work.variables[ENTRY, j])
         for at in range(states):
             base = shift + at * words
             left = np.int64(work.keys[base + needs])
@@ -239,23 +248,90 @@ def count_block(k, mults, start, stop, frame_modes, frame_degree, tables, work, 
     return 0
 
 
-@kernel
-def weigh_block(k, mults, chosen, listing, tables, work, out):
-    """Estimate the work that contracted graphs cost, in microseconds or so; a whole number for each of ``chosen``.
+@inner
+def _least(e, others, turned, tables, work):
+    """Estimate how often the label of a class is at most those of ``others`` classes alike, and at most its reverse."""
+    kind = work.classes[KIND, e]
+    above = least = same = 0.0
+    for label in range(tables.kinds[LABELS_END, kind] - 1, tables.kinds[LABELS, kind] - 1, -1):
+        packed = tables.labels[PACKED, label]
+        if tables.labels[WEIGHT, label] < tables.space and fits(
+            tables.resources[DIGITS, tables.target], packed, tables.guard
+        ):
+            # the others are as free as if the first variable were this class
+            ways = float(work.tables[WAYS, 1, tables.target - tables.labels[INDEX, label]])
+            above += ways
+            least += ways * above**others
+            if tables.labels[REVERSE, label] == label:
+                same += ways
+    if above == 0.0:
+        return 1.0
+    return least / above ** (others + 1) * (0.5 + 0.5 * same / above if turned else 1.0)
 
-    Listing visits every labelling, which is counted here, and writes out one of each orbit; counting grows with the
-    critical sets and with the automorphisms.  A graph that is too large is given -1.
+
+@inner
+def _visited(order, m, tables, work):
+    """Estimate the share of the labellings that the search for the first of each orbit visits, see ``_lay_pairs``.
+
+    Some classes have the least label of all to which an automorphism takes them that moves no class before.
+    """
+    share = 1.0
+    for e in range(m):
+        work.classes[VAR, e] = 0  # of the classes to which this one is taken
+    for e in range(m):
+        others = np.int64(0)
+        turned = False
+        for i in range(1, order):
+            perm = work.perms[i]
+            first = np.int64(0)
+            while first < e and _stays(first, perm, work):
+                first += 1
+            if first < e or _stays(e, perm, work):
+                continue
+            image = work.class_of[perm[work.classes[U, e]], perm[work.classes[V, e]]]
+            if image == e:
+                turned = True
+            elif work.classes[VAR, image] <= e:
+                work.classes[VAR, image] = e + 1
+                others += 1
+        if others or turned:
+            share *= _least(e, others, turned, tables, work)
+    return max(share, 1.0 / order)
+
+
+@inner
+def _stays(e, perm, work):
+    """Tell whether a vertex permutation takes a class to itself, not reversed."""
+    a = perm[work.classes[U, e]]
+    b = perm[work.classes[V, e]]
+    return a < b and work.class_of[a, b] == e
+
+
+@kernel
+def weigh_block(k, mults, chosen, purpose, tables, work, out):
+    """Estimate the work that contracted graphs cost; a whole number for each of ``chosen``, in microseconds or so.
+
+    LISTING visits labellings and writes out one of each orbit, COUNTING lays out the variables of each automorphism and
+    steps through states; of MAKING the work is the number of chains.  A graph that is too large is given -1.
     """
     for i in range(chosen.shape[0]):
-        mult = mults[chosen[i]]
         out[i] = -1.0
-        order = automorphisms(k, mult, work.perms)
-        m, sets = load_graph(k, mult, tables, work)
+        order = automorphisms(k, mults[chosen[i]], work.perms)
+        m, sets = load_graph(k, mults[chosen[i]], tables, work)
         if order < 0 or sets < 0:
             continue
-        if not listing:
-            out[i] = np.floor(20.0 + (np.int64(1) << k) / 50.0 + 2.0 * sets * (sets + order))
+        fixed = 0.0
+        for g in range(order if purpose == MAKING else 1):
+            n = fixed_by(g, m, sets, tables, work)
+            fixed += n
+            if n < 0:
+                fixed = -1.0
+                break
+        if fixed < 0:
             continue
-        labellings = fixed_by(np.int64(0), m, sets, tables, work)
-        if labellings >= 0:
-            out[i] = np.floor(24.0 + labellings * (0.5 + 0.4 / order) * (14 + k) / 25.0)
+        if purpose == LISTING:
+            out[i] = np.floor(35.0 + fixed * _visited(order, m, tables, work) * (48 + k) / 60.0)
+        elif purpose == COUNTING:
+            out[i] = np.floor(12.0 + (np.int64(1) << k) / 100.0 + order * sets * m / 12.0 + work.state[STEPS] / 25.0)
+        else:
+            out[i] = np.floor(1.0 + fixed / order)

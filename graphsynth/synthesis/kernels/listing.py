@@ -66,6 +66,7 @@ from graphsynth.synthesis.kernels.variables import (
 
 # work.state: where the stream stands
 GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT, PART, PARTS, MET, WORDS = range(2, 17)
+VISITED = 18  # labellings met since ``rewind``, a measure of the work
 PREFIX = 5  # variables that number the parts of one contracted graph
 HEADER = 3  # columns of a row before the labels: graph, frame mode, frame
 
@@ -265,6 +266,7 @@ def _emit(k, symmetry, tables, work, rows, n):
     """Keep the current leaf if it is the first of its orbit; return the new number of rows."""
     st, classes, variables, labels = work.state, work.classes, work.variables, tables.labels
     m = st[CLASSES]
+    st[VISITED] += 1
     for e in range(m):
         label = variables[AT, classes[VAR, e]]
         if classes[FLIP, e]:
