@@ -59,7 +59,7 @@ def test_a_free_turn_is_proved_only_where_it_is_free_in_any_unit(rod):
             left = gap_of_a_turn(*(member * [l1, l2, l3, l4]), amplitude * l3, rod)
             assert True not in found or left > -1e-9
         proved, refused = proved + (True in found), refused + (left < 0.0)
-    assert proved > 50 and refused > 50
+    assert proved > 25 and refused > 25
     assert not turns_freely(ToleranceBox(1, 1, 2, 2, rod=rod), 0.0)  # the pin meets C: the rocker may have any angle
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from graphsynth.errors import GeometryError
 from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.platform.workspace import Workspace, constant_orientation_workspace
+from graphsynth.kinematics.platform.workspace import Workspace, _between, constant_orientation_workspace
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
 
@@ -240,3 +240,12 @@ def test_bad_input(keywords: dict[str, object], message: str) -> None:
         constant_orientation_workspace(G1, 0.0, **keywords)  # type: ignore[arg-type]
     with pytest.raises(GeometryError, match="alpha"):
         constant_orientation_workspace(G1, math.nan)
+
+
+@pytest.mark.parametrize("turns", [-2, 0, 3])
+@pytest.mark.parametrize("bounds", [(0.5, 1.5), (-0.4, 0.3), (6.0, 7.0)])
+@pytest.mark.parametrize("slack", [0.0, 0.1])
+def test_angles_between_bounds_with_equal_slack_on_both_sides(bounds, slack, turns):
+    low, high = bounds[0] - slack, bounds[1] + slack
+    for angle, inside in ((low - 1e-3, False), (low + 1e-3, True), (high - 1e-3, True), (high + 1e-3, False)):
+        assert _between(angle + turns * math.tau, bounds, slack) is inside
