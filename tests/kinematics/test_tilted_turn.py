@@ -5,6 +5,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from graphsynth.kinematics._turn import _margins
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
@@ -107,6 +108,15 @@ def test_a_dip_between_two_samples_is_seen(depth, rod):
         for angle in turn.limit_angles:
             assert abs(margins(linkage, mp.mpf(angle))[0]) < 1e-14
             assert abs(mp.mpf(angle) - f) < math.tau / 1440
+
+
+@pytest.mark.parametrize(("node", "tilt"), [(100, 0.5), (1000, -1.1)])
+def test_the_one_angle_of_an_immovable_linkage_is_told(node, tilt):
+    """The motor turned back by the angle of a sample, then tilted: stretched there, with a margin of rounding size."""
+    angle = node * math.tau / 1440
+    turned = (Rotation.from_rotvec([tilt, 0.0, 0.0]) * Rotation.from_rotvec([0.0, 0.0, -angle])).as_rotvec()
+    turn = LambdaLinkage(*STRETCHED, alpha=float(np.linalg.norm(turned)), axis=tuple(turned)).full_turn()
+    assert turn.kind == "immovable" and turn.limit_angles == pytest.approx([angle], abs=1e-9)
 
 
 def test_a_tilt_below_rounding_is_flat():
