@@ -151,6 +151,33 @@ def test_a_guide_on_the_crank_and_a_slanted_slot(angle: float, slot: float) -> N
     np.testing.assert_allclose(((pin - origin - groove * own) / own * np.exp(-1j * slot)).imag, 0.0, atol=1e-13)
 
 
+def test_a_link_that_slides_on_two_shafts() -> None:
+    """Oldham coupling with offset guides: the centre is where two lines meet; rates are differences of positions."""
+    lines = [((0.3, -0.2), (0.15, 0.1), 0.4), ((0.25, 0.35), (-0.2, 0.3), 1.7)]  # rail, seat, direction
+    pivots = [(0.1, 0.25), (0.7, -0.4)]
+    joints = [
+        Revolute(0, 1, pivots[0]),
+        Prismatic(1, 2, lines[0][0], lines[0][1], lines[0][2], 0.2),
+        Prismatic(2, 3, lines[1][1], lines[1][0], 0.2 + lines[1][2] - lines[0][2], lines[1][2]),
+        Revolute(0, 3, pivots[1]),
+    ]
+    mechanism = Mechanism(CYCLE, joints, [Driver(0, 1)])
+    u = np.linspace(0.0, 6.0, 13)
+    motion = simulate(mechanism, u)
+    assert motion.completed
+    step = 1e-4
+    moved = [simulate(mechanism, u + k * step).poses for k in (-1, 1)]
+    np.testing.assert_allclose(motion.velocities, (moved[1] - moved[0]) / (2 * step), atol=1e-6)
+    second = (moved[1] - 2.0 * motion.poses + moved[0]) / step**2
+    np.testing.assert_allclose(motion.accelerations, second, atol=1e-5)
+    own, turn = np.exp(1j * motion.poses[:, 2, 2]), np.exp(1j * u)
+    origin, at = motion.poses[:, 2, 0] + 1j * motion.poses[:, 2, 1], complex(*pivots[0])
+    rail, seat, angle = complex(*lines[0][0]), complex(*lines[0][1]), lines[0][2]
+    off = (origin + seat * own - at - rail * turn) / turn * np.exp(-1j * angle)
+    np.testing.assert_allclose(off.imag, 0.0, atol=1e-13)
+    np.testing.assert_allclose(motion.poses[:, 2, 2], u + angle - 0.2, atol=1e-13)
+
+
 def test_pin_in_slot_replaces_coupler_and_slider() -> None:
     """Scotch yoke by a pin in a slot: the yoke's displacement is the cosine of the crank angle."""
     graph = MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0)

@@ -11,6 +11,7 @@ import pytest
 from graphsynth.errors import GeometryError, UnitWarning
 from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.engine import codes
+from graphsynth.kinematics.engine.escapes import between
 from graphsynth.kinematics.engine.events import _touch
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear, Table
@@ -350,3 +351,11 @@ def test_a_fold_behind_a_group_that_is_lost() -> None:
     event = _touch(tracker, trace, (0, 1, 2), 0)
     assert event.kind == "fold" and event.ends_motion
     assert event.input == 0.0 and event.uncertainty == pytest.approx(1.2, abs=0.31)
+
+
+@pytest.mark.parametrize("span", [(0.0, 1.0), (-2.0, 0.0, 1.0)])
+def test_a_bisection_ends_where_no_double_lies_between_or_none_that_matters(span: tuple[float, ...]) -> None:
+    trace = SimpleNamespace(u=np.array(span))
+    assert between(trace, 0.25, 0.5) == 0.375 and between(trace, 1.0, math.nextafter(1.0, 2.0)) is None
+    width = 1e-18 * (span[-1] - span[0])
+    assert between(trace, 0.0, 0.9 * width) is None and between(trace, 0.0, 1.1 * width) is not None

@@ -153,6 +153,17 @@ class Interrupted(Exception):
     pass
 
 
+def test_a_complete_listing_is_kept_unless_it_is_to_be_replaced(tmp_path):
+    problem, path = Problem.chains(8, 1, 3, None, False, None), tmp_path / "listing.txt"
+    lines = write_listing(problem, path)
+    whole = read(path)
+    with pytest.raises(GraphsynthError, match="exists: name another file, or replace it with --force"):
+        write_listing(problem, path)
+    assert write_listing(problem, path, resume=True) == lines and read(path) == whole  # nothing is left to do
+    path.write_bytes(b"something else")
+    assert write_listing(problem, path, overwrite=True) == lines and read(path) == whole
+
+
 @pytest.mark.parametrize("stop", [1, 5, 11])
 @pytest.mark.parametrize("junk", [b"", b"half a li"])
 def test_a_resumed_listing_is_the_same_to_the_byte(tmp_path, stop, junk):
