@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from typing import Any
-
-import pytest
-from _pytest.doctest import DoctestModule
 from hypothesis import settings
 
 collect_ignore = ["mutation"]  # a program, not tests
@@ -16,10 +11,3 @@ collect_ignore = ["mutation"]  # a program, not tests
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("fresh", deadline=None, print_blob=True)
 settings.load_profile("fixed")
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_collect_file() -> Generator[None, list[Any], list[Any]]:
-    """Look for examples in docstrings of the package only: here it would import every test file a second time."""
-    found = yield
-    return [collector for collector in found if not isinstance(collector, DoctestModule)]

@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from graphsynth.arguments import Budget, Positive
 from graphsynth.errors import IntervalError
+from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving
 from graphsynth.intervals.compiled import pave_compiled
 from graphsynth.intervals.guard import check_rounding
@@ -83,9 +85,10 @@ def _settled(paving: Paving) -> bool:
     return paving.finished and not bool((paving.status == Status.UNDECIDED).any())
 
 
+@checked
 def pave_cells(
-    f: System, box: Any, parameters: Any, *, tolerance: float = 1e-6, smallest: float = 1e-3, cell_boxes: int = 200,
-    max_boxes: int = 100_000, max_seconds: float = 60.0,
+    f: System, box: Any, parameters: Any, *, tolerance: Positive = 1e-6, smallest: Positive = 1e-3,
+    cell_boxes: Budget = 200, max_boxes: Budget = 100_000, max_seconds: Budget = 60.0,
 ) -> CellPaving:  # fmt: skip
     """Find all solutions of ``f = 0`` in a box, cutting the parameters where a wide box of them proves nothing.
 
@@ -126,9 +129,6 @@ def pave_cells(
         raise IntervalError(
             f"the parameters {p!r} are not a vector of bounded intervals; give finite bounds, shape (m,)"
         )
-    for name, value in (("smallest", smallest), ("cell_boxes", cell_boxes), ("max_boxes", max_boxes)):
-        if not value > 0:
-            raise IntervalError(f"{name} = {value} must be positive; give a number above 0")
     begin, tested, finished = perf_counter(), 0, True
     scale = np.where(start.width > 0.0, start.width, 1.0).tolist()
     widths = np.where(p.width > 0.0, p.width, 1.0)

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.arguments import Budget, Positive
 from graphsynth.errors import IntervalError
+from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
@@ -27,6 +29,7 @@ _DEPTH, _KEPT = 256, 64
 _NO_PARAMETERS = np.zeros(0)
 
 
+@checked
 def compiled_system(function: Callable[..., bool]) -> Any:
     """Compile a system for `pave_compiled`; a decorator.
 
@@ -47,9 +50,10 @@ def compiled_system(function: Callable[..., bool]) -> Any:
     return system(function)
 
 
+@checked
 def pave_compiled(
-    system: Any, box: Any, parameters: Any = None, *, tolerance: float = 1e-6, scale: Sequence[float] | None = None,
-    max_boxes: int = 1_000_000, max_seconds: float = 60.0,
+    system: Any, box: Any, parameters: Any = None, *, tolerance: Positive = 1e-6, scale: Sequence[float] | None = None,
+    max_boxes: Budget = 1_000_000, max_seconds: Budget = 60.0,
 ) -> Paving:  # fmt: skip
     """Find all solutions of a compiled system in a box.
 
@@ -104,7 +108,7 @@ def pave_compiled(
     from graphsynth.intervals.kernels import paving
 
     begin = perf_counter()
-    start, sizes = _posed(box, tolerance, scale, max_boxes, max_seconds)
+    start, sizes = _posed(box, tolerance, scale)
     p = read_parameters(parameters)
     pl, ph = (_NO_PARAMETERS, _NO_PARAMETERS) if p is None else (_row(p.lo), _row(p.hi))
     n = start.size
@@ -128,16 +132,11 @@ def _row(values: Array) -> Array:
     return np.array(values, dtype=np.float64).reshape(-1)
 
 
-def _posed(
-    box: Any, tolerance: float, scale: Sequence[float] | None, max_boxes: float, max_seconds: float
-) -> tuple[Interval, Array]:
+def _posed(box: Any, tolerance: float, scale: Sequence[float] | None) -> tuple[Interval, Array]:
     """Check a question; returns the start box and the widths that are small enough."""
     start = interval(box)
     if start.ndim != 1 or start.size == 0 or not start.is_bounded.all():
         raise IntervalError(f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)")
-    for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
-        if not value > 0:
-            raise IntervalError(f"{name} = {value} must be positive; give a number above 0")
     size = np.asarray(start.hi - start.lo if scale is None else scale, dtype=np.float64)
     if size.shape != start.shape or not np.isfinite(size).all() or (size < 0.0).any():
         raise IntervalError(f"scale {scale!r} must hold {start.size} positive numbers")

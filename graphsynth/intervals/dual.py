@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from graphsynth.errors import IntervalError
+from graphsynth.errors import GraphsynthError, IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
 
-__all__ = ["Dual", "jacobian", "jacobian_of", "values_of", "variables"]
+__all__ = ["Dual", "evaluate", "jacobian", "jacobian_of", "values_of", "variables"]
 
 
 class Dual:
@@ -83,6 +83,8 @@ class Dual:
         return Dual(value, -(value / self.value) * self.grad)
 
     def __pow__(self, exponent: int) -> Dual:
+        if not isinstance(exponent, int | np.integer):
+            raise IntervalError(f"exponent {exponent!r} is not an integer; use exp(b * log(a)) for other powers")
         if exponent == 0:
             return self.chain(self.value**0, Interval(0))
         if exponent == 2:
@@ -129,6 +131,31 @@ def variables(box: Interval) -> list[Dual]:
     for i in range(n):
         unit[i, i] = 1.0
     return [Dual(box[..., i], _make(unit[i], unit[i])) for i in range(n)]
+
+
+def evaluate(
+    f: Callable[..., Sequence[Any]], x: Sequence[Any], parameters: Interval | None, shape: tuple[int, ...]
+) -> Sequence[Any]:
+    """Return the equations at unknowns of a shape; parameters of shape (m,) or that shape + (m,)."""
+    if not callable(f):
+        raise IntervalError(f"the system {f!r} cannot be called; give a function that returns equations")
+    if parameters is not None and (parameters.ndim == 0 or parameters.shape[:-1] not in ((), shape)):
+        raise IntervalError(
+            f"parameters of shape {parameters.shape} do not fit boxes of shape {shape}; give (m,) or a row for each"
+        )
+    values = () if parameters is None else ([parameters[..., j] for j in range(parameters.shape[-1])],)
+    try:
+        results = f(x, *values)
+    except GraphsynthError:
+        raise
+    except Exception as error:
+        raise IntervalError(
+            f"the system cannot be evaluated with intervals ({error}); write it with operators and the functions of "
+            "graphsynth.intervals, as f(x), or f(x, p) if there are parameters"
+        ) from error
+    if not isinstance(results, Sequence | np.ndarray | Interval):
+        raise IntervalError(f"the system returns {results!r}; it must return a list of equations, one for each unknown")
+    return results
 
 
 def values_of(results: Sequence[Any], shape: tuple[int, ...]) -> Interval:
@@ -180,13 +207,8 @@ def jacobian(f: Callable[..., Sequence[Any]], box: Any, parameters: Any = None) 
     """
     check_rounding()
     boxes = interval(box)
-    unknowns = variables(boxes)
-    if parameters is None:
-        results = f(unknowns)
-    else:
-        p = interval(parameters)
-        results = f(unknowns, [p[..., j] for j in range(p.shape[-1])])
-    shape = boxes.shape[:-1]
+    unknowns, shape = variables(boxes), boxes.shape[:-1]
+    results = evaluate(f, unknowns, None if parameters is None else interval(parameters), shape)
     return values_of(results, shape), jacobian_of(results, boxes.shape[-1], shape)
 
 

@@ -24,6 +24,7 @@ from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, Decoration, decimal_
 __all__ = ["Decoration", "Interval"]
 
 Array = NDArray[np.float64]
+_MOST = int(np.finfo(np.float64).max)
 Mask = NDArray[np.bool_]
 Flags = NDArray[np.uint8]
 
@@ -141,17 +142,17 @@ class Interval(Measures):
     @classmethod
     def empty(cls, shape: int | tuple[int, ...] = ()) -> Interval:
         """Empty intervals."""
-        return _make(np.full(shape, np.inf), np.full(shape, -np.inf))
+        return _full(shape, np.inf, -np.inf)
 
     @classmethod
     def entire(cls, shape: int | tuple[int, ...] = ()) -> Interval:
         """Intervals over the whole line."""
-        return _make(np.full(shape, -np.inf), np.full(shape, np.inf))
+        return _full(shape, -np.inf, np.inf)
 
     @classmethod
     def zeros(cls, shape: int | tuple[int, ...] = ()) -> Interval:
         """Point intervals at 0."""
-        return _make(np.zeros(shape), np.zeros(shape))
+        return _full(shape, 0.0, 0.0)
 
     @classmethod
     def stack(cls, parts: Iterable[Interval], axis: int = 0) -> Interval:
@@ -191,14 +192,35 @@ class Interval(Measures):
         return (self[k] for k in range(len(self)))
 
     def reshape(self, *shape: int) -> Interval:
-        """Return the same intervals in another shape."""
-        flags = self.flags if self.flags.ndim == 0 else self.flags.reshape(*shape)
-        return _make(self.lo.reshape(*shape), self.hi.reshape(*shape), flags)
+        """Return the same intervals in another shape.
+
+        Raises
+        ------
+        IntervalError
+            A shape of another size.
+        """
+        try:
+            lo, hi = self.lo.reshape(*shape), self.hi.reshape(*shape)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise IntervalError(
+                f"{self.size} intervals do not fit shape {shape} ({error}); give one of as many"
+            ) from None
+        return _make(lo, hi, self.flags if self.flags.ndim == 0 else self.flags.reshape(*shape))
 
     def sum(self, axis: int | None = None) -> Interval:
-        """Sum along an axis (all axes for None), added in order, so independent of threads."""
+        """Sum along an axis (all axes for None), added in order, so independent of threads.
+
+        Raises
+        ------
+        IntervalError
+            An axis that there is not.
+        """
         if axis is None:
             return self.reshape(-1).sum(0)
+        if not isinstance(axis, int | np.integer) or not -self.ndim <= axis < self.ndim:
+            raise IntervalError(
+                f"axis = {axis!r} is none of the {self.ndim} axes of shape {self.shape}; give one, or None"
+            )
         moved = [np.moveaxis(a, axis, 0) for a in (self.lo, self.hi)]
         total = Interval.zeros(moved[0].shape[1:])
         for lo, hi in zip(*moved):
@@ -288,7 +310,7 @@ class Interval(Measures):
             A number that is negative or not finite.
         """
         for name, value in (("relative", relative), ("absolute", absolute)):
-            if not isinstance(value, int | float | np.number) or not 0.0 <= value < np.inf:
+            if not isinstance(value, int | float | np.number) or not 0.0 <= value <= _MOST:
                 raise IntervalError(f"{name} = {value!r} must be a finite number of zero or more; correct the value")
         radius = self.rad
         radius = np.where(np.isfinite(radius), radius, 0.0)  # an infinite end stays where it is, the empty set too
@@ -408,6 +430,15 @@ def _make(lo: ArrayLike, hi: ArrayLike, flags: Flags = NO_FLAGS) -> Interval:
     result = Interval.__new__(Interval)
     _fill(result, np.asarray(lo, dtype=np.float64).view(), np.asarray(hi, dtype=np.float64).view(), flags)
     return result
+
+
+def _full(shape: int | tuple[int, ...], lo: float, hi: float) -> Interval:
+    try:
+        return _make(np.full(shape, lo), np.full(shape, hi))
+    except (TypeError, ValueError, OverflowError, MemoryError) as error:
+        raise IntervalError(
+            f"shape = {str(shape)[:60]} cannot be one ({error}); give whole numbers, zero or more"
+        ) from None
 
 
 def interval(value: Any) -> Interval:

@@ -15,7 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from graphsynth.arguments import Count
 from graphsynth.errors import IntervalError
+from graphsynth.intervals._checks import checked
 from graphsynth.intervals.functions import divide_extended
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
@@ -116,7 +118,8 @@ def _tighten(residual: Interval, rest: Interval, D: Interval) -> Interval:
     return D
 
 
-def gauss_seidel(matrix: Any, right: Any, box: Any, *, rounds: int = _ROUNDS) -> LinearResult:
+@checked
+def gauss_seidel(matrix: Any, right: Any, box: Any, *, rounds: Count = _ROUNDS) -> LinearResult:
     """Cut away parts of a box that hold no solution of ``A x = b``; works for singular matrices too.
 
     Every row is solved for its diagonal unknown with the two-piece quotient, so a divisor that contains 0 may still cut

@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.arguments import Budget, Count, Positive
 from graphsynth.errors import FormatError, IntervalError
+from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving, Progress
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
@@ -77,10 +79,11 @@ class Search:
     (['UNIQUE', 'UNIQUE'], True)
     """
 
+    @checked
     def __init__(
-        self, f: System, box: Any, parameters: Any = None, *, tolerance: float = 1e-6,
-        scale: Sequence[float] | None = None, max_boxes: int = 100_000, max_seconds: float = 60.0,
-        inner: Sequence[int] | None = None, batch: int = 2048, progress: Callable[[Progress], None] | None = None,
+        self, f: System, box: Any, parameters: Any = None, *, tolerance: Positive = 1e-6,
+        scale: Sequence[float] | None = None, max_boxes: Budget = 100_000, max_seconds: Budget = 60.0,
+        inner: Sequence[int] | None = None, batch: Count = 2048, progress: Callable[[Progress], None] | None = None,
     ) -> None:  # fmt: skip
         check_rounding()
         start = interval(box)
@@ -88,9 +91,6 @@ class Search:
             raise IntervalError(
                 f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)"
             )
-        for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
-            if not value > 0:
-                raise IntervalError(f"{name} = {value} must be positive")
         self.f, self.start, self.progress = f, start, progress
         self.parameters = read_parameters(parameters)
         self.tolerance, self.max_boxes, self.max_seconds, self.batch = tolerance, max_boxes, max_seconds, batch
@@ -99,7 +99,10 @@ class Search:
             raise IntervalError(f"scale {scale!r} must hold {start.size} positive numbers")
         self.scale = np.where(size > 0.0, size, 1.0)
         self.inner_by = None if inner is None else list(inner)
-        if self.inner_by is not None and (self.parameters is None or len(self.inner_by) != start.size):
+        given = 0 if self.parameters is None else self.parameters.size
+        if self.inner_by is not None and not (
+            len(self.inner_by) == start.size and all(-given <= j < given for j in self.inner_by)
+        ):
             raise IntervalError(f"inner = {inner!r} must name as many parameters as there are equations, {start.size}")
         n = start.size
         none = np.zeros((0, n))
@@ -139,6 +142,7 @@ class Search:
         inner = np.concatenate([s["inner"], np.zeros(count, dtype=np.bool_)])
         return Paving(_make(lo, hi), status, _make(dlo, dhi), inner, count == 0, self.tested, self.seconds)
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write the state to an ``.npz`` file of plain arrays."""
         meta = np.array([_FORMAT, self.tested, self.batch], dtype=np.int64)
@@ -149,6 +153,7 @@ class Search:
                 **{key: self._state[key] for key in _ARRAYS},  # type: ignore[arg-type]
             )  # fmt: skip
 
+    @checked
     def load(self, path: str | Path) -> Search:
         """Go on from a saved state of the same search; returns the search itself.
 

@@ -19,8 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.arguments import Count
 from graphsynth.errors import IntervalError
-from graphsynth.intervals.dual import jacobian_of, values_of, variables
+from graphsynth.intervals._checks import checked
+from graphsynth.intervals.dual import evaluate, jacobian_of, values_of, variables
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.status import Status
@@ -122,20 +124,9 @@ def _inverse(matrices: Array) -> tuple[Array, Mask]:
     return np.where(fine[:, None, None], inverse, np.eye(n)), ~fine
 
 
-def evaluate(f: System, x: Sequence[Any], parameters: Interval | None) -> Sequence[Any]:
-    """Return the equations at ``x``; parameters of shape (m,) or (N, m)."""
-    if not callable(f):
-        raise IntervalError(f"the system {f!r} cannot be called; give a function that returns equations")
-    values = () if parameters is None else ([parameters[..., j] for j in range(parameters.shape[-1])],)
-    try:
-        results = f(x, *values)
-    except TypeError as error:
-        raise IntervalError(
-            f"the system cannot be evaluated with intervals ({error}); write it with operators and the functions of "
-            "graphsynth.intervals, as f(x), or f(x, p) if there are parameters"
-        ) from error
-    if not isinstance(results, Sequence | np.ndarray | Interval):
-        raise IntervalError(f"the system returns {results!r}; it must return a list of equations, one for each unknown")
+def _square(f: System, x: Sequence[Any], parameters: Interval | None, shape: tuple[int, ...]) -> Sequence[Any]:
+    """Return the equations at ``x``, as many as there are unknowns."""
+    results = evaluate(f, x, parameters, shape)
     if len(results) != len(x):
         raise IntervalError(
             f"the system returns {len(results)} equations for {len(x)} unknowns; Krawczyk's test needs as many"
@@ -183,18 +174,18 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
     ['UNIQUE', 'EMPTY']
     """
     check_rounding()
-    boxes = interval(boxes)
+    boxes, parameters = interval(boxes), None if parameters is None else interval(parameters)
     if boxes.ndim != 2:
         raise IntervalError(f"boxes of shape {boxes.shape} are no list of boxes; give shape (N, n)")
     count, n = boxes.shape
     shape = (count,)
     with np.errstate(all="ignore"):
-        duals = evaluate(f, variables(boxes), parameters)
+        duals = _square(f, variables(boxes), parameters, shape)
         over, slopes = values_of(duals, shape), jacobian_of(duals, n, shape)
         z = boxes.mid
         z = np.where(np.isfinite(z), z, 0.0)
         centre = _make(z, z)
-        at = values_of(evaluate(f, [centre[:, i] for i in range(n)], parameters), shape)
+        at = values_of(_square(f, [centre[:, i] for i in range(n)], parameters, shape), shape)
         Y, singular = _inverse(slopes.mid)
         real = _make(Y, Y)
         rest = _make(np.eye(n), np.eye(n)) - matmul(real, slopes)
@@ -245,8 +236,9 @@ def spectral_radius(factor: Array) -> float:
     return float(np.abs(np.linalg.eigvals(factor)).max(initial=0.0))
 
 
+@checked
 def krawczyk(
-    f: System, box: Any, parameters: Any = None, *, rounds: int = _ROUNDS, inflate: bool = True
+    f: System, box: Any, parameters: Any = None, *, rounds: Count = _ROUNDS, inflate: bool = True
 ) -> KrawczykResult:
     """Decide whether a box holds a solution of ``f = 0``, with proof.
 

@@ -247,7 +247,10 @@ def _bound(value: Any, side: int) -> Array:
     if isinstance(value, np.floating) and not np.isfinite(value):
         return np.asarray(float(value))
     if (isinstance(value, Sequence) and not isinstance(value, str)) or (isinstance(value, np.ndarray) and value.ndim):
-        return np.array([_bound(item, side) for item in value], dtype=np.float64)
+        try:
+            return np.array([_bound(item, side) for item in value], dtype=np.float64)
+        except ValueError:
+            raise IntervalError("the rows of bounds have different lengths; give a full array") from None
     lo, hi, _ = read_points(value)
     return hi if side else lo
 

@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.errors import GeometryError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.areas_enclosed import enclose_lid_area, enclose_rim_area, enclose_surrogate_areas
 from graphsynth.jamming.bearing import Bearing
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics._checks import checked, finite_array
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ class AreaCurve:
         return pd.DataFrame(columns)
 
 
-@takes(linkage="LambdaLinkage")
+@checked
 def enclose_tilt_sine(linkage: LambdaLinkage, f: ArrayLike | Interval) -> Interval:
     """Enclose the sine of the tilt of the coupler, ``A_z / l3``.
 
@@ -127,7 +126,7 @@ def _points(f: ArrayLike) -> Interval:
     return Interval.from_bounds(angles, angles)
 
 
-@takes(linkage="LambdaLinkage")
+@checked
 def area_curve(
     linkage: LambdaLinkage | None = None, bearing: Bearing | None = None, f: ArrayLike | None = None
 ) -> AreaCurve:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing
+from graphsynth.kinematics._checks import checked, finite_array
 
 __all__ = [
     "CrescentAreas", "ellipse_circle", "ellipse_circle_stable", "lid_area", "lid_crossing", "rim_area", "rim_crossing",
@@ -69,7 +69,7 @@ def ellipse_circle(R1: ArrayLike, a: ArrayLike, b: ArrayLike) -> CrescentAreas:
     >>> round(ellipse_circle(5.0, 6.0, 4.0).circle_only.item(), 9)
     11.487371022
     """
-    R1, a, b = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (R1, a, b)))
+    R1, a, b = _alike(R1=R1, a=a, b=b)
     if not bool(np.all((a >= b) & (b > 0.0) & (R1 > 0.0))):
         raise GeometryError("an ellipse needs semi-axes a >= b > 0 and the circle a radius R1 > 0")
     crossing = (b < R1) & (a > R1)
@@ -100,7 +100,7 @@ def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> Cresce
     >>> print(f"{ellipse_circle_stable(1.0, 1e-9, 1e-9).ellipse_only.item():.14e}")
     1.99999999842920e-09
     """
-    R1, pa, qb = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (R1, pa, qb)))
+    R1, pa, qb = _alike(R1=R1, pa=pa, qb=qb)
     if not bool(np.all((R1 > 0.0) & (qb < R1) & (pa + qb >= 0.0))):
         raise GeometryError("an ellipse needs semi-axes a >= b > 0: qb < R1 and pa + qb >= 0 with R1 > 0")
     a, b = R1 + pa, R1 - qb
@@ -122,6 +122,16 @@ def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> Cresce
     return CrescentAreas(ell, cir)
 
 
+def _alike(**given: ArrayLike) -> list[Array]:
+    """Return arrays of numbers, NaN among them, spread to one shape."""
+    arrays = {name: finite_array(name, values, nan=True) for name, values in given.items()}
+    try:
+        return list(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise GeometryError(f"the shapes do not fit each other: {shapes}; give as many of each, or one") from None
+
+
 def _tilts(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
     """Return sine (without sign) and cosine of the tilt, of one shape."""
     if bearing.clearance < 0.0:
@@ -129,11 +139,11 @@ def _tilts(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array,
             f"clearance = {bearing.clearance} is negative: an interference fit has no free position to measure an "
             "area from"
         )
-    S, C = np.broadcast_arrays(np.abs(np.asarray(sine, dtype=np.float64)), np.asarray(cosine, dtype=np.float64))
-    return S, C
+    S, C = _alike(sine=sine, cosine=cosine)
+    return np.abs(S), C
 
 
-@takes(bearing="Bearing")
+@checked
 def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> CrescentAreas:
     """Free gap and interference of the centred surrogate ellipse E4 (section 5.1), mm^2.
 
@@ -172,7 +182,7 @@ def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, 
     return np.asarray((q * thin - ring) * _segment(s1) + p * q * _segment_difference(dl, s1 + s2))
 
 
-@takes(bearing="Bearing")
+@checked
 def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     """A_lid: disc of radius R outside one lid of the tilted hole (condition B, section 5.4), mm^2.
 
@@ -196,7 +206,7 @@ def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     return np.asarray(np.where(missed, disc, np.minimum(area, disc)) + 0.0 * (S + C))
 
 
-@takes(bearing="Bearing")
+@checked
 def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     """A_rim: rim of the tilted bearing outside the disc of radius Rh (condition A, section 5.4), mm^2.
 
@@ -231,7 +241,7 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
     return np.asarray(area + 0.0 * (S + C)), quadrature
 
 
-@takes(bearing="Bearing")
+@checked
 def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
     """Crossing point of the disc of radius R and the near side of one lid (condition B, section 5.4), mm.
 
@@ -260,7 +270,7 @@ def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[
     return np.where(there, -X, np.nan), np.where(there, y, np.nan)
 
 
-@takes(bearing="Bearing")
+@checked
 def rim_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
     """Crossing point of the rim of the tilted bearing and the hole (condition A, section 5.4), mm.
 

@@ -19,7 +19,7 @@ from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.table import JammingTable, table_over
 from graphsynth.jamming.tilt_arcs import JamArcs, jam_arcs
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.kinematics._checks import checked, finite_array
 from graphsynth.kinematics._turn import FullTurn
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
 
 __all__ = ["JammingReport", "JammingTable", "assess_jamming"]
+
+_MOST_SAMPLES = 10_000_000
 
 Array = NDArray[np.float64]
 
@@ -161,6 +163,7 @@ def assess_jamming(
 ) -> CoupledReport: ...
 
 
+@checked
 def assess_jamming(
     subject: LambdaLinkage | Motion | None = None,
     bearing: Bearings | None = None,
@@ -346,8 +349,11 @@ def _notes(arcs: JamArcs, turn: FullTurn, table: JammingTable, certificate: JamC
 
 def _angles(samples: int | ArrayLike) -> Array:
     if isinstance(samples, int | np.integer):
-        if samples < 2:
-            raise GeometryError(f"samples = {samples} is too few for a table; give 2 or more, or an array of angles")
+        if not 2 <= samples <= _MOST_SAMPLES:
+            few = "few" if samples < 2 else "many"
+            raise GeometryError(
+                f"samples = {samples} is too {few} for a table; give 2 to {_MOST_SAMPLES}, or an array of angles"
+            )
         return np.linspace(0.0, math.tau, int(samples))
     return np.atleast_1d(finite_array("samples", samples))
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import numbers
-from graphsynth.kinematics._checks import check_fields, choice, finite, positive
+from graphsynth.kinematics._checks import check_fields, choice, finite, finite_array, positive
 
 __all__ = ["CONDITIONS", "Bearing", "Condition", "CriticalTilt"]
 
@@ -131,7 +130,7 @@ class Bearing:
             Short bearing in a long hole, long shaft in a short hole, pin of height Hb in a hole of ``hole_length``.
         """
         half = self._hole_half(condition)
-        S, C = np.abs(numbers("sine", sine)), numbers("cosine", cosine)
+        S, C = np.abs(finite_array("sine", sine, nan=True)), finite_array("cosine", cosine, nan=True)
         if condition == "B":
             return self._gap_b(S, C, self.h)
         gap = np.where(self.Rb * S <= self.h * C, self._gap_a(S, C), self._saturated())

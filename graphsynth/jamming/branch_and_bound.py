@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.arguments import Budget, Count
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.kinematics._checks import checked
+from graphsynth.mechanism.checks import called
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Dual, Interval
@@ -59,15 +61,15 @@ class Supremum:
     seconds: float = field(default=0.0, compare=False)
 
 
-@takes(box="Interval")
+@checked
 def maximise(
     function: Callable[[Sequence[Dual]], Dual],
     box: Interval,
     *,
     tolerance: float = 0.0,
     decide_sign: bool = False,
-    max_boxes: int = 200_000,
-    max_seconds: float = math.inf,
+    max_boxes: Count = 200_000,
+    max_seconds: Budget = math.inf,
     tried: Interval | None = None,
 ) -> Supremum:
     """Enclose the largest value of a function over a box.
@@ -110,9 +112,11 @@ def maximise(
 
     begin = perf_counter()
     check_rounding()
-    if not bool(box.is_bounded.all()):
-        raise GeometryError("the box of a search must be bounded and not empty; give finite bounds")
-    search = _Search(function, box, box if tried is None else tried)
+    tried = box if tried is None else tried
+    for name, given in (("box", box), ("tried", tried)):
+        if given.ndim != 1 or given.shape != box.shape or not bool(given.is_bounded.all()):
+            raise GeometryError(f"{name} = {given!r} must be a vector of bounded intervals, one for each variable")
+    search = _Search(function, box, tried)
     while search.waiting() and search.boxes < max_boxes and perf_counter() - begin < max_seconds:
         if search.settled(tolerance, decide_sign):
             break
@@ -174,12 +178,20 @@ class _Search:
         keep = self.bound > self.best
         self.lo, self.hi, self.bound = self.lo[keep], self.hi[keep], self.bound[keep]
 
-    def _evaluate(self, lo: Array, hi: Array) -> tuple[Array, Array, Array]:
-        from graphsynth.intervals import Interval, variables
+    def _value(self, lo: Array, hi: Array) -> tuple[Interval, Interval | None]:
+        """Return the function over boxes and, where it gives them, its derivatives."""
+        from graphsynth.intervals import Dual, Interval, variables
 
-        found = self.function(variables(Interval.from_bounds(lo, hi)))
+        found: Any = called("the function", self.function, variables(Interval.from_bounds(lo, hi)))
+        if isinstance(found, Dual):
+            return found.value, found.grad
+        if not isinstance(found, Interval):
+            raise GeometryError(f"the function returns {found!r}; write it with operators: it returns a Dual")
+        return found, None
+
+    def _evaluate(self, lo: Array, hi: Array) -> tuple[Array, Array, Array]:
+        value, grad = self._value(lo, hi)
         self.boxes += len(lo)
-        value, grad = (found.value, found.grad) if hasattr(found, "grad") else (found, None)
         top = np.where(np.broadcast_to(value.is_empty, (len(lo),)), -np.inf, np.broadcast_to(value.hi, (len(lo),)))
         if grad is None:
             unknown = np.full(lo.shape, np.inf)
@@ -191,13 +203,10 @@ class _Search:
         return top.copy(), np.where(broken, -np.inf, low), np.where(broken, np.inf, high)
 
     def _points(self, points: Array) -> None:
-        from graphsynth.intervals import Interval, variables
-
         points = np.clip(points, self.tried.lo, self.tried.hi)
         around = self.tried.width <= 2.0 * np.spacing(self.tried.mag)  # neighbouring doubles: the range lies between
         lo, hi = np.where(around, self.tried.lo, points), np.where(around, self.tried.hi, points)
-        found = self.function(variables(Interval.from_bounds(lo, hi)))
-        value: Any = found.value if hasattr(found, "grad") else found
+        value = self._value(lo, hi)[0]
         low = np.where(value.is_empty | ~value.guaranteed, -np.inf, value.lo)
         low = np.broadcast_to(low, (len(points),))
         top = int(low.argmax())
@@ -271,7 +280,7 @@ def _either(switch: Dual, low: Dual, high: Dual) -> Dual:
     return Dual(pick(low.value, high.value), pick(low.grad, high.grad))
 
 
-@takes(box="ToleranceBox")
+@checked
 def largest_gap(box: ToleranceBox, condition: Condition = "A", **options: Any) -> Supremum:
     """Enclose the largest gap (mm) over a turn and a tolerance box by branch and bound.
 

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.errors import GeometryError
 from graphsynth.jamming.certified_arcs import CertifiedArcs, Enclosure
 from graphsynth.jamming.circle_sets import covers, meets
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,6 +105,7 @@ class JamCertificate:
 
         return statement(self)
 
+    @checked
     def over(self, start: float, stop: float) -> Verdict:
         """Return what is proved about a part of the turn: from ``start`` counter-clockwise to ``stop``, radians.
 
@@ -122,9 +123,6 @@ class JamCertificate:
         >>> found.over(-0.4, 0.4).name, found.over(0.4, 1.0).name, found.over(6.0, 0.4).name
         ('CERTIFIED_FREE', 'CERTIFIED_JAMMED', 'CERTIFIED_FREE')
         """
-        for name, value in (("start", start), ("stop", stop)):
-            if not math.isfinite(value):
-                raise GeometryError(f"{name} = {value} is not finite; give crank angles in radians")
         if self.verdict is Verdict.CANNOT_ASSEMBLE or stop - start >= math.tau:
             return self.verdict
         length = (stop - start) % math.tau if stop < start else stop - start

@@ -15,7 +15,6 @@ from fractions import Fraction
 from time import perf_counter
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certificate import JamCertificate
 from graphsynth.jamming.certify import certify_jamming
@@ -24,6 +23,7 @@ from graphsynth.jamming.inverse import largest_height, largest_misalignment, sma
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.ranges import Range
 from graphsynth.jamming.verdict import Verdict
+from graphsynth.kinematics._checks import checked
 
 __all__ = [
     "CertifiedLimit", "certified_largest_height", "certified_largest_misalignment", "certified_smallest_clearance",
@@ -71,7 +71,7 @@ class CertifiedLimit:
         return abs(self.fails - self.works) / max(abs(self.fails), abs(self.works), 5e-324)
 
 
-@takes(box="ToleranceBox")
+@checked
 def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A") -> CertifiedLimit:
     """Largest tilt alpha of the motor axis (radians) that leaves the turn free, whatever the other parameters.
 
@@ -113,7 +113,7 @@ def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A"
     return _bracket(box.replace(alpha="1/100"), condition, propose, at, milder, (0.0, 1.5), "rad", 1, "-works to works")
 
 
-@takes(box="ToleranceBox")
+@checked
 def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") -> CertifiedLimit:
     """Smallest radial clearance (mm) that leaves the turn free, whatever the other parameters.
 
@@ -149,7 +149,7 @@ def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") 
     return _bracket(box.replace(clearance=0), condition, propose, at, at, (0.0, top), "mm", -1, "works and more")
 
 
-@takes(box="ToleranceBox")
+@checked
 def certified_largest_height(box: ToleranceBox, condition: Condition = "A") -> CertifiedLimit:
     """Largest height Hb (mm) that leaves the turn free, whatever the other parameters.
 

@@ -7,13 +7,13 @@ from fractions import Fraction
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certificate import JamCertificate, Witness
 from graphsynth.jamming.certified_arcs import Enclosure, arcs_from, no_arcs, whole_turn
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.ranges import Range, exact_text
 from graphsynth.jamming.verdict import Verdict
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
@@ -24,7 +24,7 @@ _ANGLES = 64  # angles of the turn tried as positions of a jam
 _PIECES = 256  # pieces of the turn on which assembly is proved
 
 
-@takes(box="ToleranceBox")
+@checked
 def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertificate:
     """Prove whether the bearing at B jams while the crank makes a turn, for all parameters of a box.
 

@@ -9,16 +9,19 @@ of a few runs, warm.  Measured figures: ``docs/explanation/bearing-jamming.md`` 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
+from graphsynth.arguments import Count, Positive
 from graphsynth.errors import GeometryError
 from graphsynth.jamming.bearing import Bearing, Condition
 from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.jamming.ranges import Range
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,8 +47,6 @@ class ErrorRow(NamedTuple):
 
 def _timed(run: Callable[[], _Result], repeats: int) -> tuple[_Result, float]:
     """Return the result of the last run and the shortest time."""
-    if repeats < 1:
-        raise GeometryError(f"repeats = {repeats} is too few; give at least 1")
     run()  # compiled and loaded
     times = []
     for _ in range(repeats):
@@ -55,12 +56,13 @@ def _timed(run: Callable[[], _Result], repeats: int) -> tuple[_Result, float]:
     return result, min(times)
 
 
+@checked
 def crossing_errors(
     problem: CircleEllipse | None = None,
-    boxes: Iterable[int] = (30, 100, 200, 300, 400, 500, 2000, 20_000),
+    boxes: Sequence[Count] = (30, 100, 200, 300, 400, 500, 2000, 20_000),
     *,
     general: bool = True,
-    repeats: int = 5,
+    repeats: Count = 5,
 ) -> list[ErrorRow]:
     """Enclose the crossing of a circle and an ellipse: how much wider than the exact solution set, and how fast.
 
@@ -68,7 +70,7 @@ def crossing_errors(
     ----------
     problem : CircleEllipse, optional
         By default the bearing of the source at its worst pose, without tolerances (its solution set is one point).
-    boxes : iterable of int
+    boxes : sequence of int
         Limits on the boxes of Krawczyk's method; those beyond the end of the search are left out.
     general : bool
         With the general solver of `graphsynth.intervals` on the same equations (for a problem without tolerances).
@@ -123,12 +125,13 @@ def _paved(problem: CircleEllipse) -> Interval:
     return Interval.from_bounds(found.boxes.lo.min(axis=0), found.boxes.hi.max(axis=0))
 
 
+@checked
 def area_errors(
     bearing: Bearing | None = None,
     sine: str = WORST_SINE,
-    counts: Iterable[int] = (16, 64, 250, 1000, 4000),
+    counts: Sequence[Count] = (16, 64, 250, 1000, 4000),
     *,
-    repeats: int = 5,
+    repeats: Count = 5,
 ) -> list[ErrorRow]:
     """Compute the free gap of the surrogate ellipse, which the source plots: how exactly, and how fast.
 
@@ -138,7 +141,7 @@ def area_errors(
         That of the source by default; its dimensions are read as the decimals they print as.
     sine : str
         Sine of the tilt, a decimal; the curves must cross.
-    counts : iterable of int
+    counts : sequence of int
         Corners of the polygons and boxes of the interval shoelace sums.
     repeats : int
         Runs of each, the shortest counts.
@@ -163,7 +166,7 @@ def area_errors(
     from graphsynth.jamming.areas_enclosed import enclose_surrogate_areas
     from graphsynth.jamming.shoelace import crescent_boxes, interval_shoelace
 
-    bearing, S = bearing or Bearing(), float(sine)
+    bearing, S = bearing or Bearing(), Range.read("sine", sine).middle
     R, c, h = repr(bearing.Rb), repr(bearing.clearance), repr(bearing.h)
     C = math.sqrt((1.0 - S) * (1.0 + S))
     a, b = bearing.Rh, bearing.Rh * C - bearing.h * S
@@ -212,13 +215,14 @@ def _exact_gap_area(R: str, c: str, h: str, sine: str) -> float:
         return float(2 * (a * b * mpmath.atan2(a * y, b * x) - r * r * mpmath.atan2(y, x)))
 
 
+@checked
 def arc_errors(
     box: ToleranceBox | None = None,
     condition: Condition = "A",
-    resolutions: Iterable[float] = (1e-1, 1e-2, 1e-4, 1e-6, 1e-9, 1e-12),
-    samples: Iterable[int] = (100, 1000, 10_000, 100_000),
+    resolutions: Sequence[Positive] = (1e-1, 1e-2, 1e-4, 1e-6, 1e-9, 1e-12),
+    samples: Sequence[Count] = (100, 1000, 10_000, 100_000),
     *,
-    repeats: int = 3,
+    repeats: Count = 3,
 ) -> list[ErrorRow]:
     """Find where the bearing begins and ceases to jam: total length of what stays open in a turn, and how fast.
 
@@ -229,9 +233,9 @@ def arc_errors(
         go to zero: part of the turn jams for some parameters and not for others.
     condition : {"A", "B", "general"}
         Contact condition.
-    resolutions : iterable of float
+    resolutions : sequence of float
         Of the sweep by interval kinematics, radians.
-    samples : iterable of int
+    samples : sequence of int
         Numbers of crank angles looked at in double precision; only without tolerances, as samples prove nothing.
     repeats : int
         Runs of each, the shortest counts.
@@ -274,6 +278,7 @@ def _sign_changes(box: ToleranceBox, condition: Condition, count: int) -> int:
     return int((jams[1:] != jams[:-1]).sum())
 
 
+@checked
 def error_table(groups: Mapping[str, Sequence[ErrorRow]]) -> pd.DataFrame:
     """Return rows of several questions as one table: question, method, setting, error, seconds.
 

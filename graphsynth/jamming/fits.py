@@ -13,12 +13,12 @@ from fractions import Fraction
 from typing import Any
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certify import certify_jamming
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.ranges import Given, Range
 from graphsynth.jamming.verdict import Verdict
+from graphsynth.kinematics._checks import checked
 
 __all__ = ["STANDARD_FITS", "Fit", "FitVerdict", "assess_fits", "tightest_free_fit"]
 
@@ -58,6 +58,7 @@ STANDARD_FITS = (
 )  # fmt: skip
 
 
+@checked
 @dataclass(frozen=True)
 class Fit:
     """Limits of one fit at one nominal diameter, exact, in millimetres.
@@ -125,6 +126,7 @@ class Fit:
         r = self.nominal / 2
         return Range(r + self.shaft.lower / 2, r + self.shaft.upper / 2, self.hole.exact)
 
+    @checked
     def pair(self, loosest: bool) -> tuple[Fraction, Fraction]:
         """Return radius and clearance of the pair with the most or the least clearance."""
         if loosest:
@@ -169,7 +171,7 @@ class FitVerdict:
         }  # fmt: skip
 
 
-@takes(box="ToleranceBox")
+@checked
 def assess_fits(
     box: ToleranceBox, condition: Condition = "A", fits: tuple[str, ...] = STANDARD_FITS, diameter: Given | None = None
 ) -> list[FitVerdict]:
@@ -201,8 +203,6 @@ def assess_fits(
     >>> [v.fit.name for v in assess_fits(ToleranceBox(alpha="1/300")) if v.verdict.is_free][:2]
     ['H7/f7', 'H8/f7']
     """
-    if not isinstance(fits, tuple | list):
-        raise GeometryError(f"fits = {fits!r} is no list of names; give names such as H7/g6")
     if diameter is None:
         diameter = box["Rb"].lower + box["Rb"].upper
     return [_assess(box, condition, Fit.read(name, diameter)) for name in fits]
@@ -220,7 +220,7 @@ def _assess(box: ToleranceBox, condition: Condition, fit: Fit) -> FitVerdict:
     return FitVerdict(fit, Verdict.CERTIFIED_JAMMED_FOR_SOME if jams else Verdict.UNDECIDED, left)
 
 
-@takes(box="ToleranceBox")
+@checked
 def tightest_free_fit(
     box: ToleranceBox, condition: Condition = "A", fits: tuple[str, ...] = STANDARD_FITS, diameter: Given | None = None
 ) -> FitVerdict | None:

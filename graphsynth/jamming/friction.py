@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certified_arcs import Enclosure
 from graphsynth.jamming.parameters import ToleranceBox
 from graphsynth.jamming.ranges import Given, Range
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
@@ -58,7 +58,7 @@ class WedgingReport:
     reason: str = ""
 
 
-@takes(box="ToleranceBox")
+@checked
 def wedging(box: ToleranceBox, friction: Given, condition: Condition = "A") -> WedgingReport:
     """Decide whether two-point contact can wedge for an interval of friction coefficients (section 8.1 and 8.2).
 
@@ -166,6 +166,7 @@ class Region(Enum):
     UNDECIDED = "undecided: the load touches the border at this resolution"
 
 
+@checked
 @dataclass(frozen=True)
 class InsertionDiagram:
     """Whitney's jamming diagram of a peg in a hole: a parallelogram in the plane of ``Fx / Fz`` and ``M / (r Fz)``.

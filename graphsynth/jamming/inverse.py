@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing, Condition
 from graphsynth.jamming.verdict import METHOD_CLOSED_FORM
+from graphsynth.kinematics._checks import checked
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
 __all__ = ["Limit", "largest_height", "largest_misalignment", "smallest_clearance"]
@@ -26,7 +26,7 @@ class Limit:
     method: str = METHOD_CLOSED_FORM
 
 
-@takes(linkage="LambdaLinkage", bearing="Bearing")
+@checked
 def largest_misalignment(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Largest alpha (radians) for which the whole turn is free; None if every alpha is free, or none.
 
@@ -80,7 +80,7 @@ def _tilt(linkage: LambdaLinkage) -> tuple[float, float]:
     return sine, math.cos(angle)
 
 
-@takes(linkage="LambdaLinkage", bearing="Bearing")
+@checked
 def smallest_clearance(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Smallest radial clearance (mm) for which the whole turn is free, for the radius and height of ``bearing``.
 
@@ -120,7 +120,7 @@ def smallest_clearance(linkage: LambdaLinkage, bearing: Bearing, condition: Cond
     return Limit(h * S - R * S * S / (1.0 + C))
 
 
-@takes(linkage="LambdaLinkage", bearing="Bearing")
+@checked
 def largest_height(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Largest height Hb (mm) for which the whole turn is free, for the radius and clearance of ``bearing``.
 

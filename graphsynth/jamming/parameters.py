@@ -80,11 +80,9 @@ class ToleranceBox:
         rod: str = "rigid",
         convention: str = "spec",
     ) -> None:
-        if isinstance(axis, str) or not hasattr(axis, "__len__") or len(axis) != 3:
-            raise GeometryError(f"axis = {axis!r} is not a direction; give three components")
         given = {"l1": l1, "l2": l2, "l3": l3, "l4": l4, "alpha": alpha, "azimuth": azimuth}
         given |= {"Rb": Rb, "Hb": Hb, "clearance": clearance}
-        given |= {f"n{i + 1}": part for i, part in enumerate(axis)}
+        given |= _components(axis)
         if hole_length is not None:
             given["hole_length"] = hole_length
         ranges = {name: Range.read(name, given[name]) for name in PARAMETERS if name in given}
@@ -117,7 +115,7 @@ class ToleranceBox:
 
     def __getitem__(self, name: str) -> Range:
         """Return the range of a parameter by its name (see `PARAMETERS`)."""
-        if name not in self._ranges:
+        if not isinstance(name, str) or name not in self._ranges:
             raise GeometryError(f"{name!r} is no parameter of this box; it has {', '.join(self._ranges)}")
         return self._ranges[name]
 
@@ -146,7 +144,7 @@ class ToleranceBox:
             if name in options:
                 options[name] = value
             elif name == "axis":
-                r |= {f"n{i + 1}": part for i, part in enumerate(value)}
+                r |= _components(value)
             elif name in PARAMETERS:
                 r[name] = value
             else:
@@ -191,6 +189,12 @@ class ToleranceBox:
     def describe(self) -> dict[str, str]:
         """Ranges as text, for reports."""
         return {name: str(value) for name, value in self._ranges.items()}
+
+
+def _components(axis: Any) -> dict[str, Any]:
+    if isinstance(axis, str) or not hasattr(axis, "__len__") or len(axis) != 3:
+        raise GeometryError(f"axis = {axis!r} is not a direction; give three components")
+    return {f"n{i}": part for i, part in enumerate(axis, start=1)}
 
 
 def _check(ranges: dict[str, Range]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from graphsynth.errors import GeometryError
 from graphsynth.intervals.reading import fraction, text_ends
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
@@ -37,6 +38,7 @@ def bounds_of(value: Fraction) -> tuple[float, float]:
     return math.nextafter(nearest, -math.inf), nearest
 
 
+@checked
 @dataclass(frozen=True)
 class Range:
     """All values from ``lower`` to ``upper``, both exact.
@@ -170,7 +172,8 @@ def spread(nominal: Given, absolute: Given = 0, relative: Given = 0) -> Range:
     >>> str(spread("0.0130", relative="1e-2"))
     '[0.01287, 0.01313]'
     """
-    value, plus, factor = (Range.read("nominal", v) for v in (nominal, absolute, relative))
+    given = {"nominal": nominal, "absolute": absolute, "relative": relative}
+    value, plus, factor = (Range.read(name, v) for name, v in given.items())
     if plus.lower < 0 or factor.lower < 0:
         raise GeometryError(f"a tolerance of {plus} or {factor} is negative; give zero or more")
     low = min(end * (1 - sign * factor.upper) for end in (value.lower, value.upper) for sign in (1, -1))

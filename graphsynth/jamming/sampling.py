@@ -14,11 +14,12 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.arguments import Count
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.certify import certify_jamming
 from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.kinematics._checks import checked
 
 __all__ = ["Samples", "sample_gaps"]
 
@@ -72,8 +73,8 @@ class Samples:
         return self.bound - max(self.largest_gap, self.corner_gap)
 
 
-@takes(box="ToleranceBox")
-def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_000, seed: int = 0) -> Samples:
+@checked
+def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: Count = 200_000, seed: int = 0) -> Samples:
     """Draw parameter vectors and crank angles, search the corners, and compare with the certified bound.
 
     Parameters
@@ -106,9 +107,7 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: int = 200_
     >>> seen.jamming_mechanisms_range[1] < 0.002
     True
     """
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise GeometryError(f"count = {count!r} must be a positive integer; 200000 is usual")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+    if seed < 0:
         raise GeometryError(f"seed = {seed!r} must be a whole number of zero or more")
     begin = perf_counter()
     bound = certify_jamming(box, condition).largest_gap.hi

@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.arguments import Budget, Count, Real
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Condition
 from graphsynth.jamming.circle_sets import TURN_HIGH, Span, total_length
 from graphsynth.jamming.parameters import ToleranceBox
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
@@ -79,13 +80,14 @@ class TurnPartition:
         return total_length(self.undecided) / math.tau
 
 
+@checked
 def sweep_turn(
     gap: Callable[[Interval], PieceGap],
     *,
-    resolution: float = 1e-6,
-    first: int = 256,
-    max_pieces: int = 200_000,
-    max_seconds: float = math.inf,
+    resolution: Real = 1e-6,
+    first: Count = 256,
+    max_pieces: Count = 200_000,
+    max_seconds: Budget = math.inf,
 ) -> TurnPartition:
     """Partition the turn by the sign of a gap function given in intervals.
 
@@ -124,11 +126,6 @@ def sweep_turn(
 
     begin = perf_counter()
     check_rounding()
-    if not callable(gap):
-        raise GeometryError(f"gap = {gap!r} cannot be called; give a function of pieces of the turn")
-    for name, value in (("resolution", resolution), ("max_pieces", max_pieces), ("max_seconds", max_seconds)):
-        if not isinstance(value, int | float | np.number):
-            raise GeometryError(f"{name} = {value!r} must be a number; correct the value")
     if not resolution >= 1e-15:
         raise GeometryError(f"resolution = {resolution} must be at least 1e-15; 1e-6 rad is usual")
     edges = np.linspace(0.0, TURN_HIGH, first + 1)
@@ -186,14 +183,14 @@ def _joined(
     return [tuple(part) for part in spans]
 
 
-@takes(box="ToleranceBox")
+@checked
 def sweep_linkage(
     box: ToleranceBox,
     condition: Condition = "A",
     *,
-    resolution: float = 1e-6,
-    max_pieces: int = 200_000,
-    max_seconds: float = math.inf,
+    resolution: Real = 1e-6,
+    max_pieces: Count = 200_000,
+    max_seconds: Budget = math.inf,
 ) -> TurnPartition:
     """Partition the turn of a lambda linkage (any four-bar) by interval kinematics, for all parameters of a box.
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing, Condition
 from graphsynth.jamming.verdict import METHOD_CLOSED_FORM
+from graphsynth.kinematics._checks import checked
 from graphsynth.kinematics.lambda_linkage import LambdaLinkage
 
 __all__ = ["Arc", "JamArcs", "jam_arcs"]
@@ -15,6 +15,7 @@ __all__ = ["Arc", "JamArcs", "jam_arcs"]
 _ROUNDING = 16 * 2.0**-52
 
 
+@checked
 @dataclass(frozen=True)
 class Arc:
     """An open arc of crank angles (radians): from ``start`` in [0, 2 pi) counter-clockwise over ``length``."""
@@ -27,6 +28,7 @@ class Arc:
         """End of the arc, at least ``start``; may exceed 2 pi when the arc wraps around."""
         return self.start + self.length
 
+    @checked
     def contains(self, f: float) -> bool:
         """Return True if the crank angle ``f`` (radians, any turn) lies inside the arc."""
         return 0.0 < math.fmod(math.fmod(f - self.start, math.tau) + math.tau, math.tau) < self.length
@@ -59,7 +61,7 @@ class JamArcs:
     reason: str = ""
 
 
-@takes(linkage="LambdaLinkage", bearing="Bearing")
+@checked
 def jam_arcs(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> JamArcs:
     """Jam arcs of the bearing at B over one turn of the crank (section 7.1).
 

@@ -2,93 +2,20 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import operator
-from collections.abc import Callable
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import check_fields, check_largest, check_sizes, finite
+from graphsynth.mechanism.checks import check_fields, check_largest, check_sizes, checked, finite
 
 __all__ = [
     "check_fields", "check_largest", "check_sizes", "checked", "choice", "finite", "finite_array", "plane_point",
     "positive", "sign", "three", "three_points", "together", "triple", "triples", "unit_vector", "whole",
 ]  # fmt: skip
-
-
-P = ParamSpec("P")
-R = TypeVar("R")
-
-#: Classes of the package that public functions take; an annotation that names one is kept by `checked`.
-_OWN = {
-    "Braider", "DynamicModel", "DynamicMotion", "EngineSettings", "ExudynSettings", "Mechanism", "MechanismGraph",
-    "MotorDrivenPlatform", "MujocoSettings", "ParallelPlatform", "PistonMachine", "SingleMotorPlatform", "StartReport",
-    "Sweep", "Tribometer",
-}  # fmt: skip
-
-
-def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function keep what its annotations say: a `GeometryError` names the argument that is something else.
-
-    Kept are classes of the package, ``float`` (finite), ``int`` and ``ArrayLike`` (numbers, NaN among them), each
-    also with ``| None``; other annotations are left to the function.
-
-    Examples
-    --------
-    >>> @checked
-    ... def half(size: float) -> float:
-    ...     return size / 2
-    >>> half("x")
-    Traceback (most recent call last):
-        ...
-    graphsynth.errors.GeometryError: size = 'x' is not a real number; give a finite one
-    """
-    signature = inspect.signature(function)
-    kinds = {
-        name: set(str(parameter.annotation).split(" | "))
-        for name, parameter in signature.parameters.items()
-        if isinstance(parameter.annotation, str)
-    }
-
-    @wraps(function)
-    def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        for name, value in signature.bind(*args, **kwargs).arguments.items():
-            _keep(name, value, kinds.get(name, set()))
-        return function(*args, **kwargs)
-
-    return call
-
-
-def _keep(name: str, value: Any, kinds: set[str]) -> None:
-    """Raise `GeometryError` unless a value is of one of the kinds."""
-    if value is None and "None" in kinds:
-        return
-    own = kinds & _OWN
-    if own:
-        if not own & {base.__name__ for base in type(value).__mro__}:
-            names = " or ".join(sorted(own))
-            raise GeometryError(f"{name} is {type(value).__name__}, not a {names}; give one")
-    elif "ArrayLike" in kinds:
-        _numbers(name, value)
-    elif kinds - {"None"} == {"float"}:
-        finite(name, value)
-    elif kinds - {"None"} == {"int"}:
-        whole(name, value, -(2**63), 2**63)
-
-
-def _numbers(name: str, value: Any) -> None:
-    """Raise `GeometryError` unless a value is an array of real or complex numbers."""
-    try:
-        kind = np.asarray(value).dtype.kind
-    except (TypeError, ValueError) as error:
-        raise GeometryError(f"{name} is not an array of numbers: {error}") from error
-    if kind not in "biufc":
-        raise GeometryError(f"{name} = {str(value)[:60]!r} is not an array of numbers; give finite ones")
 
 
 def positive(name: str, value: Any, *, zero: bool = False) -> float:

@@ -7,6 +7,7 @@ import operator
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from graphsynth.arguments import checker
 from graphsynth.errors import GeometryError, GraphsynthError
 
 __all__ = [
@@ -17,11 +18,41 @@ __all__ = [
     "check_fields",
     "check_largest",
     "check_sizes",
+    "checked",
     "finite",
     "link_number",
     "nonzero",
     "point",
 ]
+
+_CLASSES = [
+    "Bearing",
+    "Braider",
+    "CircleEllipse",
+    "DynamicModel",
+    "DynamicMotion",
+    "EngineSettings",
+    "ErrorRow",
+    "ExudynSettings",
+    "Fraction",
+    "Interval",
+    "LambdaLinkage",
+    "Mechanism",
+    "MechanismGraph",
+    "MotorDrivenPlatform",
+    "MujocoSettings",
+    "ParallelPlatform",
+    "PistonMachine",
+    "Range",
+    "Reading",
+    "SingleMotorPlatform",
+    "StartReport",
+    "Sweep",
+    "ToleranceBox",
+    "Tribometer",
+]
+#: Lets a function keep what its annotations say; a `GeometryError` names the argument that is something else.
+checked = checker(GeometryError, _CLASSES, {"Condition": "str"})
 
 Point = tuple[float, float]
 Size = float | complex | None

@@ -7,11 +7,12 @@ which solved poses are substituted, and the matrix whose rank is the mobility.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 
 __all__ = ["jacobian", "residual"]
@@ -26,6 +27,24 @@ def _place(pose: Array, link: int, local: tuple[float, float]) -> tuple[Complex,
     return pose[..., link, 0] + 1j * pose[..., link, 1] + arm, arm
 
 
+def _read(joints: Iterable[JointGeometry], poses: ArrayLike) -> tuple[list[JointGeometry], Array]:
+    """Return joints and poses that fit each other."""
+    try:
+        found = list(joints)
+        most = max((max(joint.a, joint.b) for joint in found), default=0)
+    except (TypeError, AttributeError) as error:
+        raise GeometryError(f"joints = {str(joints)[:60]} is no list of joints ({error}); give one") from error
+    try:
+        pose = np.asarray(poses, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise GeometryError(
+            f"poses hold something that is no number ({error}); give x, y and angle of each link"
+        ) from error
+    if pose.ndim < 2 or pose.shape[-1] != 3 or pose.shape[-2] <= most:
+        raise GeometryError(f"poses of shape {pose.shape} do not fit joints of links 0 to {most}; give (..., links, 3)")
+    return found, pose
+
+
 def residual(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
     """Constraint violations at ``poses`` (..., links, 3), shape (..., rows), in lengths.
 
@@ -38,7 +57,7 @@ def residual(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
     >>> residual([Revolute(0, 1, at_a=(1.0, 0.0))], [[0, 0, 0], [1, 2, 0.3]]).tolist()
     [0.0, 2.0]
     """
-    pose = np.asarray(poses, dtype=np.float64)
+    joints, pose = _read(joints, poses)
     rows: list[Array] = []
     for joint in joints:
         d = _place(pose, joint.b, joint.at_b)[0] - _place(pose, joint.a, joint.at_a)[0]
@@ -83,7 +102,7 @@ def jacobian(joints: Sequence[JointGeometry], poses: ArrayLike) -> Array:
 
     Angular rows (sliding pairs) are those of the plain angle equation, in radians.
     """
-    pose = np.asarray(poses, dtype=np.float64)
+    joints, pose = _read(joints, poses)
     count = sum(3 - joint.mobility for joint in joints)
     J = np.zeros((*pose.shape[:-2], count, 3 * pose.shape[-2]))
     row = 0

@@ -13,6 +13,7 @@ from dataclasses import fields
 from typing import Any, TypeVar
 
 from graphsynth.errors import FormatError, GeometryError
+from graphsynth.mechanism.checks import checked
 from graphsynth.mechanism.joints import KINDS, JointGeometry
 from graphsynth.mechanism.laws import LAWS, Linear
 from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
@@ -32,6 +33,7 @@ TOML_MAX = 400_000
 _T = TypeVar("_T")
 
 
+@checked
 def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     """Return plain lists, numbers and texts that describe a mechanism.
 
@@ -75,6 +77,7 @@ def _law_dict(driver: Driver) -> dict[str, Any]:
     return {"kind": kind, **_plain(law)}
 
 
+@checked
 def to_json(mechanism: Mechanism) -> str:
     """Write JSON, indented, with a final line end.
 
@@ -90,6 +93,7 @@ def to_json(mechanism: Mechanism) -> str:
     return json.dumps(to_dict(mechanism), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+@checked
 def to_toml(mechanism: Mechanism) -> str:
     """Write TOML: one table per joint, driver and point.
 
@@ -126,6 +130,8 @@ def _toml(value: Any) -> str:
 
 
 def _decoded(text: str | bytes, most: int, name: str) -> str:
+    if not isinstance(text, str | bytes):
+        raise FormatError(f"{type(text).__name__} is neither text nor bytes; give the content of a file")
     if len(text) > most:
         raise FormatError(f"{len(text)} characters; a mechanism in {name} is read up to {most}", "length")
     return text_of(text)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import Point, finite, link_number, nonzero, point
+from graphsynth.mechanism.checks import Point, checked, finite, link_number, nonzero, point
 
 __all__ = ["COLUMNS", "Cam", "Gear", "JointGeometry", "PinSlot", "Prismatic", "Revolute"]
 
@@ -192,6 +192,7 @@ class Cam(_Pair):
         waves[1 : len(self.harmonics) + 1] = [complex(c / unit, -s / unit) / 2.0 for c, s in self.harmonics]
         return float(np.fft.irfft(waves, norm="forward").min()) * unit
 
+    @checked
     def pitch_radius(self, psi: float) -> tuple[float, float, float]:
         """Radius of the pitch curve at ``psi`` (radians from ``angle_a``) and its first two derivatives."""
         value, first, second = self.radius, 0.0, 0.0

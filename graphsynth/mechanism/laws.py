@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
 from graphsynth.mechanism.checks import finite
@@ -40,8 +40,9 @@ class Linear:
         object.__setattr__(self, "rate", finite("rate", self.rate))
         object.__setattr__(self, "offset", finite("offset", self.offset))
 
-    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+    def __call__(self, u: ArrayLike) -> tuple[Array, Array, Array]:
         """Coordinate and derivatives."""
+        u = _inputs(u)
         return self.offset + self.rate * u, np.full_like(u, self.rate), np.zeros_like(u)
 
 
@@ -59,8 +60,9 @@ class Harmonic:
         for name in ("mean", "amplitude", "order", "phase"):
             object.__setattr__(self, name, finite(name, getattr(self, name)))
 
-    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+    def __call__(self, u: ArrayLike) -> tuple[Array, Array, Array]:
         """Coordinate and derivatives."""
+        u = _inputs(u)
         angle = self.order * u + self.phase
         wave = self.amplitude * np.sin(angle)
         return self.mean + wave, self.order * self.amplitude * np.cos(angle), -(self.order**2) * wave
@@ -77,9 +79,9 @@ class Polynomial:
         values = _numbers("coefficients", self.coefficients, 1)
         object.__setattr__(self, "coefficients", values)
 
-    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+    def __call__(self, u: ArrayLike) -> tuple[Array, Array, Array]:
         """Coordinate and derivatives."""
-        p = np.polynomial.Polynomial(self.coefficients)
+        u, p = _inputs(u), np.polynomial.Polynomial(self.coefficients)
         first, second = p.deriv(1), p.deriv(2)
         return np.asarray(p(u)), np.asarray(first(u)) + 0.0 * u, np.asarray(second(u)) + 0.0 * u
 
@@ -112,9 +114,18 @@ class Table:
 
         return CubicSpline(self.inputs, self.values, bc_type="natural", extrapolate=False)
 
-    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+    def __call__(self, u: ArrayLike) -> tuple[Array, Array, Array]:
         """Coordinate and derivatives."""
+        u = _inputs(u)
         return (np.asarray(self._spline(u)), np.asarray(self._spline(u, 1)), np.asarray(self._spline(u, 2)))
+
+
+def _inputs(u: ArrayLike) -> Array:
+    """Return inputs as floats, NaN among them."""
+    try:
+        return np.asarray(u, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise GeometryError(f"the input {str(u)[:60]} of a law is no number ({error}); give numbers") from error
 
 
 def _numbers(name: str, values: Any, least: int) -> tuple[float, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
+from graphsynth.mechanism.checks import checked
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Cam, Gear
 
@@ -88,6 +89,7 @@ def characteristic_length(mechanism: Mechanism) -> float:
     return spread or 1.0
 
 
+@checked
 def mobility_report(mechanism: Mechanism, pose: ArrayLike | None = None) -> MobilityReport:
     """Mobility by count and by rank of the constraint matrix (numpy SVD).
 
@@ -125,7 +127,7 @@ def mobility_report(mechanism: Mechanism, pose: ArrayLike | None = None) -> Mobi
         raise GeometryError("the rank belongs to a pose, and this mechanism has none; give an assembled pose")
     try:
         pose_array = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise GeometryError(f"pose = {given!r} is no array of numbers; give (x, y, theta) of every link") from error
     links = mechanism.graph.links
     if pose_array.shape != (links, 3) or not np.isfinite(pose_array).all():

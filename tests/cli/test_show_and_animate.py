@@ -6,6 +6,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,9 +17,13 @@ from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 
-EIGHT = list(enumerate_chains(8))
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
 PLATFORM = "N}o__QC_cA?C?C?A??w f0 2:1-2,1-3,1-4"
+
+
+@cache
+def eight(index: int) -> MechanismGraph:
+    return list(enumerate_chains(8))[index]
 
 
 def four_bar(frame: float, crank: float, coupler: float, rocker: float) -> Mechanism:
@@ -40,7 +45,7 @@ def parts(path: Path) -> list[str]:
 @pytest.mark.parametrize("view", ["diagram", "levels", "both"])
 def test_show_draws_every_view(index: int, view: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "x.svg"
-    assert main(["show", EIGHT[index].key, "-o", str(path), "--view", view]) == 0
+    assert main(["show", eight(index).key, "-o", str(path), "--view", view]) == 0
     joints = sum(part.startswith("joint") for part in parts(path))
     edges = len(re.findall(r'd="M\S+ \S+ Q', path.read_text()))
     assert joints == (0 if view == "levels" else 10)
@@ -59,7 +64,7 @@ def test_show_draws_the_diagram_by_default_and_the_driver(tmp_path: Path, capsys
 def test_show_writes_through_matplotlib(
     name: str, magic: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["show", EIGHT[0].key, "-o", str(tmp_path / name), "--view", "both"]) == 0
+    assert main(["show", eight(0).key, "-o", str(tmp_path / name), "--view", "both"]) == 0
     assert (tmp_path / name).read_bytes().startswith(magic)
 
 
@@ -73,7 +78,7 @@ def test_show_falls_back_to_levels_and_says_so(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_show_refuses_another_suffix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["show", EIGHT[0].key, "-o", str(tmp_path / "x.bmp")]) == 2
+    assert main(["show", eight(0).key, "-o", str(tmp_path / "x.bmp")]) == 2
     assert "must end in .svg, .png, .pdf, .tikz, .tex, .dxf, .g6" in capsys.readouterr().err
 
 
@@ -109,7 +114,7 @@ def test_show_tells_bad_input_in_one_sentence(
 
 def test_animate_a_chain_by_its_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, kept = tmp_path / "x.html", tmp_path / "m.toml"
-    words = ["animate", EIGHT[5].key, "-o", str(path), "--save", str(kept), "--frames", "60"]
+    words = ["animate", eight(5).key, "-o", str(path), "--save", str(kept), "--frames", "60"]
     assert main([*words, "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["accepted"] and said["completed"] and said["closed"]
@@ -131,7 +136,7 @@ def test_animate_a_chain_by_its_key(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_animate_every_eight_link_chain_and_inversion(
     index: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for k, graph in enumerate([EIGHT[index], *EIGHT[index].inversions()]):
+    for k, graph in enumerate([eight(index), *eight(index).inversions()]):
         path = tmp_path / f"{k}.html"
         assert main(["animate", graph.key, "-o", str(path), "--json"]) == 0
         said = json.loads(capsys.readouterr().out)

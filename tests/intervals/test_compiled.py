@@ -1,6 +1,7 @@
 """Compiled systems: the test beside the general one, and the search with inflation, budgets and parameters."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,11 +14,16 @@ ROOT = np.array([0.6180339887498949, 0.7861513777574233])
 MIRROR = ROOT * [1.0, -1.0]
 
 
+def on_first_use(function):
+    """Compile a system when it is asked for: a worker that only collects this file compiles nothing."""
+    return cache(lambda: compiled_system(function))
+
+
 def general(x, p):
     return [x[0] ** 2 + x[1] ** 2 - p[0], x[0] - x[1] ** 2]
 
 
-@compiled_system
+@on_first_use
 def circle_and_parabola(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
     ul, uh = ia.square(xl[0], xh[0])
     vl, vh = ia.square(xl[1], xh[1])
@@ -32,7 +38,7 @@ def circle_and_parabola(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
     return True
 
 
-@compiled_system
+@on_first_use
 def roots_of_a_parameter(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
     """``x^2 = p``."""
     low, high = ia.square(xl[0], xh[0])
@@ -50,7 +56,7 @@ def test_the_compiled_test_agrees_with_the_general_one():
     hi = lo + rng.uniform(0.0, 0.06, (3000, 2))
     out_lo, out_hi, status = np.empty_like(lo), np.empty_like(lo), np.empty(3000, dtype=np.int8)
     one = np.array([1.0])
-    krawczyk_boxes(circle_and_parabola, lo, hi, one, one, out_lo, out_hi, status)
+    krawczyk_boxes(circle_and_parabola(), lo, hi, one, one, out_lo, out_hi, status)
     reference = image(general, Interval.from_bounds(lo, hi), Interval([1]))
     assert (status == reference.status).mean() > 0.999
     has_root = ((lo <= ROOT - 1e-15) & (hi >= ROOT + 1e-15)).all(axis=1)
@@ -75,7 +81,7 @@ def found_roots(paving, roots):
 
 
 def test_all_solutions_are_found_and_proved():
-    found = pave_compiled(circle_and_parabola, ["[-2, 2]", "[-2.1, 2]"], [1])
+    found = pave_compiled(circle_and_parabola(), ["[-2, 2]", "[-2.1, 2]"], [1])
     assert found.finished
     assert (found.status == Status.UNIQUE).all()
     assert found.solutions == 2
@@ -89,13 +95,13 @@ def test_solutions_on_cuts_need_inflation(shift):
     """The first cut goes through a root: without inflation it stays undecided in both halves."""
     half = np.array([1.0, 0.5])
     box = Interval(ROOT - half + shift, ROOT + half)
-    found = pave_compiled(circle_and_parabola, box, [1])
+    found = pave_compiled(circle_and_parabola(), box, [1])
     assert [Status(s) for s in found.status] == [Status.UNIQUE]
     found_roots(found, [ROOT])
-    corner = pave_compiled(roots_of_a_parameter, ["[2, 5]"], [4])  # a root on the face proves nothing about the box
+    corner = pave_compiled(roots_of_a_parameter(), ["[2, 5]"], [4])  # a root on the face proves nothing about the box
     assert corner.verdict in (Status.UNDECIDED, Status.UNIQUE)
     assert (corner.boxes.lo <= 2.0).any()
-    outside = pave_compiled(roots_of_a_parameter, Interval([2.0 + 1e-12], [5.0]), [4])
+    outside = pave_compiled(roots_of_a_parameter(), Interval([2.0 + 1e-12], [5.0]), [4])
     assert outside.verdict is Status.EMPTY
 
 
@@ -106,7 +112,7 @@ def test_statuses_against_known_roots():
     for _ in range(200):
         p = float(np.ldexp(rng.random(), int(rng.integers(-20, 20))))
         lo, hi = np.sort(rng.normal(size=2) * 2.0 * math.sqrt(p))
-        found = pave_compiled(roots_of_a_parameter, Interval([lo], [hi]), Interval([p], [p]))
+        found = pave_compiled(roots_of_a_parameter(), Interval([lo], [hi]), Interval([p], [p]))
         true = sum(lo < r < hi for r in (math.sqrt(p), -math.sqrt(p)))
         if found.solutions is None:
             undecided += 1
@@ -117,11 +123,11 @@ def test_statuses_against_known_roots():
 
 
 def test_double_and_missing_solutions():
-    double = pave_compiled(roots_of_a_parameter, ["[-1, 1]"], [0])
+    double = pave_compiled(roots_of_a_parameter(), ["[-1, 1]"], [0])
     assert double.verdict is Status.UNDECIDED
     assert double.outer.contains(0.0).all()
-    assert pave_compiled(roots_of_a_parameter, ["[-1, 1]"], ["[-2, -1e-9]"]).verdict is Status.EMPTY
-    thick = pave_compiled(roots_of_a_parameter, ["[-1, 3]"], ["[-0.5, 4]"], tolerance=1e-3)
+    assert pave_compiled(roots_of_a_parameter(), ["[-1, 1]"], ["[-2, -1e-9]"]).verdict is Status.EMPTY
+    thick = pave_compiled(roots_of_a_parameter(), ["[-1, 3]"], ["[-0.5, 4]"], tolerance=1e-3)
     assert thick.verdict is Status.UNDECIDED
     for p in np.linspace(0.0, 4.0, 33):
         x = math.sqrt(p)
@@ -130,14 +136,14 @@ def test_double_and_missing_solutions():
 
 def test_exhausted_budgets_keep_every_solution():
     for budget in (1, 4, 9, 20):
-        found = pave_compiled(circle_and_parabola, ["[-2, 2]", "[-2.1, 2]"], [1], max_boxes=budget)
+        found = pave_compiled(circle_and_parabola(), ["[-2, 2]", "[-2.1, 2]"], [1], max_boxes=budget)
         assert not found.finished
         assert found.verdict in (Status.UNDECIDED, Status.EXISTS)
         for root in (ROOT, MIRROR):
             inside = ((found.boxes.lo <= root) & (found.boxes.hi >= root)).all(axis=1)
             assert inside.any() or (found.boxes.width[found.status == Status.UNIQUE] < 1e-14).any()
         assert found.solutions is None
-    thick = pave_compiled(roots_of_a_parameter, ["[0, 3]"], ["[0, 4]"], tolerance=1e-8, max_seconds=1e-6)
+    thick = pave_compiled(roots_of_a_parameter(), ["[0, 3]"], ["[0, 4]"], tolerance=1e-8, max_seconds=1e-6)
     assert not thick.finished
     assert thick.tested >= 100_000  # many more boxes than the arrays had room for at first
     assert thick.outer.lo[0] <= 0.0
@@ -157,14 +163,15 @@ def test_exhausted_budgets_keep_every_solution():
 )
 def test_bad_questions(box, options, word):
     with pytest.raises(IntervalError, match=word):
-        pave_compiled(circle_and_parabola, box, [1], **options)
+        pave_compiled(circle_and_parabola(), box, [1], **options)
 
 
 # -- parameters cut into cells ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("f", [general, circle_and_parabola], ids=["general", "compiled"])
-def test_wide_parameters_are_cut(f):
+@pytest.mark.parametrize("system", [lambda: general, circle_and_parabola], ids=["general", "compiled"])
+def test_wide_parameters_are_cut(system):
+    f = system()
     box, wide = ["[0.1, 3]", "[0.1, 3]"], ["[0.5, 4]"]
     whole = pave(f, box, wide, tolerance=0.01) if f is general else pave_compiled(f, box, wide, tolerance=0.01)
     assert whole.verdict is Status.UNDECIDED
@@ -186,7 +193,7 @@ def test_wide_parameters_are_cut(f):
 
 
 def test_cells_leave_an_undecided_one_where_solutions_meet():
-    found = pave_cells(roots_of_a_parameter, ["[-3, 3]"], ["[-1, 4]"], smallest=0.01)
+    found = pave_cells(roots_of_a_parameter(), ["[-3, 3]"], ["[-1, 4]"], smallest=0.01)
     assert found.verdict is Status.UNDECIDED
     assert found.solutions is None
     assert not found.finished

@@ -14,15 +14,16 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.arguments import Real
 from graphsynth.errors import IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.status import Status
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.circle_ellipse.criterion import spectral_radius
 from graphsynth.jamming.circle_ellipse.hull import mirrored
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse
 from graphsynth.jamming.circle_ellipse.reasons import Reason
+from graphsynth.kinematics._checks import checked
 
 __all__ = ["CrossingBoxes", "krawczyk_boxes", "krawczyk_data"]
 
@@ -124,7 +125,7 @@ def _hull_of(boxes: Interval) -> Interval:
     return Interval.from_bounds(boxes.lo.min(axis=0), boxes.hi.max(axis=0))
 
 
-@takes(problem="CircleEllipse")
+@checked
 def krawczyk_data(problem: CircleEllipse, power: int = 0) -> Array:
     """Bounds of the two right-hand sides and of 1/a^2 and 1/b^2, lengths in units of ``2**power``, rounded outward."""
     (low, high), level = _squared_radii(problem), problem.e2.hi
@@ -164,9 +165,9 @@ def _bounds(top: int, bottom: int) -> tuple[float, float]:
     return low, math.nextafter(nearest, math.inf) if excess < 0 else nearest
 
 
-@takes(problem="CircleEllipse")
+@checked
 def krawczyk_boxes(
-    problem: CircleEllipse, *, tolerance: float = 1e-6, max_boxes: int = 20_000, max_seconds: float = 60.0
+    problem: CircleEllipse, *, tolerance: Real = 1e-6, max_boxes: Real = 20_000, max_seconds: Real = 60.0
 ) -> CrossingBoxes:
     """Solve the problem by bisection and Krawczyk's test in (x, y).
 

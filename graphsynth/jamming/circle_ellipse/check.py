@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from graphsynth.intervals.status import Status
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.circle_ellipse.boxes import CrossingBoxes, krawczyk_boxes
 from graphsynth.jamming.circle_ellipse.hull import CrossingHull, exact_hull
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse
+from graphsynth.kinematics._checks import checked
 
 __all__ = ["CrossCheck", "cross_check"]
 
@@ -42,7 +42,7 @@ class CrossCheck:
         return self.hull_in_boxes and self.inner_in_hull and self.statuses_agree
 
 
-@takes(problem="CircleEllipse")
+@checked
 def cross_check(problem: CircleEllipse, **limits: Any) -> CrossCheck:
     """Solve a problem by both methods and compare what they prove.
 

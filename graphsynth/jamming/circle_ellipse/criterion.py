@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graphsynth.intervals.interval import Interval
-from graphsynth.jamming._arguments import takes
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     from graphsynth.jamming.circle_ellipse.problem import CircleEllipse
@@ -18,7 +18,7 @@ __all__ = ["RHO_LIMIT", "spectral_radius"]
 RHO_LIMIT = 0.25
 
 
-@takes(problem="CircleEllipse", box="Interval")
+@checked
 def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
     """Spectral radius of ``|I - Y L|`` on a box of the quadrant, Y the inverse of mid L.
 

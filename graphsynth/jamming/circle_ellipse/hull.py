@@ -14,11 +14,11 @@ import numpy as np
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.status import Status
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.circle_ellipse.criterion import RHO_LIMIT, spectral_radius
 from graphsynth.jamming.circle_ellipse.exact import Range, outward, root_bounds
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse
 from graphsynth.jamming.circle_ellipse.reasons import Reason
+from graphsynth.kinematics._checks import checked
 
 __all__ = ["CrossingHull", "exact_hull", "mirrored"]
 
@@ -65,7 +65,7 @@ class CrossingHull:
         return mirrored(self.hull)
 
 
-@takes(problem="CircleEllipse")
+@checked
 def exact_hull(problem: CircleEllipse) -> CrossingHull:
     """Solve the problem exactly.
 
@@ -157,7 +157,7 @@ def _result(
     return CrossingHull(problem, status, reasons, hull, squares, tight)
 
 
-@takes(box="Interval")
+@checked
 def mirrored(box: Interval) -> Interval:
     """Return the images of a box of the first quadrant in all four, copies on an axis merged.
 

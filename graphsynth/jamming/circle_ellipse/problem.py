@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from graphsynth.arguments import Count
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing
 from graphsynth.jamming.circle_ellipse.exact import Range, exact_range, root_bounds
+from graphsynth.kinematics._checks import checked
 
+_MOST_BITS = 10_000
 __all__ = ["CircleEllipse", "bearing_radii", "circle_ellipse", "surrogate_problem"]
 
 
@@ -99,7 +101,7 @@ def circle_ellipse(R1: Any, a: Any, b: Any, e1: Any = 0, e2: Any = 0, *, eps: An
     return CircleEllipse(**ranges)
 
 
-@takes(bearing="Bearing")
+@checked
 def bearing_radii(bearing: Bearing) -> tuple[Fraction, Fraction, Fraction]:
     """Return R, Rh and h as the decimals that they print as.
 
@@ -112,9 +114,9 @@ def bearing_radii(bearing: Bearing) -> tuple[Fraction, Fraction, Fraction]:
     return R, R + c, height / 2
 
 
-@takes(bearing="Bearing")
+@checked
 def surrogate_problem(
-    bearing: Bearing, sine: Any, e1: Any = 0, e2: Any = 0, *, eps: Any = None, bits: int = 128
+    bearing: Bearing, sine: Any, e1: Any = 0, e2: Any = 0, *, eps: Any = None, bits: Count = 128
 ) -> CircleEllipse:
     """Pose the problem for the centred surrogate ellipse E4 of a tilted bearing (specification, section 5.1).
 
@@ -143,6 +145,8 @@ def surrogate_problem(
     >>> round(float(surrogate_problem(Bearing(), "0.0133308643").b.lo), 9)
     17.461787964
     """
+    if bits > _MOST_BITS:
+        raise GeometryError(f"bits = {bits} is more than {_MOST_BITS}; fewer are enough")
     low, high = exact_range("sine", sine)
     low, high = (low, high) if low >= 0 else (max(Fraction(0), low, -high), max(-low, high))
     if high > 1:

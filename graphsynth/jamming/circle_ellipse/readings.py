@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import numbers, takes
 from graphsynth.jamming.areas import CrescentAreas, ellipse_circle_stable, lid_area, surrogate_areas
 from graphsynth.jamming.bearing import Bearing
 from graphsynth.jamming.circle_ellipse.exact import Range, exact_range, root_bounds
 from graphsynth.jamming.circle_ellipse.problem import CircleEllipse, bearing_radii, circle_ellipse, surrogate_problem
+from graphsynth.kinematics._checks import checked, finite_array
 
 __all__ = ["Reading", "TiltedEllipse", "reading_areas", "reading_ellipse", "reading_problem"]
 
@@ -57,10 +57,10 @@ class TiltedEllipse(NamedTuple):
 
 
 def _tilt(sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
-    return np.abs(numbers("sine", sine)), numbers("cosine", cosine)
+    return np.abs(finite_array("sine", sine, nan=True)), finite_array("cosine", cosine, nan=True)
 
 
-@takes(bearing="Bearing")
+@checked
 def reading_ellipse(
     bearing: Bearing, sine: ArrayLike, cosine: ArrayLike, reading: Reading = Reading.LID, lid: int = 1
 ) -> TiltedEllipse:
@@ -105,7 +105,7 @@ def reading_ellipse(
     return TiltedEllipse(zero, Rh * C - h * S, Rh * one, R)
 
 
-@takes(bearing="Bearing")
+@checked
 def reading_areas(
     bearing: Bearing, sine: ArrayLike, cosine: ArrayLike, reading: Reading = Reading.LID
 ) -> CrescentAreas:
@@ -153,7 +153,7 @@ def _masked(areas: CrescentAreas, defined: NDArray[np.bool_]) -> CrescentAreas:
     return CrescentAreas(*(np.where(defined, area, np.nan) for area in areas))
 
 
-@takes(bearing="Bearing")
+@checked
 def reading_problem(
     bearing: Bearing, sine: Any, reading: Reading, e1: Any = 0, e2: Any = 0, *, eps: Any = None
 ) -> CircleEllipse:

@@ -17,6 +17,7 @@ from graphsynth.jamming.coupled.problem import Bearings, Problem, check_motion, 
 from graphsynth.jamming.coupled.program import PoseSolution
 from graphsynth.jamming.coupled.report import CoupledReport, Loosen
 from graphsynth.jamming.verdict import Verdict
+from graphsynth.kinematics._checks import checked
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -29,6 +30,7 @@ Array = NDArray[np.float64]
 _TOUCH = 1e-12
 
 
+@checked
 def assess_coupled(
     motion: Motion,
     bearings: Bearings,

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["DirectionMap", "direction_map"]
 
+_MOST = 100_000
+
 Array = NDArray[np.float64]
 
 
@@ -86,8 +88,9 @@ def direction_map(
     -----
     Specification lambda_and_jamming, section 9.6: the direction of the tilt matters.
     """
-    if not isinstance(directions, int | np.integer) or directions < 3:
-        raise GeometryError(f"directions = {directions} are too few for a map; give a whole number, 3 or more")
+    if not isinstance(directions, int | np.integer) or not 3 <= directions <= _MOST:
+        few = "many" if isinstance(directions, int | np.integer) and directions > _MOST else "few"
+        raise GeometryError(f"directions = {directions} are too {few} for a map; give a whole number, 3 to {_MOST}")
     check_motion(motion)
     given = problem(motion.mechanism, bearings, tilts, condition)
     keep = np.flatnonzero(motion.assembled)

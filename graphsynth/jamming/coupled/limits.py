@@ -13,10 +13,10 @@ from typing import TypeAlias
 
 import numpy as np
 
+from graphsynth.arguments import Real
 from graphsynth.errors import GeometryError
-from graphsynth.jamming._arguments import takes
 from graphsynth.jamming.bearing import Bearing, Condition
-from graphsynth.kinematics._checks import choice, finite
+from graphsynth.kinematics._checks import checked, choice, finite
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
 __all__ = ["FREE", "RIGID", "SPHERICAL", "JointLimits", "Limits", "Misalignment", "SlideLimits", "bearing_limits"]
@@ -179,17 +179,17 @@ class Misalignment:
         return (self.alpha * math.cos(self.direction), self.alpha * math.sin(self.direction))
 
 
-@takes(bearing="Bearing")
+@checked
 def bearing_limits(
     bearing: Bearing,
     condition: Condition = "A",
     *,
-    play: float = 0.0,
+    play: Real = 0.0,
     radius_tolerance: float = 0.0,
     height_tolerance: float = 0.0,
     clearance_tolerance: float = 0.0,
     hole_tolerance: float = 0.0,
-    radial_offset: float = 0.0,
+    radial_offset: Real = 0.0,
 ) -> JointLimits:
     """Limits of a bearing: its critical tilt, with a range that encloses it for all dimensions within tolerance.
 

@@ -278,7 +278,7 @@ def check_range(motion: Motion, length_tolerance: float, **limits: float) -> Non
     check_rounding()
     check_motion(motion)
     for name, value in limits.items():
-        if not isinstance(value, int | float | np.number) or not value >= 0:
+        if not isinstance(value, int | float | np.number) or not value >= 0 or (value > 2**63 and value != np.inf):
             raise GeometryError(f"{name} = {value!r} must be a number of zero or more; correct the value")
     if not 0.0 <= finite("length_tolerance", length_tolerance) < 0.5:
         raise GeometryError(f"length_tolerance = {length_tolerance} must be a relative half width from 0 to 0.5")
