@@ -72,7 +72,8 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
     except (sqlite3.Error, MemoryError, UnicodeError) as error:
         if connection:
             connection.close()
-        remedy = ": make room, or name another file" if create else ""
+        full = getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+        remedy = ": make room, or name another file" if create or full else ""
         raise FormatError(f"cannot be opened as a catalogue ({plain(str(error))[:300]}){remedy}", str(path)) from None
     except FormatError:
         if connection:

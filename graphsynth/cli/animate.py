@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.cli import console
 from graphsynth.cli.show import check_place, read_graph
 from graphsynth.errors import FormatError, GraphsynthError, SpecError
+from graphsynth.wholefiles import replacing
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -46,10 +47,13 @@ def run(options: argparse.Namespace) -> int:
     place = Path(options.mechanism)
     dimensioned = len(options.mechanism) < 1000 and place.suffix.lower() in (".toml", ".json") and place.is_file()
     found = _from_file(place, options) if dimensioned else _from_graph(options)
-    _write(found, options.output, suffix, count)
+    with replacing(options.output) as fresh:
+        _write(found, fresh, suffix, count)
     if options.save:
-        text = found.motion.mechanism
-        options.save.write_text(text.to_toml() if options.save.suffix.lower() == ".toml" else text.to_json(), "utf-8")
+        mechanism = found.motion.mechanism
+        text = mechanism.to_toml() if options.save.suffix.lower() == ".toml" else mechanism.to_json()
+        with replacing(options.save) as fresh:
+            fresh.write_text(text, "utf-8")
     facts = {**_facts(found.motion), **found.facts, "statement": found.statement, "file": str(options.output)}
     if options.json:
         console.put_json(facts)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
 from graphsynth.errors import FormatError, GraphError, GraphsynthError, SpecError
+from graphsynth.wholefiles import replacing
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -183,4 +184,5 @@ def _draw(graph: MechanismGraph, path: Path, view: str | None, driver: int | Non
         framed = graph if graph.frame is not None else graph.with_frame(0)
         sketches.append(levels_sketch(framed, title=graph.key))
         poses.append(None)
-    save(path, sketches, poses)
+    with replacing(path) as fresh:
+        save(fresh, sketches, poses)

@@ -19,6 +19,7 @@ from typing import Any
 from graphsynth.errors import FormatError, GraphError, SpecError
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.wholefiles import replacing
 
 __all__ = [
     "FORMATS",
@@ -500,14 +501,10 @@ def write(items: Item | Iterable[Item], path: str | os.PathLike[str], format: st
             count += 1
             yield item
 
-    fresh = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
-        with fresh.open("w", encoding="utf-8", newline="") as file:
+        with replacing(path) as fresh, fresh.open("w", encoding="utf-8", newline="") as file:
             for piece in _pieces(counted(), entry):
                 file.write(piece)
-        fresh.replace(path)
     except UnicodeEncodeError as error:
         raise GraphError(f"a name holds half of a character that takes two ({error.object[error.start]!r})") from None
-    finally:
-        fresh.unlink(missing_ok=True)
     return count
