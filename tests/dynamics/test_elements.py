@@ -7,6 +7,7 @@ import pytest
 from dynamic_models import bar, four_bar
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from graphsynth.dynamics import (
     Body,
@@ -305,3 +306,28 @@ def test_prescribed_law_of_time():
     assert motion.poses[:, 1, 2] == pytest.approx([0.0, 1.5, 6.0], abs=1e-12)
     assert motion.reactions.joints[-1].couple == pytest.approx([1.2] * 3, rel=1e-12)
     assert motion.work == pytest.approx(motion.kinetic, rel=1e-10)
+
+
+@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+def test_constant_forces_of_the_world_and_of_the_body_at_points_off_the_origin(form):
+    """A pendulum with both, and weight at a slanted centre of mass: its angle against one equation, integrated."""
+    mass, inertia, centre = 2.0, 0.3, 0.4 + 0.1j
+    world, at, body, there = 3.0 - 2.0j, 0.5 - 0.3j, 1.0 + 2.0j, -0.2 + 0.6j
+
+    def point(z):
+        return z.real, z.imag
+
+    forces = [Force(1, point(world), point(at)), Force(1, point(body), point(there), frame="body")]
+    pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    model = DynamicModel(pendulum, {1: Body(mass, inertia, point(centre))}, forces, (0.0, -9.81))
+    times = np.linspace(0.0, 1.0, 6)
+    motion = simulate_dynamics(model, times, keep={(0, 1): 0.7}, form=form, rtol=1e-11)
+
+    def moment(angle):
+        turn = np.exp(1j * angle)
+        loads = (at, world), (there, body * turn), (centre, -9.81j * mass)
+        return sum((np.conj(turn * arm) * load).imag for arm, load in loads)
+
+    own = solve_ivp(lambda t, y: (y[1], moment(y[0]) / (inertia + mass * abs(centre) ** 2)), (0.0, 1.0), (0.7, 0.0),
+                    t_eval=times, rtol=1e-12, atol=1e-13)  # fmt: skip
+    np.testing.assert_allclose(motion.poses[:, 1, 2], own.y[0], atol=1e-8)

@@ -34,7 +34,7 @@ from sites import Change, changes
 ROOT = Path(__file__).parents[2]
 ROOMS = ("intervals", "jamming", "kinematics", "synthesis", "structure", "dynamics")
 #: Seconds: no quick test takes longer on any correct code, where nothing has to be compiled; one that does hangs.
-HANG = 60
+HANG = 100
 #: Bytes of address space for the tests of one change.
 MEMORY = 12 * 2**30
 KNOWN = Path(__file__).with_name("known.toml")

@@ -7,6 +7,7 @@ import networkx as nx
 import pytest
 
 from graphsynth.errors import FormatError, GraphError
+from graphsynth.structure.checks import integer
 from graphsynth.structure.graph import Joint, MechanismGraph
 
 FOUR_BAR = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)], frame=0)
@@ -189,3 +190,12 @@ def test_importing_and_counting_loads_no_third_party_package():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_number_out_of_bounds_is_told_unless_it_is_endless():
+    assert integer(7, "here", 0, 9, "count") == 7
+    with pytest.raises(FormatError, match="count must be within 0 to 9, not 12"):
+        integer(12, "here", 0, 9, "count")
+    for huge in (10**18, -(10**5000)):
+        with pytest.raises(FormatError, match="not a number of many digits"):
+            integer(huge, "here", 0, 9, "count")
