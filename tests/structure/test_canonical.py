@@ -161,6 +161,34 @@ def test_kernel_and_plain_search_are_the_same():
         )
 
 
+def relabelled(graph, seed):
+    places = random.Random(seed).sample(range(len(graph)), len(graph))
+    return nx.relabel_nodes(nx.convert_node_labels_to_integers(graph), dict(enumerate(places)))
+
+
+@pytest.mark.parametrize(
+    "graph",
+    [
+        nx.petersen_graph(), nx.hypercube_graph(4), nx.paley_graph(13).to_undirected(), nx.icosahedral_graph(),
+        nx.line_graph(nx.complete_bipartite_graph(4, 4)), nx.circulant_graph(12, [1, 5]), nx.desargues_graph(),
+        nx.disjoint_union_all([nx.cycle_graph(4)] * 4), nx.disjoint_union_all([nx.petersen_graph()] * 3),
+    ],
+)  # fmt: skip
+def test_every_generator_joins_orbits(graph):
+    """There are at most as many as vertices less orbits: an automorphism that joins nothing new is no generator."""
+    for seed in range(6):
+        own, n = relabelled(graph, seed), len(graph)
+        plain = Search(n, layers_of(own), [0] * n).run()
+        for generators, orbits in ((plain.generators, plain.orbits), compiled(n, layers_of(own), [0] * n)[2::2]):
+            joined = nx.Graph()
+            joined.add_nodes_from(range(n))
+            for generator in generators:
+                before = nx.number_connected_components(joined)
+                joined.add_edges_from(enumerate(generator))
+                assert nx.number_connected_components(joined) < before
+            assert nx.number_connected_components(joined) == len(set(orbits))
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_kernel_and_plain_search_on_larger_graphs(seed):
     graph = nx.random_regular_graph(3, 64, seed=seed) if seed % 2 else nx.gnp_random_graph(64, 0.1, seed=seed)

@@ -46,6 +46,7 @@ def test_estimates_of_trusses_and_of_frames():
 def test_without_anything_smaller_to_count_every_link_may_be_the_frame():
     question = (11, 8, 1, 3, {})  # chains of nine loops less have no links
     assert extrapolated(*question, framed=True) == pytest.approx(8 * extrapolated(*question), rel=1e-12)
+    assert extrapolated(*question) > 10 * extrapolated(9, 20, 1, 3, {}) > 1e12  # more loops, far more chains
 
 
 @pytest.mark.parametrize(
