@@ -19,6 +19,7 @@ from graphsynth.dynamics.start import StartReport, check_start, start_compiled
 from graphsynth.dynamics.stepping import StepOptions, Trail, integrate
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.errors import GeometryError
+from graphsynth.extras import need
 from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.checks import finite
 
@@ -148,6 +149,8 @@ def _check_options(form: str, outputs: str, options: StepOptions) -> None:
         raise GeometryError(f"outputs = {outputs!r} is not known; give 'interpolated' or 'exact'")
     if not isinstance(options.method, str) or options.method not in METHODS:
         raise GeometryError(f"method = {options.method!r} is not known; give one of {', '.join(METHODS)}")
+    if options.method == "CVODE":
+        need("sksundae.cvode", "stiff", "method 'CVODE'")
     if not 2.3e-14 <= options.rtol < 1.0:
         raise GeometryError(f"rtol = {options.rtol} must be at least 2.3e-14 (rounding) and below 1; correct it")
     if options.atol is not None and not options.atol > 0.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 
 import numpy as np
@@ -25,7 +26,7 @@ from graphsynth.dynamics.friction import TwoCoefficientLaw
 from graphsynth.dynamics.tribometer import Tribometer
 from graphsynth.dynamics.tribometer_drives import BeltDrive, HarmonicDrive
 from graphsynth.dynamics.tribometer_model import general_model
-from graphsynth.errors import GeometryError, SpecError
+from graphsynth.errors import GeometryError, MissingExtraError, SpecError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear, Polynomial
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -130,6 +131,35 @@ def test_an_oscillator_loses_the_same_at_every_half_swing(form, method):
     assert abs(end) < band and motion.poses[-1, 1, 0] == pytest.approx(end, abs=1e-11 if exact else 1e-8)
     assert (np.diff(motion.poses[-3:, 1, 0]) == 0.0).all()
     assert_complementary(motion)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_cvode_meets_the_events_of_friction(form):
+    pytest.importorskip("sksundae")
+    m, k, mu, x0 = 1.0, 400.0, 0.25, 0.055
+    model = block([JointFriction(0, 1, mu), Spring(0, 1, (-1.0, 0.0), (0.0, 0.0), k, 1.0)])
+    motion = run(model, np.linspace(0.0, 5.0, 11), x0, form=form, method="CVODE", rtol=1e-11)
+    assert motion.completed and kinds(motion) == ["reversal"] * 3 + ["stick"] and "sundae" in motion.backend
+    assert [e.time for e in motion.events] == pytest.approx(math.pi / 20.0 * np.arange(1, 5), abs=1e-9)
+    assert motion.poses[-1, 1, 0] == pytest.approx(x0 - 8.0 * mu * m * G / k, abs=1e-8)
+    resting = run(block([JointFriction(0, 1, 0.3)], 0.2), [0.0, 100.0], form=form, method="CVODE")
+    assert resting.completed and resting.events == () and (resting.poses[:, 1] == 0.0).all()
+
+
+def test_cvode_and_the_tribometer_as_a_general_model():
+    pytest.importorskip("sksundae")
+    known = CASES["B"].event_driven(4.0, estimate=False)
+    model, start = general_model(CASES["B"])
+    motion = simulate_dynamics(model, [0.0, 4.0], start=start, method="CVODE", rtol=1e-10)
+    assert motion.completed and len(motion.events) == len(known.events) > 8
+    assert max(abs(a.time - b.time) for a, b in zip(motion.events, known.events)) < 1e-7
+    assert motion.poses[-1, 2, 0] == pytest.approx(known.x2[-1], abs=1e-8)
+
+
+def test_cvode_without_its_package_is_told_before_anything_is_done(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
+    with pytest.raises(MissingExtraError, match=r"method 'CVODE' needs sksundae.*graphsynth\[stiff\]"):
+        run(block([JointFriction(0, 1, 0.3)], 0.2), [0.0, 1.0], method="CVODE")  # at rest: no solver would be made
 
 
 @pytest.mark.parametrize("form", FORMS)
