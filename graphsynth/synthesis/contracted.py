@@ -22,6 +22,8 @@ from graphsynth.errors import FormatError, TooLargeError
 __all__ = ["SHIPPED_LOOPS", "contracted_graphs", "decode", "encode", "generate", "has_contracted_graphs"]
 
 SHIPPED_LOOPS = 8
+#: With one loop more, graphs of so few vertices are made when they are asked for: some minutes and 0.7 GB at most.
+MADE_VERTICES = 11
 FOLDER_VARIABLE = "GRAPHSYNTH_CONTRACTED"
 _MAGIC = b"gsH1"
 
@@ -86,12 +88,26 @@ def _layers(loops: int) -> Layers:
     return layers
 
 
-def has_contracted_graphs(loops: int) -> bool:
-    """Tell whether the list for a number of loops is shipped, or stands in the folder of the user."""
+def has_contracted_graphs(loops: int, vertices: int | None = None) -> bool:
+    """Tell whether the graphs of up to so many vertices (all, for None) are shipped, made by the user or soon made."""
     if loops <= SHIPPED_LOOPS:
         return True
     folder = os.environ.get(FOLDER_VARIABLE)
-    return bool(folder) and (Path(str(folder)) / f"contracted-{loops}.xz").is_file()
+    if folder and (Path(folder) / f"contracted-{loops}.xz").is_file():
+        return True
+    return loops == SHIPPED_LOOPS + 1 and vertices is not None and vertices <= MADE_VERTICES
+
+
+@lru_cache(maxsize=1)
+def _known() -> dict[int, Layers]:
+    return {loops: dict(_layers(loops)) for loops in range(2, SHIPPED_LOOPS + 1)}
+
+
+def _made(loops: int, vertices: int) -> NDArray[np.uint8]:
+    """Graphs of few vertices with one loop more than shipped, made once in a process."""
+    found = generate(loops, vertices, _known())[loops][vertices]
+    found.setflags(write=False)
+    return found
 
 
 def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
@@ -112,11 +128,13 @@ def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
     >>> [len(contracted_graphs(3, k)) for k in (2, 3, 4)]
     [1, 1, 2]
     """
-    if loops < 2 or not has_contracted_graphs(loops):
+    if loops < 2 or not has_contracted_graphs(loops, vertices):
         raise TooLargeError(
             f"there is no list of contracted graphs with {loops} loops (2..{SHIPPED_LOOPS} are shipped): make it with "
             f"'python -m graphsynth.synthesis.regenerate {loops} FOLDER' and set {FOLDER_VARIABLE}=FOLDER"
         )
+    if not has_contracted_graphs(loops):
+        return _made(loops, vertices)
     return _layers(loops).get(vertices, np.zeros((0, vertices, vertices), np.uint8))
 
 

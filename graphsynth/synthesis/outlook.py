@@ -32,7 +32,7 @@ def check_loops(
     TooLargeError
         For more loops than there are contracted graphs for.
     """
-    if has_contracted_graphs(loops):
+    if has_contracted_graphs(loops, links):
         return
     count = extrapolated(loops, links, mobility, space, higher, framed=framed)
     what = "mechanisms" if framed and mobility else "groups" if framed else "chains" if mobility else "trusses"

@@ -215,7 +215,7 @@ class Problem:
                     f"W = {assortment.mobility} must be at least 1 for a mechanism: fix W, or ask for Assur groups"
                 )
             higher = tuple((i, count) for i, count in enumerate(assortment.p_i, 1) if i > 1 and count)
-            if not has_contracted_graphs(assortment.loops):
+            if not has_contracted_graphs(assortment.loops, assortment.links):
                 numbers = assortment.loops, assortment.links, assortment.mobility, assortment.space
                 check_loops(*numbers, dict(higher), framed=True)
             families += mechanism_families(assortment, levels)
