@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from graphsynth import StructuralSpec
 from graphsynth.structure.equations import Problem, domains_of, propagate, rows_of
 from graphsynth.structure.system import _box
 
@@ -38,3 +39,12 @@ def test_open_sides_are_closed_at_the_extreme(question):
     found = linprog([-float(name == "n") for name in names], upper, limits,
                     bounds=[domains.get(name, (0, None)) for name in names])  # fmt: skip
     assert found.status == 0 and box["n"][1] == math.floor(-found.fun + 1e-7)
+
+
+def test_bounds_of_higher_pairs_hold_on_both_sides():
+    """Solutions within bounds are those of wider bounds that lie within."""
+    wide = StructuralSpec(W=1, p=(6, 10), p2=(0, 10)).solve()
+    for low, high in ((0, 0), (1, 2), (2, 2), (1, 10)):
+        wanted = {str(s) for s in wide if low <= dict(enumerate(s.p_i, 1)).get(2, 0) <= high}
+        found = StructuralSpec(W=1, p=(6, 10), p2=(low, high)).solve()
+        assert {str(s) for s in found} == wanted and len(found) == len(wanted)
