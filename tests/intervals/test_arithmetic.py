@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from interval_samples import SPECIAL, bounds
 
@@ -130,6 +130,8 @@ def test_powers(a, n):
 
 
 @given(a=PAIRS, b=PAIRS, s=st.floats(0, 1), t=st.floats(0, 1))
+@example(a=(1.0, 1.0), b=(0.0, 1.0), s=0.0, t=1e-160)  # a divisor whose square underflows
+@example(a=(1.0, 3.0), b=(-1e-300, 2.0), s=0.5, t=0.75)
 def test_inclusion_isotonicity(a, b, s, t):
     """A part of the argument gives a part of the result."""
     x, y = Interval(*a), Interval(*b)
