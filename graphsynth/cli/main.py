@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import threading
+from _thread import interrupt_main
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -104,25 +105,47 @@ def _interrupts(*, at_exit: bool) -> Iterator[list[int]]:
     """Raise KeyboardInterrupt when Ctrl-C is pressed or the process is told to end; give the signals that came.
 
     A second signal ends the process at once; so does one that comes after the block, if the program ends with it.
+    An exception that is raised while a library calls back (the compiler does) goes nowhere: it is raised once more.
     """
     received: list[int] = []
+    lost: list[int] = []
     over = False
 
     def handler(number: int, frame: FrameType | None) -> None:
+        if lost:
+            lost.pop()
+            raise KeyboardInterrupt
         received.append(number)
         if len(received) > 1 or (over and at_exit):
             os._exit(128 + number)
         if not over:
             raise KeyboardInterrupt
 
+    def ignored(what: sys.UnraisableHookArgs) -> None:
+        if not (received and isinstance(what.exc_value, KeyboardInterrupt)):
+            told(what)
+        else:
+            threading.Timer(0.01, again).start()
+
+    def again() -> None:
+        if over:
+            return
+        lost.append(received[0])
+        if hasattr(signal, "pthread_kill"):  # what waits is woken
+            signal.pthread_kill(threading.main_thread().ident or 0, received[0])
+        else:
+            interrupt_main()
+
     if threading.current_thread() is not threading.main_thread():
         yield received
         return
+    told, sys.unraisablehook = sys.unraisablehook, ignored
     before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield received
     finally:
         over = True
+        sys.unraisablehook = told
         for number, old in before.items():
             signal.signal(number, signal.SIG_DFL if at_exit else old)
 
