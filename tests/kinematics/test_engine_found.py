@@ -11,6 +11,8 @@ import pytest
 from scipy.optimize import brentq
 
 from graphsynth.kinematics import simulate, simulate_batch
+from graphsynth.kinematics.engine.codes import E_PP
+from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.mechanism.constraints import residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear, Polynomial
@@ -253,3 +255,18 @@ def test_a_dyad_that_cannot_be_assembled_on_a_stretch_in_the_first_step() -> Non
             first = fold if last > start else 2.0 * math.pi - fold
             assert not motion.completed and motion.events[-1].kind == "fold"
             assert motion.stopped_at == pytest.approx(first, abs=1e-9)
+
+
+@pytest.mark.parametrize(("seed", "link"), [(13, 7), (19, 7), (21, 1), (66, 9), (81, 3)])
+def test_rates_of_a_link_that_slides_on_two_others_that_move(seed: int, link: int) -> None:
+    """Velocities and accelerations are the differences of the poses, to the second order of their step."""
+    mechanism = random_mechanism(np.random.default_rng(seed))
+    eliminated = compile_program(mechanism).eliminated
+    assert (E_PP, link) in {(int(kind), int(e)) for kind, e in eliminated[:, :2]}
+    h = 1e-4
+    motion = simulate(mechanism, h * np.arange(5.0), events=False)
+    x, v, a = (part[:, link] for part in (motion.poses, motion.velocities, motion.accelerations))
+    first = (x[:-4] - 8.0 * x[1:-3] + 8.0 * x[3:-1] - x[4:]) / (12.0 * h)
+    second = (v[:-4] - 8.0 * v[1:-3] + 8.0 * v[3:-1] - v[4:]) / (12.0 * h)
+    np.testing.assert_allclose(v[2:-2], first, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(a[2:-2], second, rtol=1e-8, atol=1e-8)
