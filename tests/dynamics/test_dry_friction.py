@@ -293,7 +293,7 @@ def test_a_rate_that_others_prescribe_changes_sign():
     assert kinds(motion) == ["reversal"] and motion.events[0].time == pytest.approx(1.0, rel=1e-13)
     along = motion.reactions.joints[-1].force[:, 0]
     assert along == pytest.approx([-1.0 + 0.2 * G, -1.0 + 0.2 * G, -1.0 - 0.2 * G, -1.0 - 0.2 * G], rel=1e-12)
-    assert motion.checks.energy < 1e-12
+    assert motion.checks.energy < 1e-12 and motion.checks.power < 1e-12
 
 
 def test_a_motion_that_starts_after_a_rest():

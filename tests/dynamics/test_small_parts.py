@@ -5,18 +5,23 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from dynamic_models import g1
+from dynamic_models import bar, g1
 
 import graphsynth.dynamics.second as second_form
+from graphsynth.dynamics import DynamicModel, JointFriction, kernels
 from graphsynth.dynamics.energies import warnings_of
 from graphsynth.dynamics.friction_kernels.kernels import plant
 from graphsynth.dynamics.friction_loads import _real_roots
 from graphsynth.dynamics.integrate import scales
+from graphsynth.dynamics.kernels.rubbing import friction_unit
 from graphsynth.dynamics.kernels.systems import pull
 from graphsynth.dynamics.platform_drive.kernels import radau, systems
 from graphsynth.dynamics.result import Checks
 from graphsynth.dynamics.start import consistent_start
 from graphsynth.dynamics.tables import compile_model
+from graphsynth.mechanism.joints import Prismatic, Revolute
+from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.structure.graph import MechanismGraph
 
 
 def test_a_force_at_a_point_has_the_power_of_that_point():
@@ -87,3 +92,35 @@ def test_rates_are_measured_by_the_fastest():
     speed = np.abs(report.v / sizes[:n]).max()
     assert rate >= speed and abs(rate - 1.0) > 1e-6
     np.testing.assert_allclose(sizes[n : 2 * n], rate * sizes[:n])
+
+
+def test_friction_of_a_guide_that_turns_acts_and_counteracts():
+    """The forces and moments on both links are in balance; their power is the friction times the rate of sliding."""
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    joints = [Revolute(0, 1), Revolute(1, 2, (0.3, 0.0)), Prismatic(2, 3, (0.1, 0.05), (0.2, -0.1), 0.4, 0.7),
+              Revolute(0, 3, (0.8, 0.2), (0.5, 0.1))]  # fmt: skip
+    bodies = {k: bar(0.2, 0.2) for k in (1, 2, 3)}
+    model = DynamicModel(Mechanism(graph, joints, [Driver(0, 1)]), bodies, [JointFriction(2, 3, 0.25)])
+    compiled = compile_model(model)
+    report = consistent_start(model, keep={(0, 1): 0.9}, keep_rates={(0, 1): 3.0})
+    T = compiled.tables
+    x = kernels.state_rows(T, report.q, report.v)
+    J = kernels.constraint_system(T, x, np.zeros(7), compiled.driven(0.0))[1]
+    Q = np.zeros(compiled.n)
+    power = friction_unit(T, x, J, 0, Q)
+    loads = {k: Q[T.column[k] : T.column[k] + 3] for k in (2, 3)}
+    np.testing.assert_allclose(loads[2][:2], -loads[3][:2], rtol=1e-12)
+    assert np.hypot(*loads[2][:2]) == pytest.approx(0.25)
+    moments = [x[k, 0] * f[1] - x[k, 1] * f[0] + f[2] for k, f in loads.items()]
+    assert sum(moments) == pytest.approx(0.0, abs=1e-14)
+    guide = report.poses[2, 2] + 0.4
+    t = np.array([math.cos(guide), math.sin(guide)])
+    arms = [np.array([[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]]) @ p
+            for a, p in ((report.poses[2, 2], (0.1, 0.05)), (report.poses[3, 2], (0.2, -0.1)))]  # fmt: skip
+    P, V = [report.poses[k, :2] + arm for k, arm in zip((2, 3), arms)], report.velocities
+    # of the link's point that lies at the pin of the other
+    here, there = P[1] - report.poses[2, :2], arms[1]
+    rate = t @ (
+        V[3, :2] + V[3, 2] * np.array([-there[1], there[0]]) - V[2, :2] - V[2, 2] * np.array([-here[1], here[0]])
+    )
+    assert power == pytest.approx(-0.25 * abs(rate), rel=1e-12)
