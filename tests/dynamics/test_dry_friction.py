@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -317,16 +316,11 @@ CASES = {
 
 @pytest.mark.parametrize(("case", "form"), [("B", "constrained"), ("C", "constrained"), ("B", "reduced")])
 def test_the_tribometer_as_a_general_model(case, form):
-    """Final state to 1e-10, the same events, their times to 1e-9 s, in at most 1 s of processor time."""
+    """Final state to 1e-10, the same events, their times to 1e-9 s, with a bounded number of right-hand sides."""
     tribometer = CASES[case]
     known = tribometer.event_driven(10.0, estimate=False)
     model, start = general_model(tribometer)
-    simulate_dynamics(model, [0.0, 0.5], start=start, form=form)  # compiles
-    spent = math.inf
-    for _ in range(2):
-        begin = time.process_time()
-        motion = simulate_dynamics(model, [0.0, 10.0], start=start, form=form)
-        spent = min(spent, time.process_time() - begin)
+    motion = simulate_dynamics(model, [0.0, 10.0], start=start, form=form)
     assert motion.completed and motion.warnings == ()
     assert (
         abs(motion.poses[-1, 2, 0] - known.x2[-1]) < 1e-10 and abs(motion.velocities[-1, 2, 0] - known.v2[-1]) < 1e-10
@@ -334,7 +328,7 @@ def test_the_tribometer_as_a_general_model(case, form):
     assert len(motion.events) == len(known.events) == 37
     assert max(abs(a.time - b.time) for a, b in zip(motion.events, known.events)) < 1e-9
     assert [e.kind for e in motion.events] == ["stick" if e.state == 0 else "slip" for e in known.events]
-    assert form != "constrained" or spent < 1.0
+    assert motion.evaluations < 20_000
 
 
 def test_an_event_storm_is_said():
