@@ -181,6 +181,8 @@ class Counts(Mapping[int, int]):
     >>> kinds = Counts({2: 6, 3: 7, 4: 1})
     >>> kinds[3], kinds[9], dict(kinds)
     (7, 0, {2: 6, 3: 7, 4: 1})
+    >>> 3 in kinds, 9 in kinds
+    (True, False)
     """
 
     __slots__ = ("_items",)
