@@ -434,6 +434,8 @@ def _make(lo: ArrayLike, hi: ArrayLike, flags: Flags = NO_FLAGS) -> Interval:
 
 def _full(shape: int | tuple[int, ...], lo: float, hi: float) -> Interval:
     try:
+        if shape is None:  # older numpy takes it for (), with a warning
+            raise TypeError("None is no shape")
         return _make(np.full(shape, lo), np.full(shape, hi))
     except (TypeError, ValueError, OverflowError, MemoryError) as error:
         raise IntervalError(
