@@ -16,12 +16,14 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from hashlib import sha1, sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-__all__ = ["announce", "kernel", "source_digest"]
+from graphsynth.core.native.library import Native
+
+__all__ = ["Intrinsic", "Kernel", "announce", "kernel", "prepare_numba", "source_digest"]
 
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+(\([^)]*\)|[^#\n]+))?", re.MULTILINE)
 _ROOT = Path(__file__).parent.parent
@@ -32,32 +34,110 @@ _UNKEPT = (
 )
 
 
-def kernel(function: Callable[..., Any] | None = None, *, signature: Any = None, **options: Any) -> Any:
-    """Compile a function with numba on first use and keep the machine code on disk.
+class Kernel(Native):  # type: ignore[misc]  # of the library, where there is one
+    """A function that runs as machine code: from the library, or through numba, which is loaded for that alone."""
+
+    building: ClassVar[dict[str, Any]] = {}  #: more options while the library is built
+
+    def __init__(
+        self, function: Callable[..., Any], signature: Callable[[], Any] | None, options: dict[str, Any]
+    ) -> None:
+        super().__init__(f"{function.__module__}.{function.__qualname__}")
+        update_wrapper(self, function)
+        self.py_func = function
+        self.targetoptions = {"error_model": "numpy", **options}
+        self._signature = signature
+
+    @property
+    def digest(self) -> str:
+        """Digest of the sources."""
+        return source_digest(Path(self.py_func.__code__.co_filename))
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """The function as numba compiles it."""
+        prepare_numba()
+        from numba import njit
+
+        compiled = njit(**(self.targetoptions | self.building))(self.py_func)
+        if not self.building:
+            compiled._cache = _cache_class()(self.py_func, self.digest)
+        if self._signature is not None:
+            compiled.compile(self._signature())
+            compiled.disable_compile()
+        return compiled
+
+    @cached_property
+    def fallback(self) -> Callable[..., Any]:
+        """What is called for types that the library does not have."""
+        function: Callable[..., Any] = self.dispatcher
+        if (record := os.environ.get("GRAPHSYNTH_RECORD")) is not None:
+            from graphsynth.core.native.record import noting
+
+            function = noting(self, Path(record))
+        self.set_fallback(function)
+        return function
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self.dispatcher, name)
+
+
+def kernel(
+    function: Callable[..., Any] | None = None, *, signature: Callable[[], Any] | None = None, **options: Any
+) -> Any:
+    """Make a function a kernel: called from the library, or compiled with numba on first use and kept on disk.
 
     Parameters
     ----------
     function : callable
         A function of a kernel module.  Division by zero gives infinity or NaN, as in C (``error_model="numpy"``).
-    signature : numba signature, optional
-        Compile at once for these types and for no others.
+    signature : callable, optional
+        Returns the numba signature, if it is to be compiled for these types and for no others.
     **options
         Further options of ``numba.njit``, for example ``inline="always"``.
 
     Returns
     -------
-    numba dispatcher
+    Kernel
     """
     if function is None:
-        return lambda target: kernel(target, signature=signature, **options)
-    from numba import njit
+        return lambda target: Kernel(target, signature, options)
+    return Kernel(function, signature, options)
 
-    compiled = njit(**{"error_model": "numpy", **options})(function)
-    compiled._cache = _cache_class()(function, source_digest(Path(function.__code__.co_filename)))
-    if signature is not None:
-        compiled.compile(signature)
-        compiled.disable_compile()
-    return compiled
+
+class Intrinsic:
+    """One operation of the processor, written in LLVM code: a ``numba.extending.intrinsic`` that is made when used."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.__doc__ = function.__doc__
+        self._function = function
+
+    @cached_property
+    def made(self) -> Any:
+        """The intrinsic as numba knows it."""
+        from numba.extending import intrinsic
+
+        return intrinsic(self._function)
+
+
+@cache
+def prepare_numba() -> None:
+    """Teach numba what a kernel is that another one calls."""
+    from numba import types
+    from numba.core.registry import cpu_target
+    from numba.extending import typeof_impl
+
+    @typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
+    def of_kernel(value: Kernel, context: Any) -> Any:
+        return types.Dispatcher(value.dispatcher)
+
+    @typeof_impl.register(Intrinsic)  # type: ignore[untyped-decorator]
+    def of_intrinsic(value: Intrinsic, context: Any) -> Any:
+        made = value.made
+        cpu_target.typing_context.refresh()  # a new one becomes known
+        return cpu_target.typing_context.resolve_value_type(made)
 
 
 def _warn(text: str) -> None:
@@ -100,7 +180,7 @@ def _cache_class() -> Any:
 
         def _place(self, sig: Any, codegen: Any) -> tuple[tuple[Any, ...], str, str]:
             """Return what a file must be of, how its name begins and its whole name."""
-            machine = (sig, codegen.magic_tuple(), numba.__version__)
+            machine = (sig, codegen.magic_tuple(), numba.__version__, sys.version)
             begin = f"{self._name}-{sha256(repr(machine).encode()).hexdigest()[:16]}"
             return (*machine, self._digest), begin, f"{begin}.{self._digest[:16]}.nbc"
 
@@ -194,7 +274,7 @@ def source_digest(module: Path, root: Path = _ROOT) -> str:
             continue
         found[path] = path.read_bytes()
         waiting += _imported(found[path].decode(), root)
-    digest = sha256(sys.version.encode())
+    digest = sha256()
     for path in sorted(found, key=str):
         digest.update(path.name.encode() + b"\0" + found[path] + b"\0")
     return digest.hexdigest()

@@ -47,7 +47,7 @@ def compiled_system(function: Callable[..., bool]) -> Any:
     """
     from graphsynth.intervals.kernels.krawczyk import system
 
-    return system(function)
+    return system(function)  # type: ignore[no-untyped-call]
 
 
 @checked

@@ -6,10 +6,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from graphsynth.compilation import kernel
+from graphsynth.core.intrinsics import lowest_bit, popcount
 
 __all__ = ["canon", "canon_packed", "canon_workspace", "lowest_bit", "popcount"]
 
@@ -24,26 +23,6 @@ LEAF = np.uint64(1 << 63)
 PATH, FIRST_PATH, BEST_PATH, FIRST_LAB, POSITION, CELL, LIKE_FIRST, VERSUS, PARENT, ROWS_I = range(10)
 # Rows of the unsigned scratch array before the forms of the first and of the current leaf.
 STARTS, LEFT, TRACE, FIRST_TRACE, BEST_TRACE, KEYS, ROWS_U = range(7)
-
-
-@intrinsic
-def popcount(typingctx, x):
-    """Return the number of set bits of a uint64."""
-
-    def codegen(context, builder, signature, args):
-        return builder.ctpop(args[0])
-
-    return types.uint64(types.uint64), codegen
-
-
-@intrinsic
-def lowest_bit(typingctx, x):
-    """Return the position of the lowest set bit of a uint64 (64 for zero) as uint64."""
-
-    def codegen(context, builder, signature, args):
-        return builder.cttz(args[0], context.get_constant(types.boolean, False))
-
-    return types.uint64(types.uint64), codegen
 
 
 @kernel

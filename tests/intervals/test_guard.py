@@ -178,7 +178,7 @@ PATCH = """
     os.environ["NUMBA_DISABLE_JIT"] = "1"
     from fractions import Fraction
     from math import isfinite
-    import graphsynth.intervals.kernels.rounding as rounding
+    import graphsynth.core.intrinsics as intrinsics
     def fma(a, b, c):
         if not (isfinite(a) and isfinite(b) and isfinite(c)):
             return float(np.float64(a) * np.float64(b) + np.float64(c))
@@ -187,7 +187,7 @@ PATCH = """
             return float(exact)
         except OverflowError:
             return float("inf") if exact > 0 else -float("inf")
-    rounding.fma = fma
+    intrinsics.fma = fma
 """
 
 

@@ -1,6 +1,7 @@
 """Interval operations on scalar bounds: four floats in, two out; empty is ``(inf, -inf)``."""
 
 from graphsynth.compilation import kernel
+from graphsynth.core.intrinsics import fma
 from graphsynth.intervals.kernels.rounding import (
     DIVISOR_MIN,
     FACTOR_MAX,
@@ -16,7 +17,6 @@ from graphsynth.intervals.kernels.rounding import (
     divide_both,
     down,
     excess,
-    fma,
     multiply_both,
     root_down,
     root_up,

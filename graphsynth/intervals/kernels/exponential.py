@@ -6,6 +6,7 @@ from math import factorial, frexp, ldexp
 import numpy as np
 
 from graphsynth.compilation import kernel
+from graphsynth.core.intrinsics import fma
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import (
@@ -14,7 +15,6 @@ from graphsynth.intervals.kernels.rounding import (
     MAX,
     add_down,
     add_up,
-    fma,
     multiply_both,
     root_down,
     root_up,

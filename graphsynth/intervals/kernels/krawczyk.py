@@ -11,18 +11,34 @@ continuous.  It is written with the scalar functions of this package (``arithmet
 """
 
 import numpy as np
-from numba import boolean, float64, int8, njit, types, void
 
-from graphsynth.compilation import kernel
+from graphsynth.compilation import kernel, prepare_numba
 from graphsynth.intervals.kernels import arithmetic as ia
 
 EMPTY, UNIQUE, EXISTS, UNDECIDED = 0, 1, 2, 3
 
-VECTOR, MATRIX = float64[::1], float64[:, ::1]
-SYSTEM = boolean(*[VECTOR] * 6, MATRIX, MATRIX, boolean)
-#: Decorator for compiled systems.
-system = njit(SYSTEM, error_model="numpy")
-_TEST = void(types.FunctionType(SYSTEM), MATRIX, MATRIX, VECTOR, VECTOR, MATRIX, MATRIX, int8[::1])
+
+def types_of_system():
+    """Types of a system for numba: of itself, of a vector and of a matrix."""
+    from numba import boolean, float64
+
+    vector, matrix = float64[::1], float64[:, ::1]
+    return boolean(*[vector] * 6, matrix, matrix, boolean), vector, matrix
+
+
+def system(function):
+    """Compile a system; a decorator."""
+    from numba import njit
+
+    prepare_numba()
+    return njit(types_of_system()[0], error_model="numpy")(function)
+
+
+def _types_of_test():
+    from numba import int8, types, void
+
+    of_system, vector, matrix = types_of_system()
+    return void(types.FunctionType(of_system), matrix, matrix, vector, vector, matrix, matrix, int8[::1])
 
 
 @kernel
@@ -120,7 +136,7 @@ def test(equations, xl, xh, pl, ph, kl, kh, fl, fh, z, jl, jh, mid, y):
     return found, norm
 
 
-@kernel(signature=_TEST)
+@kernel(signature=_types_of_test)
 def krawczyk_boxes(equations, lo, hi, pl, ph, out_lo, out_hi, status):
     """Test boxes (N, n) once with common parameters (m,): status and intersection with the image."""
     n = lo.shape[1]

@@ -6,10 +6,9 @@ that solution.  So the search can be stopped between any two boxes.
 """
 
 import numpy as np
-from numba import int8, int64, types
 
 from graphsynth.compilation import kernel
-from graphsynth.intervals.kernels.krawczyk import EMPTY, EXISTS, MATRIX, SYSTEM, UNDECIDED, UNIQUE, VECTOR, test
+from graphsynth.intervals.kernels.krawczyk import EMPTY, EXISTS, UNDECIDED, UNIQUE, test, types_of_system
 from graphsynth.intervals.kernels.rounding import add_down, add_up
 
 WAITING, KEPT, TESTED, PROVED = 0, 1, 2, 3
@@ -104,13 +103,14 @@ def _beyond(equations, pl, ph, sl, sh, xl, xh, dl, dh, kl, kh, fl, fh, z, jl, jh
     return UNDECIDED, INFLATIONS
 
 
-_STATE = int64[::1]
-_PAVE = int64(
-    types.FunctionType(SYSTEM), *[VECTOR] * 5, *[MATRIX] * 6, int8[::1], _STATE, int64,
-)  # fmt: skip
+def _types_of_pave():
+    from numba import int8, int64, types
+
+    of_system, vector, matrix = types_of_system()
+    return int64(types.FunctionType(of_system), *[vector] * 5, *[matrix] * 6, int8[::1], int64[::1], int64)
 
 
-@kernel(signature=_PAVE)
+@kernel(signature=_types_of_pave)
 def pave(
     equations, sl, sh, pl, ph, tolerance, stack_lo, stack_hi, kept_lo, kept_hi, domain_lo, domain_hi, status, state,
     limit,

@@ -6,10 +6,8 @@ itself must not fuse anything: no ``fastmath`` anywhere, and a test compares wit
 
 from math import frexp, ldexp, sqrt
 
-from numba import types
-from numba.extending import intrinsic
-
 from graphsynth.compilation import kernel
+from graphsynth.core.intrinsics import fma
 
 PHI = 2.0**-53 * (1.0 + 2.0**-52)
 ETA = 2.0**-1074
@@ -24,16 +22,6 @@ QUOTIENT_MAX = 2.0**490
 ROOT_MAX = 2.0**1000
 NORMAL_MIN = 2.0**-1022
 SCALE = 2.0**600
-
-
-@intrinsic
-def fma(typing_context, a, b, c):
-    """Compute ``a * b + c`` with one rounding."""
-
-    def build(context, builder, signature, args):
-        return builder.fma(*args)
-
-    return types.float64(types.float64, types.float64, types.float64), build
 
 
 @kernel(forceinline=True)

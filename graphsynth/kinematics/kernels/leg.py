@@ -9,10 +9,9 @@ exact evaluation of `graphsynth.kinematics.leg.solve_leg`.
 import math
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 
 from graphsynth.compilation import kernel
+from graphsynth.core.intrinsics import fma
 
 BLOCK = 256
 HARD = 9  # status of an entry that needs the exact evaluation
@@ -24,17 +23,6 @@ QUARTER_LOW = 3.061616997868383e-17
 HALF_PI, HALF_PI_LOW, TWO_OVER_PI = 1.5707963267948966, 6.123233995736766e-17, 0.6366197723675814
 ROUND = 1.5 * 2.0**52  # added and taken away: rounds to the nearest whole number
 TANGENT = 0.41421356237309503  # tan(pi / 8)
-
-
-@intrinsic
-def fma(typingctx, a, b, c):
-    """Return ``a b + c`` with one rounding."""
-    signature = types.float64(types.float64, types.float64, types.float64)
-
-    def codegen(context, builder, signature, args):
-        return builder.fma(*args)
-
-    return signature, codegen
 
 
 @kernel

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from graphsynth.compilation import kernel
-from graphsynth.kinematics.kernels.leg import fma
+from graphsynth.core.intrinsics import fma
 
 NEAR_DOUBLE, INCONSISTENT, DEGENERATE = 1, 2, 4  # bits of a flag
 NODES = 32

@@ -14,7 +14,8 @@ import math
 import numpy as np
 
 from graphsynth.compilation import kernel
-from graphsynth.kinematics.kernels.leg import ROUND, angle_of, cross_sum, directions, fma, solve
+from graphsynth.core.intrinsics import fma
+from graphsynth.kinematics.kernels.leg import ROUND, angle_of, cross_sum, directions, solve
 
 COMPLETE, NO_HOME, HOME_ENDS, DRIVE_ENDS, SINGULAR, NO_START = 0, 1, 2, 3, 4, 5
 SMALLEST = 1e-11  # step over the whole range
