@@ -217,7 +217,7 @@ def table(lowered: Lowered, levels: int) -> str:
     entries = lowered.entries
     names = [[f"entry_{k}_{level}" for level in range(levels)] for k in range(len(entries))]
     sizes = {
-        "MAX_IN": max(entry.slots_in for entry in entries) + 1,
+        "MAX_IN": max(entry.slots_in for entry in entries) + 2,
         "MAX_OUT": max(entry.slots_out for entry in entries) + 1,
         "MAX_ARRAYS": max(entry.types.count("A") for entry in entries) + 1,
     }

@@ -55,7 +55,7 @@ def _set_up(library: Any) -> int:
     import numpy as np
     from numpy._core import _multiarray_umath as multiarray  # type: ignore[attr-defined]
 
-    names = "bool int8 uint8 int16 uint16 int32 uint32 int64 uint64 - - float32 float64 - - -"
+    names = "bool int8 uint8 int16 uint16 int32 uint32 int64 uint64 - - float32 float64 - - complex128"
     scalars = tuple(None if name == "-" else getattr(np, name) for name in names.split())
     level: int = library.setup(np.ndarray, scalars, multiarray._ARRAY_API, _bound, _raise)
     for array in (np.arange(6.0)[::2], np.zeros((3, 4), dtype=np.uint8), np.frombuffer(bytes(8), dtype=np.int64)):

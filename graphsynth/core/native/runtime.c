@@ -23,7 +23,7 @@ typedef struct {
 
 enum { TP_CALL = 50, TP_INIT = 60, TP_METHODS = 64, VARARGS = 1, NOARGS = 4, ONE = 8, BASETYPE = 1 << 10 };
 
-extern PyObject PyTuple_Type, PyLong_Type, PyFloat_Type, PyBool_Type;
+extern PyObject PyTuple_Type, PyLong_Type, PyFloat_Type, PyComplex_Type, PyBool_Type;
 extern PyObject _Py_NoneStruct, _Py_TrueStruct, _Py_FalseStruct;
 extern PyObject *PyExc_TypeError, *PyExc_SystemError;
 PyObject *PyModule_Create2(Module *, int);
@@ -43,6 +43,9 @@ PyObject *PyLong_FromLongLong(long long);
 PyObject *PyLong_FromUnsignedLongLong(unsigned long long);
 double PyFloat_AsDouble(PyObject *);
 PyObject *PyFloat_FromDouble(double);
+double PyComplex_RealAsDouble(PyObject *);
+double PyComplex_ImagAsDouble(PyObject *);
+PyObject *PyComplex_FromDoubles(double, double);
 PyObject *PyUnicode_FromString(const char *);
 int PyUnicode_CompareWithASCIIString(PyObject *, const char *);
 PyObject *PyBytes_FromStringAndSize(const char *, intptr_t);
@@ -146,8 +149,9 @@ static const char LETTERS[] = "?bBhHiIiIlLfdxFD", SIZES[] = {1, 1, 1, 2, 2, 4, 4
 static const char LETTERS[] = "?bBhHiIlLlLfdxFD", SIZES[] = {1, 1, 1, 2, 2, 4, 4, 8, 8, 8, 8, 4, 8, 16, 8, 16};
 #endif
 
-static int scalar(char letter, PyObject *object, uint64_t *slot) {
+static int scalar(char letter, PyObject *object, Call *call) {
     PyObject *type = object->type;
+    uint64_t *slot = call->next++;
     if (type == &PyFloat_Type) {
         if (letter != 'd') return 0;
         *(double *)slot = PyFloat_AsDouble(object);
@@ -161,6 +165,12 @@ static int scalar(char letter, PyObject *object, uint64_t *slot) {
         *slot = PyLong_AsUnsignedLongLong(object);
         if (*slot >> 63) return 1;
         return 0;
+    }
+    if (type == &PyComplex_Type) {
+        if (letter != 'D') return 0;
+        ((double *)slot)[0] = PyComplex_RealAsDouble(object);
+        ((double *)call->next++)[0] = PyComplex_ImagAsDouble(object);
+        return 1;
     }
     if (type == &PyBool_Type) {
         if (letter != '?') return 0;
@@ -178,19 +188,21 @@ static int scalar(char letter, PyObject *object, uint64_t *slot) {
             case 'i': *slot = (uint64_t)*(int32_t *)value; return 1;
             case 'I': case 'f': *slot = *(uint32_t *)value; return 1;
             case 'l': case 'L': case 'd': *slot = *(uint64_t *)value; return 1;
+            case 'D': slot[0] = ((uint64_t *)value)[0]; *call->next++ = ((uint64_t *)value)[1]; return 1;
         }
     }
     return 0;
 }
 
-/* "A" letter ndim layout w|r */
+/* "A" letter ndim layout w|r; code that only reads takes any array, unless it may return a part of it */
 static int array(const char *type, PyObject *object, Call *call) {
     if (object->type != array_type) return 0;
     Array *a = (Array *)object;
     int ndim = type[2] - '0', number = a->dtype->number, flags = a->flags;
     if (a->ndim != ndim || (unsigned)number > 15 || LETTERS[number] != type[1]) return 0;
     char layout = flags & C_ORDER ? 'C' : flags & F_ORDER ? 'F' : 'A';
-    if (layout != type[3] || !(flags & ALIGNED) || (type[4] == 'w') != !!(flags & WRITEABLE)) return 0;
+    if (layout != type[3] || !(flags & ALIGNED)) return 0;
+    if (flags & WRITEABLE ? type[4] == 'r' && call->owners : type[4] == 'w') return 0;
     if (a->dtype->order != '=' && a->dtype->order != '|') return 0;
     uint64_t *slot = call->next;
     intptr_t items = 1;
@@ -264,7 +276,7 @@ static int match(const char **types, PyObject *object, Call *call) {
             return is_named(&named[(type[1] - '0') * 10 + type[2] - '0'], object->type) && items(types, object, call);
     }
     *types += 1;
-    return scalar(*type, object, call->next++);
+    return scalar(*type, object, call);
 }
 
 /* Fill the slots; false where the arguments are of other types. */
@@ -337,6 +349,7 @@ static PyObject *boxed(const char **types, uint64_t **slots, Call *call) {
     PyObject *constant = NULL;
     switch (*type) {
         case 'd': return PyFloat_FromDouble(*(double *)&value);
+        case 'D': return PyComplex_FromDoubles(*(double *)&value, *(double *)(*slots)++);
         case 'f': return PyFloat_FromDouble(*(float *)&value);
         case 'b': return PyLong_FromLongLong((int8_t)value);
         case 'h': return PyLong_FromLongLong((int16_t)value);

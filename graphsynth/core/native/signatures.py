@@ -20,8 +20,8 @@ _HEAD = """\
 # Calls of kernels that are compiled ahead of time: made by ``python -m graphsynth.core.native.record``, sorted.
 # A capital letter with a number stands for a named tuple of the first part.
 """
-_NUMBERS = "b1 i1 u1 i2 u2 i4 u4 i8 u8 f4 f8"
-_LETTERS = dict(zip(_NUMBERS.split(), "?bBhHiIlLfd", strict=True))
+_NUMBERS = "b1 i1 u1 i2 u2 i4 u4 i8 u8 f4 f8 c16"
+_LETTERS = dict(zip(_NUMBERS.split(), "?bBhHiIlLfdD", strict=True))
 _TOKEN = re.compile(r"\s*([\w.]+(?:\[\d[ACF]r?\])?|=[^,()]+|[(),:])")
 
 
@@ -81,6 +81,8 @@ def text_of(kind: Any) -> str:
         return f"{'f' if isinstance(kind, types.Float) else 'i' if kind.signed else 'u'}{kind.bitwidth // 8}"
     if isinstance(kind, types.Omitted):
         return f"={kind.value!r}"
+    if kind == types.complex128:
+        return "c16"
     if kind == types.none:
         return "none"
     raise TypeError(f"arguments of type {kind} are not for the library")
