@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "graphsynth"
 
 #: Modules that are public beside the packages with an ``__all__``.
 MODULES = (
-    "graphsynth.errors",
+    "graphsynth.core.errors",
     "graphsynth.structure.assur",
     "graphsynth.mechanism.joints",
     "graphsynth.mechanism.laws",

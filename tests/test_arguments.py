@@ -15,24 +15,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth import intervals, jamming
-from graphsynth.arguments import checker
-from graphsynth.errors import GeometryError, GraphsynthError, IntervalError
+from graphsynth import evidence, intervals, jamming
+from graphsynth.core.arguments import checker
+from graphsynth.core.errors import GeometryError, GraphsynthError, IntervalError
 from graphsynth.intervals import Dual, Interval, Search
 from graphsynth.jamming import Bearing, Fit, ToleranceBox
-from graphsynth.jamming import areas as circle_areas
-from graphsynth.jamming.circle_ellipse import (
+from graphsynth.jamming.bearing import areas as circle_areas
+from graphsynth.jamming.bearing.ranges import Range
+from graphsynth.jamming.bearing.sweep import PieceGap
+from graphsynth.jamming.intersection import (
     Reading,
     circle_ellipse,
     krawczyk_boxes,
     reading_ellipse,
     surrogate_problem,
 )
-from graphsynth.jamming.coupled import bearing_limits
-from graphsynth.jamming.ranges import Range
-from graphsynth.jamming.sweep import PieceGap
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.jamming.joints import bearing_limits
 from graphsynth.mechanism import constraints, files, joints, laws
+from graphsynth.mechanism.four_bar import LambdaLinkage
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.mechanism.rank import mobility_report
 from graphsynth.structure.graph import MechanismGraph
@@ -99,15 +99,17 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "part of a turn": lambda: (jamming.certify_jamming(box()).over, {"start": 0.1, "stop": 0.2}),
     "another box": lambda: (box().replace, {"l1": 2, "axis": (1, 0, 0), "clearance": 0.03}),
     "parameter of a box": lambda: (box().outer, {"name": "l1"}),
-    "arc errors": lambda: (jamming.arc_errors, {
+    "arc errors": lambda: (evidence.arc_errors, {
         "box": box(), "condition": "A", "resolutions": (0.1,), "samples": (20,), "repeats": 1,
     }),
-    "area errors": lambda: (jamming.area_errors, {"bearing": BEARING, "sine": "0.0133", "counts": (16,), "repeats": 1}),
-    "crossing errors": lambda: (jamming.crossing_errors, {
+    "area errors": lambda: (evidence.area_errors, {
+        "bearing": BEARING, "sine": "0.0133", "counts": (16,), "repeats": 1,
+    }),
+    "crossing errors": lambda: (evidence.crossing_errors, {
         "problem": None, "boxes": (30,), "general": False, "repeats": 1,
     }),
-    "error table": lambda: (jamming.error_table, {"groups": {}}),
-    "rows of an error table": lambda: (lambda rows: jamming.error_table({"a": rows}), {"rows": []}),
+    "error table": lambda: (evidence.error_table, {"groups": {}}),
+    "rows of an error table": lambda: (lambda rows: evidence.error_table({"a": rows}), {"rows": []}),
     "fits": lambda: (jamming.tightest_free_fit, {"box": box(), "fits": ("H7/g6",), "diameter": 35}),
     "assessment": lambda: (jamming.assess_jamming, {
         "subject": DECK, "bearing": BEARING, "condition": "A", "samples": 8, "certify": False,

@@ -15,12 +15,12 @@ from types import FunctionType
 import pytest
 
 import graphsynth
-from graphsynth import compilation
-from graphsynth.compilation import kernel, source_digest
+from graphsynth.core import compilation
+from graphsynth.core.compilation import kernel, source_digest
 
-BELOW = "from graphsynth.compilation import kernel\n\n@kernel\ndef below(x):\n    return x + {}\n"
+BELOW = "from graphsynth.core.compilation import kernel\n\n@kernel\ndef below(x):\n    return x + {}\n"
 ABOVE = """
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth_probe.below import below
 
 @kernel
@@ -30,7 +30,7 @@ def above(x):
 RUN = """
 import sys
 sys.path.insert(0, {folder!r})
-import graphsynth.compilation as c
+import graphsynth.core.compilation as c
 from pathlib import Path
 c._IMPORT = c.re.compile(c._IMPORT.pattern.replace("graphsynth", "graphsynth(?:_probe)?"), c.re.MULTILINE)
 c.source_digest.__wrapped__.__defaults__ = (Path({folder!r}),)

@@ -39,7 +39,7 @@ CHECKED = {
 
 #: Commands that no test of this file runs, and why.
 NOT_RUN = {
-    r"run |accuracy |stress": "the scenes, methods and cases have tests of their own: tests/scenes, accuracy, stress",
+    r"run |accuracy |stress": "the scenes, methods and cases have tests of their own: tests/pipeline, accuracy, stress",
     r"(enumerate|build) --links 16|--links 18": "much disk or many hours; fewer links in tests/synthesis, atlas",
     r"\$|part-": "jobs of a batch system; shards in tests/synthesis, atlas",
     r"--scheduler|sixteen": "needs a cluster; tests/atlas starts one",
@@ -145,8 +145,8 @@ def merged(tables, more):
 
 
 def reads(tables):
-    from graphsynth.errors import GraphsynthError
-    from graphsynth.scenes.scene import Scene
+    from graphsynth.core.errors import GraphsynthError
+    from graphsynth.pipeline.scene import Scene
 
     try:
         return Scene.from_mapping(tables)
@@ -169,14 +169,14 @@ def toml_blocks():
 def test_tables_of_scenes_and_questions_are_read(body, tmp_path, capsys):
     tables = tomllib.loads(body)
     if tables.get("mechanism", {}).get("module") == "pendulum":
-        return  # of the package that the page makes: tests/scenes/test_third_party.py installs it and runs this
+        return  # of the package that the page makes: tests/pipeline/test_third_party.py installs it and runs this
     if "scene" in tables:  # a whole scene
         assert reads(tables) is not None
     elif {"mechanism", "outputs"} & set(tables):  # part of one: it fits a shipped scene
         assert any(reads(merged(scene, tables)) for scene in tables_of_scenes())
-    elif "project" in tables:  # how another package adds families and stages
+    elif "project" in tables:  # how another package adds systems and stages
         groups = set(tables["project"]["entry-points"])
-        code = "".join(path.read_text("utf-8") for path in (ROOT / "graphsynth" / "scenes").rglob("*.py"))
+        code = "".join(path.read_text("utf-8") for path in (ROOT / "graphsynth" / "pipeline").rglob("*.py"))
         assert groups and all(f'"{group}"' in code for group in groups)
     elif "W" in tables:  # a structural question
         (tmp_path / "question.toml").write_text(body, "utf-8")
@@ -199,9 +199,9 @@ def test_a_wrong_table_is_seen():
 
 def test_the_first_run_is_as_the_tutorial_tells(tmp_path, monkeypatch):
     """The values shown, the changed clearance, the misspelt key."""
-    from graphsynth.errors import SceneError
-    from graphsynth.scenes.runner import execute
-    from graphsynth.scenes.scene import find_scene, load_scene
+    from graphsynth.core.errors import SceneError
+    from graphsynth.pipeline.runner import execute
+    from graphsynth.pipeline.scene import find_scene, load_scene
 
     blocks = list(fences(ROOT / "docs" / "tutorial" / "first-run.md"))
     shown, message = (body for language, body, _ in blocks if language == "text")

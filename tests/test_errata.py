@@ -1,8 +1,8 @@
 """Numbers on the page of errata, computed anew from formulas, without the library where that is possible.
 
-Not here: events and chatter of the tribometer (tests/dynamics/tribometer), the settling time of the braider, the
+Not here: events and chatter of the tribometer (tests/systems/tribometer), the settling time of the braider, the
 count of starts from which the printed antenna equations are solved, the error floors of MuJoCo (they need it), and
-the jam of three equal bearings at every input (tests/jamming/coupled).  The interval shoelace sum and the counts are
+the jam of three equal bearings at every input (tests/jamming/joints).  The interval shoelace sum and the counts are
 the library's own; the counts have a second producer in catalog/counts.
 """
 
@@ -120,7 +120,7 @@ def gap_width(t):
 
 def test_interval_shoelace():
     printed("`[-443, 444]`")
-    from graphsynth.jamming.shoelace import crescent_boxes, interval_shoelace
+    from graphsynth.jamming.bearing.shoelace import crescent_boxes, interval_shoelace
 
     b = RH * math.cos(TILT) - HALF * math.sin(TILT)
     for count in (60, 1000):

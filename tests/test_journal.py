@@ -10,10 +10,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from graphsynth import journal as journals
 from graphsynth.cli import main
-from graphsynth.errors import FormatError, GraphsynthError
-from graphsynth.journal import Journal, Work, digest_of
+from graphsynth.core import journal as journals
+from graphsynth.core.errors import FormatError, GraphsynthError
+from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.synthesis.problem import Problem
 from graphsynth.synthesis.writing import count_with_checkpoint, write_listing
 

@@ -15,8 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graphsynth.errors import GraphsynthError, SpecError
-from graphsynth.ordered import AHEAD, RETRIES, Crew, in_order, processes
+from graphsynth.core.errors import GraphsynthError, SpecError
+from graphsynth.core.ordered import AHEAD, RETRIES, Crew, in_order, processes
 
 
 class Held(Executor):
@@ -130,7 +130,7 @@ def test_what_is_no_executor_is_refused(wrong):
 
 PARENT = """
 import os, sys, time
-from graphsynth.ordered import processes
+from graphsynth.core.ordered import processes
 from tests_busy import busy
 if __name__ == "__main__":
     with processes(3) as crew:

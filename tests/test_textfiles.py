@@ -10,9 +10,9 @@ import pytest
 
 from graphsynth import Mechanism, StructuralSpec
 from graphsynth.cli import main
-from graphsynth.errors import FormatError, GraphsynthError
-from graphsynth.scenes.scene import load_scene
-from graphsynth.textfiles import FILE_MAX, read_bytes, toml_tables
+from graphsynth.core.errors import FormatError, GraphsynthError
+from graphsynth.core.textfiles import FILE_MAX, read_bytes, toml_tables
+from graphsynth.pipeline.scene import load_scene
 
 READERS = {
     "question": StructuralSpec.from_toml,

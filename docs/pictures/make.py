@@ -19,9 +19,9 @@ from graphsynth.drawing.coupled_pictures import clearance_picture
 from graphsynth.drawing.frames import with_trace_points
 from graphsynth.drawing.graphs import graph_sketch
 from graphsynth.drawing.svg import bare, painted, picture
-from graphsynth.jamming.coupled import JointLimits, Misalignment
-from graphsynth.scenes.products import Picture
-from graphsynth.scenes.runner import run
+from graphsynth.jamming.joints import JointLimits, Misalignment
+from graphsynth.pipeline.products import Picture
+from graphsynth.pipeline.runner import run
 
 CHOSEN = 5  # of the sixteen chains: the one that becomes a mechanism
 CELL, GAP, COLUMNS = 150, 10, 8

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from graphsynth.errors import FormatError, GraphsynthError, SpecError
+from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
 
 __all__ = ["SECONDS", "Answer", "ask", "columns"]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.atlas.sealing import unseal
 from graphsynth.atlas.tables import INDEXES
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.facts import GroupRow, Rows

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.atlas.building import BuildStep
 from graphsynth.atlas.opened import OpenCatalogue
 from graphsynth.atlas.schema import connect, readable, settle
-from graphsynth.errors import FormatError, SpecError
+from graphsynth.core.errors import FormatError, SpecError
 
 if TYPE_CHECKING:
     import pandas as pd

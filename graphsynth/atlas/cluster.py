@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor
 from contextlib import contextmanager
 
-from graphsynth.errors import GraphsynthError
-from graphsynth.extras import need
-from graphsynth.ordered import RETRIES, Again
+from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.extras import need
+from graphsynth.core.ordered import RETRIES, Again
 
 __all__ = ["dask_executor"]
 

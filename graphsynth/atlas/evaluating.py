@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.atlas.evaluations import Evaluation, store
 from graphsynth.atlas.schema import GARBAGE, connect, readable, screen, settle
 from graphsynth.atlas.stored import data_of, fingerprint, mechanism_in
-from graphsynth.errors import GraphError, GraphsynthError, SpecError
+from graphsynth.core.errors import GraphError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.coupled.turn import TurnCertificate
-    from graphsynth.kinematics.embodiment.api import Embodiment
+    from graphsynth.jamming.joints.turn import TurnCertificate
+    from graphsynth.kinematics.dimensional.api import Embodiment
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
@@ -117,7 +117,7 @@ def evaluate(
     watch: Callable[[EvaluationStep], None] | None,
 ) -> int:
     """Evaluate and store, mechanism by mechanism; see :meth:`graphsynth.atlas.catalogue.Catalogue.evaluate`."""
-    from graphsynth.ordered import in_order
+    from graphsynth.core.ordered import in_order
 
     if per_chain < 0 or (limit is not None and limit < 0):
         raise SpecError("the numbers of mechanisms must be 0 or more")
@@ -245,7 +245,7 @@ def _dimensions(task: Task) -> list[Evaluation]:
 
 
 def _embody(graph: MechanismGraph, **options: Any) -> Embodiment:
-    from graphsynth.kinematics.embodiment import embody
+    from graphsynth.kinematics.dimensional import embody
 
     found: Embodiment = embody(graph, **options)
     return found
@@ -253,7 +253,7 @@ def _embody(graph: MechanismGraph, **options: Any) -> Embodiment:
 
 def turn_is_proved(motion: Motion) -> bool:
     """Whether the motion is proved to be one regular branch that closes."""
-    from graphsynth.kinematics.certified.poses import certify
+    from graphsynth.kinematics.certify.poses import certify
 
     try:
         proof = certify(motion, max_boxes=_BOXES, seconds=_SECONDS)
@@ -294,7 +294,7 @@ def _jamming(task: Task, text: str) -> Evaluation:
 
 def jamming_proof(mechanism: Mechanism, tilt: float, joint_limit: float) -> TurnCertificate:
     """Prove whether a mechanism jams: the first driven axis tilted by at most ``tilt`` in any direction, model L1."""
-    from graphsynth.jamming.coupled import JointLimits, Misalignment, certify_coupled
+    from graphsynth.jamming.joints import JointLimits, Misalignment, certify_coupled
 
     driver = mechanism.drivers[0]
     motor = Misalignment(driver.base, driver.link, tilt, alpha_range=(0.0, tilt), direction_range=(0.0, math.tau))

@@ -19,7 +19,7 @@ from typing import Any
 from graphsynth.atlas.building import transaction
 from graphsynth.atlas.schema import connect, settle
 from graphsynth.atlas.stored import TIED, data_of, fingerprint, fingerprint_at, mechanism_in
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 
 __all__ = ["GUARANTEES", "KINDS", "NOT_COMPUTED", "Evaluation", "record", "store"]
 

@@ -11,8 +11,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from graphsynth.errors import GraphsynthError, SpecError
-from graphsynth.extras import need
+from graphsynth.core.errors import GraphsynthError, SpecError
+from graphsynth.core.extras import need
 
 __all__ = ["FORMS", "TABLES", "digest", "export"]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import TooLargeError
+from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.canonical import KEY_VERSION
 
 if TYPE_CHECKING:

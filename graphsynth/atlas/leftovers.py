@@ -11,7 +11,7 @@ import stat
 from contextlib import closing
 from pathlib import Path
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 
 __all__ = ["take_back", "unfinished"]
 

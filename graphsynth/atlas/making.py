@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.atlas.building import BuildStep, build_family, finish_family, open_family
 from graphsynth.atlas.schema import connect, settle
-from graphsynth.errors import SpecError, TooLargeError
+from graphsynth.core.errors import SpecError, TooLargeError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.facts import Rows
@@ -62,7 +62,7 @@ def _family(
 ) -> None:
     """Make or continue one family; nothing happens for numbers without any chain."""
     from graphsynth.atlas.pieces import fingerprint, problem_of, rows_of_task, share_of, tasks_of
-    from graphsynth.ordered import in_order
+    from graphsynth.core.ordered import in_order
 
     problem, whole = problem_of(links, mobility, fractionated), tasks_of(links, mobility, fractionated)
     # a shard is not counted: for 18 links that would take a fifth of its time; the merge counts once for all
@@ -97,7 +97,7 @@ def expected_of(problem: Problem, executor: Executor | None) -> int:
 
 def processes(workers: int) -> AbstractContextManager[Executor | None]:
     """Give a pool of worker processes, or None for one; the kernels are compiled here first, once for all."""
-    from graphsynth import ordered
+    from graphsynth.core import ordered
 
     return ordered.processes(workers, _compile_kernels)
 

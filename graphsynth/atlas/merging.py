@@ -17,7 +17,7 @@ from graphsynth.atlas.pieces import problem_of
 from graphsynth.atlas.schema import GARBAGE, connect, readable, screen, settle
 from graphsynth.atlas.sealing import broken_seal
 from graphsynth.atlas.statement import PUBLISHED
-from graphsynth.errors import FormatError, GraphsynthError, SpecError
+from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
 
 __all__ = ["merge"]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from graphsynth.atlas.asking import SECONDS, Answer, ask, columns
 from graphsynth.atlas.schema import GARBAGE, connect, readable, screen
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -129,7 +129,7 @@ class _Recheck:
             self.same("evaluations: free in samples", self.where, self._free_in_samples(tilt, limit), True)
 
     def _free_in_samples(self, tilt: float, limit: float) -> bool:
-        from graphsynth.jamming.coupled import JointLimits, Misalignment, assess_coupled
+        from graphsynth.jamming.joints import JointLimits, Misalignment, assess_coupled
 
         driver = self.mechanism.drivers[0]
         motion = motion_of(self.mechanism, _SAMPLES)

@@ -12,8 +12,8 @@ from pathlib import Path
 from graphsynth.atlas.leftovers import take_back, unfinished
 from graphsynth.atlas.sealing import broken_seal, seal
 from graphsynth.atlas.tables import APPLICATION_ID, EDGES, INDEXES, SCHEMA, SCHEMA_VERSION, wrong_rows
-from graphsynth.errors import FormatError, GraphsynthError
-from graphsynth.wording import plain
+from graphsynth.core.errors import FormatError, GraphsynthError
+from graphsynth.core.wording import plain
 
 __all__ = [
     "APPLICATION_ID",

@@ -17,7 +17,7 @@ __all__ = ["Turning"]
 
 Array = NDArray[np.float64]
 
-#: Steps of a turn: half a degree, the grid of :mod:`graphsynth.kinematics.embodiment.verify`.
+#: Steps of a turn: half a degree, the grid of :mod:`graphsynth.kinematics.dimensional.verify`.
 _STEPS = 720
 _STRIDE = 10
 _ITERATIONS = 30

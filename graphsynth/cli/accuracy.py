@@ -9,25 +9,25 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from graphsynth.cli import console
-from graphsynth.errors import SceneError
+from graphsynth.core.errors import SceneError
 
 __all__ = ["run"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Measure error against run time of every method of a scene; print what to choose."""
-    from graphsynth.accuracy.registry import plans_of
-    from graphsynth.accuracy.report import measure, summary, write_report
-    from graphsynth.accuracy.rows import Effort
-    from graphsynth.scenes.scene import load_scene
-    from graphsynth.scenes.stages import Context
+    from graphsynth.evidence.report import measure, summary, write_report
+    from graphsynth.evidence.rows import Effort
+    from graphsynth.pipeline.scene import load_scene
+    from graphsynth.pipeline.stages import Context
+    from graphsynth.pipeline.system import plans_of
 
     scene = load_scene(options.scene)
     plans = plans_of(scene.mechanism.module, structure=scene.structure is not None)
     if not plans:
         raise SceneError(
             f"{scene.place}: no numerical method is known for module = {scene.mechanism.module!r}; other packages add "
-            "some through the entry points graphsynth.accuracy"
+            "some through the entry points graphsynth.evidence"
         )
     folder = options.out or Path("graphsynth-out") / f"{scene.name}-accuracy"
     _check_writable(folder)

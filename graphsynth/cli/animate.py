@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
 from graphsynth.cli.show import check_place, read_graph
-from graphsynth.errors import FormatError, GraphsynthError, SpecError
-from graphsynth.wholefiles import replacing
+from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
+from graphsynth.core.wholefiles import replacing
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -67,11 +67,11 @@ def _from_file(place: Path, options: argparse.Namespace) -> _Found:
     """Move a dimensioned mechanism over the range given, or as far as it goes."""
     import numpy as np
 
+    from graphsynth.core.textfiles import read_bytes
     from graphsynth.drawing.reach import motion_over_reach
     from graphsynth.kinematics.simulation import simulate
     from graphsynth.mechanism.files import JSON_MAX
     from graphsynth.mechanism.model import Mechanism
-    from graphsynth.textfiles import read_bytes
 
     if options.driver:
         raise SpecError("--driver belongs to a graph: a dimensioned mechanism names its drivers in its file")
@@ -92,7 +92,7 @@ def _from_file(place: Path, options: argparse.Namespace) -> _Found:
 
 def _from_graph(options: argparse.Namespace) -> _Found:
     """Find dimensions for a graph; the best found is shown even where nothing was accepted."""
-    from graphsynth.kinematics.embodiment import embody
+    from graphsynth.kinematics.dimensional import embody
 
     if options.range is not None:
         raise SpecError("--range belongs to a dimensioned mechanism: dimensions of a graph are sought for a full turn")

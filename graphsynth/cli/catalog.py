@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
 from graphsynth.cli.workers import workers_for
-from graphsynth.errors import SpecError
-from graphsynth.wording import plain
+from graphsynth.core.errors import SpecError
+from graphsynth.core.wording import plain
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
 from graphsynth.cli.workers import workers_for
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
@@ -62,7 +62,7 @@ def add_evaluate(
 def run(options: argparse.Namespace) -> int:
     """Evaluate, and say what the catalogue now holds."""
     from graphsynth.atlas.catalogue import Catalogue
-    from graphsynth.ordered import processes
+    from graphsynth.core.ordered import processes
 
     if options.joint_limit is not None and options.tilt is None:
         raise SpecError("--joint-limit goes with --tilt; give both, or neither")

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     """Write the page and say what it holds."""
     from graphsynth.atlas.catalogue import Catalogue
     from graphsynth.atlas.site.building import build_site
-    from graphsynth.ordered import processes
+    from graphsynth.core.ordered import processes
 
     begin = time.perf_counter()
     with Catalogue(options.file) as catalogue:

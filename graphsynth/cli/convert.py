@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from graphsynth.cli import console
-from graphsynth.errors import GraphError, GraphsynthError, SpecError
+from graphsynth.core.errors import GraphError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
     import io

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
 from graphsynth.cli.workers import workers_for
-from graphsynth.errors import GraphsynthError, SpecError, TooLargeError
+from graphsynth.core.errors import GraphsynthError, SpecError, TooLargeError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -21,9 +21,9 @@ from graphsynth.cli.catalog_options import add_catalog
 from graphsynth.cli.console import note, settle
 from graphsynth.cli.question import add_question
 from graphsynth.cli.stress import add_stress
-from graphsynth.compilation import announce
-from graphsynth.errors import GraphsynthError
-from graphsynth.wording import plain
+from graphsynth.core.compilation import announce
+from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.wording import plain
 
 __all__ = ["main"]
 
@@ -80,7 +80,7 @@ def _failed(error: Exception, options: argparse.Namespace) -> int:
 
 def _of_the_system(error: OSError, options: argparse.Namespace) -> str:
     """Name the file and what can be done; an error while writing carries no name, it is of the output."""
-    from graphsynth.journal import FULL
+    from graphsynth.core.journal import FULL
 
     full = error.errno in FULL
     name = error.filename or (getattr(options, "output", None) or getattr(options, "out", None) if full else None)

@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 
 if TYPE_CHECKING:
-    from graphsynth.structure.spec import StructuralSpec
+    from graphsynth.structure.system.spec import StructuralSpec
     from graphsynth.synthesis.problem import Problem
 
 __all__ = ["add_question", "problem_of", "spec_of"]
@@ -55,7 +55,7 @@ def _assignments(options: argparse.Namespace) -> list[str]:
 
 def spec_of(options: argparse.Namespace) -> StructuralSpec:
     """Return the question; options on the command line add to the file, or replace what it says."""
-    from graphsynth.structure.spec import StructuralSpec
+    from graphsynth.structure.system.spec import StructuralSpec
 
     assignments = _assignments(options)
     if options.spec is None:

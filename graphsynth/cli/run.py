@@ -13,16 +13,16 @@ from graphsynth.cli import console
 from graphsynth.cli.workers import workers_for
 
 if TYPE_CHECKING:
-    from graphsynth.scenes.runner import Report
-    from graphsynth.scenes.stages import Progress
+    from graphsynth.pipeline.runner import Report
+    from graphsynth.pipeline.stages import Progress
 
 __all__ = ["run"]
 
 
 def run(options: argparse.Namespace) -> int:
     """Run a scene and print its summary."""
-    from graphsynth.scenes.journal import JOURNAL
-    from graphsynth.scenes.scene import load_scene
+    from graphsynth.pipeline.journal import JOURNAL
+    from graphsynth.pipeline.scene import load_scene
 
     scene = load_scene(options.scene)
     folder = options.out or Path("graphsynth-out") / scene.name
@@ -36,20 +36,20 @@ def run(options: argparse.Namespace) -> int:
         console.put_json(_document(report, options.explain))
         return 0
     if options.explain:
-        from graphsynth.scenes.explain import explain
+        from graphsynth.pipeline.explain import explain
 
         console.put(explain(report))
         return 0
-    from graphsynth.scenes.report import print_summary
+    from graphsynth.pipeline.report import print_summary
 
     print_summary(report, console.screen())
     return 0
 
 
 def _run(scene: Any, folder: Path, options: argparse.Namespace) -> Report:
-    from graphsynth.ordered import processes
-    from graphsynth.scenes.runner import has_stream
-    from graphsynth.scenes.runner import run as run_scene
+    from graphsynth.core.ordered import processes
+    from graphsynth.pipeline.runner import has_stream
+    from graphsynth.pipeline.runner import run as run_scene
 
     with _progress() as progress, processes(workers_for(options.workers, has_stream(scene))) as executor:
         return run_scene(scene, folder, executor, progress, options.fresh)
@@ -64,7 +64,7 @@ def _document(report: Report, explained: bool) -> dict[str, Any]:
         "notes": list(report.notes),
     }
     if explained:
-        from graphsynth.scenes.explain import explain_json
+        from graphsynth.pipeline.explain import explain_json
 
         document["explain"] = explain_json(report)
     return document

@@ -11,7 +11,7 @@ __all__ = ["run"]
 
 def run(options: argparse.Namespace) -> int:
     """Print the JSON Schema of scene files."""
-    from graphsynth.scenes.schema import schema_text
+    from graphsynth.pipeline.schema import schema_text
 
     console.put(schema_text().rstrip("\n"))
     return 0

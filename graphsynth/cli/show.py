@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
-from graphsynth.errors import FormatError, GraphError, GraphsynthError, SpecError
-from graphsynth.wholefiles import replacing
+from graphsynth.core.errors import FormatError, GraphError, GraphsynthError, SpecError
+from graphsynth.core.wholefiles import replacing
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph

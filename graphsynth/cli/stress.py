@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.cli import console
 
 if TYPE_CHECKING:
-    from graphsynth.accuracy.stress import Case, StressReport
+    from graphsynth.evidence.stress import Case, StressReport
 
 __all__ = ["add_stress", "run"]
 
@@ -33,7 +33,7 @@ def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None
 
 def run(options: argparse.Namespace) -> int:
     """Run the cases; exit status 1 if one of them is WRONG, 130 if Ctrl-C came, with what was run shown and written."""
-    from graphsynth.accuracy.stress import run_stress
+    from graphsynth.evidence.stress import run_stress
 
     if options.list:
         return _list(options)
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     with _progress() as progress:
         report = run_stress(options.names, slow=not options.fast, progress=progress)
     if options.out:
-        from graphsynth.accuracy.stress.page import write_report
+        from graphsynth.evidence.stress.page import write_report
 
         files = [str(path) for path in write_report(report, options.out)]
     else:
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
-    from graphsynth.accuracy.stress import stress_cases
+    from graphsynth.evidence.stress import stress_cases
 
     chosen = stress_cases(options.names, slow=not options.fast)
     if options.json:

@@ -1,1 +1,1 @@
-"""What every room of the package builds on."""
+"""What every other subpackage needs: errors, checks of arguments, compiled kernels, workers, journals, text files."""

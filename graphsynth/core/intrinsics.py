@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from graphsynth.compilation import Intrinsic
+from graphsynth.core.compilation import Intrinsic
 
 __all__ = ["fma", "lowest_bit", "popcount"]
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import bodies
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.frames import Frames, frames_of, shown_coordinate
@@ -28,7 +29,6 @@ from graphsynth.drawing.palette import STYLE, TRACE_COLOURS, VARIABLES
 from graphsynth.drawing.shapes import FIXED, Point, Shape, Text
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.drawing.svg import element, number, picture, words
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Revolute
 
 if TYPE_CHECKING:

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
-from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.jamming.bearing import Bearing
+    from graphsynth.jamming.bearing.bearing import Bearing
 
 __all__ = ["check_panels", "panel_title", "space_picture"]
 

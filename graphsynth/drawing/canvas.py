@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.shapes import FIXED, Circle, Path, Shape, Style, Text, placement
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.errors import GraphsynthError
 
 __all__ = ["Canvas", "draw", "figure_of", "save"]
 

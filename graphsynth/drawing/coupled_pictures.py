@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
-from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.jamming.coupled import CoupledReport, LooseningTable
+    from graphsynth.jamming.joints import CoupledReport, LooseningTable
 
 __all__ = ["clearance_picture", "loosening_picture"]
 
@@ -30,7 +30,7 @@ def clearance_picture(report: CoupledReport) -> Figure:
     Parameters
     ----------
     report : CoupledReport
-        Of `graphsynth.jamming.coupled.assess_coupled`; with a certificate the proved ranges are shaded.
+        Of `graphsynth.jamming.joints.assess_coupled`; with a certificate the proved ranges are shaded.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def loosening_picture(table: LooseningTable) -> Figure:
     Parameters
     ----------
     table : LooseningTable
-        Of `graphsynth.jamming.coupled.compare_loosening`.
+        Of `graphsynth.jamming.joints.compare_loosening`.
 
     Returns
     -------

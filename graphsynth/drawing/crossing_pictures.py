@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
-from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.intervals.interval import Interval
-    from graphsynth.jamming.circle_ellipse import CircleEllipse, CrossingBoxes
+    from graphsynth.jamming.intersection import CircleEllipse, CrossingBoxes
 
 __all__ = ["crossing_picture", "dress", "region_picture"]
 
@@ -61,11 +61,11 @@ def crossing_picture(problem: CircleEllipse, boxes: CrossingBoxes | None = None)
 
     Examples
     --------
-    >>> from graphsynth.jamming.circle_ellipse import circle_ellipse
+    >>> from graphsynth.jamming.intersection import circle_ellipse
     >>> len(crossing_picture(circle_ellipse(5, 6, 4, "0.1", "0.01")).axes)
     3
     """
-    from graphsynth.jamming.circle_ellipse import exact_hull
+    from graphsynth.jamming.intersection import exact_hull
 
     found = exact_hull(problem)
     figure = new_figure((13.5, 4.6))
@@ -218,7 +218,7 @@ def region_picture(problem: CircleEllipse, exaggeration: float | None = None) ->
 
     Examples
     --------
-    >>> from graphsynth.jamming.circle_ellipse import circle_ellipse
+    >>> from graphsynth.jamming.intersection import circle_ellipse
     >>> len(region_picture(circle_ellipse(5, 6, 4)).axes)
     2
     """

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import bodies, bounds
 from graphsynth.drawing.lettering import place_letters
 from graphsynth.drawing.sketch import Sketch
@@ -25,7 +26,6 @@ from graphsynth.drawing.symbols import (
     draw_slider,
     draw_traces,
 )
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import PinSlot, Prismatic
 from graphsynth.mechanism.model import Mechanism
 

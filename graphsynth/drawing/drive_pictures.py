@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from graphsynth.core.errors import SpecError
 from graphsynth.drawing.figures import legend_place, new_figure
 from graphsynth.drawing.palette import LIGHT, WHITE
-from graphsynth.errors import SpecError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.dynamics.braider.model import Braider
-    from graphsynth.dynamics.braider.reactions import Reactions
-    from graphsynth.dynamics.platform_drive.reduction import ReductionStudy
-    from graphsynth.dynamics.platform_drive.resistance import ResistanceEffect, RippleMap
-    from graphsynth.dynamics.platform_drive.run import DriveRun
+    from graphsynth.dynamics.driven.reduction import ReductionStudy
+    from graphsynth.dynamics.driven.run import DriveRun
+    from graphsynth.systems.braider.model import Braider
+    from graphsynth.systems.braider.reactions import Reactions
+    from graphsynth.systems.platform.resistance import ResistanceEffect, RippleMap
 
 __all__ = [
     "drive_curves", "reduction_picture", "resistance_picture", "ripple_map_picture", "ripple_picture", "sensor_picture",
@@ -64,7 +64,7 @@ def drive_curves(runs: Mapping[str, DriveRun], *, size: tuple[float, float] = (7
     Examples
     --------
     >>> from graphsynth.dynamics.motors import DCMotor
-    >>> from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
+    >>> from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
     >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
     >>> run = MotorDrivenPlatform.source(motor).simulate(np.linspace(0.0, 1.0, 101))
     >>> drive_curves({"1 ohm": run}).axes[1].get_ylabel()
@@ -197,7 +197,7 @@ def _edges(centres: Any) -> Any:
 
 
 def _gain_map(figure: Figure, axes: Any) -> None:
-    from graphsynth.dynamics.platform_drive.resistance import ripple_gain
+    from graphsynth.systems.platform.resistance import ripple_gain
 
     nu, zeta = np.geomspace(0.1, 3.0, 181), np.geomspace(0.02, 8.0, 161)
     gain = np.log10(ripple_gain(nu[None, :], zeta[:, None])[0])

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import Body, bodies
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism, TracePoint
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.canvas import figure_of
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.frames import Frames, frames_of
 from graphsynth.drawing.palette import LIGHT
-from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion

@@ -5,10 +5,10 @@ from __future__ import annotations
 import cmath
 from typing import TYPE_CHECKING
 
+from graphsynth.core.errors import GraphError
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.errors import GraphError
-from graphsynth.kinematics.embodiment.sketch import JointLayout, layout
+from graphsynth.kinematics.dimensional.sketch import JointLayout, layout
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bearing_in_space import check_panels, panel_title, space_picture
 from graphsynth.drawing.crossing_pictures import crossing_picture, dress, region_picture
 from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
-from graphsynth.errors import GeometryError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.drawing.plots import Chart
-    from graphsynth.jamming.area_curve import AreaCurve
+    from graphsynth.evidence.bearing import ErrorRow
     from graphsynth.jamming.assess import JammingReport
-    from graphsynth.jamming.bearing import Bearing
-    from graphsynth.jamming.error_against_time import ErrorRow
+    from graphsynth.jamming.bearing.area_curve import AreaCurve
+    from graphsynth.jamming.bearing.bearing import Bearing
 
 __all__ = [
     "area_chart", "area_picture", "crossing_picture", "error_time_picture", "region_picture", "report_picture",
@@ -155,11 +155,11 @@ def area_picture(curve: AreaCurve, zooms: tuple[tuple[float, float], ...] | None
 
     Examples
     --------
-    >>> from graphsynth.jamming.area_curve import area_curve
+    >>> from graphsynth.jamming.bearing.area_curve import area_curve
     >>> len(area_picture(area_curve()).axes)
     3
     """
-    from graphsynth.jamming.area_curve import ZOOMS
+    from graphsynth.jamming.bearing.area_curve import ZOOMS
 
     windows = ZOOMS if zooms is None else zooms
     figure = new_figure((10.5, 7.0))
@@ -210,7 +210,7 @@ def area_chart(curve: AreaCurve, window: tuple[float, float] | None = None) -> C
 
     Examples
     --------
-    >>> from graphsynth.jamming.area_curve import area_curve
+    >>> from graphsynth.jamming.bearing.area_curve import area_curve
     >>> area_chart(area_curve(), (90.0, 115.5)).svg()[:15]
     '<svg class="gs"'
     """
@@ -303,7 +303,7 @@ def error_time_picture(groups: Mapping[str, Sequence[ErrorRow]]) -> Figure:
     Parameters
     ----------
     groups : mapping of str to rows
-        Question with its unit, to the rows of `graphsynth.jamming.crossing_errors`, `area_errors` or `arc_errors`.
+        Question with its unit, to the rows of `graphsynth.evidence.crossing_errors`, `area_errors` or `arc_errors`.
         Subdivisions of one method are joined by a line; the first and the last are labelled with their setting.
 
     Returns
@@ -317,7 +317,7 @@ def error_time_picture(groups: Mapping[str, Sequence[ErrorRow]]) -> Figure:
 
     Examples
     --------
-    >>> from graphsynth.jamming import ErrorRow
+    >>> from graphsynth.evidence import ErrorRow
     >>> rows = [ErrorRow("sweep", "0.1 rad", 1e-1, 0.002), ErrorRow("sweep", "0.01 rad", 1e-2, 0.004)]
     >>> len(error_time_picture({"arc ends, rad": rows}).axes)
     1

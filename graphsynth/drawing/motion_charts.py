@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.palette import TRACE_COLOURS
 from graphsynth.drawing.plots import Chart, Line, Mark
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic
 
 if TYPE_CHECKING:

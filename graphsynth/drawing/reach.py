@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.laws import Linear

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.checks import called
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Force, TorqueSource
 from graphsynth.dynamics.tables import Compiled
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import called
 
 __all__ = ["applied_loads"]
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import Point, finite, link_number, nonzero, point
+from graphsynth.core.checks import Point, finite, link_number, point, positive
+from graphsynth.core.errors import GeometryError
 
 __all__ = ["Element", "Force", "JointFriction", "Pulse", "Spring", "Torque", "TorqueSource", "TorsionSpring"]
 
@@ -152,7 +152,7 @@ class Pulse:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", finite("start of a pulse", self.start))
-        object.__setattr__(self, "duration", nonzero("duration of a pulse", self.duration))
+        object.__setattr__(self, "duration", positive("duration of a pulse", self.duration))
         object.__setattr__(self, "height", finite("height of a pulse", self.height))
 
     @property
@@ -197,7 +197,7 @@ class TorqueSource:
         object.__setattr__(self, "ratio", finite(f"ratio {name}", self.ratio))
         if self.ratio == 0.0:
             raise GeometryError(f"ratio {name} = 0 transmits nothing; give motor speed / speed of link {self.b}")
-        object.__setattr__(self, "efficiency", nonzero(f"efficiency {name}", self.efficiency))
+        object.__setattr__(self, "efficiency", positive(f"efficiency {name}", self.efficiency))
         if self.efficiency > 1.0:
             raise GeometryError(f"efficiency {name} = {self.efficiency} makes power from nothing; give at most 1")
         for part in ("rotor_inertia", "rotor_damping"):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.friction_history import FrictionAt
+from graphsynth.dynamics.friction.history import FrictionAt
 from graphsynth.dynamics.result import Checks, FrictionHistory
 from graphsynth.dynamics.tables import Compiled
 

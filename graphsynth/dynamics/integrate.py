@@ -10,22 +10,21 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, finite_array
+from graphsynth.core.errors import GeometryError
+from graphsynth.core.extras import need
 from graphsynth.dynamics.energies import Balance, balance_at, checks_of, warnings_of
-from graphsynth.dynamics.friction_history import FrictionAt, friction_at, friction_history
+from graphsynth.dynamics.friction.history import FrictionAt, friction_at, friction_history
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
 from graphsynth.dynamics.second import newton_euler_difference, second_accelerations
 from graphsynth.dynamics.start import StartReport, check_start, start_compiled
 from graphsynth.dynamics.stepping import StepOptions, Trail, integrate
 from graphsynth.dynamics.tables import Compiled, compile_model
-from graphsynth.errors import GeometryError
-from graphsynth.extras import need
-from graphsynth.kinematics._checks import finite_array
-from graphsynth.mechanism.checks import finite
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.friction_problem import Senses
-    from graphsynth.dynamics.friction_rows import FrictionRows
+    from graphsynth.dynamics.friction.problem import Senses
+    from graphsynth.dynamics.friction.rows import FrictionRows
 
 __all__ = ["simulate_dynamics"]
 
@@ -196,21 +195,21 @@ class _Run:
 def make_form(compiled: Compiled, report: StartReport, name: str, project: bool) -> Form:
     """Return the formulation by name."""
     if name == "minimal":
-        from graphsynth.dynamics.minimal import MinimalForm
+        from graphsynth.dynamics.forms.one_coordinate import MinimalForm
 
         return MinimalForm(compiled, report)
     if name == "reduced":
-        from graphsynth.dynamics.reduced import ReducedForm
+        from graphsynth.dynamics.forms.partitioned import ReducedForm
 
         return ReducedForm(compiled, report)
-    from graphsynth.dynamics.constrained import ConstrainedForm
+    from graphsynth.dynamics.forms.augmented import ConstrainedForm
 
     return ConstrainedForm(compiled, report, project)
 
 
 def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, options: StepOptions) -> _Run:
     """Integrate once; in the form "auto" beyond a fold again in the constrained form."""
-    from graphsynth.dynamics.minimal import minimal_obstacle
+    from graphsynth.dynamics.forms.one_coordinate import minimal_obstacle
 
     chosen = name
     if name == "auto":
@@ -278,8 +277,8 @@ def _with_friction(
     show: Callable[[Form, int, float, Array, Senses | None], None],
 ) -> None:  # fmt: skip
     """Integrate a model with friction in its joints."""
-    from graphsynth.dynamics.dry_motion import DryMotion
-    from graphsynth.dynamics.friction_rows import FrictionRows
+    from graphsynth.dynamics.friction.motion import DryMotion
+    from graphsynth.dynamics.friction.rows import FrictionRows
 
     run.rows = FrictionRows(compiled)
     dry = DryMotion(

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite_array
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.friction_loads import fitting_loads
-from graphsynth.dynamics.friction_problem import joint_names
-from graphsynth.dynamics.friction_rows import FrictionElement, FrictionRows
+from graphsynth.dynamics.friction.loads import fitting_loads
+from graphsynth.dynamics.friction.problem import joint_names
+from graphsynth.dynamics.friction.rows import FrictionElement, FrictionRows
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
 from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
 from graphsynth.mechanism.model import Driver
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ def _loads(
 
 
 def _efforts(compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array) -> tuple[Array, Array]:
-    from graphsynth.dynamics.minimal import joint_coordinate
+    from graphsynth.dynamics.forms.one_coordinate import joint_coordinate
     from graphsynth.mechanism.joints import Revolute
 
     mechanism = motion.mechanism

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from graphsynth.core.checks import Point, finite, link_number, point, positive
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import (
     Element,
     Force,
@@ -16,8 +18,6 @@ from graphsynth.dynamics.elements import (
     TorsionSpring,
     not_negative,
 )  # fmt: skip
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import Point, finite, link_number, nonzero, point
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 
@@ -94,7 +94,7 @@ class Rack:
         object.__setattr__(self, "pinion", link_number("pinion", self.pinion))
         if self.rack == self.pinion:
             raise GeometryError(f"link {self.rack} cannot be rack and pinion; name two links")
-        object.__setattr__(self, "radius", nonzero("radius of the pinion", self.radius))
+        object.__setattr__(self, "radius", positive("radius of the pinion", self.radius))
         object.__setattr__(self, "angle", finite("angle of the rack", self.angle))
         object.__setattr__(self, "centre", point("centre of the pinion", self.centre))
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import SpecError
-from graphsynth.mechanism.checks import check_fields
+from graphsynth.core.checks import check_fields
+from graphsynth.core.errors import SpecError
 
 __all__ = ["DCMotor", "IdealSpeed", "IdealTorque", "LinearCharacteristic", "Motor", "SynchronousMotor"]
 

@@ -13,7 +13,7 @@ from graphsynth.dynamics.singular import branch_tangents
 from graphsynth.dynamics.values import Values
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.constrained import ConstrainedForm
+    from graphsynth.dynamics.forms.augmented import ConstrainedForm
 
 __all__ = ["passed_singular_pose"]
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import link_number
+from graphsynth.core.checks import link_number
+from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.joints import Cam, Gear
 from graphsynth.mechanism.model import Driver
 

@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, finite_array
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.posing import pose_from_drivers
 from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pose
 from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
 from graphsynth.dynamics.values import Values, initial_slots
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
-from graphsynth.mechanism.checks import finite
 
 __all__ = ["StartReport", "check_start", "consistent_start"]
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.dynamics.result import DynamicEvent
 from graphsynth.dynamics.stalling import lock, stalled
-from graphsynth.errors import GraphsynthError
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.dry_guard import Guard
+    from graphsynth.dynamics.friction.guard import Guard
     from graphsynth.dynamics.integrate import Form
 
 __all__ = ["METHODS", "StepOptions", "Stepper", "Trail", "integrate"]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.extras import need
+from graphsynth.core.extras import need
 
 __all__ = ["CvodeStepper"]
 

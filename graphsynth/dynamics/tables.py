@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Force, JointFriction, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
-from graphsynth.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from graphsynth.core.checks import check_fields
+from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.motors import number, whole
-from graphsynth.errors import SpecError
-from graphsynth.mechanism.checks import check_fields
 
 __all__ = ["Train"]
 

@@ -145,9 +145,9 @@ class Values:
         if not good:
             return *nothing, "; a spring has length 0, so its direction is not defined", "consistent"
         if T.friction.size:
-            from graphsynth.dynamics.dry_state import decide
-            from graphsynth.dynamics.friction_problem import FrictionProblem
-            from graphsynth.dynamics.friction_rows import FrictionRows
+            from graphsynth.dynamics.friction.problem import FrictionProblem
+            from graphsynth.dynamics.friction.rows import FrictionRows
+            from graphsynth.dynamics.friction.state import decide
 
             problem = FrictionProblem(FrictionRows(self.compiled), self.time, q, v, self.slots)
             found = decide(problem, problem.moving(), problem.resting)

@@ -11,12 +11,12 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
+from graphsynth.core.textfiles import json_value
 from graphsynth.mechanism.files import FORMAT, VERSION, from_dict, to_dict
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
-from graphsynth.textfiles import json_value
 
 __all__ = ["OF_EDGE", "OF_GRAPH", "Edge", "Item", "Spent", "attributes_of", "item_from", "whole_number"]
 

@@ -13,7 +13,7 @@ from bisect import bisect
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
-from graphsynth.errors import FormatError, GraphError
+from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.formats.attributes import OF_EDGE, OF_GRAPH, Edge, Item, Spent, attributes_of, item_from
 from graphsynth.structure.text import LINKS_MAX
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.formats.lines import head_of, read_rows
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX

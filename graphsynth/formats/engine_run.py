@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.extras import need
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.core.checks import finite_array
+from graphsynth.core.errors import GeometryError
+from graphsynth.core.extras import need
 
 __all__ = ["EngineRun", "load_engine", "steps_between", "turn"]
 

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, finite_array
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Spring, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicMotion
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import EngineRun
 from graphsynth.formats.exudyn_model import ExudynSettings
 from graphsynth.formats.mjcf import MujocoSettings, to_mjcf
-from graphsynth.kinematics._checks import finite, finite_array
 
 __all__ = ["ExportCertificate", "Trial", "certify_export"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Torque, TorqueSource
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Gear, Revolute
 
 __all__ = ["carrier_of", "check_common", "check_settings", "constant_torque", "gear_weights"]

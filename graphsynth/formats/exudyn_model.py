@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import finite, positive
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between, turn
 from graphsynth.formats.exporting import check_common, check_settings, constant_torque, gear_weights
-from graphsynth.mechanism.checks import finite, nonzero
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver
 
@@ -55,8 +55,8 @@ class ExudynSettings:
     newton_tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        nonzero("step", self.step)
-        nonzero("newton_tolerance", self.newton_tolerance)
+        positive("step", self.step)
+        positive("newton_tolerance", self.newton_tolerance)
         if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
             raise GeometryError(
                 f"integrator = {self.integrator!r} is not offered; give one of {', '.join(INTEGRATORS)}"

@@ -6,11 +6,11 @@ import json
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from graphsynth.errors import FormatError, GraphError
+from graphsynth.core.errors import FormatError, GraphError
+from graphsynth.core.textfiles import json_value
 from graphsynth.mechanism import files
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.textfiles import json_value
 
 __all__ = ["compose", "compose_lines", "graph_of", "parse", "parse_line", "record_of"]
 

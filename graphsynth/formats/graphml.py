@@ -15,7 +15,7 @@ from itertools import chain
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.formats.attributes import OF_EDGE, OF_GRAPH, Edge, Item, Spent, attributes_of, item_from
 from graphsynth.structure.text import LINKS_MAX
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import FormatError
+from graphsynth.core.checks import checked
+from graphsynth.core.errors import FormatError
 from graphsynth.formats.lines import Row, head_of, read_rows, within
-from graphsynth.kinematics._checks import checked
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
 

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.checks import finite, point, positive, three
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.model import DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport
-from graphsynth.errors import GeometryError
 from graphsynth.formats.engine_run import turn
 from graphsynth.formats.exporting import check_common, check_settings, gear_weights
 from graphsynth.formats.mjcf_parts import Work, combine, fixed, site, text, write_load
 from graphsynth.formats.trees import SpanningTree, spanning_tree
-from graphsynth.kinematics._checks import three
-from graphsynth.mechanism.checks import finite, nonzero, point
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
 __all__ = ["MjcfModel", "MujocoSettings", "to_mjcf"]
@@ -61,7 +60,7 @@ class MujocoSettings:
     solimp: tuple[float, float, float] = (0.9999, 0.9999, 0.001)
 
     def __post_init__(self) -> None:
-        nonzero("step", self.step)
+        positive("step", self.step)
         if not isinstance(self.integrator, str) or self.integrator not in INTEGRATORS:
             raise GeometryError(
                 f"integrator = {self.integrator!r} is not MuJoCo's; give one of {', '.join(INTEGRATORS)}"

@@ -6,10 +6,10 @@ import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
-from graphsynth.errors import GeometryError
 from graphsynth.formats.exporting import constant_torque
 from graphsynth.formats.trees import SpanningTree
 

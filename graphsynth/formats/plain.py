@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
-from graphsynth.errors import FormatError, GraphError
+from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.mechanism.files import TOML_MAX
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.canonical import decode_key

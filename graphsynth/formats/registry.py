@@ -16,10 +16,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from graphsynth.errors import FormatError, GraphError, SpecError
+from graphsynth.core.errors import FormatError, GraphError, SpecError
+from graphsynth.core.wholefiles import replacing
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.wholefiles import replacing
 
 __all__ = [
     "FORMATS",

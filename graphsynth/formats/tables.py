@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 
-from graphsynth.errors import FormatError, GraphError
+from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.formats.plain import graph_of_key, graph_of_text, placed
 from graphsynth.structure.graph import MechanismGraph
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from graphsynth.errors import GraphError
-from graphsynth.kinematics._checks import checked
+from graphsynth.core.checks import checked
+from graphsynth.core.errors import GraphError
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from graphsynth.arguments import checker
-from graphsynth.errors import IntervalError
+from graphsynth.core.arguments import checker
+from graphsynth.core.errors import IntervalError
 
 __all__ = ["checked"]
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from graphsynth.arguments import Budget, Positive
-from graphsynth.errors import IntervalError
+from graphsynth.core.arguments import Budget, Positive
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving
 from graphsynth.intervals.compiled import pave_compiled

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.arguments import Budget, Positive
-from graphsynth.errors import IntervalError
+from graphsynth.core.arguments import Budget, Positive
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving
 from graphsynth.intervals.guard import check_rounding

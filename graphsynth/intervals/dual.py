@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from graphsynth.errors import GraphsynthError, IntervalError
+from graphsynth.core.errors import GraphsynthError, IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
 

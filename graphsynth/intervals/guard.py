@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 
 __all__ = ["check_quickly", "check_rounding", "rounding_faults"]
 

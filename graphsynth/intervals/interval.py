@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import FormatError, IntervalError
+from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
 from graphsynth.intervals.measures import Measures
 from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, Decoration, decimal_outward, read_bounds, read_points

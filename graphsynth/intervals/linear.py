@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from graphsynth.arguments import Count
-from graphsynth.errors import IntervalError
+from graphsynth.core.arguments import Count
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals._checks import checked
 from graphsynth.intervals.functions import divide_extended
 from graphsynth.intervals.guard import check_rounding

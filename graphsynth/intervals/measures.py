@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.intervals import operations
 from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, fraction
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import IntervalError
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import arrays
 from graphsynth.intervals.guard import check_quickly
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.arguments import Budget, Count, Positive
-from graphsynth.errors import FormatError, IntervalError
+from graphsynth.core.arguments import Budget, Count, Positive
+from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving, Progress
 from graphsynth.intervals.guard import check_rounding

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.arguments import Count
-from graphsynth.errors import IntervalError
+from graphsynth.core.arguments import Count
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals._checks import checked
 from graphsynth.intervals.dual import evaluate, jacobian_of, values_of, variables
 from graphsynth.intervals.guard import check_rounding

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import FormatError, IntervalError
+from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals.guard import check_quickly
 
 __all__ = [

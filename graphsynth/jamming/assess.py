@@ -11,25 +11,25 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.jamming.bearing import Bearing, Condition
-from graphsynth.jamming.circle_sets import strictly_inside
-from graphsynth.jamming.inverse import Limit, largest_misalignment, smallest_clearance
-from graphsynth.jamming.parameters import ToleranceBox
-from graphsynth.jamming.table import JammingTable, table_over
-from graphsynth.jamming.tilt_arcs import JamArcs, jam_arcs
+from graphsynth.core.checks import checked, finite_array
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.bearing import Bearing, Condition
+from graphsynth.jamming.bearing.circle_sets import strictly_inside
+from graphsynth.jamming.bearing.inverse import Limit, largest_misalignment, smallest_clearance
+from graphsynth.jamming.bearing.parameters import ToleranceBox
+from graphsynth.jamming.bearing.table import JammingTable, table_over
+from graphsynth.jamming.bearing.tilt_arcs import JamArcs, jam_arcs
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
-from graphsynth.kinematics._checks import checked, finite_array
-from graphsynth.kinematics._turn import FullTurn
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar_turn import FullTurn
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from graphsynth.jamming.certificate import JamCertificate
-    from graphsynth.jamming.coupled.limits import Misalignment
-    from graphsynth.jamming.coupled.problem import Bearings
-    from graphsynth.jamming.coupled.report import CoupledReport
+    from graphsynth.jamming.bearing.certificate import JamCertificate
+    from graphsynth.jamming.joints.limits import Misalignment
+    from graphsynth.jamming.joints.problem import Bearings
+    from graphsynth.jamming.joints.report import CoupledReport
     from graphsynth.kinematics.simulation import Motion
 
 __all__ = ["JammingReport", "JammingTable", "assess_jamming"]
@@ -107,7 +107,7 @@ class JammingReport:
             frame[name] = [strictly_inside(spans, angle) for angle in self.table.f]
         if self.certificate and self.certificate.assembles != "always":
             from graphsynth.intervals import Interval
-            from graphsynth.jamming.poses import pose
+            from graphsynth.jamming.bearing.poses import pose
 
             f = Interval.from_bounds(self.table.f, self.table.f)
             frame["certainly_jams"] &= pose(self.certificate.box, f).assembled
@@ -186,7 +186,7 @@ def assess_jamming(
         given.
     bearing : Bearing, optional
         L0: the bearing at B, by default that of the source (17.5 mm, 10 mm, 0.03 mm).  L1: limits for all joints, or a
-        mapping of pairs of links to limits, see `graphsynth.jamming.coupled.assess_coupled`.
+        mapping of pairs of links to limits, see `graphsynth.jamming.joints.assess_coupled`.
     condition : {"A", "B", "general"}
         Contact condition; "A" (short bearing in a long hole) is what the source means.
     samples : int or array_like, optional
@@ -222,7 +222,7 @@ def assess_jamming(
     The same dimensions with three bearings of that kind, at A, B and C, over half a turn:
 
     >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
-    >>> from graphsynth.jamming.coupled import Misalignment
+    >>> from graphsynth.jamming.joints import Misalignment
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     >>> linkage = Mechanism(graph, [
     ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
@@ -262,7 +262,7 @@ def _any_mechanism(
     length_tolerance: float,
     seconds: float,
 ) -> CoupledReport:
-    from graphsynth.jamming.coupled.assess import assess_coupled
+    from graphsynth.jamming.joints.assess import assess_coupled
     from graphsynth.kinematics.simulation import Motion
 
     if not isinstance(subject, Motion):
@@ -331,7 +331,7 @@ def _given(
 
 
 def _certificate(box: ToleranceBox, condition: Condition) -> JamCertificate:
-    from graphsynth.jamming.certify import certify_jamming
+    from graphsynth.jamming.bearing.certify import certify_jamming
 
     return certify_jamming(box, condition)
 

@@ -3,16 +3,6 @@
 This file loads none of them: the public functions are resolved on first use, so that each scene pays for its own only.
 """
 
-from __future__ import annotations
+import lazy_loader as _lazy
 
-from typing import Any
-
-__all__ = ["Motion", "simulate", "simulate_batch"]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module 'graphsynth.kinematics' has no attribute {name!r}")
-    from graphsynth.kinematics import simulation
-
-    return getattr(simulation, name)
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -9,8 +9,8 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.core.checks import finite_array
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.kinematics.engine.events import ending, touches

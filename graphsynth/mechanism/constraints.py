@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 
 __all__ = ["jacobian", "residual"]

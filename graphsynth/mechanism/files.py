@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import fields
 from typing import Any, TypeVar
 
-from graphsynth.errors import FormatError, GeometryError
-from graphsynth.mechanism.checks import checked
+from graphsynth.core.checks import checked
+from graphsynth.core.errors import FormatError, GeometryError
+from graphsynth.core.textfiles import json_value, text_of, toml_tables
 from graphsynth.mechanism.joints import KINDS, JointGeometry
 from graphsynth.mechanism.laws import LAWS, Linear
 from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.textfiles import json_value, text_of, toml_tables
 
 __all__ = [
     "JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "to_dict", "to_json", "to_toml",

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import Point, checked, finite, link_number, nonzero, point
+from graphsynth.core.checks import Point, checked, finite, link_number, point, positive
+from graphsynth.core.errors import GeometryError
 
 __all__ = ["COLUMNS", "Cam", "Gear", "JointGeometry", "PinSlot", "Prismatic", "Revolute"]
 
@@ -131,7 +131,7 @@ class Gear(_Pair):
     def __post_init__(self) -> None:
         self._check(("at_a", "at_b"), ("offset",))
         for name in ("radius_a", "radius_b"):
-            value = nonzero(f"{name} of gear {self.a}-{self.b}", getattr(self, name))
+            value = positive(f"{name} of gear {self.a}-{self.b}", getattr(self, name))
             object.__setattr__(self, name, value)
         if not isinstance(self.internal, bool):
             raise GeometryError(f"internal = {self.internal!r} of gear {self.a}-{self.b} must be true or false")
@@ -169,7 +169,7 @@ class Cam(_Pair):
     def __post_init__(self) -> None:
         self._check(("at_a", "at_b"), ("angle_a",))
         name = f"of cam {self.a}-{self.b}"
-        object.__setattr__(self, "radius", nonzero(f"radius {name}", self.radius))
+        object.__setattr__(self, "radius", positive(f"radius {name}", self.radius))
         object.__setattr__(self, "harmonics", _harmonics(self.harmonics, name))
         least = self._least_radius()
         if not least > 0.0:

@@ -14,8 +14,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import finite
+from graphsynth.core.checks import finite
+from graphsynth.core.errors import GeometryError
 
 __all__ = ["LAWS", "Harmonic", "Law", "Linear", "Polynomial", "Table"]
 

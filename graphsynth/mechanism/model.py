@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import Point, finite, link_number, point
+from graphsynth.core.checks import Point, finite, link_number, point
+from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Law, Linear
 from graphsynth.structure.graph import MechanismGraph

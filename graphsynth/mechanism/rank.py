@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import checked
+from graphsynth.core.checks import checked
+from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Cam, Gear
 

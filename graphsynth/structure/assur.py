@@ -25,7 +25,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from graphsynth.errors import GraphError
+from graphsynth.core.errors import GraphError
 from graphsynth.structure.contours import contour_class
 from graphsynth.structure.levels import bits
 from graphsynth.structure.rigidity import PebbleGame, is_sparse, rigid_bodies

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from operator import index
 from typing import Any
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 
 __all__ = ["integer", "packed_joints"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.structure.text import LINKS_MAX
 
 if TYPE_CHECKING:

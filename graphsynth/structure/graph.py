@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from operator import index
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from graphsynth.errors import FormatError, GraphError
+from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.structure.checks import integer, packed_joints
 from graphsynth.structure.levels import bits, breadth_first, component_of, components_of
 from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, encode_graph6, encode_text

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import lowest_bit, popcount
 
 __all__ = ["canon", "canon_packed", "canon_workspace", "lowest_bit", "popcount"]

@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.errors import TooLargeError
+from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.levels import bits
-from graphsynth.structure.variables import whole
+from graphsynth.structure.system.variables import whole
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph

@@ -4,7 +4,7 @@ The one-line form is ``<graph6>`` followed by space-separated fields, in this or
 ``f<frame>``; ``<mobility>:<a>-<b>,<a>-<b>`` for each joint mobility of 2 and more, ascending; ``pi<space>`` when the
 space is not 3.  Example: ``C] f0 2:0-2``.
 
-Readers accept any text or bytes and raise nothing but :class:`~graphsynth.errors.FormatError`; their time and
+Readers accept any text or bytes and raise nothing but :class:`~graphsynth.core.errors.FormatError`; their time and
 memory are bounded by the length of the input, and an input longer than any valid graph is refused before it is read.
 
 Source of graph6: B. D. McKay, *Description of graph6, sparse6 and digraph6 encodings* (formats.txt of nauty).
@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterable
 from math import isqrt
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 
 __all__ = ["LINKS_MAX", "decode_graph6", "decode_text", "encode_graph6", "encode_text"]
 

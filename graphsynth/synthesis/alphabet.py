@@ -18,7 +18,7 @@ from operator import add
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import TooLargeError
+from graphsynth.core.errors import TooLargeError
 from graphsynth.synthesis.kernels.layout import Tables
 
 __all__ = ["Alphabet", "Label", "Word"]

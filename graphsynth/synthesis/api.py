@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.spec import LinkAssortment, StructuralSpec
+from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
 from graphsynth.synthesis import parallel, sampling
 from graphsynth.synthesis.problem import Problem
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import FormatError, TooLargeError
+from graphsynth.core.errors import FormatError, TooLargeError
 
 __all__ = ["SHIPPED_LOOPS", "contracted_graphs", "decode", "encode", "generate", "has_contracted_graphs"]
 

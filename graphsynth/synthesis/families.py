@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import SpecError
-from graphsynth.structure.spec import LinkAssortment
-from graphsynth.structure.variables import shown, whole
+from graphsynth.core.errors import SpecError
+from graphsynth.structure.system.spec import LinkAssortment
+from graphsynth.structure.system.variables import shown, whole
 from graphsynth.synthesis.alphabet import Alphabet, alphabet_for
 from graphsynth.synthesis.contracted import contracted_graphs
 from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX

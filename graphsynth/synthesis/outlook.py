@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from graphsynth.errors import TooLargeError
+from graphsynth.core.errors import TooLargeError
 from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
 from graphsynth.synthesis.families import chain_families, truss_families
 from graphsynth.synthesis.units import count_unit, cut

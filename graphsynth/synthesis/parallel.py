@@ -7,8 +7,8 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from itertools import chain
 
-from graphsynth import ordered
-from graphsynth.ordered import AHEAD, in_order
+from graphsynth.core import ordered
+from graphsynth.core.ordered import AHEAD, in_order
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.problem import Piece, Problem, count_piece, graphs_of_piece, text_of_piece
 

@@ -8,11 +8,11 @@ from fractions import Fraction
 from functools import lru_cache
 from hashlib import sha256
 
-from graphsynth.errors import InfeasibleSpecError, SpecError
+from graphsynth.core.errors import InfeasibleSpecError, SpecError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.levels import components_of
-from graphsynth.structure.spec import LinkAssortment, StructuralSpec
-from graphsynth.structure.variables import shown, whole
+from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
+from graphsynth.structure.system.variables import shown, whole
 from graphsynth.synthesis.contracted import has_contracted_graphs
 from graphsynth.synthesis.families import (
     MOST_LINKS,

@@ -15,9 +15,9 @@ from random import Random
 
 import numpy as np
 
-from graphsynth.errors import InfeasibleSpecError, SpecError, TooLargeError
+from graphsynth.core.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.variables import whole
+from graphsynth.structure.system.variables import whole
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.kernels.drawing_lots import decode_fixed, fixed_table, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed

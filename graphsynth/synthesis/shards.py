@@ -14,8 +14,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import SpecError
-from graphsynth.structure.variables import shown, whole
+from graphsynth.core.errors import SpecError
+from graphsynth.structure.system.variables import shown, whole
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.joined import count_fractionated
 from graphsynth.synthesis.kernels.counting import COUNTING, LISTING, MAKING, weigh_block

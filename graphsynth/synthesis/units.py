@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import TooLargeError
+from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.alphabet import Alphabet
 from graphsynth.synthesis.families import Family, Levels

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from graphsynth.errors import GraphsynthError
-from graphsynth.journal import Journal, Work, digest_of
+from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import parallel
 from graphsynth.synthesis.problem import Piece, Problem, graphs_of_piece, text_of_piece

@@ -14,7 +14,7 @@ from graphsynth.atlas import pieces
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.cluster import dask_executor
 from graphsynth.cli import main
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 
 #: A bound on pieces that cuts ten links into many.
 FINE = 10.0

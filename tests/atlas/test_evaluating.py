@@ -18,7 +18,7 @@ from graphsynth.atlas.references import Reference
 from graphsynth.atlas.sealing import seal
 from graphsynth.atlas.turning import Turning
 from graphsynth.cli import main
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.kinematics.simulation import simulate
 
 TILT = (0.001, 0.005)
@@ -125,7 +125,7 @@ def test_what_is_there_is_not_evaluated_again(copy):
 
 
 def test_without_dimensions_another_seed_searches_anew(copy, monkeypatch):
-    from graphsynth.kinematics.embodiment import Goals
+    from graphsynth.kinematics.dimensional import Goals
 
     searched = []
     embody = evaluating._embody

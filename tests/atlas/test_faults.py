@@ -14,7 +14,7 @@ import pytest
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.cli import main
-from graphsynth.errors import FormatError, GraphsynthError
+from graphsynth.core.errors import FormatError, GraphsynthError
 
 
 @pytest.fixture(scope="module")

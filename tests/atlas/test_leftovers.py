@@ -14,7 +14,7 @@ import pytest
 
 from graphsynth.atlas import schema
 from graphsynth.atlas.catalogue import Catalogue
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 
 LONG = (
     "CREATE TABLE t AS WITH RECURSIVE x(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM x WHERE n < 9000) SELECT n FROM x"

@@ -13,7 +13,7 @@ import pytest
 
 from graphsynth import MechanismGraph
 from graphsynth.atlas.catalogue import Catalogue
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.structure.assur import decompose
 
 CATALOG = Path(__file__).parents[2] / "catalog"

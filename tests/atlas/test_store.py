@@ -22,7 +22,7 @@ from graphsynth.atlas import building, pieces
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.schema import connect
-from graphsynth.errors import FormatError, GraphsynthError, SpecError, TooLargeError
+from graphsynth.core.errors import FormatError, GraphsynthError, SpecError, TooLargeError
 
 from ..telling import said
 

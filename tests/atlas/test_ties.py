@@ -12,7 +12,7 @@ from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.sealing import seal
 from graphsynth.atlas.stored import fingerprint, stored_mechanisms
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 

@@ -14,7 +14,7 @@ from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.site import build_site
 from graphsynth.cli import main
-from graphsynth.errors import FormatError, GraphsynthError, SpecError
+from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
 
 from ..telling import said
 

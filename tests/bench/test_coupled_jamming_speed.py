@@ -15,10 +15,10 @@ from scipy.optimize import linprog
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains, simulate
 from graphsynth.jamming import Bearing
-from graphsynth.jamming.coupled import JointLimits, Misalignment, certify_coupled, compare_loosening, largest_scale
-from graphsynth.jamming.coupled.closure import force_rows, joint_places, moment_rows, shifts, work_row
-from graphsynth.jamming.coupled.problem import problem
-from graphsynth.kinematics.embodiment import embody
+from graphsynth.jamming.joints import JointLimits, Misalignment, certify_coupled, compare_loosening, largest_scale
+from graphsynth.jamming.joints.closure import force_rows, joint_places, moment_rows, shifts, work_row
+from graphsynth.jamming.joints.problem import problem
+from graphsynth.kinematics.dimensional import embody
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 37)
 

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from graphsynth.dynamics.braider.model import Braider
-from graphsynth.dynamics.braider.reactions import reactions
 from graphsynth.dynamics.motors import DCMotor
-from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
+from graphsynth.systems.braider.model import Braider
+from graphsynth.systems.braider.reactions import reactions
+from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
 STIFF = replace(Braider(), motor=replace(Braider().motor, inductance=1e-6))
 PLATFORM = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))

@@ -220,7 +220,7 @@ def own_times(count, seconds):
     from graphsynth.intervals.kernels import arithmetic as ia
     from graphsynth.intervals.kernels import elementary, loops
     from graphsynth.intervals.kernels import krawczyk as compiled
-    from graphsynth.jamming.circle_ellipse import circle_ellipse, krawczyk_boxes
+    from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes
 
     @compiled.system
     def crossing(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):

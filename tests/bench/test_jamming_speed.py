@@ -8,8 +8,8 @@ import pytest
 
 from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, jam_arcs, largest_gap, spread, sweep_linkage
 from graphsynth.jamming.assess import assess_jamming
-from graphsynth.jamming.circle_ellipse import circle_ellipse, krawczyk_boxes
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes
+from graphsynth.mechanism.four_bar import LambdaLinkage
 
 DECK = ToleranceBox(alpha="1/30")
 BOX = ToleranceBox(

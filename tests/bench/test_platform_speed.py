@@ -13,9 +13,9 @@ import time
 import numpy as np
 import pytest
 
-from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.sextic import sextic
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
+from graphsynth.kinematics.triad.sextic import sextic
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
 LARGE = ParallelPlatform((0, 1, 0.3 + 0.9j), (0, 0.95, 0.32 + 0.85j), (0.5,) * 3, (1, 1.1, 0.9))

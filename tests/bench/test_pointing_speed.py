@@ -12,8 +12,8 @@ import math
 import numpy as np
 import pytest
 
-from graphsynth.kinematics.pointing import PointingMechanism
-from graphsynth.kinematics.pointing.loop_equations import loop_equations
+from graphsynth.systems.antenna import PointingMechanism
+from graphsynth.systems.antenna.loop_equations import loop_equations
 
 ART = PointingMechanism()
 

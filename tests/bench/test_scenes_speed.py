@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from graphsynth.ordered import processes
-from graphsynth.scenes.runner import run
-from graphsynth.scenes.scene import Scene, load_scene
+from graphsynth.core.ordered import processes
+from graphsynth.pipeline.runner import run
+from graphsynth.pipeline.scene import Scene, load_scene
 
 
 def survey(products: tuple[str, ...]) -> Scene:

@@ -14,10 +14,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from graphsynth.dynamics.friction import TwoCoefficientLaw
-from graphsynth.dynamics.tribometer import Tribometer
-from graphsynth.dynamics.tribometer_cycles import limit_cycle
-from graphsynth.dynamics.tribometer_drives import HarmonicDrive
+from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
+from graphsynth.systems.tribometer.cycles import limit_cycle
+from graphsynth.systems.tribometer.drives import HarmonicDrive
+from graphsynth.systems.tribometer.model import Tribometer
 
 CRANK = Tribometer()
 HARMONIC = Tribometer(law=TwoCoefficientLaw(0.4, 0.25), drive=HarmonicDrive(0.03, 2.0))

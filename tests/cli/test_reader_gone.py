@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from graphsynth.scenes.scene import find_scene
+from graphsynth.pipeline.scene import find_scene
 
 from ..telling import said
 

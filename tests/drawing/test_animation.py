@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import graphsynth
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.animation import animated_svg, animation_html
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.frames import frames_of, with_trace_points
@@ -27,7 +28,6 @@ from graphsynth.drawing.gif import save_gif
 from graphsynth.drawing.motion_charts import coupler_curves
 from graphsynth.drawing.reach import motion_over_reach
 from graphsynth.drawing.shapes import FIXED
-from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear

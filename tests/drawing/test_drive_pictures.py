@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 
+from graphsynth.core.errors import SpecError
 from graphsynth.drawing.drive_pictures import (
     drive_curves,
     reduction_picture,
@@ -20,12 +21,11 @@ from graphsynth.drawing.drive_pictures import (
 )
 from graphsynth.drawing.figures import themed_svg
 from graphsynth.drawing.palette import DARK, LIGHT
-from graphsynth.dynamics.braider.model import Braider
-from graphsynth.dynamics.braider.reactions import reactions
 from graphsynth.dynamics.motors import DCMotor
-from graphsynth.dynamics.platform_drive.model import MotorDrivenPlatform
-from graphsynth.dynamics.platform_drive.resistance import resistance_effect, ripple_map
-from graphsynth.errors import SpecError
+from graphsynth.systems.braider.model import Braider
+from graphsynth.systems.braider.reactions import reactions
+from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+from graphsynth.systems.platform.resistance import resistance_effect, ripple_map
 
 DRIVE = MotorDrivenPlatform.source(DCMotor(5.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
 

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.jamming_pictures import (
     area_chart,
     area_picture,
@@ -16,10 +17,10 @@ from graphsynth.drawing.jamming_pictures import (
     section_picture,
     space_picture,
 )
-from graphsynth.errors import GeometryError
-from graphsynth.jamming import Bearing, ErrorRow, ToleranceBox, assess_jamming
-from graphsynth.jamming.area_curve import area_curve
-from graphsynth.jamming.circle_ellipse import circle_ellipse, exact_hull, krawczyk_boxes
+from graphsynth.evidence import ErrorRow
+from graphsynth.jamming import Bearing, ToleranceBox, assess_jamming
+from graphsynth.jamming.bearing.area_curve import area_curve
+from graphsynth.jamming.intersection import circle_ellipse, exact_hull, krawczyk_boxes
 
 
 def drawn(figure):

@@ -9,10 +9,10 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from graphsynth.drawing.lambda_linkage import _View, lambda_sketch, lambda_sketch_3d, lambda_tilt_chart
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.shapes import Path, Text
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.systems.lambda_linkage.pictures import _View, lambda_sketch, lambda_sketch_3d, lambda_tilt_chart
 
 TILTED = LambdaLinkage(alpha=1 / 30)
 

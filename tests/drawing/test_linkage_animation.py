@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from graphsynth import LambdaLinkage
-from graphsynth.drawing.lambda_linkage import lambda_animation
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.linkage_animation import Bar, linkage_animation
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.errors import GeometryError
+from graphsynth.systems.lambda_linkage.pictures import lambda_animation
 
 
 def frames_of(svg, mark):

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.motion_charts import coupler_curves, margin_chart, motion_chart, transmission_chart
 from graphsynth.drawing.plots import Chart
-from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate
 
 from .conftest import TURN, four_bar

@@ -6,7 +6,11 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from graphsynth.drawing.piston_pictures import (
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.piston import FloatingPiston
+from graphsynth.systems.piston.gas import CompressorCycle
+from graphsynth.systems.piston.machine import PistonFriction, PistonMachine, PistonMasses
+from graphsynth.systems.piston.pictures import (
     indicator_chart,
     piston_animation,
     piston_motion_chart,
@@ -15,10 +19,6 @@ from graphsynth.drawing.piston_pictures import (
     side_load_chart,
     torque_chart,
 )
-from graphsynth.dynamics.piston import PistonFriction, PistonMachine, PistonMasses
-from graphsynth.dynamics.piston_gas import CompressorCycle
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics.piston import FloatingPiston
 
 SLIDER = FloatingPiston.crank_slider(0.05, 0.2, 0.01, lead=0.13, cylinder_angle=0.05)
 YOKE = FloatingPiston.scotch_yoke(0.05, lead=0.22)

@@ -8,13 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from graphsynth.drawing.platform_maps import harmonics_picture, loci_picture, map_picture, workspace_picture
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.platform.maps import platform_map
-from graphsynth.kinematics.platform.singular_loci import singular_loci
-from graphsynth.kinematics.platform.workspace import constant_orientation_workspace
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.platform.map_pictures import harmonics_picture, loci_picture, map_picture, workspace_picture
+from graphsynth.systems.platform.maps import platform_map
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+from graphsynth.systems.platform.singular_loci import singular_loci
+from graphsynth.systems.platform.workspace import constant_orientation_workspace
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
 

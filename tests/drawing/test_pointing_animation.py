@@ -9,11 +9,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.moving import Moving
-from graphsynth.drawing.pointing_animation import pointing_animation, project
-from graphsynth.drawing.pointing_maps import difference_map_picture
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics.pointing import PointingMechanism
+from graphsynth.systems.antenna import PointingMechanism
+from graphsynth.systems.antenna.animation import pointing_animation, project
+from graphsynth.systems.antenna.map_pictures import difference_map_picture
 
 ART = PointingMechanism()
 

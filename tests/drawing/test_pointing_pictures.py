@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from graphsynth.drawing.pointing_maps import fold_map_picture, tolerance_map_picture
-from graphsynth.drawing.pointing_pictures import comparison_picture, pointing_picture
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics.pointing import PointingMechanism, Reading
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.antenna import PointingMechanism, Reading
+from graphsynth.systems.antenna.map_pictures import fold_map_picture, tolerance_map_picture
+from graphsynth.systems.antenna.pictures import comparison_picture, pointing_picture
 
 ART = PointingMechanism()
 PARALLELOGRAM = PointingMechanism(l3=0.1, l5=0.1)

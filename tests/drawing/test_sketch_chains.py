@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from graphsynth.drawing.graphs import graph_svg
-from graphsynth.kinematics.embodiment import JointLayout, layout
-from graphsynth.kinematics.embodiment.crossings import crossing_pairs, fewest_crossings
+from graphsynth.kinematics.dimensional import JointLayout, layout
+from graphsynth.kinematics.dimensional.crossings import crossing_pairs, fewest_crossings
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 

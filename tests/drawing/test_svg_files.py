@@ -20,19 +20,19 @@ from graphsynth.drawing.animation import animated_svg
 from graphsynth.drawing.diagram import mechanism_svg
 from graphsynth.drawing.figures import new_figure, themed_svg
 from graphsynth.drawing.graphs import graph_svg
-from graphsynth.drawing.lambda_linkage import lambda_animation, lambda_sketch, lambda_sketch_3d
 from graphsynth.drawing.levels import draw_levels
 from graphsynth.drawing.pages import whole_page
 from graphsynth.drawing.palette import DARK, LIGHT, STYLE
-from graphsynth.drawing.piston_pictures import piston_sketch
 from graphsynth.drawing.plots import Band, Chart, Line, Mark
-from graphsynth.drawing.pointing_animation import pointing_animation
-from graphsynth.drawing.tribometer_animation import tribometer_animation, tribometer_sketch
-from graphsynth.dynamics.tribometer import Tribometer
 from graphsynth.kinematics import simulate
-from graphsynth.kinematics.piston import FloatingPiston
-from graphsynth.kinematics.pointing import PointingMechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.antenna import PointingMechanism
+from graphsynth.systems.antenna.animation import pointing_animation
+from graphsynth.systems.lambda_linkage.pictures import lambda_animation, lambda_sketch, lambda_sketch_3d
+from graphsynth.systems.piston import FloatingPiston
+from graphsynth.systems.piston.pictures import piston_sketch
+from graphsynth.systems.tribometer.animation import tribometer_animation, tribometer_sketch
+from graphsynth.systems.tribometer.model import Tribometer
 
 from ..plain_svg import faults
 from .conftest import four_bar

@@ -7,11 +7,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from graphsynth.drawing.tribometer_animation import tribometer_animation, tribometer_sketch
-from graphsynth.dynamics.friction import TwoCoefficientLaw
-from graphsynth.dynamics.tribometer import Tribometer
-from graphsynth.dynamics.tribometer_drives import BeltDrive, HarmonicDrive
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
+from graphsynth.systems.tribometer.animation import tribometer_animation, tribometer_sketch
+from graphsynth.systems.tribometer.drives import BeltDrive, HarmonicDrive
+from graphsynth.systems.tribometer.model import Tribometer
 
 PLAIN = TwoCoefficientLaw(0.4, 0.25)
 MODELS = [

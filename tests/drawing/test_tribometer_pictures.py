@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from graphsynth.drawing.tribometer_pictures import (
+from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
+from graphsynth.systems.tribometer.accuracy import regularisation_study, step_study
+from graphsynth.systems.tribometer.drives import BeltDrive
+from graphsynth.systems.tribometer.events import EventGuard
+from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.pictures import (
     error_picture,
     friction_picture,
     phase_picture,
@@ -13,12 +19,6 @@ from graphsynth.drawing.tribometer_pictures import (
     save_tribometer_gif,
     stiffness_picture,
 )
-from graphsynth.dynamics.events import EventGuard
-from graphsynth.dynamics.friction import TwoCoefficientLaw
-from graphsynth.dynamics.tribometer import Tribometer
-from graphsynth.dynamics.tribometer_accuracy import regularisation_study, step_study
-from graphsynth.dynamics.tribometer_drives import BeltDrive
-from graphsynth.errors import SpecError
 
 MODEL = Tribometer()
 

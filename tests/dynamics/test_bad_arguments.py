@@ -18,31 +18,30 @@ import numpy as np
 import pytest
 
 from graphsynth import dynamics, formats
+from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.dynamics import (
     Body,
-    Braider,
     DynamicModel,
     EffectiveInertia,
     Force,
-    GivenForce,
-    PistonMachine,
     Torque,
     Train,
     consistent_start,
     inverse_dynamics,
     simulate_dynamics,
 )
-from graphsynth.dynamics.tribometer import Tribometer
-from graphsynth.dynamics.tribometer_drives import HarmonicDrive
-from graphsynth.errors import GeometryError, GraphsynthError
 from graphsynth.formats import ExudynSettings, MujocoSettings, run_mujoco, to_mjcf
 from graphsynth.kinematics import simulate
-from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.piston import FloatingPiston
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems import braider
+from graphsynth.systems.braider import Braider
+from graphsynth.systems.piston import FloatingPiston, GivenForce, PistonMachine
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+from graphsynth.systems.tribometer.drives import HarmonicDrive
+from graphsynth.systems.tribometer.model import Tribometer
 
 G1 = ParallelPlatform.g1()
 POSE, SIGMA = (1.2, 0.9, 0.15), (1, 1, 1)
@@ -90,7 +89,7 @@ BAD = {
 
 
 def of(room: str, name: str) -> Callable[..., Any]:
-    return getattr(import_module(f"graphsynth.kinematics.platform.{room}"), name)  # type: ignore[no-any-return]
+    return getattr(import_module(f"graphsynth.systems.platform.{room}"), name)  # type: ignore[no-any-return]
 
 
 ON = {"platform": G1, "alpha": 0.1}
@@ -160,10 +159,10 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "tip": lambda: (BRAIDER.tip, {"theta": [0.0]}),
     "acceleration of a braider": lambda: (BRAIDER.acceleration, {"theta": [0.0], "speed": 1.0, "motor_torque": 0.0}),
     "thread": lambda: (BRAIDER.thread.force, {"tip": [0j]}),
-    "linkage of a braider": lambda: (dynamics.FourBar, {"crank": 0.02, "branch": 1}),
+    "linkage of a braider": lambda: (braider.FourBar, {"crank": 0.02, "branch": 1}),
     "inductances": lambda: (BRAIDER.inductance_study, {"inductances": (1e-4,), "times": [0.0, 0.1]}),
     "piston": lambda: (MACHINE.loads, {"angle": [0.1]}),
-    "piston by multipliers": lambda: (import_module("graphsynth.dynamics.piston_model").check_by_multipliers, {
+    "piston by multipliers": lambda: (import_module("graphsynth.systems.piston.dynamic_model").check_by_multipliers, {
         "machine": MACHINE, "angle": [0.1, 0.2],
     }),
     "limit force": lambda: (SLIDER.limit_force, {"times": [0.0]}),

@@ -11,6 +11,7 @@ from dynamic_models import slider_crank
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from graphsynth.core.errors import GeometryError, MissingExtraError, SpecError
 from graphsynth.dynamics import (
     Body,
     DynamicModel,
@@ -21,15 +22,14 @@ from graphsynth.dynamics import (
     Torque,
     simulate_dynamics,
 )
-from graphsynth.dynamics.friction import TwoCoefficientLaw
-from graphsynth.dynamics.tribometer import Tribometer
-from graphsynth.dynamics.tribometer_drives import BeltDrive, HarmonicDrive
-from graphsynth.dynamics.tribometer_model import general_model
-from graphsynth.errors import GeometryError, MissingExtraError, SpecError
+from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear, Polynomial
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.tribometer.drives import BeltDrive, HarmonicDrive
+from graphsynth.systems.tribometer.general_model import general_model
+from graphsynth.systems.tribometer.model import Tribometer
 
 FORMS = ("constrained", "reduced", "minimal")
 G = 9.81

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import (
     Body,
     DynamicModel,
@@ -25,7 +26,6 @@ from graphsynth.dynamics import (
     effective_inertia,
     simulate_dynamics,
 )  # fmt: skip
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Polynomial
 from graphsynth.mechanism.model import Driver, Mechanism

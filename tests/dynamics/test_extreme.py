@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dynamic_models import bar, four_bar, g1, seven_body, seven_pose
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import (
     Body,
     DynamicModel,
@@ -18,12 +19,11 @@ from graphsynth.dynamics import (
     simulate_dynamics,
 )
 from graphsynth.dynamics.energies import warnings_of
+from graphsynth.dynamics.forms.one_coordinate import MinimalForm
 from graphsynth.dynamics.integrate import make_form
-from graphsynth.dynamics.minimal import MinimalForm
 from graphsynth.dynamics.result import Checks
 from graphsynth.dynamics.stiff import CvodeStepper
 from graphsynth.dynamics.tables import compile_model
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Driver, Mechanism

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from dynamic_models import slider_crank
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import Body, DynamicModel, Force, JointFriction, Torque, consistent_start, simulate_dynamics
-from graphsynth.dynamics.friction_problem import FrictionProblem
-from graphsynth.dynamics.friction_rows import FrictionRows
+from graphsynth.dynamics.friction.problem import FrictionProblem
+from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.tables import compile_model
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import Body, DynamicModel, Force, Pulse, Torque, consistent_start, inverse_dynamics
-from graphsynth.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism

@@ -5,8 +5,9 @@ import math
 import pytest
 from dynamic_models import g1
 
-from graphsynth.dynamics import consistent_start, dynamics_work_precision
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics import consistent_start
+from graphsynth.evidence import dynamics_work_precision
 
 
 def test_rows_of_the_crank_rocker():

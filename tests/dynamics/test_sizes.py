@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth.dynamics import Body, DynamicModel, FourBar, Torque, simulate_dynamics
-from graphsynth.dynamics.braider.model import Braider, Thread
-from graphsynth.dynamics.friction import StribeckLaw, TwoCoefficientLaw
+from graphsynth.core.errors import GeometryError, SpecError
+from graphsynth.dynamics import Body, DynamicModel, Torque, simulate_dynamics
+from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
-from graphsynth.dynamics.piston_gas import CompressorCycle, ConstantForce
-from graphsynth.dynamics.piston_loads import PistonFriction, PistonMasses
 from graphsynth.dynamics.trains import Train
-from graphsynth.dynamics.tribometer import Tribometer
-from graphsynth.dynamics.tribometer_drives import BeltDrive, CrankDrive, HarmonicDrive
-from graphsynth.errors import GeometryError, SpecError
-from graphsynth.kinematics.piston.drives import CrankSlider, ScotchYoke
-from graphsynth.kinematics.piston.group import FloatingGroup
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.braider import FourBar
+from graphsynth.systems.braider.model import Braider, Thread
+from graphsynth.systems.piston.drives import CrankSlider, ScotchYoke
+from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce
+from graphsynth.systems.piston.group import FloatingGroup
+from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
+from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive, HarmonicDrive
+from graphsynth.systems.tribometer.model import Tribometer
 
 HUGE: dict[str, Any] = {
     "Braider": lambda x: Braider(switch=x), "Braider masses": lambda x: Braider(masses=(x, 1.0, 1.0, 1.0)),

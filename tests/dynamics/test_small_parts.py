@@ -9,19 +9,19 @@ from dynamic_models import bar, g1
 
 import graphsynth.dynamics.second as second_form
 from graphsynth.dynamics import DynamicModel, JointFriction, kernels
+from graphsynth.dynamics.driven.kernels import radau, systems
 from graphsynth.dynamics.energies import warnings_of
-from graphsynth.dynamics.friction_kernels.kernels import plant
-from graphsynth.dynamics.friction_loads import _real_roots
+from graphsynth.dynamics.friction.loads import _real_roots
 from graphsynth.dynamics.integrate import scales
 from graphsynth.dynamics.kernels.rubbing import friction_unit
 from graphsynth.dynamics.kernels.systems import pull
-from graphsynth.dynamics.platform_drive.kernels import radau, systems
 from graphsynth.dynamics.result import Checks
 from graphsynth.dynamics.start import consistent_start
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.tribometer.kernels import plant
 
 
 def test_a_force_at_a_point_has_the_power_of_that_point():

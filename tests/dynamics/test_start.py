@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from dynamic_models import bar, four_bar, g1, g3
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import Body, DynamicModel, consistent_start, simulate_dynamics
-from graphsynth.errors import GeometryError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph

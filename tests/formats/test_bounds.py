@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth import formats
-from graphsynth.errors import FormatError, GeometryError, GraphError
+from graphsynth.core.errors import FormatError, GeometryError, GraphError
 from graphsynth.formats import dot, graphml, tables
 from graphsynth.mechanism.files import JSON_MAX, TOML_MAX
 from graphsynth.mechanism.joints import Cam, Revolute

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth import formats
-from graphsynth.errors import FormatError, GraphError, SpecError
+from graphsynth.core.errors import FormatError, GraphError, SpecError
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear, Table
 from graphsynth.mechanism.model import Driver, Mechanism

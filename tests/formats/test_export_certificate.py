@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from dynamic_models import g1, g2, g3, seven_body, seven_pose
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import consistent_start, simulate_dynamics
-from graphsynth.errors import GeometryError
 from graphsynth.formats import ExudynSettings, MujocoSettings, certify_export, export_certificate
 from graphsynth.formats.export_certificate import mechanical_energy
 

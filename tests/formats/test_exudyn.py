@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from dynamic_models import g1
 
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import consistent_start, simulate_dynamics
-from graphsynth.errors import GeometryError
 from graphsynth.formats import ExudynSettings, run_exudyn
 from graphsynth.mechanism.laws import Harmonic
 from graphsynth.mechanism.model import Driver

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from graphsynth import formats
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Driver, Mechanism

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from graphsynth import formats
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 

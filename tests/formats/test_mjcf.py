@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from dynamic_models import g1, g2, seven_body, seven_pose
 
+from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.dynamics import (
     Body,
     DynamicModel,
@@ -18,7 +19,6 @@ from graphsynth.dynamics import (
     consistent_start,
     simulate_dynamics,
 )
-from graphsynth.errors import GeometryError, GraphError
 from graphsynth.formats import MujocoSettings, certify_export, run_mujoco, spanning_tree, to_mjcf
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from graphsynth.errors import IntervalError
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import Interval, Status, compiled_system, image, pave, pave_cells, pave_compiled
 from graphsynth.intervals.kernels import arithmetic as ia
 

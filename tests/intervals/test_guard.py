@@ -8,7 +8,7 @@ import textwrap
 
 import pytest
 
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.intervals import check_rounding
 from graphsynth.intervals.guard import rounding_faults
 
@@ -56,7 +56,7 @@ def test_a_changed_mode_is_refused_at_import_and_at_each_solve(change, word):
     code = f"""
 import ctypes, sys
 import numpy as np
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.intervals import (
     Interval, Search, gauss_seidel, image, jacobian, krawczyk, pave, pave_cells, pave_compiled, solve_linear,
 )
@@ -96,7 +96,7 @@ def test_a_changed_mode_is_refused_in_every_operation():
 import ctypes
 import numpy as np
 import graphsynth.intervals as gi
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.intervals import Interval
 many = np.linspace(1.0, 2.0, 6000)
 one, some, all_of = Interval("0.1"), Interval(["0.1", "0.3"]), Interval.from_bounds(many, many + 1.0)

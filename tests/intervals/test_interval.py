@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graphsynth.errors import FormatError, IntervalError
+from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import Decoration, Interval
 from graphsynth.testing import finite_numbers
 

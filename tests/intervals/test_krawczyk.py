@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth import intervals
-from graphsynth.errors import IntervalError
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import (
     Interval,
     Status,

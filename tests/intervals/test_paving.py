@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from graphsynth.errors import FormatError, IntervalError
+from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import Interval, Search, Status, cos, krawczyk, pave, sin, sqrt
 
 B_90 = "17.4617879639289313590283215334"

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from graphsynth.errors import IntervalError
+from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import (
     Decoration,
     Interval,

@@ -10,16 +10,16 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mpf
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
-from graphsynth.jamming.areas import ellipse_circle_stable, lid_area, rim_area, surrogate_areas
-from graphsynth.jamming.areas_enclosed import (
+from graphsynth.jamming.bearing.areas import ellipse_circle_stable, lid_area, rim_area, surrogate_areas
+from graphsynth.jamming.bearing.areas_enclosed import (
     enclose_crescents,
     enclose_lid_area,
     enclose_rim_area,
     enclose_surrogate_areas,
 )
-from graphsynth.jamming.bearing import Bearing
+from graphsynth.jamming.bearing.bearing import Bearing
 
 DIGITS = 50
 # specification 14.2: f in degrees, E4 ellipse minus circle, E4 circle minus ellipse, A_lid, A_rim

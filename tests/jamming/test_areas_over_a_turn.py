@@ -6,14 +6,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, assess_jamming
-from graphsynth.jamming.area_curve import area_curve, enclose_tilt_sine
-from graphsynth.jamming.areas_enclosed import enclose_surrogate_areas
-from graphsynth.jamming.circle_ellipse import Reading, reading_areas, reading_ellipse, reading_problem
-from graphsynth.jamming.shoelace import crescent_boxes, interval_shoelace
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.jamming.bearing.area_curve import area_curve, enclose_tilt_sine
+from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
+from graphsynth.jamming.bearing.shoelace import crescent_boxes, interval_shoelace
+from graphsynth.jamming.intersection import Reading, reading_areas, reading_ellipse, reading_problem
+from graphsynth.mechanism.four_bar import LambdaLinkage
 
 DECK = LambdaLinkage(alpha=1 / 30)
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.jamming import (
     Bearing,
     ToleranceBox,
@@ -25,9 +25,9 @@ from graphsynth.jamming import (
     largest_misalignment,
     smallest_clearance,
 )
-from graphsynth.jamming.coupled import Misalignment
+from graphsynth.jamming.joints import Misalignment
 from graphsynth.jamming.verdict import METHOD_CERTIFIED
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.mechanism.four_bar import LambdaLinkage
 
 DEG = math.pi / 180.0
 DECK = LambdaLinkage(alpha=1 / 30)

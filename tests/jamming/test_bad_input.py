@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from graphsynth import jamming
-from graphsynth.errors import GeometryError, GraphsynthError
+from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.jamming import (
     Bearing,
     Fit,
@@ -20,18 +20,18 @@ from graphsynth.jamming import (
     certified_largest_misalignment,
     certified_smallest_clearance,
     certify_jamming,
-    coupled,
     largest_gap,
     sample_gaps,
     smallest_clearance,
     sweep_linkage,
     wedging,
 )
-from graphsynth.jamming.area_curve import area_curve
-from graphsynth.jamming.areas import lid_area, rim_area, surrogate_areas
-from graphsynth.jamming.areas_enclosed import enclose_lid_area
-from graphsynth.jamming.circle_ellipse import circle_ellipse, krawczyk_boxes, surrogate_problem
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.jamming import joints as coupled
+from graphsynth.jamming.bearing.area_curve import area_curve
+from graphsynth.jamming.bearing.areas import lid_area, rim_area, surrogate_areas
+from graphsynth.jamming.bearing.areas_enclosed import enclose_lid_area
+from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes, surrogate_problem
+from graphsynth.mechanism.four_bar import LambdaLinkage
 
 DECK = LambdaLinkage(alpha=1 / 30)
 OUT_OF_REACH = LambdaLinkage(2, 3, 1, 2.5, alpha=1.2)  # the pin rises to 2.8 l3

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import GeometryError
-from graphsynth.jamming.areas import (
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.areas import (
     ellipse_circle,
     ellipse_circle_stable,
     lid_area,
@@ -20,7 +20,7 @@ from graphsynth.jamming.areas import (
     rim_crossing,
     surrogate_areas,
 )
-from graphsynth.jamming.bearing import Bearing
+from graphsynth.jamming.bearing.bearing import Bearing
 
 DECK = Bearing()
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, sin
 from graphsynth.jamming import (
     STANDARD_FITS,
@@ -24,20 +24,19 @@ from graphsynth.jamming import (
     certified_largest_misalignment,
     certified_smallest_clearance,
     certify_jamming,
-    fits,
     insertion_diagram,
     largest_gap,
     maximise,
     sample_gaps,
-    sampling,
     spread,
     sweep_linkage,
     sweep_turn,
     tightest_free_fit,
     wedging,
 )
-from graphsynth.jamming.circle_sets import Span, complement, contains, merge_outer, strictly_inside, subtract
-from graphsynth.jamming.sweep import PieceGap
+from graphsynth.jamming.bearing import fits, sampling
+from graphsynth.jamming.bearing.circle_sets import Span, complement, contains, merge_outer, strictly_inside, subtract
+from graphsynth.jamming.bearing.sweep import PieceGap
 
 
 def between(text, *ends):

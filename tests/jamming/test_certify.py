@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, ToleranceBox, Verdict, certify_jamming, spread
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.mechanism.four_bar import LambdaLinkage
 
 DEG = mpmath.mpf
 F = Fraction
@@ -357,7 +357,7 @@ def test_arcs_hold_every_member_of_a_box(data):
     f = np.linspace(0.0, math.tau, 721)
     path = linkage.positions(f)
     gap = bearing.gap(path.sin_theta, path.cos_theta, condition)
-    from graphsynth.jamming.circle_sets import contains
+    from graphsynth.jamming.bearing.circle_sets import contains
 
     for angle, g in zip(f, gap):
         if g > 1e-12:

@@ -6,9 +6,10 @@ import math
 
 import pytest
 
-from graphsynth.errors import GeometryError
-from graphsynth.jamming import ToleranceBox, arc_errors, area_errors, crossing_errors, error_table, spread
-from graphsynth.jamming.circle_ellipse import circle_ellipse
+from graphsynth.core.errors import GeometryError
+from graphsynth.evidence import arc_errors, area_errors, crossing_errors, error_table
+from graphsynth.jamming import ToleranceBox, spread
+from graphsynth.jamming.intersection import circle_ellipse
 
 
 def by_method(rows):

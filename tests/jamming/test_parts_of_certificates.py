@@ -9,9 +9,9 @@ import pytest
 
 from graphsynth.intervals import Interval
 from graphsynth.jamming import ToleranceBox
-from graphsynth.jamming.corners import sine_of
-from graphsynth.jamming.poses import turns_freely
-from graphsynth.jamming.sweep import _split
+from graphsynth.jamming.bearing.corners import sine_of
+from graphsynth.jamming.bearing.poses import turns_freely
+from graphsynth.jamming.bearing.sweep import _split
 
 
 @pytest.mark.parametrize("amplitude", [1e-9, 0.01, 0.3, 0.99, 1.5, 40.0])

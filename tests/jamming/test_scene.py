@@ -7,12 +7,12 @@ from fractions import Fraction as F
 
 import pytest
 
-from graphsynth.errors import SceneError
+from graphsynth.core.errors import SceneError
 from graphsynth.jamming import Verdict
-from graphsynth.scenes.runner import execute
-from graphsynth.scenes.scene import OutputsTable, load_scene
-from graphsynth.scenes.stages import Context
-from graphsynth.scenes.steps.four_bar import tolerance_box
+from graphsynth.pipeline.runner import execute
+from graphsynth.pipeline.scene import OutputsTable, load_scene
+from graphsynth.pipeline.stages import Context
+from graphsynth.systems.lambda_linkage.stages import tolerance_box
 
 EXAMPLE = {  # specification 10.3
     "crank": "1e-2 %", "coupler": "1e-2 %", "alpha_rad": "1e-2 %", "azimuth_rad": 0.05, "radius_mm": 0.005,

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.jamming import Bearing, Verdict, assess_jamming, jam_arcs
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
+from graphsynth.mechanism.four_bar import LambdaLinkage
 
 
 @pytest.mark.parametrize("unit", [1e-300, 1e-160, 1e-80, 1e80, 1e155, 1e300])

@@ -46,9 +46,9 @@ FAMILY = """
 import time
 from dataclasses import dataclass
 from typing import Literal
-from graphsynth.scenes.family import Family
-from graphsynth.scenes.products import Record
-from graphsynth.scenes.stages import COLLECT, Stage
+from graphsynth.pipeline.system import System
+from graphsynth.pipeline.products import Record
+from graphsynth.pipeline.stages import COLLECT, Stage
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -67,7 +67,7 @@ def weigh(context, bead):
     time.sleep(0.01)
     return Record(verdict=f"{bead.number ** 2} g", good=bead.number % 3 != 0)
 
-FAMILY = Family(
+SYSTEM = System(
     Table,
     (
         Stage("beads", "campaign_beads:beads", (), ("beads",), stream=True),
@@ -136,7 +136,7 @@ def jobs(folder: Path) -> list[Job]:
     info.mkdir(parents=True)
     (site / "campaign_beads.py").write_text(FAMILY)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: campaign-beads\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[graphsynth.families]\nbeads = campaign_beads:FAMILY\n")
+    (info / "entry_points.txt").write_text("[graphsynth.systems]\nbeads = campaign_beads:SYSTEM\n")
     sys.path.insert(0, str(site))
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
     scene, eight = folder / "beads.toml", folder / "eight.sqlite"

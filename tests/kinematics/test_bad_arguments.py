@@ -9,25 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.kinematics import simulate, simulate_batch
-from graphsynth.kinematics.certified import (
-    certify,
-    certify_assembly_modes,
-    certify_direct,
-    certify_direct_batch,
-    certify_full_turn,
-)
-from graphsynth.kinematics.embodiment import PathGoal, PosesGoal, embody
+from graphsynth.kinematics.certify import certify
+from graphsynth.kinematics.dimensional import PathGoal, PosesGoal, embody
 from graphsynth.kinematics.engine.dyads import solve_rrr
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
-from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.piston import rotary_assignments
-from graphsynth.kinematics.pointing import PointingMechanism
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
+from graphsynth.mechanism.four_bar import LambdaLinkage
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.antenna import PointingMechanism
+from graphsynth.systems.piston import rotary_assignments
+from graphsynth.systems.platform import certify_assembly_modes, certify_direct, certify_direct_batch, certify_full_turn
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
 JOINTS = [

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from graphsynth.kinematics.certified.balls import Balls, check_rounding, exact, tau_times, unit
-from graphsynth.kinematics.certified.cover import Budget, cover, prove_nodes
+from graphsynth.kinematics.certify.balls import Balls, check_rounding, exact, tau_times, unit
+from graphsynth.kinematics.certify.cover import Budget, cover, prove_nodes
 
 NUMBER = st.floats(-1e100, 1e100, allow_subnormal=True)
 OPERATIONS = [lambda a, b: a + b, lambda a, b: a - b, lambda a, b: a * b, lambda a, b: a / b]

@@ -11,18 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
-from graphsynth.kinematics.certified import certify, certify_four_bar
-from graphsynth.kinematics.certified.balls import Balls, exact
-from graphsynth.kinematics.certified.equations import MechanismSystem
+from graphsynth.kinematics.certify import certify, certify_four_bar
+from graphsynth.kinematics.certify.balls import Balls, exact
+from graphsynth.kinematics.certify.equations import MechanismSystem
 from graphsynth.kinematics.engine.result import Motion
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear, Polynomial, Table
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 TURN = np.linspace(0.0, math.tau, 121)
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)

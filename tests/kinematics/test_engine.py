@@ -11,16 +11,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
-from graphsynth.kinematics._plane import directions
-from graphsynth.kinematics.assembly_modes import assembly_modes
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
+from graphsynth.kinematics.triad.assembly_modes import assembly_modes
+from graphsynth.mechanism.four_bar import LambdaLinkage
 from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.systems.platform.plane import directions
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 TURN = np.linspace(0.0, math.tau, 361)
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)

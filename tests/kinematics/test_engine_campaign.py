@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.engine.result import Motion, MotionEvent
 from graphsynth.mechanism.constraints import residual

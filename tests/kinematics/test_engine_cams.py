@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from mpmath import mp
 
 from graphsynth import Cam, Driver, Mechanism, MechanismGraph, Prismatic, Revolute
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate, simulate_batch
-from graphsynth.kinematics.platform.rank_check import loop_closure
 from graphsynth.mechanism.constraints import jacobian, residual
+from graphsynth.systems.platform.rank_check import loop_closure
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 361)
 HARMONICS = ((0.12, -0.05), (0.03, 0.04), (0.0, -0.01))
@@ -140,7 +140,7 @@ def test_loop_closure_of_a_cam() -> None:
 
 
 def test_no_certificate_for_cams() -> None:
-    from graphsynth.kinematics.certified import certify
+    from graphsynth.kinematics.certify import certify
 
     with pytest.raises(GeometryError, match="cam"):
         certify(simulate(oscillating(), TURN))

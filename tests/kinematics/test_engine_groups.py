@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.engine.dyads import solve_rrr
 from graphsynth.kinematics.engine.program import compile_program

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from graphsynth.errors import GeometryError, UnitWarning
+from graphsynth.core.errors import GeometryError, UnitWarning
 from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.escapes import between

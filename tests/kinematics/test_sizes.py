@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics.assembly_modes import assembly_modes, assembly_modes_batch
-from graphsynth.kinematics.drive import FourBarDrive
-from graphsynth.kinematics.lambda_linkage import LambdaLinkage
-from graphsynth.kinematics.parallel_platform import ParallelPlatform
-from graphsynth.kinematics.single_motor_platform import SingleMotorPlatform
+from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.triad.assembly_modes import assembly_modes, assembly_modes_batch
+from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.systems.platform.drive import FourBarDrive
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 OUTSIDE = [1e-300, 1e-200, 1e-160, 1e-80, 1e80, 1e120, 1e155, 1e300]
 INSIDE = [2.0**-190, 2.0**190]  # powers of two: the ratios of the lengths stay what they are

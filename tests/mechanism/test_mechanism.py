@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import FormatError, GeometryError
+from graphsynth.core.errors import FormatError, GeometryError
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear, Polynomial, Table

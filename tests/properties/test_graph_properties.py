@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.testing import graphs
 

@@ -9,7 +9,7 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
 from graphsynth import Mechanism, StructuralSpec, enumerate_mechanisms, simulate
-from graphsynth.kinematics.certified import certify_four_bar
+from graphsynth.kinematics.certify import certify_four_bar
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.testing import four_bar_mechanisms, four_bars, mechanisms
 

@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from graphsynth import StructuralSpec
-from graphsynth.errors import InfeasibleSpecError, SpecError
+from graphsynth.core.errors import InfeasibleSpecError, SpecError
 
 MOST_LINKS, MOST_JOINTS = 5, 8
 PLAIN = ("W", "Pi", "n", "p", "v", "v_ct", "v_P", "t0", "G")
@@ -251,7 +251,7 @@ def test_text_forms_give_the_question_back(case):
     )
 )  # fmt: skip
 def test_any_mapping_gives_a_question_or_one_sentence(mapping):
-    from graphsynth.errors import FormatError
+    from graphsynth.core.errors import FormatError
 
     try:
         spec = StructuralSpec.from_mapping(mapping, "file.toml")

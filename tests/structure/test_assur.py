@@ -3,7 +3,7 @@ import random
 
 import pytest
 
-from graphsynth.errors import GraphError
+from graphsynth.core.errors import GraphError
 from graphsynth.structure.assur import decompose, find_fault, is_assur_group, is_baranov_truss
 from graphsynth.structure.contours import contour_class
 from graphsynth.structure.graph import MechanismGraph

@@ -10,7 +10,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.structure import canonical, kernels
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.search import Search

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graphsynth.errors import TooLargeError
+from graphsynth.core.errors import TooLargeError
 from graphsynth.structure import search
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.search import Search

@@ -6,7 +6,7 @@ import sys
 import networkx as nx
 import pytest
 
-from graphsynth.errors import FormatError, GraphError
+from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.structure.checks import integer
 from graphsynth.structure.graph import Joint, MechanismGraph
 

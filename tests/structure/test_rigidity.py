@@ -3,7 +3,7 @@ import random
 
 import pytest
 
-from graphsynth.errors import TooLargeError
+from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.rigidity import is_sparse
 

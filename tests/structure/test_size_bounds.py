@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import linprog
 
 from graphsynth import StructuralSpec
-from graphsynth.structure.equations import Problem, domains_of, propagate, rows_of
-from graphsynth.structure.system import _box
+from graphsynth.structure.system.equations import Problem, domains_of, propagate, rows_of
+from graphsynth.structure.system.solving import _box
 
 
 @pytest.mark.parametrize(

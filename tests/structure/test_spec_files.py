@@ -8,9 +8,9 @@ import pytest
 from scipy.optimize import linprog
 
 from graphsynth import StructuralSpec
-from graphsynth.errors import FormatError, SpecError
-from graphsynth.structure.equations import Row
-from graphsynth.structure.linear import maximum
+from graphsynth.core.errors import FormatError, SpecError
+from graphsynth.structure.system.equations import Row
+from graphsynth.structure.system.linear import maximum
 
 SHIPPED = Path(__file__).parents[2] / "catalog" / "specs"
 COUNTS = {"worked-example": 5, "worked-example-n4": 1, "four-link": 1}
@@ -172,11 +172,11 @@ def test_the_documentation_is_true():
     assert doctest.testfile(str(page), module_relative=False) == (0, 2)
 
 
-@pytest.mark.parametrize("module", ["spec", "assortment", "variables", "system", "linear"])
+@pytest.mark.parametrize("module", ["spec", "assortment", "variables", "solving", "linear"])
 def test_docstring_examples(module):
     import doctest
     from importlib import import_module
 
-    result = doctest.testmod(import_module(f"graphsynth.structure.{module}"))
+    result = doctest.testmod(import_module(f"graphsynth.structure.system.{module}"))
     assert result.failed == 0
     assert result.attempted > 0

@@ -4,7 +4,7 @@ import subprocess
 import networkx as nx
 import pytest
 
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 from graphsynth.structure.graph import MechanismGraph
 
 

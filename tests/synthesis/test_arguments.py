@@ -19,8 +19,8 @@ from graphsynth import (
     sample_mechanisms,
 )
 from graphsynth.cli import main
-from graphsynth.errors import GraphError, GraphsynthError, SpecError
-from graphsynth.structure.variables import Counts
+from graphsynth.core.errors import GraphError, GraphsynthError, SpecError
+from graphsynth.structure.system.variables import Counts
 from graphsynth.synthesis.problem import Problem
 
 SIX = StructuralSpec(W=1, links=6)

@@ -13,7 +13,7 @@ from graphsynth import (
     enumerate_chains,
     sample_mechanisms,
 )
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.synthesis import units
 from graphsynth.synthesis.problem import Problem, text_of_piece
 

@@ -14,7 +14,7 @@ import pytest
 from networkx.algorithms.isomorphism import GraphMatcher, numerical_edge_match
 
 from graphsynth import MechanismGraph
-from graphsynth.errors import FormatError, TooLargeError
+from graphsynth.core.errors import FormatError, TooLargeError
 from graphsynth.synthesis.contracted import (
     FOLDER_VARIABLE,
     SHIPPED_LOOPS,

@@ -12,8 +12,8 @@ from graphsynth import (
     count_mechanisms,
 )
 from graphsynth.cli import main
-from graphsynth.errors import TooLargeError
-from graphsynth.structure.system import number_of_solutions, solutions
+from graphsynth.core.errors import TooLargeError
+from graphsynth.structure.system.solving import number_of_solutions, solutions
 from graphsynth.synthesis.contracted import contracted_graphs, generate
 from graphsynth.synthesis.outlook import extrapolated
 from graphsynth.synthesis.problem import Problem

@@ -12,7 +12,7 @@ import pytest
 
 from graphsynth import StructuralSpec, count_chains, count_mechanisms, enumerate_chains, enumerate_mechanisms
 from graphsynth.cli import main
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.core.errors import GraphsynthError, SpecError
 from graphsynth.synthesis import parallel
 from graphsynth.synthesis.problem import Problem
 from graphsynth.synthesis.shards import shard_of

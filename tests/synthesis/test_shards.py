@@ -11,7 +11,7 @@ import pytest
 
 from graphsynth import StructuralSpec
 from graphsynth.atlas.pieces import share_of, tasks_of
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.synthesis.kernels.counting import LISTING
 from graphsynth.synthesis.kernels.layout import make_work
 from graphsynth.synthesis.kernels.listing import HEADER, VISITED, list_rows, rewind

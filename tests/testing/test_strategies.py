@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.errors import NoSuchExample
 
 import graphsynth.testing as testing
-from graphsynth.errors import InfeasibleSpecError, SpecError
+from graphsynth.core.errors import InfeasibleSpecError, SpecError
 from graphsynth.intervals import Interval
-from graphsynth.kinematics.leg import LegStatus
-from graphsynth.scenes.scene import Scene
+from graphsynth.kinematics.triad.leg import LegStatus
+from graphsynth.pipeline.scene import Scene
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.testing.strategies.four_bars import CLASSES, classify
 from graphsynth.testing.strategies.scenes import toml_text
@@ -164,7 +164,7 @@ def test_values_of_the_worked_example():
 @given(testing.four_bars(*CLASSES))
 def test_four_bars_have_their_class(bar):
     """The class against another exact decision: where the crank's distance stays inside of coupler and rocker."""
-    from graphsynth.kinematics.certified import certify_four_bar
+    from graphsynth.kinematics.certify import certify_four_bar
 
     found = certify_four_bar(bar.ground, bar.crank, bar.coupler, bar.rocker)
     assert found.type == bar.type or (bar.type == "never assembled" and found.kind == "never assembled")

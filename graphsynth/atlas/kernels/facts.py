@@ -7,7 +7,7 @@ leaves this module, so that they are those of the graph read back from the key.
 import numpy as np
 
 from graphsynth.atlas.kernels.grouping import groups_of
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.structure.kernels import ONE, ZERO, canon, canon_workspace, lowest_bit, popcount
 
 #: A group with its base has at most 17 vertices, and 136 pairs of them: they fit into three words.

@@ -6,7 +6,7 @@ frame: frame and driven links are one placed body, every other link is a body of
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.structure.kernels import ONE, ZERO, lowest_bit
 
 #: Constraints of a joint, and freedoms of a body, in the plane.

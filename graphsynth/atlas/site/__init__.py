@@ -1,11 +1,5 @@
 """The atlas page: a catalogue as a static site that opens from a file."""
 
-from graphsynth.lazy import resolve
+import lazy_loader as _lazy
 
-__all__ = ["SiteReport", "build_site"]
-
-_PUBLIC = {"build_site": "building", "SiteReport": "building"}
-
-
-def __getattr__(name: str) -> object:
-    return resolve(__name__, _PUBLIC, name)
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -21,7 +21,7 @@ from graphsynth.atlas.site.motions import MotionTask, motion_of
 from graphsynth.atlas.site.place import MARK, replaced, unwritten
 from graphsynth.atlas.site.sketches import PER_FILE, sketch_scripts
 from graphsynth.atlas.stored import stored_mechanisms
-from graphsynth.errors import GraphsynthError, SpecError
+from graphsynth.core.errors import GraphsynthError, SpecError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
@@ -187,7 +187,7 @@ def _motions(
     folder: Path, tasks: list[MotionTask], executor: Executor | None, progress: _Progress
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Write the pages of motions; yield label and facts."""
-    from graphsynth.ordered import in_order
+    from graphsynth.core.ordered import in_order
 
     place = folder / "motions"
     place.mkdir()

@@ -66,7 +66,7 @@ def choice_of(chain: MechanismGraph, most: int) -> list[tuple[int, list[int]]]:
     >>> choice_of(MechanismGraph.from_key("1BAN4"), 1)
     [(0, [2])]
     """
-    from graphsynth.kinematics.embodiment.choice import choices
+    from graphsynth.kinematics.dimensional.choice import choices
 
     found = []
     frames = {chain.with_frame(link): link for link in reversed(range(chain.links))}
@@ -102,8 +102,8 @@ def _stored(task: MotionTask) -> ShownMotion | None:
     """Move the mechanism of the catalogue through a turn; None if it is of another chain or does not turn."""
     import numpy as np
 
-    from graphsynth.errors import GraphsynthError
-    from graphsynth.kinematics.embodiment.verify import length_ratio, smallest_transmission
+    from graphsynth.core.errors import GraphsynthError
+    from graphsynth.kinematics.dimensional.verify import length_ratio, smallest_transmission
     from graphsynth.kinematics.simulation import simulate
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
@@ -140,8 +140,8 @@ def _shown(label: str, motion: Motion, statement: str, transmission: float, rati
 
 
 def _searched(label: str, key: str) -> ShownMotion:
-    from graphsynth.errors import GraphError
-    from graphsynth.kinematics.embodiment import embody
+    from graphsynth.core.errors import GraphError
+    from graphsynth.kinematics.dimensional import embody
     from graphsynth.structure.graph import MechanismGraph
 
     chain = MechanismGraph.from_key(key)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 
 __all__ = ["MARK", "replaced", "unwritten"]
 

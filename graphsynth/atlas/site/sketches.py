@@ -28,7 +28,7 @@ def places_of(keys: Sequence[str]) -> list[str]:
     """
     import numpy as np
 
-    from graphsynth.kinematics.embodiment.sketch import layout
+    from graphsynth.kinematics.dimensional.sketch import layout
     from graphsynth.structure.graph import MechanismGraph
 
     found = []
@@ -42,7 +42,7 @@ def places_of(keys: Sequence[str]) -> list[str]:
 
 def sketch_scripts(family: Family, executor: Executor | None) -> Iterator[tuple[str, str, int]]:
     """Yield the files of sketches of a family as (name, script, chains in it)."""
-    from graphsynth.ordered import in_order
+    from graphsynth.core.ordered import in_order
 
     keys = [row["key"] for row in family.rows]
     chunks = [keys[k : k + _CHUNK] for k in range(0, len(keys), _CHUNK)]

@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from graphsynth.compilation import Kernel
+from graphsynth.core.compilation import Kernel
 from graphsynth.core.native.library import FOLDER, LEVELS, target
 from graphsynth.core.native.signatures import LIST, Signature, code_of, parse, read_list
 

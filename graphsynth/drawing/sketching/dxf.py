@@ -10,9 +10,9 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
+from graphsynth.core.extras import need
 from graphsynth.drawing.shapes import LAYERS, Circle, Path, Placement, Point, Shape, Text, placement
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.extras import need
 
 __all__ = ["dxf", "save_dxf"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.drawing import canvas
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.errors import GraphsynthError
 
 __all__ = ["SUFFIXES", "save"]
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from graphsynth.core.errors import GraphsynthError
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.shapes import Circle, Path, Placement, Point, Shape, Style, Text, placement
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.errors import GraphsynthError
 
 __all__ = ["MAX_WIDTH", "document", "tikz"]
 

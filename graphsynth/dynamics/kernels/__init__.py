@@ -1,8 +1,8 @@
 """Compiled kernels of planar dynamics; coordinates are those of the centres of mass, see :mod:`..tables`."""
 
-from graphsynth.dynamics.kernels.constrained import constrained_stages, project_state
-from graphsynth.dynamics.kernels.minimal import minimal_stages
-from graphsynth.dynamics.kernels.reduced import accelerate_reduced, place_reduced, reduced_stages
+from graphsynth.dynamics.kernels.augmented import constrained_stages, project_state
+from graphsynth.dynamics.kernels.one_coordinate import minimal_stages
+from graphsynth.dynamics.kernels.partitioned import accelerate_reduced, place_reduced, reduced_stages
 from graphsynth.dynamics.kernels.rubbing import friction_loads, friction_unit
 from graphsynth.dynamics.kernels.solving import accelerate, factor_rows, least_step, solve_rows
 from graphsynth.dynamics.kernels.systems import constraint_system, load_vector, state_rows

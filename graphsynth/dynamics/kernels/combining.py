@@ -1,6 +1,6 @@
 """A stage of an explicit Runge-Kutta step."""
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 
 
 @kernel

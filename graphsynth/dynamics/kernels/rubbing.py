@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.dynamics.kernels.systems import pull, twist
 
 #: Columns of the table of friction; the sense is +1 or -1 (sliding), 0 (sticking, no force here), `BY_SPEED`.

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.dynamics.kernels.rubbing import friction_unit, slide_loads
 
 #: Diagonal entries of R below this part of the first count as zero (columns have length 1).

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE, PBX, PBY, RA, SIGN, SLOT, TX, TY
 from graphsynth.kinematics.engine.kernels.rows import gamma, row
 

@@ -1,6 +1,6 @@
 """Interval operations on scalar bounds: four floats in, two out; empty is ``(inf, -inf)``."""
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
 from graphsynth.intervals.kernels.rounding import (
     DIVISOR_MIN,

@@ -7,7 +7,7 @@ building blocks of double-word arithmetic", ACM TOMS 44 (2017): sum 3 u^2 + 13 u
 
 from math import sqrt
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
 from graphsynth.intervals.kernels.rounding import ETA, PHI, add_down, add_up
 

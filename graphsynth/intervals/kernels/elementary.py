@@ -1,6 +1,6 @@
 """Loops of the elementary functions over flat arrays; bounds in, bounds out."""
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.intervals.kernels import exponential, inverse, trigonometry
 
 

@@ -5,7 +5,7 @@ from math import factorial, frexp, ldexp
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import INF, divide_both, down, up

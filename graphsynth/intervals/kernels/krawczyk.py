@@ -12,7 +12,7 @@ continuous.  It is written with the scalar functions of this package (``arithmet
 
 import numpy as np
 
-from graphsynth.compilation import kernel, prepare_numba
+from graphsynth.core.compilation import kernel, prepare_numba
 from graphsynth.intervals.kernels import arithmetic as ia
 
 EMPTY, UNIQUE, EXISTS, UNDECIDED = 0, 1, 2, 3

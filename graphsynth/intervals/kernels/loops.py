@@ -1,6 +1,6 @@
 """Loops of the interval operations over flat arrays; bounds in, bounds out."""
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.intervals.kernels import arithmetic
 
 

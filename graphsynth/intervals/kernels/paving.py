@@ -7,7 +7,7 @@ that solution.  So the search can be stopped between any two boxes.
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.intervals.kernels.krawczyk import EMPTY, EXISTS, UNDECIDED, UNIQUE, test, types_of_system
 from graphsynth.intervals.kernels.rounding import add_down, add_up
 

@@ -6,7 +6,7 @@ itself must not fuse anything: no ``fastmath`` anywhere, and a test compares wit
 
 from math import frexp, ldexp, sqrt
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
 
 PHI = 2.0**-53 * (1.0 + 2.0**-52)

@@ -10,7 +10,7 @@ from math import factorial, frexp
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
 from graphsynth.intervals.kernels.rounding import INF, down, up

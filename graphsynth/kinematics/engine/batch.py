@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.core.checks import finite_array, link_number
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Delivery, Tracker, run_program, workspace
 from graphsynth.kinematics.engine.inputs import monotonic, warn_of_degrees
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_table, started, with_turns
-from graphsynth.mechanism.checks import link_number
 from graphsynth.mechanism.joints import COLUMNS, Gear
 from graphsynth.mechanism.model import Mechanism
 

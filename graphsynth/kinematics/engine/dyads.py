@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.kinematics._checks import finite_array
+from graphsynth.core.checks import finite_array
+from graphsynth.core.errors import GeometryError
 
 __all__ = ["solve_rrr"]
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError, UnitWarning
-from graphsynth.kinematics._checks import finite_array
-from graphsynth.mechanism.checks import called
+from graphsynth.core.checks import called, finite_array
+from graphsynth.core.errors import GeometryError, UnitWarning
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.laws import LAWS, Linear
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import GeometryError, GraphError
+from graphsynth.core.checks import check_largest
+from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.kinematics.engine import codes
-from graphsynth.mechanism.checks import check_largest
 from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import characteristic_length

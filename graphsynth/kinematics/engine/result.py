@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.errors import GeometryError
-from graphsynth.mechanism.checks import link_number, point
+from graphsynth.core.checks import link_number, point
+from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Prismatic
 

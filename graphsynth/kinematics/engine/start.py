@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.errors import GeometryError
+from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program
@@ -169,7 +169,7 @@ def group_modes(tracker: Tracker, trace: Trace, k: int) -> Array | None:
 
 
 def _platform_modes(program: Program, trace: Trace, k: int) -> Array | None:
-    from graphsynth.kinematics.assembly_modes import assembly_modes
+    from graphsynth.kinematics.triad.assembly_modes import assembly_modes
 
     own = program.steps[k].core[0]
     row0, count = program.step_table[k, 1:3]

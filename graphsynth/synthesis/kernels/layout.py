@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 
 MAX_VERTICES = 18
 MAX_CLASSES = 48

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.synthesis.kernels.automorphisms import automorphisms
 from graphsynth.synthesis.kernels.counting import (
     FRAME_NONE,

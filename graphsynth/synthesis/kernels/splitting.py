@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.structure.kernels import canon, canon_workspace
 
 _ONE = np.uint64(1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from graphsynth.errors import MissingExtraError, SpecError
+from graphsynth.core.errors import MissingExtraError, SpecError
 
 __all__ = ["assume", "check_range", "ready", "st"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.testing.strategies.extra import assume, st
 
 __all__ = ["CLASSES", "FourBarLengths", "four_bars"]

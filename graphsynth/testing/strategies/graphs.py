@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.testing.strategies.extra import check_range, ready, st
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.intervals import Interval
 from graphsynth.testing.strategies.extra import st
 

@@ -6,7 +6,7 @@ import math
 from functools import cache
 from typing import Any
 
-from graphsynth.errors import SpecError
+from graphsynth.core.errors import SpecError
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph

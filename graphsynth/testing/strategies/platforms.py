@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 
-from graphsynth.kinematics.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.testing.strategies.extra import assume, st
 
 __all__ = ["platform_poses", "platforms"]

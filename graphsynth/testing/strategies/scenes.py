@@ -109,7 +109,7 @@ def _scenes(draw: st.DrawFn) -> str:
 def scenes() -> st.SearchStrategy[str]:
     """Scene files as TOML text, valid by the documented schema: lambda linkages and tribometers.
 
-    Give the text to a file, or ``graphsynth.scenes.scene.Scene.from_mapping(tomllib.loads(text), "scene.toml")``.
+    Give the text to a file, or ``graphsynth.pipeline.scene.Scene.from_mapping(tomllib.loads(text), "scene.toml")``.
 
     Returns
     -------

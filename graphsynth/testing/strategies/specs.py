@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.spec import StructuralSpec
+from graphsynth.structure.system.spec import StructuralSpec
 from graphsynth.testing.strategies.extra import check_range, ready, st
 from graphsynth.testing.strategies.graphs import mechanism_graphs
 

@@ -15,8 +15,8 @@ from graphsynth.atlas.site import build_site
 from graphsynth.atlas.site.motions import choice_of
 from graphsynth.atlas.site.sketches import places_of
 from graphsynth.cli import main
-from graphsynth.errors import GraphsynthError, SpecError
-from graphsynth.kinematics.embodiment.sketch import layout
+from graphsynth.core.errors import GraphsynthError, SpecError
+from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.structure.assur import find_fault
 
 DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"

@@ -8,7 +8,7 @@ from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.site import build_site
 from graphsynth.cli import main
-from graphsynth.errors import FormatError
+from graphsynth.core.errors import FormatError
 
 WRONG = {
     "assortment": "UPDATE chains SET assortment = 'x-y'",

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from graphsynth.atlas.site import build_site
-from graphsynth.errors import GraphsynthError
+from graphsynth.core.errors import GraphsynthError
 
 PAGES = files("graphsynth.atlas.site").joinpath("pages")
 SCRIPTS = sorted(path.name for path in PAGES.iterdir() if path.name.endswith(".js"))

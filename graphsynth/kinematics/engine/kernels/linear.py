@@ -1,6 +1,6 @@
 """Small dense linear systems."""
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 
 
 @kernel

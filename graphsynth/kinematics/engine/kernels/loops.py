@@ -6,7 +6,7 @@ instructions.  ``X[link]`` has the rows x, y, cos theta, sin theta; ``V`` and ``
 
 import math
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.kinematics.engine.codes import DRIVE_R, PAX, PAY, PBX, PBY, H
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.kinematics.engine.codes import CAM, DRIVE_ANGLE, GEAR, INVERSE, PAX, PAY, PBX, PBY, SIGN, SLOT, H
 from graphsynth.kinematics.engine.kernels.linear import back, factor, solve3
 from graphsynth.kinematics.engine.kernels.rows import gamma, row, world

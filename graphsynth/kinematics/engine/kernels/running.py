@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     BAD_INPUT,
     E_RR,

@@ -2,7 +2,7 @@
 
 import math
 
-from graphsynth.compilation import kernel
+from graphsynth.core.compilation import kernel
 from graphsynth.kinematics.engine.codes import (
     E_RP,
     P_DIST,

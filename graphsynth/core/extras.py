@@ -1,0 +1,47 @@
+"""Optional packages: imported when a call needs one, or one sentence that says how to get it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from graphsynth.core.errors import MissingExtraError
+
+__all__ = ["need"]
+
+
+def need(module: str, extra: str, purpose: str) -> Any:
+    """Import an optional package, or a module of it.
+
+    Parameters
+    ----------
+    module : str
+        What to import, for example ``"sksundae.cvode"``.
+    extra : str
+        The extra of graphsynth in ``pyproject.toml`` that installs it.
+    purpose : str
+        What needs it, as the subject of a sentence in the singular.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed.
+
+    Examples
+    --------
+    >>> need("no_such_package", "dxf", "DXF")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    graphsynth.core.errors.MissingExtraError: DXF needs no_such_package, which is not installed; ...
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = module.partition(".")[0]
+        raise MissingExtraError(
+            f"{purpose} needs {package}, which is not installed; pip install 'graphsynth[{extra}]'"
+        ) from error

@@ -1,0 +1,255 @@
+"""Effective inertia of a mechanism of one freedom as a sum of squares of trigonometric polynomials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import finite_array
+from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.motors import number, numbers
+
+if TYPE_CHECKING:
+    from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+
+__all__ = ["EffectiveInertia"]
+
+Array = NDArray[np.float64]
+_LARGEST = 4096  # samples of a turn
+
+
+@dataclass(frozen=True, eq=False)
+class EffectiveInertia:
+    """Effective inertia ``J(q) = sum_i v_i(q)^2`` at the crank, each ``v_i`` a trigonometric polynomial.
+
+    ``v_i`` is a velocity per crank speed times the square root of a mass; the constant inertia of rotor and wheels is
+    not part of it.
+
+    Parameters
+    ----------
+    rows : array_like, shape (k, 2 H + 1)
+        Coefficients ``a0, a1, b1, ..., aH, bH`` of ``a0 + sum a_n cos(n q) + b_n sin(n q)``; sqrt(kg) m.
+    dead_centres : tuple of float
+        Angles in (-pi, pi] at which all v_i vanish.
+    truncation : float
+        Largest neglected part relative to the largest value; 0 if exact.
+
+    Raises
+    ------
+    SpecError
+        Rows with an even number of columns, or not finite.
+
+    Notes
+    -----
+    Specification parallel_platform, section 11.2.
+
+    Examples
+    --------
+    >>> inertia = EffectiveInertia.of_slider(mass=2.0, amplitude=0.05)
+    >>> round(float(inertia.value(0.0)), 15), [round(q, 6) for q in inertia.dead_centres]
+    (0.005, [-1.570796, 1.570796])
+    """
+
+    rows: Array
+    dead_centres: tuple[float, ...] = ()
+    truncation: float = 0.0
+
+    def __post_init__(self) -> None:
+        rows = np.atleast_2d(numbers("rows", self.rows))
+        if rows.ndim != 2 or rows.shape[1] % 2 == 0:
+            raise SpecError(f"rows of shape {rows.shape} must have an odd number of columns; give a0, a1, b1, ...")
+        rows.setflags(write=False)
+        object.__setattr__(self, "rows", rows)
+
+    @classmethod
+    def of_slider(cls, mass: float, amplitude: float) -> EffectiveInertia:
+        """Platform moving as ``y = amplitude * sin q``, the model of the source: ``m L^2 cos(q)^2``.
+
+        Raises
+        ------
+        SpecError
+            Negative mass or amplitude.
+        """
+        reach = math.sqrt(number("mass", mass, least=0.0)) * number("amplitude", amplitude, least=0.0)
+        dead = (-math.pi / 2, math.pi / 2) if reach else ()
+        return cls(np.array([[0.0, reach, 0.0]]), dead)
+
+    @classmethod
+    def of_samples(cls, velocities: ArrayLike, *, tolerance: float = 1e-13) -> EffectiveInertia:
+        """Series of velocities (k, N) sampled at ``2 pi j / N``, each times the square root of its mass.
+
+        Raises
+        ------
+        SpecError
+            If N samples do not resolve the velocities to ``tolerance`` (relative to the largest).
+        """
+        values = np.atleast_2d(numbers("velocities", velocities))
+        rows, tail = _series(values)
+        if not tail <= tolerance:
+            raise SpecError(
+                f"{values.shape[1]} samples leave a relative error of {tail:.1e} above {tolerance:g}; give more samples"
+            )
+        return cls(rows, _common_zeros(rows), tail)
+
+    @classmethod
+    def of_platform(
+        cls,
+        machine: SingleMotorPlatform,
+        mass: float,
+        gyration: float,
+        mass_centre: complex = 0.0,
+        *,
+        rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0),
+        length: float = 1e-3,
+        tolerance: float = 1e-12,
+    ) -> EffectiveInertia:
+        """Effective inertia of the platform, and of the rockers, of a single-motor mechanism over a closed turn.
+
+        Parameters
+        ----------
+        machine : SingleMotorPlatform
+        mass : float
+            Of the platform, kg.
+        gyration : float
+            Radius of gyration about the mass centre, m.
+        mass_centre : complex
+            In the frame of the platform, m.
+        rocker_inertia : sequence of 3 floats
+            About the pivots D_k, kg m^2.
+        length : float
+            Metres per length unit of the machine (1e-3 for the millimetres of the mock-up).
+        tolerance : float
+            Largest relative truncation of the series.
+
+        Raises
+        ------
+        SpecError
+            Negative masses, or a motion that 4096 samples do not resolve.
+        GeometryError
+            If the home branch does not make a whole turn.
+        """
+        m = number("mass", mass, least=0.0)
+        radius = number("gyration", gyration, least=0.0)
+        wheels = [number(f"rocker_inertia {k}", v, least=0.0) for k, v in enumerate(rocker_inertia, 1)]
+        count = 128
+        while True:
+            rows, tail = _series(_velocities(machine, m, radius, complex(mass_centre), wheels, length, count))
+            if tail <= tolerance:
+                return cls(rows, _common_zeros(rows), tail)
+            if count == _LARGEST:
+                raise SpecError(f"{count} samples of a turn leave a relative error of {tail:.1e}; relax tolerance")
+            count *= 2
+
+    def components(self, q: ArrayLike) -> tuple[Array, Array]:
+        """Return the ``v_i`` and their derivatives at angles q (...), each of shape (k, ...)."""
+        angle = finite_array("q", q, nan=True)
+        order = np.arange(1, self.rows.shape[1] // 2 + 1)
+        phase = np.multiply.outer(order, angle)
+        c, s = np.cos(phase), np.sin(phase)
+        a, b = self.rows[:, 1::2], self.rows[:, 2::2]
+        constant = self.rows[:, 0].reshape(-1, *[1] * angle.ndim)
+        value = constant + np.tensordot(a, c, 1) + np.tensordot(b, s, 1)
+        slope = np.tensordot(b * order, c, 1) - np.tensordot(a * order, s, 1)
+        return np.asarray(value), np.asarray(slope)
+
+    def value(self, q: ArrayLike) -> Array:
+        """J at angles q (radians, any shape), kg m^2."""
+        return np.asarray((self.components(q)[0] ** 2).sum(axis=0))
+
+    def derivative(self, q: ArrayLike) -> Array:
+        """dJ/dq at angles q, kg m^2/rad."""
+        value, slope = self.components(q)
+        return np.asarray(2.0 * (value * slope).sum(axis=0))
+
+    def range(self) -> tuple[float, float, float]:
+        """Least, largest and mean value over a turn; the extremes polished from 2048 samples."""
+        from scipy.optimize import minimize_scalar
+
+        q = np.linspace(0.0, math.tau, 2048, endpoint=False)
+        values = self.value(q)
+        mean = float((self.rows[:, 0] ** 2).sum() + 0.5 * (self.rows[:, 1:] ** 2).sum())
+        step = math.tau / q.size
+        found = []
+        for sign in (1.0, -1.0):
+            at = float(q[np.argmin(sign * values)])
+            best = minimize_scalar(
+                lambda x, sign=sign: sign * float(self.value(x)), bounds=(at - step, at + step), method="bounded",
+                options={"xatol": 1e-12},
+            )  # fmt: skip
+            found.append(sign * float(best.fun))
+        low = 0.0 if self.dead_centres else found[0]
+        return low, found[1], mean
+
+
+def _series(values: Array) -> tuple[Array, float]:
+    """Trigonometric coefficients of sampled periodic rows, cut where they vanish, and the relative tail."""
+    count = values.shape[1]
+    spectrum = np.fft.rfft(values, axis=1) / count
+    size = np.abs(spectrum)
+    largest = max(float(size.max()), 1e-300)
+    half = spectrum.shape[1] // 2
+    tail = float(size[:, half:].max()) / largest if spectrum.shape[1] > 2 else 1.0
+    needed = np.nonzero((size > 1e-17 * largest).any(axis=0))[0]
+    significant = np.nonzero((size > 3e-16 * largest).any(axis=0))[0]
+    top = int(min(needed[-1], significant[-1], half)) if needed.size else 0
+    rows = np.zeros((values.shape[0], 2 * top + 1))
+    rows[:, 0] = spectrum[:, 0].real
+    rows[:, 1::2] = 2.0 * spectrum[:, 1 : top + 1].real
+    rows[:, 2::2] = -2.0 * spectrum[:, 1 : top + 1].imag
+    return rows, tail
+
+
+def _velocities(
+    machine: SingleMotorPlatform,
+    m: float,
+    radius: float,
+    centre: complex,
+    rockers: list[float],
+    length: float,
+    count: int,
+) -> Array:
+    from graphsynth.core.errors import GeometryError
+
+    psi = np.linspace(0.0, math.tau, count + 1)
+    sweep = machine.sweep(psi)
+    if not sweep.complete:
+        raise GeometryError(f"the branch ends at psi = {sweep.end[0]:.6g} rad: {sweep.reason}; use shorter cranks")
+    pose, velocity = sweep.pose[:-1], sweep.velocity[:-1]
+    if np.abs(sweep.pose[-1] - sweep.pose[0]).max() > 1e-9 * machine.Lc:
+        raise GeometryError(
+            "the branch does not close after one turn, so J has no period of 2 pi; choose another start"
+        )
+    point = length * (velocity[:, 0] + 1j * velocity[:, 1]) + 1j * np.exp(1j * pose[:, 2]) * centre * velocity[:, 2]
+    rows = [math.sqrt(m) * point.real, math.sqrt(m) * point.imag, math.sqrt(m) * radius * velocity[:, 2]]
+    rows += [math.sqrt(value) * sweep.theta_velocity[:-1, k] for k, value in enumerate(rockers) if value > 0.0]
+    return np.asarray(rows)
+
+
+def _common_zeros(rows: Array) -> tuple[float, ...]:
+    """Angles in (-pi, pi] where all rows vanish: minima of the sum of squares, polished by Gauss and Newton."""
+    inertia = EffectiveInertia(rows)
+    q = np.linspace(-math.pi, math.pi, 4096, endpoint=False)
+    values = inertia.value(q)
+    scale = float(values.max())
+    if scale == 0.0:
+        return ()
+    zeros = []
+    for i in np.nonzero((values <= np.roll(values, 1)) & (values < np.roll(values, -1)))[0]:
+        at = float(q[i])
+        for _ in range(40):
+            value, slope = inertia.components(at)
+            square = float(slope @ slope)
+            if square == 0.0:
+                break
+            step = float(value @ slope) / square
+            at -= step
+            if abs(step) < 1e-16:
+                break
+        if float(inertia.value(at)) <= 1e-22 * scale:
+            zeros.append(math.remainder(at, math.tau))
+    return tuple(sorted(zeros))

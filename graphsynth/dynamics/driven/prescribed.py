@@ -1,0 +1,121 @@
+"""The ideal speed source: the motion is given and the torque follows by inverse dynamics; nothing is integrated."""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.driven.run import DriveRun, Plant, RunStatus
+from graphsynth.dynamics.driven.setup import output_times, prepare
+from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, number
+from graphsynth.dynamics.trains import Train
+
+__all__ = ["prescribed_run"]
+
+Array = NDArray[np.float64]
+#: Largest angle of a panel of the quadrature that checks the energy, rad.
+_PANEL = 0.2
+
+
+def prescribed_run(
+    plant: Plant, motor: IdealSpeed, train: Train, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0
+) -> DriveRun:
+    """Motion of an ideal speed source: constant crank speed, the motor torque by inverse dynamics.
+
+    Parameters
+    ----------
+    plant : Plant
+    motor : IdealSpeed
+    train : Train
+    times : array_like, shape (n,)
+        Strictly increasing output times, s; the first is the start.
+    angle : float
+        Crank angle at the start, rad.
+    speed : float
+        0, or the crank speed of the source (rad/s): the start has no other.
+
+    Returns
+    -------
+    DriveRun
+        Closed form up to rounding; ``energy_error`` compares the kinetic energy with a quadrature of the net power
+        ``J'(q) w^3 / 2``.  NaN from the first angle on at which the mechanism cannot be assembled.
+
+    Raises
+    ------
+    SpecError
+        Bad numbers, or another speed at the start.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+    >>> found = MotorDrivenPlatform.source(IdealSpeed(20.0)).simulate([0.0, 0.035])
+    >>> float(found.speed[-1]), round(float(found.motor_torque[-1]), 6)
+    (20.0, -0.98545)
+    """
+    begin = perf_counter()
+    out = output_times(times)
+    w = motor.value / train.ratio
+    if number("speed", speed) not in (0.0, w):
+        raise SpecError(f"speed = {speed:g} contradicts the ideal source, which turns the crank at {w:g}; leave it out")
+    q = number("angle", angle) + w * (out - out[0])
+    J, slope, load, friction = _terms(plant, motor, train, out, q)
+    required = slope * w * w + friction * w - load
+    eta = np.where(required * w >= 0.0, train.efficiency, 1.0 / train.efficiency)
+    work = np.concatenate([[0.0], np.cumsum(_net_work(plant, motor, train, out, q, w))])
+    reached = int(np.isfinite(J).cumprod().sum())
+    fields = {
+        "angle": q, "speed": np.full(out.size, w), "momentum": np.sqrt(J) * w,
+        "motor_torque": required / (train.ratio * eta), "kinetic_energy": 0.5 * J * w * w, "work": work,
+    }  # fmt: skip
+    there = np.arange(out.size) < reached
+    fields = {name: np.where(there, values, np.nan) for name, values in fields.items()}
+    turns = np.where(there, np.round(q / math.tau), 0.0).astype(np.int64)
+    return DriveRun(
+        time=out, currents=np.zeros((out.size, 0)), reduced_angle=fields["angle"] - math.tau * turns, turns=turns,
+        energy_error=_defect(fields["kinetic_energy"], fields["work"], reached), electric_error=0.0,
+        error=np.array([2.0**-52 * float(np.abs(q).max()), 0.0]), events=(),
+        status=RunStatus.DONE if reached == out.size else RunStatus.NOT_FINITE, reached=reached,
+        reason=_reason(out, reached),
+        model="ideal speed (motion given, torque by inverse dynamics)", steps=0, rejected=0, rtol=math.nan,
+        seconds=perf_counter() - begin, **fields,
+    )  # fmt: skip
+
+
+def _reason(out: Array, reached: int) -> str:
+    return "" if reached == out.size else f"the mechanism cannot be assembled at t = {out[reached]:.6g} s"
+
+
+def _terms(plant: Plant, motor: IdealSpeed, train: Train, out: Array, q: Array) -> tuple[Array, Array, Array, float]:
+    """Inertia, half its derivative and the driving load at angles q; the viscous coefficient."""
+    from graphsynth.dynamics.driven.kernels import systems as s
+
+    idle = LinearCharacteristic(0.0, 0.0, motor.rotor_inertia, motor.friction)
+    ready = prepare(plant, idle, train, out, float(q[0]), 0.0, None, regular=False, singular=True)
+    table = np.zeros((q.size, 16))
+    with np.errstate(invalid="ignore"):
+        s.tabulate(ready.setup, np.ascontiguousarray(q), ready.values, ready.rows, table)
+    return table[:, 0], table[:, 1], table[:, 2], float(ready.values[s.FRICTION])
+
+
+def _net_work(plant: Plant, motor: IdealSpeed, train: Train, out: Array, q: Array, w: float) -> Array:
+    """Work of all torques on the mechanism between output times: Gauss quadrature of ``J'(q) w^2 / 2`` over q."""
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    counts = np.maximum(np.ceil(np.abs(np.diff(q)) / _PANEL), 1).astype(np.intp)
+    edges = np.concatenate([[q[0]], *(np.linspace(a, b, n + 1)[1:] for a, b, n in zip(q[:-1], q[1:], counts))])
+    half = 0.5 * np.diff(edges)
+    angles = (edges[:-1] + half)[:, None] + half[:, None] * nodes
+    slope = _terms(plant, motor, train, out, angles.ravel())[1].reshape(angles.shape)
+    panels = half * (slope @ weights) * w * w
+    return np.asarray(np.add.reduceat(panels, np.concatenate([[0], np.cumsum(counts)[:-1]])))
+
+
+def _defect(kinetic: Array, work: Array, reached: int) -> float:
+    """Largest defect of the energy relative to the largest energy."""
+    if reached < 2:
+        return math.nan
+    size = float(kinetic[:reached].max())
+    return float(np.abs(kinetic - kinetic[0] - work)[:reached].max()) / size if size > 0.0 else 0.0

@@ -1,0 +1,1 @@
+"""Equations of motion in three forms: one coordinate, partitioned coordinates, augmented with multipliers."""

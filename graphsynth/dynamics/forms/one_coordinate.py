@@ -1,0 +1,420 @@
+"""The minimal form: one independent coordinate through the planar engine (spec 5.4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import checked
+from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.compiled_steps import ONE_STAGE, Stages
+from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem
+from graphsynth.dynamics.friction.rows import FrictionRows
+from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.values import initial_slots
+from graphsynth.kinematics.engine.follow import Trace, Tracker
+from graphsynth.kinematics.engine.program import Program, compile_program
+from graphsynth.kinematics.engine.start import started
+from graphsynth.mechanism.joints import Prismatic, Revolute
+from graphsynth.mechanism.laws import Linear
+from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["EffectiveInertia", "MinimalForm", "effective_inertia", "minimal_obstacle"]
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+#: Sine of a dyad's angle below which modes may meet within a step.
+_CLOSE = 0.2
+
+
+class EngineTables(NamedTuple):
+    """The engine's program for the kernel; see `graphsynth.kinematics.engine.kernels.running.run`."""
+
+    steps: IntArray
+    touched: IntArray
+    rows: IntArray
+    RP: Array
+    core: IntArray
+    elim: IntArray
+    EP: Array
+    drv: IntArray
+    DP: Array
+    need: NDArray[np.bool_]
+    wanted: NDArray[np.bool_]
+    modes: Array
+    poses: Array
+    centres: Array
+    kept: IntArray
+    groups: IntArray
+    OX: Array
+    OV: Array
+    OW: Array
+    OM: Array
+    first: int
+    Lc: float
+    far: float
+    derivs: bool
+
+
+class EngineState(NamedTuple):
+    """Two samples of the engine: where it starts, and what is asked for.
+
+    ``centres`` (3, n) are the coordinates of the centres of mass and their derivatives by the input.
+    """
+
+    u: Array
+    q: Array
+    X: Array
+    TH: Array
+    V: Array
+    W: Array
+    PHI: Array
+    M: Array
+    done: IntArray
+    why: IntArray
+    centres: Array
+
+
+class EffectiveInertia(NamedTuple):
+    """Effective inertia at the input, its derivative, and the mechanism's transmission to every link.
+
+    ``inertia`` J and ``slope`` dJ/dtheta, shape (n,), kg m^2 (kg for a sliding input); NaN where the pose is out of
+    reach.
+    """
+
+    inputs: Array
+    inertia: Array
+    slope: Array
+
+
+def minimal_obstacle(model: DynamicModel) -> str:
+    """Why a model has no minimal form through the planar engine; empty if it has one."""
+    mechanism = model.mechanism
+    if model.additional or model.prescribed:
+        return "it has additional constraints or prescribed motions"
+    if len(mechanism.drivers) != 1:
+        return f"the mechanism names {len(mechanism.drivers)} drivers, not the one independent coordinate"
+    if mechanism.graph.mobility != 1:
+        return f"the mobility by count is {mechanism.graph.mobility}, not 1"
+    return ""
+
+
+def free_program(model: DynamicModel) -> Program:
+    """Compile the mechanism with its driver's coordinate as input."""
+    driver = model.mechanism.drivers[0]
+    return compile_program(replace(model.mechanism, drivers=(replace(driver, law=Linear()),)))
+
+
+def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, rates: Array) -> tuple[Array, Array]:
+    """Coordinate and rate of an R or P joint at link poses and velocities (..., links, 3).
+
+    Raises
+    ------
+    GeometryError
+        If the links have no joint, or one without coordinate.
+    """
+    joint = mechanism.joint(base, link)
+    if isinstance(joint, Revolute):
+        return poses[..., link, 2] - poses[..., base, 2], rates[..., link, 2] - rates[..., base, 2]
+    if not isinstance(joint, Prismatic):
+        raise GeometryError(f"joint {base}-{link} is {joint.kind}; only R and P joints have one coordinate")
+    sign = 1.0 if base == joint.a else -1.0
+    place, speed = [], []
+    for end, at in ((joint.a, joint.at_a), (joint.b, joint.at_b)):
+        arm = np.exp(1j * poses[..., end, 2]) * complex(*at)
+        place.append(poses[..., end, 0] + 1j * poses[..., end, 1] + arm)
+        speed.append(rates[..., end, 0] + 1j * rates[..., end, 1] + 1j * rates[..., end, 2] * arm)
+    t = np.exp(1j * (poses[..., joint.a, 2] + joint.angle_a))
+    apart, moving = place[1] - place[0], speed[1] - speed[0]
+    rate = np.conj(t) * (moving - 1j * rates[..., joint.a, 2] * apart)
+    return sign * (np.conj(t) * apart).real, sign * rate.real
+
+
+class MinimalForm:
+    """State ``(theta, omega, work)``; a solver workspace, not a result.
+
+    Raises
+    ------
+    GeometryError
+        A model without a minimal form; the message says why.
+    """
+
+    name = "minimal"
+    loss = 0.0
+    stall = (
+        "the input is next to a fold or a change point, where two assembly modes merge or meet, and is no coordinate "
+        "there; use form='constrained' or 'reduced'"
+    )
+
+    def __init__(self, compiled: Compiled, start: StartReport) -> None:
+        from graphsynth.dynamics import kernels
+
+        obstacle = minimal_obstacle(compiled.model)
+        if obstacle:
+            raise GeometryError(f"there is no minimal form: {obstacle}; use form='constrained' or form='reduced'")
+        self.compiled = compiled
+        self.changes: list[tuple[float, str]] = []
+        self.why = ""
+        self.contraction = 0.0
+        self.pivot = 1.0
+        self.inertia = float("nan")
+        self._slopes: dict[int, float] = {}
+        self._rows: FrictionRows | None = None
+        self._kernels = kernels
+        driver = compiled.model.mechanism.drivers[0]
+        theta, omega = (
+            float(part)
+            for part in joint_coordinate(
+                compiled.model.mechanism, driver.base, driver.link, start.poses, start.velocities
+            )
+        )
+        self.tracker = started(free_program(compiled.model), theta, {}, np.asarray(start.poses))
+        self.program = self.tracker.program
+        self.trace = self.tracker.blank(np.array([theta, theta]))
+        self.E, self.S = engine_tables(self.tracker), engine_buffers(self.trace, compiled.n)
+        self._seed(theta, start.poses)
+        self._begin = np.array([theta, omega, 0.0])
+        self._none, self._out, self._one = np.zeros(compiled.n), np.zeros(4), np.empty((1, 3))
+
+    def _seed(self, theta: float, poses: Array) -> None:
+        """Start the engine at the start pose, in its sample 0."""
+        first = self.tracker.blank(np.array([theta]))
+        self.tracker.seed(first, poses)
+        done, _, _ = self.tracker.run(first, 0)
+        if done < 1:
+            raise GeometryError(f"the planar engine does not reach the start pose at the input {theta:.6g}")
+        for target, source in zip(self.trace.row(0), first.row(0)):
+            target[...] = source
+        self.S.u[0] = theta
+        for link in self.compiled.moving:
+            if not self.program.need_angle[link]:
+                self.trace.TH[0, link] = poses[link, 2]
+
+    def begin(self) -> Array:
+        """Start state."""
+        return self._begin.copy()
+
+    def rates(self, t: float, y: Array) -> Array:
+        """Return the derivative of the state; NaN where the mechanism cannot be assembled."""
+        if self.compiled.applied or self.compiled.tables.friction.size:
+            return self._loaded_rates(t, y)
+        self._run(y, 0.0, ONE_STAGE, self._one, 0, 1)
+        return self._one[0].copy() if self._good() else self._failed(y)
+
+    def _run(self, y: Array, h: float, A: Array, K: Array, low: int, high: int) -> Array:
+        found = self._kernels.minimal_stages(
+            self.compiled.tables, self.E, self.S, self.compiled.centres, self._none, np.ascontiguousarray(y), h, A, K,
+            low, high, self._out,
+        )  # fmt: skip
+        return np.asarray(found)
+
+    def _good(self) -> bool:
+        """Whether the last rates had a value."""
+        return bool(self._out[0] > 0.0 and self._out[3] == 1.0)
+
+    @property
+    def stages(self) -> Stages | None:
+        """A compiled Runge-Kutta step, if no load is given as a function and there is no friction."""
+        if self.compiled.applied or self.compiled.tables.friction.size:
+            return None
+
+        def run(t: float, y: Array, h: float, A: Array, K: Array) -> Array:
+            fresh = self._run(y, h, A, K, 1, len(A))
+            if not np.isfinite(K).all():
+                self.rates(0.0, fresh)  # says why
+            return fresh
+
+        return run
+
+    def _failed(self, y: Array) -> Array:
+        """Say why; the integrator tries a shorter step, and gives up where none is short enough."""
+        if not np.isfinite(y).all():  # asked by a solver that has lost its way: no word on the mechanism
+            return np.full(3, np.nan)
+        if self.S.done[0] == 2:
+            self.why = (
+                "a spring has length 0, so its direction is not defined" if self._out[3] == 0.0
+                else f"the effective inertia is {self._out[0]:.3g} at the input {y[0]:.9g}: give a link on the way "
+                "some mass"
+            )  # fmt: skip
+        else:
+            self.why = (
+                f"the coordinate cannot go beyond {self.S.u[0]:.9g}: at a fold next to it two assembly modes merge, "
+                "and it is no coordinate there; use form='constrained' or 'reduced'"
+            )
+        return np.full(3, np.nan)
+
+    def transmission(self, theta: float) -> tuple[Array, Array, Array]:
+        """Coordinates and their first and second derivatives by the input; NaN out of reach."""
+        if self.S.done[0] < 2 or self.S.u[1] != theta:  # else the engine has just been there
+            self._run(np.array([theta, 0.0, 0.0]), 0.0, ONE_STAGE, self._one, 0, 1)
+        if self.S.done[0] < 2:
+            return (np.full(self.compiled.n, np.nan),) * 3
+        q, q1, q2 = self.S.centres.copy()
+        return q, q1, q2
+
+    def _loaded_rates(self, t: float, y: Array) -> Array:
+        """Rates with loads given as functions, or with friction."""
+        q, q1, q2 = self.transmission(float(y[0]))
+        if not np.isfinite(q).all():
+            return self._failed(y)
+        w, T = float(y[1]), self.compiled.tables
+        v = q1 * w
+        x = self._kernels.state_rows(T, q, v)
+        Q, _, _, P, good = self._kernels.load_vector(T, x, applied_loads(self.compiled, t, q, v))
+        Mq = T.mass @ q1
+        inertia = float(Mq @ q1)
+        self._out[0], self._out[3] = inertia, float(good)
+        if T.friction.size:
+            rubbed = self._rub(t, q, v, x, Q)
+            if not np.isfinite(rubbed):
+                self.why = NO_LOADS
+                return np.full(3, np.nan)
+            P += rubbed
+        if not self._good():
+            return self._failed(y)
+        return np.array([w, float(Q @ q1 - Mq @ q2 * w * w) / inertia, P])
+
+    def _rub(self, t: float, q: Array, v: Array, x: Array, Q: Array) -> float:
+        """Add friction to the generalised forces; returns its power, NaN if there is none that fits."""
+        T = self.compiled.tables
+        slots = initial_slots(self.compiled, q)
+        if not T.lower.size:  # links without mass
+            if self._rows is None:
+                self._rows = FrictionRows(self.compiled)
+            problem = FrictionProblem(self._rows, t, q, v, slots)
+            fit = problem.at(tuple(int(s) if abs(s) <= 1.0 else 0 for s in T.friction_table[:, 6]))
+            if fit is None:
+                return float("nan")
+            Q += problem.W.T @ fit.forces
+            return float(problem.rates @ fit.forces)
+        _, J, gam, _ = self._kernels.constraint_system(T, x, slots, np.zeros((1, 3)))
+        out = np.zeros(7)
+        _, lam = self._kernels.accelerate(T, x, J, gam, Q, out)
+        self.contraction = max(self.contraction, float(out[3]))
+        return float(self._kernels.friction_loads(T, x, J, lam, Q)) if out[4] >= 0.0 else float("nan")
+
+    def refuses(self, t: float, y: Array) -> bool:
+        """Whether two assembly modes met within the step: the sign of a mode says nothing of how it goes on there.
+
+        The sine of a dyad's angle is the root of its margin; it falls towards 0 and rises again where modes meet.
+        """
+        self.transmission(float(y[0]))
+        if self.S.done[0] < 2:
+            return False
+        h = float(y[0]) - float(self.S.u[0])
+        for k, step in enumerate(self.program.steps):
+            if not step.has_two_modes or h == 0.0:
+                continue
+            before, after = np.sqrt(np.maximum(self.S.M[k, :2], 0.0))
+            slope = self._slopes.get(k)
+            self._slopes[k] = (after - before) / h
+            if min(before, after) < _CLOSE and slope is not None and before + slope * h < 0.0:
+                self.why = (
+                    f"two assembly modes of group {step.group} meet near the input {float(y[0]):.6g}, and the minimal "
+                    "form cannot tell how the motion goes on; use form='constrained'"
+                )
+                return True
+        return False
+
+    def accept(self, t: float, y: Array) -> Array:
+        """Move the engine's first sample to the accepted input."""
+        _, q1, _ = self.transmission(float(y[0]))
+        if self.S.done[0] == 2:
+            self.S.u[0] = y[0]
+            for part in (self.S.X, self.S.TH, self.S.V, self.S.W, self.S.PHI, self.S.M):
+                part[..., 0] = part[..., 1]
+            sines = [self.S.M[k, 1] for k, step in enumerate(self.program.steps) if step.has_two_modes]
+            self.pivot = float(np.sqrt(max(min(sines, default=1.0), 0.0)))
+            self.inertia = float(q1 @ self.compiled.tables.mass @ q1)
+        return y
+
+    def state(self, t: float, y: Array) -> tuple[Array, Array]:
+        """Coordinates and velocities of a state."""
+        q, q1, _ = self.transmission(float(y[0]))
+        return q, q1 * y[1]
+
+    def accelerations(self, t: float, y: Array) -> Array:
+        """Accelerations of all coordinates in this form."""
+        _, q1, q2 = self.transmission(float(y[0]))
+        return np.asarray(q1 * self.rates(t, y)[1] + q2 * y[1] ** 2)
+
+
+def engine_tables(tracker: Tracker) -> EngineTables:
+    """Pack the program for the kernel."""
+    p = tracker.program
+    empty4, empty3, none = np.empty((0, 0, 0, 0)), np.empty((0, 0, 0)), np.empty(0, np.int64)
+    return EngineTables(
+        p.step_table, p.touched, p.rows, p.row_table, p.core, p.eliminated, p.eliminated_table, p.drives,
+        p.drive_table, p.need_angle, np.ones(p.mechanism.graph.links, dtype=np.bool_), tracker.modes, empty3,
+        np.empty((0, 0)), none, none, empty4, empty4, empty4, empty3, 1, p.Lc, p.far, True,
+    )  # fmt: skip
+
+
+def engine_buffers(trace: Trace, n: int) -> EngineState:
+    """Pack a two-sample trace for the kernel; it shares the trace's memory.  ``n`` is the number of coordinates."""
+    X, TH, V, W, PHI, M = trace.memory
+    done, why = np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
+    return EngineState(trace.u, trace.q, X, TH, V, W, PHI, M, done, why, np.zeros((3, n)))
+
+
+@checked
+def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object) -> EffectiveInertia:
+    """Effective inertia ``J(theta) = sum m |r'|^2 + I psi'^2 (+ rotors)`` over the input, and its derivative.
+
+    Parameters
+    ----------
+    model : DynamicModel
+        Mobility 1, one driver named by the mechanism.
+    inputs : array_like, shape (n,)
+        Monotonic; radians, or metres for a sliding input.
+    **options
+        ``modes`` and ``start`` of :func:`graphsynth.kinematics.simulate`.
+
+    Returns
+    -------
+    EffectiveInertia
+        Arrays of shape (n,): ``inertia``, ``slope``, and the ``inputs`` (estimated: floating point).
+
+    Raises
+    ------
+    GeometryError
+        If the mechanism has no single input to reduce to.
+
+    Examples
+    --------
+    >>> from graphsynth.dynamics.model import Body
+    >>> from graphsynth.mechanism.joints import Revolute
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    >>> model = DynamicModel(pendulum, {1: Body.bar(3.0, (0.0, 0.0), (1.0, 0.0))})
+    >>> effective_inertia(model, [0.0, 1.0]).inertia.round(12).tolist()
+    [1.0, 1.0]
+    """
+    from graphsynth.dynamics.tables import compile_model
+    from graphsynth.kinematics.simulation import simulate
+
+    obstacle = minimal_obstacle(model)
+    if obstacle:
+        raise GeometryError(f"there is no effective inertia: {obstacle}")
+    compiled = compile_model(model)
+    driver = replace(model.mechanism.drivers[0], law=Linear())
+    motion = simulate(replace(model.mechanism, drivers=(driver,)), inputs, events=False, **options)  # type: ignore[arg-type]
+    q = compiled.to_coordinates(motion.poses)
+    first = compiled.to_rates(q, motion.velocities)
+    arm = np.exp(1j * motion.poses[:, compiled.moving, 2]) * (compiled.centres[compiled.moving] @ [1.0, 1j])
+    w, e = motion.velocities[:, compiled.moving, 2], motion.accelerations[:, compiled.moving, 2]
+    extra = (1j * e - w**2) * arm
+    second = motion.accelerations[:, compiled.moving, :].copy()
+    second[..., 0] += extra.real
+    second[..., 1] += extra.imag
+    weighted = first @ compiled.tables.mass
+    inertia = (weighted * first).sum(axis=1)
+    return EffectiveInertia(motion.inputs, inertia, 2.0 * (weighted * second.reshape(first.shape)).sum(axis=1))

@@ -1,0 +1,392 @@
+"""The friction problem at one state: every set of friction forces that fits its own loads and the motion it leaves.
+
+Accelerations and multipliers depend linearly on the friction ``phi`` along the sliding directions, so at one state all
+that is left is ``udot = b + A phi`` and ``lam = lam0 + B phi``.  A joint that slides has ``phi = -sign(u) mu N(lam)``;
+one at rest either sticks (``udot = 0``, ``|phi| <= mu_s N``) or starts (``phi = -sign(udot) mu_s N``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.friction.linear import respond
+from graphsynth.dynamics.friction.loads import fitting_loads
+from graphsynth.dynamics.friction.rows import FrictionRows
+from graphsynth.dynamics.tables import Compiled
+
+__all__ = ["AT_REST", "MOST", "NO_LOADS", "FrictionProblem", "FrictionSolution", "joint_names"]
+
+Array = NDArray[np.float64]
+Senses = tuple[int, ...]
+
+#: What a formulation says where it finds no loads on the way.
+NO_LOADS = (
+    "there is no motion beyond: the load that friction makes returns to it with a factor that reaches 1, and the joint "
+    "jams; reduce the friction coefficient, or lengthen the guide"
+)
+#: Rates below this part of the velocities that make them count as 0: rounding.
+AT_REST = 1e-12
+#: Joints at rest whose states are enumerated.
+MOST = 7
+#: Part of their size below which friction directions depend on each other.
+_DEPENDENT = 1e-9
+#: Relative: equal accelerations, limits of sticking, accelerations that start a sliding.
+_SAME, _LIMIT, _STARTS = 1e-7, 1e-10, 1e-10
+#: Part of a null vector of the multipliers in the rows of a joint from which its load is not determined.
+_OPEN = 1e-8
+#: Parts of its limit at which the friction of an element is looked at.
+_FOLLOWED = 65
+#: Rounds for how friction is shared among joints that stick together.
+_ROUNDS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionSolution:
+    """One state of friction: senses (0 sticks), forces (N or N m, on b), loads (N), accelerations, multipliers.
+
+    ``shared`` are the elements that stick together in a loop: how they share their friction is not determined.
+    """
+
+    senses: Senses
+    forces: Array
+    loads: Array
+    a: Array
+    multipliers: Array
+    shared: tuple[int, ...] = ()
+
+
+class FrictionProblem:
+    """The friction problem of a model at one state.
+
+    Parameters
+    ----------
+    rows : FrictionRows
+    t : float
+    q, v : ndarray, shape (n,)
+    slots : ndarray
+        Of gears and racks.
+    speed : float, optional
+        Largest velocity so far (characteristic lengths or radians per second), beside which rounding is judged.
+    """
+
+    def __init__(self, rows: FrictionRows, t: float, q: Array, v: Array, slots: Array, speed: float = 0.0) -> None:
+        from graphsynth.dynamics import kernels
+
+        self.rows, self.elements = rows, rows.elements
+        compiled = rows.compiled
+        T = compiled.tables
+        self._J, gam, self.W, _, offset = rows.directions(t, q, v, slots)
+        Q, _, _, _, self.good = kernels.load_vector(T, kernels.state_rows(T, q, v), applied_loads(compiled, t, q, v))
+        self.rates = self.W @ v
+        size = np.tile([T.size, T.size, 1.0], compiled.n // 3)
+        self.speed = max(speed, float(np.abs(v / size).max()))
+        self.noise = AT_REST * self.speed * (np.abs(self.W) @ size) + 1e-300
+        self.speeds = self.rates * np.array([e.lever for e in self.elements])
+        self._part = respond(rows, self._J, gam, Q, self.W)
+        self.A = self.W @ self._part.G
+        self.b = self.W @ self._part.a0 + offset
+        unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
+        inertial = T.mass @ self._part.a0
+        self._force = max(float(np.abs(part * unit).max()) for part in (Q, inertial, self._J.T @ self._part.lam0))
+        inertia = np.diag(T.mass)
+        weight = np.where(inertia > 0.0, inertia, float((inertia * size**2).max()) / size**2)  # of massless links
+        self._push = np.abs(self.W @ np.diag(1.0 / weight) @ self.W.T)
+
+    @property
+    def resting(self) -> list[int]:
+        """Elements at rest that could stick."""
+        return [
+            f for f, e in enumerate(self.elements)
+            if not e.smooth and e.static > 0.0 and abs(self.rates[f]) <= self.noise[f]
+        ]  # fmt: skip
+
+    def moving(self) -> dict[int, int]:
+        """Senses of the elements that slide."""
+        resting = set(self.resting)
+        return {f: int(np.sign(self.rates[f])) for f in range(len(self.elements)) if f not in resting}
+
+    def undetermined(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Name joints whose friction needs loads that redundant constraints leave open, and all that share these."""
+        scaled = self._part.null * self._part.sizes[:, None]
+        needed = [e for f, e in enumerate(self.elements) if e.static > 0.0 and not self.idle(f)]
+        bad = [e for e in needed if np.abs(scaled[e.rows]).max(initial=0.0) > _OPEN]
+        if not bad:
+            return (), ()
+        own = np.abs(np.vstack([scaled[e.rows] for e in bad])).max(axis=0) > _OPEN
+        touched = np.abs(scaled[:, own]).max(axis=1) > _OPEN
+        return tuple(dict.fromkeys(e.name for e in bad)), joint_names(self.rows.compiled, touched)
+
+    def idle(self, f: int) -> bool:
+        """Whether the element's friction moves nothing, and nothing moves it: its joint is held by others."""
+        small = _DEPENDENT * max(float(self._push[f, f]), 1e-300)
+        return bool(
+            abs(self.rates[f]) <= self.noise[f] and abs(self.A[f, f]) <= small and abs(self.b[f]) <= self._starting(f)
+        )
+
+    def _starting(self, f: int) -> float:
+        """Acceleration of an element's joint that counts as none."""
+        scale = np.abs(self.W[f]) @ (np.abs(self._part.a0)) + self._push[f, f] * self._force
+        return float(_STARTS * scale) + 1e-300
+
+    def factor(self, senses: Mapping[int, int] | None = None) -> float:
+        """Bound of how much the loads change with the loads when all elements slide; below 1 they are unique."""
+        if not self.elements:
+            return 0.0
+        K = np.array([
+            [e.load(self._part.B[:, g]) * other.static * other.lever for g, other in enumerate(self.elements)]
+            for e in self.elements
+        ])  # fmt: skip
+        return float(np.abs(np.linalg.eigvals(K)).max())
+
+    def solutions(
+        self, sliding: Mapping[int, int], resting: Iterable[int], onset: Iterable[int] = ()
+    ) -> tuple[list[FrictionSolution], bool]:
+        """Return all solutions, and whether that is known to be all of them.
+
+        Parameters
+        ----------
+        sliding : mapping of int to int
+            Elements that slide, with their senses.
+        resting : iterable of int
+            Elements that stick or start to slide.
+        onset : iterable of int
+            Those of ``sliding`` that have just begun, with the friction of that instant.
+        """
+        begun = set(onset)
+        free = [f for f in resting if not self.idle(f)]
+        found: list[FrictionSolution] = []
+        known, unsettled = True, False
+        for choice in product((0, 1, -1), repeat=len(free)):
+            trial = dict(zip(free, choice))
+            stuck = [f for f in free if trial[f] == 0]
+            moving = {**sliding, **{f: s for f, s in trial.items() if s}}
+            if self._held(stuck, trial):
+                continue
+            fits, whole, lost = self._of(moving, stuck, begun)
+            if not whole and len(stuck) == 1 and self.factor() < 1.0:
+                fits, whole = self._followed(moving, stuck[0], begun), True
+            known, unsettled = known and whole, unsettled or lost
+            for fit in fits:
+                starts = all(s * self._udot(fit.forces, f) > self._starting(f) for f, s in trial.items() if s)
+                if starts and not any(self._alike(fit, other) for other in found):
+                    found.append(fit)
+        if unsettled and not (len(found) == 1 and self.factor() < 1.0):
+            known = (
+                False  # below 1, joints held in a loop that are used beyond their limits start, and nothing else fits
+            )
+        return found, known
+
+    def _followed(self, moving: dict[int, int], f: int, begun: set[int]) -> list[FrictionSolution]:
+        """Return the states in which one element sticks, where the loads of the others are not known to be all found.
+
+        Its friction is followed from one limit to the other; every part of the limit leaves one set of loads.
+        """
+        from scipy.optimize import brentq
+
+        D, e, at_rest = sorted({*moving, f}), self.elements[f], set(self.resting)
+        free, part = _Hold(self, []), self._part
+
+        def forces(use: float) -> Array:
+            ratio = np.array([
+                use * e.static * e.lever if g == f else self._ratio(g, moving[g], begun, g in at_rest) for g in D
+            ])  # fmt: skip
+            fits, _ = fitting_loads([self.elements[g] for g in D], part.lam0, part.B[:, D] * ratio)
+            return free.forces(ratio * fits[0], D)
+
+        uses = np.linspace(-1.0, 1.0, _FOLLOWED)
+        rates = [self._udot(forces(use), f) for use in uses]
+        found = []
+        for k in range(len(uses) - 1):
+            if rates[k] == 0.0 or rates[k] * rates[k + 1] < 0.0:
+                use = brentq(lambda at: self._udot(forces(at), f), uses[k], uses[k + 1], xtol=1e-15)
+                found.append(self._made(forces(use), moving, ()))
+        return found
+
+    def _held(self, stuck: list[int], trial: Mapping[int, int]) -> bool:
+        """Whether joints that stick hold one that should start: no friction can change that."""
+        kept = self._independent(stuck)
+        moving = [f for f, s in trial.items() if s]
+        if not kept or not moving:
+            return False
+        through = self.A[np.ix_(moving, kept)] @ np.linalg.inv(self.A[np.ix_(kept, kept)])
+        own = np.diag(self.A)[moving]
+        left = own - (through * self.A[np.ix_(moving, kept)]).sum(axis=1)
+        fixed = self.b[moving] - through @ self.b[kept]
+        return any(
+            left[k] <= _DEPENDENT * max(own[k], 1e-300) and trial[f] * fixed[k] <= self._starting(f)
+            for k, f in enumerate(moving)
+        )
+
+    def _udot(self, forces: Array, f: int) -> float:
+        return float(self.b[f] + self.A[f] @ forces)
+
+    def _alike(self, one: FrictionSolution, two: FrictionSolution) -> bool:
+        size = max(float(np.abs(one.a).max()), float(np.abs(two.a).max()), float(np.abs(self._part.a0).max()))
+        loads = max(float(one.loads.max()), float(two.loads.max()))
+        moved = float(np.abs(one.a - two.a).max()) <= _SAME * size
+        return moved and (bool(one.shared) or float(np.abs(one.loads - two.loads).max()) <= _SAME * loads)
+
+    def _ratio(self, f: int, sense: int, begun: set[int], resting: bool) -> float:
+        """Friction for a unit load."""
+        e = self.elements[f]
+        if e.smooth:
+            return -e.coefficient(self.speeds[f]) * float(np.tanh(self.speeds[f] / e.regular)) * e.lever
+        if f in begun:
+            return -sense * e.onset * e.lever
+        return -sense * (e.static if resting else e.coefficient(self.speeds[f])) * e.lever
+
+    def _of(
+        self, moving: dict[int, int], stuck: list[int], begun: set[int], within: bool = True
+    ) -> tuple[list[FrictionSolution], bool, bool]:
+        """Return the solutions with given elements sliding and sticking, whether all, whether sharing failed."""
+        D = sorted(moving)
+        at_rest = set(self.resting)
+        ratio = np.array([self._ratio(f, moving[f], begun, f in at_rest) for f in D])
+        kept = self._independent(stuck)
+        hold = _Hold(self, kept)
+        start, slopes = hold.multipliers(np.zeros(len(D)), D), np.empty((len(self._part.lam0), len(D)))
+        for k in range(len(D)):
+            one = np.zeros(len(D))
+            one[k] = ratio[k]
+            slopes[:, k] = hold.multipliers(one, D) - start
+        fits, known = fitting_loads([self.elements[f] for f in D], start, slopes)
+        found, unsettled = [], False
+        for x in fits:
+            forces = hold.forces(ratio * x, D)
+            shared: tuple[int, ...] = ()
+            if len(kept) < len(stuck):
+                if any(abs(self._udot(forces, f)) > self._starting(f) for f in stuck):
+                    continue  # they cannot all be at rest
+                shared = tuple(stuck)
+                spread = self._share(hold, D, ratio, stuck, kept, x)
+                if spread is None:
+                    unsettled = True
+                    continue
+                forces = spread
+            fit = self._made(forces, moving, shared)
+            limit = np.array([self.elements[f].static * self.elements[f].lever * fit.loads[f] for f in stuck])
+            lever = np.array([self.elements[f].lever for f in stuck])
+            if not within or (np.abs(forces[stuck]) <= limit * (1.0 + _LIMIT) + 1e-12 * self._force * lever).all():
+                found.append(fit)
+        return found, known, unsettled
+
+    def _made(self, forces: Array, moving: Mapping[int, int], shared: tuple[int, ...]) -> FrictionSolution:
+        lam = self._part.lam0 + self._part.B @ forces
+        return FrictionSolution(
+            tuple(moving.get(f, 0) for f in range(len(self.elements))), forces,
+            np.array([e.load(lam) for e in self.elements]), self._part.a0 + self._part.G @ forces, lam, shared,
+        )  # fmt: skip
+
+    def _independent(self, stuck: list[int]) -> list[int]:
+        """Return elements enough to hold all that stick."""
+        kept: list[int] = []
+        for f in stuck:
+            trial = [*kept, f]
+            scale = 1.0 / np.sqrt(np.maximum(np.diag(self._push)[trial], 1e-300))
+            block = self.A[np.ix_(trial, trial)] * scale[:, None] * scale
+            if float(np.linalg.eigvalsh(0.5 * (block + block.T))[0]) > _DEPENDENT:
+                kept = trial
+        return kept
+
+    def _share(
+        self, hold: _Hold, D: list[int], ratio: Array, stuck: list[int], kept: list[int], x: Array
+    ) -> Array | None:
+        """Friction of elements that stick together, spread so that all are used to the same part of their limits.
+
+        Only its sums over the motions that it prevents are determined.  None if the loads do not settle.
+        """
+        forces = hold.forces(ratio * x, D)
+        map_ = self.A[np.ix_(kept, stuck)]  # how friction prevents motions: rows of rank len(kept)
+        for step in range(_ROUNDS):
+            lam = self._part.lam0 + self._part.B @ forces
+            loads = np.array([e.load(lam) for e in self.elements])
+            limits = np.array([self.elements[f].static * self.elements[f].lever * loads[f] for f in stuck])
+            fresh = hold.forces(ratio * loads[D], D)
+            need = map_ @ fresh[stuck]
+            part = _least_use(map_, need, limits)
+            if part is None:
+                return None
+            fresh[stuck] = part
+            change = float(np.abs(fresh - forces).max())
+            forces = fresh if step < 20 else 0.5 * (forces + fresh)
+            if change <= 1e-13 * float(np.abs(forces).max(initial=0.0)) + 1e-300:
+                return forces
+        return None
+
+    def open_shares(self, stuck: list[int]) -> Array:
+        """Return changes of the multipliers that leave every motion as it is where elements stick; largest 1."""
+        kept = self._independent(stuck)
+        rest = [f for f in stuck if f not in kept and not self.idle(f)]
+        shift = np.zeros((len(self.elements), len(rest)))
+        if kept:
+            shift[kept] = -np.linalg.solve(self.A[np.ix_(kept, kept)], self.A[np.ix_(kept, rest)])
+        shift[rest, range(len(rest))] = 1.0
+        changes = self._part.B @ shift
+        size = np.abs(changes).max(axis=0, initial=0.0)
+        return np.asarray(changes[:, size > 0.0] / size[size > 0.0])
+
+    def at(self, senses: Senses, *, within: bool = True) -> FrictionSolution | None:
+        """Return the solution with given senses: what an integration follows; None if there is none or several.
+
+        ``within`` asks that what sticks is within its limits.
+        """
+        stuck = [f for f, s in enumerate(senses) if s == 0 and not self.elements[f].smooth and not self.idle(f)]
+        moving = {f: s for f, s in enumerate(senses) if f not in stuck and (s or self.elements[f].smooth)}
+        fits, _, _ = self._of(moving, stuck, {f for f in moving if abs(self.rates[f]) <= self.noise[f]}, within)
+        return fits[0] if len(fits) == 1 else None
+
+
+class _Hold:
+    """Friction of elements held at rest, as a function of the friction of those that slide."""
+
+    def __init__(self, problem: FrictionProblem, kept: list[int]) -> None:
+        self._problem, self._kept = problem, kept
+        self._inverse = np.linalg.inv(problem.A[np.ix_(kept, kept)]) if kept else np.zeros((0, 0))
+
+    def forces(self, sliding: Array, D: list[int]) -> Array:
+        p, found = self._problem, np.zeros(len(self._problem.elements))
+        found[D] = sliding
+        if self._kept:
+            found[self._kept] = -self._inverse @ (p.b[self._kept] + p.A[self._kept] @ found)
+        return found
+
+    def multipliers(self, sliding: Array, D: list[int]) -> Array:
+        part = self._problem._part
+        return np.asarray(part.lam0 + part.B @ self.forces(sliding, D))
+
+
+def _least_use(rows: Array, need: Array, limits: Array) -> Array | None:
+    """Find forces with ``rows forces = need`` whose largest part of its limit is least; None if limits are all 0."""
+    if not limits.max(initial=0.0) > 0.0:
+        return None if np.abs(need).max(initial=0.0) > 0.0 else np.zeros_like(limits)
+    scaled = rows * limits
+    if len(rows) == 1:
+        total = float(np.abs(scaled).sum())
+        return limits * np.sign(scaled[0]) * float(need[0]) / total if total > 0.0 else None
+    from scipy.optimize import linprog
+
+    n = len(limits)
+    size = max(float(np.abs(scaled).max()), 1e-300)
+    sides = np.vstack([np.hstack([np.eye(n), -np.ones((n, 1))]), np.hstack([-np.eye(n), -np.ones((n, 1))])])
+    solved = linprog(
+        [*np.zeros(n), 1.0], sides, np.zeros(2 * n), np.hstack([scaled / size, np.zeros((len(rows), 1))]), need / size,
+        bounds=[(None, None)] * n + [(0.0, None)],
+    )  # fmt: skip
+    return np.asarray(limits * solved.x[:n]) if solved.status == 0 else None
+
+
+def joint_names(compiled: Compiled, touched: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Names of the joints of some rows."""
+    names = []
+    for k in np.flatnonzero(touched):
+        name = compiled.info[k].name
+        for part in (" x", " y", " normal", " angle"):
+            name = name.removesuffix(part)
+        names.append(name)
+    return tuple(dict.fromkeys(names))

@@ -1,0 +1,283 @@
+"""Crossings and areas of circle and ellipse: every method beside closed forms and quadrature in 50 digits.
+
+Whatever proves an enclosure is asked whether it holds the 50-digit value: one that does not is a failure, however
+narrow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from inspect import signature
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+
+if TYPE_CHECKING:
+    from graphsynth.intervals import Interval
+    from graphsynth.jamming.bearing.bearing import Bearing
+    from graphsynth.jamming.intersection import CircleEllipse
+
+__all__ = ["area_problem", "crossing_problem", "precise_area", "precise_crossing"]
+
+_DIGITS = 50
+#: Parts of the search by boxes after which it is stopped.
+_PARTS = (0.3, 0.6, 0.75, 0.85, 0.92, 0.97)
+_NO_SHARE = "the enclosure is wider than the area itself, {:.3g} mm²"
+
+
+def precise_crossing(problem: CircleEllipse) -> tuple[Any, Any]:
+    """Crossing in the first quadrant with 50 digits, from the radii as they are (exact point data).
+
+    Raises
+    ------
+    GeometryError
+        If the curves do not cross.
+    """
+    import mpmath
+
+    with mpmath.workdps(_DIGITS):
+        R, a, b = (mpmath.mpf(r.lo.numerator) / r.lo.denominator for r in (problem.R1, problem.a, problem.b))
+        if not b < R < a:
+            raise GeometryError("circle and ellipse do not cross at this tilt; give one beyond the critical tilt")
+        x = a * mpmath.sqrt((R * R - b * b) / (a * a - b * b))
+        y = b * mpmath.sqrt((a * a - R * R) / (a * a - b * b))
+        return x, y
+
+
+def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> Problem:
+    """Enclose the crossing of the circle and the ellipse of a tilted bearing.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    sine : str
+        Sine of the tilt, a decimal; the curves must cross.
+    effort : Effort, optional
+
+    Raises
+    ------
+    GeometryError
+        If the curves do not cross.
+
+    Examples
+    --------
+    >>> from graphsynth.jamming import Bearing
+    >>> problem = crossing_problem(Bearing(), "0.0133308643347", Effort(rounds=1, quick=True))
+    >>> problem.methods, problem.rows[0].status.value
+    (('exact hull', 'Krawczyk boxes'), 'ok')
+    """
+    from graphsynth.jamming.intersection import krawczyk_boxes, surrogate_problem
+
+    effort = effort or Effort()
+    given = surrogate_problem(bearing, sine)
+    truth = precise_crossing(given)
+    hull, row = _hull_row(given, truth, effort)
+    rows = [row]
+    limit = signature(krawczyk_boxes).parameters["max_boxes"].default
+    whole = krawczyk_boxes(given).tested
+    for boxes in effort.some((*(max(1, round(part * whole)) for part in _PARTS), limit)):
+        found, seconds, rounds = best_of(lambda n=boxes: krawczyk_boxes(given, max_boxes=n), effort)  # type: ignore[misc]
+        # a search that ends by itself is what the default limit gives
+        ended = bool(found.finished) or boxes == limit
+        rows.append(_enclosed(
+            "Krawczyk boxes", f"{found.tested} boxes", found.outer, hull, truth, (seconds, rounds), default=ended,
+        ))  # fmt: skip
+        if found.finished:
+            break
+    for boxes in () if effort.quick else (100, 300, 3000):
+        once = Effort(1)
+        paved, seconds, rounds = best_of(partial(_paved, given, boxes), once, warm=False)
+        setting = f"up to {boxes} boxes"
+        rows.append(_enclosed("general solver", setting, paved, hull, truth, (seconds, rounds)))
+    question = f"Where circle and ellipse of the bearing cross at the tilt asin({float(sine):.6g})"
+    note = "A limit of boxes ends the search before its end; what is left is then enclosed, only wider."
+    return Problem("crossing", question, "mm", tuple(rows), note=note)
+
+
+def _hull_row(problem: CircleEllipse, truth: tuple[Any, Any], effort: Effort) -> tuple[Interval, Row]:
+    """Exact hull against 50 digits: its width, and whether it holds the crossing."""
+    from graphsynth.jamming.intersection import exact_hull
+
+    found, seconds, rounds = best_of(lambda: exact_hull(problem), effort)
+    held = _holds(found.hull, truth)
+    status, why = (RowStatus.OK, "") if held else (RowStatus.FAILED, "the hull does not hold the crossing")
+    return found.hull, Row(
+        "exact hull", "", float(found.hull.width.max()), seconds, rounds, "width of the enclosure",
+        f"closed form with {_DIGITS} digits", status, why, proved=True,
+    )  # fmt: skip
+
+
+def _holds(found: Interval, truth: tuple[Any, Any]) -> bool:
+    """Whether an enclosure (2,) holds the crossing; numbers of any precision are compared exactly."""
+    low, high = np.atleast_1d(found.lo), np.atleast_1d(found.hi)
+    return all(float(a) <= value <= float(b) for a, b, value in zip(low, high, truth, strict=True))
+
+
+def _enclosed(
+    method: str, setting: str, found: Interval, hull: Interval, truth: tuple[Any, Any], timed: tuple[float, int], *,
+    default: bool = False,
+) -> Row:  # fmt: skip
+    """Row of an enclosure of the crossing: how much wider than the exact hull, and whether it holds the crossing."""
+    # two roundings outward for each coordinate: more than the hull can be too wide
+    rounding = float((np.spacing(np.abs(hull.lo)) + np.spacing(np.abs(hull.hi))).max(initial=0.0))
+    excess = max(float((found.width - hull.width).max()), rounding)
+    # the search begins with a square over the quarter circle: an enclosure of its size is no result
+    radius = float(np.hypot(*hull.hi))
+    why = f"{setting} leave the whole start box" if float(found.width.max()) > 0.99 * radius else ""
+    why = why if _holds(found, truth) else "the enclosure does not hold the crossing"
+    status = RowStatus.FAILED if why else RowStatus.OK
+    return Row(
+        method, setting, excess, *timed, "width of the enclosure beyond the exact hull",
+        f"exact hull, rational arithmetic; checked to hold the crossing with {_DIGITS} digits", status, why, default,
+        True,
+    )  # fmt: skip
+
+
+def _paved(problem: CircleEllipse, boxes: int) -> Interval:
+    """Hull of what the general solver leaves, from the equations alone."""
+    from graphsynth.intervals import Interval, pave
+
+    Q, a, b = (r.outward() for r in (problem.circle_bounds, problem.a, problem.b))
+    alpha, beta, side = 1 / a.sqr(), 1 / b.sqr(), float(Q.sqrt().hi)
+    found = pave(
+        lambda z: [z[0] ** 2 + z[1] ** 2 - Q, z[0] ** 2 * alpha + z[1] ** 2 * beta - 1],
+        Interval.from_bounds([0.0, 0.0], [side, side]), max_boxes=boxes,
+    )  # fmt: skip
+    return Interval.from_bounds(found.boxes.lo.min(axis=0), found.boxes.hi.max(axis=0))
+
+
+def precise_area(bearing: Bearing, sine: str) -> Any:
+    """Part of the ellipse outside the circle, mm², with 50 digits: quadrature in polar coordinates, no area formula.
+
+    Between the crossings the radius of the ellipse is ``r(t)^2 = a^2 b^2 / (b^2 cos^2 t + a^2 sin^2 t)``, and the area
+    is ``2 int (r^2 - R^2) dt`` up to the crossing.
+
+    Raises
+    ------
+    GeometryError
+        If the curves do not cross.
+
+    Examples
+    --------
+    >>> from graphsynth.jamming import Bearing
+    >>> from graphsynth.evidence.bearing import WORST_SINE
+    >>> round(float(precise_area(Bearing(), WORST_SINE)), 16)  # specification, section 13, point 14
+    0.9749683652811658
+    """
+    import mpmath
+
+    from graphsynth.jamming.intersection import surrogate_problem
+
+    with mpmath.workdps(_DIGITS):
+        R, S = mpmath.mpf(repr(bearing.Rb)), mpmath.mpf(sine)
+        a = R + mpmath.mpf(repr(bearing.clearance))
+        b = a * mpmath.sqrt((1 - S) * (1 + S)) - mpmath.mpf(repr(bearing.h)) * S
+        if not 0 < b < R < a:
+            raise GeometryError(f"sine = {sine}: circle and ellipse do not cross; give a tilt beyond the critical one")
+        x, y = precise_crossing(surrogate_problem(bearing, sine))
+
+        def beyond(t: Any) -> Any:
+            return (a * b) ** 2 / ((b * mpmath.cos(t)) ** 2 + (a * mpmath.sin(t)) ** 2) - R * R
+
+        return 2 * mpmath.quad(beyond, [0, mpmath.atan2(y, x)])
+
+
+def area_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> Problem:
+    """Compute the free gap of the surrogate ellipse; arguments and errors as for `crossing_problem`.
+
+    Examples
+    --------
+    >>> from graphsynth.jamming import Bearing
+    >>> len(area_problem(Bearing(), "0.0133308643347", Effort(rounds=1, quick=True)).methods)
+    5
+    """
+    effort = effort or Effort()
+    truth = precise_area(bearing, sine)
+    many = (1, 10, 100) if effort.quick else (1, 100, 10_000)
+    corners = effort.some((16, 64, 250, 1000, 4000))
+    rows = [_enclosed_area(bearing, sine, n, truth, effort) for n in (1, 10, 100)]
+    S = float(sine)
+    C, a = math.sqrt((1.0 - S) * (1.0 + S)), bearing.Rh
+    b = a * C - bearing.h * S
+    for n in many:
+        run = partial(_stable_areas, bearing, np.full(n, S), np.full(n, C))
+        rows.append(_doubles_row("closed form, doubles", f"{n} at once", run, n, truth, effort))
+    for n in many:
+        run = partial(_direct_areas, np.full(n, bearing.Rb), np.full(n, a), np.full(n, b))
+        rows.append(_doubles_row("direct formula, doubles", f"{n} at once", run, n, truth, effort))
+    rows += [
+        _doubles_row("polygon, doubles", f"{n} corners", partial(_polygon, bearing.Rb, a, b, n), 1, truth, effort)
+        for n in corners
+    ]
+    rows += [_shoelace_row(bearing.Rb, a, b, n, truth, effort) for n in corners]
+    question = f"Area between bearing and hole of the source's figure at the tilt asin({S:.6g})"
+    return Problem("areas", question, "mm²", tuple(rows), "area")
+
+
+_AREA_REFERENCE = f"quadrature in polar coordinates with {_DIGITS} digits"
+
+
+def _stable_areas(bearing: Bearing, S: Any, C: Any) -> Any:
+    from graphsynth.jamming.bearing.areas import surrogate_areas
+
+    return surrogate_areas(bearing, S, C).ellipse_only
+
+
+def _direct_areas(R: Any, a: Any, b: Any) -> Any:
+    from graphsynth.jamming.bearing.areas import ellipse_circle
+
+    return ellipse_circle(R, a, b).ellipse_only
+
+
+def _polygon(R: float, a: float, b: float, count: int) -> float:
+    """Shoelace sum of points on both crescents of the ellipse outside the circle."""
+    from graphsynth.jamming.bearing.shoelace import crescent_points
+
+    x, y = crescent_points(R, a, b, count).T
+    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _doubles_row(method: str, setting: str, run: Callable[[], Any], many: int, truth: Any, effort: Effort) -> Row:
+    found, seconds, rounds = best_of(run, effort)
+    error = max(float(abs(truth - value)) for value in {float(v) for v in np.atleast_1d(found)})
+    kind = "distance from the reference"
+    return Row(method, setting, max(error, math.ulp(float(truth)) / 2), seconds / many, rounds, kind, _AREA_REFERENCE)
+
+
+def _area_row(
+    method: str, setting: str, found: Interval, many: int, truth: Any, seconds: float, rounds: int
+) -> Row:  # fmt: skip
+    """Row of an enclosure of the area: it must hold the reference, and say more than that there is an area."""
+    width = float(np.max(found.width))
+    low, high = np.atleast_1d(found.lo), np.atleast_1d(found.hi)
+    why = "" if width < float(truth) else _NO_SHARE.format(float(truth))
+    if not all(float(a) <= truth <= float(b) for a, b in zip(low, high, strict=True)):
+        why = "the enclosure does not hold the area"
+    status = RowStatus.FAILED if why else RowStatus.OK
+    return Row(
+        method, setting, width, seconds / many, rounds, "width of the enclosure",
+        f"none needed; checked to hold the {_AREA_REFERENCE}", status, why, proved=True,
+    )  # fmt: skip
+
+
+def _enclosed_area(bearing: Bearing, sine: str, many: int, truth: Any, effort: Effort) -> Row:
+    from graphsynth.intervals import Interval
+    from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
+
+    R, c, h = repr(bearing.Rb), repr(bearing.clearance), repr(bearing.h)
+    one = Interval(sine)
+    given: Any = sine if many == 1 else Interval.from_bounds(np.full(many, float(one.lo)), np.full(many, float(one.hi)))
+    found, seconds, rounds = best_of(lambda: enclose_surrogate_areas(R, c, h, given).ellipse_only, effort)
+    return _area_row("closed form, enclosed", f"{many} at once", found, many, truth, seconds, rounds)
+
+
+def _shoelace_row(R: float, a: float, b: float, boxes: int, truth: Any, effort: Effort) -> Row:
+    from graphsynth.jamming.bearing.shoelace import crescent_boxes, interval_shoelace
+
+    found, seconds, rounds = best_of(lambda: interval_shoelace(crescent_boxes(R, a, b, boxes)) * 2, effort)
+    return _area_row("interval shoelace sum", f"{boxes} boxes", found, 1, truth, seconds, rounds)

@@ -1,0 +1,133 @@
+"""The search for dimensions: error against run time, where the best dimensions are known.
+
+A search draws lots: rows of one setting are several seeds, of which the median counts.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from inspect import signature
+from statistics import median
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.dimensional.goals import Goals
+
+__all__ = ["line_problem", "path_problem", "precise_strip"]
+
+
+@cache
+def precise_strip() -> float:
+    """Width of the strip of Chebyshev's lambda linkage over the length of its segment, from the closed form.
+
+    With frame 2, crank 1 and all other bars 5/2 the traced point is ``M = C + sqrt(4 b^2 / D^2 - 1) (A - C) turned by a
+    right angle``; its height over the working half turn is maximised with 50 digits.  The segment is four cranks long.
+
+    Examples
+    --------
+    >>> round(precise_strip() * 4, 7)
+    0.0097537
+    """
+    import mpmath
+
+    with mpmath.workdps(50):
+        b = mpmath.mpf(5) / 2
+
+        def height(f: Any) -> Any:
+            away = mpmath.expj(f) - 2
+            return (2 - 1j * mpmath.sqrt(4 * b * b / abs(away) ** 2 - 1) * away).imag
+
+        at = mpmath.findroot(lambda f: mpmath.diff(height, f), mpmath.radians(128.7))
+        return float((height(at) - height(mpmath.pi / 2)) / 4)
+
+
+def _rows(
+    goals: Goals, settings: tuple[tuple[float, int], ...], seeds: int, error: Any, kind: str, reference: str
+) -> tuple[Row, ...]:  # fmt: skip
+    """One row for each effort and number of tries; a seed without an acceptable result is infinitely wrong."""
+    from graphsynth.kinematics.dimensional.api import embody
+    from graphsynth.structure.graph import MechanismGraph
+
+    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    embody(graph)  # compiled and loaded
+    given = signature(embody).parameters
+    default = given["effort"].default, given["tries"].default
+    rows = []
+    for effort, tries in settings:
+        errors, times, lost = [], [], ""
+        for seed in range(seeds):
+            begin = perf_counter()
+            found = embody(graph, goals, seed, driver=1, tries=tries, effort=effort)
+            times.append(perf_counter() - begin)
+            errors.append(error(found) if found.accepted else math.inf)
+            lost = lost if found.accepted else found.statement
+        middle = median(errors)
+        missed = not math.isfinite(middle)
+        rows.append(
+            Row(
+                "search", f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}",
+                math.nan if missed else middle, median(times), seeds, kind, reference,
+                RowStatus.FAILED if missed else RowStatus.OK, lost if missed else "",
+                default=(effort, tries) == default, more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
+            )
+        )  # fmt: skip
+    return tuple(rows)
+
+
+def line_problem(effort: Effort | None = None) -> Problem:
+    """Find a four-bar linkage that draws a straight line, the wish that leads to the lambda linkage.
+
+    The error is how much wider the strip is than that of Chebyshev's proportions, which solve this wish exactly
+    (``docs/explanation/embodiment.md``).
+    """
+    from graphsynth.kinematics.dimensional.goals import Goals, LineGoal
+
+    effort = effort or Effort()
+    goals = Goals(
+        target=LineGoal(length=4.0, on_bar=True), max_length_ratio=5.0, min_transmission_angle=math.radians(20)
+    )
+    settings = ((0.15, 1), (0.15, 3), (0.3, 3))
+    seeds = 1 if effort.quick else 3
+
+    def error(found: Any) -> float:
+        return float(abs(found.figures.goal_error - precise_strip()))
+
+    kind = f"width of the strip over its length against the best, median of {seeds} seeds"
+    rows = _rows(goals, settings, seeds, error, kind, "closed form with 50 digits")
+    question = "Dimensions of a four-bar linkage from the wish for a straight line of four cranks (Chebyshev's lambda)"
+    return Problem("dimensions", question, "relative", rows, "search", _NOTE)
+
+
+_NOTE = (
+    "A search draws lots and proves nothing; times and errors are medians over seeds. By default the effort is 1, with "
+    "up to 12 tries, fewer when the target is met exactly."
+)
+
+
+def path_problem(effort: Effort | None = None) -> Problem:
+    """Find a four-bar linkage through eight points at given inputs, taken from a linkage: no error is possible."""
+    from graphsynth.kinematics.dimensional.api import embody
+    from graphsynth.kinematics.dimensional.goals import Goals, PathGoal
+    from graphsynth.mechanism.four_bar import LambdaLinkage
+
+    effort = effort or Effort()
+    inputs = np.arange(8) * math.tau / 8
+    M = LambdaLinkage(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M
+    points = tuple((float(x), float(y)) for x, y, _ in M)
+    goals = Goals(target=PathGoal(points, tuple(inputs.tolist())), min_transmission_angle=math.radians(15))
+    own = signature(embody).parameters
+    efforts, seeds = ((0.02, 0.05, 0.1), 1) if effort.quick else ((0.02, 0.1, 0.3, own["effort"].default), 3)
+    settings = tuple((share, own["tries"].default) for share in efforts)  # a target that is met ends the tries
+    rows = _rows(
+        goals, settings, seeds, lambda found: found.figures.goal_error,
+        f"largest distance from a point over the size of the set, median of {seeds} seeds",
+        "exact: the points are those of a linkage",
+    )  # fmt: skip
+    question = "Dimensions of a four-bar linkage that passes eight points of another one at given inputs"
+    return Problem("path-dimensions", question, "relative", rows, "search", _NOTE)

@@ -1,0 +1,134 @@
+"""``stress.html`` and ``stress.csv`` of a run: self-contained, readable on a phone."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import graphsynth
+from graphsynth.drawing.pages import whole_page
+from graphsynth.evidence.stress.catalogue import PAGES
+from graphsynth.evidence.stress.checks import SEVERITY, Check, Status
+
+if TYPE_CHECKING:
+    from graphsynth.evidence.stress.running import Outcome, StressReport
+
+__all__ = ["stress_html", "write_report"]
+
+_CSS = """
+:root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;
+--good:#00735a;--told:#0b66b0;--bad:#b3261e;--none:#8a6100}
+@media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#9aa7b4;--paper:#12181f;--card:#1a222b;--rule:#323d48;
+--good:#3ecf9f;--told:#69b3ff;--bad:#ff8a80;--none:#e0b050}}
+*{box-sizing:border-box}
+body{margin:0;background:var(--paper);color:var(--ink)}
+body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+main{max-width:66rem;margin:0 auto;padding:1.25rem 1rem 3rem}
+h1{font-size:1.65rem;margin:.4rem 0}h2{font-size:1.2rem;margin:2rem 0 .5rem}
+p{margin:.4rem 0 .8rem;max-width:46rem}.soft{color:var(--soft);font-size:.875rem}
+.facts{display:flex;flex-wrap:wrap;gap:.6rem;margin:1rem 0;padding:0;list-style:none}
+.facts li{background:var(--card);border-radius:.5rem;padding:.5rem .9rem}.facts b{display:block;font-size:1.3rem}
+details{border-bottom:1px solid var(--rule);padding:.3rem 0}
+summary,.head{display:grid;grid-template-columns:10.5rem 1fr 5rem 10rem 4rem;gap:.2rem .8rem;align-items:baseline}
+summary{cursor:pointer;list-style:none}summary::-webkit-details-marker{display:none}
+summary code::before{content:"\\25B8";display:inline-block;width:1.1em;color:var(--soft)}
+details[open] summary code::before{content:"\\25BE"}
+summary span:nth-child(n+4),.head span:nth-child(n+4){text-align:right;font-variant-numeric:tabular-nums}
+summary span:nth-child(n+4),.head{color:var(--soft);font-size:.875rem}
+.ok{color:var(--good)}.flagged{color:var(--told)}.WRONG{color:var(--bad);font-weight:700}.not-run{color:var(--none)}
+.scroll{overflow-x:auto;margin:.4rem 0 .8rem}
+table{border-collapse:collapse;font-size:.8rem;font-variant-numeric:tabular-nums}
+th,td{text-align:left;vertical-align:top;padding:.2rem .9rem .2rem 0;border-bottom:1px solid var(--rule)}
+th{color:var(--soft);font-weight:600}td{overflow-wrap:anywhere}td.num{text-align:right}
+td.num,td.ok,td.flagged,td.WRONG,td.not-run{white-space:nowrap}th,td{min-width:4.5em}
+code{font-size:.9em}
+@media (max-width:46rem){.head{display:none}summary{grid-template-columns:1fr auto}
+summary span:nth-child(2){grid-row:2;grid-column:1/-1}summary span:nth-child(4){grid-row:3;text-align:left}
+summary span:nth-child(4):not(:empty)::before{content:"error "}summary span:nth-child(5){grid-row:3}
+table,tbody,tr,td{display:block}thead{display:none}tr{border-bottom:1px solid var(--rule);padding:.35rem 0}
+td,td.num{border:0;padding:0;text-align:left;white-space:normal}td:empty{display:none}
+td[data-name]::before{content:attr(data-name) ": ";color:var(--soft)}td:first-child{font-weight:600}}
+"""
+
+_HEAD = (
+    '<div class="head"><span>case</span><span>what</span><span>status</span><span>error of allowed</span>'
+    "<span>time</span></div>"
+)
+
+
+def stress_html(report: StressReport) -> str:
+    """Return the page of a run as one string; values are escaped, nothing is loaded from elsewhere."""
+    facts = "".join(
+        f'<li><b class="{_class(status) if number else "ok"}">{number}</b>{status.value}</li>'
+        for status in SEVERITY
+        if (number := report.count(status)) or status is Status.WRONG
+    )
+    pages = [
+        f"<h2>{escape(title)}</h2>{_HEAD}" + "".join(map(_case, chosen))
+        for page, title in PAGES.items()
+        if (chosen := [o for o in report.outcomes if o.case.page == page])
+    ]
+    left, lost = (", ".join(case.name for case in cases) for cases in (report.left_out, report.not_reached))
+    return whole_page(
+        "Stress cases",
+        _CSS,
+        "<h1>Stress cases</h1>"
+        f"<p>{escape(report.statement)}</p>"
+        + "<p>Each case compares what the library gives with what is right: a printed value, a closed form, many "
+        "digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: the situation is extreme, and "
+        "the library reports it as it must. <b>WRONG</b>: neither. Open a case to see its comparisons.</p>"
+        + (f"<p>Left out because they are slow: {escape(left)}.</p>" if left else "")
+        + (f'<p class="not-run">Interrupted, not reached: {escape(lost)}.</p>' if lost else "")
+        + f'<ul class="facts">{facts}<li><b>{report.seconds:.0f} s</b>run time</li></ul>'
+        + "".join(pages)
+        + f'<p class="soft">graphsynth {escape(graphsynth.__version__)}</p>',
+    )
+
+
+def write_report(report: StressReport, folder: Path) -> tuple[Path, Path]:
+    """Write ``stress.html`` and ``stress.csv`` (a row per check) into a folder; return both paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    html, csv = folder / "stress.html", folder / "stress.csv"
+    html.write_text(stress_html(report), encoding="utf-8")
+    report.to_pandas().to_csv(csv, index=False)
+    return html, csv
+
+
+def _class(status: Status) -> str:
+    return status.value.replace(" ", "-")
+
+
+def _case(outcome: Outcome) -> str:
+    status, worst = outcome.status, outcome.worst
+    error = _error(worst) if worst and not math.isnan(worst.error) else ""
+    opened = " open" if status is Status.WRONG else ""
+    rows = "".join(map(_row, outcome.checks))
+    reason = f'<p class="{_class(status)}">{escape(outcome.reason)}</p>' if outcome.reason else ""
+    return (
+        f'<details{opened} id="{outcome.case.name}"><summary><span><code>{outcome.case.name}</code></span>'
+        f'<span>{escape(outcome.case.title)}</span><span class="{_class(status)}">{status.value}</span>'
+        f"<span>{error}</span><span>{outcome.seconds:.2f} s</span></summary>{reason}"
+        '<div class="scroll"><table><thead><tr><th>what</th><th>right</th><th>given</th><th>error</th><th>allowed</th>'
+        f"<th>status</th><th>what is right comes from</th></tr></thead><tbody>{rows}</tbody></table></div></details>"
+    )
+
+
+def _error(check: Check) -> str:
+    return f"{check.error:.1e} of {check.bound:.1e}" if check.error or check.bound else "none: exact"
+
+
+def _row(check: Check) -> str:
+    numbers = ("", "") if math.isnan(check.error) else (f"{check.error:.2e}", f"{check.bound:.2e}")
+    return (
+        f'<tr><td>{escape(check.what)}</td><td data-name="right">{escape(check.right)}</td>'
+        f'<td data-name="given">{escape(check.given)}</td>{_number("error", numbers[0])}'
+        f"{_number('allowed', numbers[1])}"
+        f'<td class="{_class(check.status)}">{check.status.value}</td>'
+        f'<td data-name="what is right comes from">{escape(check.source)}</td></tr>'
+    )
+
+
+def _number(name: str, text: str) -> str:
+    return f'<td class="num" data-name="{name}">{text}</td>' if text else "<td></td>"

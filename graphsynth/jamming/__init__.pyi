@@ -1,0 +1,128 @@
+from .assess import (
+    JammingReport as JammingReport,
+)
+from .assess import (
+    assess_jamming as assess_jamming,
+)
+from .bearing.bearing import (
+    Bearing as Bearing,
+)
+from .bearing.bearing import (
+    CriticalTilt as CriticalTilt,
+)
+from .bearing.branch_and_bound import (
+    Supremum as Supremum,
+)
+from .bearing.branch_and_bound import (
+    largest_gap as largest_gap,
+)
+from .bearing.branch_and_bound import (
+    maximise as maximise,
+)
+from .bearing.certificate import (
+    JamCertificate as JamCertificate,
+)
+from .bearing.certificate import (
+    Witness as Witness,
+)
+from .bearing.certified_arcs import (
+    ArcEnclosure as ArcEnclosure,
+)
+from .bearing.certified_arcs import (
+    CertifiedArcs as CertifiedArcs,
+)
+from .bearing.certified_arcs import (
+    Enclosure as Enclosure,
+)
+from .bearing.certified_limits import (
+    CertifiedLimit as CertifiedLimit,
+)
+from .bearing.certified_limits import (
+    certified_largest_height as certified_largest_height,
+)
+from .bearing.certified_limits import (
+    certified_largest_misalignment as certified_largest_misalignment,
+)
+from .bearing.certified_limits import (
+    certified_smallest_clearance as certified_smallest_clearance,
+)
+from .bearing.certify import certify_jamming as certify_jamming
+from .bearing.circle_sets import Span as Span
+from .bearing.fits import (
+    STANDARD_FITS as STANDARD_FITS,
+)
+from .bearing.fits import (
+    Fit as Fit,
+)
+from .bearing.fits import (
+    FitVerdict as FitVerdict,
+)
+from .bearing.fits import (
+    assess_fits as assess_fits,
+)
+from .bearing.fits import (
+    tightest_free_fit as tightest_free_fit,
+)
+from .bearing.friction import (
+    InsertionDiagram as InsertionDiagram,
+)
+from .bearing.friction import (
+    Region as Region,
+)
+from .bearing.friction import (
+    Wedging as Wedging,
+)
+from .bearing.friction import (
+    WedgingReport as WedgingReport,
+)
+from .bearing.friction import (
+    insertion_diagram as insertion_diagram,
+)
+from .bearing.friction import (
+    wedging as wedging,
+)
+from .bearing.inverse import (
+    Limit as Limit,
+)
+from .bearing.inverse import (
+    largest_height as largest_height,
+)
+from .bearing.inverse import (
+    largest_misalignment as largest_misalignment,
+)
+from .bearing.inverse import (
+    smallest_clearance as smallest_clearance,
+)
+from .bearing.parameters import ToleranceBox as ToleranceBox
+from .bearing.ranges import (
+    Range as Range,
+)
+from .bearing.ranges import (
+    spread as spread,
+)
+from .bearing.sampling import (
+    Samples as Samples,
+)
+from .bearing.sampling import (
+    sample_gaps as sample_gaps,
+)
+from .bearing.sweep import (
+    TurnPartition as TurnPartition,
+)
+from .bearing.sweep import (
+    sweep_linkage as sweep_linkage,
+)
+from .bearing.sweep import (
+    sweep_turn as sweep_turn,
+)
+from .bearing.table import JammingTable as JammingTable
+from .bearing.tilt_arcs import (
+    Arc as Arc,
+)
+from .bearing.tilt_arcs import (
+    JamArcs as JamArcs,
+)
+from .bearing.tilt_arcs import (
+    jam_arcs as jam_arcs,
+)
+from .verdict import Verdict as Verdict

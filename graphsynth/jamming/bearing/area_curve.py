@@ -1,0 +1,178 @@
+"""Areas of interference against the crank angle, enclosed; and what the ordinate of the source's plot was.
+
+The source plots "the part of the ellipse not crossed by the circle" over [90, 450] degrees.  That is the free gap of
+the surrogate ellipse, zero where there is no crossing: it jumps at the onset and falls towards the worst pose.  The
+true interference, `AreaCurve.lid` and `AreaCurve.rim`, does the opposite.  Specification 5.4, 7.2, 13 (14 to 16).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import checked, finite_array
+from graphsynth.core.errors import GeometryError
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.interval import Interval
+from graphsynth.jamming.bearing.areas_enclosed import enclose_lid_area, enclose_rim_area, enclose_surrogate_areas
+from graphsynth.jamming.bearing.bearing import Bearing
+from graphsynth.mechanism.four_bar import LambdaLinkage
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["ZOOMS", "AreaCurve", "area_curve", "enclose_tilt_sine"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Detail windows of the source, degrees.
+ZOOMS = ((90.0, 115.5), (414.0, 450.0))
+
+
+@dataclass(frozen=True, eq=False)
+class AreaCurve:
+    """Areas over crank angles; every array and `Interval` has the shape of ``f``.
+
+    Attributes
+    ----------
+    f : ndarray
+        Crank angles, radians.
+    sine : Interval
+        Sine of the tilt of the coupler, signed (the sign tells the lid).
+    lid, rim : Interval
+        True one-lid interference for conditions B and A, mm^2; certified for the numbers given.
+    surrogate_gap, surrogate_jam : Interval
+        Ellipse minus circle and circle minus ellipse of the surrogate E4, mm^2; empty where E4 does not exist.
+    crossing : ndarray of bool
+        Where circle and ellipse E4 certainly cross.
+    rim_closed : ndarray of bool
+        Where ``rim`` is the closed form; elsewhere a coarse enclosure (``R S > h C``).
+    """
+
+    f: Array
+    sine: Interval
+    lid: Interval
+    rim: Interval
+    surrogate_gap: Interval
+    surrogate_jam: Interval
+    crossing: Mask
+    rim_closed: Mask
+
+    @property
+    def source_ordinate(self) -> Array:
+        """What the source plots, as far as it can be told: the free gap of E4, 0 where there is no crossing, mm^2."""
+        return np.where(self.crossing, self.surrogate_gap.mid, 0.0)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return bounds of every area as a `pandas.DataFrame` (pandas is imported here); angles in radians."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"f": self.f}
+        for name in ("sine", "lid", "rim", "surrogate_gap", "surrogate_jam"):
+            bounds: Interval = getattr(self, name)
+            columns |= {f"{name}_lo": bounds.lo, f"{name}_hi": bounds.hi}
+        columns |= {"source_ordinate": self.source_ordinate, "crossing": self.crossing, "rim_closed": self.rim_closed}
+        return pd.DataFrame(columns)
+
+
+@checked
+def enclose_tilt_sine(linkage: LambdaLinkage, f: ArrayLike | Interval) -> Interval:
+    """Enclose the sine of the tilt of the coupler, ``A_z / l3``.
+
+    Parameters
+    ----------
+    linkage : LambdaLinkage
+        With ``rod="rigid"``; its numbers are taken as the doubles that they are.
+    f : array_like or Interval
+        Crank angles, radians.
+
+    Raises
+    ------
+    GeometryError
+        For ``rod="deck"``, which is no rigid body.
+
+    Notes
+    -----
+    Specification 3.1 to 3.4.  Certified; a pin that rises above l3 gives a sine beyond 1.
+
+    Examples
+    --------
+    >>> float(enclose_tilt_sine(LambdaLinkage(alpha=1 / 30), np.pi / 2).width) < 1e-16
+    True
+    """
+    from graphsynth.intervals import functions
+
+    if linkage.rod != "rigid":
+        raise GeometryError('enclose_tilt_sine holds for rod="rigid" only; the deck rod is not a rigid body')
+    check_rounding()
+    angle = f if isinstance(f, Interval) else _points(f)
+    axis = [Interval.from_bounds(n, n) for n in linkage.axis]  # of length 1 up to rounding only
+    length = (axis[0].sqr() + axis[1].sqr() + axis[2].sqr()).sqrt()
+    n1, n2, n3 = (part / length for part in axis)
+    alpha = Interval.from_bounds(linkage._angle, linkage._angle)
+    s, v = functions.sin(alpha), 2 * functions.sin(alpha / 2).sqr()
+    height = (n1 * n3 * v - n2 * s) * functions.cos(angle) + (n2 * n3 * v + n1 * s) * functions.sin(angle)
+    ratio = Interval.from_bounds(linkage.l2, linkage.l2) / Interval.from_bounds(linkage.l3, linkage.l3)
+    sine: Interval = height * ratio
+    return sine
+
+
+def _points(f: ArrayLike) -> Interval:
+    angles = finite_array("f", f)
+    return Interval.from_bounds(angles, angles)
+
+
+@checked
+def area_curve(
+    linkage: LambdaLinkage | None = None, bearing: Bearing | None = None, f: ArrayLike | None = None
+) -> AreaCurve:
+    """Enclose all areas over crank angles.
+
+    Parameters
+    ----------
+    linkage : LambdaLinkage, optional
+        Defaults to the source: its lengths, ``alpha = 1/30`` about x.
+    bearing : Bearing, optional
+        Its dimensions are read as the decimals they print as.
+    f : array_like, optional
+        Crank angles, radians; the source's [90, 450] degrees in half degrees by default.
+
+    Returns
+    -------
+    AreaCurve
+        Certified.
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit, the non-rigid rod, and angles at which the crank pin rises above l3.
+
+    Examples
+    --------
+    >>> curve = area_curve(f=np.radians([90.0, 180.0]))
+    >>> np.round(curve.lid.mid, 9).tolist(), np.round(curve.source_ordinate, 9).tolist()
+    ([0.966036031, 0.0], [0.974968365, 0.0])
+    """
+    linkage = LambdaLinkage(alpha=1 / 30) if linkage is None else linkage
+    bearing = Bearing() if bearing is None else bearing
+    angles = np.radians(np.linspace(90.0, 450.0, 721)) if f is None else np.atleast_1d(finite_array("f", f))
+    sine = enclose_tilt_sine(linkage, angles)
+    if bool((abs(sine).hi > 1.0).any()):
+        place = np.degrees(angles.ravel()[abs(sine).hi.ravel().argmax()])
+        raise GeometryError(
+            f"the crank pin rises above l3 at {place:.6g} degrees: the linkage cannot be assembled there; "
+            "reduce alpha or leave the angle out"
+        )
+    R, c, height = (Interval(repr(v)) for v in (bearing.Rb, bearing.clearance, bearing.Hb))
+    h = height / 2
+    rim, closed = enclose_rim_area(R, c, h, sine)
+    gap, jam = enclose_surrogate_areas(R, c, h, sine)
+    size = abs(sine)
+    cosine = ((1 - size) * (1 + size)).sqrt()
+    used = h * size - c + (R + c) * size.sqr() / (1 + cosine)
+    crossing = (used.lo > 0.0) & (c.lo > 0.0) & ~gap.is_empty
+    return AreaCurve(angles, sine, enclose_lid_area(R, c, h, sine), rim, gap, jam, np.asarray(crossing), closed)

@@ -1,0 +1,280 @@
+"""`certify_jamming`: a proved verdict on one tilted bearing over a whole turn and a whole tolerance box (model L0)."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from graphsynth.core.checks import checked
+from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.bearing.certificate import JamCertificate, Witness
+from graphsynth.jamming.bearing.certified_arcs import Enclosure, arcs_from, no_arcs, whole_turn
+from graphsynth.jamming.bearing.parameters import ToleranceBox
+from graphsynth.jamming.bearing.ranges import Range, exact_text
+from graphsynth.jamming.verdict import Verdict
+
+if TYPE_CHECKING:
+    from graphsynth.intervals import Interval
+
+__all__ = ["JamCertificate", "certify_jamming"]
+
+_ANGLES = 64  # angles of the turn tried as positions of a jam
+_PIECES = 256  # pieces of the turn on which assembly is proved
+
+
+@checked
+def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertificate:
+    """Prove whether the bearing at B jams while the crank makes a turn, for all parameters of a box.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        The linkage and the bearing; give text or fractions, not floats, if the numbers are decimals.
+    condition : {"A", "B", "general"}
+        Contact condition, see `Bearing.gap`.
+
+    Returns
+    -------
+    JamCertificate
+        Certified: every rounding error is included.  Where neither side is proved, ``UNDECIDED`` with the reason.
+
+    Raises
+    ------
+    GeometryError
+        An unknown condition, or "general" without a hole length.
+    GraphsynthError
+        If another library has changed the rounding mode of the processor.
+
+    Notes
+    -----
+    The gap is monotone in every parameter, so that its extremes over the box are values at two exact corners
+    (specification 10.2); a jam also needs a position that can be assembled, which interval kinematics proves.
+
+    Examples
+    --------
+    >>> found = certify_jamming(ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003"))
+    >>> found.verdict.name, found.largest_gap.hi < 0
+    ('CERTIFIED_FREE', True)
+    """
+    import graphsynth.intervals.kernels.loops  # noqa: F401  # few intervals, many operations: the compiled path pays
+    from graphsynth.intervals import check_rounding
+    from graphsynth.jamming.bearing.corners import check_condition
+
+    begin = perf_counter()
+    check_rounding()
+    check_condition(box, condition)
+    clearance = box["clearance"]
+    if clearance.upper < 0:
+        return _interference(box, condition, begin)
+    if clearance.lower < 0:
+        return _partly_interference(box, condition, begin)
+    return _Proof(box, condition, begin).result()
+
+
+class _Proof:
+    """One run: the corner values, then the weakest work that settles the verdict."""
+
+    def __init__(self, box: ToleranceBox, condition: Condition, begin: float) -> None:
+        from graphsynth.jamming.bearing import corners
+
+        self.box, self.condition, self.begin = box, condition, begin
+        self.tilt = corners.sines(box)
+        self.gaps = corners.gap_corners(box, self.tilt.sine, condition)
+        self.critical = corners.critical_sines(box, condition)
+        self.phase = corners.phase(box)
+        self.kappa = Enclosure(*corners.onset(box, self.critical, self.tilt))
+        self.boxes = 2
+        self.assembles = self._assembly(box)
+
+    def result(self) -> JamCertificate:
+
+        low, high = _pair(self.gaps, 0), _pair(self.gaps, 1)
+        verdict, reason, witness = Verdict.UNDECIDED, "", None
+        if self.assembles == "never":
+            verdict, reason = Verdict.CANNOT_ASSEMBLE, "no crank angle can be assembled, for any parameters"
+        elif high.hi < 0.0:
+            verdict = Verdict.CERTIFIED_FREE
+        else:
+            witness = self._jam_of_all(low) if low.lo > 0.0 else None
+            if witness:
+                verdict = Verdict.CERTIFIED_JAMMED
+            elif high.lo > 0.0:
+                witness = self._jam_of_worst()
+                verdict = Verdict.CERTIFIED_JAMMED_FOR_SOME if witness else Verdict.UNDECIDED
+        if verdict is Verdict.UNDECIDED:
+            reason = self._why(high)
+        return self._finish(verdict, reason, witness)
+
+    def _why(self, high: Enclosure) -> str:
+        if high.lo > 0.0:
+            return "the gap closes, but no position with a jam is proved to be assembled"
+        c = self.box["clearance"]
+        if c.lower == 0:
+            if self.kappa.lo > 0.0 or float(self.tilt.sine.hi[1]) == 0.0:
+                return "touching: no clearance and no tilt, the parts touch at every angle"
+            return "touching: no clearance is left at the lower end of its range"
+        if self.condition == "A" and _touches_only(self.box):
+            return "touching: h^2 = c (2R + c) exactly, the parts can touch but never overlap"
+        from graphsynth.intervals.reading import shortened
+
+        width = f"[{shortened(high.lo, -1, 3)}, {shortened(high.hi, 1, 3)}] mm"
+        return f"the largest gap lies in {width}, which contains 0: touching at this resolution; change a tolerance"
+
+    def _assembly(self, box: ToleranceBox) -> str:
+        """Say at how much of the turn the linkage is proved to be assembled, for every parameter vector."""
+        from graphsynth.jamming.bearing.poses import pose, turn_pieces, turns_freely
+
+        if turns_freely(box, float(self.tilt.amplitude.hi[1])):
+            return "always"
+        found = pose(box, turn_pieces(_PIECES))
+        self.boxes += _PIECES
+        if found.assembled.all():
+            return "always"
+        if found.missing.all():
+            return "never"
+        return "at some angles" if found.assembled.any() else "not decided"
+
+    def _jam_of_all(self, gap: Enclosure) -> Witness | None:
+        """Find a position in which every parameter vector jams, if ``gap`` is the least one at the worst angle."""
+        if self.assembles == "always":
+            return _at_worst_angle(self.box, gap)
+        return self._jam_on_grid(self.box)
+
+    def _jam_of_worst(self) -> Witness | None:
+        """Find a position in which the worst parameter vector jams."""
+        from graphsynth.jamming.bearing import corners
+
+        worst = corners.worst_corner(self.box, self.condition)
+        if self.assembles != "always":
+            return self._jam_on_grid(worst)
+        self.boxes += 1
+        gap = _pair(corners.gap_corners(worst, corners.sines(worst).sine, self.condition), 0)
+        return _at_worst_angle(worst, gap) if gap.lo > 0.0 else None
+
+    def _jam_on_grid(self, box: ToleranceBox) -> Witness | None:
+        """Look for an angle at which every parameter vector of ``box`` is proved assembled and jammed."""
+        import numpy as np
+
+        from graphsynth.intervals import Interval, sin
+        from graphsynth.jamming.bearing import corners, poses
+
+        turn = poses.grid(_ANGLES)  # angles after the phase
+        tilt = corners.sines(box) if box is not self.box else self.tilt
+        amplitude = Interval.from_bounds(tilt.amplitude.lo[0], tilt.amplitude.hi[0])
+        sine = corners.sine_of(amplitude * abs(sin(turn)), box.rod)
+        gap = poses.corner_gap(box, sine, self.condition, 0)
+        f = corners.phase(box) + turn
+        found = poses.pose(box, f)
+        self.boxes += _ANGLES
+        proved = np.flatnonzero((gap.lo > 0.0) & found.assembled)
+        if proved.size == 0:
+            return None
+        best = int(proved[np.argmax(gap.lo[proved])])
+        angle = Enclosure(float(f.lo[best]), float(f.hi[best]))
+        return _witness(box, angle, Enclosure(float(gap.lo[best]), float(gap.hi[best])))
+
+    def _finish(self, verdict: Verdict, reason: str, witness: Witness | None) -> JamCertificate:
+        shown = Enclosure(float(self.phase.lo), float(self.phase.hi))
+        if verdict is Verdict.CERTIFIED_FREE:
+            why = "the gap stays open"
+            if self.kappa.lo == math.inf:
+                still = float(self.tilt.amplitude.hi[1]) == 0.0
+                why = "the crank pin stays in the plane: no tilt" if still else "there is no critical tilt"
+            arcs = no_arcs(self.kappa, shown, why)
+        elif self.kappa.lo == 0.0 and float(self.tilt.amplitude.hi[1]) == 0.0:
+            arcs = whole_turn(self.kappa, shown, reason, False)
+        else:
+            arcs = arcs_from(self.kappa, self.phase)
+        return JamCertificate(
+            verdict=verdict,
+            reason=reason,
+            condition=self.condition,
+            box=self.box,
+            largest_gap=_pair(self.gaps, 1),
+            smallest_worst_gap=_pair(self.gaps, 0),
+            largest_tilt=_angles(self.tilt.sine),
+            critical_tilt=_angles(self.critical),
+            arcs=arcs,
+            assembles=self.assembles,
+            witness=witness,
+            exact_input=self.box.exact_input,
+            boxes=self.boxes,
+            seconds=perf_counter() - self.begin,
+        )
+
+
+def _at_worst_angle(box: ToleranceBox, gap: Enclosure) -> Witness:
+    """Return the position a quarter turn after the phase, where the tilt of every parameter vector is largest."""
+    from graphsynth.intervals import pi
+    from graphsynth.jamming.bearing.corners import phase
+
+    f = phase(box) + pi() / 2
+    return _witness(box, Enclosure(float(f.lo), float(f.hi)), gap)
+
+
+def _witness(box: ToleranceBox, angle: Enclosure, gap: Enclosure) -> Witness:
+    return Witness({name: _text(value) for name, value in box.ranges.items()}, angle, gap)
+
+
+def _text(value: Range) -> str:
+    """Write a parameter exactly; a range, where every value of it jams, by both ends."""
+    if value.is_point:
+        return exact_text(value.lower)
+    return f"[{exact_text(value.lower)}, {exact_text(value.upper)}]"
+
+
+def _pair(values: Interval, corner: int) -> Enclosure:
+    return Enclosure(float(values.lo[corner]), float(values.hi[corner]))
+
+
+def _angles(sine: Interval) -> Enclosure:
+    """Range of the angles of a pair of sines; an infinite sine stands for "none"."""
+    from graphsynth.jamming.bearing.corners import arcsine
+
+    low, high = float(sine.lo[0]), float(sine.hi[1])
+    first = float(arcsine(low).lo) if low <= 1.0 else math.inf
+    return Enclosure(first, float(arcsine(high).hi) if high <= 1.0 else math.inf)
+
+
+def _touches_only(box: ToleranceBox) -> bool:
+    h, c, R = box["Hb"].upper / 2, box["clearance"].lower, box["Rb"].lower
+    return h * h == c * (2 * R + c)
+
+
+def _interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
+    """Answer for a clearance that is negative throughout."""
+    from graphsynth.jamming.bearing import corners
+
+    tilt = corners.sines(box)
+    gaps = corners.gap_corners(box, tilt.sine, condition)
+    nothing = Enclosure(0.0, 0.0)
+    reason = "interference fit: the clearance is negative, the parts overlap at every tilt"
+    arcs = whole_turn(nothing, Enclosure(-math.pi, math.pi), reason, True)
+    return JamCertificate(
+        Verdict.CANNOT_ASSEMBLE, reason, condition, box, _pair(gaps, 1), _pair(gaps, 0), _angles(tilt.sine), nothing,
+        arcs, "never", None, box.exact_input, 2, perf_counter() - begin,
+    )  # fmt: skip
+
+
+def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
+    """Answer for a range of clearances from negative to positive: jams of the sound part count, freedom does not."""
+    from dataclasses import replace
+
+    from graphsynth.jamming.bearing import corners
+
+    c = box["clearance"]
+    sound = box.replace(clearance=Range(Fraction(0), c.upper, c.exact))
+    found = _Proof(sound, condition, begin).result()
+    verdict, reason = found.verdict, found.reason
+    text = "part of the range of the clearance is an interference fit, which cannot be assembled"
+    if found.verdict is Verdict.CERTIFIED_JAMMED:
+        verdict, reason = Verdict.CERTIFIED_JAMMED_FOR_SOME, text
+    elif found.verdict is not Verdict.CERTIFIED_JAMMED_FOR_SOME:
+        verdict, reason = Verdict.UNDECIDED, text
+    gaps = corners.gap_corners(box, corners.sines(box).sine, condition)  # of all, the interference included
+    return replace(
+        found, verdict=verdict, reason=reason, box=box, largest_gap=_pair(gaps, 1), smallest_worst_gap=_pair(gaps, 0),
+        seconds=perf_counter() - begin,
+    )  # fmt: skip

@@ -1,0 +1,329 @@
+"""Two-corner enclosures: extremes over a tolerance box of quantities that are monotone in every parameter.
+
+A "corner pair" is an `Interval` of shape (2,): entry 0 encloses the smallest value over the box, entry 1 the largest.
+Every parameter occurs in them at an exact end of its range, itself enclosed by neighbouring doubles, so that both
+bounds of both entries are proofs about the exact box.  Specification: sections 4.6, 4.7, 7.1, 7.3 and 10.2; the
+monotonicity is derived in ``docs/explanation/bearing-jamming.md``.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from graphsynth.core.checks import choice
+from graphsynth.core.errors import GeometryError
+from graphsynth.intervals import Interval, asin, atan2, cos, hypot, sin
+from graphsynth.jamming.bearing.bearing import CONDITIONS, Condition
+from graphsynth.jamming.bearing.parameters import ToleranceBox
+from graphsynth.jamming.bearing.ranges import Range, bounds_of
+
+__all__ = [
+    "Tilt", "arcsine", "check_condition", "cosine", "critical_sines", "ends", "gap_corners", "gap_values", "onset",
+    "phase", "sine_of", "sines", "slanted", "worst_corner",
+]  # fmt: skip
+
+
+def ends(box: ToleranceBox, name: str, falling: bool = False) -> Interval:
+    """Return both exact ends of a parameter as a pair; exchanged for a quantity that falls with it."""
+    low, high = box[name].ends
+    if falling:
+        low, high = high, low
+    return Interval.from_bounds([low[0], high[0]], [low[1], high[1]])
+
+
+def check_condition(box: ToleranceBox, condition: Condition) -> None:
+    """Raise `GeometryError` for an unknown condition, or for "general" without a hole length."""
+    choice("condition", condition, CONDITIONS)
+    if condition == "general" and "hole_length" not in box:
+        raise GeometryError('condition "general" needs hole_length; give it, or use condition "A" or "B"')
+
+
+class Tilt(NamedTuple):
+    """Largest sine of tilt over a turn (pair), and the sine of the angle of the coupler per unit of sin(f - psi).
+
+    ``amplitude`` is the pair of ``max |A_z| / l3`` before any cap; ``sine`` the pair of the largest ``sin |theta|``.
+    """
+
+    amplitude: Interval
+    sine: Interval
+
+
+def sines(box: ToleranceBox) -> Tilt:
+    """Enclose the largest sine of tilt over a turn at its two corners (section 3.2 and 3.4)."""
+    amplitude = _height(box) * ends(box, "l2") / ends(box, "l3", falling=True)
+    return Tilt(amplitude, sine_of(amplitude, box.rod))
+
+
+def sine_of(amplitude: Interval, rod: str) -> Interval:
+    """Sine of tilt from ``|A_z| / l3``; capped at 1 (beyond it the linkage cannot be assembled)."""
+    if rod == "deck":
+        return amplitude / (amplitude.sqr() + 1).sqrt()
+    return Interval.from_bounds(np.minimum(amplitude.lo, 1.0), np.minimum(amplitude.hi, 1.0))
+
+
+def _inclination(box: ToleranceBox) -> Interval:
+    """Pair of ``1 - n3^2`` for the normalised axis: grows with n1^2 + n2^2, falls with n3^2; rational, so exact."""
+    squares = [_squares(box[f"n{i}"]) for i in (1, 2, 3)]
+    flat = [squares[0][k] + squares[1][k] for k in (0, 1)]
+    pairs = [bounds_of(flat[k] / (flat[k] + squares[2][1 - k])) for k in (0, 1)]
+    return Interval.from_bounds([low for low, _ in pairs], [high for _, high in pairs])
+
+
+def _squares(value: Range) -> tuple[Fraction, Fraction]:
+    """Return the smallest and the largest square of a range."""
+    low, high = value.lower**2, value.upper**2
+    return (Fraction(0) if value.lower <= 0 <= value.upper else min(low, high)), max(low, high)
+
+
+def _height(box: ToleranceBox) -> Interval:
+    """Pair of ``sqrt((1 - R33)(1 + R33))``; with d = 1 - R33 it is ``sqrt(d (2 - d))``, growing up to d = 1."""
+    low, high = box["alpha"].lower, box["alpha"].upper
+    small = 0 if low <= 0 <= high else min(abs(low), abs(high))
+    large = max(abs(low), abs(high))
+    if large > 3:  # beyond pi the sine of alpha/2 falls again
+        wave = sin(box.outer("alpha") / 2).sqr()
+        halves = Interval.from_bounds([wave.lo, wave.lo], [wave.hi, wave.hi])  # both corners: the whole range
+    else:
+        a, b = (Interval(abs(end)) for end in (small, large))
+        halves = sin(Interval.from_bounds([a.lo, b.lo], [a.hi, b.hi]) / 2).sqr()
+    d = halves * _inclination(box) * 2
+    values = d * (2 - d)
+    clipped = Interval.from_bounds(np.clip(values.lo, 0.0, 1.0), np.clip(values.hi, 0.0, 1.0))
+    if not (d.hi <= 1.0).all():  # the product falls beyond d = 1: take what holds for every d of the box
+        top = 1.0 if d.hi[1] >= 1.0 and d.lo[0] <= 1.0 else float(clipped.hi.max())
+        bottom = float(clipped.lo.min())
+        clipped = Interval.from_bounds([bottom, bottom], [top, top])
+    return clipped.sqrt()
+
+
+def phase(box: ToleranceBox) -> Interval:
+    """Enclose psi1 modulo pi over the box: ``arg(n1 + i n2) - atan2(n3 sin(alpha/2), cos(alpha/2)) + azimuth``.
+
+    Half turns do not matter, because ``|sin(f - psi1)|`` decides.  At least pi wide if the direction is not known.
+    """
+    n1, n2, n3 = (box.outer(f"n{i}") for i in (1, 2, 3))
+    if float(n1.lo) <= 0.0 <= float(n1.hi) and float(n2.lo) <= 0.0 <= float(n2.hi):
+        return Interval.from_bounds(-2.0, 2.0)
+    if float(n1.hi) <= 0.0:  # keep away from the cut of atan2; a half turn does not matter
+        n1, n2 = -n1, -n2
+    result: Interval = atan2(n2, n1) + box.outer("azimuth")
+    if not (box["n3"].is_point and box["n3"].lower == 0):
+        half = box.outer("alpha") / 2 * (1 if box.convention == "spec" else -1)
+        length = (n1.sqr() + n2.sqr() + n3.sqr()).sqrt()
+        result = result - atan2(n3 / length * sin(half), cos(half))
+    return result
+
+
+def cosine(sine: Interval) -> Interval:
+    """Cosine of a tilt between 0 and pi/2 from its sine, without cancellation."""
+    return ((1 - sine) * (1 + sine)).sqrt()
+
+
+def _gap_a(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
+    """Condition A with both branches of section 4.2, in stable form; nondecreasing in S, h, nonincreasing in R, c."""
+    rising = h * S - c - R * S.sqr() / (1 + C)
+    across, along = R * S, h * C
+    if (across.hi <= along.lo).all():
+        return rising
+    saturated = (h.sqr() - c * (2 * R + c)) / (hypot(R, h) + R + c)
+    steep, flat = across.lo > along.hi, across.hi <= along.lo
+    hull = rising.hull(saturated)
+    lo = np.where(steep, saturated.lo, np.where(flat, rising.lo, hull.lo))
+    hi = np.where(steep, saturated.hi, np.where(flat, rising.hi, hull.hi))
+    return Interval.from_bounds(lo, hi)
+
+
+def _gap_b(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
+    return h * S - c + (R + c) * S.sqr() / (1 + C)
+
+
+def gap_values(S: Interval, R: Interval, h: Interval, c: Interval, hole: Interval | None, condition: str) -> Interval:
+    """Enclose the gap g (mm) elementwise for given intervals of sine, radius, half height, clearance, half hole.
+
+    Condition "general" is ``min(gA, gB / C)``: the pin jams where it would both as a short bearing in a long hole and
+    as a long shaft in a hole of this length (section 4.4).
+    """
+    C = cosine(S)
+    if condition == "A":
+        return _gap_a(S, C, R, h, c)
+    if condition == "B":
+        return _gap_b(S, C, R, h, c)
+    assert hole is not None
+    a, b = _gap_a(S, C, R, h, c), slanted(S, R, hole, c)
+    return Interval.from_bounds(np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi))
+
+
+def slanted(S: Interval, R: Interval, hole: Interval, c: Interval) -> Interval:
+    """Gap ``gB / C`` of the slanted shaft at the rim of a hole of half length ``hole``; unbounded at 90 degrees."""
+    C = cosine(S)
+    value = _gap_b(S, C, R, hole, c) / C
+    upright = value.is_empty  # C = 0: the shaft lies across
+    return Interval.from_bounds(np.where(upright, 0.0, value.lo), np.where(upright, np.inf, value.hi))
+
+
+def gap_corners(box: ToleranceBox, sine: Interval, condition: Condition) -> Interval:
+    """Pair of the smallest and the largest gap (mm) over the box, for a pair of sines of tilt (section 10.2)."""
+    check_condition(box, condition)
+    h, c = ends(box, "Hb") / 2, ends(box, "clearance", falling=True)
+    if condition != "general":
+        return gap_values(sine, ends(box, "Rb", falling=condition == "A"), h, c, None, condition)
+    hole = ends(box, "hole_length") / 2
+    a = gap_values(sine, ends(box, "Rb", falling=True), h, c, None, "A")
+    b = slanted(sine, ends(box, "Rb"), hole, c)
+    low = (min(float(a.lo[0]), float(b.lo[0])), min(float(a.hi[0]), float(b.hi[0])))
+    if box["Rb"].is_point:
+        high = (min(float(a.lo[1]), float(b.lo[1])), min(float(a.hi[1]), float(b.hi[1])))
+    else:
+        high = _largest_over_radius(box, sine[1], h[1], c[1], hole[1])
+    return Interval.from_bounds([low[0], high[0]], [low[1], high[1]])
+
+
+def _largest_over_radius(
+    box: ToleranceBox, S: Interval, h: Interval, c: Interval, hole: Interval
+) -> tuple[float, float]:
+    """Enclose ``max over R of min(gA, gB / C)``: gA falls with R and gB rises, so the ends of a piece of R bound it."""
+    (start, first), (last, stop) = box["Rb"].ends
+
+    def both(points: Interval) -> tuple[Interval, Interval]:
+        return gap_values(S, points, h, c, None, "A"), slanted(S, points, hole, c)
+
+    a, b = both(Interval.from_bounds(start, stop))
+    best, above = float(min(a.lo, b.lo)), float(min(a.hi, b.hi))
+    low, high = start, stop
+    for _ in range(6):
+        edges = np.linspace(low, high, 65)
+        a, b = both(Interval.from_bounds(edges, edges))
+        inside = (edges >= first) & (edges <= last)  # values there are attained in the exact range
+        if inside.any():
+            best = max(best, float(np.minimum(a.lo, b.lo)[inside].max()))
+        pieces = np.minimum(a.hi[:-1], b.hi[1:])
+        above = min(above, max(float(pieces.max()), best))
+        keep = np.flatnonzero(pieces > best)
+        if keep.size == 0 or above - best <= 4e-16 * abs(best):
+            break
+        low, high = float(edges[keep[0]]), float(edges[keep[-1] + 1])
+    return best, above
+
+
+def critical_sines(box: ToleranceBox, condition: Condition) -> Interval:
+    """Pair of the sine of the critical tilt (section 4.7); an infinite bound means "no critical tilt".
+
+    Condition A: grows with c and R, falls with h, and exists where ``h^2 > c (2R + c)``, decided exactly; equality,
+    contact without overlap, counts in the lower bound only.  Condition B: grows with c, falls with R and h.  General:
+    the larger one of both, since the pin jams where both do.
+    """
+    check_condition(box, condition)
+    if condition == "B":
+        return _critical(box, "Hb", "B")
+    a = _critical(box, "Hb", "A")
+    if condition == "A":
+        return a
+    b = _critical(box, "hole_length", "B")
+    return Interval.from_bounds(np.maximum(a.lo, b.lo), np.maximum(a.hi, b.hi))
+
+
+def _critical(box: ToleranceBox, height: str, condition: str) -> Interval:
+    c, R = ends(box, "clearance"), ends(box, "Rb", falling=condition == "B")
+    h = ends(box, height, falling=True) / 2
+    slack = c * (2 * R + c)
+    room = h.sqr() + (slack if condition == "B" else -slack)
+    w = room.sqrt()
+    q = c / (h + w)
+    with np.errstate(all="ignore"):
+        s = 2 * q / (1 + q.sqr())
+    lo, hi = np.where(s.is_empty, 0.0, np.clip(s.lo, 0.0, 1.0)), np.where(s.is_empty, 1.0, np.clip(s.hi, 0.0, 1.0))
+    for corner in (0, 1):
+        exists = _exists(box, height, corner, condition)
+        if not exists:
+            lo[corner] = hi[corner] = math.inf
+        if c.lo[corner] <= 0.0 <= c.hi[corner] and exists:  # no clearance, no tilt
+            lo[corner] = 0.0
+            hi[corner] = 0.0 if c.hi[corner] == 0.0 else hi[corner]
+    big = float(np.finfo(np.float64).max)
+    lo = np.where(np.isinf(lo), big, lo)  # an interval needs a finite lower bound
+    return Interval.from_bounds(lo, hi)
+
+
+def _exists(box: ToleranceBox, height: str, corner: int, condition: str) -> bool:
+    """Decide in rational arithmetic whether there is a critical tilt at a corner."""
+    c, R, h = box["clearance"], box["Rb"], box[height]
+    clearance, radius = (c.lower, R.lower) if corner == 0 else (c.upper, R.upper)
+    half = (h.upper if corner == 0 else h.lower) / 2
+    if condition == "B":
+        return clearance >= 0
+    room = half * half - clearance * (2 * radius + clearance)
+    # with no room the parts touch but never overlap: no jam for the bearing that is to jam last
+    return clearance >= 0 and (room > 0 if corner else room >= 0)
+
+
+def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, float]:
+    """Bounds of kappa over the box: the bearing jams where ``|sin(f - psi1)| > kappa`` (section 7.1).
+
+    Infinite where there is no critical tilt or no tilt.
+    """
+    big = float(np.finfo(np.float64).max)
+    s = Interval.from_bounds(np.minimum(critical.lo, 1.0), np.minimum(critical.hi, 1.0))
+    if box.rod == "deck":  # tan theta = A_z / l3
+        s = s / cosine(s)
+        s = Interval.from_bounds(np.where(s.is_empty, big, s.lo), np.where(s.is_empty, np.inf, s.hi))
+    low, high = float(s.lo[0]), float(s.hi[1])
+    a, b = float(tilt.amplitude.lo[0]), float(tilt.amplitude.hi[1])
+    if low == 0.0:
+        first = 0.0
+    elif b == 0.0 or critical.lo[0] == big:
+        first = math.inf
+    else:
+        first = float((Interval.from_bounds(low, low) / Interval.from_bounds(b, b)).lo)
+    if high == 0.0 and a > 0.0:
+        last = 0.0
+    elif a == 0.0 or not math.isfinite(high) or not math.isfinite(float(critical.hi[1])):
+        last = math.inf
+    else:
+        last = float((Interval.from_bounds(high, high) / Interval.from_bounds(a, a)).hi)
+    return first, max(first, last)
+
+
+def arcsine(value: float) -> Interval:
+    """Enclose ``asin`` of a double in [0, 1]."""
+    found: Interval = asin(Interval.from_bounds(value, value))
+    return found
+
+
+def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:
+    """Return the parameter vector of the box at which the gap is largest; the middle where it does not matter.
+
+    For condition "general" with a range of radii the radius is a candidate only: the value there is evaluated anew.
+    """
+    ends: dict[str, Fraction] = {name: (r.lower + r.upper) / 2 for name, r in box.ranges.items()}
+    for name in ("l2", "Hb", "hole_length"):
+        if name in box:
+            ends[name] = box[name].upper
+    ends["l3"], ends["clearance"] = box["l3"].lower, max(box["clearance"].lower, Fraction(0))
+    far = max(box["alpha"].lower, box["alpha"].upper, key=abs)
+    ends["alpha"] = far
+    for name in ("n1", "n2"):
+        ends[name] = max(box[name].lower, box[name].upper, key=abs)
+    low, high = box["n3"].lower, box["n3"].upper
+    ends["n3"] = Fraction(0) if low <= 0 <= high else min(low, high, key=abs)
+    if condition == "A":
+        ends["Rb"] = box["Rb"].lower
+    elif condition == "B":
+        ends["Rb"] = box["Rb"].upper
+    else:
+        ends["Rb"] = _balanced_radius(box, ends)
+    axis = (ends.pop("n1"), ends.pop("n2"), ends.pop("n3"))
+    return ToleranceBox(**ends, axis=axis, sgn=box.sgn, rod=box.rod, convention=box.convention)
+
+
+def _balanced_radius(box: ToleranceBox, ends: dict[str, Fraction]) -> Fraction:
+    """Radius at which both readings of the general pin are about equal: ``R S = hp C - hh`` (section 4.4)."""
+    linkage, _ = box.nominal()
+    sine = linkage.largest_tilt[1]
+    if sine == 0.0:
+        return box["Rb"].upper
+    wanted = float(ends["Hb"]) / 2 * math.sqrt(1.0 - sine * sine) - float(ends["hole_length"]) / 2
+    return min(max(Fraction(wanted / sine), box["Rb"].lower), box["Rb"].upper)

@@ -1,0 +1,214 @@
+"""`ToleranceBox`: the lambda linkage and its bearing with a tolerance on every dimension."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from graphsynth.core.checks import choice, sign
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.bearing import Bearing
+from graphsynth.jamming.bearing.ranges import Given, Range
+from graphsynth.mechanism.four_bar import LambdaLinkage
+
+if TYPE_CHECKING:
+    from graphsynth.intervals import Interval
+
+__all__ = ["PARAMETERS", "ToleranceBox"]
+
+#: Names of the ranges of a box, in a fixed order.
+PARAMETERS = ("l1", "l2", "l3", "l4", "alpha", "n1", "n2", "n3", "azimuth", "Rb", "Hb", "clearance", "hole_length")
+
+
+class ToleranceBox:
+    """A lambda linkage with its bearing, every parameter in a range; immutable.
+
+    Each value may be a number, decimal text (``"0.03"``, ``"1/30"``, ``"17.5 +- 0.005"``, ``"[0.1, 0.2]"``), a
+    Fraction, Decimal, pair of bounds, `Range` or `Interval`.  Text and rational numbers are exact; a float is taken as
+    the double it is, and `exact_input` is then False.
+
+    Parameters
+    ----------
+    l1, l2, l3, l4 : Given
+        Frame, crank, coupler, rocker; any common unit.
+    alpha : Given
+        Tilt of the motor axis, radians.
+    axis : sequence of three
+        Direction about which the motor axis is tilted; need not be normalised, each component may be a range.
+    azimuth : Given
+        Further turn of that direction about the normal of the plane, radians.
+    Rb, Hb, clearance : Given
+        Radius and height of the bearing, radial clearance, millimetres.
+    hole_length : Given, optional
+        Length of the hole for condition "general", millimetres.
+    sgn, rod, convention
+        As for `LambdaLinkage`.
+
+    Raises
+    ------
+    GeometryError
+        With the parameter, its value and the bound it breaks.
+
+    Examples
+    --------
+    >>> box = ToleranceBox(alpha="1/30", clearance="0.03 +- 0.003")
+    >>> str(box["clearance"]), box.exact_input
+    ('[0.027, 0.033]', True)
+    """
+
+    __slots__ = ("_ranges", "convention", "rod", "sgn")
+    _ranges: dict[str, Range]
+    sgn: int
+    rod: str
+    convention: str
+
+    def __init__(
+        self,
+        l1: Given = 2,
+        l2: Given = 1,
+        l3: Given = "2.5",
+        l4: Given = "2.5",
+        alpha: Given = 0,
+        axis: Any = (1, 0, 0),
+        azimuth: Given = 0,
+        Rb: Given = "17.5",
+        Hb: Given = 10,
+        clearance: Given = "0.03",
+        hole_length: Given | None = None,
+        *,
+        sgn: int = 1,
+        rod: str = "rigid",
+        convention: str = "spec",
+    ) -> None:
+        given = {"l1": l1, "l2": l2, "l3": l3, "l4": l4, "alpha": alpha, "azimuth": azimuth}
+        given |= {"Rb": Rb, "Hb": Hb, "clearance": clearance}
+        given |= _components(axis)
+        if hole_length is not None:
+            given["hole_length"] = hole_length
+        ranges = {name: Range.read(name, given[name]) for name in PARAMETERS if name in given}
+        _check(ranges)
+        object.__setattr__(self, "_ranges", ranges)
+        object.__setattr__(self, "sgn", sign("sgn", sgn))
+        object.__setattr__(self, "rod", choice("rod", rod, ("rigid", "deck")))
+        object.__setattr__(self, "convention", choice("convention", convention, ("spec", "deck")))
+
+    @classmethod
+    def of(cls, linkage: LambdaLinkage, bearing: Bearing | None = None) -> ToleranceBox:
+        """Return the box of one linkage and one bearing: their doubles as they are, marked as float input.
+
+        Raises
+        ------
+        GeometryError
+            Something else than a linkage or a bearing.
+        """
+        if not isinstance(linkage, LambdaLinkage):
+            raise GeometryError(f"linkage = {linkage!r} is no LambdaLinkage; give one")
+        b = Bearing() if bearing is None else bearing
+        if not isinstance(b, Bearing):
+            raise GeometryError(f"bearing = {b!r} is no Bearing; give Bearing(Rb, Hb, clearance), or none")
+        k = linkage
+        return cls(k.l1, k.l2, k.l3, k.l4, k.alpha, k.axis, 0, b.Rb, b.Hb, b.clearance, b.hole_length,
+                   sgn=k.sgn, rod=k.rod, convention=k.convention)  # fmt: skip
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise AttributeError(f"a ToleranceBox does not change; make another with replace({name}=...)")
+
+    def __getitem__(self, name: str) -> Range:
+        """Return the range of a parameter by its name (see `PARAMETERS`)."""
+        if not isinstance(name, str) or name not in self._ranges:
+            raise GeometryError(f"{name!r} is no parameter of this box; it has {', '.join(self._ranges)}")
+        return self._ranges[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._ranges
+
+    def __repr__(self) -> str:
+        return f"ToleranceBox({', '.join(f'{name}={value}' for name, value in self._ranges.items())})"
+
+    def replace(self, **changes: Given) -> ToleranceBox:
+        """Return the box with some parameters changed.
+
+        Raises
+        ------
+        GeometryError
+            For a name that is no parameter.
+
+        Examples
+        --------
+        >>> str(ToleranceBox().replace(alpha="0.013")["alpha"])
+        '0.013'
+        """
+        r: dict[str, Any] = {**self._ranges}
+        options: dict[str, Any] = {"sgn": self.sgn, "rod": self.rod, "convention": self.convention}
+        for name, value in changes.items():
+            if name in options:
+                options[name] = value
+            elif name == "axis":
+                r |= _components(value)
+            elif name in PARAMETERS:
+                r[name] = value
+            else:
+                raise GeometryError(f"{name!r} is no parameter; use {', '.join(PARAMETERS)}, axis, rod or convention")
+        axis = (r.pop("n1"), r.pop("n2"), r.pop("n3"))
+        return ToleranceBox(**r, **options, axis=axis)
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """All ranges by name."""
+        return dict(self._ranges)
+
+    @property
+    def exact_input(self) -> bool:
+        """Whether no plain float came in."""
+        return all(value.exact for value in self._ranges.values())
+
+    @property
+    def is_point(self) -> bool:
+        """Whether every range is a single number."""
+        return all(value.is_point for value in self._ranges.values())
+
+    def outer(self, name: str) -> Interval:
+        """Return the smallest interval of doubles around the range of a parameter."""
+        return self[name].outer
+
+    def nominal(self) -> tuple[LambdaLinkage, Bearing]:
+        """Return the linkage and the bearing in the middle of the box, in doubles (estimated: for tables and plots)."""
+        import math
+
+        m = {name: value.middle for name, value in self._ranges.items()}
+        turn = m["azimuth"]
+        n1 = m["n1"] * math.cos(turn) - m["n2"] * math.sin(turn)
+        n2 = m["n1"] * math.sin(turn) + m["n2"] * math.cos(turn)
+        axis = (m["n1"], m["n2"], m["n3"]) if turn == 0.0 else (n1, n2, m["n3"])
+        linkage = LambdaLinkage(
+            m["l1"], m["l2"], m["l3"], m["l4"], self.sgn, alpha=m["alpha"], axis=axis, rod=self.rod,
+            convention=self.convention,
+        )  # fmt: skip
+        return linkage, Bearing(m["Rb"], m["Hb"], m["clearance"], m.get("hole_length"))
+
+    def describe(self) -> dict[str, str]:
+        """Ranges as text, for reports."""
+        return {name: str(value) for name, value in self._ranges.items()}
+
+
+def _components(axis: Any) -> dict[str, Any]:
+    if isinstance(axis, str) or not hasattr(axis, "__len__") or len(axis) != 3:
+        raise GeometryError(f"axis = {axis!r} is not a direction; give three components")
+    return {f"n{i}": part for i, part in enumerate(axis, start=1)}
+
+
+def _check(ranges: dict[str, Range]) -> None:
+    for name in ("l1", "l2", "l3", "l4", "Rb", "hole_length"):
+        if name in ranges and ranges[name].lower <= 0:
+            raise GeometryError(f"{name} = {ranges[name]} must be positive; correct the value or its tolerance")
+    if ranges["Hb"].lower < 0:
+        raise GeometryError(f"Hb = {ranges['Hb']} must be zero or more; correct the value or its tolerance")
+    if ranges["clearance"].lower <= -ranges["Rb"].lower:
+        least = float(-ranges["Rb"].lower)
+        raise GeometryError(
+            f"clearance = {ranges['clearance']} mm leaves no hole; it must exceed -Rb = {least:.12g} mm"
+        )
+    parts = [ranges[f"n{i}"] for i in (1, 2, 3)]
+    if all(part.lower <= Fraction(0) <= part.upper for part in parts):
+        shown = ", ".join(map(str, parts))
+        raise GeometryError(f"axis = ({shown}) contains the zero vector; give a direction that cannot vanish")

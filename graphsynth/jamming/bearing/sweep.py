@@ -1,0 +1,227 @@
+"""The turn cut into pieces: free, jammed or undecided with proof, for motions without a closed form.
+
+The gap is enclosed on every piece of the turn; undecided pieces are halved until a resolution or a budget ends the
+search (specification, section 7.3).  For the lambda linkage `sweep_linkage` uses interval kinematics, which shares no
+formula with the closed form of the arcs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.arguments import Budget, Count, Real
+from graphsynth.core.checks import checked
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.bearing.circle_sets import TURN_HIGH, Span, total_length
+from graphsynth.jamming.bearing.parameters import ToleranceBox
+
+if TYPE_CHECKING:
+    from graphsynth.intervals import Interval
+
+__all__ = ["PieceGap", "TurnPartition", "sweep_linkage", "sweep_turn"]
+
+Mask = NDArray[np.bool_]
+_FREE, _JAMS, _OPEN, _OUT = 0, 1, 2, 3
+_ENOUGH = 64
+
+
+class PieceGap(NamedTuple):
+    """Enclosure of the gap on pieces of the turn, over all parameters; and what is proved about assembly there.
+
+    ``assembled``: at every angle of the piece for every parameter vector; ``missing``: at none of them.
+    """
+
+    gap: Interval
+    assembled: Mask
+    missing: Mask
+
+
+@dataclass(frozen=True)
+class TurnPartition:
+    """The turn in four kinds of spans (radians, within [0, 2 pi]); together they cover it.
+
+    Attributes
+    ----------
+    free : tuple of Span
+        Certified: no parameter vector jams.
+    inner : tuple of Span
+        Certified: assembled and jammed for every parameter vector.
+    undecided : tuple of Span
+        Neither is proved at this resolution.
+    missing : tuple of Span
+        Certified: no parameter vector can be assembled.
+    pieces : int
+        Pieces evaluated.
+    finished : bool
+        False if the budget ended the search above the resolution asked for.
+    seconds : float
+        Run time.
+    """
+
+    free: tuple[Span, ...]
+    inner: tuple[Span, ...]
+    undecided: tuple[Span, ...]
+    missing: tuple[Span, ...]
+    pieces: int
+    finished: bool
+    seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def undecided_part(self) -> float:
+        """Part of the turn that is undecided."""
+        return total_length(self.undecided) / math.tau
+
+
+@checked
+def sweep_turn(
+    gap: Callable[[Interval], PieceGap],
+    *,
+    resolution: Real = 1e-6,
+    first: Count = 256,
+    max_pieces: Count = 200_000,
+    max_seconds: Budget = math.inf,
+) -> TurnPartition:
+    """Partition the turn by the sign of a gap function given in intervals.
+
+    Parameters
+    ----------
+    gap : callable
+        Takes pieces of the turn, an `Interval` of shape (m,), and returns a `PieceGap`.
+    resolution : float
+        Undecided pieces no longer than this (radians) are left; at least 1e-15.
+    first : int
+        Pieces to begin with.
+    max_pieces, max_seconds : budgets
+        Exhausted: what is not settled is undecided, ``finished`` is False.
+
+    Returns
+    -------
+    TurnPartition
+        Pieces that jam, are free, cannot be assembled (certified), or are undecided.
+
+    Raises
+    ------
+    GeometryError
+        For a resolution that is not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from graphsynth.intervals import sin
+    >>> def always(f):
+    ...     return PieceGap(sin(f) - 0.5, np.ones(len(f), bool), np.zeros(len(f), bool))
+    >>> found = sweep_turn(always)
+    >>> [round(end, 5) for end in found.inner[0]], found.undecided_part < 1e-6
+    ([0.5236, 2.61799], True)
+    """
+    from graphsynth.intervals import Interval, check_rounding
+
+    begin = perf_counter()
+    check_rounding()
+    if not resolution >= 1e-15:
+        raise GeometryError(f"resolution = {resolution} must be at least 1e-15; 1e-6 rad is usual")
+    edges = np.linspace(0.0, TURN_HIGH, first + 1)
+    lo, hi = edges[:-1], edges[1:]
+    done: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int8]]] = []
+    pieces, finished = 0, True
+    while lo.size:
+        if pieces + lo.size > max_pieces or perf_counter() - begin > max_seconds:
+            finished = False
+            done.append((lo, hi, np.full(lo.size, _OPEN, dtype=np.int8)))
+            break
+        kind = _classify(gap(Interval.from_bounds(lo, hi)), lo.size)
+        pieces += lo.size
+        split = (kind == _OPEN) & (hi - lo > resolution)
+        done.append((lo[~split], hi[~split], kind[~split]))
+        lo, hi = _split(lo[split], hi[split])
+    spans = _joined(done)
+    return TurnPartition(
+        spans[_FREE], spans[_JAMS], spans[_OPEN], spans[_OUT], pieces, finished, perf_counter() - begin
+    )
+
+
+def _split(lo: NDArray[np.float64], hi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cut every piece in two, or in more parts when there are few: long arrays take the compiled path."""
+    parts = 2 if lo.size >= _ENOUGH // 2 else -(-_ENOUGH // max(lo.size, 1))
+    shares = np.linspace(0.0, 1.0, parts + 1)[1:-1]
+    inner = np.clip(lo[:, None] + (hi - lo)[:, None] * shares, lo[:, None], hi[:, None])
+    starts, stops = np.column_stack([lo, inner]), np.column_stack([inner, hi])
+    filled = (starts < stops) | (lo == hi)[:, None]
+    return starts[filled], stops[filled]
+
+
+def _classify(found: PieceGap, size: int) -> NDArray[np.int8]:
+    lo, hi = np.broadcast_to(found.gap.lo, (size,)), np.broadcast_to(found.gap.hi, (size,))
+    sound = np.broadcast_to(found.gap.guaranteed & ~found.gap.is_empty, (size,))
+    kind = np.full(size, _OPEN, dtype=np.int8)
+    kind[sound & (hi < 0.0)] = _FREE
+    kind[sound & (lo > 0.0) & found.assembled] = _JAMS
+    kind[found.missing] = _OUT
+    return kind
+
+
+def _joined(
+    done: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int8]]],
+) -> list[tuple[Span, ...]]:
+    """Sort the pieces and join neighbours of one kind; their borders are the same doubles."""
+    lo, hi, kind = (np.concatenate([part[i] for part in done]) for i in range(3))
+    order = np.argsort(lo, kind="stable")
+    lo, hi, kind = lo[order], hi[order], kind[order]
+    starts = np.flatnonzero(np.r_[True, kind[1:] != kind[:-1]])
+    stops = np.r_[starts[1:] - 1, len(kind) - 1]
+    spans: list[list[Span]] = [[], [], [], []]
+    for a, b in zip(starts, stops):
+        spans[int(kind[a])].append(Span(float(lo[a]), float(hi[b])))
+    return [tuple(part) for part in spans]
+
+
+@checked
+def sweep_linkage(
+    box: ToleranceBox,
+    condition: Condition = "A",
+    *,
+    resolution: Real = 1e-6,
+    max_pieces: Count = 200_000,
+    max_seconds: Budget = math.inf,
+) -> TurnPartition:
+    """Partition the turn of a lambda linkage (any four-bar) by interval kinematics, for all parameters of a box.
+
+    Unlike the closed form it also proves where the linkage cannot be assembled.
+
+    Parameters
+    ----------
+    box : ToleranceBox
+        Ranges of all parameters; the statement holds for each of their combinations.
+    condition : {"A", "B", "general"}
+        Contact condition.
+    resolution : float, optional
+        Undecided pieces no longer than this (radians) are left.
+    max_pieces, max_seconds : optional
+        Budgets; when exhausted, what is not settled is undecided.
+
+    Returns
+    -------
+    TurnPartition
+        Pieces that jam, are free, cannot be assembled (certified), or are undecided.
+
+    Examples
+    --------
+    >>> found = sweep_linkage(ToleranceBox(alpha="1/30"), resolution=1e-3)
+    >>> len(found.inner), len(found.missing), found.undecided_part < 1e-3
+    (2, 0, True)
+    """
+    from graphsynth.jamming.bearing.poses import pose_gap
+
+    def gap(f: Interval) -> PieceGap:
+        value, found = pose_gap(box, f, condition)
+        return PieceGap(value, found.assembled, found.missing)
+
+    return sweep_turn(gap, resolution=resolution, max_pieces=max_pieces, max_seconds=max_seconds)

@@ -1,0 +1,35 @@
+"""Circle and ellipse with tolerances: the interval problem of the source, solved exactly and by Krawczyk's method."""
+
+from __future__ import annotations
+
+from graphsynth.jamming.intersection.boxes import CrossingBoxes, krawczyk_boxes
+from graphsynth.jamming.intersection.check import CrossCheck, cross_check
+from graphsynth.jamming.intersection.hull import CrossingHull, exact_hull, mirrored
+from graphsynth.jamming.intersection.problem import CircleEllipse, circle_ellipse, surrogate_problem
+from graphsynth.jamming.intersection.readings import (
+    Reading,
+    TiltedEllipse,
+    reading_areas,
+    reading_ellipse,
+    reading_problem,
+)
+from graphsynth.jamming.intersection.reasons import Reason
+
+__all__ = [
+    "CircleEllipse",
+    "CrossCheck",
+    "CrossingBoxes",
+    "CrossingHull",
+    "Reading",
+    "Reason",
+    "TiltedEllipse",
+    "circle_ellipse",
+    "cross_check",
+    "exact_hull",
+    "krawczyk_boxes",
+    "mirrored",
+    "reading_areas",
+    "reading_ellipse",
+    "reading_problem",
+    "surrogate_problem",
+]

@@ -1,0 +1,279 @@
+"""Circle and ellipse by Krawczyk's method in (x, y) with bisection, as in the source, but with sound statuses.
+
+Specification, sections 6.4 and 6.5: an empty image proves that there is no crossing, an image in the interior of its
+box that there is exactly one, and an overlap proves nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.arguments import Real
+from graphsynth.core.checks import checked
+from graphsynth.core.errors import IntervalError
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.interval import Interval
+from graphsynth.intervals.status import Status
+from graphsynth.jamming.intersection.criterion import spectral_radius
+from graphsynth.jamming.intersection.hull import mirrored
+from graphsynth.jamming.intersection.problem import CircleEllipse
+from graphsynth.jamming.intersection.reasons import Reason
+
+__all__ = ["CrossingBoxes", "krawczyk_boxes", "krawczyk_data"]
+
+Array = NDArray[np.float64]
+
+#: Boxes treated between two looks at the clock.
+_BATCH = 4096
+_MOST_PROVED = 16
+_MOST_BOXES = 20_000_000
+_MOST_POWER = 900
+
+
+@dataclass(frozen=True, eq=False)
+class CrossingBoxes:
+    """Outcome of `krawczyk_boxes`, for the first quadrant.
+
+    Attributes
+    ----------
+    status : Status
+        ``EMPTY``: no crossing; ``UNIQUE``: exactly one in the quadrant, for every choice of the parameters; ``EXISTS``:
+        at least one for every choice, but boxes are left that may hold more; ``UNDECIDED``: see ``reasons``.
+    reasons : tuple of Reason
+    proved : Interval, shape (P, 2)
+        Enclosures of crossings that exist and are unique in the matching row of ``domains``.
+    domains : Interval, shape (P, 2)
+    inner : Interval, shape (M, 2)
+        Boxes of which every point is a solution for some choice of the parameters.
+    boundary : Interval, shape (N, 2)
+        Boxes about which nothing is proved: the layer around a thick solution set, and boxes not treated.
+    rows : four ndarrays, shape (K, 4)
+        The same four as bounds x lo, x hi, y lo, y hi.
+    finished : bool
+        False if a limit ended the search; all boxes together hold every solution all the same.
+    tested, seconds : int, float
+        Work done.
+    """
+
+    problem: CircleEllipse
+    status: Status
+    reasons: tuple[Reason, ...]
+    rows: tuple[Array, Array, Array, Array] = field(repr=False)
+    finished: bool
+    tested: int
+    seconds: float = field(compare=False)
+
+    @cached_property
+    def proved(self) -> Interval:
+        """Enclosures of the crossings that are proved, shape (P, 2)."""
+        return _intervals(self.rows[0])
+
+    @cached_property
+    def domains(self) -> Interval:
+        """Boxes in which each of them is the only crossing, shape (P, 2)."""
+        return _intervals(self.rows[1])
+
+    @cached_property
+    def inner(self) -> Interval:
+        """Boxes of solutions, shape (M, 2)."""
+        return _intervals(self.rows[2])
+
+    @cached_property
+    def boundary(self) -> Interval:
+        """Boxes about which nothing is proved, shape (N, 2)."""
+        return _intervals(self.rows[3])
+
+    @property
+    def spectral_radius(self) -> float:
+        """``rho(|I - Y L|)`` on ``outer``, an estimate."""
+        return spectral_radius(self.problem, self.outer)
+
+    @property
+    def boxes(self) -> Interval:
+        """All boxes, shape (K, 2): every solution lies in one of them."""
+        return _joined(self.proved, self.inner, self.boundary)
+
+    @property
+    def outer(self) -> Interval:
+        """Hull of all boxes, shape (2,)."""
+        return _hull_of(self.boxes)
+
+    @property
+    def inside(self) -> Interval:
+        """Hull of the inner boxes, shape (2,): part of the solution set; empty if there are none."""
+        return _hull_of(self.inner)
+
+    @property
+    def four(self) -> Interval:
+        """Hulls of the crossings in all quadrants, copies on an axis merged; see `mirrored`."""
+        return mirrored(self.outer)
+
+
+def _joined(*parts: Interval) -> Interval:
+    return Interval.from_bounds(np.concatenate([p.lo for p in parts]), np.concatenate([p.hi for p in parts]))
+
+
+def _hull_of(boxes: Interval) -> Interval:
+    if len(boxes) == 0:
+        return Interval.empty(2)
+    return Interval.from_bounds(boxes.lo.min(axis=0), boxes.hi.max(axis=0))
+
+
+@checked
+def krawczyk_data(problem: CircleEllipse, power: int = 0) -> Array:
+    """Bounds of the two right-hand sides and of 1/a^2 and 1/b^2, lengths in units of ``2**power``, rounded outward."""
+    (low, high), level = _squared_radii(problem), problem.e2.hi
+    one = level.denominator
+    ends = [(*_scaled(*low, -2 * power), 0), (*_scaled(*high, -2 * power), 1)]
+    ends += [(one - level.numerator, one, 0), (one + level.numerator, one, 1)]
+    for r in (problem.a, problem.b):
+        for side, end in enumerate((r.hi, r.lo)):
+            ends.append((*_scaled(end.denominator**2, end.numerator**2, 2 * power), side))
+    return np.array([_bounds(top, bottom)[side] for top, bottom, side in ends])
+
+
+def _squared_radii(problem: CircleEllipse) -> list[tuple[int, int]]:
+    """Smallest and largest ``x^2 + y^2`` as quotients of integers, not reduced."""
+    e = problem.e1.hi
+    found = []
+    for sign, r in ((-1, problem.R1.lo), (1, problem.R1.hi)):
+        bottom = r.denominator**2
+        found.append((r.numerator**2 * e.denominator + sign * e.numerator * bottom, bottom * e.denominator))
+    return found
+
+
+def _scaled(top: int, bottom: int, power: int) -> tuple[int, int]:
+    """Multiply a quotient by ``2**power``."""
+    return (top << power, bottom) if power >= 0 else (top, bottom << -power)
+
+
+def _bounds(top: int, bottom: int) -> tuple[float, float]:
+    """Return the tightest doubles around a quotient of integers (``bottom > 0``), which need not be reduced."""
+    try:
+        nearest = top / bottom  # correctly rounded
+    except OverflowError:
+        return (math.nextafter(math.inf, 0.0), math.inf) if top > 0 else (-math.inf, -math.nextafter(math.inf, 0.0))
+    n, d = nearest.as_integer_ratio()
+    excess = n * bottom - top * d
+    low = math.nextafter(nearest, -math.inf) if excess > 0 else nearest
+    return low, math.nextafter(nearest, math.inf) if excess < 0 else nearest
+
+
+@checked
+def krawczyk_boxes(
+    problem: CircleEllipse, *, tolerance: Real = 1e-6, max_boxes: Real = 20_000, max_seconds: Real = 60.0
+) -> CrossingBoxes:
+    """Solve the problem by bisection and Krawczyk's test in (x, y).
+
+    Parameters
+    ----------
+    problem : CircleEllipse
+    tolerance : float
+        Boxes with both sides below ``tolerance`` times the side of the start box are not cut further.
+    max_boxes : int
+        Limit on the boxes tested; waiting boxes are then reported as boundary.
+    max_seconds : float
+        Limit on the run time, looked at every few thousand boxes.
+
+    Returns
+    -------
+    CrossingBoxes
+        Certified, whatever the limit.
+
+    Raises
+    ------
+    IntervalError
+        For limits that are not positive, and more than 20 million boxes.
+    GraphsynthError
+        If the processor's rounding has been changed.
+
+    Examples
+    --------
+    >>> from graphsynth.jamming.intersection import circle_ellipse
+    >>> found = krawczyk_boxes(circle_ellipse(5, 6, 4, eps="1e-9"))
+    >>> found.status.name, len(found.four), found.finished
+    ('UNIQUE', 4, True)
+    """
+    check_rounding()
+    for name, value in (("tolerance", tolerance), ("max_boxes", max_boxes), ("max_seconds", max_seconds)):
+        if not value > 0:
+            raise IntervalError(f"{name} = {value} must be positive; give a number above 0")
+    if not isinstance(max_boxes, int | np.integer) or max_boxes > _MOST_BOXES:
+        raise IntervalError(
+            f"max_boxes = {max_boxes} must be an integer of at most {_MOST_BOXES}; use fewer, or a tolerance"
+        )
+    from graphsynth.jamming.intersection import kernels
+
+    begin = perf_counter()
+    side, power = _start_side(problem)
+    queue, state = np.empty((2 * max_boxes + 2, 4)), np.zeros(5, dtype=np.int64)
+    queue[0], state[kernels.TAIL] = (0.0, side, 0.0, side), 1
+    kept, inner = np.empty((max_boxes + 1, 4)), np.zeros(max_boxes + 1, dtype=np.bool_)
+    proved, data = np.empty((_MOST_PROVED, 8)), krawczyk_data(problem, power)
+    seconds = 0.0
+    while state[kernels.HEAD] < state[kernels.TAIL] and state[kernels.TESTED] < max_boxes and seconds < max_seconds:
+        limit = min(int(state[kernels.TESTED]) + _BATCH, max_boxes)
+        kernels.search(queue, state, kept, inner, proved, data, tolerance * side, limit)
+        seconds = perf_counter() - begin
+    head, tail, tested, found, count = state.tolist()
+    within, layer = kept[:count], queue[head:tail]
+    if count:
+        solved = inner[:count]
+        within, layer = within[solved], np.concatenate([within[~solved], layer])
+    parts = [_carried(part, power) for part in (proved[:found, 4:], proved[:found, :4], within, layer)]
+    return _outcome(problem, parts, head == tail, tested, seconds, tested >= max_boxes)
+
+
+def _start_side(problem: CircleEllipse) -> tuple[float, int]:
+    """Side of the start box in units of ``2**power``, about 1: the same boxes for every unit of length."""
+    top, bottom = _squared_radii(problem)[1]
+    power = (top.bit_length() - bottom.bit_length()) // 2
+    if abs(power) > _MOST_POWER:
+        raise IntervalError(
+            f"R1 = {float(problem.R1.hi)} is beyond the range for boxes; choose a unit of length nearer to it"
+        )
+    square = _bounds(*_scaled(top, bottom, -2 * power))[1]
+    return math.nextafter(math.sqrt(square), math.inf), power
+
+
+def _carried(rows: Array, power: int) -> Array:
+    """Multiply boxes by ``2**power``; bounds that become subnormal and are rounded move outward."""
+    if len(rows) == 0 or power >= 0:
+        return rows * 2.0**power
+    moved = np.ldexp(rows, power)
+    lost = np.ldexp(moved, -power) - rows
+    side = np.tile([-1.0, 1.0], rows.shape[1] // 2)
+    return np.asarray(np.where(lost * side < 0.0, np.nextafter(moved, side * np.inf), moved))
+
+
+def _intervals(rows: Array) -> Interval:
+    return Interval.from_bounds(rows[:, ::2], rows[:, 1::2])
+
+
+def _outcome(
+    problem: CircleEllipse, parts: list[Array], finished: bool, tested: int, seconds: float, full: bool
+) -> CrossingBoxes:
+    """Drop boxes that a proved crossing stands for, and say what is known."""
+    enclosures, domains, inner, rest = parts
+    for domain in domains if len(rest) else ():
+        for_it = (rest[:, ::2] >= domain[::2]).all(axis=1) & (rest[:, 1::2] <= domain[1::2]).all(axis=1)
+        rest = rest[~for_it]
+    left = len(rest) + len(inner) > 0
+    if len(domains):
+        status = Status.EXISTS if left or len(domains) > 1 else Status.UNIQUE
+    else:
+        status = Status.UNDECIDED if left else Status.EMPTY
+    reasons = [Reason.CROSSING] if status is Status.UNIQUE else []
+    if status is Status.EMPTY:
+        outside = problem.circle_bounds.lo > problem.a.lo**2
+        reasons.append(Reason.CIRCLE_OUTSIDE if outside else Reason.CIRCLE_INSIDE)
+    elif left:
+        reasons.append(Reason.RESOLUTION if finished else Reason.BOXES if full else Reason.SECONDS)
+    rows = (enclosures, domains, inner, rest)
+    return CrossingBoxes(problem, status, tuple(reasons), rows, finished, tested, seconds)

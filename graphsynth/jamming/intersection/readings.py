@@ -1,0 +1,200 @@
+"""The four readings of "the ellipse" of the source (specification lambda_and_jamming, section 5.1)."""
+
+from __future__ import annotations
+
+from enum import Enum
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import checked, finite_array
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.areas import CrescentAreas, ellipse_circle_stable, lid_area, surrogate_areas
+from graphsynth.jamming.bearing.bearing import Bearing
+from graphsynth.jamming.intersection.exact import Range, exact_range, root_bounds
+from graphsynth.jamming.intersection.problem import CircleEllipse, bearing_radii, circle_ellipse, surrogate_problem
+
+__all__ = ["Reading", "TiltedEllipse", "reading_areas", "reading_ellipse", "reading_problem"]
+
+Array = NDArray[np.float64]
+
+
+class Reading(Enum):
+    """Which ellipse stands for the tilted part, against which circle.
+
+    Members
+    -------
+    IMAGE (E1)
+        Projection of the tilted hole centred on the axis, against the bearing.
+    SECTION (E2)
+        Section of the tilted bearing, against the hole.
+    LID (E3)
+        Projection of the rim of the tilted hole at one lid, shifted by ``h sin t``, against the bearing.  The default:
+        the only one whose area is the interference of condition B.
+    SURROGATE (E4)
+        Centred ellipse that touches the near side of the lid, against the bearing: right onset, wrong area.
+    """
+
+    IMAGE = "E1"
+    SECTION = "E2"
+    LID = "E3"
+    SURROGATE = "E4"
+
+
+class TiltedEllipse(NamedTuple):
+    """Ellipse in the plane perpendicular to the other part's axis, the direction of the tilt first; mm.
+
+    ``centre``: place of the centre along the tilt; ``along``, ``across``: semi-axes; ``circle``: radius of the circle
+    that it is compared with.
+    """
+
+    centre: Array
+    along: Array
+    across: Array
+    circle: float
+
+
+def _tilt(sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
+    return np.abs(finite_array("sine", sine, nan=True)), finite_array("cosine", cosine, nan=True)
+
+
+@checked
+def reading_ellipse(
+    bearing: Bearing, sine: ArrayLike, cosine: ArrayLike, reading: Reading = Reading.LID, lid: int = 1
+) -> TiltedEllipse:
+    """Return the ellipse of a reading for the sine and cosine of the tilt.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    sine, cosine : array_like, shape (...)
+    reading : Reading
+    lid : {1, -1}
+        For E3: the lid at which the shift is ``+h sin t`` or ``-h sin t``.
+
+    Returns
+    -------
+    TiltedEllipse
+        Centre and semi-axes, mm, of the same shape (estimated: floating point).
+
+    Raises
+    ------
+    GeometryError
+        For another ``lid``.
+
+    Examples
+    --------
+    >>> found = reading_ellipse(Bearing(), 0.6, 0.8)
+    >>> float(found.centre), round(float(found.along), 9)
+    (3.0, 14.024)
+    """
+    if lid not in (1, -1):
+        raise GeometryError(f"lid = {lid!r} must be +1 or -1")
+    S, C = _tilt(sine, cosine)
+    R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
+    zero, one = np.zeros_like(S * C), np.ones_like(S * C)
+    if reading is Reading.IMAGE:
+        return TiltedEllipse(zero, Rh * C * one, Rh * one, R)
+    if reading is Reading.SECTION:
+        with np.errstate(divide="ignore"):
+            return TiltedEllipse(zero, R / C * one, R * one, Rh)
+    if reading is Reading.LID:
+        return TiltedEllipse(lid * h * S * one, Rh * C * one, Rh * one, R)
+    return TiltedEllipse(zero, Rh * C - h * S, Rh * one, R)
+
+
+@checked
+def reading_areas(
+    bearing: Bearing, sine: ArrayLike, cosine: ArrayLike, reading: Reading = Reading.LID
+) -> CrescentAreas:
+    """Both differences of ellipse and circle for a reading, mm^2; stable closed forms (estimated, not certified).
+
+    For E2 the interference is the ellipse outside the circle, for the others the circle outside the ellipse.  NaN where
+    the ellipse does not exist.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        Dimensions in millimetres.
+    sine, cosine : array_like, shape (...)
+        Of the tilt.
+    reading : Reading, optional
+        Which ellipse; the lid E3 by default.
+
+    Returns
+    -------
+    CrescentAreas
+        Of the same shape, mm^2.
+
+    Examples
+    --------
+    >>> [round(float(a), 12) for a in reading_areas(Bearing(), 0.0, 1.0, Reading.LID)]
+    [3.301499719658, 0.0]
+    """
+    S, C = _tilt(sine, cosine)
+    R, Rh, c = bearing.Rb, bearing.Rh, bearing.clearance
+    bend = S * S / (1.0 + C)
+    if reading is Reading.SURROGATE:
+        return surrogate_areas(bearing, S, C)
+    if reading is Reading.IMAGE:
+        defined = C > 0.0
+        return _masked(ellipse_circle_stable(R, c, np.where(defined, Rh * bend - c, 0.0)), defined)
+    if reading is Reading.SECTION:
+        defined = C > 0.0
+        longer = (R * bend - c * C) / np.where(defined, C, 1.0)
+        return _masked(ellipse_circle_stable(Rh, np.where(defined, longer, 0.0), c), defined)
+    jam = lid_area(bearing, S, C)
+    return CrescentAreas(jam + np.pi * (c * (2.0 * R + c) - Rh * Rh * bend), jam)
+
+
+def _masked(areas: CrescentAreas, defined: NDArray[np.bool_]) -> CrescentAreas:
+    return CrescentAreas(*(np.where(defined, area, np.nan) for area in areas))
+
+
+@checked
+def reading_problem(
+    bearing: Bearing, sine: Any, reading: Reading, e1: Any = 0, e2: Any = 0, *, eps: Any = None
+) -> CircleEllipse:
+    """Pose the crossing problem for a centred reading: E1, E2 or E4, with x along the long axis.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        Its dimensions are read as the decimals they print as.
+    sine : number, text or Interval
+        Sine of the tilt.
+    reading : Reading
+        One of the centred ones.
+    e1, e2, eps : as for `circle_ellipse`
+
+    Returns
+    -------
+    CircleEllipse
+        The problem, its numbers exact.
+
+    Raises
+    ------
+    GeometryError
+        For E3, whose ellipse is not centred; for a tilt at which the ellipse does not exist.
+
+    Examples
+    --------
+    >>> round(float(reading_problem(Bearing(), "0.6", Reading.IMAGE).b.lo), 9)
+    14.024
+    """
+    if reading is Reading.LID:
+        raise GeometryError("the ellipse of reading E3 (LID) is not centred; use lid_area, or E4 (SURROGATE)")
+    if reading is Reading.SURROGATE:
+        return surrogate_problem(bearing, sine, e1, e2, eps=eps)
+    low, high = exact_range("sine", sine)
+    most = max(abs(low), abs(high))
+    least = Fraction(0) if low <= 0 <= high else min(abs(low), abs(high))
+    if most >= 1:
+        raise GeometryError(f"sine = {float(most)}: the ellipse of {reading.value} exists for |sine| < 1 only")
+    cosine = Range(root_bounds(1 - most * most, 128).lo, root_bounds(1 - least * least, 128).hi)
+    R, Rh, _ = bearing_radii(bearing)
+    if reading is Reading.IMAGE:
+        return circle_ellipse(R, Rh, (Rh * cosine.lo, Rh * cosine.hi), e1, e2, eps=eps)
+    return circle_ellipse(Rh, (R / cosine.hi, R / cosine.lo), R, e1, e2, eps=eps)

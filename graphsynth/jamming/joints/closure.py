@@ -1,0 +1,230 @@
+"""Loops and bodies: the small-tilt closure of any planar mechanism.
+
+Body i has the tilt vector ``omega_i`` and the axial displacement ``w_i``: ``z_i(r) = w_i + cross(omega_i, r)``.  At
+joint j between bodies a and b, ``tau_j = omega_b - omega_a - d_j`` (d_j the misalignment of its axis) and
+``zeta_j = z_b(r_j) - z_a(r_j)``, both of b against a.
+
+A set of moments and axial forces in equilibrium on every moving body is a combination of loops: the loop l carries the
+wrench ``(M_l, f_l)`` about the origin, and joint j the sum ``(M, f)_j`` of the loops through it, with sign, so that its
+moment is ``m_j = M_j - f_j J(r_j)``, ``J(r) = (r_y, -r_x)``.  Equilibrium then holds identically in the positions.
+Specification, sections 9.2 to 9.4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.jamming.joints.limits import JointLimits, Limits, Misalignment
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+
+if TYPE_CHECKING:
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["Layout", "joint_places", "lay_out", "moment_rows", "work_row"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+ROUND, ROLL, PITCH = 0, 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What does not change with the pose.
+
+    Attributes
+    ----------
+    joints : tuple of int
+        Joints with any limit, by their number in the mechanism; the others are no part of the program.
+    pairs : ndarray, shape (joints, 2)
+        Bodies a and b.
+    incidence : ndarray, shape (loops, joints)
+        +1 where the loop passes the joint from a to b, -1 from b to a, else 0.
+    block_joint, block_axis : ndarray, shape (blocks,)
+        Every limit on tilt: its joint (position in ``joints``) and whether it is round, on roll, or on pitch.
+    limit, play : ndarray, shape (blocks,) and (joints,)
+        Nominal limits; 0 is rigid, infinite is none.
+    limit_range, play_range : ndarray, shape (2, blocks) and (2, joints)
+        Tolerance boxes.
+    misalignments : tuple of (int, Misalignment)
+        Position in ``joints`` and the misalignment, turned so that it is of b against a.
+    frame, bodies : int
+    """
+
+    joints: tuple[int, ...]
+    pairs: Ints
+    incidence: Array
+    block_joint: Ints
+    block_axis: Ints
+    limit: Array
+    play: Array
+    limit_range: Array
+    play_range: Array
+    misalignments: tuple[tuple[int, float, Misalignment], ...]
+    frame: int
+    bodies: int
+
+    @property
+    def loops(self) -> int:
+        """Number of independent loops."""
+        return len(self.incidence)
+
+
+def lay_out(mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Layout:
+    """Loops, blocks and limits of a mechanism."""
+    by_pair = {(min(t.base, t.link), max(t.base, t.link)): t for t in tilts}
+    kept = [k for k, own in enumerate(limits) if _holds(own) or mechanism.joints[k].pair in by_pair]
+    pairs = np.array([(mechanism.joints[k].a, mechanism.joints[k].b) for k in kept], dtype=np.intp).reshape(-1, 2)
+    blocks: list[tuple[int, int, float, float, float]] = []
+    for place, k in enumerate(kept):
+        own = limits[k]
+        if isinstance(own, JointLimits):
+            blocks.append((place, ROUND, own.tilt, *_of(own.tilt_range)))
+        else:
+            blocks.append((place, ROLL, own.roll, *_of(own.roll_range)))
+            blocks.append((place, PITCH, own.pitch, *_of(own.pitch_range)))
+    table = np.array(blocks, dtype=np.float64).reshape(-1, 5)
+    turned = []
+    for place, k in enumerate(kept):
+        joint = mechanism.joints[k]
+        if joint.pair in by_pair:
+            tilt = by_pair[joint.pair]
+            turned.append((place, 1.0 if tilt.base == joint.a else -1.0, tilt))
+    return Layout(
+        joints=tuple(kept), pairs=pairs, incidence=_loops(pairs, mechanism.graph.links, mechanism.frame),
+        block_joint=table[:, 0].astype(np.intp), block_axis=table[:, 1].astype(np.intp), limit=table[:, 2],
+        play=np.array([limits[k].play for k in kept]), limit_range=table[:, 3:].T.copy(),
+        play_range=np.array([_of(limits[k].play_range) for k in kept]).reshape(-1, 2).T.copy(),
+        misalignments=tuple(turned), frame=mechanism.frame, bodies=mechanism.graph.links,
+    )  # fmt: skip
+
+
+def _of(bounds: tuple[float, float] | None) -> tuple[float, float]:
+    assert bounds is not None  # filled when made
+    return bounds
+
+
+def _holds(own: Limits) -> bool:
+    tilts = (own.tilt,) if isinstance(own, JointLimits) else (own.roll, own.pitch)
+    return min(*tilts, own.play) < math.inf if len(tilts) > 1 else min(tilts[0], own.play) < math.inf
+
+
+def _loops(pairs: Ints, bodies: int, frame: int) -> Array:
+    """Fundamental loops of a breadth-first tree from the frame (and from every part it does not reach)."""
+    up: dict[int, tuple[int, int, float] | None] = {}  # body: (parent, joint, sign of the way down)
+    tree: set[int] = set()
+    for root in (frame, *range(bodies)):
+        if root in up:
+            continue
+        up[root] = None
+        queue = [root]
+        for body in queue:
+            for k, (a, b) in enumerate(pairs.tolist()):
+                for here, there, sign in ((a, b, 1.0), (b, a, -1.0)):
+                    if here == body and there not in up:
+                        up[there] = (body, k, sign)
+                        tree.add(k)
+                        queue.append(there)
+    rows = []
+    for k, (a, b) in enumerate(pairs.tolist()):
+        if k in tree:
+            continue
+        row = np.zeros(len(pairs))
+        row[k] = 1.0
+        for body, sense in ((a, 1.0), (b, -1.0)):  # down the tree to a, through the joint, and up from b
+            step = up[body]
+            while step is not None:
+                row[step[1]] += sense * step[2]
+                step = up[step[0]]
+        rows.append(row)
+    return np.array(rows).reshape(-1, len(pairs))
+
+
+def joint_places(mechanism: Mechanism, joints: tuple[int, ...], poses: Array) -> tuple[Array, Array, Array]:
+    """Positions, directions of guides, and directions of the bases, each (N, joints, 2), at poses (N, links, 3)."""
+    turn = np.exp(1j * poses[..., 2])
+    r = np.zeros((len(poses), len(joints)), dtype=np.complex128)
+    e, base = np.ones_like(r), np.ones((*r.shape, 2), dtype=np.complex128)
+    for column, k in enumerate(joints):
+        joint = mechanism.joints[k]
+        link, at = (joint.a, joint.at_a) if isinstance(joint, Revolute) else (joint.b, joint.at_b)
+        r[:, column] = poses[:, link, 0] + 1j * poses[:, link, 1] + turn[:, link] * complex(*at)
+        if isinstance(joint, Prismatic | PinSlot):
+            e[:, column] = turn[:, joint.a] * np.exp(1j * joint.angle_a)
+        base[:, column, 0], base[:, column, 1] = turn[:, joint.a], turn[:, joint.b]
+    return (np.stack([r.real, r.imag], -1), np.stack([e.real, e.imag], -1), np.stack([base.real, base.imag], -1))
+
+
+def shifts(layout: Layout, base: Array, extra: float = 0.0) -> Array:
+    """Misalignments d_j in the plane, (N, joints, 2); ``extra`` turns every direction (radians)."""
+    d = np.zeros((*base.shape[:2], 2))
+    for place, sign, tilt in layout.misalignments:
+        side = 0 if sign > 0 else 1
+        angle = tilt.direction + extra
+        own = tilt.alpha * (math.cos(angle) + 1j * math.sin(angle)) * (base[:, place, side] @ np.array([1.0, 1j]))
+        d[:, place, 0], d[:, place, 1] = sign * own.real, sign * own.imag
+    return d
+
+
+def moment_rows(layout: Layout, r: Array, e: Array) -> Array:
+    """Matrix of all blocks' moments by the loop wrenches ``(M_x, M_y, f)``, shape (N, blocks, 2, 3 loops)."""
+    C = layout.incidence
+    loops = layout.loops
+    at, axis = layout.block_joint, layout.block_axis
+    rows = np.zeros((len(r), len(at), 2, loops, 3))
+    through = C[:, at].T[None, :, :]
+    rows[:, :, 0, :, 0] = rows[:, :, 1, :, 1] = through
+    rows[:, :, 0, :, 2] = -through * r[:, at, 1, None]
+    rows[:, :, 1, :, 2] = through * r[:, at, 0, None]
+    flat = rows.reshape(len(r), len(at), 2, 3 * loops)
+    lean = e[:, at]
+    along = lean[:, :, 0, None] * flat[:, :, 0] + lean[:, :, 1, None] * flat[:, :, 1]
+    across = -lean[:, :, 1, None] * flat[:, :, 0] + lean[:, :, 0, None] * flat[:, :, 1]
+    for kind, value in ((ROLL, along), (PITCH, across)):
+        flat[:, axis == kind, 0] = value[:, axis == kind]
+        flat[:, axis == kind, 1] = 0.0
+    return flat
+
+
+def force_rows(layout: Layout) -> Array:
+    """Axial forces of the joints by the loop wrenches, shape (joints, 3 loops)."""
+    rows = np.zeros((len(layout.joints), layout.loops, 3))
+    rows[:, :, 2] = layout.incidence.T
+    return rows.reshape(len(layout.joints), -1)
+
+
+def work_row(layout: Layout, r: Array, d: Array) -> Array:
+    """Work of the misalignments by the loop wrenches: ``W = sum m_j . d_j``, shape (N, 3 loops)."""
+    rows = np.zeros((len(r), layout.loops, 3))
+    C = layout.incidence
+    rows[:, :, 0], rows[:, :, 1] = d[:, :, 0] @ C.T, d[:, :, 1] @ C.T
+    rows[:, :, 2] = (d[:, :, 1] * r[:, :, 0] - d[:, :, 0] * r[:, :, 1]) @ C.T
+    return rows.reshape(len(r), -1)
+
+
+def body_rows(layout: Layout, r: Array, e: Array) -> tuple[Array, Array]:
+    """Body form: tilts of the blocks (N, blocks, 2, 3 bodies) and slips (N, joints, 3 bodies) by ``(omega, w)``."""
+    count = len(r)
+    slip = np.zeros((count, len(layout.joints), layout.bodies, 3))
+    tilt = np.zeros((count, len(layout.joints), 2, layout.bodies, 3))
+    for place, (a, b) in enumerate(layout.pairs.tolist()):
+        for body, sign in ((a, -1.0), (b, 1.0)):
+            if body == layout.frame:
+                continue
+            tilt[:, place, 0, body, 0] = tilt[:, place, 1, body, 1] = sign
+            slip[:, place, body, 0], slip[:, place, body, 1] = sign * r[:, place, 1], -sign * r[:, place, 0]
+            slip[:, place, body, 2] = sign
+    at = layout.block_joint
+    flat = tilt.reshape(count, len(layout.joints), 2, -1)[:, at]
+    lean = e[:, at]
+    along = lean[:, :, 0, None] * flat[:, :, 0] + lean[:, :, 1, None] * flat[:, :, 1]
+    across = -lean[:, :, 1, None] * flat[:, :, 0] + lean[:, :, 0, None] * flat[:, :, 1]
+    for kind, value in ((ROLL, along), (PITCH, across)):
+        mask = layout.block_axis == kind
+        flat[:, mask, 0], flat[:, mask, 1] = value[:, mask], 0.0
+    return flat, slip.reshape(count, len(layout.joints), -1)

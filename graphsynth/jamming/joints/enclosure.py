@@ -1,0 +1,415 @@
+"""Bounds of the factor in intervals: from a system in equilibrium below, from a closed system of tilts above.
+
+Both start from floating-point numbers that need not be right.  Below: loop wrenches are in equilibrium whatever the
+positions (`graphsynth.jamming.joints.closure`); where a joint must carry no moment or no force, the wrenches are
+corrected by an enclosed linear solve.  Above: the tilts are corrected by an enclosed linear solve until every loop
+closes, for every position in the box.  Then limits and work are evaluated with outward rounding.
+Specification, sections 9.4 and 9.5.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals import Dual, Interval, cos, sin
+from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Layout, moment_rows
+from graphsynth.jamming.joints.linear import enclosed_solve, points
+from graphsynth.jamming.joints.program import PoseSolution, Units
+
+if TYPE_CHECKING:
+    from graphsynth.jamming.joints.exact import Neglected
+
+__all__ = ["Moving", "Pieces", "factor_bounds", "lower_bounds", "shifts_enclosed", "start_tilts", "upper_bounds"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+#: x and y of every joint, intervals or duals of shape (N,).
+Columns: TypeAlias = list[tuple[Any, Any]]
+
+
+class Moving(NamedTuple):
+    """The same at the middle of each piece, their derivatives by the input over it, and the input less its middle.
+
+    Lets the closure be bounded by the mean value theorem: joints that move together do not count as if each moved
+    alone.  ``sound`` (N,) tells where all of it is proved; elsewhere it is not used.
+    """
+
+    r: Interval
+    e: Interval
+    d: Interval
+    r_slope: Interval
+    e_slope: Interval
+    d_slope: Interval
+    step: Interval
+    sound: Mask
+
+
+class Pieces(NamedTuple):
+    """Positions, guide directions and misalignments in intervals, each (N, joints, 2)."""
+
+    r: Interval
+    e: Interval
+    d: Interval
+    moving: Moving | None = None
+
+
+def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
+    """Enclose the misalignments over their tolerance boxes; ``base`` (N, joints, 2, 2) directions of links a and b."""
+    count, joints = base.shape[:2]
+    zero = Interval.zeros((count,))
+    columns = [Interval.zeros((count, 2)) for _ in range(joints)]
+    for place, sign, tilt in layout.misalignments:
+        assert tilt.alpha_range is not None and tilt.direction_range is not None  # filled when made
+        alpha = Interval.from_bounds(*tilt.alpha_range) * sign
+        direction = Interval.from_bounds(*tilt.direction_range)
+        c, s = cos(direction) * alpha, sin(direction) * alpha
+        turn = base[:, place, 0 if sign > 0 else 1]
+        x, y = turn[:, 0], turn[:, 1]
+        columns[place] = Interval.stack([x * c - y * s + zero, x * s + y * c + zero], axis=-1)
+    return Interval.stack(columns, axis=1) if joints else Interval.zeros((count, 0, 2))
+
+
+def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
+    """Certified bounds of the factor (mode "scale") over boxes of positions, misalignments and limits.
+
+    Parameters
+    ----------
+    layout : Layout
+        Its ``limit_range`` and ``play_range`` are part of the box.
+    at : Pieces
+    found : PoseSolution
+        Of `solve_poses` with mode "scale" near the middle of the boxes; any numbers give valid bounds.
+
+    Returns
+    -------
+    lower, upper : ndarray, shape (N,)
+        For every member of the box ``lower <= T <= upper``; 0 and infinity where nothing is proved.
+    """
+    return lower_bounds(layout, at, found), upper_bounds(layout, at, found)
+
+
+def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
+    """Bounds from equilibrium; see `factor_bounds`.  With ``exact`` above 1 only where exact tilts jam too."""
+    if layout.loops == 0:
+        return np.zeros(len(at.r))
+    length = found.units.length
+    if exact is not None:
+        at = Pieces(_around(at.r, exact.r), _around(at.e, exact.e), _around(at.d, exact.d))
+    with np.errstate(all="ignore"):
+        value = _lower(layout, (at.r - Interval(found.units.centre)) / length, at, found, length, exact)
+    return value if exact is None else np.where(exact.sound, value, 0.0)
+
+
+def upper_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
+    """Bounds from closure; see `factor_bounds`.  With ``exact`` below 1 only where exact tilts are free too."""
+    if layout.loops == 0:
+        return np.zeros(len(at.r))
+    length = found.units.length
+    with np.errstate(all="ignore"):
+        value = _upper(layout, (at.r - Interval(found.units.centre)) / length, at, found, length, exact)
+    return value if exact is None else np.where(exact.sound, value, np.inf)
+
+
+def _around(values: Interval, radius: Array) -> Interval:
+    """Widen pairs (N, joints, 2) by (N, joints)."""
+    return values + Interval.from_bounds(-radius, radius).reshape(*radius.shape, 1)
+
+
+def _lower(
+    layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float, exact: Neglected | None
+) -> Array:
+    y, fine = _without_forbidden(layout, r, at.e, found.y)
+    wrench = _by_joint(layout, y)
+    m = (wrench[:, :, 0] - wrench[:, :, 2] * r[:, :, 1], wrench[:, :, 1] + wrench[:, :, 2] * r[:, :, 0])
+    work = Interval.zeros((len(found.y),))
+    for place, _, _ in layout.misalignments:
+        work = work + m[0][:, place] * at.d[:, place, 0] + m[1][:, place] * at.d[:, place, 1]
+    cost = Interval.zeros((len(found.y),))
+    limits = np.broadcast_to(layout.limit_range[1], (len(y), len(layout.limit))) if exact is None else exact.wide
+    for block, place in enumerate(layout.block_joint.tolist()):
+        limit = limits[:, block]
+        if not limit.any() or np.isinf(layout.limit[block]):  # rigid costs nothing; without limit the moment is zero
+            continue
+        size = _size(layout.block_axis[block], (m[0][:, place], m[1][:, place]), at.e[:, place])
+        cost = cost + size * Interval.from_bounds(np.zeros(len(y)), limit)
+    for place, play in enumerate(layout.play_range[1].tolist()):
+        if play > 0.0 and np.isfinite(layout.play[place]):
+            cost = cost + abs(wrench[:, place, 2]) * Interval.from_bounds(0.0, play) / length
+    if exact is not None:
+        rest = Interval.from_bounds(np.zeros_like(exact.lift), exact.lift)
+        cost = cost + (abs(y[:, 2::3]) * rest).sum(-1) / length
+    least = work.mig
+    quotient = (Interval.from_bounds(least, least) / Interval.from_bounds(cost.hi, cost.hi)).lo
+    quotient = np.where((cost.hi == 0.0) & (least > 0.0), np.inf, quotient)
+    sound = fine & np.isfinite(least) & (least > 0.0) & ~np.isnan(quotient)
+    return np.where(sound, np.maximum(quotient, 0.0), 0.0)
+
+
+def _size(axis: float, v: tuple[Interval, Interval], e: Interval) -> Interval:
+    """Length of a vector, or its component along or across the guide, as the limit takes it."""
+    if axis == ROUND:
+        return (v[0].sqr() + v[1].sqr()).sqrt()
+    if axis == ROLL:
+        return abs(v[0] * e[:, 0] + v[1] * e[:, 1])
+    assert axis == PITCH
+    return abs(v[1] * e[:, 0] - v[0] * e[:, 1])
+
+
+def _by_joint(layout: Layout, y: Interval) -> Interval:
+    """Sum of the loop wrenches (N, 3 loops) through every joint, (N, joints, 3)."""
+    columns = []
+    for place in range(len(layout.joints)):
+        total = Interval.zeros((len(y), 3))
+        for loop, sign in enumerate(layout.incidence[:, place].tolist()):
+            if sign != 0.0:
+                part = y[:, 3 * loop : 3 * loop + 3]
+                total = total + part if sign > 0.0 else total - part
+        columns.append(total)
+    return Interval.stack(columns, axis=1)
+
+
+def _without_forbidden(layout: Layout, r: Interval, e: Interval, y: Array) -> tuple[Interval, Mask]:
+    """Correct y until joints without limit carry exactly nothing; False where that is not proved."""
+    exact = Interval.from_bounds(y, y)
+    every = np.ones(len(y), dtype=bool)
+    rows = _forbidden(layout, r, e)
+    if rows is None:
+        return exact, every
+    direction = rows.mid
+    matrix = (rows.reshape(*rows.shape[:2], 1, rows.shape[2]) * points(direction[:, None])).sum(-1)
+    right = -(rows * points(y[:, None])).sum(-1)
+    step, fine = enclosed_solve(matrix, right)
+    change = (step.reshape(*step.shape, 1) * points(direction)).sum(1)
+    return exact + change, fine
+
+
+def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
+    """Rows (N, rows, 3 loops) of moments and forces that must vanish; equal rows once."""
+    blocks = np.flatnonzero(np.isinf(layout.limit))
+    count, loops = len(r), layout.loops
+    lo, hi = [], []
+
+    def add(entries: list[list[Interval]]) -> None:
+        flat = [value + Interval.zeros((count,)) for loop in entries for value in loop]
+        row = Interval.stack(flat, axis=-1)
+        lo.append(row.lo)
+        hi.append(row.hi)
+
+    zero, one = Interval(0), Interval(1)
+    for block in blocks.tolist():
+        place = int(layout.block_joint[block])
+        x, y, signs = r[:, place, 0], r[:, place, 1], [int(s) for s in layout.incidence[:, place]]
+        plain = (one, zero, -y), (zero, one, x)
+        if layout.block_axis[block] == ROUND:
+            wanted = plain
+        else:
+            a, b = e[:, place, 0], e[:, place, 1]
+            if layout.block_axis[block] == PITCH:
+                a, b = -b, a
+            wanted = (tuple(plain[0][i] * a + plain[1][i] * b for i in range(3)),)  # type: ignore[assignment]
+        for row in wanted:
+            add([[value * s for value in row] for s in signs])
+    columns = {tuple((c * (c[np.flatnonzero(c)[0]] if c.any() else 1.0)).tolist())
+               for c in layout.incidence.T[np.isinf(layout.play)]}  # fmt: skip
+    for column in sorted(columns):
+        if any(column):
+            add([[zero, zero, Interval(int(s))] for s in column])
+    if not lo:
+        return None
+    assert loops == len(layout.incidence)
+    return Interval.from_bounds(np.stack(lo, axis=1), np.stack(hi, axis=1))
+
+
+def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
+    """Tilts (N, blocks, 2) and slips (N, joints) from which a closed system is sought, in floats."""
+    tau, zeta = np.nan_to_num(found.tau), np.nan_to_num(found.zeta)
+    tau[:, layout.limit == 0.0], zeta[:, layout.play == 0.0] = 0.0, 0.0
+    tau[:, layout.block_axis != ROUND, 1] = 0.0
+    length = found.units.length
+    return _fill_free(layout, (at.r.mid - found.units.centre) / length, at, (tau, zeta), length)
+
+
+def _upper(
+    layout: Layout, r: Interval, at: Pieces, found: PoseSolution, length: float, exact: Neglected | None
+) -> Array:
+    tau, zeta = start_tilts(layout, at, found)
+    tilts, slips = _directions(layout, r.mid, at.e.mid, found, length)
+    off = _off(layout, at, r, points(tau), points(zeta), found.units)
+    e = at.e
+    if exact is not None:
+        rest = _disturbed(layout, r, at, tau, length, exact)
+        off = off + Interval.from_bounds(-rest, rest)
+        r, e = _around(r, (points(exact.r) / length).hi), _around(e, exact.e)
+    columns = tilts.shape[-1]
+    places, guides = _columns(r), _columns(e)
+    parts = [
+        _stacked(_closure(layout, places, guides, points(tilts[..., c]), points(slips[..., c]), length))
+        for c in range(columns)
+    ]
+    matrix = Interval.stack(parts, axis=-1)
+    step, fine = enclosed_solve(matrix, -off)
+    tau_all = points(tau) + (points(tilts) * step.reshape(len(step), 1, 1, columns)).sum(-1)
+    zeta_all = points(zeta) + (points(slips) * step.reshape(len(step), 1, columns)).sum(-1)
+    worst = np.zeros(len(step))
+    count = len(step)
+    limits = np.broadcast_to(layout.limit_range[0], (count, len(layout.limit))) if exact is None else exact.narrow
+    plays = np.broadcast_to(layout.play_range[0], (count, len(layout.joints))) if exact is None else exact.play
+    for block in range(len(layout.limit)):
+        if layout.limit[block] == 0.0 or np.isinf(limits[:, block]).any():
+            continue
+        if layout.block_axis[block] == ROUND:
+            size = (tau_all[:, block, 0].sqr() + tau_all[:, block, 1].sqr()).sqrt()
+        else:
+            size = abs(tau_all[:, block, 0])
+        worst = np.maximum(worst, _ratio(size.hi, limits[:, block]))
+    for place in range(len(layout.joints)):
+        if layout.play[place] > 0.0 and np.isfinite(layout.play_range[0, place]):
+            worst = np.maximum(worst, _ratio(zeta_all[:, place].mag, plays[:, place]))
+    return np.where(fine & ~np.isnan(worst), worst, np.inf)
+
+
+def _disturbed(layout: Layout, r: Interval, at: Pieces, tau: Array, length: float, exact: Neglected) -> Array:
+    """Bound what exact tilts add to the closure of given tilts, (N, 3 loops).
+
+    The closure is linear in the tilts and bilinear with the positions: ``(r + dr) x (t + dt) - r x t``.
+    """
+    count = len(tau)
+    lean, change = np.zeros((2, count, len(layout.joints)))
+    for block, place in enumerate(layout.block_joint.tolist()):
+        size = np.abs(tau[:, block]).sum(axis=-1)
+        lean[:, place] += size
+        if layout.block_axis[block] != ROUND:
+            change[:, place] += size * exact.e[:, place]
+    lean += at.d.mag.sum(axis=-1)
+    change += exact.d
+    move = exact.r / length
+    lift = move * (lean + change) + r.mag.sum(axis=-1) * change
+    through = np.abs(layout.incidence).T
+    rest = np.empty((count, 3 * layout.loops))
+    rest[:, 0::3] = rest[:, 1::3] = change @ through
+    rest[:, 2::3] = lift @ through + exact.lift / length
+    return rest * (1.0 + 1e-12)  # for the rounding of a few dozen nonnegative terms
+
+
+def _ratio(size: Array, limit: Array) -> Array:
+    """Upper bound of size over limit; infinite for a limit that may be zero, unless the size is zero too."""
+    positive = limit > 0.0
+    quotient = (points(size) / points(np.where(positive, limit, 1.0))).hi
+    return np.where(positive, quotient, np.where(size > 0.0, np.inf, 0.0))
+
+
+def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length: float) -> tuple[Array, Array]:
+    """Return changes of tilts (N, blocks, 2, 3 loops) and slips (N, joints, 3 loops) that may correct the closure.
+
+    In proportion to the squares of the limits: the least change measured by what each joint has; joints without limit
+    take most.  Column k changes nearly the sum k of the closure alone, so no bound is lost in a change of basis.
+    """
+    loops = layout.loops
+    rows = moment_rows(layout, r, e)
+    finite = layout.limit[np.isfinite(layout.limit)].max(initial=0.0) or 1.0
+    weight = np.where(np.isinf(layout.limit), 100.0, (layout.limit / finite) ** 2)
+    tilts = rows * weight[:, None, None]
+    play = np.where(np.isinf(layout.play), 10.0 * finite * length, np.minimum(layout.play, 10.0 * finite * length))
+    share = (play / (length * finite)) ** 2
+    slips = np.zeros((len(r), len(layout.joints), 3 * loops))
+    slips[:, :, 2::3] = layout.incidence.T * (share * length)[:, None]
+    flat, lifts = rows.reshape(len(r), -1, 3 * loops), layout.incidence.T / length
+    effect = flat.transpose(0, 2, 1) @ tilts.reshape(flat.shape)
+    effect[:, 2::3] += lifts.T @ slips
+    inverse = np.linalg.pinv(effect, rcond=1e-14)
+    return tilts @ inverse[:, None], slips @ inverse
+
+
+def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array], length: float) -> tuple[Array, Array]:
+    """Give joints without limit the tilts and slips that close the loops, in floats."""
+    tau, zeta = start
+    blocks, joints = np.isinf(layout.limit), np.isinf(layout.play)
+    if not (blocks.any() or joints.any()):
+        return tau, zeta
+    count = len(r)
+    rows = moment_rows(layout, r, at.e.mid)[:, blocks].reshape(count, -1, 3 * layout.loops)
+    slips = np.zeros((count, int(joints.sum()), 3 * layout.loops))
+    slips[:, :, 2::3] = layout.incidence.T[joints]
+    middle = (_columns(points(value)) for value in (r, at.e.mid, at.d.mid))
+    places, guides, shift = middle
+    off = _stacked(_closure(layout, places, guides, points(tau), points(zeta), length, shift)).mid
+    both = np.concatenate([rows, slips], axis=1).transpose(0, 2, 1)
+    value = -(np.linalg.pinv(both, rcond=1e-12) @ np.nan_to_num(off)[:, :, None])[..., 0]
+    n = 2 * int(blocks.sum())
+    tau[:, blocks] = value[:, :n].reshape(count, -1, 2)
+    tau[:, layout.block_axis != ROUND, 1] = 0.0
+    zeta[:, joints] = value[:, n:] * length
+    return tau, zeta
+
+
+def _closure(
+    layout: Layout, r: Columns, e: Columns, tau: Interval, zeta: Interval, length: float, d: Columns | None = None
+) -> list[Any]:
+    """Sum up every loop (3 for each): tilts, tilts, slips over ``length``; misalignments d included if given."""
+    zero = Interval.zeros((len(tau),))
+    x: list[Any] = [zero] * len(layout.joints)
+    y: list[Any] = [zero] * len(layout.joints)
+    for block, place in enumerate(layout.block_joint.tolist()):
+        axis = layout.block_axis[block]
+        if axis == ROUND:
+            x[place], y[place] = x[place] + tau[:, block, 0], y[place] + tau[:, block, 1]
+        else:
+            own, (a, b) = tau[:, block, 0], e[place]
+            if axis == PITCH:
+                a, b = -b, a
+            x[place], y[place] = x[place] + a * own, y[place] + b * own
+    if d is not None:
+        for place, _, _ in layout.misalignments:
+            x[place], y[place] = x[place] + d[place][0], y[place] + d[place][1]
+    sums: list[Any] = []
+    for signs in layout.incidence.tolist():
+        parts: list[Any] = [zero] * 3
+        for place, sign in enumerate(signs):
+            if sign == 0.0:
+                continue
+            lift = r[place][0] * y[place] - r[place][1] * x[place] + zeta[:, place] / length
+            parts = [p + v if sign > 0.0 else p - v for p, v in zip(parts, (x[place], y[place], lift))]
+        sums += parts
+    return sums
+
+
+def _columns(values: Interval) -> Columns:
+    return [(values[:, k, 0], values[:, k, 1]) for k in range(values.shape[1])]
+
+
+def _moving_columns(values: Interval, slopes: Interval) -> Columns:
+    """Columns with their derivatives by the input."""
+    return [
+        (Dual(a, c.reshape(1, -1)), Dual(b, d.reshape(1, -1)))
+        for (a, b), (c, d) in zip(_columns(values), _columns(slopes))
+    ]
+
+
+def _off(layout: Layout, at: Pieces, scaled: Interval, tau: Interval, zeta: Interval, units: Units) -> Interval:
+    """Enclose what is missing from the closure of given tilts over a piece, (N, 3 loops)."""
+    length = units.length
+    off = _stacked(_closure(layout, _columns(scaled), _columns(at.e), tau, zeta, length, _columns(at.d)))
+    moving = at.moving
+    if moving is None:
+        return off
+    centre = Interval(units.centre)
+    at_middle = _closure(
+        layout, _columns((moving.r - centre) / length), _columns(moving.e), tau, zeta, length, _columns(moving.d)
+    )
+    sums = _closure(
+        layout, _moving_columns(scaled, moving.r_slope / length), _moving_columns(at.e, moving.e_slope), tau, zeta,
+        length, _moving_columns(at.d, moving.d_slope),
+    )  # fmt: skip
+    zero = Interval.zeros((len(tau),))
+    slopes = [value.grad[0] if isinstance(value, Dual) else zero for value in sums]
+    straight = _stacked([m + slope * moving.step for m, slope in zip(at_middle, slopes)])
+    better = off.intersect(straight)
+    use = moving.sound[:, None] & ~better.is_empty
+    return Interval.from_bounds(np.where(use, better.lo, off.lo), np.where(use, better.hi, off.hi))
+
+
+def _stacked(parts: list[Any]) -> Interval:
+    return Interval.stack(parts, axis=-1)

@@ -1,0 +1,331 @@
+"""What the small-tilt closure neglects, bounded: the step from a proof of first order to one with exact tilts.
+
+The exact model.  Link i has the orientation ``T(n_i) Rz(phi_i)``: n_i its normal, T the least rotation from the z axis
+to it, ``phi_i`` its twist.  At a joint the angle between the axes of both sides (the seat turned by its misalignment)
+is at most the limit (a guide: components of the relative rotation), and the centres lie at most the play apart along an
+axis of the joint.  Drivers, guides and gears prescribe twists.  With ``h`` the horizontal part of a normal and v the
+plane vector between two joints of a link, exactly
+
+    horizontal step = v - h (h . v) / (1 + cos),      vertical step = - h . v
+
+so the vertical closure is that of the small-tilt model at slightly moved positions, and the plane closure is disturbed
+by terms of second order.  Those are bounded here from the largest angles that the limits allow; how far they move the
+joints follows from the loop equations, over the box in which the plane assembly is the only one.
+Derivation: ``docs/explanation/coupled-jamming.md``.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals import Dual, Interval, Status, image, variables
+from graphsynth.intervals.dual import jacobian_of
+from graphsynth.jamming.joints.closure import ROUND, Layout
+from graphsynth.jamming.joints.linear import enclosed_solve
+from graphsynth.jamming.joints.positions import Moved, Positions
+from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
+
+if TYPE_CHECKING:
+    from graphsynth.jamming.joints.tubes import Tubes
+
+__all__ = ["Neglected", "neglected"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Largest angle of a link against the normal of the plane for which the bounds hold (their constants allow for it).
+LARGEST = 0.5
+#: Size of the box in which the disturbed assembly is proved the only one, over the movement expected.
+_ROOM = 2.0
+#: Allowance for the rounding of the sums below, all of them of a few dozen nonnegative terms.
+_ROUNDING = 1.0 + 1e-12
+
+
+class Neglected(NamedTuple):
+    """Bounds of what exact tilts change, per piece; lengths and radians.
+
+    ``r``, ``e``, ``d`` (N, joints): movement of a joint, turn of a guide, change of a misalignment.  ``lift`` (N,
+    loops): rest of the vertical closure.  ``wide`` and ``narrow`` (N, blocks): limits on linear tilts that every exact
+    tilt within its limit obeys, and that leave every exact tilt within its limit; ``play`` (N, joints) the latter for
+    slips.  ``sound`` (N,): whether all of it is proved.
+    """
+
+    r: Array
+    e: Array
+    d: Array
+    lift: Array
+    wide: Array
+    narrow: Array
+    play: Array
+    sound: Mask
+
+
+class _Angles(NamedTuple):
+    """Largest angles of every link (N, links) and joint (N, joints of the mechanism); misalignments and their bases.
+
+    ``seat`` (joints,) is the largest misalignment, ``base`` (joints,) the link that carries it, -1 without one.
+    """
+
+    link: Array
+    joint: Array
+    seat: Array
+    base: NDArray[np.intp]
+
+
+def neglected(
+    system: Positions, layout: Layout, tubes: Tubes, u: Interval, counted: Array, assumed: Array
+) -> Neglected:
+    """Bound what the small-tilt closure neglects over pieces of the input.
+
+    Parameters
+    ----------
+    system : Positions
+    layout : Layout
+    tubes : Tubes
+        Proved, (N,).
+    u : Interval, shape (N,)
+    counted : ndarray, shape (N, closing)
+    assumed : ndarray, shape (N, blocks)
+        Tilts below which a proof of freedom will keep all blocks, so that their limits need not be looked at; infinity
+        for a proof of a jam.
+    """
+    count = len(tubes.r)
+    blocks = np.minimum(layout.limit_range[1], assumed)
+    angles = _angles(system, layout, blocks)
+    small: Mask = np.asarray((angles.link < LARGEST).all(axis=1) & (angles.joint < LARGEST).all(axis=1))
+    angles = angles._replace(**{k: np.where(small[:, None], getattr(angles, k), 0.0) for k in ("link", "joint")})
+    lengths = _lengths(system, tubes, u)
+    slips, reached = _slips(system, layout, angles, lengths)
+    small &= reached
+    slips = np.where(small[:, None], slips, 0.0)
+    offset, twist = _disturbances(system, angles, lengths, slips)
+    moved_r, turned, sound = _movements(system, layout, tubes, u, counted, offset, twist)
+    kept = list(layout.joints)
+    moved_r = moved_r + offset[:, kept]
+    a = layout.pairs[:, 0]
+    along = np.stack([turned[:, link] for link in a], axis=1) if kept else np.zeros((count, 0))
+    shift = _shifts(layout, angles, turned)
+    wide, narrow = _limits(system, layout, angles, blocks)
+    lean = np.sin(_axis(system, angles))[:, kept]
+    play = layout.play_range[0] * (1.0 - 0.5 * lean**2) / _ROUNDING
+    lift = _rest(system, layout, angles, lengths, slips)
+    moved_r, along, shift, lift, wide = (value * _ROUNDING for value in (moved_r, along, shift, lift, wide))
+    return Neglected(moved_r, along, shift, lift, wide, narrow, play, np.asarray(sound & small))
+
+
+# -- angles and lengths ------------------------------------------------------------------------------------------------
+
+
+def _angles(system: Positions, layout: Layout, blocks: Array) -> _Angles:
+    """Largest angles: shortest paths from the frame through the joints whose tilt is bounded."""
+    mechanism = system.mechanism
+    joints, links = mechanism.joints, mechanism.graph.links
+    count = len(blocks)
+    tilt = np.full((count, len(joints)), np.inf)
+    for place, k in enumerate(layout.joints):
+        tilt[:, k] = np.sqrt((blocks[:, layout.block_joint == place] ** 2).sum(axis=1))
+    seat, base = np.zeros(len(joints)), np.full(len(joints), -1)
+    for place, sign, own in layout.misalignments:
+        assert own.alpha_range is not None  # filled when made
+        k = layout.joints[place]
+        seat[k] = max(abs(bound) for bound in (*own.alpha_range, own.alpha))
+        base[k] = joints[k].a if sign > 0 else joints[k].b
+    link = np.full((count, links), np.inf)
+    link[:, mechanism.frame] = 0.0
+    for _ in range(links):
+        for k, joint in enumerate(joints):
+            for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
+                link[:, there] = np.minimum(link[:, there], (link[:, here] + tilt[:, k] + seat[k]) * _ROUNDING)
+    between = np.stack([link[:, j.a] + link[:, j.b] + seat[k] for k, j in enumerate(joints)], axis=1)
+    return _Angles(link, np.minimum(tilt, between), seat, base)
+
+
+def _lengths(system: Positions, tubes: Tubes, u: Interval) -> Array:
+    """Largest distance between two joints of a link, (N, links); the link that carries a guide has its way added."""
+    mechanism, count = system.mechanism, len(tubes.r)
+    found = np.zeros((count, mechanism.graph.links))
+    for link in range(mechanism.graph.links):
+        ends = [complex(*(j.at_a if j.a == link else j.at_b)) for j in mechanism.joints if link in j.pair]
+        for p, q in combinations(ends, 2):
+            own = abs(p - q) + 2.0 * system.tolerance * (abs(p) + abs(q))
+            found[:, link] = np.maximum(found[:, link], own)
+    at = system.place([tubes.tight[:, k] for k in range(system.size)], system.driven(u))
+    for k, joint in enumerate(mechanism.joints):
+        if isinstance(joint, Prismatic | PinSlot):
+            A, B = system.ends(k, at)
+            way = ((B[0] - A[0]).sqr() + (B[1] - A[1]).sqr()).sqrt().hi
+            found[:, joint.a] += way / np.cos(LARGEST)
+    return found * _ROUNDING
+
+
+def _axis(system: Positions, angles: _Angles) -> Array:
+    """Largest angle of either axis of every joint against the normal, (N, joints of the mechanism)."""
+    joints = system.mechanism.joints
+    return np.stack(
+        [np.maximum(angles.link[:, j.a], angles.link[:, j.b]) + angles.seat[k] for k, j in enumerate(joints)], axis=1
+    )
+
+
+def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -> tuple[Array, Mask]:
+    """Largest slip of every joint: its play, or what the heights of both links leave where there is none."""
+    mechanism = system.mechanism
+    play = np.full(len(mechanism.joints), np.inf)
+    play[list(layout.joints)] = layout.play_range[1]
+    rise = lengths * np.sin(angles.link)
+    height = np.full_like(angles.link, np.inf)
+    height[:, mechanism.frame] = 0.0
+    for _ in range(mechanism.graph.links):
+        for k, joint in enumerate(mechanism.joints):
+            for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
+                own = height[:, here] + rise[:, here] + play[k]
+                height[:, there] = np.minimum(height[:, there], own)
+    top = height + rise
+    slips = []
+    for k, joint in enumerate(mechanism.joints):
+        slips.append(np.minimum(play[k], (top[:, joint.a] + top[:, joint.b]) / np.cos(LARGEST)))
+    found = np.stack(slips, axis=1) * _ROUNDING
+    return found, np.asarray(np.isfinite(found).all(axis=1))
+
+
+# -- the plane ---------------------------------------------------------------------------------------------------------
+
+
+def _disturbances(system: Positions, angles: _Angles, lengths: Array, slips: Array) -> tuple[Array, Array]:
+    """Bounds of the offset of the plane closure at every joint, and of the twist that a joint prescribes amiss.
+
+    Two rotations of tilts x and y make one of a tilt and a twist, at most half of ``x y (1 + small)``: the area of a
+    spherical triangle.
+    """
+    mechanism = system.mechanism
+    short = lengths * (1.0 - np.cos(angles.link))
+    lean = np.sin(_axis(system, angles))
+    driven = {driver.pair for driver in mechanism.drivers}
+    parents = {edge.joint: edge.parent for edge in system.edges}
+    offset, twist = np.zeros_like(slips), np.zeros_like(slips)
+    for k, joint in enumerate(mechanism.joints):
+        first, second = angles.link[:, joint.a], angles.link[:, joint.b]
+        before = parents.get(k)
+        offset[:, k] = slips[:, k] * lean[:, k]
+        offset[:, k] += short[:, joint.a] + short[:, joint.b] if before is None else short[:, before]
+        if isinstance(joint, Gear):
+            twist[:, k] = (first + second) ** 2
+        elif isinstance(joint, Prismatic) or joint.pair in driven:
+            alpha, base = float(angles.seat[k]), int(angles.base[k])
+            own = np.minimum(first, second) if base < 0 else angles.link[:, base]
+            twist[:, k] = own * alpha + (own + alpha) * angles.joint[:, k]
+    return offset * _ROUNDING, twist * _ROUNDING
+
+
+def _movements(
+    system: Positions, layout: Layout, tubes: Tubes, u: Interval, counted: Array, offset: Array, twist: Array
+) -> tuple[Array, Array, Mask]:
+    """Bound how far joints move (N, joints) and links turn (N, links) in the plane; whether one assembly is proved.
+
+    For every disturbance p the box has exactly one assembly; with ``F(x0, 0) = F(x, p) = 0`` the mean value theorem
+    gives ``F_x (x - x0) = - F_p p``.
+    """
+    count, n = len(tubes.r), system.size
+    amounts = np.concatenate([offset, offset, twist], axis=1)
+    width, q = n + amounts.shape[1], system.driven(u)
+    around = Interval.from_bounds(-amounts, amounts)
+
+    def rates(x: Interval) -> tuple[list[Any], Interval, Mask]:
+        """Unknowns with derivatives over a box, and how far its assembly moves."""
+        unknowns = variables(_beside(x, around))
+        rows = system.equations(unknowns[:n], q, counted, _moved(unknowns[n:]))
+        table = jacobian_of(rows, width, (count,))
+        return unknowns, *enclosed_solve(table[:, :, :n], -(table[:, :, n:] * around.reshape(count, 1, -1)).sum(-1))
+
+    sound = np.ones(count, dtype=np.bool_)
+    unknowns, rate = variables(_beside(tubes.tight, around)), Interval.zeros((count, 0))
+    with np.errstate(all="ignore"):
+        if n:
+            reach = _ROOM * rates(tubes.tight)[1].mag + 1e-12 * system.weights
+            box = tubes.tight + Interval.from_bounds(-reach, reach)
+            constants = _moved([around[:, k] for k in range(width - n)])
+            status = image(lambda x: system.equations(x, q, counted, constants), box).status
+            unknowns, rate, fine = rates(box)
+            sound = np.asarray(fine & (status == Status.UNIQUE))
+        change = Interval.stack([*(rate[:, k] for k in range(n)), *(around[:, k] for k in range(width - n))], axis=-1)
+        at = system.place(unknowns[:n], q, _moved(unknowns[n:]))
+
+        def size(value: Any) -> Array:
+            if not isinstance(value, Dual):
+                return np.zeros(count)
+            total = Interval.zeros((count,))
+            for k in range(width):
+                total = total + value.grad[k] * change[:, k]
+            return np.asarray(total.mag)
+
+        turned = np.stack([size(angle) for angle in at.angle], axis=1)
+        moves = []
+        for k in layout.joints:
+            A, B = system.ends(k, at)
+            ends = (A, B) if isinstance(system.mechanism.joints[k], Revolute) else (B,)
+            moves.append(np.max([np.hypot(size(x), size(y)) for x, y in ends], axis=0))
+    r = np.stack(moves, axis=1) if moves else np.zeros((count, 0))
+    return r * _ROUNDING, turned * _ROUNDING, sound
+
+
+def _beside(first: Interval, second: Interval) -> Interval:
+    return Interval.from_bounds(
+        np.concatenate([first.lo, second.lo], axis=1), np.concatenate([first.hi, second.hi], axis=1)
+    )
+
+
+def _moved(values: list[Any]) -> Moved:
+    third = len(values) // 3
+    return list(zip(values[:third], values[third : 2 * third], values[2 * third :]))
+
+
+# -- out of the plane --------------------------------------------------------------------------------------------------
+
+
+def _shifts(layout: Layout, angles: _Angles, turned: Array) -> Array:
+    """Change of every misalignment: a sine for the angle, the tilt of its base, and the turn of its base."""
+    found = np.zeros((len(turned), len(layout.joints)))
+    for place, _, _ in layout.misalignments:
+        k = layout.joints[place]
+        alpha, base = float(angles.seat[k]), int(angles.base[k])
+        own = angles.link[:, base]
+        found[:, place] = alpha**3 / 6.0 + alpha * turned[:, base]
+        found[:, place] += alpha * (own**2 + own * alpha) / (1.0 + np.cos(own)) + 0.5 * own * alpha**2
+    return found
+
+
+def _limits(system: Positions, layout: Layout, angles: _Angles, blocks: Array) -> tuple[Array, Array]:
+    """Limits on linear tilts, from outside and from inside.
+
+    With ``n_b`` at the tilt k from ``n_a``, ``|h_b - h_a - k| <= |k| (H^2 + H |k|) / (1 + cos H)``, H the angle of a;
+    of a round joint either side may be a.  The sine of an angle t is at least ``t (1 - t^2 / 6)``.
+    """
+    joints = system.mechanism.joints
+    wide, narrow = blocks.copy(), np.empty_like(blocks)
+    for block, place in enumerate(layout.block_joint.tolist()):
+        k = layout.joints[place]
+        a, b = angles.link[:, joints[k].a], angles.link[:, joints[k].b]
+        seat, base = float(angles.seat[k]), int(angles.base[k])
+        a, b = (a + (seat if base == joints[k].a else 0.0)), (b + (seat if base == joints[k].b else 0.0))
+        own = np.minimum(a, b) if layout.block_axis[block] == ROUND else a
+        tilt = angles.joint[:, k]
+        off = tilt * (own**2 + own * tilt) / (1.0 + np.cos(own))
+        wide[:, block] += off
+        least = np.minimum(layout.limit_range[0, block], blocks[:, block])
+        narrow[:, block] = np.maximum(least * (1.0 - tilt**2 / 5.0) - off * _ROUNDING, 0.0) / _ROUNDING
+    return wide, narrow
+
+
+def _rest(system: Positions, layout: Layout, angles: _Angles, lengths: Array, slips: Array) -> Array:
+    """Bound what is left of the vertical closure of every loop: ``h^2 (h . v) / (1 + cos)`` of its links, and slips."""
+    body = np.sin(angles.link) * lengths * (1.0 - np.cos(angles.link))
+    lean = np.sin(_axis(system, angles))
+    own = []
+    for place, k in enumerate(layout.joints):
+        a, b = layout.pairs[place]
+        own.append(0.5 * (body[:, a] + body[:, b]) + slips[:, k] * lean[:, k] ** 2)
+    table = np.stack(own, axis=1) if own else np.zeros((len(body), 0))
+    return np.asarray(table @ np.abs(layout.incidence).T)

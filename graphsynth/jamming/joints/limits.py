@@ -1,0 +1,284 @@
+"""What each joint can give: tilt limits and axial play, and which axes are misaligned.
+
+Tilts in radians; axial play in the length unit of the mechanism.  Every number is kept as a nominal value and a range
+``(low, high)`` that certificates use; without tolerance the range is the value itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from graphsynth.core.arguments import Real
+from graphsynth.core.checks import checked, choice, finite
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.bearing import Bearing, Condition
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
+
+__all__ = ["FREE", "RIGID", "SPHERICAL", "JointLimits", "Limits", "Misalignment", "SlideLimits", "bearing_limits"]
+
+Range: TypeAlias = tuple[float, float]
+
+
+#: Smallest limit above zero: products of smaller ones would vanish.
+_SMALLEST = 1e-150
+
+
+def _limit(name: str, value: float) -> float:
+    if isinstance(value, float | np.floating) and value == math.inf:
+        return math.inf
+    number = finite(name, value)
+    if 0.0 < number < _SMALLEST:
+        raise GeometryError(f"{name} = {number} is smaller than {_SMALLEST}; give 0 (rigid), or another unit of length")
+    if number < 0.0:
+        raise GeometryError(f"{name} = {number} is negative; give 0 (rigid), a positive limit, or inf (no limit)")
+    return number
+
+
+def _pair(name: str, given: Range) -> Range:
+    """Return both bounds; raise `GeometryError` for anything that is no pair."""
+    if not isinstance(given, tuple | list) or len(given) != 2:
+        raise GeometryError(f"{name}_range = {given!r} is no pair of bounds; give (low, high)")
+    return given[0], given[1]
+
+
+def _range(name: str, value: float, given: Range | None) -> Range:
+    if given is None:
+        return (value, value)
+    low, high = (_limit(f"{name} of the range", bound) for bound in _pair(name, given))
+    if not low <= value <= high:
+        raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
+    return (low, high)
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of a joint that tilts alike in all directions: a bearing, a pin, a spherical joint.
+
+    Parameters
+    ----------
+    tilt : float
+        Largest relative tilt, radians; 0 for a rigid guide, ``math.inf`` for none (a spherical joint).
+    play : float
+        Largest axial slip to either side, in the length unit of the mechanism; ``math.inf`` for a joint that floats.
+    tilt_range, play_range : (float, float), optional
+        Tolerance boxes; the value itself by default.
+
+    Examples
+    --------
+    >>> JointLimits(0.006).play
+    0.0
+    """
+
+    tilt: float
+    play: float = 0.0
+    tilt_range: Range | None = None
+    play_range: Range | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("tilt", "play"):
+            value = _limit(name, getattr(self, name))
+            object.__setattr__(self, name, value)
+            object.__setattr__(self, f"{name}_range", _range(name, value, getattr(self, f"{name}_range")))
+
+
+@dataclass(frozen=True)
+class SlideLimits:
+    """Limits of a straight guide (prismatic joint, or a pin guided in its slot).
+
+    Parameters
+    ----------
+    roll, pitch : float
+        Largest tilt about the direction of the guide and about the perpendicular in the plane, radians.
+    play : float
+        Largest slip out of the plane to either side, in the length unit of the mechanism.
+    roll_range, pitch_range, play_range : (float, float), optional
+        Tolerance boxes.
+    """
+
+    roll: float
+    pitch: float
+    play: float = 0.0
+    roll_range: Range | None = None
+    pitch_range: Range | None = None
+    play_range: Range | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("roll", "pitch", "play"):
+            value = _limit(name, getattr(self, name))
+            object.__setattr__(self, name, value)
+            object.__setattr__(self, f"{name}_range", _range(name, value, getattr(self, f"{name}_range")))
+
+
+Limits: TypeAlias = JointLimits | SlideLimits
+
+#: No clearance at all; any tilt but no slip; neither (a gear or cam contact).
+RIGID = JointLimits(0.0)
+SPHERICAL = JointLimits(math.inf)
+FREE = JointLimits(math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Misalignment:
+    """A joint whose axis on link ``base`` is tilted against the normal of the plane.
+
+    Parameters
+    ----------
+    base, link : int
+        The two links of the joint; the seat on ``base``, usually the frame, is the tilted one.
+    alpha : float
+        Tilt, radians (small).
+    direction : float
+        Angle in the plane of the axis about which it is tilted, radians: 0 is the x axis (the ``n = [1, 0, 0]`` of the
+        lambda linkage).  On a moving base it is counted in that link's frame.
+    rigid : bool
+        Whether ``link`` follows the tilted axis without clearance, as on a motor shaft; with False the joint's own
+        limits hold.
+    alpha_range, direction_range : (float, float), optional
+        Tolerance boxes.
+
+    Raises
+    ------
+    GeometryError
+        Links that are no numbers, values outside of their ranges, |alpha| above 0.5 rad.
+
+    Examples
+    --------
+    >>> Misalignment(0, 1, 0.01).vector
+    (0.01, 0.0)
+    """
+
+    base: int
+    link: int
+    alpha: float
+    direction: float = 0.0
+    rigid: bool = True
+    alpha_range: Range | None = None
+    direction_range: Range | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "direction"):
+            value = finite(name, getattr(self, name))
+            object.__setattr__(self, name, value)
+            given = getattr(self, f"{name}_range")
+            low, high = (value, value) if given is None else (finite(name, bound) for bound in _pair(name, given))
+            if not low <= value <= high:
+                raise GeometryError(f"{name} = {value} lies outside its range ({low}, {high}); correct one of them")
+            object.__setattr__(self, f"{name}_range", (low, high))
+            if name == "alpha" and max(abs(low), abs(high)) > 0.5:
+                largest = max(low, high, key=abs)
+                raise GeometryError(f"alpha = {largest} rad is no small tilt; the coupled model needs |alpha| <= 0.5")
+
+    @property
+    def vector(self) -> tuple[float, float]:
+        """``alpha (cos direction, sin direction)``."""
+        return (self.alpha * math.cos(self.direction), self.alpha * math.sin(self.direction))
+
+
+@checked
+def bearing_limits(
+    bearing: Bearing,
+    condition: Condition = "A",
+    *,
+    play: Real = 0.0,
+    radius_tolerance: float = 0.0,
+    height_tolerance: float = 0.0,
+    clearance_tolerance: float = 0.0,
+    hole_tolerance: float = 0.0,
+    radial_offset: Real = 0.0,
+) -> JointLimits:
+    """Limits of a bearing: its critical tilt, with a range that encloses it for all dimensions within tolerance.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    condition : {"A", "B", "general"}
+        Contact condition; "general" needs ``bearing.hole_length``.
+    play : float
+        Axial play, in the length unit of the mechanism.
+    radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance : float
+        Half widths in millimetres of ``Rb``, ``Hb``, ``clearance`` and ``hole_length``.
+    radial_offset : float
+        Largest distance in millimetres by which a load pushes the axis off the middle (level L2 of the model ladder);
+        the clearance left is smaller by it.
+
+    Returns
+    -------
+    JointLimits
+        ``tilt`` is infinite if there is no critical tilt.  The range is certified (outward rounding): t_A
+        grows with the clearance and the radius and falls with the height; t_B falls with the radius and the height; a
+        pin in a hole has the larger one of both (specification, sections 4.4 and 4.7).
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit, a tolerance that is negative or reaches zero, "general" without a hole length.
+
+    Examples
+    --------
+    >>> round(bearing_limits(Bearing()).tilt, 15)
+    0.006064396559156
+    """
+    from graphsynth.jamming.joints.critical import critical_range, pushed
+
+    choice("condition", condition, ("A", "B", "general"))
+    bearing = pushed(bearing, radial_offset, clearance_tolerance)
+    boxes = (radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance)
+    for name, value in zip(("radius", "height", "clearance", "hole"), boxes):
+        if not 0.0 <= value < math.inf:
+            raise GeometryError(f"{name}_tolerance = {value} must be zero or more; correct the value")
+    if hole_tolerance and condition != "general":
+        raise GeometryError(f'hole_tolerance = {hole_tolerance} needs condition "general"; condition is "{condition}"')
+    if bearing.clearance < 0.0:
+        raise GeometryError(f"clearance = {bearing.clearance} mm is an interference fit; the joint cannot be assembled")
+    critical = bearing.critical_tilt(condition)
+    tilt = math.inf if critical.angle is None or critical.reason else critical.angle
+    return JointLimits(tilt, play, critical_range(bearing, condition, boxes, tilt))
+
+
+def complete(
+    joints: tuple[JointGeometry, ...], given: Bearing | Limits | Mapping[tuple[int, int], Bearing | Limits],
+    misaligned: Mapping[tuple[int, int], Misalignment], condition: Condition,
+) -> tuple[Limits, ...]:  # fmt: skip
+    """Limits of every joint: those named, else those given for all; contacts of gears, cams and slots are free."""
+    table: dict[tuple[int, int], Bearing | Limits] = {}
+    common: Bearing | Limits | None = None
+    if isinstance(given, Mapping):
+        pairs = {joint.pair for joint in joints}
+        for key, value in given.items():
+            pair = (min(key), max(key))
+            if pair not in pairs:
+                raise GeometryError(f"bearings name the joint {pair[0]}-{pair[1]}, which does not exist")
+            table[pair] = value
+    else:
+        common = given
+    found = []
+    for joint in joints:
+        own = table.get(joint.pair)
+        if joint.pair in misaligned and misaligned[joint.pair].rigid:
+            own = RIGID if isinstance(joint, Revolute) else SlideLimits(0.0, 0.0)
+        elif own is None:
+            own = FREE if isinstance(joint, Gear | Cam | PinSlot) else common
+        found.append(_checked(joint, own, condition))
+    return tuple(found)
+
+
+def _checked(joint: JointGeometry, own: Bearing | Limits | None, condition: Condition) -> Limits:
+    name = f"joint {joint.a}-{joint.b}"
+    if own is None:
+        raise GeometryError(f"{name} has no limits; give bearings={{({joint.a}, {joint.b}): ...}}")
+    if isinstance(own, Bearing):
+        if not isinstance(joint, Revolute):
+            raise GeometryError(f"{name} is a {joint.kind} joint, a bearing does not fit; give SlideLimits or FREE")
+        return bearing_limits(own, condition)
+    if not isinstance(own, JointLimits | SlideLimits):
+        raise GeometryError(f"{own!r} are no limits of {name}; give a Bearing, JointLimits or SlideLimits")
+    if isinstance(own, SlideLimits) and not isinstance(joint, Prismatic | PinSlot):
+        raise GeometryError(f"{name} is a {joint.kind} joint without a direction; give JointLimits")
+    if isinstance(joint, Gear | Cam) and own != FREE:
+        raise GeometryError(f"{name} is a {joint.kind} contact, which guides nothing out of the plane; leave it FREE")
+    return own

@@ -1,0 +1,288 @@
+"""Pieces of the input along a motion: their positions proved, the factor bounded over each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.checks import finite
+from graphsynth.core.errors import GeometryError
+from graphsynth.intervals import Interval, check_rounding
+from graphsynth.jamming.joints.closure import Layout
+from graphsynth.jamming.joints.corners import corner_layouts
+from graphsynth.jamming.joints.enclosure import (
+    Moving,
+    Pieces,
+    lower_bounds,
+    shifts_enclosed,
+    start_tilts,
+    upper_bounds,
+)
+from graphsynth.jamming.joints.exact import neglected
+from graphsynth.jamming.joints.linear import points
+from graphsynth.jamming.joints.positions import Positions
+from graphsynth.jamming.joints.problem import Problem, check_motion
+from graphsynth.jamming.joints.program import PoseSolution
+from graphsynth.jamming.joints.slopes import slopes
+from graphsynth.jamming.joints.tubes import Tubes, linked, prove_tubes
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.simulation import Motion
+
+__all__ = ["PARTS", "Found", "Work", "check_range", "cut"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Pieces of a whole turn at first, of any range at least, and parts into which one is cut.
+FIRST, FEWEST, PARTS = 128, 16, 4
+#: In a proof of freedom a joint may tilt so much more than the tilt found, in its own share and that of the largest.
+_ROOM, _SHARE, _LEAST = 1.25, 0.25, 1e-4
+
+#: Layout, pieces and solution that a bound starts from.
+_Bound: TypeAlias = tuple[Layout, Pieces, PoseSolution]
+
+
+class Found(NamedTuple):
+    """Pieces evaluated: inputs, bounds of the factor, whether positions are proved, and the boxes they lie in.
+
+    ``sure`` tells what exact tilts prove: +1 free, -1 jams, 0 nothing; the bounds of the factor are of first order.
+    """
+
+    lo: Array
+    hi: Array
+    lower: Array
+    upper: Array
+    proved: Mask
+    box_lo: Array
+    box_hi: Array
+    sure: NDArray[np.int8]
+
+    def take(self, rows: Mask | NDArray[np.intp]) -> Found:
+        """Return some of the pieces."""
+        return Found(
+            self.lo[rows], self.hi[rows], self.lower[rows], self.upper[rows], self.proved[rows],
+            self.box_lo[rows], self.box_hi[rows], self.sure[rows],
+        )  # fmt: skip
+
+    @staticmethod
+    def join(parts: list[Found]) -> Found:
+        """Return all pieces in the order of the input."""
+        whole = Found(*(np.concatenate(columns) for columns in zip(*parts)))
+        return whole.take(np.lexsort((whole.hi, whole.lo)))
+
+
+class Work:
+    """Evaluation of pieces of one problem along one motion; without ``exact`` by small tilts alone."""
+
+    def __init__(self, given: Problem, motion: Motion, tolerance: float, exact: bool = True) -> None:
+        self.given, self.motion, self.tolerance, self.exact = given, motion, tolerance, exact
+        self.system = Positions(motion.mechanism, tolerance)
+        self.corners = corner_layouts(given.layout)
+        keep = np.flatnonzero(motion.assembled)
+        ends = motion.inputs[keep]
+        self.low, self.high = float(ends.min()), float(ends.max())
+        self.start = motion.poses[keep[int(np.argmin(ends))]]
+        self.evaluated = 0
+
+    def first(self) -> tuple[Array, Array]:
+        """Equal pieces of the whole range; fewer for a short one (an input is mostly an angle)."""
+        count = int(np.clip(math.ceil(FIRST * (self.high - self.low) / math.tau), FEWEST, FIRST))
+        edges = np.linspace(self.low, self.high, count + 1)
+        return edges[:-1], edges[1:]
+
+    def evaluate(self, lo: Array, hi: Array) -> Found:
+        """Bounds of the factor over every piece."""
+        from graphsynth.kinematics.simulation import simulate
+
+        count, size = len(lo), self.system.size
+        self.evaluated += count
+        u = Interval.from_bounds(lo, hi)
+        order = np.argsort(u.mid, kind="stable")
+        inputs, back = np.unique(np.concatenate([[self.low], u.mid[order]]), return_inverse=True)
+        found = simulate(self.given.mechanism, inputs, start=self.start, events=False)
+        at = np.empty(count, dtype=np.intp)
+        at[order] = back[1:]
+        lower, upper = np.zeros(count), np.full(count, np.inf)
+        proved = np.zeros(count, dtype=bool)
+        box, sure = np.full((2, count, size), np.nan), np.zeros(count, dtype=np.int8)
+        keep = np.flatnonzero(found.assembled[at] & np.isfinite(found.velocities[at]).all(axis=(1, 2)))
+        if keep.size:
+            poses = found.poses[at[keep]]
+            x, rate = self.system.coordinates(poses, found.velocities[at[keep]])
+            counted = self.system.count(poses)
+            tubes = prove_tubes(self.system, self.given.layout.joints, u[keep], x, rate, counted)
+            proved[keep] = tubes.proved
+            box[0, keep], box[1, keep] = tubes.domain.lo, tubes.domain.hi
+            rows = np.flatnonzero(tubes.proved)
+            if rows.size:
+                at_middle = prove_tubes(
+                    self.system, self.given.layout.joints, points(u.mid[keep[rows]]), x[rows], rate[rows], counted[rows]
+                )
+                whole = u[keep[rows]], tubes.take(rows), at_middle, counted[rows]
+                lower[keep[rows]], upper[keep[rows]], sure[keep[rows]] = self._bounds(poses[rows], *whole)
+        return Found(lo, hi, lower, upper, proved, box[0], box[1], sure)
+
+    def _bounds(
+        self, poses: Array, u: Interval, tubes: Tubes, middle: Tubes, counted: Array
+    ) -> tuple[Array, Array, NDArray[np.int8]]:
+        """Bound the factor: below over the whole boxes, above at the corners of the misalignments.
+
+        And where small tilts decide, tell what exact tilts prove.  A combination of corners closes with the combination
+        of their tilts, and what exact tilts add to it is the combination of what they add at the corners.
+        """
+        layout = self.given.layout
+        rates = slopes(self.system, layout.joints, u, tubes, counted)
+        step = u - points(u.mid)
+
+        def pieces(own: Layout) -> Pieces:
+            """Positions and misalignments, with what the mean value theorem needs where it is proved."""
+            r_slope, e_slope, base_slope, fine = rates
+            moving = Moving(
+                middle.r, middle.e, shifts_enclosed(own, middle.base), r_slope, e_slope,
+                shifts_enclosed(own, base_slope), step, middle.proved & fine,
+            )  # fmt: skip
+            return Pieces(tubes.r, tubes.e, shifts_enclosed(own, tubes.base), moving)
+
+        upper = np.zeros(len(poses))
+        above = []
+        for corner in self.corners:
+            found = replace(self.given, layout=corner).solve(poses, "scale")
+            above.append((corner, pieces(corner), found))
+            upper = np.maximum(upper, upper_bounds(*above[-1]))
+        if len(self.corners) > 1:  # one alone differs by a factor at most, which the bound from below does not see
+            found = self.given.solve(poses, "scale")
+        below = layout, pieces(layout), found
+        lower = lower_bounds(*below)
+        if not self.exact:
+            return lower, upper, np.zeros(len(poses), dtype=np.int8)
+        return lower, upper, self._sure(lower, upper, below, above, tubes, u, counted)
+
+    def _sure(
+        self, lower: Array, upper: Array, below: _Bound, above: list[_Bound], tubes: Tubes, u: Interval, counted: Array
+    ) -> NDArray[np.int8]:
+        """Tell where exact tilts prove a jam (-1) or freedom (+1), among the pieces that small tilts decide."""
+        sure = np.zeros(len(lower), dtype=np.int8)
+        rows = np.flatnonzero(lower > 1.0)
+        if rows.size:
+            layout, at, found = below[0], _take(below[1], rows), _take(below[2], rows)
+            none = np.full((rows.size, len(layout.limit)), np.inf)
+            exact = neglected(self.system, layout, tubes.take(rows), u[rows], counted[rows], none)
+            sure[rows[lower_bounds(layout, at, found, exact) > 1.0]] = -1
+        rows = np.flatnonzero(upper < 1.0)
+        if rows.size:
+            free = np.ones(rows.size, dtype=bool)
+            for layout, whole, found in above:
+                at, found = _take(whole, rows), _take(found, rows)
+                tilts = np.abs(start_tilts(layout, at, found)[0]).sum(axis=-1)
+                tilts = _ROOM * tilts + _SHARE * tilts.max(axis=1, keepdims=True, initial=0.0) + _LEAST
+                exact = neglected(self.system, layout, tubes.take(rows), u[rows], counted[rows], tilts)
+                free &= upper_bounds(layout, at, found, exact) < 1.0
+            sure[rows[free]] = 1
+        return sure
+
+    def estimate(self, inputs: Array) -> Array:
+        """Factor at inputs in ascending order (estimated); 0 where there is no pose."""
+        from graphsynth.kinematics.simulation import simulate
+
+        start = [] if inputs[0] == self.low else [self.low]
+        found = simulate(self.given.mechanism, [*start, *inputs], start=self.start, events=False)
+        fine = found.assembled[len(start) :]
+        value = np.zeros(len(inputs))
+        value[fine] = self.given.solve(found.poses[len(start) :][fine], "scale").lower
+        return value
+
+    def links(self, pieces: Found) -> Mask:
+        """Whether the assemblies of neighbouring pieces are proved to be one at the input they share, (pieces - 1,)."""
+        from graphsynth.kinematics.simulation import simulate
+
+        edges = pieces.lo[1:]
+        found: Mask = pieces.proved[:-1] & pieces.proved[1:]
+        rows = np.flatnonzero(found)
+        if rows.size == 0 or self.system.size == 0:
+            return found
+        inputs, back = np.unique(np.concatenate([[self.low], edges[rows]]), return_inverse=True)
+        passed = simulate(self.given.mechanism, inputs, start=self.start, events=False)
+        poses, velocities = passed.poses[back[1:]], passed.velocities[back[1:]]
+        fine = passed.assembled[back[1:]] & np.isfinite(velocities).all(axis=(1, 2))
+        found[rows[~fine]] = False
+        rows, poses, velocities = rows[fine], poses[fine], velocities[fine]
+        if rows.size == 0:
+            return found
+        x, rate = self.system.coordinates(poses, velocities)
+        counted, u = self.system.count(poses), Interval.from_bounds(edges[rows], edges[rows])
+        single = prove_tubes(self.system, (), u, x, rate, counted)
+        before = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
+        after = Interval.from_bounds(pieces.box_lo[rows + 1], pieces.box_hi[rows + 1])
+        found[rows] = linked(self.system, single, u, before, after, counted)
+        return found
+
+    def on_branch(self, pieces: Found, links: Mask) -> Mask:
+        """Whether the assembly of a piece is proved to be that of the motion: a sample's own, or linked to such a one.
+
+        A sample of the motion stands for the one assembly proved next to it.  Every box holds exactly one for each
+        input, so a box around that assembly belongs to the motion.
+        """
+        found: Mask = np.zeros(len(pieces.lo), dtype=bool)
+        rows, samples = self._samples(pieces)
+        if self.system.size and rows.size:
+            poses = self.motion.poses[samples]
+            x, u = self.system.coordinates(poses, np.zeros_like(poses))[0], self.motion.inputs[samples]
+            own = prove_tubes(self.system, (), points(u), x, np.zeros_like(x), self.system.count(poses))
+            box = Interval.from_bounds(pieces.box_lo[rows], pieces.box_hi[rows])
+            rows = rows[own.proved & own.tight.subset(box).all(axis=1)]
+        found[rows] = True
+        for k in range(1, len(found)):
+            found[k] |= found[k - 1] & links[k - 1]
+        for k in range(len(found) - 2, -1, -1):
+            found[k] |= found[k + 1] & links[k]
+        return found
+
+    def _samples(self, pieces: Found) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Proved pieces within which the motion has a sample, and for each the sample nearest to its middle."""
+        keep = np.flatnonzero(self.motion.assembled)
+        u = self.motion.inputs[keep]
+        place = np.clip(np.searchsorted(pieces.lo, u, side="right") - 1, 0, None)
+        inside = np.flatnonzero(pieces.proved[place] & (pieces.lo[place] <= u) & (u <= pieces.hi[place]))
+        place, u = place[inside], u[inside]
+        away = np.abs(u - 0.5 * (pieces.lo[place] + pieces.hi[place]))
+        order = np.lexsort((away, place))
+        rows, first = np.unique(place[order], return_index=True)
+        return rows, keep[inside[order[first]]]
+
+
+def _take(value: Any, rows: NDArray[np.intp]) -> Any:
+    """Return some of the pieces of a named tuple of arrays and intervals; its other entries as they are."""
+    parts = []
+    for part in value:
+        if isinstance(part, tuple):
+            parts.append(_take(part, rows) if isinstance(part, Moving) else part)
+        else:
+            parts.append(part[rows] if isinstance(part, np.ndarray | Interval) else part)
+    return type(value)(*parts)
+
+
+def cut(lo: Array, hi: Array) -> tuple[Array, Array]:
+    """Cut every piece into equal parts; parts share their ends exactly."""
+    edges = lo[:, None] + (hi - lo)[:, None] * (np.arange(PARTS + 1) / PARTS)
+    edges[:, 0], edges[:, -1] = lo, hi
+    return edges[:, :-1].ravel(), edges[:, 1:].ravel()
+
+
+def check_range(motion: Motion, length_tolerance: float, **limits: float) -> None:
+    """Refuse a changed rounding mode, a tolerance or a limit of the work out of bounds, a motion without a range."""
+    check_rounding()
+    check_motion(motion)
+    for name, value in limits.items():
+        if not isinstance(value, int | float | np.number) or not value >= 0 or (value > 2**63 and value != np.inf):
+            raise GeometryError(f"{name} = {value!r} must be a number of zero or more; correct the value")
+    if not 0.0 <= finite("length_tolerance", length_tolerance) < 0.5:
+        raise GeometryError(f"length_tolerance = {length_tolerance} must be a relative half width from 0 to 0.5")
+    if int(motion.assembled.sum()) < 2:
+        raise GeometryError(
+            f"the motion has {int(motion.assembled.sum())} assembled samples; a range needs two or more"
+        )

@@ -1,0 +1,304 @@
+"""Least tilt T* of every pose, with a lower bound from equilibrium and an upper bound from closure.
+
+Two quantities, of the same program:
+
+* ``"tilt"``: T*, the smallest factor on the tilt limits that lets the mechanism assemble, axial plays as they are;
+* ``"scale"``: the smallest factor on tilt limits and plays together.  It is proportional to the misalignment, so its
+  inverse is the factor by which all misalignments may grow.  Both pass 1 together.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.joints.closure import Layout, force_rows, moment_rows, work_row
+from graphsynth.jamming.joints.cones import ConeSolution, solve_cones
+from graphsynth.jamming.joints.polish import polish
+
+__all__ = ["PoseSolution", "Units", "solve_poses"]
+
+Array = NDArray[np.float64]
+Mode = Literal["tilt", "scale"]
+
+_RANK = 1e-11
+
+
+class Units(NamedTuple):
+    """Centre and length that positions are measured in, and the scale of the misalignments."""
+
+    centre: Array
+    length: float
+    tilt: float
+
+
+class PoseSolution(NamedTuple):
+    """Solutions of N poses.
+
+    ``lower`` and ``upper`` bound T (estimated: rounding only); ``y`` (N, 3 loops) are loop wrenches
+    about ``units.centre``, forces times ``units.length``; ``tau`` (N, blocks, 2) radians, ``zeta`` (N, joints) lengths:
+    NaN where a joint has no limit; ``moment`` (N, blocks) and ``force`` (N, joints) the shares ``t_b |m_b|`` and
+    ``s_j |f_j|`` of the dual over ``sum t |m|``.
+    """
+
+    lower: Array
+    upper: Array
+    y: Array
+    tau: Array
+    zeta: Array
+    moment: Array
+    force: Array
+    units: Units
+    rounds: int
+
+
+def units_of(r: Array, d: Array, layout: Layout) -> Units:
+    """Units in which every number of the program is of the order of 1."""
+    flat = r.reshape(-1, 2)
+    if flat.size == 0:
+        return Units(np.zeros(2), 1.0, 1.0)
+    centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    length = float(np.abs(flat - centre).max()) or 1.0
+    return Units(centre, length, float(np.sqrt((d**2).sum(-1)).max(initial=0.0)) or 1.0)
+
+
+def solve_poses(layout: Layout, r: Array, e: Array, d: Array, mode: Mode = "tilt") -> PoseSolution:
+    """Solve the program at N poses.
+
+    Parameters
+    ----------
+    layout : Layout
+    r, e, d : ndarray, shape (N, joints, 2)
+        Positions, guide directions, misalignments (radians).
+    mode : {"tilt", "scale"}
+
+    Returns
+    -------
+    PoseSolution
+        Estimated; ``lower == upper == inf`` where no factor is enough.
+
+    Notes
+    -----
+    Specification, sections 9.3 and 9.4; loop form.
+
+    Raises
+    ------
+    GeometryError
+        If a position is not finite.
+    """
+    if not (np.isfinite(r).all() and np.isfinite(e).all() and np.isfinite(d).all()):
+        raise GeometryError("a joint position is not finite; give assembled poses only")
+    count = len(r)
+    units = units_of(r, d, layout)
+    rows = _Rows(layout, (r - units.centre) / units.length, e, d / units.tilt, units)
+    out = PoseSolution(
+        np.zeros(count), np.zeros(count), np.zeros((count, 3 * layout.loops)),
+        np.zeros((count, len(layout.limit), 2)), np.zeros((count, len(layout.joints))),
+        np.zeros((count, len(layout.limit))), np.zeros((count, len(layout.joints))), units, 0,
+    )  # fmt: skip
+    if layout.loops == 0 or count == 0:
+        return out
+    rounds = 0
+    for basis, poses in _allowed(rows.forbidden()):
+        rounds = max(rounds, _solve_group(rows, basis, poses, mode, out))
+    return out._replace(rounds=rounds)
+
+
+class _Rows:
+    """Rows of moments, forces and work, in units; limits in units of the largest."""
+
+    def __init__(self, layout: Layout, r: Array, e: Array, d: Array, units: Units) -> None:
+        self.layout = layout
+        self.M = moment_rows(layout, r, e)
+        self.F = force_rows(layout)
+        self.W = work_row(layout, r, d)
+        limit, play = layout.limit, layout.play
+        finite = limit[np.isfinite(limit)]
+        self.unit = float(finite.max(initial=0.0)) or 1.0
+        self.t = limit / self.unit
+        self.s = play / (units.length * units.tilt)
+        self.factor = units.tilt / self.unit  # T = factor times T of the scaled program in mode "tilt"
+        self.units = units
+
+    def forbidden(self) -> Array:
+        """Rows that must vanish: moments and forces of joints without limit, (N, rows, 3 loops)."""
+        free = self.M[:, np.isinf(self.t)]
+        count = len(self.M)
+        force = np.broadcast_to(self.F[np.isinf(self.s)], (count, int(np.isinf(self.s).sum()), self.F.shape[1]))
+        return np.concatenate([free.reshape(count, -1, self.F.shape[1]), force], axis=1)
+
+
+def _allowed(rows: Array) -> list[tuple[Array, NDArray[np.intp]]]:
+    """Bases of the null spaces, grouped by their dimension: [(basis (n, k, free), poses (n,))]."""
+    count, m, k = rows.shape
+    if m == 0:
+        return [(np.broadcast_to(np.eye(k), (count, k, k)), np.arange(count))]
+    _, values, right = np.linalg.svd(rows, full_matrices=True)
+    rank = (values > _RANK * np.maximum(values[:, :1], 1.0)).sum(axis=1)
+    return [(right[rank == n, n:].transpose(0, 2, 1), np.flatnonzero(rank == n)) for n in np.unique(rank)]
+
+
+def _solve_group(rows: _Rows, basis: Array, poses: NDArray[np.intp], mode: Mode, out: PoseSolution) -> int:
+    """Solve poses with null spaces of one dimension, again grouped by the rank of what costs anything."""
+    if basis.shape[2] == 0:
+        _write(rows, poses, np.zeros((len(poses), rows.F.shape[1])), None, mode, out)
+        return 0
+    M, F, W = _scaled(rows, poses, mode)
+    M, F, W = M @ basis[:, None], F @ basis, (W[:, None] @ basis)[:, 0]
+    stacked = np.concatenate([M.reshape(len(poses), -1, M.shape[3]), F], axis=1)
+    if stacked.shape[1] == 0:
+        stacked = np.zeros((len(poses), 1, M.shape[3]))
+    _, values, right = np.linalg.svd(stacked, full_matrices=True)
+    rank = (values > _RANK).sum(axis=1)
+    rounds = 0
+    for n in np.unique(rank):
+        chosen = np.flatnonzero(rank == n)
+        span, idle = right[chosen, :n].transpose(0, 2, 1), right[chosen, n:]
+        lost = np.abs((idle @ W[chosen, :, None])[..., 0]).max(axis=1, initial=0.0) > 1e-12
+        _never(poses[chosen[lost]], basis[chosen[lost]], idle[lost], W[chosen[lost]], out)
+        chosen, span = chosen[~lost], span[~lost]
+        if chosen.size == 0:
+            continue
+        if n == 0:  # nothing costs anything, and nothing does work
+            _write(rows, poses[chosen], np.zeros((len(chosen), rows.F.shape[1])), None, mode, out)
+            continue
+        parts = M[chosen] @ span[:, None], F[chosen] @ span, (W[chosen, None] @ span)[:, 0]
+        rounds = max(rounds, _solve_regular(rows, basis[chosen] @ span, poses[chosen], parts, mode, out))
+    return rounds
+
+
+def _never(poses: NDArray[np.intp], basis: Array, idle: Array, W: Array, out: PoseSolution) -> None:
+    """Note poses where a wrench costs nothing and does work: no factor on the limits is enough."""
+    if poses.size == 0:
+        return
+    work = (idle @ W[:, :, None])[..., 0]
+    q = (idle.transpose(0, 2, 1) @ work[:, :, None])[..., 0]
+    out.y[poses] = (basis @ q[:, :, None])[..., 0]
+    out.lower[poses] = out.upper[poses] = math.inf
+    for part in (out.tau, out.zeta, out.moment, out.force):
+        part[poses] = np.nan
+
+
+def _scaled(rows: _Rows, poses: NDArray[np.intp], mode: Mode) -> tuple[Array, Array, Array]:
+    """Blocks and forces that cost something, times their limits; in mode "scale" forces are blocks."""
+    t, s = rows.t, rows.s
+    costly, pushed = np.isfinite(t) & (t > 0.0), np.isfinite(s) & (s > 0.0)
+    M = rows.M[poses][:, costly] * t[costly, None, None]
+    F = np.broadcast_to(rows.F[pushed] * s[pushed, None], (len(poses), int(pushed.sum()), rows.F.shape[1]))
+    if mode == "scale":
+        # the factor of the units stands between plays, measured by the misalignment, and limits, by the largest
+        block = np.zeros((len(poses), F.shape[1], 2, F.shape[2]))
+        block[:, :, 0] = F * rows.factor
+        M, F = np.concatenate([M, block], axis=1), F[:, :0]
+    return M, F, rows.W[poses]
+
+
+def _solve_regular(
+    rows: _Rows, basis: Array, poses: NDArray[np.intp], parts: tuple[Array, Array, Array], mode: Mode, out: PoseSolution
+) -> int:
+    """Solve poses whose costs bound every wrench."""
+    M, F, W = parts
+    size = np.sqrt((W**2).sum(axis=1))
+    quiet = size <= 1e-300
+    unit = np.where(quiet, 1.0, size)
+    if M.shape[1] == 0:  # only forces cost: any excess of work over them is beyond every factor
+        M = np.zeros((len(W), 1, 2, W.shape[1]))
+    F, W = F / unit[:, None, None], W / unit[:, None]
+    found = solve_cones(M, F, W)
+    best = _Best(M, F, W, found)
+    for robust, enough in ((False, 2e-15), (True, 1e-13)):
+        left = best.open(enough)
+        if left.size:
+            part = ConeSolution(found.q[left], found.tau[left], found.zeta[left], found.rounds)
+            best.offer(left, polish(M[left], F[left], W[left], part, robust=robust))
+    bounds = np.where(quiet, 0.0, np.stack([best.lower, best.upper]) * unit) * rows.factor
+    q, tau, zeta = best.q, best.tau * unit[:, None, None], best.zeta
+    y = (basis @ np.where(quiet[:, None], 0.0, q)[:, :, None])[..., 0]
+    _write(rows, poses, y, (bounds, tau, zeta), mode, out)
+    return found.rounds
+
+
+class _Best:
+    """The best lower and the best upper bound found so far, each with what proves it."""
+
+    def __init__(self, M: Array, F: Array, W: Array, found: ConeSolution) -> None:
+        self.program = M, F, W
+        self.q, self.zeta = found.q.copy(), found.zeta.copy()
+        self.lower, self.upper, self.tau = _bounds(M, F, W, found)
+
+    def open(self, enough: float) -> NDArray[np.intp]:
+        """Return the poses whose bounds are further apart."""
+        with np.errstate(invalid="ignore"):
+            return np.flatnonzero(~(self.upper - self.lower <= enough * self.upper))
+
+    def offer(self, poses: NDArray[np.intp], found: ConeSolution) -> None:
+        """Take what is better."""
+        M, F, W = (part[poses] for part in self.program)
+        lower, upper, tau = _bounds(M, F, W, found)
+        more, less = lower > self.lower[poses], upper < self.upper[poses]
+        self.lower[poses[more]], self.q[poses[more]] = lower[more], found.q[more]
+        self.upper[poses[less]], self.tau[poses[less]] = upper[less], tau[less]
+        self.zeta[poses[less]] = np.clip(found.zeta[less], -1.0, 1.0)
+
+
+def _or(values: Array, other: float) -> Array:
+    return np.where(np.isnan(values), other, values)
+
+
+def _bounds(M: Array, F: Array, W: Array, found: ConeSolution) -> tuple[Array, Array, Array]:
+    """Lower bound from q, upper bound from tau after the closure has been restored, and that tau."""
+    with np.errstate(all="ignore"):
+        m = (M @ found.q[:, None, :, None])[..., 0]
+        f = (F @ found.q[:, :, None])[..., 0]
+        cost = np.hypot(m[..., 0], m[..., 1]).sum(axis=1)
+        lower = (np.abs((W * found.q).sum(axis=1)) - np.abs(f).sum(axis=1)) / cost
+        zeta = np.clip(found.zeta, -1.0, 1.0)
+        flat = M.reshape(len(W), -1, W.shape[1])
+        tau = found.tau.reshape(len(W), -1)
+        for _ in range(2):
+            off = W + (flat.transpose(0, 2, 1) @ tau[:, :, None])[..., 0]
+            off = off + (F.transpose(0, 2, 1) @ zeta[:, :, None])[..., 0]
+            safe = np.where(np.isfinite(off), off, 0.0)
+            tau = tau - (np.linalg.pinv(flat, rcond=1e-13).transpose(0, 2, 1) @ safe[:, :, None])[..., 0]
+        off = W + (flat.transpose(0, 2, 1) @ tau[:, :, None])[..., 0]
+        off = off + (F.transpose(0, 2, 1) @ zeta[:, :, None])[..., 0]
+        closed = np.abs(off).max(axis=1, initial=0.0) <= 1e-12 * (1.0 + np.abs(flat).max(axis=(1, 2), initial=0.0))
+        tau = tau.reshape(*M.shape[:3])
+        upper = np.where(closed, np.hypot(tau[..., 0], tau[..., 1]).max(axis=1, initial=0.0), np.inf)
+    return np.maximum(_or(lower, 0.0), 0.0), upper, tau
+
+
+def _write(
+    rows: _Rows, poses: NDArray[np.intp], y: Array, found: tuple[Array, Array, Array] | None, mode: Mode,
+    out: PoseSolution,
+) -> None:  # fmt: skip
+    t, s = rows.t, rows.s
+    costly, pushed = np.isfinite(t) & (t > 0.0), np.isfinite(s) & (s > 0.0)
+    out.tau[np.ix_(poses, np.flatnonzero(np.isinf(t)))] = np.nan
+    out.zeta[np.ix_(poses, np.flatnonzero(np.isinf(s)))] = np.nan
+    out.y[poses] = y
+    if found is None:
+        return
+    (lower, upper), tau, zeta = found
+    out.lower[poses], out.upper[poses] = lower, upper
+    tilt, length = rows.units.tilt, rows.units.length
+    n = int(costly.sum())
+    # the scaled program has tau' = tau / (t times tilt), so tau = tilt t tau'
+    out.tau[np.ix_(poses, np.flatnonzero(costly))] = tau[:, :n] * (tilt * t[costly])[:, None]
+    where = np.ix_(poses, np.flatnonzero(pushed))
+    if mode == "tilt":
+        out.zeta[where] = zeta * (s[pushed] * length * tilt)
+    else:
+        out.zeta[where] = tau[:, n:, 0] * (rows.factor * s[pushed] * length * tilt)
+    m = (rows.M[poses] @ y[:, None, :, None])[..., 0]
+    moment = np.where(costly, t, 0.0) * np.hypot(m[..., 0], m[..., 1])
+    force = np.where(pushed, s, 0.0) * np.abs(y @ rows.F.T)
+    cost = moment.sum(axis=1) if mode == "tilt" else moment.sum(axis=1) + rows.factor * force.sum(axis=1)
+    with np.errstate(all="ignore"):
+        share = np.where(cost > 0.0, 1.0 / cost, 0.0)
+    out.moment[poses] = moment * share[:, None]
+    out.force[poses] = force * rows.factor * share[:, None]

@@ -1,0 +1,169 @@
+"""The largest misalignment over the range of a motion, between two proved bounds: branch and bound over the input.
+
+Both bounds are about the small-tilt model (first order), in which the factor grows in proportion to the misalignments.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.intervals import Interval
+from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.joints.limits import Misalignment
+from graphsynth.jamming.joints.pieces import PARTS, Found, Work, check_range, cut
+from graphsynth.jamming.joints.positions import Unsupported
+from graphsynth.jamming.joints.problem import Bearings, problem
+from graphsynth.jamming.joints.search import Budget
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.simulation import Motion
+
+__all__ = ["ScaleCertificate", "largest_scale"]
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ScaleCertificate:
+    """Largest factor on all misalignments that leaves the whole range free with small tilts, between two proved bounds.
+
+    ``low``: with a smaller factor every input is proved free, for all members of the tolerance boxes.  ``high``: with a
+    larger one the input ``at`` is proved to jam, again for all of them; tolerances keep the two apart.
+    ``relative_gap`` is ``high / low - 1``; ``reason`` says why it is not smaller, or is empty.  Free and jammed are
+    those of the small-tilt model, whose error, of relative order alpha squared, is not in the bounds; `certify_coupled`
+    judges a given misalignment with exact tilts.
+    """
+
+    low: float
+    high: float
+    at: float
+    evaluated: int
+    reason: str
+    seconds: float
+    model: str = (
+        "L1 with small tilts (first order): the terms of second order that it neglects, of relative order alpha "
+        "squared, are not in the bounds"
+    )
+
+    @property
+    def relative_gap(self) -> float:
+        """``high / low - 1``."""
+        return self.high / self.low - 1.0 if self.low > 0.0 else math.inf
+
+
+def largest_scale(
+    motion: Motion,
+    bearings: Bearings,
+    tilts: Misalignment | Iterable[Misalignment],
+    *,
+    condition: Condition = "A",
+    length_tolerance: float = 0.0,
+    relative_gap: float = 1e-4,
+    max_pieces: int = 20_000,
+    seconds: float = 20.0,
+) -> ScaleCertificate:
+    """Enclose the largest factor by which all misalignments may grow over the range, with proof on both sides.
+
+    Parameters
+    ----------
+    motion, bearings, tilts, condition, length_tolerance
+        As for `certify_coupled`.
+    relative_gap : float
+        Wanted ``high / low - 1``.
+    max_pieces, seconds : optional
+        Limits of the work.
+
+    Returns
+    -------
+    ScaleCertificate
+        Certified for the small-tilt model (branch and bound over the input).  With one misalignment its largest alpha
+        lies between ``low * alpha`` and ``high * alpha``.
+
+    Raises
+    ------
+    GeometryError
+        As `certify_coupled`; and for a motion or mechanism whose positions cannot be proved at all.
+    """
+    begin = perf_counter()
+    check_range(motion, length_tolerance, relative_gap=relative_gap, max_pieces=max_pieces, seconds=seconds)
+    given = problem(motion.mechanism, bearings, tilts, condition)
+    try:
+        work = Work(given, motion, length_tolerance, exact=False)
+        budget = Budget(1e-9 * (work.high - work.low), max_pieces, seconds, begin)
+        found = _enclosed(work, budget, *_branch_and_bound(work, budget, relative_gap))
+        if found.reason or found.relative_gap <= relative_gap or found.high == math.inf == found.low:
+            return found
+        return replace(found, reason="the tolerances leave no smaller gap: high holds for all members, low for any")
+    except Unsupported as error:
+        return ScaleCertificate(0.0, math.inf, math.nan, 0, str(error), perf_counter() - begin)
+
+
+def _branch_and_bound(work: Work, budget: Budget, relative_gap: float) -> tuple[Found, float, str]:
+    """Cut what may hold a larger factor than the best found; return the pieces, a bound of them, and what stopped.
+
+    With tolerances the bound from above at a single input is not reached by the one from below, which holds for all
+    members; pieces are cut against the larger of the two.
+    """
+    best, reach, above, reason = 0.0, 0.0, 0.0, ""
+    parts: list[Found] = []
+    lo, hi = work.first()
+    while lo.size:
+        found = work.evaluate(lo, hi)
+        peaks, highest = _peaks(work, found)
+        found = found._replace(lower=peaks)
+        best, reach = max(best, float(peaks.max())), max(reach, highest)
+        rest = found.upper > max(best, reach) * (1.0 + 0.9 * relative_gap)
+        above = max(above, float(found.upper[~rest].max(initial=0.0)))
+        narrow = hi - lo <= budget.smallest
+        if work.evaluated + PARTS * int(rest.sum()) > budget.max_pieces or budget.over or (rest & narrow).any():
+            above = max(above, float(found.upper[rest].max(initial=0.0)))
+            reason = f"the limit of work was reached after {work.evaluated} pieces" if rest.any() else ""
+            parts.append(found)
+            break
+        parts.append(found.take(~rest))
+        lo, hi = cut(lo[rest], hi[rest])
+    return Found.join(parts), above, reason
+
+
+def _enclosed(work: Work, budget: Budget, pieces: Found, above: float, reason: str) -> ScaleCertificate:
+    """Turn bounds of the factor into bounds of its inverse; only pieces proved to be on the branch count."""
+    links = work.links(pieces)
+    own = work.on_branch(pieces, links)
+    peak = np.where(own, pieces.lower, 0.0)
+    top = int(np.argmax(peak))
+    best, at = float(peak[top]), float(Interval.from_bounds(pieces.lo[top], pieces.hi[top]).mid)
+    if not (own.all() and links.all()):
+        above = math.inf
+        reason = reason or "the pieces are not proved to be one branch"
+    one = Interval(1)
+    low = float((one / Interval.from_bounds(above, above)).lo) if 0.0 < above < math.inf else 0.0
+    high = float((one / Interval.from_bounds(best, best)).hi) if best > 0.0 else math.inf
+    low = math.inf if above == 0.0 else low
+    if not work.motion.completed:
+        reason = reason or f"the motion ends: {work.motion.reason}"
+    at = at if best > 0.0 else math.nan
+    return ScaleCertificate(low, high, at, work.evaluated, reason, perf_counter() - budget.begin)
+
+
+def _peaks(work: Work, found: Found) -> tuple[Array, float]:
+    """Lower bounds of the largest factor in each piece: over the whole of it, or at its middle for the worst few.
+
+    And the largest bound from above at these middles.  A middle counts only if its assembly is the one of the piece: it
+    lies in the box that holds exactly one.
+    """
+    peak = found.lower.copy()
+    top = np.argsort(-found.upper)[:4]
+    middle = Interval.from_bounds(found.lo[top], found.hi[top]).mid
+    points = work.evaluate(middle, middle)
+    inside = (points.box_lo >= found.box_lo[top]) & (points.box_hi <= found.box_hi[top])
+    same = points.proved & found.proved[top] & inside.all(axis=1)
+    peak[top] = np.maximum(peak[top], np.where(same, points.lower, 0.0))
+    return peak, float(points.upper[same & np.isfinite(points.upper)].max(initial=0.0))

@@ -1,0 +1,221 @@
+"""Proved verdicts over the range of a motion: pieces of the input, cut until each is decided.
+
+A piece is free if the tilts found at its middle can be corrected to close every loop, inside the limits, for every
+input, position and tolerance in it; it jams if the wrenches found at its middle prove so for all of them.  The
+positions are proved by `graphsynth.jamming.joints.tubes`.  The search is that of the small-tilt model L1; the verdict
+counts only pieces for which the terms of second order, which that model neglects, are proved not to change it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.jamming.bearing.bearing import Condition
+from graphsynth.jamming.joints.judgement import MODEL, judge, states
+from graphsynth.jamming.joints.limits import Misalignment
+from graphsynth.jamming.joints.pieces import Found, Work, check_range
+from graphsynth.jamming.joints.positions import Unsupported
+from graphsynth.jamming.joints.problem import Bearings, problem
+from graphsynth.jamming.joints.search import Budget, search
+from graphsynth.jamming.joints.witness import Witness, jamming_member
+from graphsynth.jamming.verdict import Verdict
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.simulation import Motion
+
+__all__ = ["TurnCertificate", "certify_coupled"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TurnCertificate:
+    """What is proved about the range of inputs (certified: rounding, positions, tolerances and exact tilts included).
+
+    Attributes
+    ----------
+    verdict : Verdict
+        CERTIFIED_FREE: no jam at any input of the range (between the samples too), for any value in the tolerance
+        boxes.  CERTIFIED_JAMMED: at every input of the pieces marked so it jams, for every value in the boxes.
+        CERTIFIED_JAMMED_FOR_SOME: the member ``witness`` of the boxes jams.  UNDECIDED otherwise, also where small
+        tilts would decide but the terms of second order that they neglect may change it.
+    reason : str
+    low, high : ndarray, shape (pieces,)
+        Pieces of the input, ascending.
+    state : ndarray of int8, shape (pieces,)
+        +1 free, -1 jammed, 0 undecided; with exact tilts.
+    lower, upper : ndarray, shape (pieces,)
+        Proved bounds of the factor on limits and plays together (the inverse of the allowed scale), in the small-tilt
+        model (first order).
+    small_tilts : Verdict
+        What is proved in the small-tilt model alone, which neglects terms of second order in the tilts.
+    one_branch : bool
+        All pieces are proved to belong to one continuous branch.
+    witness : Witness or None
+        The member that jams, for CERTIFIED_JAMMED_FOR_SOME.
+    evaluated : int
+        Pieces evaluated.
+    seconds : float
+    """
+
+    verdict: Verdict
+    reason: str
+    low: Array
+    high: Array
+    state: NDArray[np.int8]
+    lower: Array
+    upper: Array
+    one_branch: bool
+    witness: Witness | None
+    evaluated: int
+    seconds: float
+    small_tilts: Verdict = Verdict.UNDECIDED
+    model: str = MODEL
+
+    @property
+    def certified(self) -> bool:
+        """Whether the verdict is proved."""
+        return self.verdict.is_certified
+
+    def arcs(self, state: int) -> list[tuple[float, float]]:
+        """Ranges of the input of one state (+1 free, -1 jammed, 0 undecided), neighbours joined."""
+        found: list[tuple[float, float]] = []
+        for a, b in zip(self.low[self.state == state].tolist(), self.high[self.state == state].tolist()):
+            if found and found[-1][1] == a:
+                found[-1] = (found[-1][0], b)
+            else:
+                found.append((a, b))
+        return found
+
+    def share(self, state: int) -> float:
+        """Part of the range in one state."""
+        width = self.high - self.low
+        return float(width[self.state == state].sum() / width.sum()) if width.size else 0.0
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "verdict": self.verdict.name,
+            "reason": self.reason,
+            "model": self.model,
+            "small_tilts": self.small_tilts.name,
+            "free": self.arcs(1),
+            "jammed": self.arcs(-1),
+            "undecided": self.arcs(0),
+            "one_branch": self.one_branch,
+            "witness": None if self.witness is None else self.witness.summary(),
+            "evaluated": self.evaluated,
+            "seconds": self.seconds,
+        }
+
+    def to_pandas(self) -> Any:
+        """Return a table of the pieces."""
+        import pandas as pd
+
+        columns = {name: getattr(self, name) for name in ("low", "high", "state", "lower", "upper")}
+        return pd.DataFrame(columns)
+
+
+def certify_coupled(
+    motion: Motion,
+    bearings: Bearings,
+    tilts: Misalignment | Iterable[Misalignment],
+    *,
+    condition: Condition = "A",
+    length_tolerance: float = 0.0,
+    resolution: float = 1e-4,
+    max_pieces: int = 20_000,
+    seconds: float = 20.0,
+) -> TurnCertificate:
+    """Prove where a mechanism is free and where it jams, between the first and the last input of a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of `graphsynth.simulate`; its branch is followed, its samples need not be dense.  No cams.
+    bearings, tilts, condition
+        As for `graphsynth.jamming.joints.assess_coupled`; the ranges they carry are tolerance boxes, and the verdict
+        holds for every value in them.
+    length_tolerance : float
+        Relative half width of every coordinate of a joint on its links.
+    resolution : float
+        Width of a piece, over the range, below which it is left undecided.
+    max_pieces, seconds : optional
+        Limits of the work; what is not decided within them stays undecided.  A member that jams is looked for after it.
+
+    Returns
+    -------
+    TurnCertificate
+        Certified, with exact tilts; UNDECIDED with a reason rather than a guess.
+
+    Raises
+    ------
+    GeometryError
+        Limits or misalignments that do not fit the mechanism, fewer than two assembled samples.
+
+    Notes
+    -----
+    Specification lambda_and_jamming, sections 9.4, 9.5 and 10.
+
+    Examples
+    --------
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> from graphsynth.jamming import Bearing
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> joints = Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (2.5, 0), (2.5, 0)), Revolute(0, 3, (2, 0))
+    >>> motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.linspace(0.0, 2.0 * np.pi, 37))
+    >>> certify_coupled(motion, Bearing(), Misalignment(0, 1, 0.0115)).verdict.name
+    'CERTIFIED_FREE'
+    """
+    begin = perf_counter()
+    check_range(motion, length_tolerance, resolution=resolution, max_pieces=max_pieces, seconds=seconds)
+    given = problem(motion.mechanism, bearings, tilts, condition)
+    try:
+        work = Work(given, motion, length_tolerance)
+        budget = Budget(resolution * (work.high - work.low), max_pieces, seconds, begin)
+        return _proved(work, budget, *search(work, budget))
+    except Unsupported as error:
+        return _nothing(motion, str(error), perf_counter() - begin)
+
+
+def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCertificate:
+    """Keep what is proved to be on the branch of the motion; judge."""
+    links = work.links(pieces)
+    own = work.on_branch(pieces, links)
+    branch = bool(own.all() and links.all())
+    lost = np.flatnonzero(pieces.proved & ~own)
+    # of another branch, perhaps: nothing is said about the motion
+    pieces = pieces._replace(
+        lower=np.where(own, pieces.lower, 0.0), upper=np.where(own, pieces.upper, np.inf),
+        sure=np.where(own, pieces.sure, 0).astype(np.int8),
+    )  # fmt: skip
+    if lost.size and not stopped:
+        stopped = (
+            f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
+        )
+    state = pieces.sure
+    witness = None if (state == -1).any() or (state == 1).all() else jamming_member(work, pieces, own)
+    proved = witness if witness is not None and witness.exact else None
+    verdict, reason = judge(work, pieces, state, stopped, branch, proved)
+    small, first_order = judge(work, pieces, states(pieces), stopped, branch, witness)
+    if small.is_certified and small is not verdict:
+        reason = f"{reason}; with small tilts (first order): {first_order}"
+    return TurnCertificate(
+        verdict, reason, pieces.lo, pieces.hi, state, pieces.lower, pieces.upper, branch, witness, work.evaluated,
+        perf_counter() - budget.begin, small,
+    )  # fmt: skip
+
+
+def _nothing(motion: Motion, reason: str, seconds: float) -> TurnCertificate:
+    ends = motion.inputs[motion.assembled]
+    low, high = np.array([ends.min()]), np.array([ends.max()])
+    zero = np.zeros(1)
+    return TurnCertificate(
+        Verdict.UNDECIDED, reason, low, high, np.zeros(1, dtype=np.int8), zero, zero + np.inf, False, None, 0, seconds
+    )

@@ -1,0 +1,295 @@
+"""`certify`: proof that a simulated motion of any planar mechanism is one branch of exact assemblies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.checks import positive, whole
+from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.certify.balls import Balls, check_rounding, exact, tau_times
+from graphsynth.kinematics.certify.cover import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
+from graphsynth.kinematics.certify.equations import MechanismSystem
+from graphsynth.kinematics.certify.laws import enclosed, whole_periods
+from graphsynth.kinematics.engine.result import Motion
+from graphsynth.mechanism.joints import Gear, Prismatic
+
+__all__ = ["MotionCertificate", "Verdict", "certify"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class Verdict(StrEnum):
+    """Outcome of a certificate: proved, or not decided for a stated reason."""
+
+    CERTIFIED = "certified"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, eq=False)
+class MotionCertificate:
+    """What is proved about a simulated motion.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        CERTIFIED: every sample has its exact assembly, and (with ``between``) all samples lie on one branch that is
+        continuous and regular over the whole range of inputs.
+    poses : ndarray of bool, shape (n,)
+        Samples for which exactly one exact assembly within the stated radii is proved.
+    position_radius, angle_radius : ndarray, shape (n,)
+        The exact assembly is within this distance of the origin of every link (length) and within this angle of every
+        link (radians) of the sample; NaN where nothing is proved.
+    unique_within : ndarray, shape (n,)
+        No other exact assembly has all link origins within ``unique_within * Lc`` and all angles within
+        ``unique_within`` of the sample; NaN where nothing is proved.
+    intervals : ndarray of bool, shape (n - 1,)
+        Intervals between samples for which one regular branch from sample to sample is proved; all False if
+        ``between`` is False.
+    closed : bool
+        The assembly after the full turn is proved to be the first one again.
+    undecided : tuple of (float, float)
+        Intervals of the input, of the smallest size tried, where nothing is proved.
+    reason : str
+        Why the verdict is UNDECIDED; empty if it is not.
+    boxes : int
+        Moving boxes tested.
+    Lc : float
+        Characteristic length.
+    seconds : float
+        Run time.
+    statement : str
+        The result in one sentence.
+    """
+
+    verdict: Verdict
+    poses: Mask
+    position_radius: Array
+    angle_radius: Array
+    unique_within: Array
+    intervals: Mask
+    closed: bool
+    undecided: tuple[tuple[float, float], ...]
+    reason: str
+    boxes: int
+    Lc: float
+    seconds: float
+    statement: str
+
+    @property
+    def certified(self) -> bool:
+        """Whether the verdict is CERTIFIED."""
+        return self.verdict is Verdict.CERTIFIED
+
+
+def certify(
+    motion: Motion, *, between: bool = True, max_boxes: int = 100_000, seconds: float = 60.0
+) -> MotionCertificate:
+    """Prove that a motion of `graphsynth.simulate` shows exact assemblies of one branch.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of any planar mechanism (R, P, pin-slot, gears; groups of any class), with as many drivers as freedoms.  Its
+        dimensions and inputs are taken as exact numbers.
+    between : bool, optional
+        Prove the branch between the samples as well, and its closing after a full turn.
+    max_boxes, seconds : optional
+        Limits of the work; what is not proved within them is UNDECIDED.
+
+    Returns
+    -------
+    MotionCertificate
+        Certified: by Krawczyk's test on all joint equations with the driver coordinates held, in ball arithmetic.
+
+    Raises
+    ------
+    GeometryError
+        If the drivers do not fit the mobility, or there is a cam.
+
+    Notes
+    -----
+    Krawczyk (1969); Neumaier (1990), section 5.1; specification parallel_platform, section 7.4.
+    See ``docs/explanation/certificates.md``.
+
+    Examples
+    --------
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> rocker = Mechanism(graph, [
+    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
+    ...     Revolute(0, 3, (2.0, 0.0)),
+    ... ], [Driver(0, 1)])
+    >>> proof = certify(simulate(rocker, np.linspace(0.0, 2.0 * np.pi, 37)))
+    >>> proof.certified, proof.closed, bool(proof.position_radius.max() < 1e-12)
+    (True, True, True)
+    """
+    if not isinstance(motion, Motion):
+        raise GeometryError(f"{type(motion).__name__} is not a motion of graphsynth.simulate; give one")
+    return _certify(motion, between, Budget(whole("max_boxes", max_boxes, 1, 10**9), positive("seconds", seconds)))
+
+
+def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate:
+    begin = perf_counter()
+    check_rounding()
+    system = MechanismSystem(motion.mechanism)
+    reached = motion.assembled & np.isfinite(motion.poses).all(axis=(1, 2))
+    asked = np.arange(int(np.argmin(np.append(reached, False))))  # up to the first gap: a branch has no holes
+    samples = motion.poses[asked][:, system.moving].reshape(len(asked), system.size)
+    turns = _full_turn(motion) if between and len(asked) == len(motion.inputs) else None
+    u, end = _inputs(motion.inputs[asked], turns)
+    nodes = prove_nodes(system, u, samples)
+    position, angle, room = _radii(system, nodes, samples)
+    proved = np.isfinite(room)
+    found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
+    if between and len(asked) > 1 and all(enclosed(driver.law) for driver in motion.mechanism.drivers):
+        found = cover(system, nodes, budget, begin)
+    closed = turns is not None and end
+    closed = closed and bool(found.covered.all()) and _closes(system, nodes, turns)
+    return _certificate(motion, between, asked, (position, angle, room), proved, found, closed, turns, begin)
+
+
+def _full_turn(motion: Motion) -> Fraction | None:
+    """Return the turns of the input, ``u_end - u_0 = 2 pi turns``, after which every driver is in its place again."""
+    if len(motion.inputs) < 2:
+        return None
+    span = float(motion.inputs[-1] - motion.inputs[0]) / math.tau
+    turns = Fraction(span).limit_denominator(360)
+    if turns == 0 or abs(span - float(turns)) > 1e-12 * abs(span):
+        return None
+    mechanism = motion.mechanism
+    for driver in mechanism.drivers:
+        slides = isinstance(mechanism.joint(*driver.pair), Prismatic)
+        if whole_periods(driver.law, turns, slides) is None:
+            return None
+    return turns
+
+
+def _inputs(u: Array, turns: Fraction | None) -> tuple[Balls, bool]:
+    """Return the inputs as balls; the last one also holds the end of the exact turn, if the samples make one."""
+    balls = exact(u)
+    if turns is None or len(u) < 2:
+        return balls, False
+    stop = exact(u[0]) + tau_times(float(turns.numerator)) / exact(float(turns.denominator))
+    gap = (stop - exact(u[-1])).size
+    rad = balls.rad.copy()
+    rad[-1] = gap
+    return Balls(balls.mid, rad), bool(gap < 1e-9 * (1.0 + abs(u[-1])))
+
+
+def _radii(system: MechanismSystem, nodes: Nodes, samples: Array) -> tuple[Array, Array, Array]:
+    """Distance of the exact assembly from the sample, and the room around the sample in which it is the only one."""
+    proof, w = nodes.proof, system.weights
+    with np.errstate(all="ignore"):
+        apart = (exact(samples) - exact(nodes.x)).size
+        distance = (apart + proof.tight) * (1.0 + 1e-14)
+        room = ((proof.radius * (1.0 - 1e-14) - apart) / w).min(axis=1) * (1.0 - 1e-14)
+        reach = (distance / w).max(axis=1)
+        good = proof.proved & (reach < room)
+        position = np.hypot(distance[:, 0::3], distance[:, 1::3]).max(axis=1, initial=0.0) * (1.0 + 1e-14)
+    angle = distance[:, 2::3].max(axis=1, initial=0.0)
+    return np.where(good, position, np.nan), np.where(good, angle, np.nan), np.where(good, room, np.nan)
+
+
+def _closes(system: MechanismSystem, nodes: Nodes, turns: Fraction | None) -> bool:
+    """Whether the solution at the end of the turn, with whole turns taken off, is the one at the start."""
+    assert turns is not None
+    made = whole_turns(nodes, np.tile([False, False, True], len(system.moving)))
+    if made is None:
+        return False
+    mechanism, angle = system.mechanism, dict.fromkeys(range(system.mechanism.graph.links), 0)
+    angle |= {link: made[3 * k + 2] for k, link in enumerate(system.moving)}
+    expected, gear = [], 0
+    for joint in mechanism.joints:
+        if isinstance(joint, Prismatic):
+            expected.append(angle[joint.b] - angle[joint.a])
+        elif isinstance(joint, Gear):
+            if not _meshes_again(joint, nodes, gear, angle):
+                return False
+            gear += 1
+    for driver, joint in system.driven:
+        if not isinstance(joint, Prismatic):
+            own = whole_periods(driver.law, turns, False)
+            assert own is not None
+            expected.append(angle[driver.link] - angle[driver.base] - own)
+    return bool((nodes.turns[-1] - nodes.turns[0] == np.array(expected, dtype=np.int64)).all())
+
+
+def _meshes_again(joint: Gear, nodes: Nodes, gear: int, angle: dict[int, int]) -> bool:
+    """Whether the gear equation is the same after the turns that wheels and line of centres have made, exactly."""
+    first, last = nodes.directions[0, gear], nodes.directions[-1, gear]
+    line = round(float(last.mid - first.mid) / math.tau)
+    if not bool((last - first - tau_times(float(line))).size < 3.0):
+        return False
+    sign = -1 if joint.internal else 1
+    shift = Fraction(joint.radius_a) * (angle[joint.a] - line) + sign * Fraction(joint.radius_b) * (
+        angle[joint.b] - line
+    )
+    return shift == 0
+
+
+def _certificate(
+    motion: Motion, between: bool, asked: NDArray[np.intp], radii: tuple[Array, Array, Array], proved: Mask,
+    found: Cover, closed: bool, turns: Fraction | None, begin: float,
+) -> MotionCertificate:  # fmt: skip
+    n = len(motion.inputs)
+    position, angle, room = (np.full(n, np.nan) for _ in range(3))
+    poses, intervals = np.zeros(n, dtype=bool), np.zeros(max(n - 1, 0), dtype=bool)
+    for target, part in zip((position, angle, room), radii):
+        target[asked] = part
+    poses[asked] = proved
+    intervals[: len(found.covered)] = found.covered & proved[:-1] & proved[1:]
+    reason = _reason(motion, between, poses, intervals, found)
+    verdict = Verdict.UNDECIDED if reason else Verdict.CERTIFIED
+    seconds = perf_counter() - begin
+    return MotionCertificate(
+        verdict=verdict, poses=poses, position_radius=position, angle_radius=angle, unique_within=room,
+        intervals=intervals, closed=bool(closed and not reason), undecided=tuple(sorted(found.undecided)),
+        reason=reason, boxes=found.tested, Lc=motion.Lc, seconds=seconds,
+        statement=_statement(reason, between, poses, intervals, closed, turns),
+    )  # fmt: skip
+
+
+def _reason(motion: Motion, between: bool, poses: Mask, intervals: Mask, found: Cover) -> str:
+    """Return why not everything is proved; empty if it is."""
+    if not motion.assembled.all():
+        return f"the motion itself is incomplete: {motion.reason or 'a sample is not assembled'}"
+    if not poses.all():
+        where = float(motion.inputs[int(np.argmin(poses))])
+        return f"no exact assembly is proved beside the sample at input {where:.9g}: singular there, or no assembly"
+    if not between or intervals.all():
+        return ""
+    unknown = [d for d in motion.mechanism.drivers if not enclosed(d.law)]
+    if unknown:
+        pair = f"{unknown[0].base}-{unknown[0].link}"
+        return f"the law of driver {pair} is known at points only, so nothing is proved between samples"
+    if found.exhausted:
+        done = int(intervals.sum())
+        return (
+            f"the limit of work was reached after {found.tested} boxes: {done} of {len(intervals)} intervals are proved"
+        )
+    a, b = sorted(found.undecided)[0] if found.undecided else (math.nan, math.nan)
+    return (
+        f"no single regular branch is proved between inputs {a:.12g} and {b:.12g}: a singularity, two modes that "
+        "nearly meet, or samples of different branches"
+    )
+
+
+def _statement(reason: str, between: bool, poses: Mask, intervals: Mask, closed: bool, turns: Fraction | None) -> str:
+    count = int(poses.sum())
+    if reason:
+        return f"undecided: {reason} ({count} of {len(poses)} poses proved)"
+    text = f"certified: each of the {count} samples has exactly one exact assembly within its radius"
+    if not between:
+        return text + "; nothing is stated between samples"
+    text += ", and all lie on one branch without a singularity"
+    if closed:
+        return text + "; after the full turn the mechanism is proved to be where it began"
+    return text + ("; closing after the turn is not proved" if turns is not None else "")

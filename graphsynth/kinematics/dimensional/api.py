@@ -1,0 +1,297 @@
+"""`embody`: dimensions for a mechanism graph."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from graphsynth.core.checks import positive
+from graphsynth.core.errors import GeometryError, GraphError
+from graphsynth.kinematics.dimensional.choice import Drivers, choices
+from graphsynth.kinematics.dimensional.design import Design
+from graphsynth.kinematics.dimensional.dimension import dimensioned
+from graphsynth.kinematics.dimensional.goals import Goals
+from graphsynth.kinematics.dimensional.problem import Problem
+from graphsynth.kinematics.dimensional.search import EXACT, HistoryRow, Search, search, verdict
+from graphsynth.kinematics.dimensional.verify import Figures, verify
+from graphsynth.structure.graph import MechanismGraph
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["Embodiment", "embody"]
+
+#: Searches for a target that are continued to their end.
+_CONTINUED = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Embodiment:
+    """Dimensions found for a mechanism graph, and how they were judged.
+
+    Attributes
+    ----------
+    graph : MechanismGraph
+        With the frame that was chosen; link numbers are those of this graph.
+    drivers : tuple of (base, link)
+    accepted : bool
+        Every bound and the target are kept over the whole range, on one branch, verified by `simulate`.
+    mechanism : Mechanism or None
+        The accepted mechanism, else the best found; None if nothing could be assembled.
+    motion : Motion or None
+        Its motion over the range.
+    figures : Figures or None
+    reasons : dict of str to int
+        Why candidates were rejected, counted: of each first population, and of every result verified.
+    statement : str
+    goals : Goals
+    seed : int
+    evaluations : int
+        Candidate motions computed.
+    seconds : float
+    history : tuple of HistoryRow
+        Best cost by generation; see `to_pandas`.
+    """
+
+    graph: MechanismGraph
+    drivers: tuple[tuple[int, int], ...]
+    accepted: bool
+    mechanism: Mechanism | None
+    motion: Motion | None
+    figures: Figures | None
+    reasons: Mapping[str, int]
+    statement: str
+    goals: Goals
+    seed: int
+    evaluations: int
+    seconds: float
+    history: tuple[HistoryRow, ...] = field(default=(), repr=False)
+
+    def to_pandas(self) -> Any:
+        """Return the search history as a table: attempt, generation, evaluations, cost."""
+        import pandas as pd
+
+        return pd.DataFrame(self.history, columns=list(HistoryRow._fields))
+
+
+def embody(
+    graph: MechanismGraph,
+    goals: Goals | None = None,
+    seed: int = 0,
+    *,
+    driver: Drivers | None = None,
+    joints: Mapping[tuple[int, int], str] | None = None,
+    tries: int = 12,
+    seconds: float = math.inf,
+    effort: float = 1.0,
+) -> Embodiment:
+    """Find dimensions with which a mechanism moves as wanted.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+        A chain (frame and driver are chosen) or a mechanism (driver chosen unless given).
+        Space 3, joint mobilities 1 and 2.
+    goals : Goals, optional
+        A full turn with the default bounds unless given.
+    seed : int
+        Same labelled graph, goals and seed, same result (unless ``seconds`` cuts the search short).
+    driver : int or (base, link), or one of these for each driver, optional
+        A link on the frame, or two jointed links.
+    joints : mapping of (a, b) to str, optional
+        Kind by pair of links of the graph given: "R" (default), "P", or "pin-slot" (default for mobility 2).
+    tries : int
+        Searches at most; each takes the next frame and driver of the order of
+        :func:`graphsynth.kinematics.dimensional.choice.choices`, and starts anew from another sketch.
+    seconds : float
+        Time limit; not exceeded by more than one generation and a verification.
+    effort : float
+        Share of the usual work of each search, for a quick look at many graphs: unlike a time limit it does not change
+        the result from run to run.
+
+    Returns
+    -------
+    Embodiment
+        Accepted only after `simulate` completed the range in steps of at most half a degree (estimated).
+
+    Raises
+    ------
+    GraphError
+        A graph that cannot move, or drivers that do not move it.
+    GeometryError
+        Joint kinds or goals that do not fit the graph.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> found = embody(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)]))
+    >>> found.accepted, found.motion.completed, found.motion.closure.closed
+    (True, True, True)
+    """
+    begin, wanted = perf_counter(), Goals() if goals is None else goals
+    _check(graph, wanted, seed, tries, seconds)
+    positive("effort", effort)
+    order = choices(graph, driver)
+    run = _Run(wanted, seed, begin, seconds, effort)
+    for attempt in range(tries):
+        inversion, drivers = order[attempt % len(order)]
+        run.start(Design(inversion, drivers, _kinds(graph, inversion, joints)), attempt, attempt // len(order))
+        if run.ended:
+            break
+    return run.result()
+
+
+class _Run:
+    """Searches of one call, and what they came to."""
+
+    def __init__(self, goals: Goals, seed: int, begin: float, seconds: float, effort: float) -> None:
+        self.goals, self.seed, self.begin, self.deadline = goals, seed, begin, begin + seconds
+        self.effort = effort
+        self.reasons: Counter[str] = Counter()
+        self.history: list[HistoryRow] = []
+        self.found: list[tuple[Search, Problem, int]] = []
+        self.best: tuple[tuple[bool, float], Embodiment] | None = None
+        self.ended = False
+
+    def start(self, design: Design, attempt: int, round_: int) -> None:
+        """Search once; without a target an accepted result ends the run."""
+        random = np.random.default_rng([self.seed, attempt])
+        problem = Problem(design, self.goals, random, round_ if self.goals.target is not None else 0)
+        found = search(problem, attempt, random, self.deadline, effort=self.effort)
+        every, complete, inside = found.start
+        self.reasons["first population: the range is not completed"] += every - complete
+        self.reasons["first population: a bound is not kept"] += complete - inside
+        self.found.append((found, problem, attempt))
+        self.history += found.history
+        late = perf_counter() > self.deadline
+        if self.goals.target is None:
+            self.judge(problem, found)
+            self.ended = late or (self.best is not None and self.best[1].accepted)
+        else:
+            self.ended = late or found.cost <= EXACT
+
+    def go_on(self) -> None:
+        """Continue the most promising searches to their end."""
+        for found, problem, attempt in sorted(self.found, key=lambda item: item[0].cost)[:_CONTINUED]:
+            random = np.random.default_rng([self.seed, attempt, 1])
+            final = found
+            if perf_counter() < self.deadline and found.cost > EXACT:
+                final = search(problem, attempt, random, self.deadline, found, self.effort)
+                self.history += final.history
+            self.judge(problem, final)
+            if final.cost <= EXACT and self.best is not None and self.best[1].accepted:
+                break
+
+    def judge(self, problem: Problem, found: Search) -> None:
+        """Verify the best of a search and keep it if it is better than those before."""
+        result = _judge(problem, found.best, found.cost, self.goals, self.seed)
+        self.reasons.update(result.reasons)
+        rank = (not result.accepted, found.cost)
+        if self.best is None or rank < self.best[0]:
+            self.best = rank, result
+
+    def result(self) -> Embodiment:
+        """Finish the searches for a target; return the best with the totals of the run."""
+        if self.goals.target is not None:
+            self.go_on()
+        assert self.best is not None
+        evaluations = sum(problem.evaluations for _, problem, _ in self.found)
+        return _with_totals(
+            self.best[1], self.reasons, evaluations, perf_counter() - self.begin, self.history, len(self.found)
+        )
+
+
+def _check(graph: MechanismGraph, goals: Goals, seed: int, tries: int, seconds: float) -> None:
+    if not isinstance(graph, MechanismGraph):
+        raise GraphError(f"{graph!r} is not a MechanismGraph")
+    if not isinstance(goals, Goals):
+        raise GeometryError(f"goals = {goals!r} are not Goals")
+    if graph.space != 3 or not graph.is_connected:
+        raise GraphError("embodiment needs a connected graph of space 3 (planar mechanisms)")
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise GeometryError(f"seed = {seed!r} must be a whole number, 0 or more")
+    if isinstance(tries, bool) or not isinstance(tries, int) or tries < 1:
+        raise GeometryError(f"tries = {tries!r} must be a whole number, 1 or more")
+    if seconds != math.inf:
+        positive("seconds", seconds)
+
+
+def _kinds(
+    graph: MechanismGraph, inversion: MechanismGraph, joints: Mapping[tuple[int, int], str] | None
+) -> tuple[str, ...]:
+    """Kinds of the joints of an inversion, from those of the graph given."""
+    if joints is not None and not isinstance(joints, Mapping):
+        raise GeometryError(f"joints = {joints!r} is not a mapping of (a, b) to a kind, as in {{(0, 1): 'P'}}")
+    given = {(min(pair), max(pair)): kind for pair, kind in (joints or {}).items()}
+    allowed = {1: ("R", "P"), 2: ("pin-slot",)}
+    kinds = {}
+    for a, b, mobility in graph.joints:
+        kind = given.pop((a, b), allowed.get(mobility, ("",))[0])
+        if kind not in allowed.get(mobility, ()):
+            raise GeometryError(
+                f"joint {a}-{b} has mobility {mobility} and cannot be {kind!r}; use one of {allowed.get(mobility, ())}"
+            )
+        kinds[a, b] = kind
+    if given:
+        raise GeometryError(f"joints names {min(given)}, but the graph has no such joint")
+    if inversion.frame == graph.frame:
+        return tuple(kinds.values())
+    first = _moved(graph, inversion)
+    return tuple(kinds[min(first[a], first[b]), max(first[a], first[b])] for a, b, _ in inversion.joints)
+
+
+def _moved(graph: MechanismGraph, inversion: MechanismGraph) -> list[int]:
+    """Return the old number of every link of an inversion."""
+    for link in range(graph.links):
+        if graph.with_frame(link) == inversion:
+            return [link, *(k for k in range(graph.links) if k != link)]
+    raise AssertionError("an inversion is the graph with one of its links as frame")
+
+
+def _judge(problem: Problem, x: Any, cost: float, goals: Goals, seed: int) -> Embodiment:
+    """Verify the best of a search."""
+    mechanism = dimensioned(problem, x)
+    blank = Embodiment(
+        problem.design.graph, problem.design.drivers, False, mechanism, None, None, {}, "", goals, seed, 0, 0.0
+    )
+    if mechanism is None:
+        return _changed(blank, reasons={"result: cannot be assembled": 1})
+    motion, figures, why = verify(mechanism, goals)
+    if why and verdict(cost):
+        why = tuple(dict.fromkeys((*why, verdict(cost))))
+    return _changed(
+        blank, accepted=not why, motion=motion, figures=figures, reasons={f"result: {reason}": 1 for reason in why}
+    )
+
+
+def _changed(result: Embodiment, **changes: Any) -> Embodiment:
+    from dataclasses import replace
+
+    return replace(result, **changes)
+
+
+def _with_totals(
+    result: Embodiment, reasons: Counter[str], evaluations: int, seconds: float, history: list[HistoryRow], tries: int
+) -> Embodiment:
+    frame = "" if result.graph.frame is None else f"frame {result.graph.frame}, "
+    choice = f"{frame}drivers {', '.join(f'{a}-{b}' for a, b in result.drivers)}"
+    counted = {reason: count for reason, count in reasons.items() if count}
+    if result.accepted and result.figures is not None:
+        text = (
+            f"accepted after {tries} search{'es' * (tries > 1)}: {choice}; smallest transmission angle "
+            f"{math.degrees(result.figures.transmission_angle):.1f} degrees, "
+            f"length ratio {result.figures.length_ratio:.2f}"
+        )
+    else:
+        listed = "; ".join(f"{reason}: {count}" for reason, count in counted.items()) or "no candidate"
+        text = f"nothing was accepted in {tries} search{'es' * (tries > 1)}; the best has {choice}; {listed}"
+    return _changed(
+        result, reasons=counted, statement=text, evaluations=evaluations, seconds=seconds, history=tuple(history)
+    )

@@ -1,0 +1,289 @@
+"""The search problem: a vector of unknowns per candidate, and what it costs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.kinematics.dimensional.design import Design
+from graphsynth.kinematics.dimensional.goals import Goals
+from graphsynth.kinematics.dimensional.sketch import layout
+from graphsynth.kinematics.dimensional.targets import Fit, PathFit, Placed, Sampled, make_fit, target_link
+from graphsynth.kinematics.dimensional.transmission import group_forms, transmission_sines
+from graphsynth.kinematics.simulation import simulate, simulate_batch
+from graphsynth.mechanism.laws import Linear
+from graphsynth.mechanism.model import Driver, Mechanism
+
+__all__ = ["Outcome", "Problem"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Cost of a candidate that does not complete its range; below it every candidate is complete.
+INCOMPLETE = 100.0
+#: Cost from which a bound is violated.
+OUTSIDE = 10.0
+_CLOSED = 1e-6
+#: The sine of the transmission angle is asked for with this factor: its least value lies between samples.
+_SPARE = 1.002
+
+
+class Outcome(NamedTuple):
+    """Candidates evaluated: cost, merit of the bounds (1 or more: kept), errors of the target, and what was moved.
+
+    ``frames0`` holds (x, y, cos, sin) of every link at the first input; ``placed`` the placement by the target.
+    """
+
+    cost: Array
+    merit: Array
+    errors: Complex
+    dimensions: Array
+    frames0: Array
+    placed: Placed | None
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Where the parts of the vector are."""
+
+    free: NDArray[np.intp]
+    angles: int
+    extras: int
+
+    @property
+    def size(self) -> int:
+        """Length of the vector."""
+        return 2 * len(self.free) + self.angles + self.extras
+
+
+class Problem:
+    """Candidates for one design under given goals, from one sketch.
+
+    Parameters
+    ----------
+    design : Design
+    goals : Goals
+    random : numpy.random.Generator
+        Shifts the sketch, so that repeated problems start from different ones.
+    variant : int
+        0: the assembly modes of the sketch, drivers turn left.  With a target other curves matter too: bit 0 turns the
+        drivers the other way, bit k the mode of dyad k - 1 (only of mechanisms of dyads, which need no start pose).
+    """
+
+    def __init__(self, design: Design, goals: Goals, random: np.random.Generator, variant: int = 0) -> None:
+        self.design, self.goals, self.sense = design, goals, -1 if variant & 1 else 1
+        sense = self.sense
+        self.fit: Fit | None = make_fit(goals.target)
+        self.link = target_link(design, goals.target) if goals.target is not None else -1
+        self.ends = [(joint.a, joint.b) for joint in design.graph.joints]
+        free = np.setdiff1d(np.arange(len(self.ends)), design.fixed)
+        self.unknowns = Unknowns(free, len(design.directed), 0 if self.fit is None else len(self.fit.ranges))
+        self.sketch = self._sketch(random)
+        self.angles = random.uniform(0.0, math.pi, len(design.directed))
+        base = design.mechanism(self.sketch, self.angles)
+        self.base = Mechanism(
+            base.graph,
+            base.joints,
+            tuple(Driver(*pair, Linear(float(sense))) for pair in design.drivers),
+            pose=base.pose,
+        )
+        at_rest = simulate(self.base, [0.0], events=False)
+        self.forms = group_forms(self.base, at_rest.steps)
+        self.regular = bool(at_rest.assembled[0])
+        self.modes = {
+            step.group: int(at_rest.modes[0, step.group])
+            for step in at_rest.steps
+            if step.group >= 0 and step.has_two_modes and at_rest.modes[0, step.group] != 0
+        }
+        self.iterative = any(step.iterative for step in at_rest.steps)
+        if not self.iterative:
+            flips = variant >> 1
+            self.modes = {
+                group: -mode if flips >> k & 1 else mode for k, (group, mode) in enumerate(self.modes.items())
+            }
+        self.evaluations = 0
+        self._set_inputs()
+
+    def _sketch(self, random: np.random.Generator) -> Array:
+        """Places of the automatic sketch, shifted a little, with the driven links shrunk to cranks."""
+        places = layout(self.design.graph).positions.copy()
+        places += random.normal(0.0, 0.12, places.shape)
+        frame = self.design.graph.frame
+        for (base, link), joint in zip(self.design.drivers, self.design.driver_joints):
+            if base == frame and self.design.kinds[joint] == "R":
+                for k in self.design.joints_of(link):
+                    places[k] = places[joint] + 0.3 * (places[k] - places[joint])
+        return places
+
+    def _set_inputs(self) -> None:
+        """Uniform samples over the range, and the inputs of the target among them."""
+        count = 96 if self.iterative else 48
+        uniform = np.linspace(0.0, self.goals.span, count + 1)
+        own = np.zeros(0) if self.fit is None else self.fit.inputs
+        everything = np.concatenate([uniform, own])
+        order = np.sort(everything)
+        keep = np.concatenate([[True], np.diff(order) > 1e-9])
+        self.inputs = order[keep]
+        self.at_target = np.abs(self.inputs[None] - own[:, None]).argmin(axis=1)
+
+    # --- from vectors to motions
+
+    def decode(self, X: Array) -> tuple[Array, Array, Array]:
+        """Places (sets, joints, 2), angles and extras of vectors (sets, size)."""
+        own, count = self.unknowns, 2 * len(self.unknowns.free)
+        places = np.repeat(self.sketch[None], len(X), axis=0)
+        places[:, own.free] = X[:, :count].reshape(len(X), -1, 2)
+        return places, X[:, count : count + own.angles], X[:, count + own.angles :]
+
+    def bounds(self) -> Array:
+        """Box of the search, shape (size, 2)."""
+        middle = self.sketch.mean(axis=0)
+        reach = 1.5 * float(np.abs(self.sketch - middle).max())
+        if self.fit is not None:
+            reach = max(reach, self.goals.max_length_ratio)
+        box = [(middle[k % 2] - reach, middle[k % 2] + reach) for k in range(2 * len(self.unknowns.free))]
+        box += [(-math.pi, 2.0 * math.pi)] * self.unknowns.angles
+        return np.array([*box, *([] if self.fit is None else self.fit.ranges.tolist())]).reshape(-1, 2)
+
+    def population(self, count: int, random: np.random.Generator) -> Array:
+        """Vectors near the sketch: everything shaken, cranks of many sizes; targets also far from it."""
+        wide = np.zeros((count, 1, 1)) if self.fit is None else random.choice([0.0, 0.0, 1.0], (count, 1, 1))
+        places = np.repeat(self.sketch[None], count, axis=0)
+        places += random.normal(0.0, 1.0, places.shape) * (random.uniform(0.0, 0.35, (count, 1, 1)) + wide)
+        places[:, self.design.fixed] = self.sketch[list(self.design.fixed)]
+        frame = self.design.graph.frame
+        for (base, link), joint in zip(self.design.drivers, self.design.driver_joints):
+            if base == frame and self.design.kinds[joint] == "R":
+                size = np.exp(random.uniform(math.log(0.15), math.log(2.0), (count, 1)))
+                for k in self.design.joints_of(link):
+                    if k not in self.design.fixed:
+                        places[:, k] = places[:, joint] + size * (places[:, k] - places[:, joint])
+        angles = self.angles + random.normal(0.0, 0.5, (count, self.unknowns.angles))
+        ranges = self.bounds()[len(self.bounds()) - self.unknowns.extras :]
+        extras = random.uniform(ranges[:, 0], ranges[:, 1], (count, self.unknowns.extras))
+        X = np.concatenate([places[:, self.unknowns.free].reshape(count, -1), angles, extras], axis=1)
+        box = self.bounds()
+        return np.asarray(np.clip(X, box[:, 0], box[:, 1]))
+
+    def evaluate(self, X: Array) -> Outcome:
+        """Move candidates (sets, size) and judge them."""
+        places, angles, extras = self.decode(X)
+        dimensions = self.design.dimensions(places, angles)
+        self.evaluations += len(X)
+        rates = self.fit is not None and self.fit.warped
+        motion = simulate_batch(self.base, self.inputs, dimensions, modes=self.modes, rates=rates)
+        sines = transmission_sines(self.forms, dimensions, self.ends, motion.frames, motion.margins)
+        complete = motion.completed & self._closed(motion.frames)
+        with np.errstate(invalid="ignore"):
+            least = np.where(complete, _least(sines, self.goals.full_turn), 0.0)
+        ratio = self._ratio(places)
+        errors, placed = np.zeros((len(X), 1), dtype=np.complex128), None
+        if self.fit is not None:
+            errors, placed, arms = self._error(motion.frames, motion.velocities, extras, places, complete)
+            ratio = np.maximum(ratio, arms / self._shortest(places))
+        error = np.abs(errors).max(axis=1)
+        goal = max(_SPARE * math.sin(self.goals.min_transmission_angle), 1e-3)
+        merit = np.minimum(least / goal, self.goals.max_length_ratio / ratio)
+        cost = -merit if self.fit is None else np.where(merit >= 1.0, error, OUTSIDE - merit)
+        reached = motion.reached / len(self.inputs)
+        cost = np.where(complete, cost, INCOMPLETE - 10.0 * reached)
+        return Outcome(cost, np.where(complete, merit, 0.0), errors, dimensions, motion.frames[:, 0], placed)
+
+    def _closed(self, frames: Array) -> NDArray[np.bool_]:
+        if not self.goals.full_turn:
+            return np.ones(len(frames), dtype=np.bool_)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.abs(frames[:, -1] - frames[:, 0]).max(axis=(1, 2)) < _CLOSED)
+
+    def _lengths(self, places: Array) -> Array:
+        sides = self.design.sides
+        d = places[:, sides[:, 0]] - places[:, sides[:, 1]]
+        return np.asarray(np.hypot(d[..., 0], d[..., 1]))
+
+    def _shortest(self, places: Array) -> Array:
+        return np.asarray(np.maximum(self._lengths(places).min(axis=1, initial=np.inf), 1e-12))
+
+    def _ratio(self, places: Array) -> Array:
+        lengths = self._lengths(places)
+        if not lengths.shape[1]:
+            return np.ones(len(places))
+        return np.asarray(lengths.max(axis=1) / self._shortest(places))
+
+    def crank(self, places: Array) -> Array:
+        """Length of the first driven link: from its driven joint to its first other joint."""
+        joint = self.design.driver_joints[0]
+        other = next(k for k in self.design.joints_of(self.design.drivers[0][1]) if k != joint)
+        d = places[:, joint] - places[:, other]
+        return np.asarray(np.hypot(d[:, 0], d[:, 1]))
+
+    def _bar(self, places: Array) -> tuple[Complex, Complex]:
+        """Origin and direction of the target's link at the sketch pose: its first joint, towards its second."""
+        first, second = (self.design.joints_of(self.link) * 2)[:2]
+        d = places[:, second] - places[:, first]
+        z = d[:, 0] + 1j * d[:, 1]
+        size = np.abs(z)
+        along = np.where(size > 0.0, z / np.maximum(size, 1e-300), 1.0)
+        return places[:, first, 0] + 1j * places[:, first, 1], along
+
+    def _error(
+        self, frames: Array, velocities: Array, extras: Array, places: Array, complete: NDArray[np.bool_]
+    ) -> tuple[Complex, Placed, Array]:
+        """Errors of the target, its placement, and the longest arm of the tracing point."""
+        assert self.fit is not None
+        own = frames[:, :, self.link]
+        origin, along = self._bar(places)
+        w = own[..., 2] + 1j * own[..., 3]
+        z, w = own[..., 0] + 1j * own[..., 1] + w * origin[:, None], w * along[:, None]
+        angle = np.unwrap(np.nan_to_num(np.angle(w)), axis=1) if self.fit.angular else np.zeros(w.shape)
+        if isinstance(self.fit, PathFit) and self.fit.warped:
+            times = self.fit.times(extras, self.goals.span)
+            v = velocities[:, :, self.link]
+            turn = own[..., 2] + 1j * own[..., 3]
+            dz = v[..., 0] + 1j * v[..., 1] + 1j * v[..., 2] * turn * origin[:, None]
+            sampled = _hermite(self.inputs, (z, dz), (angle, v[..., 2]), times)
+        else:
+            sampled = Sampled(z[:, self.at_target], w[:, self.at_target], angle[:, self.at_target])
+        filler = np.exp(0.1j * np.arange(sampled.z.shape[1]))
+        keep = complete[:, None]
+        sampled = Sampled(
+            np.where(keep, sampled.z, filler**2), np.where(keep, sampled.w, filler), np.where(keep, sampled.angle, 0.0)
+        )
+        errors, found = self.fit.errors(sampled, extras, self.crank(places))
+        placed = Placed(found.s, found.s * origin + found.q * along, found.t)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            point = placed.q / placed.s
+        joints = self.design.joints_of(self.link)
+        arms = np.abs(places[:, joints, 0] + 1j * places[:, joints, 1] - point[:, None]).max(axis=1)
+        return errors, placed, np.nan_to_num(arms, nan=1e12, posinf=1e12)
+
+
+def _least(sines: Array, periodic: bool) -> Array:
+    """Smallest value by set, shape (sets,), with the parabola through the smallest sample and its neighbours."""
+    n, groups = sines.shape[1:]
+    if not groups or n < 3:
+        return np.asarray(sines.min(axis=(1, 2), initial=1.0))
+    k = np.nan_to_num(sines, nan=2.0).argmin(axis=1)
+    last = n - 1  # the same pose as sample 0 after a full turn
+    low = np.where(k == 0, last - 1 if periodic else 0, k - 1)
+    high = np.where(k == last, 1 if periodic else last, k + 1)
+    y0, y1, y2 = (np.take_along_axis(sines, at[:, None], axis=1)[:, 0] for at in (low, k, high))
+    bend = y0 - 2.0 * y1 + y2
+    drop = np.where(bend > 0.0, (y0 - y2) ** 2 / (8.0 * np.where(bend > 0.0, bend, 1.0)), 0.0)
+    return np.asarray((y1 - drop).min(axis=1))
+
+
+def _hermite(u: Array, origin: tuple[Complex, Complex], turn: tuple[Array, Array], times: Array) -> Sampled:
+    """Cubic interpolation of a link at inputs that differ by set."""
+    k = np.clip(np.searchsorted(u, times, side="right") - 1, 0, len(u) - 2)
+    (z, dz), (angle, rate) = origin, turn
+    row = np.arange(len(z))[:, None]
+    h = u[k + 1] - u[k]
+    x = (times - u[k]) / h
+    a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2 * h, x * x * (3 - 2 * x), x * x * (x - 1) * h
+    at = a * z[row, k] + b * dz[row, k] + c * z[row, k + 1] + d * dz[row, k + 1]
+    theta = a * angle[row, k] + b * rate[row, k] + c * angle[row, k + 1] + d * rate[row, k + 1]
+    return Sampled(at, np.exp(1j * theta), theta)

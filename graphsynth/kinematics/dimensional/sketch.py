@@ -1,0 +1,335 @@
+"""The automatic sketch: where to draw the joints of a mechanism graph that has no dimensions yet.
+
+The joints become the vertices of a plane graph: a link with two joints is an edge, a link with more is a polygon.  When
+the mechanism graph is planar, its loops and its link polygons are the faces.  One loop is the outer face, a regular
+polygon; a hub is put into every other loop and joined to its joints.  The graph so made is 3-connected, so the
+barycentric drawing of Tutte (1963, "How to draw a graph", Proc. London Math. Soc. 13, 743-767) has no crossings and
+every link polygon is strictly convex.  Forces then even out the distances; no step may turn a face over.
+
+A graph that is not planar (11 of the 230 ten-link chains) is drawn with the fewest crossings found, see
+:mod:`graphsynth.kinematics.dimensional.crossings`; one with a cut link by forces.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.errors import GraphError
+from graphsynth.kinematics.dimensional.crossings import crossing_pairs, fewest_crossings, merged
+from graphsynth.structure.graph import MechanismGraph
+
+__all__ = ["JointLayout", "layout"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Polygons = tuple[tuple[int, ...], ...]
+IntArray = NDArray[np.intp]
+
+#: Steps of forces: for the comparison of outer faces, and for the picture.
+_ROUGH, _STEPS = 15, 60
+#: Further rounds of steps while two joints are closer than this, in mean sides.
+_ROUNDS, _CLOSE = 30, 0.3
+#: Outer faces compared, the longest first.
+_OUTER = 4
+#: Springs of polygons over those of bars: plates are to be nearly regular.
+_STIFF = 3.0
+#: Height of a plate's corner over the line of its neighbours below which it is pushed out, in mean sides.
+_HEIGHT = 0.6
+#: Trials of a step, each with the offending vertices moved less.
+_RETRIES = 4
+#: Share of the area of a triangle that a step must leave.
+_KEPT = 0.4
+#: Distance of joints from sides they are not on below which a force acts, in mean sides, and its strength.
+_CLEAR, _CLEARING = 0.5, 5.0
+#: Distance of two joints below which a further force acts, in mean sides.
+_APART = 0.6
+#: Strength of the force that keeps triangles from becoming flat.
+_BARRIER = 0.05
+_STRENGTHS = (_APART, _CLEAR, _CLEARING, _BARRIER, _HEIGHT, _KEPT, float(_RETRIES))
+
+
+@dataclass(frozen=True, eq=False)
+class JointLayout:
+    """Places of the joints in a sketch.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+    positions : ndarray, shape (joints, 2)
+        In the order of ``graph.joints``; the mean distance between neighbours on a link is 1.
+    polygons : tuple of tuple of int
+        For each link its joints (indices into ``graph.joints``) in the order of its outline.
+    planar : bool
+        Whether the drawing was made without crossings.
+    crossings : int
+        Crossings of sides of links, 0 if planar.
+    """
+
+    graph: MechanismGraph
+    positions: Array
+    polygons: tuple[tuple[int, ...], ...]
+    planar: bool
+    crossings: int = 0
+
+    def outline(self, link: int) -> Array:
+        """Corners of a link, shape (its joints, 2)."""
+        return np.asarray(self.positions[list(self.polygons[link])])
+
+
+def layout(graph: MechanismGraph) -> JointLayout:
+    """Sketch a chain or a mechanism: places of its joints.
+
+    Parameters
+    ----------
+    graph : MechanismGraph
+        Connected; joint mobilities do not matter.  A frame is drawn at the bottom.
+
+    Returns
+    -------
+    JointLayout
+        Deterministic; where the graph is planar without cut links, free of crossings with convex links (exact
+        embedding, estimated places).
+
+    Raises
+    ------
+    GraphError
+        If the graph is not connected or has no joint.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> square = layout(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0))
+    >>> square.planar, square.polygons[0]
+    (True, (0, 1))
+    """
+    if not graph.joints or not graph.is_connected:
+        raise GraphError("a sketch needs a connected graph with at least one joint")
+    found = _embedding(graph)
+    if found is None:
+        return _with_crossings(graph)
+    loops, polygons = found
+    places = _circle(graph, loops[0]) if len(loops) == 2 else _best_outer(graph, loops, polygons)
+    return JointLayout(graph, places, polygons, True)
+
+
+# --- planar embedding
+
+
+def _embedding(graph: MechanismGraph) -> tuple[list[list[int]], Polygons] | None:
+    """Loops as cycles of joints and outlines of the links; None if the graph has no such embedding."""
+    import networkx as nx
+
+    if min(graph.degrees) < 2 or graph.cut_links or graph.cut_joints:
+        return None
+    plain = nx.Graph([(a, b) for a, b, _ in graph.joints])
+    planar, embedding = nx.check_planarity(plain)
+    if not planar:
+        return None
+    index = {pair: k for k, joint in enumerate(graph.joints) for pair in ((joint.a, joint.b), (joint.b, joint.a))}
+    outlines = tuple(
+        tuple(index[link, other] for other in embedding.neighbors_cw_order(link)) for link in range(graph.links)
+    )
+    return _loops(embedding, index), outlines
+
+
+def _loops(embedding: Any, index: dict[tuple[int, int], int]) -> list[list[int]]:
+    """Faces of the embedding as cycles of joints, in a fixed order."""
+    seen: set[tuple[int, int]] = set()
+    found = []
+    for edge in sorted(index):
+        if edge not in seen:
+            around = embedding.traverse_face(*edge, mark_half_edges=seen)
+            found.append([index[pair] for pair in zip(around, [*around[1:], around[0]])])
+    return found
+
+
+def _best_outer(graph: MechanismGraph, loops: list[list[int]], polygons: Polygons) -> Array:
+    """Draw with the outer face that gives the roomiest picture; with the frame outside if there is one."""
+    frame_joints = {k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)}
+    allowed = [k for k, loop in enumerate(loops) if graph.frame is None or len(frame_joints & set(loop)) >= 2]
+    longest = max(len(loops[k]) for k in allowed)
+    near = sorted((k for k in allowed if len(loops[k]) >= longest - 1), key=lambda k: -len(loops[k]))
+    drawings = [_Drawing(graph, loops, k, polygons) for k in near[:_OUTER]]
+    for drawing in drawings:
+        drawing.even_out(_ROUGH)
+    rooms = [drawing.room() for drawing in drawings]
+    # the first of equals: rounding must not choose among faces that symmetry makes alike
+    best = next(drawing for drawing, room in zip(drawings, rooms) if room >= (1.0 - 1e-6) * max(rooms))
+    best.even_out(_STEPS)
+    for _ in range(_ROUNDS):  # large graphs begin crowded
+        if best.closest() >= _CLOSE:
+            break
+        best.even_out(_STEPS, crowded=True)
+    return _upright(graph, best.z[: len(graph.joints)], best.outer)
+
+
+class _Drawing:
+    """A drawing under way: joints, then the hubs of the inner loops, as complex numbers."""
+
+    def __init__(self, graph: MechanismGraph, loops: list[list[int]], outer: int, polygons: Polygons) -> None:
+        count, self.outer = len(graph.joints), loops[outer]
+        inner = loops[:outer] + loops[outer + 1 :]
+        sides = _sides(polygons)
+        spokes = [(count + hub, joint) for hub, loop in enumerate(inner) for joint in loop]
+        triangles = [(count + h, a, b) for h, loop in enumerate(inner) for a, b in zip(loop, [*loop[1:], loop[0]])]
+        self.plates = [corner for p in polygons if len(p) > 2 for corner in _corners(p)]
+        self.triangles = np.array(triangles + self.plates + _corners(self.outer), dtype=np.intp)
+        stiff = {pair for p in polygons if len(p) > 2 for pair in _sides((p,))}
+        self.springs = _Springs(
+            np.array(sides, dtype=np.intp), [_STIFF if side in stiff else 1.0 for side in sides], count
+        )
+        z = _tutte(count + len(inner), np.array(sides + spokes), self.outer)
+        self.z = z / float(np.abs(self.springs.stretch(z)).mean())
+        self.sense = np.sign(_areas(self.z, self.triangles))
+        self.joints = count
+        self.corners = np.array(self.plates, dtype=np.intp).reshape(-1, 3)
+        self.turned = np.sign(_areas(self.z, self.corners))
+
+    def even_out(self, steps: int, crowded: bool = False) -> None:
+        """Let springs, repulsion and the room of the faces act; no face turns over.
+
+        A step keeps a share of the area of every triangle, so it never gets stuck at a face that is small already.
+        """
+        from graphsynth.kinematics.dimensional import kernels
+
+        x, y = self.z.real.copy(), self.z.imag.copy()
+        kernels.even_out(
+            x, y, self.joints, self.springs.sides, self.springs.stiffness, self.triangles, self.sense,
+            self.corners, self.turned, steps, crowded, _STRENGTHS,
+        )  # fmt: skip
+        self.z = x + 1j * y
+
+    def closest(self) -> float:
+        """Smallest distance of two joints in mean sides."""
+        z = self.z[: self.joints]
+        apart = np.abs(z[:, None] - z)[np.triu_indices(len(z), 1)].min()
+        return float(apart / np.abs(self.springs.stretch(z)).mean())
+
+    def room(self) -> float:
+        """Smallest distance of two joints, or height of a plate, over the size of the picture."""
+        z = self.z[: self.joints]
+        apart = np.abs(z[:, None] - z)
+        least = apart[np.triu_indices(len(z), 1)].min()
+        longest = apart[self.corners, np.roll(self.corners, 1, axis=1)].max(axis=1, initial=1e-300)
+        heights = np.abs(_areas(z, self.corners)) / longest
+        bars = self.springs.clearances(z).min(initial=np.inf)
+        return float(min(least, heights.min(initial=np.inf), 2.0 * bars) / apart.max())
+
+
+class _Springs:
+    """The sides of links, their springs of rest length 1, and the joints they are to keep away from."""
+
+    def __init__(self, sides: IntArray, stiffness: list[float], joints: int) -> None:
+        self.sides, self.stiffness = sides, np.array(stiffness)
+        of_side, joint = np.divmod(np.arange(joints * len(sides)), joints)
+        foreign = (joint != sides[of_side, 0]) & (joint != sides[of_side, 1])
+        self.foreign = joint[foreign], sides[of_side[foreign], 0], sides[of_side[foreign], 1]
+
+    def stretch(self, z: Complex) -> Complex:
+        """Vectors along the sides."""
+        return np.asarray(z[self.sides[:, 1]] - z[self.sides[:, 0]])
+
+    def clearances(self, z: Complex) -> Array:
+        """Distances of joints from the sides they are not on."""
+        k, p, q = self.foreign
+        side, way = z[q] - z[p], z[k] - z[p]
+        share = (way.real * side.real + way.imag * side.imag) / np.maximum(side.real**2 + side.imag**2, 1e-12)
+        return np.asarray(np.abs(way - np.minimum(np.maximum(share, 0.0), 1.0) * side))
+
+
+def _sides(polygons: Polygons) -> list[tuple[int, int]]:
+    """Neighbouring joints on the outline of every link, each pair once."""
+    pairs = [pair for p in polygons if len(p) > 1 for pair in zip(p, (*p[1:], p[0]))]
+    return sorted({(min(pair), max(pair)) for pair in pairs})
+
+
+def _corners(around: Any) -> list[tuple[int, int, int]]:
+    return [(around[k - 2], around[k - 1], around[k]) for k in range(len(around))]
+
+
+def _tutte(count: int, edges: IntArray, outer: list[int]) -> Complex:
+    """Barycentric drawing: outer face on a regular polygon, every other vertex at the mean of its neighbours."""
+    A = np.zeros((count, count))
+    np.add.at(A, (edges[:, 0], edges[:, 1]), 1.0)
+    A = np.minimum(A + A.T, 1.0)
+    z = np.zeros(count, dtype=np.complex128)
+    z[outer] = np.exp(1j * math.tau * np.arange(len(outer)) / len(outer))
+    free = np.setdiff1d(np.arange(count), outer)
+    if free.size:
+        L = np.diag(A.sum(axis=1)) - A
+        z[free] = np.linalg.solve(L[free][:, free], -L[free][:, outer] @ z[outer])
+    return z
+
+
+def _areas(z: Complex, triangles: IntArray) -> Array:
+    """Twice the signed areas of triangles."""
+    p, q, r = z[triangles[:, 0]], z[triangles[:, 1]], z[triangles[:, 2]]
+    return np.asarray((np.conj(q - p) * (r - p)).imag)
+
+
+def _upright(graph: MechanismGraph, z: Complex, outer: list[int]) -> Array:
+    """Turn the frame to the bottom, a side of it on the outer face horizontal; centre at the origin."""
+    z = z - z.mean()
+    own = [k for k, joint in enumerate(graph.joints) if graph.frame in (joint.a, joint.b)]
+    pairs = [(p, q) for p, q in zip(outer, [*outer[1:], *outer[:1]]) if p in own and q in own]
+    if pairs:
+        direction = z[pairs[0][1]] - z[pairs[0][0]]
+        z = z * np.conj(direction) / abs(direction)
+        if (z[pairs[0][0]].imag + z[pairs[0][1]].imag) > 0.0:
+            z = -z
+    elif own:
+        middle = z[own].mean()
+        if abs(middle) > 1e-9:
+            z = z * (-1j * np.conj(middle) / abs(middle))
+    return np.column_stack([z.real, z.imag])
+
+
+# --- without a plane embedding
+
+
+def _circle(graph: MechanismGraph, loop: list[int]) -> Array:
+    """Draw a single loop: a regular polygon of sides 1."""
+    z = np.zeros(len(graph.joints), dtype=np.complex128)
+    z[loop] = np.exp(1j * math.tau * np.arange(len(loop)) / len(loop)) / (2.0 * math.sin(math.pi / len(loop)))
+    return _upright(graph, z, loop)
+
+
+def _with_crossings(graph: MechanismGraph) -> JointLayout:
+    """Let binary links cross as diagonals of a quadrilateral; by forces where that is not enough."""
+    if not graph.is_planar and (pairs := crossing_pairs(graph)):
+        number = merged(graph, pairs)
+        joints = [(number[a], number[b]) for a, b, _ in graph.joints]
+        frame = None if graph.frame is None else number[graph.frame]
+        simple = MechanismGraph(max(number) + 1, joints, frame=frame)
+        if _embedding(simple) is not None:
+            drawn = layout(simple)
+            index = {(a, b): k for k, (a, b, _) in enumerate(simple.joints)}
+            places = drawn.positions[[index[min(pair), max(pair)] for pair in joints]]
+            polygons = tuple(_around(places, own) for own in _own_joints(graph))
+            return JointLayout(graph, places, polygons, False, len(pairs))
+    return _by_forces(graph)
+
+
+def _own_joints(graph: MechanismGraph) -> list[list[int]]:
+    return [[k for k, joint in enumerate(graph.joints) if link in (joint.a, joint.b)] for link in range(graph.links)]
+
+
+def _by_forces(graph: MechanismGraph) -> JointLayout:
+    """Springs between all joints of a link and repulsion, the best of many starts."""
+    own = _own_joints(graph)
+    if max(map(len, own)) < 2:
+        return JointLayout(graph, np.zeros((len(graph.joints), 2)), tuple(map(tuple, own)), True)
+    z, crossings = fewest_crossings(own, len(graph.joints))
+    places = _upright(graph, z, [])
+    return JointLayout(graph, places, tuple(_around(places, joints) for joints in own), False, crossings)
+
+
+def _around(places: Array, joints: list[int]) -> tuple[int, ...]:
+    """Joints of a link in the order of their direction from the middle."""
+    d = places[joints] - places[joints].mean(axis=0)
+    return tuple(joints[k] for k in np.argsort(np.arctan2(d[:, 1], d[:, 0]), kind="stable"))

@@ -1,0 +1,335 @@
+"""Direct problem of the planar platform: every pose for given anchors and leg lengths (3-RPR).
+
+The compiled solver (``kernels.modes``) isolates the real roots of the sextic with bounds on derivatives and polishes
+every pose on the closure equations.  What it cannot decide in double precision it flags; `escalation` then works with
+50 digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import LARGEST, SMALLEST, check_largest, positive
+from graphsynth.core.errors import GeometryError
+
+__all__ = ["AssemblyModeBatch", "AssemblyModes", "assembly_modes", "assembly_modes_batch"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: (pivots, arms, angles): lets the anchors be recomputed at higher precision
+Arms = tuple[tuple[complex, complex, complex], tuple[float, float, float], Sequence[float]]
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyModes:
+    """All assembly modes of one problem, sorted by alpha.
+
+    Attributes
+    ----------
+    poses : ndarray, shape (m, 3)
+        ``(x, y, alpha)`` with alpha in (-pi, pi]; m is 0 to 6, or 0 with ``self_motion`` set.
+    determinants : ndarray, shape (m,)
+        ``det JX`` of every mode, length^4.
+    residuals : ndarray, shape (m,)
+        Largest ``|f_k|`` relative to the square of the largest length.
+    near_double_root : bool
+        Two modes are closer than float64 coefficients can separate (type-II singularity).
+    escalated : bool
+        The modes were then computed at 50 digits from the given double-precision input.
+    double : ndarray of bool, shape (m,)
+        Modes that stay merged even at 50 digits; they count twice.
+    self_motion : str
+        Description of a continuous family of poses; empty if there is none.
+    consistent : bool
+        The number of modes is even and the signs of ``det JX`` cancel (section 5.4).
+    note : str
+        Remark, for instance on a drop of the degree.
+    method : str
+        How the count was had.
+    """
+
+    poses: Array
+    determinants: Array
+    residuals: Array
+    near_double_root: bool
+    escalated: bool
+    double: NDArray[np.bool_]
+    self_motion: str
+    consistent: bool
+    note: str
+    method: str
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def separation(self, Lc: float) -> Array:
+        """Distance of every mode from its nearest neighbour, ``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2) / Lc``, shape (m,).
+
+        ``Lc`` is the characteristic length; infinite for a mode without neighbour.
+        """
+        d = self.poses[:, None] - self.poses[None]
+        turn = np.angle(np.exp(1j * d[..., 2]))
+        distance = np.sqrt((d[..., 0] ** 2 + d[..., 1] ** 2) / positive("Lc", Lc) ** 2 + turn**2)
+        np.fill_diagonal(distance, np.inf)
+        return np.asarray(distance.min(axis=1, initial=np.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyModeBatch:
+    """Assembly modes of N problems in one list, by problem and then by alpha.
+
+    Attributes
+    ----------
+    problem : ndarray of int, shape (M,)
+        Problem of every mode.
+    poses : ndarray, shape (M, 3)
+        ``(x, y, alpha)``, alpha in (-pi, pi].
+    determinants : ndarray, shape (M,)
+        ``det JX``, length^4.
+    counts : ndarray of int, shape (N,)
+        Number of modes of every problem.
+    near_double_root : ndarray of bool, shape (N,)
+        Double precision does not decide this problem.  If it was not escalated its modes are incomplete or inaccurate.
+    consistent : ndarray of bool, shape (N,)
+        Even number of modes and vanishing sum of ``sign(det JX)`` (section 5.4), double modes left out.
+    escalated : ndarray of bool, shape (N,)
+        Solved again at 50 digits.
+    remarks : dict of int to str
+        For escalated problems: a self-motion, or why the problem is not decided.  Such problems have no modes here.
+    """
+
+    problem: NDArray[np.intp]
+    poses: Array
+    determinants: Array
+    counts: NDArray[np.intp]
+    near_double_root: NDArray[np.bool_]
+    consistent: NDArray[np.bool_]
+    escalated: NDArray[np.bool_]
+    remarks: dict[int, str] = field(default_factory=dict)
+
+
+def _scale(anchors: Complex, vertices: Complex, lengths: Array) -> float:
+    """Largest length of the problem."""
+    spread, arms = np.abs(anchors - anchors[0]).max(), np.abs(vertices - vertices[0]).max()
+    return float(max(spread, arms, lengths.max())) or 1.0
+
+
+def _jacobian(anchors: Complex, vertices: Complex, pose: Array) -> tuple[Array, Complex]:
+    """``df/dX`` (..., 3, 3) and the leg vectors (..., 3)."""
+    arm = np.exp(1j * pose[..., 2:3]) * vertices
+    d = pose[..., 0:1] + 1j * pose[..., 1:2] + arm - anchors
+    return 2.0 * np.stack([d.real, d.imag, arm.real * d.imag - arm.imag * d.real], axis=-1), d
+
+
+def _closure(d: Complex, lengths: Array) -> Array:
+    size = np.abs(d)
+    return np.asarray((size - lengths) * (size + lengths))
+
+
+def _rows(name: str, values: ArrayLike, dtype: type) -> NDArray[Any]:
+    """Finite array (n, 3) as the kernels need it: contiguous and writeable."""
+    try:
+        array: NDArray[Any] = np.atleast_2d(np.asarray(values, dtype=dtype))
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{name} is not an array of numbers: {error}") from error
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise GeometryError(f"{name} has shape {array.shape}; give three per problem, shape (3,) or (N, 3)")
+    bad = np.argwhere(~np.isfinite(array))
+    if bad.size:
+        raise GeometryError(f"{name} of leg {bad[0, 1] + 1}, problem {bad[0, 0]}, is not finite; give finite numbers")
+    return np.require(array, requirements=["C", "W"])
+
+
+def assembly_modes_batch(
+    anchors: ArrayLike,
+    vertices: ArrayLike,
+    lengths: ArrayLike,
+    *,
+    escalate: bool = True,
+    arms: tuple[ArrayLike, ArrayLike, Array] | None = None,
+) -> AssemblyModeBatch:
+    """All assembly modes of N problems (3-RPR): about a million problems a second on one core.
+
+    Parameters
+    ----------
+    anchors, vertices : array_like of complex, shape (N, 3) or (3,)
+        Anchors A_k in the fixed frame, vertices b_k in the platform frame; a single row serves all problems.
+    lengths : array_like, shape (N, 3) or (3,)
+        Leg lengths, zero or more.
+    escalate : bool
+        Solve flagged problems again at 50 digits (tens of milliseconds each); else they stay flagged.
+    arms : tuple (pivots (3,), arms (3,), angles (N, 3)), optional
+        From what the anchors came, so that 50 digits can start from the given angles.
+
+    Returns
+    -------
+    AssemblyModeBatch
+        The count is guaranteed for the computed coefficients where ``near_double_root`` is False (section 5.2); every
+        pose is polished on the closure equations and accurate to about 3e-12 of the largest length, or flagged.
+
+    Raises
+    ------
+    GeometryError
+        Numbers that are not finite, negative lengths, shapes that do not fit, a problem whose largest dimension is not
+        between 1e-60 and 1e60.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corner = np.exp(2j * np.pi * np.arange(3) / 3)
+    >>> batch = assembly_modes_batch(2 * corner, corner, [[1.5, 1.5, 1.5], [0.5, 0.5, 0.5]])
+    >>> batch.counts.tolist()
+    [2, 0]
+    """
+    A, b, l2 = _rows("anchor", anchors, complex), _rows("vertex", vertices, complex), _rows("length", lengths, float)
+    if bool((l2 < 0.0).any()):
+        problem, leg = np.argwhere(l2 < 0.0)[0]
+        raise GeometryError(f"length of leg {leg + 1}, problem {problem}, is {l2[problem, leg]}; give zero or more")
+    n = max(len(A), len(b), len(l2))
+    if any(len(rows) not in (1, n) for rows in (A, b, l2)):
+        raise GeometryError(f"{len(A)} anchors, {len(b)} platforms and {len(l2)} legs; give N or one of each")
+    _check_sizes(A, b, l2)
+    if len(A) < n:
+        A = np.repeat(A, n, axis=0)
+    batch = _compiled(A, b, l2)
+    if not escalate:
+        return batch
+    undecided = np.flatnonzero(batch.near_double_root | ~batch.consistent)
+    if undecided.size == 0:
+        return batch
+    return _escalated(batch, undecided, A, np.broadcast_to(b, A.shape), np.broadcast_to(l2, A.shape), arms)
+
+
+def _check_sizes(A: Complex, b: Complex, l2: Array) -> None:
+    """Refuse problems whose determinants, length^4, would not be numbers."""
+    tables = [np.abs(rows.view(np.float64)) for rows in (A, b, l2)]
+    largest = max(float(table.max(initial=0.0)) for table in tables)
+    if not (largest <= LARGEST and l2.min(initial=LARGEST) >= SMALLEST):  # else no problem can be out of range
+        size = np.maximum.reduce(np.broadcast_arrays(*(table.max(axis=1) for table in tables)))
+        for problem in np.flatnonzero((size > LARGEST) | ((size > 0.0) & (size < SMALLEST))):
+            check_largest(float(size[problem]), f"dimension of problem {problem}")
+
+
+def _compiled(A: Complex, b: Complex, l2: Array) -> AssemblyModeBatch:
+    from graphsynth.kinematics.triad.kernels.modes import INCONSISTENT, modes
+
+    n = len(A)  # rows that stay unused cost no memory
+    problem, poses, determinants = np.empty(6 * n, dtype=np.intp), np.empty((6 * n, 3)), np.empty(6 * n)
+    counts, flags = np.empty(n, dtype=np.intp), np.empty(n, dtype=np.uint8)
+    total = modes(A, b, l2, problem, poses, determinants, counts, flags)
+    found = (problem[:total].copy(), poses[:total].copy(), determinants[:total].copy())
+    inconsistent = (flags & INCONSISTENT) != 0
+    return AssemblyModeBatch(
+        *found, counts, (flags & ~np.uint8(INCONSISTENT)) != 0, ~inconsistent, np.zeros(n, dtype=bool)
+    )
+
+
+def _escalated(
+    batch: AssemblyModeBatch,
+    undecided: NDArray[np.intp],
+    A: Complex,
+    b: Complex,
+    l2: Array,
+    arms: tuple[ArrayLike, ArrayLike, Array] | None,
+) -> AssemblyModeBatch:
+    counts, consistent, escalated = batch.counts.copy(), batch.consistent.copy(), batch.escalated.copy()
+    keep = ~np.isin(batch.problem, undecided)
+    problems, poses, determinants = [batch.problem[keep]], [batch.poses[keep]], [batch.determinants[keep]]
+    remarks = {}
+    for index in undecided:
+        i = int(index)
+        given = None if arms is None else (_three(arms[0], complex), _three(arms[1], float), arms[2][i])
+        modes = _at_fifty_digits(A[i], b[i], l2[i], given, bool(batch.near_double_root[i]))
+        problems.append(np.full(len(modes), i, dtype=np.intp))
+        poses.append(modes.poses)
+        determinants.append(modes.determinants)
+        counts[i], consistent[i], escalated[i] = len(modes), modes.consistent, True
+        if modes.self_motion:
+            remarks[i] = modes.self_motion
+        elif not modes.consistent:
+            remarks[i] = "parity of the modes violated after escalation: a mode is missing or singular; please report"
+    problem = np.concatenate(problems)
+    order = np.argsort(problem, kind="stable")
+    return AssemblyModeBatch(
+        problem[order],
+        np.concatenate(poses)[order],
+        np.concatenate(determinants)[order],
+        counts,
+        batch.near_double_root,
+        consistent,
+        escalated,
+        remarks,
+    )
+
+
+def _three(values: ArrayLike, dtype: type) -> Any:
+    return tuple(np.asarray(values, dtype=dtype).tolist())
+
+
+def _at_fifty_digits(A: Complex, b: Complex, l2: Array, arms: Arms | None, flagged: bool) -> AssemblyModes:
+    from graphsynth.kinematics.triad.escalation import escalate
+
+    poses, double, self_motion = escalate(A, b, l2, arms)
+    return _described(A, b, l2, poses, double, self_motion, flagged, "isolated by bounds on derivatives at 50 digits")
+
+
+def _described(
+    A: Complex,
+    b: Complex,
+    l2: Array,
+    poses: Array,
+    double: NDArray[np.bool_],
+    self_motion: str,
+    flagged: bool,
+    method: str,
+) -> AssemblyModes:
+    """Modes with everything that can be recomputed from the poses."""
+    JX, d = _jacobian(A, b, poses)
+    determinants = np.linalg.det(JX)
+    residuals = np.max(np.abs(_closure(d, l2)), axis=-1, initial=0.0) / _scale(A, b, l2) ** 2
+    single = np.sign(determinants[~double])
+    consistent = bool(single.size % 2 == 0 and single.sum() == 0) and not self_motion
+    return AssemblyModes(
+        poses, determinants, residuals, flagged, "digits" in method, double, self_motion, consistent,
+        _degree_note(A, b), method,
+    )  # fmt: skip
+
+
+def assembly_modes(
+    anchors: ArrayLike, vertices: ArrayLike, lengths: ArrayLike, *, arms: Arms | None = None
+) -> AssemblyModes:
+    """All assembly modes of one problem: anchors A_k, platform vertices b_k, leg lengths, each of shape (3,).
+
+    Problems whose modes nearly merge, or whose linear system degenerates at a mode, are solved again at 50 digits from
+    the given double-precision numbers; ``arms`` lets the anchors be recomputed there from pivots, arms and angles.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corner = np.exp(2j * np.pi * np.arange(3) / 3)  # similar triangles: two mirror modes (section 5.3)
+    >>> modes = assembly_modes(2 * corner, corner, [1.5, 1.5, 1.5])
+    >>> len(modes), modes.consistent
+    (2, True)
+    """
+    A, b = np.asarray(anchors, dtype=np.complex128).reshape(-1), np.asarray(vertices, dtype=np.complex128).reshape(-1)
+    l2 = np.asarray(lengths, dtype=np.float64).reshape(-1)
+    batch = assembly_modes_batch(A, b, l2, escalate=False)
+    flagged = bool(batch.near_double_root[0])
+    if flagged or not batch.consistent[0]:
+        return _at_fifty_digits(A, b, l2, arms, flagged)
+    single = np.zeros(len(batch.poses), dtype=bool)
+    return _described(A, b, l2, batch.poses, single, "", False, "isolated by bounds on derivatives, float64")
+
+
+def _degree_note(A: Complex, b: Complex) -> str:
+    for name, points in (("anchors", A), ("platform vertices", b)):
+        for first, second in ((0, 1), (0, 2), (1, 2)):
+            if points[first] == points[second]:
+                return f"{name} {first + 1} and {second + 1} coincide: the degree drops to at most four modes"
+    return ""

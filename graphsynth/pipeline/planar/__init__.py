@@ -1,0 +1,1 @@
+"""The built-in family of scenes: any planar mechanism."""

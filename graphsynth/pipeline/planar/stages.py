@@ -1,0 +1,275 @@
+"""Stages for any planar mechanism: take candidates, give them dimensions, move them, judge them."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.core.errors import FormatError, GraphsynthError
+from graphsynth.pipeline.planar.system import EmbodyTable, PlanarTable
+from graphsynth.pipeline.products import Candidate, Columns, Outcome, Quantity, Record, Rejected, exact
+from graphsynth.pipeline.stages import Context
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.dimensional.goals import Goals, Target
+    from graphsynth.kinematics.engine.result import Motion
+    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.pipeline.planar.stages_loads import Driven, Jammed
+
+__all__ = ["Built", "FileCandidate", "Moved", "embody", "judge", "mechanisms", "move", "scaled", "take", "write"]
+
+
+@dataclass(frozen=True, slots=True)
+class FileCandidate:
+    """A mechanism with dimensions, read from a file."""
+
+    number: int
+    name: str
+    mechanism: Mechanism
+    key: str
+    solution: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Built:
+    """A candidate with dimensions, in metres (in cranks without ``crank_mm``), and what its search achieved."""
+
+    name: str
+    mechanism: Mechanism
+    margins: tuple[Quantity, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moved:
+    """A candidate in motion over its range."""
+
+    name: str
+    motion: Motion
+    margins: tuple[Quantity, ...]
+
+
+def take(context: Context) -> Iterator[Candidate | FileCandidate]:
+    """Return the candidates of ``[structure]``, or those of the files, in their order.
+
+    All files are read, and all candidates counted, before work begins on the first.
+
+    Raises
+    ------
+    SceneError
+        A file that cannot be read or is no mechanism; goals nobody can mean; a question without candidates.
+    TooLargeError
+        More candidates than the limit.
+    """
+    table: PlanarTable = context.scene.mechanism
+    if table.files:
+        return iter([_read(context, i, name) for i, name in enumerate(table.files)])
+    from graphsynth.pipeline.steps.structural import check_count, generate, solve
+
+    try:
+        goals_of(table.embody)
+    except GraphsynthError as error:
+        raise (context.scene.place / "mechanism" / "embody").error(f"asks for what cannot be: {error}") from error
+    solutions = solve(context)
+    check_count(context, solutions)
+    return generate(context, solutions)
+
+
+def _read(context: Context, place: int, name: str) -> FileCandidate:
+    from graphsynth.core.textfiles import read_bytes
+    from graphsynth.mechanism.files import JSON_MAX
+    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.pipeline.steps.structural import assortment_text
+
+    at = context.scene.place / "mechanism" / "files" / str(place)
+    path = context.scene.folder / name
+    try:
+        data = read_bytes(path, JSON_MAX, "a mechanism", path.name)
+    except FormatError as error:
+        raise at.error(f"names {name!r}, which {str(error).removeprefix(f'{path.name}: ')}") from error
+    try:
+        mechanism = Mechanism.from_json(data) if path.suffix == ".json" else Mechanism.from_toml(data)
+    except GraphsynthError as error:  # FormatError: no mechanism as text; others: one that nobody can build
+        raise at.error(f"names {name!r}, which is no mechanism: {error}") from error
+    key = f"{mechanism.graph.key} {hashlib.sha256(data).hexdigest()[:12]}"
+    return FileCandidate(place + 1, path.stem, mechanism, key, assortment_text(mechanism.graph))
+
+
+def embody(context: Context, design: Candidate | FileCandidate) -> Built:
+    """Give a graph dimensions that meet the goals; a mechanism of a file keeps its own.
+
+    Raises
+    ------
+    Rejected
+        If the search finds none.
+    """
+    table: PlanarTable = context.scene.mechanism
+    if isinstance(design, FileCandidate):
+        return Built(design.name, design.mechanism)
+    from graphsynth.kinematics.dimensional.api import embody as search
+
+    own = table.embody
+    found = search(design.graph, goals_of(own), context.scene.scene.seed, tries=own.tries, effort=own.effort)
+    if not found.accepted or found.mechanism is None or found.figures is None:
+        causes = [why.removeprefix("result: ") for why in found.reasons if why.startswith("result: ")]
+        error = found.figures.goal_error if found.figures is not None else math.nan
+        best = f"; error {error:.3g}" if math.isfinite(error) else ""
+        raise Rejected(f"no dimensions found: {causes[0] if causes else 'nothing moves'}", found.statement + best)
+    margins = [Quantity("length ratio", found.figures.length_ratio)]
+    if math.isfinite(found.figures.goal_error):
+        margins.insert(0, Quantity("deviation", found.figures.goal_error))
+    mechanism = scaled(found.mechanism, _size(table) / _crank(found.mechanism))
+    return Built(f"No. {design.number}", mechanism, tuple(margins))
+
+
+def goals_of(table: EmbodyTable) -> Goals:
+    """Return the goals of ``[mechanism.embody]``."""
+    from graphsynth.kinematics.dimensional.goals import Goals
+
+    return Goals(
+        math.radians(table.span_deg), math.radians(table.min_transmission_deg), table.max_length_ratio, _target(table)
+    )
+
+
+def _target(table: EmbodyTable) -> Target | None:
+    from graphsynth.kinematics.dimensional.goals import FunctionGoal, LineGoal, PathGoal, PosesGoal
+
+    def radians(values: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(map(math.radians, values))
+
+    if (line := table.line) is not None:
+        return LineGoal(line.length, math.radians(line.span_deg), line.link, line.on_bar, line.tolerance)
+    if (path := table.path) is not None:
+        return PathGoal(path.points, radians(path.inputs_deg) or None, path.link, path.tolerance)
+    if (poses := table.poses) is not None:
+        rows = tuple((*p, a) for p, a in zip(poses.points, radians(poses.angles_deg), strict=True))
+        return PosesGoal(rows, radians(poses.inputs_deg), poses.link, poses.tolerance)
+    if (wanted := table.function) is not None:
+        tolerance = math.radians(wanted.tolerance_deg)
+        return FunctionGoal(radians(wanted.inputs_deg), radians(wanted.outputs_deg), wanted.link, tolerance)
+    return None
+
+
+def _size(table: PlanarTable) -> float:
+    return 1.0 if table.crank_mm is None else table.crank_mm / 1000.0
+
+
+def _crank(mechanism: Mechanism) -> float:
+    """Length of the first driven link: from its driven joint to its next one; 1 for a slider."""
+    driver = mechanism.drivers[0]
+    at = [
+        joint.at_a if joint.a == driver.link else joint.at_b for joint in mechanism.joints if driver.link in joint.pair
+    ]
+    joints = [joint for joint in mechanism.joints if driver.link in joint.pair]
+    first = next(p for p, joint in zip(at, joints, strict=True) if driver.base in joint.pair)
+    others = [math.dist(p, first) for p, joint in zip(at, joints, strict=True) if driver.base not in joint.pair]
+    return others[0] if others and others[0] > 0.0 else 1.0
+
+
+def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
+    """Return the mechanism with all lengths multiplied (turning and sliding pairs, pins in slots).
+
+    Examples
+    --------
+    >>> from graphsynth.systems.four_bar_survey.motion import four_bar
+    >>> scaled(four_bar(), 0.5).joint(2, 3).at_a
+    (1.25, 0.0)
+    """
+    from graphsynth.mechanism.model import Mechanism
+
+    def times(point: tuple[float, float]) -> tuple[float, float]:
+        return point[0] * factor, point[1] * factor
+
+    joints = tuple(replace(joint, at_a=times(joint.at_a), at_b=times(joint.at_b)) for joint in mechanism.joints)
+    points = {name: (point.link, times(point.at)) for name, point in mechanism.points.items()}
+    pose = mechanism.pose and tuple((x * factor, y * factor, angle) for x, y, angle in mechanism.pose)
+    return Mechanism(mechanism.graph, joints, mechanism.drivers, points, pose)  # type: ignore[arg-type]
+
+
+def move(context: Context, built: Built) -> Moved:
+    """Move a candidate over the range of ``[mechanism.motion]``.
+
+    Raises
+    ------
+    Rejected
+        If the range is not completed, or the transmission angle is too small.
+    """
+    import numpy as np
+
+    from graphsynth.kinematics.dimensional.verify import smallest_transmission
+    from graphsynth.kinematics.simulation import simulate
+
+    table: PlanarTable = context.scene.mechanism
+    span = math.radians(table.motion.span_deg)
+    motion = simulate(built.mechanism, np.linspace(0.0, span, table.motion.positions + 1))
+    if not motion.completed:
+        raise Rejected("the range is not completed", motion.reason)
+    angle = math.degrees(smallest_transmission(motion))
+    if angle < table.motion.min_transmission_deg:
+        raise Rejected(
+            "the transmission angle is too small", f"{angle:.2f} deg, {table.motion.min_transmission_deg:g} is asked"
+        )
+    margins = (
+        *built.margins,
+        Quantity("transmission angle", angle, "deg"),
+        Quantity("distance to singularity", float(motion.singularity_distance.min())),
+        Quantity("size", _extent(motion) / _crank(built.mechanism)),
+        exact("links", built.mechanism.graph.links),
+    )
+    return Moved(built.name, motion, margins)
+
+
+def _extent(motion: Motion) -> float:
+    """Diagonal of the box that holds all joints and named points over the range."""
+    import numpy as np
+
+    mechanism = motion.mechanism
+    places = [motion.point(joint.a, joint.at_a).position for joint in mechanism.joints]
+    places += [motion.point(name).position for name in mechanism.points]
+    low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
+    return float(np.hypot(*(high - low)))
+
+
+def judge(context: Context, moved: Moved, *parts: Jammed | Driven) -> Record:
+    """Give the record of a candidate: what its motion, its bearings and its loads say."""
+    words = ["moves over the whole range (estimated)", *(part.words for part in parts if part.words)]
+    verdicts = [part.good for part in parts if part.words]
+    margins = (*moved.margins, *(margin for part in parts for margin in part.margins))
+    reason = "; ".join(part.reason for part in parts if part.reason)
+    good = False if False in verdicts else None if None in verdicts else True
+    return Record(verdict=", ".join(words), good=good, margins=margins, reason=reason)
+
+
+def write(context: Context, moved: Moved) -> dict[str, Any]:
+    """Keep the mechanism as text, for files and pictures."""
+    return {"name": moved.name, "mechanism": moved.motion.mechanism.to_json()}
+
+
+def mechanisms(context: Context, written: tuple[Outcome, ...]) -> Columns:
+    """Lay out the mechanisms that were built, each in the JSON of ``Mechanism.from_json``."""
+    built = [outcome for outcome in written if outcome.status == "assessed"]
+    return Columns(
+        "mechanisms",
+        {
+            "number": [outcome.number for outcome in built],
+            "key": [outcome.key for outcome in built],
+            "mechanism": [outcome.products["written"]["mechanism"] for outcome in built],
+        },
+    )
+
+
+def restored(outcome: Outcome) -> Mechanism:
+    """Return the mechanism that `write` kept.
+
+    Raises
+    ------
+    GraphsynthError
+        If it keeps none.
+    """
+    from graphsynth.mechanism.model import Mechanism
+
+    if outcome.status != "assessed":
+        raise GraphsynthError(f"candidate {outcome.number} has no mechanism: {outcome.reason}")
+    return Mechanism.from_json(outcome.products["written"]["mechanism"])

@@ -1,0 +1,87 @@
+"""Pictures of the best planar mechanisms: diagrams, animations, the paths of their tracing points."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from graphsynth.pipeline.planar.stages import restored
+from graphsynth.pipeline.planar.system import PlanarTable
+from graphsynth.pipeline.products import Outcome, Picture, Ranking, Record
+from graphsynth.pipeline.stages import Context
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.engine.result import Motion
+
+__all__ = ["animations", "plots", "sketches"]
+
+_FRAMES = 72
+
+
+def _best(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> list[tuple[int, Motion]]:
+    """Return number and motion of the best candidates, the best first."""
+    import numpy as np
+
+    from graphsynth.kinematics.simulation import simulate
+
+    table: PlanarTable = context.scene.mechanism
+    outcomes = {outcome.number: outcome for outcome in written}
+    inputs = np.linspace(0.0, math.radians(table.motion.span_deg), 181)
+    return [(n, simulate(restored(outcomes[n]), inputs)) for n in ranking.numbers[: table.pictures]]
+
+
+def sketches(
+    context: Context, written: tuple[Outcome, ...], ranking: Ranking, records: tuple[Record, ...]
+) -> tuple[Picture, ...]:
+    """Draw the best candidates where their joints are well apart."""
+    from graphsynth.drawing.diagram import mechanism_svg
+
+    by_number = {record.number: record for record in records}
+    pictures = []
+    for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
+        svg = mechanism_svg(motion, _clear(motion), width=420, height=320, title=f"Place {place}")
+        record = by_number[number]
+        margins = ", ".join(f"{m.name} {m.value:.3g}{' ' + m.unit if m.unit else ''}" for m in record.margins[:5])
+        text = f"{record.verdict[:1].upper()}{record.verdict[1:]}: {margins}."
+        pictures.append(Picture(f"Place {place}: candidate {number}", svg, text))
+    return tuple(pictures)
+
+
+def _clear(motion: Motion) -> int:
+    """Return the sample in which the nearest two joints of different links are farthest apart."""
+    import numpy as np
+
+    places = np.stack([motion.point(j.a, j.at_a).position for j in motion.mechanism.joints], axis=1)
+    apart = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
+    apart += 1e9 * np.eye(places.shape[1])
+    return int(apart.min(axis=(1, 2)).argmax())
+
+
+def animations(
+    context: Context, written: tuple[Outcome, ...], ranking: Ranking, records: tuple[Record, ...]
+) -> tuple[Picture, ...]:
+    """Show the best candidates in motion, with the path of a tracing point."""
+    from graphsynth.drawing.animation import animated_svg
+    from graphsynth.drawing.frames import with_trace_points
+
+    pictures = []
+    for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
+        title = f"Place {place}: candidate {number}"
+        svg = animated_svg(
+            with_trace_points(motion), frames=_FRAMES, title=title, seconds=4.0, width=420.0, height=320.0
+        )
+        pictures.append(Picture(title, svg, next(r.solution for r in records if r.number == number)))
+    return tuple(pictures)
+
+
+def plots(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> tuple[Picture, ...]:
+    """Plot the paths of the tracing points of the best candidates, or how far their assembly modes are apart."""
+    from graphsynth.drawing.motion_charts import coupler_curves, margin_chart
+
+    pictures = []
+    for place, (number, motion) in enumerate(_best(context, written, ranking), 1):
+        named = bool(motion.mechanism.points)
+        chart = coupler_curves(motion) if named else margin_chart(motion)
+        what = "path of the point" if named else "margins of the groups: 0 where two assembly modes meet"
+        pictures.append(Picture(f"Place {place}: candidate {number}", chart.svg(), f"The {what}."))
+    return tuple(pictures)

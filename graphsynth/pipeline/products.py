@@ -1,0 +1,336 @@
+"""What stages hand to one another and to the report: plain frozen data in which a number says how it was had."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeVar
+
+from graphsynth.core.errors import GraphsynthError
+
+__all__ = [
+    "Attempt",
+    "Candidate",
+    "Columns",
+    "Finding",
+    "Objective",
+    "Outcome",
+    "Part",
+    "Picture",
+    "Quantity",
+    "Ranking",
+    "Recognised",
+    "Record",
+    "Rejected",
+    "Table",
+    "each",
+    "exact",
+]
+
+T = TypeVar("T")
+R = TypeVar("R")
+Guarantee = Literal["exact", "certified", "estimated"]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A mechanism graph that answers the structural question.
+
+    Attributes
+    ----------
+    number : int
+        From 1, in the order of generation.
+    graph : MechanismGraph
+        With its frame.
+    solution : str
+        The integer solution it belongs to, for example ``n2=6 n3=7 n4=1``.
+    """
+
+    number: int
+    graph: Any
+    solution: str = ""
+
+    @property
+    def key(self) -> str:
+        """Canonical key of the graph."""
+        return str(self.graph.key)
+
+
+class Rejected(Exception):  # noqa: N818  # not an error: a candidate that does not meet a goal
+    """Raised by a stage for each candidate: this one does not meet a goal, and later stages need not look at it.
+
+    Parameters
+    ----------
+    cause : str
+        The reason in words that are the same for all candidates it holds for; causes are counted.
+    detail : str, optional
+        What holds for this candidate only, as in ``"transmission angle 12.3 deg, at least 30 deg is asked"``.
+    """
+
+    def __init__(self, cause: str, detail: str = "") -> None:
+        super().__init__(f"{cause}: {detail}" if detail else cause)
+        self.cause = cause
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one candidate in the stages for each candidate.
+
+    Attributes
+    ----------
+    number : int
+        From 1, in the order of the stream.
+    key, solution : str
+        Of the candidate, if it has them.
+    status : {"assessed", "rejected", "failed"}
+        Through all stages; or stopped by a goal; or by an exception.
+    stage, cause, reason : str
+        Where it was stopped, why in countable words, and why in full.
+    products : Mapping
+        What later stages and the report need of it: text, numbers, booleans, None, tuples, dictionaries with text
+        keys, and the frozen dataclasses of this module.
+    """
+
+    number: int
+    key: str = ""
+    solution: str = ""
+    status: Literal["assessed", "rejected", "failed"] = "assessed"
+    stage: str = ""
+    cause: str = ""
+    reason: str = ""
+    products: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Recognised:
+    """A candidate with the kinematic module that knows it, or the reason why none does."""
+
+    candidate: Candidate
+    module: str | None
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number with its unit, how it was had and how far it may be off.
+
+    Attributes
+    ----------
+    guarantee : {"exact", "certified", "estimated"}
+        ``exact``: no rounding, or a closed form evaluated in floating point with the rounding error in `error`.
+    error : float or None
+        Bound (exact, certified) or estimate (estimated) of the absolute error, in `unit`; None if unknown.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    guarantee: Guarantee = "estimated"
+    error: float | None = None
+
+    @property
+    def text(self) -> str:
+        """The value with its unit, to a readable number of digits."""
+        return f"{self.value:.10g}{'' if self.unit in ('', '°', '′', '″') else ' '}{self.unit}"
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One row of ``results.csv``: a candidate and what became of it.
+
+    Attributes
+    ----------
+    number, key, solution
+        Of the candidate; a scene without candidates has one record and leaves them out.
+    status : {"assessed", "not recognised", "rejected", "failed"}
+        A candidate that no module recognises or that a goal rejects is not a failure; all but the first carry a reason.
+    good : bool or None
+        Whether the verdict is what a designer hopes for; None if there is none.
+    cause : str
+        The reason in words that can be counted; empty if the reason is that already.
+    """
+
+    number: int = 1
+    key: str = ""
+    solution: str = ""
+    status: Literal["assessed", "not recognised", "rejected", "failed"] = "assessed"
+    recognised_as: str = ""
+    verdict: str = ""
+    good: bool | None = None
+    margins: tuple[Quantity, ...] = ()
+    reason: str = ""
+    cause: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something the first screen of the page and of the terminal says: a sentence, or a number and what it counts.
+
+    Attributes
+    ----------
+    text : str
+        The sentence; with a value its caption.
+    good : bool or None
+        Whether a designer hopes for it; None if it is neither good nor bad.
+    value : str
+        Printed large, over the caption; empty for a sentence.
+    """
+
+    text: str
+    good: bool | None = None
+    value: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of the report: strings, ready to print.
+
+    Attributes
+    ----------
+    title, note : str
+    columns : tuple of str
+    rows : tuple of tuple of str
+    findings : tuple of Finding
+        What the first screen says about it.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Columns:
+    """Numbers by the column, for files rather than for the page: curves, a survey of many dimension sets.
+
+    Attributes
+    ----------
+    name : str
+        Of the files: ``<name>.csv``, ``<name>.parquet``.
+    columns : Mapping
+        Header, with its unit as in ``"crank [deg]"``, to a sequence or array; all of the same length.
+
+    Notes
+    -----
+    What a stage for each candidate gives as `Columns` is written at once, as ``<name>/part-<number>.csv``, and a `Part`
+    stands for it from then on: memory does not grow with the number of rows.
+    """
+
+    name: str
+    columns: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Columns of one candidate that are in files.
+
+    Attributes
+    ----------
+    name : str
+        Of the columns, and of the folder beside the report.
+    rows : int
+    files : tuple of (str, str)
+        Path below the report folder, and SHA-256 of the content.
+    """
+
+    name: str
+    rows: int
+    files: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An inline SVG with a title and a caption, and the place it takes on the page: small ones stand in rows."""
+
+    title: str
+    svg: str
+    caption: str = ""
+    size: Literal["small", "normal", "wide"] = "normal"
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """The outcome of one step for one candidate: a value, or the reason why there is none."""
+
+    candidate: Candidate
+    value: Any = None
+    reason: str = ""
+    notes: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the step gave a reason instead of a value."""
+        return bool(self.reason)
+
+
+def each(attempts: Iterable[Attempt], step: Callable[[Any], Any]) -> tuple[Attempt, ...]:
+    """Apply `step` to every value; a candidate that fails keeps its reason and does not stop the others.
+
+    Any exception counts: whatever goes wrong with one candidate is recorded under its name and shown in the report.
+
+    Examples
+    --------
+    >>> ok, bad = each([Attempt(None, 2.0), Attempt(None, 0.0)], lambda x: 1 / x)
+    >>> ok.value, bad.reason
+    (0.5, 'ZeroDivisionError: float division by zero')
+    """
+    done = []
+    for attempt in attempts:
+        if not attempt.failed:
+            try:
+                attempt = replace(attempt, value=step(attempt.value))
+            except Exception as error:
+                words = "" if isinstance(error, GraphsynthError) else f"{type(error).__name__}: "
+                attempt = replace(attempt, value=None, reason=f"{words}{error}")
+        done.append(attempt)
+    return tuple(done)
+
+
+def exact(name: str, value: float, unit: str = "") -> Quantity:
+    """Return a quantity that carries no rounding (a count, an order)."""
+    return Quantity(name, value, unit, "exact", 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """One thing to rank by: a margin of the records, whether less, more or a value is wanted, and its weight."""
+
+    quantity: str
+    goal: Literal["min", "max"] | float
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Ranking:
+    """Records in the order of preference.
+
+    Attributes
+    ----------
+    objectives : tuple of Objective
+    numbers : tuple of int
+        Candidates with all objectives, the best first.
+    scores : tuple of float
+        In that order: weighted mean of the objectives, each scaled to 0 (worst of all) .. 1 (best of all).
+    front : tuple of int
+        The candidates that no other one beats in every objective (Pareto front), in the order of `numbers`.
+    values : tuple of tuple of float
+        In the order of `numbers`: the value of each objective.
+    unranked : tuple of (int, str)
+        Assessed candidates without some objective, and which.
+    places : tuple of tuple of int
+        In the order of `numbers`: by objective, how many of all ranked ones are better.
+    ranked, front_size : int
+        How many were ranked, and how many of them are on the Pareto front; `numbers` may be the first of them only.
+    """
+
+    objectives: tuple[Objective, ...]
+    numbers: tuple[int, ...]
+    scores: tuple[float, ...]
+    front: tuple[int, ...]
+    values: tuple[tuple[float, ...], ...]
+    unranked: tuple[tuple[int, str], ...] = ()
+    places: tuple[tuple[int, ...], ...] = ()
+    ranked: int = 0
+    front_size: int = 0

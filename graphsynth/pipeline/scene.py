@@ -1,0 +1,344 @@
+"""A scene: one question, the mechanism it is about, and the outputs wanted, as frozen data read from TOML."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from graphsynth.core.errors import SceneError
+from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
+from graphsynth.pipeline.stages import RANK, STRUCTURE, Stage
+from graphsynth.pipeline.system import System, system, system_names
+from graphsynth.pipeline.tables import Place, read_table, require, suggest
+from graphsynth.structure.system.variables import nearest
+
+__all__ = [
+    "TABLES",
+    "BudgetTable",
+    "GenerateTable",
+    "OutputsTable",
+    "RankingTable",
+    "Scene",
+    "StructureTable",
+    "available_scenes",
+    "find_scene",
+    "load_scene",
+]
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+_LONGEST_NAME = 100
+
+
+@dataclass(frozen=True, slots=True)
+class SceneTable:
+    """``[scene]``: how the scene is called."""
+
+    name: str
+    title: str
+    description: str = ""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        require(
+            re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", self.name) is not None,
+            f"has name {self.name!r}; it names a folder, so use letters, digits, '-', '_' and '.'",
+        )
+        require(len(self.name) <= _LONGEST_NAME, f"has name of {len(self.name)} letters; use at most {_LONGEST_NAME}")
+        for key in ("title", "description"):
+            strange = [c for c in getattr(self, key) if not c.isprintable() and c not in "\n\t"]
+            require(not strange, f"has {key} with {strange[:1]}, which cannot be printed; remove it")
+        require(0 <= self.seed < 2**63, f"has seed = {self.seed}; use 0 to 2**63 - 1")
+
+
+@dataclass(frozen=True, slots=True)
+class GenerateTable:
+    """``[structure.generate]``: which mechanisms of the question become candidates.
+
+    Attributes
+    ----------
+    symmetry : int or None
+        Keep mechanisms that have an automorphism of this order that fixes the frame.
+    fixed_moving_links : int or None
+        Of such an automorphism, the number of moving links that stay in place.
+    planar : bool
+        Leave out graphs that cannot be drawn without crossings.
+    sample : int or None
+        Draw this many mechanisms uniformly, with the seed of the scene, instead of listing all; repeats are dropped.
+    limit : int
+        Stop with an error when there are more candidates than this.
+    """
+
+    symmetry: int | None = None
+    fixed_moving_links: int | None = None
+    planar: bool = False
+    sample: int | None = None
+    limit: int = 10_000
+
+    def __post_init__(self) -> None:
+        require(self.symmetry in (None, 3), f"has symmetry {self.symmetry}; only 3 is known, or leave it out")
+        require(self.limit >= 1, f"has limit {self.limit}; it must be at least 1")
+        most = min(self.limit, 1_000_000)
+        require(
+            self.sample is None or 1 <= self.sample <= most,
+            f"has sample {self.sample}; draw 1 to {most}, the limit on candidates",
+        )
+        require(self.sample is None or self.symmetry is None, "has sample and symmetry; only one of them works")
+        if self.fixed_moving_links is not None:
+            require(self.symmetry is not None, "gives fixed_moving_links without symmetry; add symmetry = 3")
+            require(self.fixed_moving_links >= 0, f"has fixed_moving_links {self.fixed_moving_links}; at least 0")
+
+
+@dataclass(frozen=True, slots=True)
+class StructureTable:
+    """``[structure]``: the structural question, or graphs by their keys or text forms, and which become candidates."""
+
+    question: Mapping[str, object] | None = None
+    graphs: tuple[str, ...] = ()
+    generate: GenerateTable = field(default_factory=GenerateTable)
+
+    def __post_init__(self) -> None:
+        require(
+            (self.question is None) != (not self.graphs),
+            "must have either a table question or a list graphs",
+        )
+        if self.graphs:
+            only = "of graphs that are given; it is for a question"
+            require(self.generate.symmetry is None, f"has generate.symmetry {only}")
+            require(self.generate.sample is None, f"has generate.sample {only}")
+
+
+@dataclass(frozen=True, slots=True)
+class OutputsTable:
+    """``[outputs]``: the products wanted; nothing that they do not need is imported or computed."""
+
+    products: tuple[str, ...]
+    files: tuple[Literal["csv", "parquet"], ...] = ("csv",)
+
+    def __post_init__(self) -> None:
+        require(bool(self.products), "has products = []; name at least one output")
+        require(
+            len(set(self.products)) == len(self.products), f"has products = {list(self.products)}, one of them twice"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetTable:
+    """``[budget]``: where a run stops.  What is stored by then stays, and a run with more goes on from it.
+
+    Attributes
+    ----------
+    time_s : float or None
+        Wall time; looked at after each candidate and between stages.
+    memory_MB : float or None
+        Resident memory of the process that runs the scene; looked at at the same places.
+    boxes : int or None
+        For stages that pave or prove: the most boxes they may look at.
+    """
+
+    time_s: float | None = None
+    memory_MB: float | None = None
+    boxes: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "memory_MB", "boxes"):
+            value = getattr(self, name)
+            require(value is None or value > 0, f"has {name} = {value}; it must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectiveTable:
+    """One of ``[[ranking.objectives]]``: a margin of the records, and what is wanted of it."""
+
+    quantity: str
+    goal: Literal["min", "max"] = "min"
+    target: float | None = None
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        require(self.weight > 0, f"has weight = {self.weight}; it must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class RankingTable:
+    """``[ranking]``: the objectives, and how many candidates the report lists."""
+
+    objectives: tuple[ObjectiveTable, ...]
+    show: int = 10
+
+    def __post_init__(self) -> None:
+        require(bool(self.objectives), "has no objectives; name at least one quantity")
+        require(self.show >= 1, f"has show = {self.show}; it must be at least 1")
+
+
+#: Every table of a scene but ``[mechanism]``, which its system describes.
+TABLES: dict[str, type] = {
+    "scene": SceneTable,
+    "structure": StructureTable,
+    "ranking": RankingTable,
+    "budget": BudgetTable,
+    "outputs": OutputsTable,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A scene as read: checked, frozen, and with its raw text for the record.
+
+    Attributes
+    ----------
+    scene, mechanism, outputs, structure, ranking, budget
+        The tables of the file; `mechanism` has the type its system says, the last three may be missing.
+    source : str
+        File name, or ``<mapping>``.
+    raw : Mapping
+        The tables as TOML gave them.
+    digest : str
+        SHA-256 of the file's bytes, empty for a mapping.
+    text : str
+        The file, for the line numbers of messages; empty for a mapping.
+    folder : Path
+        Of the file: where paths in it begin; the working directory for a mapping.
+    """
+
+    scene: SceneTable
+    mechanism: Any
+    outputs: OutputsTable
+    structure: StructureTable | None = None
+    ranking: RankingTable | None = None
+    budget: BudgetTable = field(default_factory=BudgetTable)
+    source: str = "<mapping>"
+    raw: Mapping[str, object] = field(default_factory=dict, compare=False, repr=False)
+    digest: str = ""
+    text: str = field(default="", compare=False, repr=False)
+    folder: Path = field(default=Path(), compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return self.scene.name
+
+    @property
+    def place(self) -> Place:
+        """Where the scene was read from, for messages."""
+        return Place(self.source, (), self.text)
+
+    @classmethod
+    def from_mapping(cls, tables: object, source: str = "<mapping>", digest: str = "", text: str = "") -> Scene:
+        """Read a scene from the tables of a TOML document.
+
+        Raises
+        ------
+        SceneError
+            With the file, the key, what was expected and the nearest valid key.
+        """
+        place = Place(source, (), text)
+        if not isinstance(tables, Mapping):
+            raise place.error("must hold tables")
+        known: dict[str, type] = {**TABLES, "mechanism": object}
+        for key in tables:
+            if key not in known:
+                raise place.error(f"has an unknown table [{key}]{suggest(str(key), known)}", str(key))
+        for key in ("scene", "mechanism", "outputs"):
+            if key not in tables:
+                raise place.error(f"lacks the table [{key}]")
+        chosen = _system(tables["mechanism"], place / "mechanism")
+        if chosen.structure == "required" and "structure" not in tables:
+            raise place.error("lacks the table [structure]")
+        if chosen.structure == "none" and "structure" in tables:
+            raise place.error("has a table [structure], which its mechanism does not need; remove it")
+        known["mechanism"] = chosen.table
+        read: dict[str, Any] = {
+            key: read_table(schema, tables[key], place / key) for key, schema in known.items() if key in tables
+        }
+        return cls(**read, source=source, raw=dict(tables), digest=digest, text=text)
+
+    def stages(self) -> tuple[Stage, ...]:
+        """Return every stage this scene can use; most are not needed for its outputs."""
+        own = system(self.mechanism.module).stages_for(self)
+        given = {product for stage in (*STRUCTURE, *own) for product in stage.gives}
+        common = tuple(stage for stage in STRUCTURE if given.issuperset(stage.needs)) if self.structure else ()
+        ranking = (RANK,) if self.ranking is not None and "ranking" not in given else ()
+        return (*common, *ranking, *own)
+
+
+def _system(table: object, place: Place) -> System:
+    """Choose the system by the key ``module`` of ``[mechanism]``."""
+    if not isinstance(table, Mapping):
+        raise place.error("must be a table")
+    module = table.get("module")
+    if not isinstance(module, str):
+        raise place.error(f"lacks the key 'module'{suggest('', system_names())}")
+    return system(module, place)
+
+
+def _folders() -> tuple[Path, ...]:
+    """Folders with shipped scenes: inside a wheel, then beside an editable checkout."""
+    return (_PACKAGE / "shipped", _PACKAGE.parent.parent / "catalog" / "scenes")
+
+
+def available_scenes() -> tuple[str, ...]:
+    """Return the names of the scenes shipped with the package, sorted.
+
+    Examples
+    --------
+    >>> "lambda" in available_scenes()
+    True
+    """
+    return tuple(sorted({path.stem for folder in _folders() for path in folder.glob("*.toml")}))
+
+
+def find_scene(name_or_path: str | Path) -> Path:
+    """Return the file of a scene given by the name of a shipped one or by a path.
+
+    A path wins if it exists as a file; a bare word is looked up among the shipped scenes.
+
+    Raises
+    ------
+    SceneError
+        If there is neither; the message lists the shipped scenes.
+
+    Examples
+    --------
+    >>> find_scene("lambda").name
+    'lambda.toml'
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml" and path.is_file():
+        return path
+    for folder in _folders():
+        shipped = folder / f"{name_or_path}.toml"
+        if path.name == str(name_or_path) and shipped.is_file():
+            return shipped
+    raise SceneError(
+        f"no scene {str(name_or_path)!r}: neither the path of a .toml file nor one of the shipped scenes "
+        f"{', '.join(map(repr, available_scenes()))}{nearest(path.stem, available_scenes())}"
+    )
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """Read a scene by name or path.
+
+    Raises
+    ------
+    SceneError
+        On a missing scene, an unknown key, a wrong type or a missing table.
+    FormatError
+        If the file is not TOML; the place carries line and column.
+
+    Examples
+    --------
+    >>> load_scene("lambda").mechanism.tilt.alpha_rad == 1 / 30
+    True
+    """
+    path = find_scene(name_or_path)
+    data = read_bytes(path, what="a scene", place=path.name)
+    text = text_of(data, path.name, "the scene")
+    tables = toml_tables(text, path.name)
+    scene = Scene.from_mapping(tables, path.name, hashlib.sha256(data).hexdigest(), text)
+    return replace(scene, folder=path.parent)

@@ -1,0 +1,218 @@
+"""From the structural question to candidate mechanism graphs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from graphsynth.core.errors import FormatError, GraphError, SceneError, SpecError, TooLargeError
+from graphsynth.pipeline.products import Candidate
+from graphsynth.pipeline.scene import StructureTable
+from graphsynth.pipeline.stages import Context
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
+
+__all__ = ["check_count", "generate", "has_threefold_symmetry", "solve"]
+
+
+def solve(context: Context) -> tuple[LinkAssortment, ...]:
+    """Return every integer solution of the scene's structural question (exact); none if graphs are given instead.
+
+    Raises
+    ------
+    SceneError
+        If graphs are given and the solutions are asked for.
+    """
+    if _structure(context).graphs:
+        if "solutions" in context.scene.outputs.products:
+            raise (context.scene.place / "outputs").error(
+                "asks for 'solutions', but graphs are given and there is no question to solve; remove it"
+            )
+        return ()
+    return tuple(_spec(context).solve())
+
+
+def _structure(context: Context) -> StructureTable:
+    table = context.scene.structure
+    assert table is not None  # a scene without [structure] has none of these stages
+    return table
+
+
+def _spec(context: Context) -> StructuralSpec:
+    from graphsynth.structure.system.spec import StructuralSpec
+
+    place = context.scene.place / "structure" / "question"
+    try:
+        return StructuralSpec.from_mapping(_structure(context).question or {})
+    except (FormatError, SpecError) as error:
+        # a FormatError about a key says which one
+        key = getattr(error, "place", "").removeprefix("key ").strip("'")
+        raise place.error(f"cannot be read: {error}", key) from error
+
+
+def generate(context: Context, solutions: tuple[LinkAssortment, ...]) -> Iterator[Candidate]:
+    """Yield the mechanisms of the question, each once up to isomorphism, filtered as ``[structure.generate]`` says.
+
+    Raises
+    ------
+    TooLargeError
+        If there are more than ``limit``.
+    SceneError
+        If there is none.
+    """
+    count = 0
+    for graph in _mechanisms(context):
+        _refuse_more(context, count)
+        count += 1
+        yield Candidate(count, graph, assortment_text(graph))
+    _refuse_none(context, count, solutions)
+
+
+def check_count(context: Context, solutions: tuple[LinkAssortment, ...]) -> None:
+    """List the candidates once without keeping them: before much work is put into the first of too many.
+
+    Raises
+    ------
+    TooLargeError, SceneError
+        As `generate` does, but before it gives the first candidate.
+    """
+    count = 0
+    for _ in _mechanisms(context):
+        _refuse_more(context, count)
+        count += 1
+    _refuse_none(context, count, solutions)
+
+
+def _refuse_more(context: Context, count: int) -> None:
+    limit = _structure(context).generate.limit
+    if count == limit:
+        raise TooLargeError(
+            f"{context.scene.place / 'structure' / 'generate'} the question has more than limit = {limit} "
+            "mechanisms; raise the limit, or fix more variables of the question"
+        )
+
+
+def _refuse_none(context: Context, count: int, solutions: tuple[LinkAssortment, ...]) -> None:
+    if not count:
+        raise SceneError(
+            f"{context.scene.place / 'structure'} gives no candidate ({len(solutions)} integer solutions): nothing "
+            "passes the filters of [structure.generate]; relax them"
+        )
+
+
+def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
+    """Yield what passes the filters, as long as listing alone does not use up the time of ``[budget]``."""
+    budget = context.scene.budget.time_s
+    spent, listed, source = 0.0, 0, _filtered(context)
+    while True:
+        start = time.perf_counter()
+        graph = next(source, None)
+        spent += time.perf_counter() - start
+        if graph is None:
+            return
+        if budget is not None and spent > budget:
+            raise SceneError(
+                f"{context.scene.place / 'budget'} stops the run while candidates are listed ({listed} so far): the "
+                f"time of {budget:g} s is used up; raise it, or fix more variables of the question"
+            )
+        listed += 1
+        yield graph
+
+
+def _filtered(context: Context) -> Iterator[MechanismGraph]:
+    options = _structure(context).generate
+    fixed = options.fixed_moving_links
+    for graph in _all(context):
+        if fixed is not None and not has_threefold_symmetry(graph, fixed):
+            continue
+        if not options.planar or graph.is_planar:
+            yield graph
+
+
+def _all(context: Context) -> Iterator[MechanismGraph]:
+    """Yield the graphs that are given, or drawn, or all that answer the question."""
+    from graphsynth.synthesis import enumerate_mechanisms, sample_mechanisms
+
+    table = _structure(context)
+    if table.graphs:
+        yield from (_read(context, i, text) for i, text in enumerate(table.graphs))
+    elif table.generate.sample is not None:
+        drawn = sample_mechanisms(_spec(context), table.generate.sample, context.scene.scene.seed)
+        yield from {graph.key: graph for graph in drawn}.values()
+    else:
+        yield from enumerate_mechanisms(_spec(context), symmetry=table.generate.symmetry)
+
+
+def _read(context: Context, place: int, text: str) -> MechanismGraph:
+    from graphsynth.structure.graph import MechanismGraph
+
+    try:
+        graph = MechanismGraph.from_key(text) if text.startswith("1") else MechanismGraph.from_text(text)
+    except (FormatError, GraphError) as error:
+        at = context.scene.place / "structure" / "graphs" / str(place)
+        raise at.error(f"is neither a canonical key nor the text form of a graph: {error}") from error
+    return graph
+
+
+def assortment_text(graph: MechanismGraph) -> str:
+    """Return the assortment of moving links as text.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> assortment_text(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0))
+    'n2=3'
+    """
+    return " ".join(f"n{joints}={count}" for joints, count in sorted(graph.assortment.items()) if count)
+
+
+def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bool:
+    """Return whether an automorphism of order 3 fixes the frame and exactly this many moving links (exact).
+
+    Depth-first search: link by link, each either stays or starts a three-cycle, and every joint is checked as soon as
+    both of its ends are placed. Exact whatever the automorphism group is, which link orbits alone are not: when 9
+    divides the group's order, different three-fold symmetries may fix different numbers of links.
+
+    Examples
+    --------
+    >>> from graphsynth.structure.graph import MechanismGraph
+    >>> star = MechanismGraph(5, [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)], frame=0)
+    >>> has_threefold_symmetry(star, 1), has_threefold_symmetry(star, 0)
+    (True, False)
+    """
+    mobility = {(j.a, j.b): j.mobility for j in graph.joints} | {(j.b, j.a): j.mobility for j in graph.joints}
+    profile = [sorted(m for (a, _), m in mobility.items() if a == link) for link in range(graph.links)]
+    image: dict[int, int] = {}
+
+    def consistent(placed: tuple[int, ...]) -> bool:
+        return all(mobility.get((a, b)) == mobility.get((image[a], image[b])) for a in placed for b in image)
+
+    def search(free: tuple[int, ...], fixed_left: int) -> bool:
+        if not free:
+            return fixed_left == 0
+        first, rest = free[0], free[1:]
+        if fixed_left and place((first,), rest, fixed_left - 1):
+            return True
+        alike = [link for link in rest if profile[link] == profile[first]]
+        return any(
+            place((first, a, b), tuple(link for link in rest if link not in (a, b)), fixed_left)
+            for a in alike
+            for b in alike
+            if a != b
+        )
+
+    def place(cycle: tuple[int, ...], free: tuple[int, ...], fixed_left: int) -> bool:
+        image.update(zip(cycle, (*cycle[1:], cycle[0]), strict=True))
+        found = consistent(cycle) and search(free, fixed_left)
+        for link in cycle:
+            del image[link]
+        return found
+
+    frame = graph.frame
+    if frame is None or (graph.links - 1 - fixed_moving_links) % 3 or fixed_moving_links > graph.links - 4:
+        return False  # no three-cycle left, or the rest does not fall into three-cycles
+    image[frame] = frame
+    return search(tuple(link for link in range(graph.links) if link != frame), fixed_moving_links)

@@ -1,0 +1,235 @@
+"""The eight equations of the structural system as data, and exact bound propagation over them.
+
+For a given Pi every equation is linear.  A row is ``lowest <= sum coefficient * variable <= highest``; the domains
+of the variables shrink until no row can shrink them further.  Integers only, ``None`` is infinity.
+
+The kinds of links beyond the largest one that the question mentions are gathered in two variables: ``k``, how many
+such links there are, and ``e``, how many joints they have together.  Any k, e with (A+1)*k <= e <= A_max*k can be
+realised by integers, so nothing is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from graphsynth.structure.system.variables import Range
+
+__all__ = ["EQUATIONS", "NATURAL", "Domains", "Problem", "Row", "domains_of", "propagate", "rows_of"]
+
+Domains: TypeAlias = "dict[str, Range]"
+
+#: Printed form of the equations, in the order of docs/explanation/structural-system.md.
+EQUATIONS = (
+    "W = G - v*Pi",
+    "p = sum p_i",
+    "v = p - n",
+    "n = sum n_a",
+    "v = v_ct + v_P",
+    "t0 = v_ct + 1",
+    "2p = t0 + sum a*n_a",
+    "G = sum i*p_i",
+)
+
+#: Natural bounds that are rules rather than signs; they can be named in a contradiction.
+NATURAL = ("t0 >= 2", "a <= v + 1")
+
+_TAIL = "the other kinds of links"
+_ROUNDS = 200
+_HUGE = 10**9  # a vertex of the system has far smaller coordinates: a lower bound above it means "no solution"
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A structural question with every rule of reading it made explicit.
+
+    Attributes
+    ----------
+    ranges : tuple of (symbol, range)
+        What the question fixes or bounds; ``n`` instead of ``N``, ``Pi`` always present.
+    mobilities : tuple of int
+        Joint mobilities i whose p_i may be positive.
+    link_limit : int or None
+        Most joints on a moving link; None for the natural bound alone.
+    fractionated : bool
+        Whether the mechanism may fall apart (c >= 1 parts) without its frame.
+    """
+
+    ranges: tuple[tuple[str, Range], ...]
+    mobilities: tuple[int, ...] = (1,)
+    link_limit: int | None = None
+    fractionated: bool = False
+
+    def range(self, symbol: str) -> Range:
+        """Return what the question says about ``symbol``."""
+        return dict(self.ranges).get(symbol, (None, None))
+
+    @property
+    def largest_kind(self) -> int:
+        """A: the largest number of joints of a link that has a variable of its own."""
+        return max([3, *(int(symbol[1:]) for symbol, _ in self.ranges if symbol[0] == "n" and symbol != "n")])
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """``lowest <= sum coefficient * variable <= highest``."""
+
+    label: str
+    terms: tuple[tuple[str, int], ...]
+    lowest: int | None = 0
+    highest: int | None = 0
+    parents: tuple[int, ...] = ()  # of a derived row: the equations it follows from
+
+
+def rows_of(problem: Problem, space: int, equations: Collection[str] = EQUATIONS) -> list[Row]:
+    """Return the given equations for Pi = ``space``.
+
+    Two consequences that make propagation strong are added when the equations imply them:
+    W = Pi*n - sum (Pi-i)*p_i and 2v = t0 + sum (a-2)*n_a.
+    """
+    freedoms = [(f"p{i}", i) for i in range(1, space)]
+    kinds = [(f"n{a}", a) for a in range(2, problem.largest_kind + 1)]
+    one = [(name, 1) for name, _ in freedoms]
+    excess = ((name, a - 2) for name, a in kinds if a > 2)
+    freedom = ((name, i - space) for name, i in freedoms)
+    rows = [
+        _equation(0, [("G", 1), ("v", -space), ("W", -1)]),
+        _equation(1, [("p", -1), *one]),
+        _equation(2, [("p", 1), ("n", -1), ("v", -1)]),
+        _equation(3, [("n", -1), *((name, 1) for name, _ in kinds), ("k", 1)]),
+        _equation(4, [("v_ct", 1), ("v_P", 1), ("v", -1)]),
+        _equation(5, [("v_ct", 1), ("c", 1), ("t0", -1)]),
+        _equation(6, [("p", -2), ("t0", 1), *kinds, ("e", 1)]),
+        _equation(7, [("G", -1), *freedoms]),
+        Row(_TAIL, (("e", 1), ("k", -problem.largest_kind - 1)), 0, None),
+    ]
+    if problem.link_limit is not None:
+        rows.append(Row(_TAIL, (("e", -1), ("k", problem.link_limit)), 0, None))
+    rows = [row for row in rows if row.label in equations or row.label == _TAIL]
+    consequences = (
+        Row("", (("n", space), ("W", -1), *freedom), parents=(0, 1, 2, 7)),
+        Row("", (("v", -2), ("t0", 1), *excess, ("e", 1), ("k", -2)), parents=(2, 3, 6)),
+    )
+    rows += [row for row in consequences if all(EQUATIONS[parent] in equations for parent in row.parents)]
+    return rows
+
+
+def _equation(number: int, terms: Iterable[tuple[str, int]]) -> Row:
+    return Row(EQUATIONS[number], tuple(terms))
+
+
+def domains_of(problem: Problem, space: int, natural: Iterable[str] = NATURAL) -> Domains:
+    """Return the domain of every variable before propagation: the natural bounds and the question's own."""
+    domains: Domains = {"W": (None, None), "n": (1, None), "p": (1, None)}
+    domains.update(dict.fromkeys(("v", "v_ct", "v_P", "G", "k", "e"), (0, None)))
+    domains["t0"] = (2 if "t0 >= 2" in natural else 1, None)
+    domains["c"] = (1, None if problem.fractionated else 1)
+    domains.update({f"n{a}": (0, None) for a in range(2, problem.largest_kind + 1)})
+    domains.update({f"p{i}": (0, None if i in problem.mobilities else 0) for i in range(1, space)})
+    for symbol, own in problem.ranges:
+        if symbol != "Pi":
+            # A joint mobility that the space does not have: p_i = 0 is the natural bound i <= Pi - 1.
+            domains[symbol] = _meet(domains.get(symbol, (0, 0)), own)
+    return domains
+
+
+def _meet(first: Range, second: Range) -> Range:
+    lows = [side for side in (first[0], second[0]) if side is not None]
+    highs = [side for side in (first[1], second[1]) if side is not None]
+    return max(lows, default=None), min(highs, default=None)
+
+
+def propagate(problem: Problem, domains: Domains, rows: list[Row], natural: Iterable[str] = NATURAL) -> bool:
+    """Shrink ``domains`` in place by every row until nothing changes.
+
+    Returns
+    -------
+    bool
+        False if some domain is empty: then there is no integer solution.  True proves nothing.
+    """
+    if any(lo is not None and hi is not None and lo > hi for lo, hi in domains.values()):
+        return False
+    bounded_kinds = "a <= v + 1" in natural
+    for _ in range(_ROUNDS):
+        before = dict(domains)
+        if not _limit_kinds(problem, domains, bounded_kinds):
+            return False
+        for row in rows:
+            if not _tighten(row, domains):
+                return False
+        if domains == before:
+            return True
+        if any(lo is not None and lo > _HUGE for lo, _ in domains.values()):
+            return False
+    return True
+
+
+def kind_limit(problem: Problem, loops: int, mobility: int) -> int:
+    """Return the largest possible number of joints on a moving link.
+
+    A link with a joints leaves v - a + c' >= 0 loops when it is taken away, c' the number of parts left: a <= v + c'.
+    A non-fractionated chain has c' = 1; otherwise each part moves on its own, so c' <= W.
+    """
+    natural = loops + (max(1, mobility) if problem.fractionated else 1)
+    return natural if problem.link_limit is None else min(natural, problem.link_limit)
+
+
+def _limit_kinds(problem: Problem, domains: Domains, bounded_kinds: bool) -> bool:
+    """Apply a <= limit to the domains of the link kinds, and 1 <= c <= max(1, W)."""
+    limit = problem.link_limit
+    loops, mobility = domains["v"][1], domains["W"][1]
+    if problem.fractionated and mobility is not None:
+        domains["c"] = _meet(domains["c"], (1, max(1, mobility)))
+    if bounded_kinds and loops is not None and (mobility is not None or not problem.fractionated):
+        limit = kind_limit(problem, loops, mobility or 0)
+    if limit is None:
+        return True
+    for a in range(limit + 1, problem.largest_kind + 1):
+        if a >= 2:
+            domains[f"n{a}"] = _meet(domains[f"n{a}"], (0, 0))
+    if limit <= problem.largest_kind:
+        domains["k"] = domains["e"] = (0, 0)
+    row = Row(_TAIL, (("e", -1), ("k", limit)), 0, None)
+    empty = any(lo is not None and hi is not None and lo > hi for lo, hi in domains.values())
+    return not empty and _tighten(row, domains)
+
+
+def _tighten(row: Row, domains: Domains) -> bool:
+    """Shrink the domains of one row's variables; False if one becomes empty."""
+    least, most, open_below, open_above = 0, 0, 0, 0
+    spans: list[Range] = []
+    for name, coefficient in row.terms:
+        lo, hi = domains[name]
+        if coefficient < 0:
+            lo, hi = hi, lo
+        low = None if lo is None else coefficient * lo
+        high = None if hi is None else coefficient * hi
+        spans.append((low, high))
+        if low is None:
+            open_below += 1
+        else:
+            least += low
+        if high is None:
+            open_above += 1
+        else:
+            most += high
+    for (name, coefficient), (low, high) in zip(row.terms, spans):
+        ceiling = floor = None
+        if row.highest is not None and open_below - (low is None) == 0:
+            ceiling = row.highest - (least - (low or 0))
+        if row.lowest is not None and open_above - (high is None) == 0:
+            floor = row.lowest - (most - (high or 0))
+        if coefficient < 0:
+            floor, ceiling = ceiling, floor
+        new = _meet(
+            domains[name],
+            (
+                None if floor is None else -(-floor // coefficient),
+                None if ceiling is None else ceiling // coefficient,
+            ),
+        )
+        if new[0] is not None and new[1] is not None and new[0] > new[1]:
+            return False
+        domains[name] = new
+    return True

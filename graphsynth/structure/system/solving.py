@@ -1,0 +1,286 @@
+"""The structural system solved exactly: every integer solution, once, in a stated order.
+
+An outer search runs over W, Pi, n and p inside bounds found by propagation; the joint mobilities p_i and the link
+kinds n_a are then compositions with two linear conditions, generated without dead ends as long as no upper bound on
+a single kind interferes.  Integers only: the result is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from math import ceil, floor
+
+from graphsynth.core.errors import SpecError
+from graphsynth.structure.system.assortment import LinkAssortment
+from graphsynth.structure.system.equations import Domains, Problem, Row, domains_of, kind_limit, propagate, rows_of
+from graphsynth.structure.system.linear import maximum
+from graphsynth.structure.system.variables import LARGEST, SPACES, Counts, Range
+
+__all__ = ["number_of_solutions", "solutions"]
+
+_WORDS = {"n": "n (moving links)", "p": "p (joints)", "W": "W (mobility)"}
+
+
+def solutions(problem: Problem) -> Iterator[LinkAssortment]:
+    """Yield every integer solution, lexicographically by (W, Pi, n, p, p_1.., t0, v_ct, n_2, n_3, ...).
+
+    Raises
+    ------
+    SpecError
+        Before the first solution, if the question does not bound the search; names the variable to bound.
+
+    Examples
+    --------
+    >>> next(solutions(Problem((("Pi", (3, 3)), ("W", (1, 1)), ("n", (3, 3)))))).frame_joints
+    2
+    """
+    boxes = {space: box for space in SPACES if (box := _box(problem, space)) is not None}
+    if not boxes:
+        return
+    for mobility in range(min(box["W"][0] for box in boxes.values()), max(box["W"][1] for box in boxes.values()) + 1):
+        for space, box in boxes.items():
+            if not box["W"][0] <= mobility <= box["W"][1]:
+                continue
+            for links, joints in _sizes(problem, space, mobility, box):
+                yield from _of_size(problem, space, mobility, links, joints)
+
+
+def _box(problem: Problem, space: int) -> dict[str, tuple[int, int]] | None:
+    """Finite bounds of W, n and p for one space, or None if it has no solution."""
+    lowest, highest = problem.range("Pi")
+    if not (lowest or 0) <= space <= (highest or SPACES[-1]):
+        return None
+    domains, rows = domains_of(problem, space), rows_of(problem, space)
+    if not propagate(problem, domains, rows):
+        return None
+    box: dict[str, tuple[int, int]] = {}
+    for symbol in ("n", "p", "W"):
+        if None in domains[symbol] and not _close(problem, symbol, domains, rows):
+            return None
+        lo, hi = domains[symbol]
+        if lo is None or hi is None:
+            raise _open_question(symbol, domains["W"])
+        box[symbol] = lo, hi
+    return box
+
+
+def _close(problem: Problem, symbol: str, domains: Domains, rows: list[Row]) -> bool:
+    """Bound one variable by exact linear programming where propagation did not; False if there is no solution."""
+    lo, hi = domains[symbol]
+    try:
+        highest = maximum({symbol: 1}, rows, domains) if hi is None else Fraction(hi)
+        lowest = maximum({symbol: -1}, rows, domains) if lo is None else Fraction(-lo)
+    except ValueError:
+        return False
+    domains[symbol] = (None if lowest is None else ceil(-lowest), None if highest is None else floor(highest))
+    return propagate(problem, domains, rows)
+
+
+def _open_question(symbol: str, mobility: Range) -> SpecError:
+    open_mobility = symbol == "p" and None in mobility
+    wanted = f"{_WORDS['W']} or {_WORDS['p']}" if open_mobility else _WORDS[symbol]
+    return SpecError(
+        f"the question leaves the size open, so there may be infinitely many solutions: bound {wanted}, "
+        f"for example {symbol} = (1, 15) or a fixed value"
+    )
+
+
+def _sizes(
+    problem: Problem, space: int, mobility: int, box: Mapping[str, tuple[int, int]]
+) -> Iterator[tuple[int, int]]:
+    """Yield (n, p): W = Pi*n - sum (Pi-i)*p_i bounds p on both sides once n is known."""
+    usable = [i for i in problem.mobilities if i < space] or [1]
+    for links in range(box["n"][0], box["n"][1] + 1):
+        constraint = space * links - mobility
+        least = -(-constraint // (space - min(usable)))
+        most = constraint // (space - max(usable))
+        for joints in range(max(least, box["p"][0]), min(most, box["p"][1]) + 1):
+            yield links, joints
+
+
+def _of_size(problem: Problem, space: int, mobility: int, links: int, joints: int) -> Iterator[LinkAssortment]:
+    """Yield the solutions with W, Pi, n and p known."""
+    loops = joints - links
+    sub_edges = mobility + space * loops
+    if not (_within(problem.range("v"), loops) and _within(problem.range("G"), sub_edges)):
+        return
+    ranges = _mobility_ranges(problem, space)
+    attachments = list(_attachments(problem, mobility, links, loops))
+    largest = kind_limit(problem, loops, mobility)
+    for freedoms in compositions(joints, sub_edges, 1, space - 1, ranges):
+        for frame_joints, parts in attachments:
+            for kinds in compositions(links, 2 * joints - frame_joints, 2, largest, _kind_ranges(problem)):
+                yield LinkAssortment(
+                    mobility=mobility,
+                    space=space,
+                    moving_links=links,
+                    joints=joints,
+                    p_i=tuple(freedoms.get(i, 0) for i in range(1, space)),
+                    n_a=Counts(kinds),
+                    loops=loops,
+                    frame_loops=frame_joints - parts,
+                    moving_loops=loops - frame_joints + parts,
+                    frame_joints=frame_joints,
+                    sub_edges=sub_edges,
+                    frame_parts=parts,
+                )
+
+
+def number_of_solutions(problem: Problem, enough: int) -> int:
+    """Count the solutions without listing them: exactly, or the first number beyond ``enough`` that is found.
+
+    Parameters
+    ----------
+    problem : Problem
+    enough : int
+        A larger number need not be the exact one.
+
+    Examples
+    --------
+    >>> question = Problem((("Pi", (3, 3)), ("n", (40, 40)), ("p", (59, 59))))
+    >>> number_of_solutions(question, 10**6)
+    93339
+    """
+    boxes = {space: box for space in SPACES if (box := _box(problem, space)) is not None}
+    total = 0
+    for largest in (5, LARGEST):  # with links of few joints there may be enough already
+        total = 0
+        for space, box in boxes.items():
+            for mobility in range(box["W"][0], box["W"][1] + 1):
+                for links, joints in _sizes(problem, space, mobility, box):
+                    total += _number_of_size(problem, space, mobility, links, joints, largest)
+                    if total > enough:
+                        return total
+    return total
+
+
+def _number_of_size(problem: Problem, space: int, mobility: int, links: int, joints: int, largest: int) -> int:
+    loops = joints - links
+    sub_edges = mobility + space * loops
+    if not (_within(problem.range("v"), loops) and _within(problem.range("G"), sub_edges)):
+        return 0
+    freedoms = _counts(joints, 1, space - 1, _mobility_ranges(problem, space)).get(sub_edges, 0)
+    if not freedoms:
+        return 0
+    largest = min(largest, kind_limit(problem, loops, mobility))
+    kinds = _counts(links, 2, largest, _kind_ranges(problem), 2 * joints)
+    return freedoms * sum(kinds.get(2 * joints - t0, 0) for t0, _ in _attachments(problem, mobility, links, loops))
+
+
+def _counts(
+    number: int, smallest: int, largest: int, ranges: Mapping[int, Range], most: int | None = None
+) -> dict[int, int]:
+    """Count the ways to choose x_a >= 0 with sum x_a = number, by sum a*x_a up to ``most``; see `compositions`."""
+    if any(lo and not smallest <= a <= largest for a, (lo, _) in ranges.items()):
+        return {}
+    most = number * largest if most is None else most
+    spare = most - number * smallest
+    if any(lo for a, (lo, _) in ranges.items() if a > smallest + spare):
+        return {}
+    ways: list[dict[int, int]] = [{} for _ in range(number + 1)]  # by how many are chosen: sum above the smallest kind
+    ways[0][0] = 1
+    for a in range(smallest, min(largest, smallest + spare) + 1):
+        lo, hi = ranges.get(a, (0, None))
+        lo, step = lo or 0, a - smallest
+        grown: list[dict[int, int]] = []
+        for used in range(number + 1):  # one more of the kind a than one fewer, from lo to hi of them
+            here = _moved(ways[used - lo], lo * step, spare) if used >= lo else {}
+            for above, count in _moved(grown[-1], step, spare).items() if used else ():
+                here[above] = here.get(above, 0) + count
+            if hi is not None and used > hi:
+                for above, count in _moved(ways[used - hi - 1], (hi + 1) * step, spare).items():
+                    here[above] -= count
+            grown.append({above: count for above, count in here.items() if count})
+        ways = grown
+    return {above + number * smallest: count for above, count in ways[number].items()}
+
+
+def _moved(counts: Mapping[int, int], by: int, most: int) -> dict[int, int]:
+    return {above + by: count for above, count in counts.items() if above + by <= most}
+
+
+def _attachments(problem: Problem, mobility: int, links: int, loops: int) -> Iterator[tuple[int, int]]:
+    """Yield (t0, c) by increasing t0, then increasing v_ct = t0 - c."""
+    most_parts = max(1, min(mobility, links)) if problem.fractionated else 1
+    for frame_joints in range(2, loops + most_parts + 1):
+        for parts in range(min(most_parts, frame_joints), 0, -1):
+            frame_loops = frame_joints - parts
+            if (
+                _within(problem.range("t0"), frame_joints)
+                and _within(problem.range("v_ct"), frame_loops)
+                and loops >= frame_loops
+                and _within(problem.range("v_P"), loops - frame_loops)
+            ):
+                yield frame_joints, parts
+
+
+def _within(bounds: Range, value: int) -> bool:
+    lo, hi = bounds
+    return (lo is None or lo <= value) and (hi is None or value <= hi)
+
+
+def _mobility_ranges(problem: Problem, space: int) -> dict[int, Range]:
+    ranges = {i: problem.range(f"p{i}") for i in range(1, space)}
+    return {i: (lo or 0, hi if i in problem.mobilities else 0) for i, (lo, hi) in ranges.items()}
+
+
+def _kind_ranges(problem: Problem) -> dict[int, Range]:
+    return {int(symbol[1:]): own for symbol, own in problem.ranges if symbol[0] == "n" and symbol != "n"}
+
+
+def compositions(
+    number: int, total: int, smallest: int, largest: int, ranges: Mapping[int, Range]
+) -> Iterator[dict[int, int]]:
+    """Yield every way to choose x_a >= 0 with sum x_a = number and sum a*x_a = total.
+
+    Parameters
+    ----------
+    number, total : int
+    smallest, largest : int
+        smallest <= a <= largest.
+    ranges : mapping
+        Bounds of single x_a; kinds not listed are free.
+
+    Yields
+    ------
+    dict
+        Non-zero x_a by a, in lexicographic order of (x_smallest, x_smallest+1, ...).
+
+    Examples
+    --------
+    >>> [list(found.values()) for found in compositions(14, 37, 2, 4, {})]
+    [[5, 9], [6, 7, 1], [7, 5, 2], [8, 3, 3], [9, 1, 4]]
+    """
+    floor = {a: lo for a, (lo, _) in ranges.items() if lo}
+    if any(not smallest <= a <= largest for a in floor):
+        return
+    room = {a: hi - floor.get(a, 0) for a, (_, hi) in ranges.items() if hi is not None}
+    number -= sum(floor.values())
+    total -= sum(a * lo for a, lo in floor.items())
+    for extra in _free_compositions(number, total, smallest, largest, room):
+        merged = dict(floor)
+        for a, x in extra:
+            merged[a] = merged.get(a, 0) + x
+        yield dict(sorted(merged.items()))
+
+
+def _free_compositions(
+    number: int, total: int, smallest: int, largest: int, room: Mapping[int, int]
+) -> Iterator[tuple[tuple[int, int], ...]]:
+    """Compositions with zero lower bounds; an explicit stack, since kinds can be thousands."""
+    # An entry: the next kind a, what is left for the kinds from a on, and the non-zero choices so far.
+    stack: list[tuple[int, int, int, tuple[tuple[int, int], ...]]] = [(smallest, number, total, ())]
+    while stack:
+        a, left, sum_left, chosen = stack.pop()
+        if left == 0 and sum_left == 0:
+            yield chosen
+        if left <= 0 or a > largest or not a * left <= sum_left <= largest * left:
+            continue
+        most = left if a == largest else min(left, (largest * left - sum_left) // (largest - a))
+        least = max(0, (a + 1) * left - sum_left)
+        # Pushed from the largest down, so that the smallest x_a is taken first.
+        stack.extend(
+            (a + 1, left - x, sum_left - a * x, (*chosen, (a, x)) if x else chosen)
+            for x in range(min(most, room.get(a, most)), least - 1, -1)
+        )

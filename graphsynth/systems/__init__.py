@@ -1,0 +1,1 @@
+"""Named systems, each at home in one folder; entry points register them."""

@@ -1,0 +1,238 @@
+"""Pictures of the antenna pointing mechanism: in space, and the published comparison; maps: `pointing_maps`.
+
+Every function returns a matplotlib figure that belongs to no window; write it with ``figure.savefig(path)``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.drawing.figures import new_figure
+from graphsynth.drawing.palette import LIGHT
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from graphsynth.systems.antenna.comparison import ModelComparison, Reading
+    from graphsynth.systems.antenna.mechanism import PointingMechanism
+    from graphsynth.systems.antenna.results import Poses
+
+__all__ = ["comparison_picture", "pointing_picture"]
+
+Array = NDArray[np.float64]
+
+_LEG_Y, _LEG_X, _REST = LIGHT["a"], LIGHT["b"], LIGHT["soft"]
+
+
+def _joints(mechanism: PointingMechanism, poses: Poses) -> dict[str, Array]:
+    """Crank pivot, ball joint and cardan of each leg in the ground, metres."""
+    l1, l2, l3, l4, l5 = mechanism.lengths
+    R, x, y = poses.rotation, float(poses.phi_x), float(poses.phi_y)
+    return {
+        "pivot Y": np.array([0.0, l1 - l3, -l2]),
+        "ball Y": np.array([0.0, l1 - l3 + l3 * math.cos(x), -l2 + l3 * math.sin(x)]),
+        "cardan Y": l1 * R[:, 1],
+        "pivot X": np.array([l1 - l5, 0.0, -l4]),
+        "ball X": np.array([l1 - l5 + l5 * math.cos(y), 0.0, -l4 - l5 * math.sin(y)]),
+        "cardan X": l1 * R[:, 0],
+    }
+
+
+def pointing_picture(
+    mechanism: PointingMechanism,
+    phi_x: float,
+    phi_y: float,
+    *,
+    s_y: int = 1,
+    s_x: int = -1,
+    size: tuple[float, float] = (6.6, 6.0),
+    plain: bool = False,
+) -> Figure:
+    """Draw the mechanism in space in one pose: reflector, gimbal axes, both legs, rest position of the reflector.
+
+    Parameters
+    ----------
+    mechanism : PointingMechanism
+    phi_x, phi_y : float
+        Crank angles, radians.
+    s_y, s_x : {+1, -1}
+        Assembly mode.
+    size : tuple of float, optional
+        Inches.
+    plain : bool, optional
+        Leave out the legend and the axes, for small pictures.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    GeometryError
+        The mechanism cannot be assembled at these crank angles.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.antenna import PointingMechanism
+    >>> pointing_picture(PointingMechanism(), 0.5, 0.3).axes[0].get_zlabel()
+    'z'
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    poses = mechanism.poses(phi_x, phi_y, s_y, s_x)
+    if not poses.assembled:
+        raise GeometryError(f"no picture at phi_x = {phi_x}, phi_y = {phi_y}: {poses.reasons()[0]}")
+    figure = new_figure(size)
+    axes: Any = figure.add_subplot(projection="3d")
+    joints, l1, R = _joints(mechanism, poses), mechanism.l1, poses.rotation
+    _discs(axes, l1, R)
+    _gimbal(axes, l1, R, mechanism.order)
+    for leg, colour in (("Y", _LEG_Y), ("X", _LEG_X)):
+        _leg(axes, mechanism, joints, leg, colour)
+    everything = np.array([*joints.values(), l1 * R[:, 2], [-l1, -l1, 0.0], [l1, l1, 0.0]])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    middle, reach = 0.5 * (low + high), 0.55 * float((high - low).max())
+    for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle):
+        set_limits(centre - reach, centre + reach)
+    axes.set_box_aspect((1, 1, 1), zoom=1.12 if plain else 1.08)
+    axes.view_init(elev=22, azim=38)
+    axes.set(xlabel="x", ylabel="y", zlabel="z")
+    axes.tick_params(labelsize=7)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    if plain:
+        axes.set_axis_off()
+    else:
+        figure.legend(loc="outside lower center", ncols=2, fontsize=8, frameon=False)
+    cranks = f"cranks φx = {math.degrees(phi_x):.4g}°, φy = {math.degrees(phi_y):.4g}°"
+    outputs = f"elevation {math.degrees(float(poses.a)):.4f}°, azimuth {math.degrees(float(poses.b)):.4f}°"
+    axes.set_title(outputs if plain else f"{cranks}\n{outputs} (order {mechanism.order})", fontsize=10)
+    return figure
+
+
+def _discs(axes: Any, l1: float, R: Array) -> None:
+    """Draw the reflector, the outline of its rest position and its normal."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+    turn = np.linspace(0.0, math.tau, 73)
+    circle = l1 * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], -1)
+    axes.plot(*circle.T, color=_REST, lw=0.9, ls=":", label="reflector at rest")
+    disc = circle @ R.T
+    axes.add_collection3d(Poly3DCollection([disc], facecolor=LIGHT["fill"], edgecolor=LIGHT["ink"], alpha=0.55))
+    tip = l1 * R[:, 2]
+    axes.plot(*np.array([np.zeros(3), tip]).T, color=LIGHT["c"], lw=1.8, label="normal of the reflector")
+
+
+def _gimbal(axes: Any, l1: float, R: Array, order: str) -> None:
+    """Draw the axis fixed to the ground and the axis carried by the reflector."""
+    fixed = np.array([0.0, 1.0, 0.0]) if order == "YX" else np.array([1.0, 0.0, 0.0])
+    carried = R[:, 0] if order == "YX" else R[:, 1]
+    for direction, style, label in ((fixed, "-.", "gimbal axis fixed to the ground"), (carried, "--", "carried axis")):
+        axes.plot(*np.outer([-1.25 * l1, 1.25 * l1], direction).T, color=LIGHT["note"], lw=1.0, ls=style, label=label)
+
+
+def _leg(axes: Any, mechanism: PointingMechanism, joints: dict[str, Array], leg: str, colour: str) -> None:
+    """Draw crank, rod and arm of one leg, the circle of its crank and the crank axis."""
+    pivot, ball, cardan = (joints[f"{kind} {leg}"] for kind in ("pivot", "ball", "cardan"))
+    crank = mechanism.l3 if leg == "Y" else mechanism.l5
+    turn = np.linspace(0.0, math.tau, 73)
+    zero = np.zeros_like(turn)
+    if leg == "Y":
+        circle, axis = np.stack([zero, np.cos(turn), np.sin(turn)], -1), np.array([1.0, 0.0, 0.0])
+    else:
+        circle, axis = np.stack([np.cos(turn), zero, -np.sin(turn)], -1), np.array([0.0, 1.0, 0.0])
+    axes.plot(*(pivot + crank * circle).T, color=colour, lw=0.7, ls=":")
+    axes.plot(*(pivot + 0.4 * crank * np.outer([-1.0, 1.0], axis)).T, color=colour, lw=4.5, solid_capstyle="butt")
+    axes.plot(*np.array([pivot, ball]).T, color=colour, lw=3.2, label=f"leg {leg}: crank (thick) and rod")
+    axes.plot(*np.array([ball, cardan]).T, color=colour, lw=1.7)
+    axes.plot(*np.array([np.zeros(3), cardan]).T, color=LIGHT["ink"], lw=1.0)
+    axes.plot(*ball, "o", color="white", mec=colour, mew=1.8, ms=7)
+    axes.plot(*cardan, "s", color="white", mec=colour, mew=1.8, ms=6)
+    axes.plot(*pivot, "o", color=colour, ms=6)
+
+
+def comparison_picture(
+    mechanism: PointingMechanism,
+    other: PointingMechanism | None = None,
+    *,
+    reading: Reading | None = None,
+    other_reading: Reading | None = None,
+    largest: float = math.radians(40.0),
+    samples: int = 161,
+    working: float = math.radians(15.0),
+    size: tuple[float, float] = (11.0, 4.0),
+) -> Figure:
+    """Draw two models over equal crank angles as the source does (Figure 4): each model, then the means.
+
+    Curves: 1 elevation, 2 azimuth, 3 and 4 the means of the two models, with their difference in minutes of arc.
+
+    Parameters
+    ----------
+    mechanism : PointingMechanism
+        Model of panel b (analytical).
+    other : PointingMechanism, optional
+        Model of panel a (block diagram); by default the same lengths with the other gimbal order.
+    reading, other_reading : Reading, optional
+        Conventions of each model.
+    largest : float
+        Crank angle at the end of the sweep, radians.
+    samples : int
+    working : float
+        Working limit, radians: a dotted line.
+    size : tuple of float, optional
+        Inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from dataclasses import replace
+
+    if other is None:
+        other = replace(mechanism, order="XY" if mechanism.order == "YX" else "YX")
+    phi = np.linspace(0.0, largest, samples)
+    found = mechanism.compare(other, phi, reading=reading, other_reading=other_reading)
+    degrees = np.degrees(phi)
+    figure = new_figure(size)
+    panels = figure.subplots(1, 3, sharex=True, sharey=True)
+    for axes, which, name in ((panels[0], 1, f"a: model of order {other.order}"),
+                              (panels[1], 0, f"b: model of order {mechanism.order}")):  # fmt: skip
+        axes.plot(degrees, np.degrees(found.a[which]), color=_LEG_Y, lw=1.8, label="1 about X (elevation)")
+        axes.plot(degrees, np.degrees(found.b[which]), color=_LEG_X, lw=1.8, ls="--", label="2 about Y (azimuth)")
+        axes.set_title(name, fontsize=10)
+    _means(panels[2], degrees, found, (mechanism.order, other.order))
+    for axes in panels:
+        axes.axvline(math.degrees(working), color=_REST, lw=0.8, ls=":")
+        axes.grid(alpha=0.25)
+        axes.set_xlabel("crank angle [deg]")
+        axes.set_xlim(0.0, degrees[-1])
+        axes.set_ylim(bottom=0.0)
+    panels[0].set_ylabel("reflector angle [deg]")
+    for axes in panels[:2]:
+        axes.legend(loc="upper left", fontsize=8, frameon=False)
+    return figure
+
+
+def _means(axes: Any, degrees: Array, found: ModelComparison, orders: tuple[str, str]) -> None:
+    """Draw the means of both models and, on an axis of its own, their difference."""
+    means, difference = np.degrees(found.means), found.arcminutes
+    axes.plot(degrees, means[1], color=LIGHT["d"], lw=1.8, label=f"3 mean, order {orders[1]}")
+    axes.plot(degrees, means[0], color=LIGHT["c"], lw=1.8, ls="--", label=f"4 mean, order {orders[0]}")
+    axes.set_title("c: means of both models", fontsize=10)
+    own = axes.get_lines()[-2:]
+    twin = axes.twinx()
+    twin.plot(degrees, difference, color=LIGHT["note"], lw=1.2, label="difference")
+    twin.set_ylabel("difference of means [arc-minutes]", color=LIGHT["note"])
+    seen = difference[np.isfinite(difference)]
+    size = max(1.0, float(np.abs(seen).max(initial=0.0)))
+    twin.set_ylim((-1.2 * size if seen.min(initial=0.0) < -0.05 * size else 0.0), 4.0 * size)
+    if np.isfinite(difference[-1]):
+        text = f"{difference[-1]:.2f}′"
+        twin.annotate(text, (degrees[-1], difference[-1]), (-6, 8), textcoords="offset points", ha="right", fontsize=9)
+    lines = [*own, *twin.get_lines()]
+    axes.legend(lines, [line.get_label() for line in lines], loc="upper left", fontsize=8, frameon=False)

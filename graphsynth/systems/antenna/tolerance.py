@@ -1,0 +1,281 @@
+"""Guaranteed bounds of the pointing direction over length tolerances (specification, section 2.10)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from graphsynth.core.checks import choice, finite, finite_array
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.antenna.enclosure import Enclosure, LengthBoxProblem, NoProof, middle_of
+
+if TYPE_CHECKING:
+    from graphsynth.systems.antenna.mechanism import PointingMechanism
+
+__all__ = ["AngleBounds", "Tolerance", "ToleranceStatus", "outward_text", "tolerance"]
+
+NAMES = ("l1", "l2", "l3", "l4", "l5")
+_ARCSECOND = math.pi / 648000.0
+#: Relative rounding of lengths and angles that were decimals or degrees: at most three operations to nearest.
+_CONVERTED = 2.0**-51
+
+
+class ToleranceStatus(IntEnum):
+    """What is proved about a box of lengths."""
+
+    CERTIFIED = 0  #: for all lengths in the box one pose of this mode exists, inside the bounds
+    UNDECIDED = 1  #: nothing is proved; a fold lies in the box or close to it
+
+
+@dataclass(frozen=True)
+class AngleBounds:
+    """One output over the box of lengths, radians.
+
+    Attributes
+    ----------
+    nominal : float
+        At the middle of the box.
+    lower, upper : float
+        Certified bounds; NaN if undecided.
+    corner_lower, corner_upper : float
+        Extremes over the 32 corners of the box (estimate from inside); NaN if a corner cannot be assembled.
+    first_order : float
+        Sum of ``|d output / d l_i| width_i`` (estimate).
+    gradient : tuple of float
+        Derivatives by l1 to l5 at the middle, rad per unit of length.
+    monotone : tuple of bool
+        Lengths for which the sign of the derivative is proved over the whole box.
+    """
+
+    nominal: float
+    lower: float
+    upper: float
+    corner_lower: float
+    corner_upper: float
+    first_order: float
+    gradient: tuple[float, ...]
+    monotone: tuple[bool, ...]
+
+    @property
+    def deviation(self) -> tuple[float, float]:
+        """Certified deviations from the nominal value, seconds of arc, rounded outward."""
+        low, high = (self.lower - self.nominal) / _ARCSECOND, (self.upper - self.nominal) / _ARCSECOND
+        # three operations to nearest, the constant included
+        return math.nextafter(low - 4e-16 * abs(low), -math.inf), math.nextafter(high + 4e-16 * abs(high), math.inf)
+
+    @property
+    def corner_deviation(self) -> tuple[float, float]:
+        """Deviations of the extreme corners, seconds of arc."""
+        return (self.corner_lower - self.nominal) / _ARCSECOND, (self.corner_upper - self.nominal) / _ARCSECOND
+
+    @property
+    def excess(self) -> float:
+        """By how much the certified bounds are wider than the corner values, relative; NaN for a box without width."""
+        width = self.corner_upper - self.corner_lower
+        return (self.upper - self.lower) / width - 1.0 if width > 0.0 else math.nan
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Bounds of both outputs.
+
+    Attributes
+    ----------
+    status : ToleranceStatus
+    reason : str
+        One sentence.
+    lengths : tuple of str
+        If undecided: the lengths that make a denominator contain zero by themselves, else the one with the largest
+        share in it.
+    a, b : AngleBounds
+        Elevation and azimuth.
+    """
+
+    status: ToleranceStatus
+    reason: str
+    lengths: tuple[str, ...]
+    a: AngleBounds
+    b: AngleBounds
+
+    def report(self) -> str:
+        """Certified bounds, corner values and first-order estimate of both outputs in seconds of arc."""
+        lines = [self.reason]
+        for name, bounds in (("elevation", self.a), ("azimuth", self.b)):
+            corners = bounds.corner_deviation
+            certified = [outward_text(value, side) for value, side in zip(bounds.deviation, (-1, 1))]
+            lines.append(
+                f"{name} {math.degrees(bounds.nominal):.9f} deg: certified {certified[0]} .. {certified[1]}, "
+                f"corners {corners[0]:+.4f} .. {corners[1]:+.4f}, first order {bounds.first_order / _ARCSECOND:.4f}"
+            )
+        return "\n".join(lines)
+
+
+def outward_text(value: float, side: int, places: int = 4) -> str:
+    """Write a bound with a sign and so many decimals, rounded down (side -1) or up (+1) so that it stays one.
+
+    Examples
+    --------
+    >>> outward_text(-0.12341, -1), outward_text(0.12341, 1), outward_text(math.nan, 1)
+    ('-0.1235', '+0.1235', 'nan')
+    """
+    if not math.isfinite(value):
+        return str(value)
+    from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+
+    digits = Decimal(value).quantize(Decimal(1).scaleb(-places), ROUND_FLOOR if side < 0 else ROUND_CEILING)
+    return f"{digits:+f}"
+
+
+def _box(problem: LengthBoxProblem, widths: tuple[float, ...]) -> tuple[Any, ...]:
+    iv = problem.iv
+    around = iv.mpf([1.0 - problem.slack, 1.0 + problem.slack])
+    return tuple((iv.mpf(l) + iv.mpf([-w, w])) * around for l, w in zip(problem.mechanism.lengths, widths))
+
+
+def _floor(x: Any) -> float:
+    value = float(x.a)
+    return value if x.a >= value else math.nextafter(value, -math.inf)
+
+
+def _ceil(x: Any) -> float:
+    value = float(x.b)
+    return value if x.b <= value else math.nextafter(value, math.inf)
+
+
+def _face_bound(problem: LengthBoxProblem, box: tuple[Any, ...], found: Enclosure, which: int, upward: bool) -> Any:
+    """Bound of one output with every proved monotone length at its end, the others in mean-value form (step 3)."""
+    iv = problem.iv
+    gradient = found.dv if which else found.du
+    face = []
+    for rate, whole in zip(gradient, box):
+        if rate.a > 0 or rate.b < 0:
+            face.append(iv.mpf(whole.b if (rate.a > 0) == upward else whole.a))
+        else:
+            face.append(whole)
+    middle = middle_of(tuple(face))
+    centre = problem.enclose(middle)
+    over = problem.enclose(tuple(face))
+    value = centre.v if which else centre.u
+    for rate, whole, mid in zip(over.dv if which else over.du, face, middle):
+        value += rate * (whole - mid)
+    return value
+
+
+def tolerance(
+    mechanism: PointingMechanism, phi_x: float, phi_y: float, widths: ArrayLike, s_y: int, s_x: int, method: str,
+    converted: bool = False,
+) -> Tolerance:  # fmt: skip
+    """Bound both outputs; see `PointingMechanism.tolerance`.
+
+    Raises
+    ------
+    GeometryError
+        Not one width or five, or a width that reaches the length.
+    """
+    choice("method", method, ("mixed", "mean_value"))
+    given = finite_array("widths", widths)
+    if given.shape not in ((), (5,)):
+        raise GeometryError(f"widths has shape {given.shape}; give one number or five, for l1 to l5")
+    box_widths = tuple(np.broadcast_to(given, 5).tolist())
+    for name, length, width in zip(NAMES, mechanism.lengths, box_widths):
+        if not 0.0 <= width < length:
+            raise GeometryError(f"the tolerance {width} of {name} must be at least 0 and below the length {length}")
+    slack = _CONVERTED if converted else 0.0
+    problem = LengthBoxProblem(mechanism, finite("phi_x", phi_x), finite("phi_y", phi_y), s_y, s_x, slack)
+    box = _box(problem, box_widths)
+    estimates = _estimates(problem, box_widths)
+    try:
+        found = problem.enclose(box)
+        bounds = [[found.u, found.u], [found.v, found.v]]
+        if method == "mixed":
+            for which in (0, 1):
+                low, high = (_face_bound(problem, box, found, which, upward) for upward in (False, True))
+                bounds[which] = [max(bounds[which][0].a, low.a), min(bounds[which][1].b, high.b)]
+    except NoProof as failure:
+        lengths, reason = _explain(problem, box_widths, failure)
+        outputs = [_bounds(part, math.nan, math.nan, (False,) * 5) for part in estimates]
+        status = ToleranceStatus.UNDECIDED
+    else:
+        lengths, reason, status = (), "certified: one pose of this mode for all lengths in the box", ToleranceStatus(0)
+        outputs = []
+        for part, (low, high), gradient in zip(estimates, bounds, (found.du, found.dv)):
+            monotone = tuple(bool(rate.a > 0 or rate.b < 0) for rate in gradient)
+            outputs.append(_bounds(part, _floor(low), _ceil(high), monotone))
+    u, v = outputs
+    return Tolerance(status, reason, lengths, *((v, u) if mechanism.order == "YX" else (u, v)))
+
+
+class _Estimate(NamedTuple):
+    """Nominal value, extreme corners, first-order deviation, gradient."""
+
+    nominal: float
+    low: float
+    high: float
+    first_order: float
+    gradient: tuple[float, ...]
+
+
+def _bounds(part: _Estimate, lower: float, upper: float, monotone: tuple[bool, ...]) -> AngleBounds:
+    return AngleBounds(part.nominal, lower, upper, part.low, part.high, part.first_order, part.gradient, monotone)
+
+
+def _estimates(problem: LengthBoxProblem, widths: tuple[float, ...]) -> list[_Estimate]:
+    """Nominal value, extreme corners, first-order estimate and gradient of u and of v, in double precision."""
+    lengths = problem.mechanism.lengths
+    nominal = problem.nominal(lengths)
+    ends = [(l - w, l + w) if w > 0.0 else (l,) for l, w in zip(lengths, widths)]
+    corners = np.array([problem.nominal(corner) for corner in itertools.product(*ends)])
+    gradients = _gradients(problem, nominal)
+    made = []
+    for i, gradient in enumerate(gradients):
+        order = sum(abs(g) * w for g, w in zip(gradient, widths))
+        offsets = np.remainder(corners[:, i] - nominal[i] + math.pi, math.tau) - math.pi  # no jump at +-pi
+        low, high = nominal[i] + float(offsets.min()), nominal[i] + float(offsets.max())
+        made.append(_Estimate(nominal[i], low, high, order, gradient))
+    return made
+
+
+def _gradients(problem: LengthBoxProblem, nominal: tuple[float, float]) -> list[tuple[float, ...]]:
+    """Return derivatives of u and v by the lengths at the middle; NaN where not assembled or at a fold."""
+    if math.isnan(nominal[0]):
+        return [(math.nan,) * 5] * 2
+    iv = problem.iv
+    lengths = tuple(iv.mpf(length) for length in problem.mechanism.lengths)
+    first, second = problem.legs
+    u, v = (iv.mpf(value) for value in nominal)
+    one, two = problem.terms(first, lengths, u, None), problem.terms(second, lengths, v, u)
+    if 0 in one.by_output or 0 in two.by_output:
+        return [(math.nan,) * 5] * 2
+    du = tuple(-part / one.by_output for part in problem._gradient(first, one, None))
+    dv = tuple(-part / two.by_output for part in problem._gradient(second, two, du))
+    return [tuple(float(rate.mid.a) for rate in rates) for rates in (du, dv)]
+
+
+def _explain(problem: LengthBoxProblem, widths: tuple[float, ...], failure: NoProof) -> tuple[tuple[str, ...], str]:
+    """Which lengths make the denominator contain zero, and the sentence that says so."""
+    if math.isnan(problem.nominal(problem.mechanism.lengths)[0]):
+        return (), "undecided: the mechanism with the nominal lengths cannot be assembled at these crank angles"
+    alone, shares = [], []
+    for i, name in enumerate(NAMES):
+        single = tuple(width if j == i else 0.0 for j, width in enumerate(widths))
+        box = _box(problem, single)
+        try:
+            found = problem.enclose(box)
+        except NoProof:
+            alone.append(name)
+            continue
+        leg = problem.legs[0] if failure.leg == problem.legs[0].name else problem.legs[1]
+        first = leg is problem.legs[0]
+        slope = problem.terms(leg, box, found.u if first else found.v, None if first else found.u).by_output
+        shares.append((float(slope.delta.b) / abs(float(slope.mid.a)), name))
+    where = f"undecided: the denominator of leg {failure.leg} contains zero, a fold lies in or near the box of lengths,"
+    if alone:
+        return tuple(alone), f"{where} by the tolerance of {' or '.join(alone)} alone; narrow it or move the cranks"
+    largest = max(shares)[1]
+    return (largest,), f"{where} by all tolerances together, of which {largest} has the largest share; narrow them"

@@ -1,0 +1,131 @@
+"""A four-bar linkage with masses in long doubles: inertia, load and places of its bodies, from the closed loop alone.
+
+The loop ``a e^(i t) + b e^(i f2) = g + c e^(i f3)`` is closed by two circles and differentiated twice; velocities and
+accelerations of the centres of mass follow.  It shares no code with the rooms of kinematics and dynamics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from graphsynth.evidence.precise_drive import Long, Shape
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.model import Body
+    from graphsynth.systems.braider.linkage import FourBar
+    from graphsynth.systems.braider.model import Braider
+
+__all__ = ["bodies_of", "places", "shape_of_braider", "shape_of_four_bar"]
+
+
+class _Link(NamedTuple):
+    """Origin and direction of a link, its rates per crank rate, and those of the origin: first and second."""
+
+    origin: Any
+    along: Any
+    first: Any
+    second: Any
+    origin_first: Any
+    origin_second: Any
+
+
+def _cross(u: Any, v: Any) -> Any:
+    return (u.conjugate() * v).imag
+
+
+def _links(bar: FourBar, t: Any) -> tuple[_Link, _Link, _Link]:
+    """Crank, coupler and rocker at a crank angle."""
+    a, b, c, g = map(Long, (bar.crank, bar.coupler, bar.rocker, bar.frame))
+    turn = np.exp(1j * Long(t))
+    A = a * turn
+    line = g - A
+    d = abs(line)
+    reach = (b * b - c * c + d * d) / (2 * d)
+    u = line / d * (reach + 1j * (bar.branch * np.sqrt(b * b - reach * reach)))
+    v = A + u - g
+    sine, nothing = _cross(u, v), Long(0)
+    k2, k3 = -_cross(A, v) / sine, -_cross(A, u) / sine  # A + k2 u = k3 v
+    rest = A + u * k2 * k2 - v * k3 * k3  # i rest + f2 u = f3 v
+    f2, f3 = (rest * v.conjugate()).real / sine, (rest * u.conjugate()).real / sine
+    return (
+        _Link(nothing, turn, Long(1), nothing, nothing, nothing), _Link(A, u / b, k2, f2, 1j * A, -A),
+        _Link(g, v / c, k3, f3, nothing, nothing),
+    )  # fmt: skip
+
+
+def shape_of_four_bar(bar: FourBar, bodies: Mapping[int, Body], gravity: tuple[float, float] = (0.0, 0.0)) -> Shape:
+    """Shape of a four-bar linkage: link 1 is the crank, 2 the coupler, 3 the rocker, each along its bar.
+
+    Parameters
+    ----------
+    bar : FourBar
+    bodies : mapping of int to Body
+    gravity : (float, float)
+        m/s^2; what it does is the load.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.braider.model import Braider
+    >>> braider = Braider()
+    >>> J, half, load = shape_of_four_bar(braider.linkage, bodies_of(braider))(0.3)
+    >>> abs(float(J) + braider.reflected_inertia - float(braider.effective_inertia(0.3)[0])) < 1e-17, float(load)
+    (True, 0.0)
+    """
+    weight = np.clongdouble(complex(*gravity))
+
+    def shape(t: Any) -> tuple[Any, Any, Any]:
+        inertia = half = load = Long(0)
+        for number, link in enumerate(_links(bar, t), 1):
+            body = bodies[number]
+            m, I, arm = Long(body.mass), Long(body.inertia), link.along * np.clongdouble(complex(*body.centre))
+            velocity = link.origin_first + 1j * link.first * arm
+            change = link.origin_second + (1j * link.second - link.first**2) * arm
+            inertia += m * abs(velocity) ** 2 + I * link.first**2
+            half += m * (velocity.conjugate() * change).real + I * link.first * link.second
+            load += m * (weight.conjugate() * velocity).real
+        return inertia, half, load
+
+    return shape
+
+
+def places(bar: FourBar, bodies: Mapping[int, Body], t: Any) -> list[Any]:
+    """Centres of mass and angles of crank, coupler and rocker at a crank angle: x, y, angle of each."""
+    found: list[Any] = []
+    for number, link in enumerate(_links(bar, t), 1):
+        centre = link.origin + link.along * np.clongdouble(complex(*bodies[number].centre))
+        found += [centre.real, centre.imag, np.arctan2(link.along.imag, link.along.real)]
+    return found
+
+
+def bodies_of(braider: Braider) -> dict[int, Body]:
+    """Bars of a braider, the switch rigid with the rocker."""
+    from graphsynth.dynamics.model import Body
+
+    bar, (m1, m2, m3, m4) = braider.linkage, braider.masses
+    tip = braider.switch * complex(np.cos(braider.switch_angle), np.sin(braider.switch_angle))
+    rocker = Body.bar(m3, (0.0, 0.0), (bar.rocker, 0.0)), Body.bar(m4, (0.0, 0.0), (tip.real, tip.imag))
+    return {
+        1: Body.bar(m1, (0.0, 0.0), (bar.crank, 0.0)), 2: Body.bar(m2, (0.0, 0.0), (bar.coupler, 0.0)),
+        3: Body.combined(*rocker),
+    }  # fmt: skip
+
+
+def shape_of_braider(braider: Braider) -> Shape:
+    """Shape of the braider as its motor feels it: the linkage, and the thread at the tip of the switch."""
+    linkage, thread = shape_of_four_bar(braider.linkage, bodies_of(braider)), braider.thread
+    arm0 = Long(braider.switch) * np.exp(1j * Long(braider.switch_angle))
+    pull, height = Long(thread.weight) * Long(thread.gravity), Long(thread.height)
+    guide = np.clongdouble(thread.guide)
+
+    def shape(t: Any) -> tuple[Any, Any, Any]:
+        rocker = _links(braider.linkage, t)[2]
+        arm = rocker.along * arm0
+        reach = guide - rocker.origin - arm
+        force = pull * reach / np.sqrt(abs(reach) ** 2 + height * height)
+        inertia, half, load = linkage(t)
+        return inertia + Long(braider.inertia), half, load + _cross(arm, force) * rocker.first
+
+    return shape

@@ -1,0 +1,386 @@
+"""The braider as a whole: linkage, switch with thread, train, synchronous motor; its motion and its reactions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import check_fields, check_sizes, checked, finite_array
+from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.driven.prescribed import prescribed_run
+from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, inductance_study
+from graphsynth.dynamics.driven.run import DriveRun, Plant, RunStatus, run
+from graphsynth.dynamics.motors import IdealSpeed, Motor, SynchronousMotor, check_motor, number, whole
+from graphsynth.dynamics.trains import Train
+from graphsynth.systems.braider.linkage import FourBar
+
+__all__ = ["Braider", "LinkMotion", "Peak", "Settling", "Thread"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Thread:
+    """Thread from the switch tip over a guide point; a weight keeps its tension.
+
+    Parameters
+    ----------
+    weight : float
+        Mass of the weight, kg, not negative.
+    guide : complex
+        Guide point in the plane of the linkage, m.
+    height : float
+        Of the guide point above the plane of the switch, m, not negative.
+    gravity : float
+        m/s^2.
+
+    Raises
+    ------
+    SpecError
+        Negative or infinite numbers, a guide that is no point.
+
+    Notes
+    -----
+    Specification instruments_and_dynamics, section 4.3: the in-plane part of the tension acts on the switch.
+
+    Examples
+    --------
+    >>> round(float(abs(Thread().force(0.06 + 0.08j))), 9)
+    0.034671744
+    """
+
+    weight: float = 0.005
+    guide: complex = 0.060 + 0j
+    height: float = 0.080
+    gravity: float = 9.80665
+
+    def __post_init__(self) -> None:
+        for name in ("weight", "height", "gravity"):
+            object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
+        try:
+            point = complex(self.guide)
+        except (TypeError, ValueError, OverflowError):
+            raise SpecError(f"guide = {self.guide!r} is no point; give x + 1j * y in metres") from None
+        number("guide x", point.real)
+        number("guide y", point.imag)
+        object.__setattr__(self, "guide", point)
+        check_fields(self, (), SpecError, small=("weight", "height", "gravity", "guide"))
+
+    @checked
+    def force(self, tip: ArrayLike) -> NDArray[np.complex128]:
+        """Force (N, complex) on the switch tip at points ``tip`` (complex, m)."""
+        reach = self.guide - np.asarray(tip, dtype=np.complex128)
+        return np.asarray(self.weight * self.gravity * reach / np.sqrt(np.abs(reach) ** 2 + self.height**2))
+
+
+class LinkMotion(NamedTuple):
+    """Angular velocities (rad/s) and accelerations (rad/s^2) of crank, coupler, rocker (n, 3)."""
+
+    speed: Array
+    acceleration: Array
+
+
+class Settling(NamedTuple):
+    """First time (s) after which the speed stays in the band around the target; NaN if it never does."""
+
+    time: float
+    target: float
+    band: float
+
+
+class Peak(NamedTuple):
+    """Time (s) and value of an extreme; ``error``, an estimate from above, is its distance from the nearest sample."""
+
+    time: float
+    value: float
+    error: float
+
+
+def _motor() -> SynchronousMotor:
+    return SynchronousMotor(4, 2.0, 1e-3, 5e-3, 0.0, 2.1013, rotor_inertia=8.2e-6, friction=1e-6)
+
+
+def _train() -> Train:
+    return Train.of_teeth([(10, 44), (10, 33), (20, 80)])
+
+
+@dataclass(frozen=True, eq=False)
+class Braider:
+    """Braiding mechanism; the default numbers are those of the specification.
+
+    Parameters
+    ----------
+    linkage : FourBar
+    switch : float
+        Length r of the switch O2C, rigid with the rocker, m.
+    switch_angle : float
+        From rocker to switch, rad.
+    masses : tuple of 4 floats
+        Crank, coupler, rocker, switch; uniform bars, kg, not negative.
+    thread : Thread
+    motor : SynchronousMotor, DCMotor, LinearCharacteristic, IdealTorque or IdealSpeed
+    train : Train
+    inertia : float
+        Further constant inertia at the crank, kg m^2.
+
+    Raises
+    ------
+    SpecError
+        Negative masses or lengths, numbers that are not finite.
+
+    Notes
+    -----
+    Specification instruments_and_dynamics, section 4.
+
+    Examples
+    --------
+    >>> run = Braider().simulate([0.0, 0.11])
+    >>> round(float(run.speed[-1]), 9)
+    1.769031244
+    """
+
+    linkage: FourBar = field(default_factory=FourBar)
+    switch: float = 0.035
+    switch_angle: float = 5.0 * math.pi / 6.0
+    masses: tuple[float, float, float, float] = (0.015, 0.045, 0.030, 0.020)
+    thread: Thread = field(default_factory=Thread)
+    motor: Motor | IdealSpeed = field(default_factory=_motor)
+    train: Train = field(default_factory=_train)
+    inertia: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "switch", number("switch", self.switch, least=0.0))
+        object.__setattr__(self, "switch_angle", number("switch_angle", self.switch_angle))
+        object.__setattr__(self, "inertia", number("inertia", self.inertia, least=0.0))
+        names = ("crank", "coupler", "rocker", "switch")
+        if not isinstance(self.linkage, FourBar) or not isinstance(self.thread, Thread):
+            raise SpecError("linkage and thread must be a FourBar and a Thread; make them first")
+        if not isinstance(self.train, Train):
+            raise SpecError(f"train = {self.train!r} is not a Train; give Train(ratio) or Train.of_teeth(stages)")
+        check_motor(self.motor)
+        masses = tuple(self.masses) if isinstance(self.masses, Iterable) else (self.masses,)
+        if len(masses) != 4:
+            raise SpecError(f"{len(masses)} masses given; give four: {', '.join(names)}")
+        checked = tuple(number(f"mass of the {n}", m, least=0.0) for n, m in zip(names, masses))
+        object.__setattr__(self, "masses", checked)
+        check_fields(self, (), SpecError, small=("switch", "inertia"))
+        check_sizes("Braider", {f"mass of the {n}": m for n, m in zip(names, checked)}, SpecError)
+
+    @property
+    def moments(self) -> tuple[float, float, float]:
+        """I1 (about the centre), I2 (about the centre), I3 (rocker and switch about O2), kg m^2."""
+        m1, m2, m3, m4 = self.masses
+        bar = self.linkage
+        return m1 * bar.crank**2 / 12.0, m2 * bar.coupler**2 / 12.0, (m3 * bar.rocker**2 + m4 * self.switch**2) / 3.0
+
+    @property
+    def reflected_inertia(self) -> float:
+        """Rotor and train at the crank, ``G^2 J_m`` and more, kg m^2."""
+        return self.train.reflected(self.motor.rotor_inertia) + self.inertia
+
+    def plant(self) -> Plant:
+        """Mechanism as the integrator sees it."""
+        bar, (_, i2, i3) = self.linkage, self.moments
+        far, near = bar.excess
+        thread = self.thread
+        linkage = np.array([
+            bar.crank, bar.coupler, bar.rocker, bar.frame, bar.branch, self.switch, math.cos(self.switch_angle),
+            math.sin(self.switch_angle), self.masses[0], self.masses[1], i2, i3, thread.weight * thread.gravity,
+            thread.guide.real, thread.guide.imag, thread.height, far, near,
+        ])  # fmt: skip
+        return Plant(np.zeros((1, 1)), base=self.inertia, linkage=linkage)
+
+    def tip(self, theta: ArrayLike) -> NDArray[np.complex128]:
+        """Position of the switch tip C, complex, m."""
+        return np.asarray(self.linkage.frame + self._arm(theta))
+
+    def _arm(self, theta: ArrayLike) -> NDArray[np.complex128]:
+        rocker = self.linkage.motion(theta).rocker
+        return np.asarray(self.switch / self.linkage.rocker * np.exp(1j * self.switch_angle) * rocker)
+
+    def load_moment(self, theta: ArrayLike) -> Array:
+        """Moment of the thread about O2 on the switch, N m (signed)."""
+        arm = self._arm(theta)
+        return np.asarray((np.conj(arm) * self.thread.force(self.linkage.frame + arm)).imag)
+
+    def effective_inertia(self, theta: ArrayLike) -> tuple[Array, Array]:
+        """J at the crank with the reflected rotor, and dJ/dtheta; kg m^2."""
+        s, (_, i2, i3), bar = self.linkage.motion(theta), self.moments, self.linkage
+        m1, m2 = self.masses[:2]
+        turn = s.crank * np.conj(s.coupler)  # a b exp(i (theta - phi2))
+        linkage = m1 * bar.crank**2 / 3.0 + m2 * (
+            bar.crank**2 + 0.25 * bar.coupler**2 * s.k2**2 + s.k2 * turn.real
+        ) + i2 * s.k2**2 + i3 * s.k3**2  # fmt: skip
+        slope = m2 * (
+            0.5 * bar.coupler**2 * s.k2 * s.f2 + s.f2 * turn.real - s.k2 * (1.0 - s.k2) * turn.imag
+        ) + 2.0 * i2 * s.k2 * s.f2 + 2.0 * i3 * s.k3 * s.f3  # fmt: skip
+        return np.asarray(self.reflected_inertia + linkage), np.asarray(slope)
+
+    def acceleration(self, theta: ArrayLike, speed: ArrayLike, motor_torque: ArrayLike) -> Array:
+        """Crank acceleration for a motor torque (N m) at the driving shaft, rad/s^2."""
+        w, torque = finite_array("speed", speed, nan=True), finite_array("motor_torque", motor_torque, nan=True)
+        J, slope = self.effective_inertia(theta)
+        eta = np.where(torque * w >= 0.0, self.train.efficiency, 1.0 / self.train.efficiency)
+        friction = self.train.ratio**2 * self.motor.friction * w
+        load = self.load_moment(theta) * self.linkage.motion(theta).k3
+        return np.asarray((self.train.ratio * eta * torque - friction + load - 0.5 * slope * w * w) / J)
+
+    @checked
+    def simulate(
+        self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0, currents: tuple[float, ...] | None = None,
+        reduce: bool | str = "auto", rtol: float = 1e-10, estimate: bool = True, max_steps: int = 200_000,
+    ) -> DriveRun:  # fmt: skip
+        """Motion from ``times[0]``; the arguments are those of `MotorDrivenPlatform.simulate`.
+
+        A motion that reaches a change point of the linkage ends there with the status CHANGE_POINT: no continuation
+        is chosen silently.  A crank that meets the end of its reach ends with NOT_FINITE or STEP_TOO_SMALL.
+
+        Raises
+        ------
+        SpecError
+            Options or numbers that make no sense, L = 0 with the unreduced model, a start out of reach.
+        """
+        if not math.isfinite(float(self.linkage.motion(number("angle", angle)).k3)):
+            raise SpecError(f"the linkage cannot be assembled at angle = {angle:g} rad; start within linkage.reach()")
+        if isinstance(self.motor, IdealSpeed):
+            given = prescribed_run(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
+            return self._until_change_point(given)
+        motor, note = choose_motor(
+            self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol
+        )
+        found = run(
+            self.plant(), motor, self.train, times, angle=angle, speed=speed, currents=None if note else currents,
+            rtol=rtol, estimate=estimate, max_steps=max_steps, notes=(note,) if note else (),
+        )  # fmt: skip
+        return self._until_change_point(found)
+
+    def _until_change_point(self, found: DriveRun) -> DriveRun:
+        points = self.linkage.change_points()
+        if not points:
+            return found
+        start = found.angle[0]
+        for point in points:
+            turns = np.floor((found.angle - point.theta) / math.tau)
+            beyond = np.nonzero(turns != math.floor((start - point.theta) / math.tau))[0]
+            beyond = beyond[np.isfinite(found.angle[beyond])]
+            if beyond.size:
+                return _cut(found, int(beyond[0]), point.theta, point.ratios)
+        return found
+
+    @checked
+    def inductance_study(self, times: ArrayLike, inductances: tuple[float, ...]) -> ReductionStudy:
+        """Distance to the limit L -> 0 for several inductances (section 4.6), from rest.
+
+        Raises
+        ------
+        SpecError
+            For an ideal speed, which has no inductance.
+        """
+        if isinstance(self.motor, IdealSpeed):
+            raise SpecError("an ideal speed has no inductance to take to zero; give a SynchronousMotor or a DCMotor")
+        return inductance_study(self.plant(), self.motor, self.train, times, inductances)
+
+    def link_motion(self, found: DriveRun) -> LinkMotion:
+        """Angular velocities and accelerations of crank, coupler and rocker along a run."""
+        s, w = self.linkage.motion(found.angle), found.speed
+        alpha = self.acceleration(found.angle, w, found.motor_torque)
+        speed = np.stack([w, s.k2 * w, s.k3 * w], axis=-1)
+        return LinkMotion(speed, np.stack([alpha, s.f2 * w * w + s.k2 * alpha, s.f3 * w * w + s.k3 * alpha], axis=-1))
+
+    @checked
+    def steady_range(self, turns: int = 1, rtol: float = 1e-11, samples: int = 720) -> tuple[float, float]:
+        """Least and largest crank speed over whole turns after the start-up, rad/s; estimated, NaN if a run fails.
+
+        The extremes of ``samples`` output times per turn: their error falls with the square of the number.
+        """
+        first = self.simulate([0.0, 2.0], rtol=rtol, estimate=False)
+        if not first.complete:
+            return math.nan, math.nan
+        period = math.tau / float(first.speed[-1])
+        times = np.concatenate([[0.0], 2.0 + np.linspace(0.0, 1.02 * turns * period, samples * turns + 1)])
+        found = self.simulate(times, rtol=rtol, estimate=False)
+        speed = found.speed[1:]
+        return float(speed.min()), float(speed.max())
+
+    def largest_current(self, found: DriveRun) -> Peak:
+        """Largest torque-making current of a run, between its output times.
+
+        Estimated: a finer run beside the largest output, the vertex of the parabola through three of its outputs.
+
+        Examples
+        --------
+        >>> braider = Braider()
+        >>> peak = braider.largest_current(braider.simulate(np.linspace(0.0, 0.1, 51)))
+        >>> round(peak.time, 5), round(peak.value, 4)
+        (0.00206, 0.9915)
+        """
+        if not found.complete or found.currents.shape[1] == 0:
+            return Peak(math.nan, math.nan, math.nan)
+        k = int(np.argmax(np.abs(found.currents[:, -1])))
+        if k in (0, found.time.size - 1):
+            return Peak(float(found.time[k]), float(found.currents[k, -1]), math.nan)
+        near = np.linspace(found.time[k - 1], found.time[k + 1], 401)[1:]
+        start = tuple(map(float, found.currents[k - 1]))
+        fine = self.simulate(
+            [float(found.time[k - 1]), *near], angle=float(found.angle[k - 1]), speed=float(found.speed[k - 1]),
+            currents=start, reduce=False, rtol=found.rtol, estimate=False,
+        )  # fmt: skip
+        best = min(max(int(np.argmax(np.abs(fine.currents[:, -1]))), 1), near.size - 1)
+        left, middle, right = fine.currents[best - 1 : best + 2, -1]
+        bend = left - 2.0 * middle + right
+        shift = 0.5 * (left - right) / bend if bend != 0.0 else 0.0
+        lift = -0.125 * (right - left) ** 2 / bend if bend != 0.0 else 0.0
+        time = fine.time[best] + shift * (fine.time[best + 1] - fine.time[best])
+        return Peak(float(time), float(middle + lift), abs(float(lift)))
+
+    @checked
+    def settling(
+        self, target: float, band: float = 0.02, end: float = 0.5, rtol: float = 1e-11, samples: int = 2001
+    ) -> Settling:  # fmt: skip
+        """First time after which ``|w / target - 1| <= band`` up to ``end``, from rest.
+
+        The last crossing between samples is solved on the cubic through speeds and accelerations.
+
+        Raises
+        ------
+        SpecError
+            For ``target = 0``.
+        """
+        number("band", band, least=0.0, above=True)
+        if number("target", target) == 0.0:
+            raise SpecError("target = 0 has no relative band; give the speed that is to be reached, rad/s")
+        times = np.linspace(
+            0.0, number("end", end, least=0.0, above=True), whole("samples", samples, "give some hundreds")
+        )
+        found = self.simulate(times, rtol=rtol, estimate=False)
+        outside = np.nonzero(~(np.abs(found.speed / target - 1.0) <= band))[0]
+        if not found.complete or outside.size == 0 or outside[-1] == times.size - 1:
+            return Settling(0.0 if outside.size == 0 else math.nan, target, band)
+        from scipy.interpolate import CubicHermiteSpline
+        from scipy.optimize import brentq
+
+        k = int(outside[-1])
+        slopes = self.acceleration(found.angle, found.speed, found.motor_torque)[k : k + 2]
+        curve = CubicHermiteSpline(times[k : k + 2], found.speed[k : k + 2], slopes)
+        edge = target * (1.0 + math.copysign(band, found.speed[k] / target - 1.0))
+        return Settling(float(brentq(lambda t: float(curve(t)) - edge, times[k], times[k + 1])), target, band)
+
+
+def _cut(found: DriveRun, row: int, theta: float, ratios: dict[int, tuple[float, float]]) -> DriveRun:
+    """Run with NaN from ``row`` on, ended by a change point."""
+    said = "; ".join(f"branch {b:+d}: k2 = {k[0]:.6g}, k3 = {k[1]:.6g}" for b, k in ratios.items())
+    reason = (
+        f"the linkage passes a change point at theta = {theta:.12g} rad (modulo a turn), where both modes meet "
+        f"({said}); choose the branch and start again behind it"
+    )
+    arrays = {}
+    for name in ("angle", "speed", "currents", "reduced_angle", "momentum", "motor_torque", "kinetic_energy", "work"):
+        values = getattr(found, name).copy()
+        values[row:] = np.nan
+        arrays[name] = values
+    return replace(found, status=RunStatus.CHANGE_POINT, reached=row, reason=reason, **arrays)

@@ -1,0 +1,139 @@
+"""``module = "braider"``: a synchronous motor that drives a four-bar with a switch through a train."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from graphsynth.evidence.registry import plans
+from graphsynth.pipeline.stages import Stage
+from graphsynth.pipeline.system import System
+from graphsynth.pipeline.tables import check_positions, require, require_positive
+
+__all__ = ["SYSTEM", "BraiderTable", "MotorTable", "StartTable", "SwitchTable", "ThreadTable", "TrainTable"]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkageTable:
+    """Crank O1A, coupler AB, rocker BO2, frame O1O2; +1: B on the left of the line from A to O2."""
+
+    crank_mm: float
+    coupler_mm: float
+    rocker_mm: float
+    frame_mm: float
+    branch: Literal[1, -1] = 1
+
+    def __post_init__(self) -> None:
+        require_positive(self, ("crank_mm", "coupler_mm", "rocker_mm", "frame_mm"), "a length must be positive")
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchTable:
+    """Length O2C of the switch, rigid with the rocker, and the angle from rocker to switch."""
+
+    length_mm: float
+    angle_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class MassTable:
+    """Masses of the four uniform bars."""
+
+    crank_g: float
+    coupler_g: float
+    rocker_g: float
+    switch_g: float
+
+
+@dataclass(frozen=True, slots=True)
+class ThreadTable:
+    """Weight that tightens the thread, the guide point in the plane, its height above the plane."""
+
+    weight_g: float
+    guide_mm: tuple[float, float]
+    height_mm: float
+    gravity_m_s2: float = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class TrainTable:
+    """Stages [driving teeth, driven teeth] from the motor to the crank; efficiencies, one for each stage."""
+
+    stages: tuple[tuple[int, int], ...]
+    efficiency: tuple[float, ...] = ()
+    inertia_kg_m2: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class MotorTable:
+    """Permanent-magnet synchronous motor in the rotor frame; the voltages step to their values at t = 0."""
+
+    pole_pairs: int
+    resistance_ohm: float
+    inductance_H: float
+    flux_V_s: float
+    ud_V: float
+    uq_V: float
+    rotor_inertia_kg_m2: float = 0.0
+    friction_Nm_s_per_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class StartTable:
+    """Start-up from rest: its length, the speed that is to be reached and its band, the tolerance of the integrator."""
+
+    end_s: float = 0.5
+    target_rad_s: float = 1.803
+    band: float = 0.02
+    samples: int = 501
+    tolerance: float = 1e-11
+
+    def __post_init__(self) -> None:
+        for name in ("end_s", "target_rad_s", "band"):
+            value = getattr(self, name)
+            require(math.isfinite(value) and value > 0, f"has {name} = {value}; it must be positive")
+        require(20 <= self.samples <= 100_000, f"has samples = {self.samples}; use 20 to 100000 output times")
+
+
+@dataclass(frozen=True, slots=True)
+class BraiderTable:
+    """``[mechanism]`` with ``module = "braider"``.
+
+    ``speed_rad_s`` turns the crank evenly for the sensors over a turn; ``inductances_H`` are compared with L -> 0.
+    """
+
+    module: Literal["braider"]
+    linkage: LinkageTable
+    switch: SwitchTable
+    masses: MassTable
+    thread: ThreadTable
+    train: TrainTable
+    motor: MotorTable
+    start: StartTable = field(default_factory=StartTable)
+    speed_rad_s: float = 1.803
+    positions: int = 360
+    inductances_H: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
+
+    def __post_init__(self) -> None:
+        check_positions(self.positions)
+        require(self.speed_rad_s != 0, "has speed_rad_s = 0; give the speed of the crank for the sensors")
+        require(all(x > 0 for x in self.inductances_H), "has an inductances_H that is not positive; each must be")
+
+
+_HERE = "graphsynth.systems.braider"
+SYSTEM = System(
+    table=BraiderTable,
+    structure="none",
+    stages=(
+        Stage("start up", f"{_HERE}.stages:start_up", (), ("start_up",)),
+        Stage("sensors", f"{_HERE}.stages:sensors", (), ("sensors",)),
+        Stage("inductance", f"{_HERE}.stages:inductance", (), ("inductance",)),
+        Stage("judge", f"{_HERE}.stages:judge", ("start_up", "sensors", "inductance"), ("records", "tables")),
+        Stage("sketch mechanism", f"{_HERE}.stages_pictures:sketches", (), ("mechanism_pictures",)),
+        Stage("animate", f"{_HERE}.stages_pictures:animations", (), ("animations",)),
+        Stage("plot", f"{_HERE}.stages_pictures:plots", ("start_up", "sensors", "inductance"), ("plots",)),
+        Stage("compare solvers", f"{_HERE}.stages:solvers", (), ("solvers",)),
+    ),
+    evidence=plans("graphsynth.systems.braider.evidence", "start-up", "linkage-dynamics", "positions"),
+)

@@ -1,0 +1,1 @@
+"""A survey of all four-bar linkages on a lattice of lengths."""

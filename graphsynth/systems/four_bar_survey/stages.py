@@ -1,0 +1,301 @@
+"""Stages of a four-bar survey for each shard of the lattice: motion, closed-form jamming, what is worth keeping."""
+
+from __future__ import annotations
+
+import math
+from base64 import b64decode, b64encode
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.pipeline.products import Columns, Objective
+from graphsynth.pipeline.stages import Context
+from graphsynth.pipeline.tables import suggest
+from graphsynth.systems.four_bar_survey.jamming import Jamming, close_form
+from graphsynth.systems.four_bar_survey.lattice import KINDS, TYPES, Ints, Lattice, classify, lattice_of
+from graphsynth.systems.four_bar_survey.motion import Moved, move
+from graphsynth.systems.four_bar_survey.system import SurveyTable
+
+__all__ = ["QUANTITIES", "Evaluated", "Shard", "evaluate", "evaluate_sets", "front_of", "losses_of", "objectives_of"]
+__all__ += ["shards", "store", "unpacked"]
+
+Array = NDArray[np.float64]
+
+#: Margins of a set that objectives may name, with their units.
+QUANTITIES = {
+    "transmission angle": "deg",
+    "rocker swing": "deg",
+    "size": "",
+    "largest tilt": "deg",
+    "largest axis tilt": "deg",
+    "smallest clearance": "mm",
+    "jammed part": "",
+}
+_UNITS = QUANTITIES | {"frame": "", "coupler": "", "rocker": "", "type": "", "kind": "", "passes": ""}
+_DEFAULT = (Objective("transmission angle", "max"), Objective("largest axis tilt", "max"), Objective("size", "min"))
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """Sets `start` to `stop` (without it) of the lattice: one candidate of the stream."""
+
+    number: int
+    start: int
+    stop: int
+
+    @property
+    def key(self) -> str:
+        """What it is, for the journal."""
+        return f"sets {self.start} to {self.stop - 1}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluated:
+    """Sets of the lattice with everything that is known of each.
+
+    Attributes
+    ----------
+    sets : ndarray of int64, shape (n,)
+    lengths : ndarray of int64, shape (n, 4)
+        Frame, crank, coupler, rocker in units of the lattice (exact).
+    kind, type : ndarray of int8, shape (n,)
+        Exact; see `classify`.
+    moved : Moved
+    jamming : Jamming
+    size : ndarray, shape (n,)
+        Longest length over the crank.
+    passes : ndarray of bool, shape (n,)
+        Keeps the limits of the scene.
+    """
+
+    sets: Ints
+    lengths: Ints
+    kind: NDArray[np.int8]
+    type: NDArray[np.int8]
+    moved: Moved
+    jamming: Jamming
+    size: Array
+    passes: NDArray[np.bool_]
+
+    def quantity(self, name: str) -> Array:
+        """Return a margin of `QUANTITIES` by set, in its unit."""
+        found: dict[str, Array] = {
+            "transmission angle": np.degrees(self.moved.transmission),
+            "rocker swing": np.degrees(self.moved.swing),
+            "size": self.size,
+            "largest tilt": np.degrees(self.jamming.tilt),
+            "largest axis tilt": np.degrees(self.jamming.axis_tilt),
+            "smallest clearance": self.jamming.clearance,
+            "jammed part": self.jamming.part,
+        }
+        return found[name]
+
+    def rounded(self, name: str) -> Array:
+        """Return a margin to the 9 decimals by which sets are turned down, ranked and stored: rounding decides nothing.
+
+        What is 30 degrees but for rounding keeps a limit of 30 degrees, and what differs by rounding alone is a tie.
+        """
+        return np.round(self.quantity(name), 9)
+
+
+def shards(context: Context) -> Iterator[Shard]:
+    """Cut the lattice into runs of sets; a shard depends on the scene and its number only."""
+    lattice = lattice_of(context)
+    objectives_of(context)
+    size = context.scene.mechanism.shard
+    whole = len(lattice.rocker)  # a pair of frame and coupler stays together, so that its maps are whole
+    step = max(1, size // whole) * whole
+    for number, start in enumerate(range(0, len(lattice), step), 1):
+        yield Shard(number, start, min(start + step, len(lattice)))
+
+
+def objectives_of(context: Context) -> tuple[Objective, ...]:
+    """Return the objectives of ``[ranking]``, or the usual ones.
+
+    Raises
+    ------
+    SceneError
+        If one names no margin of a set.
+    """
+    table = context.scene.ranking
+    if table is None:
+        return _DEFAULT
+    for i, objective in enumerate(table.objectives):
+        if objective.quantity not in QUANTITIES:
+            raise (context.scene.place / "ranking" / "objectives" / str(i)).error(
+                f"has quantity = {objective.quantity!r}, which no set has{suggest(objective.quantity, QUANTITIES)}",
+                "quantity",
+            )
+    return tuple(Objective(o.quantity, o.goal if o.target is None else o.target, o.weight) for o in table.objectives)
+
+
+def evaluate_sets(context: Context, lattice: Lattice, sets: Ints) -> Evaluated:
+    """Classify (exact), move and judge (estimated) some sets of the lattice."""
+    table: SurveyTable = context.scene.mechanism
+    lengths = lattice.lengths(sets)
+    kind, types = classify(lengths)
+    moved = move(lengths, table.positions)
+    jamming = close_form(table, lengths)
+    size = lengths.max(axis=1) / lattice.crank
+    done = Evaluated(sets, lengths, kind, types, moved, jamming, size, np.zeros(len(sets), dtype=np.bool_))
+    return replace(done, passes=np.all(list(_kept(table, done).values()), axis=0))
+
+
+def _kept(table: SurveyTable, done: Evaluated) -> dict[str, NDArray[np.bool_]]:
+    """Return which sets keep each limit, by the words that turn the others down, in the order of asking."""
+    return {
+        "the crank does not turn fully": done.kind == KINDS.index("full turn"),
+        f"not {' or '.join(table.limits.types)}": np.isin(done.type, [TYPES.index(t) for t in table.limits.types]),
+        "the transmission angle is too small": done.rounded("transmission angle") >= table.limits.transmission_deg,
+        "the bearing jams at the tilt of the scene": (done.jamming.part == 0.0) | (not table.limits.free),
+    }
+
+
+def evaluate(context: Context, shard: Shard) -> tuple[Evaluated, dict[str, Any]]:
+    """Evaluate a shard; give its sets for the rows, and what the survey keeps of it."""
+    table: SurveyTable = context.scene.mechanism
+    lattice = lattice_of(context)
+    done = evaluate_sets(context, lattice, np.arange(shard.start, shard.stop))
+    return done, {
+        "start": shard.start,
+        "sets": len(done.sets),
+        "positions": int(done.moved.positions),
+        "classes": _classes(done),
+        "turned down": _turned_down(table, done),
+        "maps": _maps(lattice, done),
+        **ranked_by(context, done),
+    }
+
+
+def _classes(done: Evaluated) -> list[list[int]]:
+    """Count sets by exact type, exact kind and kind found in motion: rows (type, kind, found, count)."""
+    code = (done.type.astype(np.int64) * len(KINDS) + done.kind) * len(KINDS) + done.moved.kind
+    values, counts = np.unique(code, return_counts=True)
+    rest, found = np.divmod(values, len(KINDS))
+    types, kinds = np.divmod(rest, len(KINDS))
+    return np.stack([types, kinds, found, counts], axis=1).tolist()  # type: ignore[no-any-return]
+
+
+def _turned_down(table: SurveyTable, done: Evaluated) -> dict[str, int]:
+    """Count the sets that a limit turns down; each is counted at the first limit it misses."""
+    left, found = np.ones(len(done.sets), dtype=np.bool_), {}
+    for words, kept in _kept(table, done).items():
+        found[words] = int(np.sum(left & ~kept))
+        left &= kept
+    return found
+
+
+def _maps(lattice: Lattice, done: Evaluated) -> dict[str, list[Any]]:
+    """Reduce over the rocker: by pair (frame, coupler) the best transmission angle, and the best tilt that passes."""
+    pairs = done.lengths[:, [0, 2]].reshape(-1, len(lattice.rocker), 2)[:, 0]
+    turns = (done.kind == KINDS.index("full turn")).reshape(len(pairs), -1)
+    by_pair = {
+        name: np.where(mask, done.quantity(name).reshape(len(pairs), -1), -1.0).max(axis=1)
+        for name, mask in (
+            ("transmission angle", turns),
+            ("largest axis tilt", done.passes.reshape(len(pairs), -1)),
+        )
+    }
+    kept = by_pair["transmission angle"] >= 0.0
+    return {
+        "frame": pairs[kept, 0].tolist(),
+        "coupler": pairs[kept, 1].tolist(),
+        "turning": turns.sum(axis=1)[kept].tolist(),
+        **{name: np.round(values[kept], 6).tolist() for name, values in by_pair.items()},
+    }
+
+
+def ranked_by(context: Context, done: Evaluated) -> dict[str, Any]:
+    """Keep what the sets that pass are ranked by, and which of them are on the Pareto front of this shard."""
+    passing = np.flatnonzero(done.passes)
+    losses = losses_of(objectives_of(context), done, passing)
+    return {
+        "passing": len(passing),
+        "front": done.sets[passing[front_of(losses)]].tolist(),
+        "losses": packed(np.column_stack([done.sets[passing], losses])),
+    }
+
+
+def packed(rows: Array) -> str:
+    """Return rows of numbers as text, bit by bit, at 11 characters a number."""
+    return b64encode(rows.astype("<f8").tobytes()).decode()
+
+
+def unpacked(text: str, columns: int) -> Array:
+    """Return the rows of `packed`.
+
+    Examples
+    --------
+    >>> unpacked(packed(np.array([[1.0, 0.1]])), 2).tolist()
+    [[1.0, 0.1]]
+    """
+    return np.frombuffer(b64decode(text), dtype="<f8").reshape(-1, columns)
+
+
+def losses_of(objectives: tuple[Objective, ...], done: Evaluated, which: NDArray[np.intp]) -> Array:
+    """Return what is to be small, shape (n, objectives)."""
+    losses = np.empty((len(which), len(objectives)))
+    sign = {"min": 1.0, "max": -1.0}
+    for k, objective in enumerate(objectives):
+        values, goal = done.rounded(objective.quantity)[which], objective.goal
+        losses[:, k] = sign[goal] * values if isinstance(goal, str) else np.abs(values - goal)
+    losses[~np.isfinite(losses)] = np.inf
+    return losses
+
+
+def front_of(losses: Array) -> NDArray[np.intp]:
+    """Return the rows that no other row beats: at most as large everywhere and smaller somewhere.
+
+    The row of least sum among those left is of the front; what it beats is dropped; and so on.
+
+    Examples
+    --------
+    >>> front_of(np.array([[1.0, 2.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0]])).tolist()
+    [0, 1, 3]
+    """
+    left = np.flatnonzero(np.isfinite(losses).all(axis=1))
+    if not len(left):
+        return left
+    span = np.ptp(losses[left], axis=0)
+    left = left[np.argsort((losses[left] / np.where(span > 0.0, span, 1.0)).sum(axis=1), kind="stable")]
+    front: list[NDArray[np.intp]] = []
+    while len(left):
+        row = losses[left[0]]
+        rows = losses[left]
+        beats = (rows <= row).all(axis=1) & (rows < row).any(axis=1)
+        if beats.any():  # rounding of the sum put the loser first
+            left = np.concatenate([left[beats], left[~beats]])
+            continue
+        same = (rows == row).all(axis=1)
+        front.append(left[same])
+        left = left[~((rows >= row).all(axis=1))]
+    return np.sort(np.concatenate(front))
+
+
+def store(context: Context, evaluated: Evaluated) -> Columns:
+    """Lay out the rows of a shard: the columns the scene names, of all sets or of those that pass."""
+    table: SurveyTable = context.scene.mechanism
+    which = slice(None) if table.rows == "all" else np.flatnonzero(evaluated.passes)
+    unit = float(lattice_of(context).unit)
+    columns: dict[str, Any] = {"set": evaluated.sets[which]}
+    for name in table.columns:
+        header = f"{name} [{_UNITS[name]}]" if _UNITS[name] else name
+        columns[header] = _column(evaluated, name, unit)[which]
+    return Columns("rows", columns)
+
+
+def _column(done: Evaluated, name: str, unit: float) -> NDArray[Any]:
+    if name in ("frame", "coupler", "rocker"):
+        values = done.lengths[:, ("frame", "crank", "coupler", "rocker").index(name)] * unit
+        return np.asarray([float(f"{v:.12g}") for v in np.unique(values)])[np.unique(values, return_inverse=True)[1]]
+    if name == "type":
+        return np.array(TYPES)[done.type]
+    if name == "kind":
+        return np.array(KINDS)[done.kind]
+    if name == "passes":
+        return done.passes.astype(np.int8)
+    values = done.rounded(name)
+    return np.where(np.isfinite(values), values, math.nan)

@@ -1,0 +1,140 @@
+"""``module = "four_bar_survey"``: all four-bars of a lattice of lengths moved, judged, ranked; the best certified."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from graphsynth.evidence.registry import plans
+from graphsynth.pipeline.stages import Stage
+from graphsynth.pipeline.system import System
+from graphsynth.pipeline.tables import require
+from graphsynth.systems.lambda_linkage.system import BearingTable, Tilt
+
+__all__ = ["SYSTEM", "Grashof", "RangeTable", "SurveyLengths", "SurveyLimits", "SurveyTable", "SurveyTolerances"]
+
+_MOST = 10**8
+
+Grashof = Literal["crank-rocker", "double crank"]
+Column = Literal[
+    "frame", "coupler", "rocker", "type", "kind", "transmission angle", "rocker swing", "size", "largest tilt",
+    "largest axis tilt", "smallest clearance", "jammed part", "passes",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class RangeTable:
+    """Lengths from `first` to `last` in steps of `step`."""
+
+    first: float
+    last: float
+    step: float
+
+    def __post_init__(self) -> None:
+        require(self.first > 0, f"has first = {self.first}; a length must be positive")
+        require(self.step > 0, f"has step = {self.step}; it must be positive")
+        require(self.last >= self.first, f"has last = {self.last}, less than first = {self.first}; exchange them")
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyLengths:
+    """Lengths in any one unit, exact decimals: one crank, and a range of each other link."""
+
+    frame: RangeTable
+    coupler: RangeTable
+    rocker: RangeTable
+    crank: float = 1.0
+
+    def __post_init__(self) -> None:
+        require(self.crank > 0, f"has crank = {self.crank}; a length must be positive")
+        sets = math.prod((r.last - r.first) / r.step + 1.0 for r in (self.frame, self.coupler, self.rocker))
+        require(
+            sets <= 1.001 * _MOST,
+            f"has ranges of {sets:.3g} dimension sets together, hours of work; at most {_MOST:.0e} are taken at once: "
+            "use larger steps, or one scene for each part of the range of the frame",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyLimits:
+    """What a set must keep to be ranked; only sets whose crank turns fully are."""
+
+    types: tuple[Grashof, ...] = ("crank-rocker",)
+    transmission_deg: float = 30.0
+    free: bool = True
+
+    def __post_init__(self) -> None:
+        require(bool(self.types), "has no types; name crank-rocker, double crank or both")
+        require(
+            0 <= self.transmission_deg < 90,
+            f"has transmission_deg = {self.transmission_deg}; an angle of 0 or more and less than 90 degrees is asked",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyTolerances:
+    """Plus or minus, for the certificates: of all four lengths, the tilt and its azimuth, the bearing."""
+
+    lengths_percent: float = 0.0
+    alpha_rad: float = 0.0
+    azimuth_rad: float = 0.0
+    radius_mm: float = 0.0
+    height_mm: float = 0.0
+    clearance_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            require(value >= 0, f"has {name} = {value}; a tolerance is zero or more")
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyTable:
+    """``[mechanism]`` with ``module = "four_bar_survey"``."""
+
+    module: Literal["four_bar_survey"]
+    lengths: SurveyLengths
+    tilt: Tilt
+    bearing: BearingTable
+    limits: SurveyLimits = field(default_factory=SurveyLimits)
+    tolerances: SurveyTolerances = field(default_factory=SurveyTolerances)
+    positions: int = 72
+    shard: int = 20_000
+    certify: int = 1000
+    rows: Literal["all", "passing"] = "passing"
+    columns: tuple[Column, ...] = (
+        "frame", "coupler", "rocker", "type", "transmission angle", "rocker swing", "size", "largest axis tilt",
+    )  # fmt: skip
+    slices: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        require(
+            8 <= self.positions <= 3600 and self.positions % 2 == 0,
+            f"has positions = {self.positions}; give an even number from 8 to 3600, so that both dead centres are met",
+        )
+        require(100 <= self.shard <= 1_000_000, f"has shard = {self.shard}; use 100 to 1000000 sets")
+        require(1 <= self.certify <= 1_000_000, f"has certify = {self.certify}; use 1 to 1000000 sets")
+        require(bool(self.columns), "has columns = []; name at least one")
+        require(abs(self.tilt.alpha_rad) < math.pi / 4, "has a tilt of 45 degrees or more; no bearing is meant for it")
+
+
+_HERE = "graphsynth.systems.four_bar_survey"
+_RANK = Stage("rank", f"{_HERE}.order:rank", ("survey", "records"), ("ranking",))
+SYSTEM = System(
+    table=SurveyTable,
+    structure="none",
+    stages=(
+        Stage("shards", f"{_HERE}.stages:shards", (), ("shards",), stream=True),
+        Stage("evaluate", f"{_HERE}.stages:evaluate", ("shards",), ("evaluated", "surveyed"), each=True),
+        Stage("store rows", f"{_HERE}.stages:store", ("evaluated",), ("rows",), each=True),
+        Stage("gather", f"{_HERE}.results:gather", ("surveyed",), ("survey",)),
+        Stage("certify", f"{_HERE}.results:certify", ("survey",), ("certificates",)),
+        Stage("judge", f"{_HERE}.answer:judge", ("survey", "certificates"), ("records", "tables")),
+        Stage("maps", f"{_HERE}.pictures:maps", ("survey",), ("plots",), aside=True),
+        Stage("sketch best", f"{_HERE}.pictures:sketches", ("records", "ranking"), ("mechanism_pictures",)),
+        Stage("animate best", f"{_HERE}.pictures:animations", ("records", "ranking"), ("animations",)),
+    ),
+    more=lambda scene: (_RANK,) if scene.ranking is not None else (),
+    evidence=plans("graphsynth.systems.four_bar_survey.evidence", "many-sets", "arc-ends", "crossing", "dimensions"),
+)

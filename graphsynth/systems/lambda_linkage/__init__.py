@@ -1,0 +1,1 @@
+"""Chebyshev's lambda linkage with a tilted motor axis."""

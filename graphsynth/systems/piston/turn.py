@@ -1,0 +1,316 @@
+"""One turn of a crank drive with a piston: works and their balance, peaks; with and without the second group."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.checks import positive
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.piston.drives import CrankSlider
+from graphsynth.systems.piston.machine import PistonLoads, PistonMachine
+
+__all__ = ["PistonComparison", "PistonTurn", "compare_pistons", "piston_turn"]
+
+Array = NDArray[np.float64]
+
+_NODES = 16
+_WIDEST = math.pi / 8
+#: Panels shrink towards a reversal of the sliding down to this fraction of the zone in which friction changes sides.
+_FINEST = 0.25
+_SAMPLES = 720
+
+
+@dataclass(frozen=True, eq=False)
+class PistonTurn:
+    """Works of a turn at constant speed (estimated: Gauss quadrature on panels that end where a load has a kink), J.
+
+    Attributes
+    ----------
+    motor, gas, friction : float
+        Work of the motor, work taken by the gas, work lost.
+    kinetic, weights : float
+        Change of the kinetic energy and work of the weights over the turn: exactly 0, so they are errors.
+    gas_closed_form : float
+        Indicated work from the pressure-volume diagram; NaN if the gas law has none.
+    balance_error : float
+        ``|motor - gas - friction|`` over the largest work in play: the kinetic energy's way up and down counts.
+    peak_wall, mean_wall : float
+        Largest and mean side load of the cylinder, N (magnitudes).
+    peak_guide, mean_guide : float
+        The same of the crosshead's guide.
+    peak_edge, peak_guide_edge : float
+        Largest force at an end of the piston, and of the crosshead's shoe, N.
+    peak_held : float
+        Largest side load that the slot's static friction can add, N; 0 where the slot slides.
+    """
+
+    motor: float
+    gas: float
+    friction: float
+    kinetic: float
+    weights: float
+    gas_closed_form: float
+    balance_error: float
+    peak_wall: float
+    mean_wall: float
+    peak_guide: float
+    mean_guide: float
+    peak_edge: float
+    peak_guide_edge: float
+    peak_held: float
+
+
+@dataclass(frozen=True, eq=False)
+class PistonComparison:
+    """The same drive, gas and masses with and without the second group (estimated).
+
+    Attributes
+    ----------
+    floating, plain : PistonTurn
+    wall_ratio : float
+        Peak side load of the cylinder with over without the second group; NaN if there is none without, up to
+        rounding.
+    edge_ratio : float
+        The same of the forces at the ends of the piston.
+    guide_share : float
+        Peak force at an end of the crosshead's shoe over that at an end of the plain piston: where the load goes.
+    friction_ratio : float
+        Work lost with over without; NaN without friction.
+    squareness : float
+        Error of the right angle between slot and cylinder, radians, from which on the second group buys nothing
+        whatever the gas force, masses aside: the steepest angle of the rod.  NaN for a Scotch yoke, whose plain piston
+        has no side load.
+    """
+
+    floating: PistonTurn
+    plain: PistonTurn
+    wall_ratio: float
+    edge_ratio: float
+    guide_share: float
+    friction_ratio: float
+    squareness: float
+
+    @property
+    def statement(self) -> str:
+        """What the second group buys, in one sentence."""
+        a, b = self.floating, self.plain
+        text = (
+            f"peak side load of the cylinder {a.peak_wall:.4g} N with the second group, {b.peak_wall:.4g} N without; "
+            f"the crosshead's guide carries {a.peak_guide:.4g} N"
+        )
+        if a.peak_held > 0.0:
+            text += f"; static friction in the slot may add {a.peak_held:.4g} N"
+        return text
+
+
+def piston_turn(machine: PistonMachine, length: float | None = None) -> PistonTurn:
+    """Works and peaks of one turn.
+
+    Parameters
+    ----------
+    machine : PistonMachine
+        With an acceleration of 0.
+    length : float, optional
+        Of piston and shoe, for the forces at their ends, m; the stroke by default.
+
+    Raises
+    ------
+    GeometryError
+        A crank at rest or accelerated; friction that jams somewhere.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.piston.gas import CompressorCycle
+    >>> from graphsynth.systems.piston import FloatingPiston
+    >>> gas = CompressorCycle(0.1, suction=1e5, discharge=6e5)
+    >>> turn = piston_turn(PistonMachine(FloatingPiston.crank_slider(0.05, 0.2), gas=gas, speed=50.0))
+    >>> turn.balance_error < 1e-12, abs(turn.gas / turn.gas_closed_form - 1.0) < 1e-12, turn.peak_wall < 1e-9
+    (True, True, True)
+    """
+    if machine.speed == 0.0 or machine.acceleration != 0.0:
+        raise GeometryError(
+            f"a turn needs a constant speed other than 0; speed = {machine.speed:g} rad/s and acceleration = "
+            f"{machine.acceleration:g} rad/s^2; change them"
+        )
+    size = machine.mechanism.stroke if length is None else positive("length of the piston", length)
+    nodes, weights = _nodes(machine)
+    loads = machine.loads(nodes)
+    _check(loads)
+    step = weights / abs(machine.speed)
+
+    def work(power: Array) -> float:
+        return float(step @ power)
+
+    motor, gas, friction = work(loads.driving), work(loads.gas_power), work(loads.friction_power)
+    moved = max(work(np.abs(p)) for p in (loads.driving, loads.gas_power, loads.friction_power, loads.kinetic_power))
+    turn = float(weights.sum())
+    return PistonTurn(
+        motor=motor, gas=gas, friction=friction, kinetic=work(loads.kinetic_power), weights=work(loads.weight_power),
+        gas_closed_form=machine.gas.work(machine.mechanism.stroke),
+        balance_error=abs(motor - gas - friction) / max(moved, 1e-300),
+        peak_wall=_peak(machine, lambda found: np.abs(found.wall), loads),
+        mean_wall=float(weights @ np.abs(loads.wall)) / turn,
+        peak_guide=_peak(machine, lambda found: np.abs(found.guide), loads),
+        mean_guide=float(weights @ np.abs(loads.guide)) / turn,
+        peak_edge=_peak(machine, lambda found: np.maximum(*map(np.abs, found.edges(size))), loads),
+        peak_guide_edge=_peak(machine, lambda found: np.maximum(*map(np.abs, found.edges(size, "guide"))), loads),
+        peak_held=float(loads.held.max()),
+    )  # fmt: skip
+
+
+def compare_pistons(machine: PistonMachine, length: float | None = None) -> PistonComparison:
+    """Compare a machine with its plain form, whose crosshead is the piston.
+
+    Parameters
+    ----------
+    machine : PistonMachine
+        With a second group.
+    length : float, optional
+        Of both pistons and of the crosshead's shoe, m; the stroke by default.
+
+    Returns
+    -------
+    PistonComparison
+        Side loads and losses of both over a turn (estimated).
+
+    Raises
+    ------
+    GeometryError
+        A machine without a second group, or a cause of :func:`piston_turn`.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.piston.gas import ConstantForce
+    >>> from graphsynth.systems.piston import FloatingPiston
+    >>> machine = PistonMachine(FloatingPiston.crank_slider(0.05, 0.2), gas=ConstantForce(1000.0))
+    >>> found = compare_pistons(machine)
+    >>> found.wall_ratio < 1e-12, round(found.guide_share, 12), round(found.plain.peak_wall, 3)
+    (True, 1.0, 258.199)
+    """
+    if machine.mechanism.group is None:
+        raise GeometryError("the machine has no second group to compare with; give a mechanism with a FloatingGroup")
+    size = machine.mechanism.stroke if length is None else length
+    floating, plain = piston_turn(machine, size), piston_turn(machine.without_group(), size)
+    drive = machine.mechanism.drive
+    some = np.linspace(0.0, 2.0 * math.pi, 91)
+    least = 1e-10 * float(np.abs(machine.loads(some).crank_pin).max())
+    return PistonComparison(
+        floating, plain, _ratio(floating.peak_wall, plain.peak_wall, least),
+        _ratio(floating.peak_edge, plain.peak_edge, least), _ratio(floating.peak_guide_edge, plain.peak_edge, least),
+        _ratio(floating.friction, plain.friction, 0.0),
+        drive.steepest if isinstance(drive, CrankSlider) else math.nan,
+    )  # fmt: skip
+
+
+def _ratio(one: float, other: float, least: float) -> float:
+    """NaN where the other is 0, or not more than rounding."""
+    return one / other if other > least else math.nan
+
+
+def _check(loads: PistonLoads) -> None:
+    bad = np.flatnonzero(~np.isfinite(loads.torque))
+    if len(bad):
+        at = loads.angle[bad[0]] % (2.0 * math.pi)
+        raise GeometryError(
+            f"friction leaves no single solution at the crank angle {at:.6g} rad: the machine jams there, or may; "
+            "reduce the friction coefficients, or make slot and cylinder square"
+        )
+
+
+def _nodes(machine: PistonMachine) -> tuple[Array, Array]:
+    """Nodes and weights of a turn: panels end at kinks and shrink towards places where loads change fast."""
+    start = machine.mechanism.dead_centres()[0].angle
+    narrow = _narrow(machine)
+    edges = {start, start + 2.0 * math.pi}
+    for at in (*(place for place, _ in narrow), *_valves(machine), *_sign_changes(machine)):
+        edges.add(start + (at - start) % (2.0 * math.pi))
+    for at, offset in narrow:
+        while offset < _WIDEST:
+            edges |= {start + (at + side * offset - start) % (2.0 * math.pi) for side in (1.0, -1.0)}
+            offset *= 2.0
+    ends = np.array(sorted(edges))
+    pieces = [np.linspace(a, b, max(1, math.ceil((b - a) / _WIDEST)) + 1)[:-1] for a, b in pairwise(ends) if b > a]
+    ends = np.append(np.concatenate(pieces), ends[-1])
+    x, w = np.polynomial.legendre.leggauss(_NODES)
+    half = 0.5 * np.diff(ends)
+    middle = 0.5 * (ends[1:] + ends[:-1])
+    return (middle[:, None] + half[:, None] * x).ravel(), (half[:, None] * w).ravel()
+
+
+def _narrow(machine: PistonMachine) -> list[tuple[float, float]]:
+    """Crank angles where loads change fast, and over which angle.
+
+    Friction changes sides at dead centres, and where the block of a yoke reverses; a rod that is hardly long enough
+    swings fast where it is steepest: ``l - |z|`` has its zeros ``sqrt(2 (l - |z|) / r)`` beside the real axis.
+    """
+    drive = machine.mechanism.drive
+    dead = [dead.angle for dead in machine.mechanism.dead_centres()]
+    sides = (0.5 * math.pi, 1.5 * math.pi)
+    if not isinstance(drive, CrankSlider):
+        zone = _zone(machine, [*dead, *sides])
+        return [(at, zone) for at in (*dead, *sides)]
+    zone = _zone(machine, dead)
+    slack = (drive.rod - drive.crank + drive.offset, drive.rod - drive.crank - drive.offset)
+    steep = [(at, max(0.5 * math.sqrt(2.0 * gap / drive.crank), 1e-9)) for at, gap in zip(sides, slack)]
+    return [*((at, zone) for at in dead), *steep]
+
+
+def _zone(machine: PistonMachine, reversals: list[float]) -> float:
+    """Smallest width of the panels at a reversal."""
+    friction = machine.friction
+    if not any((friction.guide, friction.cylinder, friction.slot, friction.yoke, friction.rings)):
+        return _WIDEST
+    motion = machine.mechanism.motion(np.array(reversals))
+    steep = max(float(np.abs(part.second).max()) for part in (motion.crosshead, motion.piston, motion.slot))
+    steep = max(steep, machine.mechanism.drive.crank)
+    return max(_FINEST * friction.regular_speed / (abs(machine.speed) * steep), 1e-9)
+
+
+def _valves(machine: PistonMachine) -> list[float]:
+    """Crank angles where the gas force is not smooth."""
+    outer, inner = machine.mechanism.dead_centres()
+    found = []
+    for gap, closing in machine.gas.kinks(machine.mechanism.stroke):
+        place = min(max(outer.piston - gap, inner.piston), outer.piston)
+        # turning backwards, the crank angles of the way to the head are those of the way back
+        found.append(machine.mechanism.angle_at(place, closing if machine.speed > 0.0 else not closing))
+    return found
+
+
+def _sign_changes(machine: PistonMachine) -> list[float]:
+    """Crank angles where a normal force changes sign, so that its friction has a kink."""
+    from scipy.optimize import brentq
+
+    phi = np.linspace(0.0, 2.0 * math.pi, _SAMPLES + 1)
+    loads = machine.loads(phi)
+    found = []
+    for name in ("wall", "guide", "slot", "yoke"):
+        values = getattr(loads, name)
+
+        def normal(angle: float, name: str = name) -> float:
+            return float(getattr(machine.loads(angle), name)[0])
+
+        places = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+        found += [float(brentq(normal, phi[k], phi[k + 1], xtol=1e-13)) for k in places]
+    return found
+
+
+def _peak(machine: PistonMachine, of: Callable[[PistonLoads], Array], loads: PistonLoads) -> float:
+    """Largest value over the turn: at the nodes, and between those next to the largest one."""
+    values = of(loads)
+    best = int(np.argmax(values))
+    peak, phi = float(values[best]), loads.angle
+    low, high = phi[max(best - 1, 0)], phi[min(best + 1, len(phi) - 1)]
+    for _ in range(4):
+        fine = np.linspace(low, high, 33)
+        inner = of(machine.loads(fine))
+        k = int(np.nanargmax(inner))
+        peak = max(peak, float(inner[k]))
+        low, high = fine[max(k - 1, 0)], fine[min(k + 1, 32)]
+    return peak

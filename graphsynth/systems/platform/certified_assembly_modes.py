@@ -1,0 +1,351 @@
+"""`certify_assembly_modes`: the number of assembly modes of the planar platform proved, and every pose enclosed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from fractions import Fraction
+from time import perf_counter
+from typing import Any
+
+import flint
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.checks import three
+from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.certify.numbers import Gaussian, ball, complex_ball, gaussian, rational
+from graphsynth.kinematics.certify.precision import precision
+from graphsynth.systems.platform.certified_exact_modes import exact_roots, parallel_positions, self_motion
+from graphsynth.systems.platform.certified_sextic_balls import SexticBalls, isolate, mirror_count, refine, sextic_balls
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+
+__all__ = ["AssemblyCertificate", "AssemblyVerdict", "ModeEnclosure", "certify_assembly_modes", "certify_direct"]
+
+Array = NDArray[np.float64]
+
+_LADDER = (64, 128, 256, 512, 1024)
+
+
+class AssemblyVerdict(StrEnum):
+    """Outcome of the certificate of a direct problem."""
+
+    CERTIFIED = "certified"
+    SELF_MOTION = "proved: self-motion"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, eq=False)
+class ModeEnclosure:
+    """One assembly mode, enclosed.
+
+    Attributes
+    ----------
+    x, y, alpha, determinant : arb
+        Balls of python-flint that contain the exact pose and its ``det JX``; alpha up to whole turns, its midpoint in
+        (-pi, pi].
+    multiplicity : int
+        1 for a regular mode, whose ``det JX`` is not zero; else that of the root alpha.
+    """
+
+    x: Any
+    y: Any
+    alpha: Any
+    determinant: Any
+    multiplicity: int = 1
+
+    @property
+    def pose(self) -> Array:
+        """Midpoints ``(x, y, alpha)`` in double precision."""
+        return np.array([float(v.mid()) for v in (self.x, self.y, self.alpha)])
+
+    @property
+    def radius(self) -> Array:
+        """Bound of the distance of the exact ``(x, y, alpha)`` from `pose`."""
+        return np.array([float(abs(v - m).upper()) for v, m in zip((self.x, self.y, self.alpha), self.pose)]) * (
+            1.0 + 1e-15
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyCertificate:
+    """All assembly modes of one problem, with proof.
+
+    Attributes
+    ----------
+    verdict : AssemblyVerdict
+    modes : tuple of ModeEnclosure
+        All modes, sorted by alpha; empty unless CERTIFIED.
+    reason : str
+        Why nothing is proved; empty if CERTIFIED.
+    bits : int
+        Binary digits that sufficed (or the last ones tried).
+    method : str
+        "subdivision", or "exact polynomial" at an exact singularity of rational data.
+    cross_check : bool or None
+        Whether root isolation with the mirror test gives the same count; None if it does not decide.
+    seconds : float
+    statement : str
+    """
+
+    verdict: AssemblyVerdict
+    modes: tuple[ModeEnclosure, ...]
+    reason: str
+    bits: int
+    method: str
+    cross_check: bool | None
+    seconds: float
+    statement: str
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    @property
+    def certified(self) -> bool:
+        """Whether the count and every pose are proved."""
+        return self.verdict is AssemblyVerdict.CERTIFIED
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Exact data; ``arms`` (pivots, arm lengths, angles) replace the anchors where given."""
+
+    vertices: list[Any]
+    lengths: list[Any]
+    anchors: list[Any]
+    arms: tuple[list[Gaussian], list[Fraction], list[Fraction]] | None = None
+
+    @property
+    def exact(self) -> bool:
+        """Whether all data are rational."""
+        points = [*self.anchors, *self.vertices]
+        return (
+            self.arms is None
+            and all(isinstance(v, Gaussian) for v in points)
+            and all(isinstance(v, Fraction) for v in self.lengths)
+        )
+
+    def balls(self) -> tuple[list[Any], list[Any], list[Any]]:
+        """Anchors, vertices and lengths at the precision set."""
+        vertices, lengths = [complex_ball(v) for v in self.vertices], [ball(v) for v in self.lengths]
+        if self.arms is None:
+            return [complex_ball(v) for v in self.anchors], vertices, lengths
+        anchors = []
+        for pivot, arm, angle in zip(*self.arms):
+            s, c = ball(angle).sin_cos()
+            anchors.append(complex_ball(pivot) + ball(arm) * flint.acb(c, s))
+        return anchors, vertices, lengths
+
+
+def certify_assembly_modes(
+    anchors: Sequence[Any],
+    vertices: Sequence[Any],
+    lengths: Sequence[Any],
+    *,
+    max_bits: int = 512,
+    cross_check: bool = True,
+) -> AssemblyCertificate:
+    """Prove how many assembly modes exist for given anchors and leg lengths (3-RPR), and enclose each.
+
+    Parameters
+    ----------
+    anchors, vertices : sequence of 3
+        Points A_k and b_k: complex numbers, or pairs (x, y) of exact numbers.  Floats are exact dyadic numbers; int,
+        Fraction, Decimal and texts such as "0.1" or "1/3" are exact too; ``acb`` balls stand for all their members.
+    lengths : sequence of 3
+        Leg lengths, exact numbers or ``arb`` balls.
+    max_bits : int, optional
+        Largest working precision.
+    cross_check : bool, optional
+        Isolate all six roots as well and compare the counts.
+
+    Returns
+    -------
+    AssemblyCertificate
+        Certified: subdivision of the circle in ball arithmetic, raised in precision until it decides.  Rational data at
+        an exact singularity are decided with their multiplicities by exact polynomial arithmetic.
+
+    Raises
+    ------
+    GeometryError
+        Data that are not three points and lengths, a negative length.
+
+    Notes
+    -----
+    Specification parallel_platform, section 5.5.
+
+    Examples
+    --------
+    >>> proof = certify_assembly_modes(
+    ...     [("0.9", 0), ("3.5", "0.2"), ("1.9", "2.3")],
+    ...     [("-0.4", "-0.25"), ("0.45", "-0.3"), ("0.05", "0.5")], ["1.1", "0.95", "1.05"])
+    >>> len(proof), proof.certified, proof.modes[0].pose.round(9).tolist()
+    (2, True, [2.201176575, 0.859202394, -0.167647891])
+    """
+    problem = _Problem(_points("vertices", vertices), _lengths(lengths), _points("anchors", anchors))
+    return _certify(problem, max_bits, cross_check)
+
+
+def certify_direct(
+    platform: ParallelPlatform, theta: Sequence[Any], *, max_bits: int = 512, cross_check: bool = True
+) -> AssemblyCertificate:
+    """Prove how many assembly modes a platform has at given rocker angles, and enclose each.
+
+    As `certify_assembly_modes`, with ``A_k = D_k + l1_k exp(i theta_k)`` in ball arithmetic; the dimensions (floats)
+    and the angles (exact numbers, radians) are taken as exact.
+
+    Parameters
+    ----------
+    platform : ParallelPlatform
+    theta : sequence of three numbers
+        Rocker angles, radians; floats, integers, fractions or decimal text.
+    max_bits : int, optional
+        Precision at which an undecided count is given up.
+    cross_check : bool, optional
+        Also count by a second method and compare.
+
+    Returns
+    -------
+    AssemblyCertificate
+        Number of modes, enclosures of the poses, or the reason why undecided (certified).
+
+    Examples
+    --------
+    >>> len(certify_direct(ParallelPlatform.mock(), [0.239804666389671, 2.334199768783167, -1.854590436003224]))
+    2
+    """
+    angles = [rational(f"theta of leg {k}", value) for k, value in enumerate(three("theta", theta), 1)]
+    arms = ([gaussian("D", v) for v in platform.D], [rational("l1", v) for v in platform.l1], angles)
+    problem = _Problem(_points("b", platform.b), _lengths(platform.l2), [], arms)
+    return _certify(problem, max_bits, cross_check)
+
+
+def _points(name: str, values: Sequence[Any]) -> list[Any]:
+    acb = flint.acb
+    return [v if isinstance(v, acb) else gaussian(f"{name} {k}", v) for k, v in enumerate(three(name, values), 1)]
+
+
+def _lengths(values: Sequence[Any]) -> list[Any]:
+    values = three("lengths", values)
+    arb = flint.arb
+    found = [v if isinstance(v, arb) else rational(f"length of leg {k}", v) for k, v in enumerate(values, 1)]
+    for k, value in enumerate(found, 1):
+        if value < 0:
+            raise GeometryError(f"length of leg {k} = {values[k - 1]} must be zero or more; correct the value")
+    return found
+
+
+def _certify(problem: _Problem, max_bits: int, cross_check: bool) -> AssemblyCertificate:
+    begin = perf_counter()
+    reason, bits = "max_bits is less than 64; raise it", 0
+    for bits in (b for b in _LADDER if b <= max_bits):
+        with precision(bits):
+            modes, reason = _subdivide(problem, bits)
+            if modes is not None:
+                checked = _cross_check(problem, modes) if cross_check else None
+                return _certificate(modes, bits, "subdivision", checked, begin)
+    if problem.exact:
+        with precision(max(bits, 128)):
+            if self_motion(problem.anchors, problem.vertices, problem.lengths):
+                text = "at one orientation the platform translates on a circle: congruent triangles and equal legs"
+                return AssemblyCertificate(
+                    AssemblyVerdict.SELF_MOTION, (), text, bits, "exact", None, perf_counter() - begin, text
+                )
+            modes, reason = _decide_exactly(problem, reason)
+            if modes is not None:
+                return _certificate(modes, bits, "exact polynomial", None, begin)
+    return AssemblyCertificate(
+        AssemblyVerdict.UNDECIDED, (), reason, bits, "subdivision", None, perf_counter() - begin, f"undecided: {reason}"
+    )
+
+
+def _subdivide(problem: _Problem, bits: int) -> tuple[list[ModeEnclosure] | None, str]:
+    """All modes at one precision, or None and the reason why it does not decide."""
+    A, b, lengths = problem.balls()
+    s = sextic_balls(A, b, lengths)
+    found = isolate(s, bits)
+    if found.reason:
+        return None, found.reason
+    modes = []
+    for low, high in found.roots:
+        mode = _pose(s, A, b, refine(s, low, high, bits))
+        if mode is None:
+            return None, "Delta may vanish at a mode: its position is not determined by its orientation alone"
+        if mode.determinant.contains(0):
+            return None, "the sign of det JX at a mode is not decided"
+        modes.append(mode)
+    if sum(1 if mode.determinant > 0 else -1 for mode in modes) != 0:
+        return None, "the signs of det JX do not cancel, which contradicts the theory; please report these data"
+    return sorted(modes, key=lambda mode: float(mode.alpha)), ""
+
+
+def _pose(s: SexticBalls, A: list[Any], b: list[Any], alpha: Any) -> ModeEnclosure | None:
+    """Pose of a root; None if Delta may be zero."""
+    sine, cosine = alpha.sin_cos()
+    z, back = flint.acb(cosine, sine), flint.acb(cosine, -sine)
+    n2, n1, n0, nm = s.n
+    Delta = s.d[0] + s.d[1] * z - flint.acb(s.d[1].real, -s.d[1].imag) * back
+    if Delta.contains(0):
+        return None
+    N = (n2 * z + n1) * z + n0 + nm * back
+    return _enclosure(A, b, A[0] + N / Delta - z * b[0], z, alpha)
+
+
+def _enclosure(A: list[Any], b: list[Any], p: Any, z: Any, alpha: Any) -> ModeEnclosure:
+    """Mode at the position p and the orientation z, with ``det JX``."""
+    rows = []
+    for k in range(3):
+        arm = z * b[k]
+        d = p + arm - A[k]
+        rows.append([2 * d.real, 2 * d.imag, 2 * (arm.real * d.imag - arm.imag * d.real)])
+    turned = alpha - 2 * flint.arb.pi() if alpha.mid() > flint.arb.pi() else alpha
+    return ModeEnclosure(p.real, p.imag, turned, flint.arb_mat(rows).det())
+
+
+def _decide_exactly(problem: _Problem, reason: str) -> tuple[list[ModeEnclosure] | None, str]:
+    """All modes of rational data with their multiplicities; None and a reason where a position is not determined."""
+    data = problem.anchors, problem.vertices, problem.lengths
+    roots = exact_roots(*data)
+    if roots is None:
+        return None, "every orientation solves the elimination equation: a self-motion, or a degenerate platform"
+    A, b, lengths = problem.balls()
+    s = sextic_balls(A, b, lengths)
+    modes: list[ModeEnclosure] = []
+    for root in roots:
+        mode = _pose(s, A, b, root.alpha)
+        if mode is not None:
+            modes.append(replace(mode, multiplicity=root.multiplicity))
+            continue
+        positions = None if root.z is None else parallel_positions(*data, root.z)
+        if positions is None:
+            where = float(root.alpha)
+            return (
+                None,
+                f"Delta may vanish at the root alpha = {where:.15g}, so the position is not determined; {reason}",
+            )
+        for p in positions:
+            mode = _enclosure(A, b, p, complex_ball(root.z), root.alpha)
+            regular = not mode.determinant.contains(0)
+            modes.append(replace(mode, multiplicity=1 if regular else root.multiplicity))
+    return modes, ""
+
+
+def _cross_check(problem: _Problem, modes: list[ModeEnclosure]) -> bool | None:
+    count = mirror_count(sextic_balls(*problem.balls()))
+    return None if count is None else count == len(modes)
+
+
+def _certificate(
+    modes: list[ModeEnclosure], bits: int, method: str, checked: bool | None, begin: float
+) -> AssemblyCertificate:
+    seconds = perf_counter() - begin
+    if checked is False:
+        reason = "subdivision and root isolation give different counts; please report these data"
+        return AssemblyCertificate(
+            AssemblyVerdict.UNDECIDED, (), reason, bits, method, checked, seconds, f"undecided: {reason}"
+        )
+    merged = sum(mode.multiplicity > 1 for mode in modes)
+    text = f"certified: exactly {len(modes)} assembly modes, each enclosed"
+    text += f"; {merged} of them multiple roots (type-II singularity)" if merged else ""
+    return AssemblyCertificate(AssemblyVerdict.CERTIFIED, tuple(modes), "", bits, method, checked, seconds, text)

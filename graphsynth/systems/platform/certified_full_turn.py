@@ -1,0 +1,316 @@
+"""`certify_full_turn`: proof that the single-motor platform makes a full turn on one branch.
+
+Drives by the exact condition of specification parallel_platform, section 7.4; the platform by moving boxes that cover
+the turn, linked, and closed at exactly 2 pi; the working mode by enclosures of the reach of every leg over these boxes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.certify.balls import TINY, UP, Balls, check_rounding, exact, tau_times
+from graphsynth.kinematics.certify.cover import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
+from graphsynth.kinematics.certify.krawczyk import Boxes
+from graphsynth.systems.platform.certified_equations import PlatformSystem
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+
+__all__ = ["FullTurnCertificate", "TurnVerdict", "certify_full_turn"]
+
+Array = NDArray[np.float64]
+Arc = tuple[float, float]
+
+_NODES = 73
+_SPLIT = 12
+
+
+class TurnVerdict(StrEnum):
+    """Outcome for a full turn of the wheels."""
+
+    CERTIFIED_FULL_TURN = "certified full turn"
+    NOT_FULL_TURN = "proved: no full turn"
+    CHANGE_POINT = "proved: change point"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, eq=False)
+class FullTurnCertificate:
+    """What is proved about a full turn.
+
+    Attributes
+    ----------
+    verdict : TurnVerdict
+        CERTIFIED_FULL_TURN: no drive locks or changes its branch, ``det JX`` vanishes nowhere on the branch through the
+        start pose, and the pose after exactly 2 pi is the start pose.  NOT_FULL_TURN and CHANGE_POINT are exact
+        statements on the drives.
+    drives : tuple of str
+        Exact kind of every drive: "full turn", "change point", "limited", "immovable" or "never assembled".
+    covered : float
+        The branch is proved for wheel angles from 0 to here (radians; 0 if nothing is).
+    sigma : tuple of int
+        Working mode at psi = 0; zeros where it is not proved.
+    working_mode_constant : bool or None
+        True: proved constant over ``covered``; False: a change is proved; None: not decided, or no cover.
+    mode_arcs : tuple of (leg, start, stop, changes)
+        Arcs of psi in which leg 1 to 3 may pass its boundary; ``changes`` tells that its sign is proved different
+        before and after.
+    boxes : int
+        Moving boxes tested.
+    reason : str
+        Why the verdict is UNDECIDED, or what forbids the turn; empty for a certified turn.
+    seconds : float
+    statement : str
+    """
+
+    verdict: TurnVerdict
+    drives: tuple[str, str, str]
+    covered: float
+    sigma: tuple[int, int, int]
+    working_mode_constant: bool | None
+    mode_arcs: tuple[tuple[int, float, float, bool], ...]
+    boxes: int
+    reason: str
+    seconds: float
+    statement: str
+    _cover: tuple[PlatformSystem, Boxes, Array] | None = None
+
+    @property
+    def certified(self) -> bool:
+        """Whether the full turn is certified."""
+        return self.verdict is TurnVerdict.CERTIFIED_FULL_TURN
+
+    def enclosure(self, psi: float) -> tuple[Array, Array]:
+        """Pose ``(x, y, alpha)`` on the proved branch at the wheel angle ``psi`` in [0, covered]: midpoint and radius.
+
+        Raises
+        ------
+        GeometryError
+            If no proved box contains ``psi``.
+        """
+        if self._cover is not None and 0.0 <= psi <= self.covered:
+            system, boxes, tight = self._cover
+            hits = np.flatnonzero(np.abs(psi - boxes.u.mid) * UP <= boxes.u.rad)
+            u = exact(np.array([psi], dtype=np.float64))
+            for hit in hits:
+                box = boxes.take(np.array([hit])).at(u)
+                node = prove_nodes(system, u, box.mid)
+                # the solution is in the tight box around the moving centre, and the node's box holds only one
+                apart = (box - exact(node.x)).size + tight[hit]
+                if bool(node.proof.proved[0]) and bool((apart * UP < node.proof.radius).all()):
+                    return node.x[0, 3:], node.proof.tight[0, 3:]
+        raise GeometryError(f"psi = {psi} is outside the proved arc [0, {self.covered:.9g}]; give an angle inside it")
+
+
+def certify_full_turn(
+    mechanism: SingleMotorPlatform,
+    *,
+    start: ArrayLike | None = None,
+    max_boxes: int = 100_000,
+    seconds: float = 60.0,
+) -> FullTurnCertificate:
+    """Prove or disprove a full turn of the wheels on the branch through a pose.
+
+    Parameters
+    ----------
+    mechanism : SingleMotorPlatform
+        Lengths and points in the frames of the legs are taken as exact; every angle is meant within 5e-16 rad.
+    start : array_like, shape (3,), optional
+        Pose near the branch at psi = 0; the home branch by default.
+    max_boxes, seconds : optional
+        Limits of the work.
+
+    Returns
+    -------
+    FullTurnCertificate
+
+    Raises
+    ------
+    GeometryError
+        For anything but a `SingleMotorPlatform`.
+
+    Notes
+    -----
+    Specification parallel_platform, section 7.4.
+
+    Examples
+    --------
+    >>> proof = certify_full_turn(SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)))
+    >>> proof.certified, proof.sigma, proof.working_mode_constant
+    (True, (-1, -1, -1), True)
+    """
+    begin = perf_counter()
+    check_rounding()
+    if not isinstance(mechanism, SingleMotorPlatform):
+        raise GeometryError(f"{type(mechanism).__name__} is not a SingleMotorPlatform; certify proves other motions")
+    kinds = [turn.kind for turn in mechanism.drive_turns()]
+    drives = (kinds[0], kinds[1], kinds[2])
+    for verdict, bad in (
+        (TurnVerdict.NOT_FULL_TURN, ("limited", "immovable", "never assembled")),
+        (TurnVerdict.CHANGE_POINT, ("change point",)),
+    ):
+        legs = [str(k) for k, kind in enumerate(drives, 1) if kind in bad]
+        words = " and ".join(dict.fromkeys(kind for kind in drives if kind in bad))
+        if legs:
+            return _without_cover(verdict, drives, f"drive {', '.join(legs)}: {words}, decided exactly", begin)
+    try:
+        motion = mechanism.full_turn(_NODES, start)
+    except GeometryError as error:
+        return _without_cover(TurnVerdict.UNDECIDED, drives, f"there is no start pose: {error}", begin)
+    system = PlatformSystem(mechanism)
+    delta = np.array(mechanism.delta)
+    nodes = _nodes(system, motion.psi, np.column_stack([motion.theta - delta, motion.pose]), motion.complete)
+    found = cover(system, nodes, Budget(max_boxes, seconds), begin)
+    return _conclude(system, nodes, found, drives, motion.stop_reason(), begin)
+
+
+def _without_cover(
+    verdict: TurnVerdict, drives: tuple[str, str, str], reason: str, begin: float
+) -> FullTurnCertificate:
+    return FullTurnCertificate(
+        verdict, drives, 0.0, (0, 0, 0), None, (), 0, reason, perf_counter() - begin, f"{verdict}: {reason}"
+    )
+
+
+def _nodes(system: PlatformSystem, psi: Array, guess: Array, complete: bool) -> Nodes:
+    """Prove the poses that the motion suggests; the last one at exactly 2 pi."""
+    u = exact(psi)
+    if complete:
+        u.rad[-1] = (tau_times(1.0) - exact(psi[-1])).size
+    return prove_nodes(system, u, guess)
+
+
+@np.errstate(all="ignore")
+def _conclude(
+    system: PlatformSystem, nodes: Nodes, found: Cover, drives: tuple[str, str, str], stopped: str, begin: float
+) -> FullTurnCertificate:
+    whole = not stopped and bool(found.covered.all())
+    covered, boxes = _covered(nodes, found, whole)
+    closed = whole and whole_turns(nodes, np.array([True, True, True, False, False, True])) is not None
+    sigma, branches = _signs(system, nodes)
+    constant, arcs = _working_mode(system, boxes) if boxes is not None else (None, ())
+    right_drives = branches == system.platform.tau
+    if closed and right_drives:
+        verdict, reason = TurnVerdict.CERTIFIED_FULL_TURN, ""
+    else:
+        verdict, reason = TurnVerdict.UNDECIDED, _reason(stopped, found, whole, right_drives)
+    text = f"{verdict}: {reason}; proved from psi = 0 to {covered:.9g}" if reason else f"{verdict}: one regular branch"
+    if constant is not None:
+        text += "; the working mode is proved constant" if constant else "; a change of the working mode is proved"
+    return FullTurnCertificate(
+        verdict,
+        drives,
+        covered,
+        sigma,
+        constant,
+        arcs,
+        found.tested,
+        reason,
+        perf_counter() - begin,
+        text,
+        None if boxes is None else (system, *boxes),
+    )
+
+
+def _reason(stopped: str, found: Cover, whole: bool, right_drives: bool) -> str:
+    if stopped:
+        return f"the motion itself ends: {stopped}"
+    if found.exhausted:
+        return f"the limit of work was reached after {found.tested} boxes"
+    if not whole:
+        a, b = sorted(found.undecided)[0]
+        return f"no single regular branch is proved between psi = {a:.12g} and {b:.12g}"
+    return (
+        "the pose after the turn is not proved to be the start pose" if right_drives else "the drive branch is unclear"
+    )
+
+
+def _covered(nodes: Nodes, found: Cover, whole: bool) -> tuple[float, tuple[Boxes, Array] | None]:
+    """End of the arc proved without a gap from the first node, and its boxes in order."""
+    if not found.boxes:
+        return 0.0, None
+    limit = float(nodes.u.mid[-1])
+    if not whole:
+        gaps = [a for a, _ in found.undecided]
+        limit = min([limit, *gaps])
+    boxes = [part for part, _ in found.boxes]
+    u = Balls(np.concatenate([b.u.mid for b in boxes]), np.concatenate([b.u.rad for b in boxes]))
+    x, V = (np.concatenate([getattr(b, name) for b in boxes]) for name in ("x", "V"))
+    tight = np.concatenate([t for _, t in found.boxes])
+    order = np.argsort(u.mid)
+    order = order[u.mid[order] < limit]
+    if order.size == 0:
+        return 0.0, None
+    return limit, (Boxes(u[order], x[order], V[order]), tight[order])
+
+
+def _signs(system: PlatformSystem, nodes: Nodes) -> tuple[tuple[int, int, int], tuple[int, ...]]:
+    """Proved working mode and drive branches at the first node; 0 where the sign is not proved."""
+    first = nodes.take(np.array([0]))
+    if not bool(first.proof.proved[0]):
+        return (0, 0, 0), (0, 0, 0)
+    bounds = system.bounds(exact(first.x).wider(first.proof.tight), first.u)
+    a, b, c = (int(s) for s in _sign(bounds.JT)[0])
+    return (a, b, c), tuple(int(s) for s in _sign(bounds.h_phi)[0])
+
+
+def _sign(value: Balls) -> Array:
+    return np.where(value.least > 0.0, np.sign(value.mid), 0.0)
+
+
+def _working_mode(
+    system: PlatformSystem, cover: tuple[Boxes, Array]
+) -> tuple[bool | None, tuple[tuple[int, float, float, bool], ...]]:
+    """Decide by enclosures of P1, P2 and JT whether a leg passes its boundary; halve the slices that do not decide."""
+    boxes, tight = cover
+    slices = np.column_stack([boxes.u.mid - boxes.u.rad, boxes.u.mid + boxes.u.rad])
+    own = np.arange(len(slices))
+    clear = np.zeros((0, 3), dtype=bool)
+    kept = np.zeros((0, 2))
+    signs = np.zeros((0, 3))
+    for depth in range(_SPLIT + 1):
+        middle = 0.5 * (slices[:, 0] + slices[:, 1])
+        u = Balls(middle, np.maximum(slices[:, 1] - middle, middle - slices[:, 0]) * UP + TINY)
+        part = boxes.take(own)
+        centre = part.at(u)
+        b = system.bounds(centre.wider(tight[own]), u)
+        # JT^2 = P1 P2 on the closure: either form may decide
+        good = (b.JT.least > 0.0) | ((b.P1.mid > b.P1.rad * UP) & (b.P2.mid > b.P2.rad * UP))
+        done = good.all(axis=1) | (depth == _SPLIT)
+        kept, clear = np.concatenate([kept, slices[done]]), np.concatenate([clear, good[done]])
+        signs = np.concatenate([signs, np.where(good, np.sign(b.JT.mid) * (b.JT.least > 0.0), 0.0)[done]])
+        slices, own = slices[~done], own[~done]
+        if own.size == 0:
+            break
+        half = 0.5 * (slices[:, 0] + slices[:, 1])
+        slices = np.concatenate([np.column_stack([slices[:, 0], half]), np.column_stack([half, slices[:, 1]])])
+        own = np.concatenate([own, own])
+    order = np.argsort(kept[:, 0])
+    return _arcs(kept[order], clear[order], signs[order])
+
+
+def _arcs(
+    slices: Array, clear: NDArray[np.bool_], signs: Array
+) -> tuple[bool | None, tuple[tuple[int, float, float, bool], ...]]:
+    """Merge the slices that do not decide into arcs, and compare the proved signs on both sides of each."""
+    found = []
+    for leg in range(3):
+        k, n = 0, len(slices)
+        while k < n:
+            if clear[k, leg]:
+                k += 1
+                continue
+            stop = k
+            while stop + 1 < n and not clear[stop + 1, leg]:
+                stop += 1
+            before = next((s for s in signs[:k, leg][::-1] if s), 0.0)
+            after = next((s for s in signs[stop + 1 :, leg] if s), 0.0)
+            found.append((leg + 1, float(slices[k, 0]), float(slices[stop, 1]), bool(before * after < 0.0)))
+            k = stop + 1
+    if not found:
+        return True, ()
+    return (False if any(arc[3] for arc in found) else None), tuple(found)

@@ -1,0 +1,239 @@
+"""The four-bar drive of one leg: closed-form motion, exact full-turn statement, lock angles, dead points."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import check_fields, check_sizes, finite, positive, sign
+from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.triad.leg import solve_leg
+from graphsynth.systems.platform.motion import Event
+
+__all__ = ["DriveMotion", "DriveTurn", "FourBarDrive", "first_barrier"]
+
+Array = NDArray[np.float64]
+
+
+_BARRIERS = {
+    "lock": ("drive lock", "drive {0} locks: coupler and rocker in line; the crank cannot pass"),
+    "change point": (
+        "change point",
+        "drive {0} reaches a change point: the branches tau = +1 and tau = -1 meet and both continue; choose one",
+    ),
+}
+
+
+class DriveMotion(NamedTuple):
+    """Rocker of the drive: ``phi`` in its leg frame (radians), d/dpsi, d2/dpsi2, ``h_phi = tau S_B``, leg status."""
+
+    phi: Array
+    phi1: Array
+    phi2: Array
+    h_phi: Array
+    status: NDArray[np.int8]
+
+
+class DriveTurn(NamedTuple):
+    """Exact statement on a full turn.
+
+    ``kind`` is "full turn", "change point", "limited", "immovable" or "never assembled"; ``admissible`` lists the
+    intervals of the wheel angle psi (radians) inside the reach; None means every psi.
+    """
+
+    kind: str
+    admissible: tuple[tuple[float, float], ...] | None
+
+
+@dataclass(frozen=True)
+class FourBarDrive:
+    """Crank on a wheel axis, coupler, rocker arm; all in the frame of the leg.
+
+    Parameters
+    ----------
+    axis, pivot : complex
+        Wheel axis O and rocker pivot D in the frame of the leg.
+    crank, coupler, rocker : float
+        l_B (zero or more), l_BC, l_CD.
+    phase : float
+        Crank angle minus psi, measured in the frame of the leg, radians.
+    tau : {+1, -1}
+        Assembly branch of the four-bar.
+
+    Raises
+    ------
+    GeometryError
+        Lengths that are not positive, or both fixed points at one place; sizes beyond 1e60 or between 0 and 1e-60.
+
+    Notes
+    -----
+    Specification parallel_platform, sections 7.2 to 7.4.
+
+    Examples
+    --------
+    >>> drive = FourBarDrive(45, 105 + 45j, 12.0, 45.0, 60.0)
+    >>> round(float(drive.motion(0.7).phi), 12), drive.turn().kind
+    (-1.761428034867, 'full turn')
+    """
+
+    axis: complex
+    pivot: complex
+    crank: float
+    coupler: float
+    rocker: float
+    phase: float = 0.0
+    tau: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("axis", "pivot"):
+            value = complex(getattr(self, name))
+            finite(f"{name}.real", value.real)
+            finite(f"{name}.imag", value.imag)
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "crank", positive("crank", self.crank, zero=True))
+        for name in ("coupler", "rocker"):
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
+        object.__setattr__(self, "phase", finite("phase", self.phase))
+        object.__setattr__(self, "tau", sign("tau", self.tau))
+        if self.axis == self.pivot:
+            raise GeometryError(f"axis and pivot coincide at {self.axis}; the drive needs two different fixed points")
+        check_fields(self, ("crank", "coupler", "rocker", "axis", "pivot"))
+        check_sizes("FourBarDrive", {"distance of axis and pivot": self.axis - self.pivot})
+
+    def motion(self, psi: ArrayLike, scale: float = 1.0) -> DriveMotion:
+        """Rocker angle and its first two derivatives with respect to psi (radians, any shape).
+
+        ``scale`` multiplies the crank length.  NaN with a status where the drive cannot be assembled; the derivatives
+        are also NaN where it locks (``h_phi = 0``).
+        """
+        turn = np.exp(1j * (np.asarray(psi, dtype=np.float64) + self.phase))
+        arm = np.asarray(scale * self.crank * turn, dtype=np.complex128)
+        return self._rocker(arm, np.asarray(1j * arm), np.asarray(-arm))
+
+    def _rocker(
+        self, arm: NDArray[np.complex128], arm1: NDArray[np.complex128], arm2: NDArray[np.complex128]
+    ) -> DriveMotion:
+        w = (self.axis - self.pivot) + arm
+        leg = solve_leg(w.real, w.imag, self.rocker, self.coupler)
+        phi = leg.angle(self.tau)
+        rocker = self.rocker * np.exp(1j * phi)
+        link = rocker - w  # C - B
+        moment = np.where(leg.S > 0.0, self.tau * leg.S / 2.0, np.nan)  # cross(C - D, C - B)
+        phi1 = _dot(link, arm1) / moment
+        speed = 1j * rocker * phi1 - arm1
+        phi2 = (-(np.abs(speed) ** 2) + _dot(link, arm2 + rocker * phi1 * phi1)) / moment
+        return DriveMotion(phi, phi1, phi2, self.tau * leg.S, leg.status)
+
+    def growth(self, psi: float, scale: float) -> tuple[float, float]:
+        """Phi and ``d phi / d scale`` for the homotopy from zero crank length."""
+        unit = np.asarray(self.crank * np.exp(1j * (psi + self.phase)), dtype=np.complex128)
+        moved = self._rocker(np.asarray(scale * unit), unit, np.zeros_like(unit))
+        return float(moved.phi), float(moved.phi1)
+
+    def turn(self) -> DriveTurn:
+        """Whether the crank turns fully, decided in exact arithmetic on the given numbers (section 7.4)."""
+        w = (Fraction(self.axis.real) - Fraction(self.pivot.real), Fraction(self.axis.imag) - Fraction(self.pivot.imag))
+        square = w[0] ** 2 + w[1] ** 2
+        crank, rocker, coupler = (Fraction(x) for x in (self.crank, self.rocker, self.coupler))
+        least, most = abs(rocker - coupler), rocker + coupler
+        if crank == 0:
+            inside = least**2 <= square <= most**2
+            return DriveTurn("full turn", None) if inside else DriveTurn("never assembled", ())
+        # far: |OD| + l_B against l_CD + l_BC;  near: ||OD| - l_B| against |l_CD - l_BC|
+        far = _order(square, most - crank)
+        above = _order(square, crank + least)  # > 0: |OD| - l_B exceeds the bound
+        below = -_order(square, crank - least) if crank > least else -1
+        near = max(above, below)
+        if far < 0 and near > 0:
+            return DriveTurn("full turn", None)
+        if far <= 0 and near >= 0:
+            return DriveTurn("change point", None)
+        # one place, crank and frame in line with the dyad: |OD| + l_B = |l_CD - l_BC|, ||OD| - l_B| = l_CD + l_BC
+        short = _order(square, least - crank) if least > crank else 1
+        long = max(_order(square, crank + most), -_order(square, crank - most) if crank > most else -1)
+        if short < 0 or long > 0:
+            return DriveTurn("never assembled", ())
+        kind = "limited" if short and long else "immovable"
+        return DriveTurn(kind, self._limited(float(square), float(least), float(most)))
+
+    def _limited(self, square: float, least: float, most: float) -> tuple[tuple[float, float], ...]:
+        """Return the admissible angles of a crank that can be somewhere."""
+        span = 2.0 * math.sqrt(square) * self.crank
+        low, high = ((bound * bound - square - self.crank**2) / span for bound in (least, most))
+        inner = math.acos(max(-1.0, min(high, 1.0)))
+        outer = math.acos(min(1.0, max(low, -1.0)))
+        shift = cmath.phase(self.axis - self.pivot) - self.phase
+        if high >= 1.0:
+            intervals = [(-outer, outer)]
+        elif low <= -1.0:
+            intervals = [(inner, math.tau - inner)]
+        else:
+            intervals = [(inner, outer), (-outer, -inner)]
+        return tuple((start + shift, stop + shift) for start, stop in intervals)
+
+    def barriers(self) -> tuple[tuple[float, str], ...]:
+        """Wheel angles psi in [0, 2 pi) that the crank cannot pass on a definite branch, with "lock" or "change point".
+
+        The angles are closed forms in double precision; whether there are any is decided exactly (see `turn`).
+        """
+        state = self.turn()
+        if state.kind in ("limited", "immovable") and state.admissible is not None:
+            return tuple(sorted((bound % math.tau, "lock") for interval in state.admissible for bound in interval))
+        if state.kind != "change point":
+            return ()
+        shift = cmath.phase(self.axis - self.pivot) - self.phase
+        reach = math.fsum((self.rocker, self.coupler, -self.crank, -abs(self.axis - self.pivot)))
+        scale = self.rocker + self.coupler
+        angles = [shift] if abs(reach) <= 1e-14 * scale else []  # stretched at the far end
+        if abs(abs(abs(self.axis - self.pivot) - self.crank) - abs(self.rocker - self.coupler)) <= 1e-14 * scale:
+            angles.append(shift + math.pi)
+        return tuple(sorted((angle % math.tau, "change point") for angle in angles))
+
+    def dead_points(self) -> tuple[float, ...]:
+        """Wheel angles psi in [0, 2 pi) at which crank and coupler are in line, so that the rocker reverses."""
+        if self.crank == 0.0:
+            return ()
+        offset = self.axis - self.pivot
+        found = []
+        for reach in (self.crank + self.coupler, self.crank - self.coupler):
+            if reach == 0.0:
+                continue
+            cosine = (self.rocker**2 - abs(offset) ** 2 - reach**2) / (2.0 * abs(offset) * reach)
+            if abs(cosine) > 1.0:
+                continue
+            for side in (1.0, -1.0):
+                direction = cmath.exp(1j * (cmath.phase(offset) + side * math.acos(cosine)))
+                rocker, link = offset + reach * direction, (reach - self.crank) * direction
+                if math.copysign(1.0, (rocker.conjugate() * link).imag) == self.tau:
+                    found.append((cmath.phase(direction) - self.phase) % math.tau)
+        return tuple(sorted(found))
+
+
+def _order(square: Fraction, bound: Fraction) -> int:
+    """Sign of ``sqrt(square) - bound``, exactly."""
+    if bound < 0:
+        return 1
+    return (square > bound * bound) - (square < bound * bound)
+
+
+def _dot(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:
+    return np.asarray((np.conj(a) * b).real)
+
+
+def first_barrier(drives: Sequence[FourBarDrive], start: float, stop: float) -> Event | None:
+    """First drive lock or change point in (start, stop]: no continuation may step over it."""
+    found: list[Event] = []
+    for number, drive in enumerate(drives, start=1):
+        for angle, kind in drive.barriers():
+            at = start + (angle - start) % math.tau
+            if start < at <= stop:
+                name, text = _BARRIERS[kind]
+                found.append(Event(name, at, number, True, text.format(number)))
+    return min(found, key=lambda event: event.psi, default=None)

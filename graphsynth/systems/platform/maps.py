@@ -1,0 +1,203 @@
+"""Maps of dexterity, force and velocity over the positions at one orientation, for one working mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import checked, finite, finite_array, positive, whole
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.platform.field import (
+    characteristic_length,
+    cofactors,
+    pose_grid,
+    scaled_rows,
+    working_mode,
+)
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+
+__all__ = ["PlatformMap", "Quality", "platform_map", "quality"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """First-order quality of poses, arrays of one shape; NaN out of reach.
+
+    With ``J_s = diag(1/Lc, 1/Lc, 1) J`` (platform speed over rocker speed) and its singular values:
+
+    Attributes
+    ----------
+    determinant : ndarray
+        ``det JX``, length^4; its sign names the side of the type-II curves.
+    smallest : ndarray
+        Smallest singular value of ``JX diag(1, 1, 1/Lc)``, length: zero at type II.
+    dexterity : ndarray
+        ``1 / condition number`` of J_s, 1 at best, 0 at a singularity of type I or II.
+    velocity_min, velocity_max : ndarray
+        Slowest and fastest platform speed (1/Lc-scaled) for a unit vector of rocker speeds.
+    force_min, force_max : ndarray
+        Smallest and largest wrench (force times Lc, moment) that a unit vector of rocker torques holds:
+        ``1 / velocity_max``, ``1 / velocity_min``.
+    link_force : ndarray
+        Largest norm of the three axial link forces for a unit wrench (force, moment / Lc).
+    reach : ndarray
+        Smallest ``S_k / (2 l1 l2)``: sine of the angle between rocker and link, zero at type I.
+    Lc : float
+        Characteristic length.
+    """
+
+    determinant: Array
+    smallest: Array
+    dexterity: Array
+    velocity_min: Array
+    velocity_max: Array
+    force_min: Array
+    force_max: Array
+    link_force: Array
+    reach: Array
+    Lc: float
+
+    @property
+    def condition(self) -> Array:
+        """Condition number of J_s; infinite at a singularity."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / self.dexterity)
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformMap:
+    """`Quality` on a grid: arrays of shape (len(x), len(y)), first axis x."""
+
+    platform: ParallelPlatform
+    alpha: float
+    sigma: tuple[int, int, int]
+    x: Array
+    y: Array
+    quality: Quality
+
+    def to_pandas(self) -> Any:
+        """Return one row per reachable node."""
+        import pandas as pd
+
+        x, y = np.meshgrid(self.x, self.y, indexing="ij")
+        names = [name for name in Quality.__dataclass_fields__ if name != "Lc"]
+        columns = {"x": x, "y": y, **{name: getattr(self.quality, name) for name in names}}
+        table = pd.DataFrame({name: np.ravel(values) for name, values in columns.items()})
+        return table[table["determinant"].notna()].reset_index(drop=True)
+
+
+@checked
+def quality(platform: ParallelPlatform, poses: ArrayLike, sigma: Sequence[int], *, Lc: float | None = None) -> Quality:
+    """Dexterity, force and velocity transmission at poses (..., 3) of one working mode.
+
+    Parameters
+    ----------
+    platform : ParallelPlatform
+    poses : array_like, shape (..., 3)
+    sigma : sequence of 3 of {+1, -1}
+    Lc : float, optional
+        Characteristic length; the largest distance of a vertex from the reference point by default.
+
+    Returns
+    -------
+    Quality
+        Floating point.  Singular poses give zeros and infinities, poses out of reach NaN.
+
+    Raises
+    ------
+    GeometryError
+        Poses without three coordinates, or not finite.
+
+    Notes
+    -----
+    Specification parallel_platform, sections 4.3 and 6.3.
+
+    Examples
+    --------
+    >>> home = quality(ParallelPlatform.mock(), [0.0, 0.0, 0.0], (-1, -1, -1), Lc=45.0)
+    >>> round(float(home.condition), 12)  # 0.96 sqrt(2)
+    1.357645019878
+    """
+    mode = working_mode(sigma)
+    length = characteristic_length(platform) if Lc is None else positive("Lc", Lc)
+    X = finite_array("poses", poses)
+    if X.shape[-1:] != (3,):
+        raise GeometryError(f"poses have shape {X.shape}; give (..., 3): x, y, alpha")
+    found = platform.inverse(X, mode)
+    reachable = np.isfinite(found.theta).all(axis=-1)
+    JX, JT = platform.jacobians(X[reachable], found.theta[reachable])
+    values = _values(platform, scaled_rows(JX, length), JT, length)
+
+    def spread(array: Array) -> Array:
+        full = np.full(reachable.shape, np.nan)
+        full[reachable] = array
+        return full
+
+    a, b, c, d, e, f, g, h, i = (spread(array) for array in values)
+    return Quality(a, b, c, d, e, f, g, h, i, length)
+
+
+def _values(platform: ParallelPlatform, rows: Array, JT: Array, Lc: float) -> list[Array]:
+    """Quantities for the rows of ``JX diag(1, 1, 1/Lc)``, in the order of `Quality`."""
+    l1, l2 = np.array(platform.l1), np.array(platform.l2)
+    adjugate = np.swapaxes(cofactors(rows), -1, -2)
+    determinant = np.einsum("...i,...i->...", rows[..., 0, :], adjugate[..., :, 0])
+    smallest = np.linalg.svd(rows, compute_uv=False)[..., 2]
+    # det * J_s stays finite at type II: its singular values over |det| are those of J_s
+    motion = np.linalg.svd(adjugate * (-JT[..., None, :]), compute_uv=False) / Lc
+    size = np.abs(determinant)
+    top, bottom = motion[..., 0], motion[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fastest, slowest = np.where(size > 0.0, top / size, np.inf), np.where(size > 0.0, bottom / size, 0.0)
+        dexterity = np.where(top > 0.0, bottom / top, 0.0)
+        held_least, held_most = np.where(top > 0.0, size / top, np.inf), np.where(bottom > 0.0, size / bottom, np.inf)
+        unit = rows / np.where(l2 > 0.0, 2.0 * l2, 1.0)[:, None]
+        force = 1.0 / np.linalg.svd(unit, compute_uv=False)[..., 2]
+        arms = 2.0 * l1 * l2
+        reach = np.where(arms > 0.0, np.abs(JT) / np.where(arms > 0.0, arms, 1.0), 0.0).min(axis=-1)
+    found = (determinant * Lc, smallest, dexterity, slowest, fastest, held_least, held_most, force, reach)
+    return [np.asarray(array, dtype=np.float64) for array in found]
+
+
+@checked
+def platform_map(
+    platform: ParallelPlatform,
+    alpha: float,
+    sigma: Sequence[int],
+    *,
+    nodes: int = 200,
+    Lc: float | None = None,
+) -> PlatformMap:
+    """`quality` over a rectangle that holds the workspace at orientation ``alpha``.
+
+    Parameters
+    ----------
+    platform : ParallelPlatform
+    alpha : float
+        Orientation, radians.
+    sigma : sequence of 3 of {+1, -1}
+    nodes : int, optional
+        Nodes along x and along y.
+    Lc : float, optional
+
+    Returns
+    -------
+    PlatformMap
+
+    Examples
+    --------
+    >>> found = platform_map(ParallelPlatform.mock(), 0.0, (-1, -1, -1), nodes=50)
+    >>> bool(0.7 < found.quality.dexterity[~np.isnan(found.quality.dexterity)].max() <= 1.0)
+    True
+    """
+    mode, alpha = working_mode(sigma), finite("alpha", alpha)
+    nodes = whole("nodes", nodes, 2, 100_000)
+    x, y = pose_grid(platform, alpha, nodes)
+    poses = np.stack(np.broadcast_arrays(x[:, None], y[None, :], alpha), axis=-1)
+    return PlatformMap(platform, alpha, mode, x, y, quality(platform, poses, mode, Lc=Lc))

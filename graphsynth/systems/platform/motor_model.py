@@ -1,0 +1,212 @@
+"""The motor-driven platform: one motor, one train, the effective inertia of the platform; models J, S and reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import check_fields, finite_array
+from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.driven.inertia import EffectiveInertia
+from graphsynth.dynamics.driven.prescribed import prescribed_run
+from graphsynth.dynamics.driven.reduction import (
+    ReductionStudy,
+    choose_motor,
+    inductance_study,
+    reduction_error,
+)
+from graphsynth.dynamics.driven.run import DriveRun, Plant, run
+from graphsynth.dynamics.driven.setup import load_coefficients
+from graphsynth.dynamics.motors import IdealSpeed, Motor, check_motor, number
+from graphsynth.dynamics.trains import Train
+
+if TYPE_CHECKING:
+    from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+
+__all__ = ["MotorDrivenPlatform"]
+
+Array = NDArray[np.float64]
+_SPIKES = "no rotor inertia: model S; the crank speed is unbounded at dead centres, an artefact of the missing inertia"
+
+
+@dataclass(frozen=True, eq=False)
+class MotorDrivenPlatform:
+    """A motor that drives a mechanism of one freedom with effective inertia ``J_0 + J(q)``.
+
+    Parameters
+    ----------
+    inertia : EffectiveInertia
+        Of the moving platform (and further links).
+    motor : DCMotor, SynchronousMotor, LinearCharacteristic, IdealTorque or IdealSpeed
+    train : Train
+        Between motor and crank.
+    base_inertia : float
+        Constant part of J_0 at the crank beside the reflected rotor and the train, kg m^2 (wheels, pinion).
+    friction : float
+        Viscous, at the crank, N m s/rad.
+    load : float
+        Constant load torque at the crank, N m; positive when it brakes motion towards increasing q.
+    load_series : array_like, optional
+        Further load torque as ``a0, a1, b1, ...`` of ``a0 + a1 cos q + b1 sin q + ...``, braking like ``load``.
+
+    Raises
+    ------
+    SpecError
+        Negative inertia or friction, numbers that are not finite.
+
+    Notes
+    -----
+    Specification parallel_platform, section 11; the source is ``MotorDrivenPlatform.source``.
+
+    Examples
+    --------
+    >>> from graphsynth.dynamics.motors import DCMotor
+    >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
+    >>> motion = MotorDrivenPlatform.source(motor).simulate([0.0, 0.1])
+    >>> motion.complete, round(float(motion.speed[-1]), 9)
+    (True, 11.711831447)
+    """
+
+    inertia: EffectiveInertia
+    motor: Motor | IdealSpeed
+    train: Train = field(default_factory=Train)
+    base_inertia: float = 0.0
+    friction: float = 0.0
+    load: float = 0.0
+    load_series: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("base_inertia", "friction"):
+            object.__setattr__(self, name, number(name, getattr(self, name), least=0.0))
+        object.__setattr__(self, "load", number("load", self.load))
+        check_fields(self, (), SpecError, small=("base_inertia", "friction", "load"))
+        if not isinstance(self.inertia, EffectiveInertia):
+            raise SpecError(f"inertia = {self.inertia!r} is no EffectiveInertia; use EffectiveInertia.of_slider(...)")
+        if self.load_series is not None:
+            object.__setattr__(self, "load_series", load_coefficients(self.load_series))
+        check_motor(self.motor)
+
+    @classmethod
+    def source(
+        cls, motor: Motor | IdealSpeed, *, mass: float = 2.0, amplitude: float = 0.05, base_inertia: float = 0.002
+    ) -> MotorDrivenPlatform:
+        """Model of the source: ``J = J_0 + m L^2 cos(q)^2``, crank coupled directly to the motor."""
+        return cls(EffectiveInertia.of_slider(mass, amplitude), motor, base_inertia=base_inertia)
+
+    @classmethod
+    def of_machine(
+        cls, machine: SingleMotorPlatform, motor: Motor | IdealSpeed, *, mass: float, gyration: float,
+        mass_centre: complex = 0.0, rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0), wheel_inertia: float = 0.0,
+        pinion_inertia: float = 0.0, efficiency: float = 1.0, friction: float = 0.0, load: float = 0.0,
+        length: float = 1e-3,
+    ) -> MotorDrivenPlatform:  # fmt: skip
+        """Real geometry: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of the gears."""
+        series = EffectiveInertia.of_platform(
+            machine, mass, gyration, mass_centre, rocker_inertia=rocker_inertia, length=length
+        )
+        ratio = machine.gears.z2 / machine.gears.z1
+        own = ratio**2 * number("pinion_inertia", pinion_inertia, least=0.0)
+        own += 3.0 * number("wheel_inertia", wheel_inertia, least=0.0)
+        return cls(series, motor, Train(ratio, efficiency, own), 0.0, friction, load)
+
+    @property
+    def constant_inertia(self) -> float:
+        """J_0: base inertia, train and reflected rotor, kg m^2."""
+        return self.base_inertia + self.train.reflected(self.motor.rotor_inertia)
+
+    def plant(self) -> Plant:
+        """Mechanism as the integrator sees it (load torques with the sign of driving)."""
+        series = None if self.load_series is None else -np.asarray(self.load_series, dtype=np.float64)
+        return Plant(
+            self.inertia.rows, self.base_inertia, self.friction, -self.load, series,
+            dead_centres=self.inertia.dead_centres,
+        )  # fmt: skip
+
+    def simulate(
+        self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0, currents: tuple[float, ...] | None = None,
+        model: str = "auto", reduce: bool | str = "auto", rtol: float = 1e-10, estimate: bool = True,
+        max_steps: int = 200_000,
+    ) -> DriveRun:  # fmt: skip
+        """Motion from ``times[0]``.
+
+        Parameters
+        ----------
+        times : array_like, shape (n,)
+            Strictly increasing output times, s.
+        angle, speed, currents
+            State at the start: rad, rad/s, A.
+        model : {"auto", "J", "S"}
+            With inertia, or the regularised model of the source without; "auto" takes S only where J is singular.
+        reduce : {"auto", True, False}
+            Replace the motor by its limit L -> 0; "auto" does so for L = 0, and for a small L if the error of first
+            order in L is below ``rtol`` (a note says so).
+        rtol, estimate, max_steps
+            See `graphsynth.dynamics.driven.run.run`.
+
+        Returns
+        -------
+        DriveRun
+            Estimated; for an ideal speed the motion is given and the torque a closed form (`prescribed_run`).  A
+            failure of the integrator is a status with NaN after ``reached``, never an early end.
+
+        Raises
+        ------
+        SpecError
+            Options or numbers that make no sense; what model S cannot have (friction, L = 0, a voltage limit).
+        """
+        if not isinstance(model, str) or model not in ("auto", "J", "S"):
+            raise SpecError(f"model = {model!r} is unknown; choose 'auto', 'J' or 'S'")
+        if isinstance(self.motor, IdealSpeed):
+            return prescribed_run(self.plant(), self.motor, self.train, times, angle=angle, speed=speed)
+        regular = model == "S" or (model == "auto" and self.constant_inertia == 0.0 and bool(self.inertia.dead_centres))
+        notes = (_SPIKES,) if regular else ()
+        motor, note = choose_motor(
+            self.plant(), self.motor, self.train, times, reduce, angle=angle, speed=speed, rtol=rtol, regular=regular
+        )
+        if note:
+            currents, notes = None, (*notes, note)
+        return run(
+            self.plant(), motor, self.train, times, angle=angle, speed=speed, currents=currents, regular=regular,
+            rtol=rtol, estimate=estimate, max_steps=max_steps, notes=notes,
+        )  # fmt: skip
+
+    def reduction_error(self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0) -> float:
+        """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; see `reduction`."""
+        return reduction_error(self.plant(), self._driving(), self.train, times, angle=angle, speed=speed)
+
+    def inductance_study(
+        self, times: ArrayLike, inductances: Sequence[float], *, angle: float = 0.0, speed: float = 0.0,
+        after: float | None = None,
+    ) -> ReductionStudy:  # fmt: skip
+        """Compare the full model at several inductances (H) with the limit L -> 0; see `reduction`."""
+        return inductance_study(
+            self.plant(), self._driving(), self.train, times, inductances, angle=angle, speed=speed, after=after
+        )
+
+    def _driving(self) -> Motor:
+        if isinstance(self.motor, IdealSpeed):
+            raise SpecError("an ideal speed has no inductance to take to zero; give a DCMotor or a SynchronousMotor")
+        return self.motor
+
+    def torque_at_speed(self, q: ArrayLike, speed: float) -> Array:
+        """Torque at the crank that keeps a constant crank speed (rad/s): ``J'(q) w^2 / 2 + b w + load``, N m.
+
+        The answer for an ideal speed source; no differential equation is solved.
+
+        Examples
+        --------
+        >>> from graphsynth.dynamics.motors import IdealTorque
+        >>> platform = MotorDrivenPlatform.source(IdealTorque(1.0))
+        >>> platform.torque_at_speed([0.0, 0.7], 20.0).round(6).tolist()
+        [0.0, -0.98545]
+        """
+        w, angle = number("speed", speed), finite_array("q", q, nan=True)
+        load = np.full(angle.shape, self.load)
+        if self.load_series is not None:
+            load += EffectiveInertia(np.atleast_2d(self.load_series)).components(angle)[0][0]
+        friction = self.friction + self.train.ratio**2 * self.motor.friction
+        return np.asarray(0.5 * self.inertia.derivative(angle) * w * w + friction * w + load)

@@ -1,0 +1,195 @@
+"""Pictures of the motor-driven platform: torque, speed, phase portraits, no inertia, the claim as a map, animation."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.pipeline.motor_tables import shown_motion
+from graphsynth.pipeline.products import Picture
+from graphsynth.pipeline.stages import Context
+from graphsynth.systems.platform.motor_stages import Claim, LabelledRun, WithoutInertia, table_of
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.driven.reduction import ReductionStudy
+    from graphsynth.dynamics.driven.run import DriveRun
+
+__all__ = ["animations", "plots", "run_pictures", "sketches"]
+
+_COLOURS = ("a", "b", "c", "d")
+_STYLES = ("-", "--", "-.", ":")
+
+
+def sketches(context: Context) -> tuple[Picture, ...]:
+    """Draw crank, slot and platform at one angle, and the inertia that the motor feels over a turn."""
+    import numpy as np
+
+    from graphsynth.drawing.diagram import mechanism_sketch
+    from graphsynth.drawing.plots import Line, line_plot
+    from graphsynth.dynamics.driven.inertia import EffectiveInertia
+
+    moved = table_of(context).platform
+    q = np.linspace(0.0, math.tau, 361)
+    pictures = []
+    if moved.amplitude_mm > 0.0:
+        mechanism, poses = _yoke(moved.amplitude_mm / 1e3, q)
+        caption = (
+            "Link 1 is the crank, whose pin moves the platform, link 2, along its guide: y = amplitude sin(angle)."
+        )
+        svg = mechanism_sketch(mechanism, poses, width=420, height=360).svg(poses[52].tolist())
+        pictures.append(Picture("Crank and platform", svg, caption))
+    own = moved.inertia_kg_m2
+    total = 1e3 * (EffectiveInertia.of_slider(moved.mass_kg, moved.amplitude_mm / 1e3).value(q) + own)
+    curve = line_plot(
+        [Line(np.degrees(q), total)], "crank angle [°]", "effective inertia [g m²]", xticks=range(0, 361, 45),
+        levels=[Line((), 1e3 * own, "constant part", "soft", "--")],
+    )  # fmt: skip
+    caption = "At the dead centres, 90° and 270°, the platform stands still and only the constant part is left."
+    pictures.append(Picture("Inertia at the crank", curve, caption))
+    return tuple(pictures)
+
+
+def _yoke(amplitude: float, q: Any) -> tuple[Any, Any]:
+    """Crank with a pin in the slot of a platform that slides along y, and its poses (n, 3, 3) at crank angles."""
+    import numpy as np
+
+    from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
+    from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+    from graphsynth.structure.graph import MechanismGraph
+
+    mechanism = Mechanism(
+        MechanismGraph(3, [(0, 1), (0, 2), (1, 2, 2)], frame=0),
+        (
+            Revolute(0, 1),
+            Prismatic(0, 2, (1.6 * amplitude, 0.0), (1.6 * amplitude, 0.0), math.pi / 2, math.pi / 2),
+            PinSlot(2, 1, (0.0, 0.0), (amplitude, 0.0)),
+        ),
+        drivers=(Driver(0, 1),),
+        points={"P": TracePoint(1, (amplitude, 0.0))},
+    )
+    poses = np.zeros((q.size, 3, 3))
+    poses[:, 1, 2] = q
+    poses[:, 2, 1] = amplitude * np.sin(q)
+    return mechanism, poses
+
+
+def animations(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ...]:
+    """Let the crank make its last turn with the speed that the motor gives it, slowed down."""
+    import numpy as np
+
+    from graphsynth.drawing.animation import animated_svg
+
+    amplitude = table_of(context).platform.amplitude_mm / 1e3
+    usable = [item for item in runs if item.run.complete and item.run.angle[-1] - item.run.angle[0] > math.tau]
+    if not usable or amplitude == 0.0:
+        return ()
+    item = max(usable, key=lambda k: float(np.ptp(k.run.speed[k.run.time > 0.5 * k.run.time[-1]])))
+    run = item.run
+    begin = float(np.interp(run.angle[-1] - math.tau, run.angle, run.time))
+    times = np.linspace(begin, float(run.time[-1]), 91)
+    fine = item.drive.simulate(np.concatenate([[0.0], times]), rtol=run.rtol, estimate=False)
+    q = fine.angle[1:]
+    mechanism, poses = _yoke(amplitude, q)
+    slow = 10.0
+    seconds = slow * float(times[-1] - times[0])
+    title = f"Platform driven by the motor, {item.label}"
+    motion = shown_motion(mechanism, q, poses, closed=True)
+    svg = animated_svg(motion, title=title, seconds=seconds, width=460, height=400)
+    caption = (
+        f"The last turn of the run with {item.label}, {slow:g} times slower than real: the crank hurries through the "
+        "dead centres, where it has hardly any inertia to move."
+    )
+    return (Picture("A turn with the real speed", svg, caption, "wide"),)
+
+
+def plots(
+    context: Context,
+    runs: tuple[LabelledRun, ...],
+    bare: WithoutInertia,
+    found: Claim,
+    study: ReductionStudy | None,
+) -> tuple[Picture, ...]:
+    """Torque, speed and phase portraits; the model without inertia; the claim; the limit L -> 0."""
+    from graphsynth.drawing.drive_pictures import reduction_picture, ripple_map_picture, ripple_picture
+    from graphsynth.drawing.figures import themed_svg
+
+    pictures = [*run_pictures(runs), *_bare_pictures(context, bare)]
+    map_caption = (
+        "Blue: a larger resistance lowers the speed ripple of the full model, red: it raises it. The bar is the linear "
+        "condition Om = w_n/√2: blue above and red below it is what small ripples obey."
+    )
+    pictures.append(
+        Picture("The claim about the resistance as a map", themed_svg(ripple_map_picture(found.map)), map_caption)
+    )
+    for of, said in (("speed", "rises where Om/w_n < 0.71"), ("current", "always falls, and the torque with it")):
+        svg = themed_svg(ripple_picture(found.effects, of))
+        pictures.append(Picture(f"Ripple of the {of} over the resistance", svg, f"Linear theory: it {said}."))
+    if study is not None:
+        caption = "Largest differences from the motor without inductance, after the electrical transient."
+        pictures.append(Picture("The limit L -> 0", themed_svg(reduction_picture(study, size=(5.4, 3.4))), caption))
+    return tuple(pictures)
+
+
+def run_pictures(runs: tuple[LabelledRun, ...]) -> list[Picture]:
+    """Torque and speed over time (Figures 6 and 7 of the source), and two phase portraits of the steady motion."""
+    from graphsynth.drawing.plots import Line, line_plot
+
+    torque, speed, turn, spiral = [], [], [], []
+    for k, item in enumerate(runs):
+        run, look = item.run, (item.label, _COLOURS[k % 4], _STYLES[k % 4])
+        late = run.time >= 0.5 * run.time[-1]
+        torque.append(Line(run.time, run.motor_torque, *look))
+        speed.append(Line(run.time, run.speed, *look))
+        angle, value = _wrapped(run, late)
+        turn.append(Line(angle, value, *look))
+        spiral.append(Line(run.motor_torque, run.speed, *look))
+    ticks = tuple(range(0, 361, 45))
+    said = "From rest, for each armature resistance."
+    return [
+        Picture("Motor torque", line_plot(torque, "time [s]", "torque [N m]"), said),
+        Picture("Crank speed", line_plot(speed, "time [s]", "speed [rad/s]"), said),
+        Picture(
+            "Phase portrait over a turn", line_plot(turn, "crank angle [°]", "speed [rad/s]", xticks=ticks),
+            "Second half of the run: a closed curve is a steady motion.",
+        ),
+        Picture(
+            "Phase portrait of motor and crank", line_plot(spiral, "torque [N m]", "speed [rad/s]", size=(5.4, 3.6)),
+            "From rest (0, 0) into the steady loop.",
+        ),
+    ]  # fmt: skip
+
+
+def _wrapped(run: DriveRun, rows: Any) -> tuple[Any, Any]:
+    """Crank angle within a turn (degrees) and speed, with a gap where a turn ends."""
+    import numpy as np
+
+    angle, value = np.degrees(run.angle[rows]) % 360.0, run.speed[rows].copy()
+    ends = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
+    return np.insert(angle, ends, np.nan), np.insert(value, ends, np.nan)
+
+
+def _bare_pictures(context: Context, bare: WithoutInertia) -> list[Picture]:
+    import numpy as np
+
+    from graphsynth.drawing.plots import Chart, Line, Mark
+
+    run = bare.source
+    root = math.sqrt(table_of(context).platform.mass_kg) or 1.0
+    marks = [Mark(event.time, event.kind, "soft" if event.kind == "dead centre" else "b") for event in run.events]
+    moving = Chart([Line(run.time, run.momentum / root)], "time [s]", "speed of the platform [m/s]", marks=marks)
+    spike = float(np.nanpercentile(np.abs(run.speed), 97.0))
+    lines = [Line(run.time, np.where(np.abs(run.speed) <= spike, run.speed, np.nan), "none", "a")]
+    for k, (inertia, other) in enumerate(zip(bare.inertias[:3], bare.runs), 1):
+        shown = np.where(np.abs(other.speed) <= spike, other.speed, np.nan)
+        lines.append(Line(other.time, shown, f"{inertia:.0e}", _COLOURS[k], _STYLES[k]))
+    speeds = Chart(lines, "time [s]", "crank speed [rad/s]", marks=marks[:0])
+    return [
+        Picture(
+            "Without inertia: speed of the platform", moving.svg(),
+            "The regularised model of the source passes its dead centres (upright lines); this speed stays finite.",
+        ),
+        Picture(
+            "Without and with ever smaller inertia", speeds.svg(),
+            f"J_0 in kg m². The spikes of the crank speed at the dead centres are cut off at {spike:.3g} rad/s.",
+        ),
+    ]  # fmt: skip

@@ -1,0 +1,291 @@
+"""The whole single-motor mechanism as a `graphsynth.Mechanism`, and the rank of its loop-closure matrix.
+
+The loop-closure matrix has one column for every freedom of a joint and three rows for every independent loop: the
+unit twists of the joints around a loop, weighted by their speeds, sum to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import checked, finite, finite_array, triple
+from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
+
+if TYPE_CHECKING:
+    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+
+__all__ = ["LoopClosure", "as_mechanism", "link_poses", "loop_closure", "platform_loop_closure"]
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LoopClosure:
+    """Loop-closure matrix at one configuration (estimated: floating point, rank by singular values).
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (3 loops, freedoms)
+        Rows in rad/s, length/s over ``Lc``; sliding columns are scaled with ``Lc``.
+    columns : tuple of str
+        ``"R 0-1"``; a gear pair has ``"roll 1-2"`` and ``"slide 1-2"``, a pin in a slot ``"turn"`` and ``"slide"``.
+    singular_values : ndarray
+        Descending.
+    rank : int
+        Singular values above ``tolerance`` times the largest.
+    motions : ndarray, shape (freedoms - rank, freedoms)
+        Orthonormal null vectors: joint speeds of the instantaneous motions (sliding speeds over ``Lc``).
+    tolerance, Lc : float
+    """
+
+    matrix: Array
+    columns: tuple[str, ...]
+    singular_values: Array
+    rank: int
+    motions: Array
+    tolerance: float
+    Lc: float
+
+    @property
+    def mobility(self) -> int:
+        """Freedoms minus rank."""
+        return len(self.columns) - self.rank
+
+    def component(self, column: str) -> Array:
+        """Speeds of one joint freedom in every instantaneous motion.
+
+        Raises
+        ------
+        GeometryError
+            A column that does not exist.
+        """
+        if column not in self.columns:
+            raise GeometryError(f"column {column!r} is unknown; use one of {', '.join(self.columns)}")
+        return np.asarray(self.motions[:, self.columns.index(column)])
+
+
+@checked
+def link_poses(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> Array:
+    """Pose ``(x, y, angle)`` of all 15 links, in the frames used by `as_mechanism`; shape (15, 3).
+
+    Links: 0 frame, 1 pinion, 2-4 wheels, 5-7 couplers, 8-10 rockers (bell-cranks), 11-13 intermediate links, 14
+    platform.
+    """
+    X = triple("pose", pose)
+    state = platform.drive(finite("psi", psi))
+    turn = np.exp(1j * np.array(platform.frame_angle))
+    O, D = np.array(platform.axis) * turn, np.array(platform.platform.D)
+    phi = state.theta - np.array(platform.delta)
+    B = O + np.array(platform.crank) * np.exp(1j * (psi + np.array(platform.phase)))
+    C = D + np.array(platform.rocker) * np.exp(1j * phi)
+    A, F = platform.platform.elbows(state.theta), platform.platform.vertices(X)
+    poses = np.zeros((15, 3))
+    poses[1, 2] = psi / platform.gears.ratio
+    for first, at, angle in ((2, O, np.full(3, psi)), (5, B, np.angle(C - B)), (8, D, phi), (11, A, np.angle(F - A))):
+        poses[first : first + 3] = np.column_stack([at.real, at.imag, angle])
+    poses[14] = X
+    return poses
+
+
+@checked
+def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLike | None = None) -> Mechanism:
+    """Build the 15-link mechanism with 19 turning pairs and 3 gear pairs.
+
+    Parameters
+    ----------
+    platform : SingleMotorPlatform
+    psi : float, optional
+        Wheel angle at which the links' poses are given, radians.
+    pose : array_like, shape (3,), optional
+        Platform pose there; the home branch by default.
+
+    Returns
+    -------
+    Mechanism
+        Driven at the pinion with the common wheel angle psi as input; the named point "P" is the platform's reference
+        point.
+
+    Raises
+    ------
+    GeometryError
+        A wheel on the axis of the pinion, or a drive that is not assembled at ``psi``.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+    >>> mechanism = as_mechanism(SingleMotorPlatform())
+    >>> mechanism.graph.links, mechanism.mobility().count, mechanism.mobility().by_rank
+    (15, 1, 1)
+    """
+    from graphsynth.mechanism.laws import Linear
+    from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+
+    start = platform.home_pose(psi) if pose is None else triple("pose", pose)
+    poses = link_poses(platform, psi, start)
+    if not np.isfinite(poses).all():
+        raise GeometryError(f"a drive is not assembled at psi = {psi}; choose an angle inside its reach")
+    joints: list[JointGeometry] = [Revolute(0, 1)]
+    for k in range(3):
+        joints += _leg(platform, k)
+    driver = Driver(0, 1, Linear(1.0 / platform.gears.ratio))
+    return Mechanism(
+        platform.graph(), tuple(joints), (driver,), {"P": TracePoint(14, (0.0, 0.0))},
+        tuple((float(x), float(y), float(a)) for x, y, a in poses),
+    )  # fmt: skip
+
+
+def _leg(platform: SingleMotorPlatform, k: int) -> list[JointGeometry]:
+    """Joints of wheel, coupler, rocker and intermediate link k (from 0)."""
+    turn = complex(np.exp(1j * platform.frame_angle[k]))
+    z1, z2 = platform.gears.z1, platform.gears.z2
+    wheel, coupler, rocker, link = 2 + k, 5 + k, 8 + k, 11 + k
+    O = complex(platform.axis[k] * turn)
+    if O == 0:
+        raise GeometryError(f"wheel {k + 1} lies on the axis of the pinion; give an axis that is not 0")
+    small, large = abs(O) * z1 / (z1 + z2), abs(O) * z2 / (z1 + z2)
+    toothed = -(1.0 + small / large) * math.atan2(O.imag, O.real)
+    crank = platform.crank[k] * complex(np.exp(1j * platform.phase[k]))
+    arm = platform.l1[k] * complex(np.exp(1j * platform.delta[k]))
+    return [
+        Revolute(0, wheel, _pair(O)),
+        Revolute(wheel, coupler, _pair(crank)),
+        Revolute(coupler, rocker, (platform.coupler[k], 0.0), (platform.rocker[k], 0.0)),
+        Revolute(0, rocker, _pair(platform.platform.D[k])),
+        Revolute(rocker, link, _pair(arm)),
+        Revolute(link, 14, (platform.l2[k], 0.0), _pair(platform.platform.b[k])),
+        Gear(1, wheel, radius_a=small, radius_b=large, offset=toothed),
+    ]
+
+
+def _pair(z: complex) -> tuple[float, float]:
+    return (float(z.real), float(z.imag))
+
+
+@checked
+def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, tolerance: float = TOLERANCE) -> LoopClosure:
+    """Loop-closure matrix of any planar mechanism at a configuration, with rank and instantaneous motions.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    pose : array_like, shape (links, 3), optional
+        Link poses; the mechanism's own by default.
+    tolerance : float, optional
+
+    Returns
+    -------
+    LoopClosure
+
+    Raises
+    ------
+    GeometryError
+        No configuration, or one of another shape.
+
+    Notes
+    -----
+    Loops are the fundamental cycles of a breadth-first spanning tree from the frame.  A gear pair has two freedoms:
+    rolling about the pitch point and sliding along the line of centres (specification parallel_platform, section 7.6).
+    """
+    from graphsynth.mechanism.rank import characteristic_length
+
+    given = mechanism.pose if pose is None else pose
+    if given is None:
+        raise GeometryError("the rank belongs to a configuration, and this mechanism has none; give link poses")
+    X = finite_array("pose", given)
+    if X.shape != (mechanism.graph.links, 3):
+        raise GeometryError(f"pose has shape {X.shape}; give (x, y, theta) for {mechanism.graph.links} links")
+    Lc = characteristic_length(mechanism)
+    names: list[str] = []
+    twists: list[Array] = []
+    owner: list[int] = []
+    for number, joint in enumerate(mechanism.joints):
+        for name, twist in _twists(joint, X, Lc):
+            names.append(f"{name} {joint.a}-{joint.b}")
+            twists.append(twist)
+            owner.append(number)
+    signs = _cycles(mechanism)
+    columns, own = np.array(twists), np.array(owner)
+    matrix = (signs[:, own][:, None, :] * columns.T[None]).reshape(-1, len(names))
+    _, values, rows = np.linalg.svd(matrix, full_matrices=True)
+    rank = int((values > tolerance * values[0]).sum()) if values.size else 0
+    return LoopClosure(matrix, tuple(names), values, rank, rows[rank:], tolerance, Lc)
+
+
+@checked
+def platform_loop_closure(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> LoopClosure:
+    """Loop-closure matrix (24 x 25) of the single-motor mechanism at one configuration.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+    >>> mechanism = SingleMotorPlatform(crank=(10, 5, 1), phase=(0, 0.5, 1))
+    >>> found = platform_loop_closure(mechanism, 0.3, mechanism.home_pose(0.3))
+    >>> found.matrix.shape, found.rank, found.mobility
+    ((24, 25), 24, 1)
+    """
+    return loop_closure(as_mechanism(platform, psi, pose))
+
+
+def _twists(joint: JointGeometry, X: Array, Lc: float) -> list[tuple[str, Array]]:
+    """List the unit twists ``(turn, v_x / Lc, v_y / Lc)`` of link b against link a, velocities taken at the origin."""
+    P = complex(X[joint.a, 0], X[joint.a, 1]) + complex(np.exp(1j * X[joint.a, 2])) * complex(*joint.at_a)
+    Q = complex(X[joint.b, 0], X[joint.b, 1]) + complex(np.exp(1j * X[joint.b, 2])) * complex(*joint.at_b)
+
+    def about(point: complex) -> Array:
+        return np.array([1.0, point.imag / Lc, -point.real / Lc])
+
+    def along(direction: complex) -> Array:
+        return np.array([0.0, direction.real, direction.imag])
+
+    if isinstance(joint, Revolute):
+        return [("R", about(P))]
+    if isinstance(joint, Gear):
+        between = Q - P
+        outer = joint.radius_a + (-joint.radius_b if joint.internal else joint.radius_b)
+        pitch = P + between * (joint.radius_a / outer)
+        return [("roll", about(pitch)), ("slide", along(between / abs(between)))]
+    if isinstance(joint, Cam):
+        radial = (Q - P) / abs(Q - P)
+        rho, slope, _ = joint.pitch_radius(float(np.angle(radial)) - X[joint.a, 2] - joint.angle_a)
+        return [("turn", about(Q)), ("slide", along(radial * complex(slope, rho) / abs(complex(slope, rho))))]
+    line = complex(np.exp(1j * (X[joint.a, 2] + joint.angle_a)))
+    if isinstance(joint, Prismatic):
+        return [("P", along(line))]
+    return [("turn", about(Q)), ("slide", along(line))]
+
+
+def _cycles(mechanism: Mechanism) -> Array:
+    """Fundamental cycles, shape (loops, joints): +1 where a loop passes a joint from a to b, -1 the other way."""
+    parent: dict[int, tuple[int, int, int]] = {mechanism.frame: (-1, -1, 0)}  # link -> (previous link, joint, sense)
+    queue, tree = deque([mechanism.frame]), set()
+    while queue:
+        here = queue.popleft()
+        for number, joint in enumerate(mechanism.joints):
+            for a, b, sense in ((joint.a, joint.b, 1), (joint.b, joint.a, -1)):
+                if a == here and b not in parent:
+                    parent[b] = (here, number, sense)
+                    tree.add(number)
+                    queue.append(b)
+    rows = []
+    for number, joint in enumerate(mechanism.joints):
+        if number in tree:
+            continue
+        row = np.zeros(len(mechanism.joints))
+        row[number] = 1.0
+        for end, sign in ((joint.a, 1.0), (joint.b, -1.0)):
+            link = end
+            while parent[link][1] >= 0:
+                row[parent[link][1]] += sign * parent[link][2]
+                link = parent[link][0]
+        rows.append(row)
+    return np.array(rows).reshape(-1, len(mechanism.joints))

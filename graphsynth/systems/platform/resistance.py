@@ -1,0 +1,263 @@
+"""The claim about the armature resistance: when a larger one calms the speed, and that it always calms the torque."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.motors import DCMotor, number, numbers, whole
+from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+
+__all__ = ["ResistanceEffect", "RippleMap", "resistance_effect", "ripple_gain", "ripple_map", "steady_ripple"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ResistanceEffect:
+    """Effect of the armature resistance on the steady ripples; peak to peak, speed in rad/s, current in A.
+
+    ``speed_falls`` is the linear criterion ``Om > w_n/sqrt(2)`` at the mean speed (the same for every resistance);
+    ``speed`` and ``current`` are the linear predictions, ``simulated_speed`` and ``simulated_current`` those of the
+    full model (NaN if not asked for, or where the run failed).
+    """
+
+    resistance: Array
+    mean_speed: float
+    mean_inertia: float
+    natural_frequency: float
+    forcing_frequency: float
+    harmonic: int
+    damping: Array
+    speed_falls: bool
+    current_falls: bool
+    speed: Array
+    current: Array
+    simulated_speed: Array
+    simulated_current: Array
+
+    @property
+    def frequency_ratio(self) -> float:
+        """``Om / w_n``."""
+        return self.forcing_frequency / self.natural_frequency
+
+
+def ripple_gain(ratio: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
+    """Dimensionless linear gains of speed and torque over the frequency ratio ``Om/w_n`` and the damping ``zeta``.
+
+    ``|dw| sqrt(J_m K_c / L) / F`` and ``|dM| / F`` for a torque disturbance of amplitude F; arrays broadcast.
+
+    Notes
+    -----
+    With ``nu = Om/w_n``: ``(4 zeta^2 + nu^2) / ((1 - nu^2)^2 + 4 zeta^2 nu^2)`` and ``1`` over the same denominator.
+    The derivative of the first by zeta^2 has the sign of ``1 - 2 nu^2``: specification parallel_platform, 11.5.
+
+    Examples
+    --------
+    >>> speed, torque = ripple_gain(2**-0.5, [0.1, 1.0, 10.0])
+    >>> speed.round(12).tolist()
+    [1.414213562373, 1.414213562373, 1.414213562373]
+    """
+    nu2, z2 = np.square(np.asarray(ratio, dtype=np.float64)), 4.0 * np.square(np.asarray(damping, dtype=np.float64))
+    below = np.square(1.0 - nu2) + z2 * nu2
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt((z2 + nu2) / below)), np.asarray(1.0 / np.sqrt(below))
+
+
+def resistance_effect(
+    drive: MotorDrivenPlatform, resistances: Sequence[float], *, simulate: bool = False, revolutions: int = 40
+) -> ResistanceEffect:
+    """Linear criterion, predicted ripples and, on request, those of the full model for several resistances.
+
+    Parameters
+    ----------
+    drive : MotorDrivenPlatform
+        With a `DCMotor` whose inductance is positive; its resistance is replaced by each of ``resistances`` (ohm).
+    resistances : sequence of float
+        Armature resistances, ohm.
+    simulate : bool, optional
+        Also integrate the full model from rest and measure over the second half.
+    revolutions : int, optional
+        Mean revolutions of that run.
+
+    Returns
+    -------
+    ResistanceEffect
+        Arrays in the order of ``resistances``: speeds rad/s, torques N m (estimated).
+
+    Raises
+    ------
+    SpecError
+        Another motor, no inductance, no variation of the inertia, a resistance that is negative.
+
+    Notes
+    -----
+    Specification parallel_platform, section 11.5, with the train included and the largest harmonic of J.
+
+    Examples
+    --------
+    >>> motor = DCMotor(1.0, 0.01, 0.1, 0.1, gain=20.0, speed=20.0)
+    >>> effect = resistance_effect(MotorDrivenPlatform.source(motor), [0.5, 20.0])
+    >>> effect.speed_falls, effect.speed.round(2).tolist()
+    (False, [0.65, 9.73])
+    """
+    motor = drive.motor
+    if not isinstance(motor, DCMotor) or motor.inductance == 0.0:
+        raise SpecError("the effect of the resistance needs a DCMotor with positive inductance; give one")
+    _must_be_bounded(drive)
+    if 0.0 in (motor.gain, motor.speed, motor.torque_constant):
+        raise SpecError(
+            f"gain = {motor.gain:g}, speed = {motor.speed:g} and torque_constant = {motor.torque_constant:g} must not "
+            "vanish: the machine would stand still; give what drives it"
+        )
+    values = np.array([number("resistance", r, least=0.0) for r in resistances])
+    if values.size == 0:
+        raise SpecError("there is no resistance to try; give at least one, in ohm")
+    ratio, feedback = drive.train.ratio, motor.gain + motor.emf_constant
+    harmonic, amplitude, mean = _harmonic(drive)
+    inertia = drive.constant_inertia + mean
+    stiffness = ratio**2 * motor.torque_constant * feedback
+    w = motor.gain * motor.speed / feedback / ratio
+    natural = math.sqrt(stiffness / (motor.inductance * inertia))
+    damping = 0.5 * values * math.sqrt(inertia / (motor.inductance * stiffness))
+    forcing = abs(harmonic * w)
+    force = 0.5 * harmonic * amplitude * w * w
+    speed, torque = ripple_gain(forcing / natural, damping)
+    size = 2.0 * force * math.sqrt(motor.inductance / (inertia * stiffness))
+    found = np.full((values.size, 2), np.nan)
+    if simulate:
+        for k, value in enumerate(values):
+            found[k] = steady_ripple(replace(drive, motor=replace(motor, resistance=float(value))), revolutions)
+    return ResistanceEffect(
+        values, w, inertia, natural, forcing, harmonic, damping, forcing > natural / math.sqrt(2.0), True,
+        np.asarray(size * speed), np.asarray(2.0 * force * torque / (ratio * motor.torque_constant)),
+        found[:, 0], found[:, 1],
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class RippleMap:
+    """Simulated steady ripples over inductance (rows) and resistance (columns), and where the claim holds.
+
+    ``speed`` (rad/s) and ``current`` (A) are peak to peak, NaN after a failure; ``speed_slope`` and ``current_slope``
+    (n_L, n_r - 1) are ``d ln(ripple) / d ln(r)`` between neighbours: the claim holds where they are negative.
+    ``frequency_ratio`` (n_L,) is ``Om / w_n``; the linear condition is that it exceeds ``1 / sqrt(2)``.
+    """
+
+    resistance: Array
+    inductance: Array
+    frequency_ratio: Array
+    speed: Array
+    current: Array
+    speed_slope: Array
+    current_slope: Array
+
+    @property
+    def agreement(self) -> float:
+        """Share of the map on which the linear condition tells the sign of the simulated slope of the speed ripple."""
+        falls = self.speed_slope < 0.0
+        known = np.isfinite(self.speed_slope)
+        said = np.broadcast_to((self.frequency_ratio > math.sqrt(0.5))[:, None], falls.shape)
+        return float((falls == said)[known].mean()) if known.any() else math.nan
+
+
+def ripple_map(
+    drive: MotorDrivenPlatform,
+    resistances: Sequence[float],
+    inductances: Sequence[float],
+    *,
+    revolutions: int = 40,
+) -> RippleMap:
+    """Simulate the steady ripples over resistances (ohm) and inductances (H): the claim's true condition as a map.
+
+    Raises
+    ------
+    SpecError
+        As `resistance_effect`; fewer than two resistances, or not in increasing order.
+
+    Examples
+    --------
+    >>> drive = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
+    >>> (ripple_map(drive, [5.0, 20.0], [0.2, 0.01]).speed_slope < 0.0).tolist()
+    [[True], [False]]
+    """
+    r, L = numbers("resistances", resistances, "ohm"), numbers("inductances", inductances, "H")
+    if r.ndim != 1 or r.size < 2 or not (np.diff(r) > 0.0).all() or r[0] <= 0.0:
+        raise SpecError(f"resistances of shape {r.shape} must be two or more increasing positive numbers; give ohm")
+    motor = drive.motor
+    if not isinstance(motor, DCMotor):
+        raise SpecError(f"{type(motor).__name__} has no armature; give a DCMotor")
+    effects = [
+        resistance_effect(replace(drive, motor=replace(motor, inductance=float(x))), r.tolist(), simulate=True,
+                          revolutions=revolutions)
+        for x in L
+    ]  # fmt: skip
+    speed, current = (
+        np.array([getattr(e, name) for e in effects]) for name in ("simulated_speed", "simulated_current")
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = [np.diff(np.log(values), axis=1) / np.diff(np.log(r)) for values in (speed, current)]
+    ratio = np.array([effect.frequency_ratio for effect in effects])
+    return RippleMap(r, L, ratio, speed, current, slopes[0], slopes[1])
+
+
+def _harmonic(drive: MotorDrivenPlatform) -> tuple[int, float, float]:
+    """Return number and amplitude of the harmonic of J whose derivative is largest, and the mean of J."""
+    count = 4 * drive.inertia.rows.shape[1] + 8
+    values = drive.inertia.value(np.linspace(0.0, math.tau, count, endpoint=False))
+    spectrum = 2.0 * np.abs(np.fft.rfft(values)) / count
+    harmonic = int(np.argmax(np.arange(spectrum.size) * spectrum))
+    if not spectrum[1:].max() > 1e-14 * spectrum[0]:
+        raise SpecError("the inertia does not vary over a turn: there is no ripple to speak of; give a moving mass")
+    return harmonic, float(spectrum[harmonic]), float(0.5 * spectrum[0])
+
+
+def steady_ripple(drive: MotorDrivenPlatform, revolutions: int = 40, rtol: float = 1e-9) -> tuple[float, float]:
+    """Peak-to-peak speed (rad/s) and current (A) in the second half of ``revolutions`` mean revolutions from rest.
+
+    Estimated: 240 samples per mean revolution, the extremes through parabolas.  NaN if the run fails.
+
+    Raises
+    ------
+    SpecError
+        For a motor that is no DCMotor.
+    """
+    motor = drive.motor
+    if not isinstance(motor, DCMotor):
+        raise SpecError(f"{type(motor).__name__} has no armature current; give a DCMotor")
+    _must_be_bounded(drive)
+    whole("revolutions", revolutions, "two halves of the run are compared")
+    free = motor.gain * motor.speed
+    if free == 0.0:
+        raise SpecError(
+            f"gain = {motor.gain:g} and speed = {motor.speed:g} leave the machine at rest; give both another value"
+        )
+    w = abs(free / (motor.gain + motor.emf_constant) / drive.train.ratio)
+    end = revolutions * math.tau / w
+    times = np.concatenate([[0.0], np.linspace(0.5 * end, end, 120 * revolutions + 1)])
+    motion = drive.simulate(times, rtol=rtol, estimate=False, reduce=False)
+    if not motion.complete:
+        return math.nan, math.nan
+    return _peak_to_peak(motion.speed[1:]), _peak_to_peak(motion.currents[1:, 0])
+
+
+def _must_be_bounded(drive: MotorDrivenPlatform) -> None:
+    if drive.constant_inertia == 0.0 and drive.inertia.dead_centres:
+        raise SpecError("without inertia the crank speed is unbounded at dead centres: no ripple; give J_0 > 0")
+
+
+def _peak_to_peak(values: Array) -> float:
+    left, middle, right = values[:-2], values[1:-1], values[2:]
+    bend = left - 2.0 * middle + right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        vertex = middle - 0.125 * (right - left) ** 2 / bend
+    peak = (middle >= left) & (middle >= right) & (bend < 0.0)
+    low = (middle <= left) & (middle <= right) & (bend > 0.0)
+    highest = max(values.max(), *vertex[peak]) if peak.any() else values.max()
+    lowest = min(values.min(), *vertex[low]) if low.any() else values.min()
+    return float(highest - lowest)

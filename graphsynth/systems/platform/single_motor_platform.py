@@ -1,0 +1,382 @@
+"""The single-motor mechanism: one pinion, three wheels, three four-bar drives, three legs, one platform.
+
+Default dimensions: MOCK-RECT (millimetres), all rational in the frame of a leg.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import finite, finite_array, positive, sign, three, three_points, triple
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.platform.drive import DriveTurn, FourBarDrive, first_barrier
+from graphsynth.systems.platform.gears import GearTrain
+from graphsynth.systems.platform.motion import BranchLabel, Monodromy, Motion, Sweep, TurnBatch
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.plane import directions
+from graphsynth.systems.platform.tracking import (
+    SINGULAR,
+    BranchEnd,
+    Tracked,
+    compare,
+    distance,
+    machine_rows,
+    monodromy,
+    track,
+    turn_batch,
+)
+from graphsynth.systems.platform.turn_events import events, wheel_angles
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+
+__all__ = ["DriveState", "SingleMotorPlatform"]
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+_METHOD = "continuation with step control, compared with all assembly modes; estimated, not certified"
+
+#: Figure 3 of the source: 0 frame, 1 pinion, 2-4 wheels, 5-7 couplers, 8-10 rockers, 11-13 links, 14 platform
+_TURNING = "0-1 0-2 0-3 0-4 2-5 3-6 4-7 5-8 6-9 7-10 0-8 0-9 0-10 8-11 9-12 10-13 11-14 12-14 13-14"
+_GEARED = "1-2 1-3 1-4"
+
+
+class DriveState(NamedTuple):
+    """Rocker angles (..., 3) in the fixed frame, first and second derivatives by psi, ``h_phi`` and leg status."""
+
+    theta: Array
+    theta1: Array
+    theta2: Array
+    h_phi: Array
+    status: NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class SingleMotorPlatform:
+    """Platform driven by one motor through three wheels and three four-bar linkages.
+
+    Parameters
+    ----------
+    crank : sequence of 3 floats
+        Crank lengths l_B,k, zero or more.
+    phase : sequence of 3 floats
+        Keying phases psi0_k in the fixed frame, radians.
+    coupler, rocker : sequence of 3 floats
+        l_BC,k and l_CD,k.
+    axis, pivot, vertex : sequence of 3 complex
+        Wheel axis O_k, rocker pivot D_k and platform vertex b_k, in the frame of leg k.
+    l1, l2 : sequence of 3 floats
+        Rocker arms towards the platform and intermediate links.
+    frame_angle : sequence of 3 floats
+        Angle beta_k of each leg frame in the fixed frame, radians.
+    delta : sequence of 3 floats
+        Angle of the bell-crank, ``theta_k = phi_k + delta_k``, radians.
+    tau : sequence of 3 of {+1, -1}
+        Branches of the drives.
+    home : sequence of 3 floats
+        A pose close to the home pose, which belongs to zero crank lengths; selects the assembly mode.
+    gears : GearTrain
+        Teeth of pinion and wheels.
+
+    Raises
+    ------
+    GeometryError
+        Impossible dimensions; the message names the parameter and the leg.
+
+    Notes
+    -----
+    Specification parallel_platform, sections 7 and 8.
+
+    Examples
+    --------
+    >>> motion = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).full_turn(samples=9)
+    >>> motion.closed, motion.label.sigma, motion.pose[0].round(6).tolist()
+    (True, (-1, -1, -1), [0.672631, -5.007799, 0.053385])
+    """
+
+    crank: Triple = (10.0, 10.0, 10.0)
+    phase: Triple = (0.0, 0.0, 0.0)
+    coupler: Triple = (45.0, 45.0, 45.0)
+    rocker: Triple = (60.0, 60.0, 60.0)
+    axis: tuple[complex, complex, complex] = (45.0, 45.0, 45.0)
+    pivot: tuple[complex, complex, complex] = (105 + 45j, 105 + 45j, 105 + 45j)
+    vertex: tuple[complex, complex, complex] = (45.0, 45.0, 45.0)
+    l1: Triple = (45.0, 45.0, 45.0)
+    l2: Triple = (60.0, 60.0, 60.0)
+    frame_angle: Triple = (-5 * math.pi / 6, -math.pi / 6, math.pi / 2)
+    delta: Triple = (-math.pi / 2, -math.pi / 2, -math.pi / 2)
+    tau: tuple[int, int, int] = (1, 1, 1)
+    home: Triple = (0.0, 0.0, 0.0)
+    gears: GearTrain = field(default_factory=GearTrain)
+
+    def __post_init__(self) -> None:
+        rules = {
+            "crank": lambda n, v: positive(n, v, zero=True),
+            "coupler": positive,
+            "rocker": positive,
+            "phase": finite,
+            "frame_angle": finite,
+            "delta": finite,
+            "home": finite,
+            "tau": sign,
+        }
+        for name, rule in rules.items():
+            values = three(name, getattr(self, name))
+            object.__setattr__(self, name, tuple(rule(f"{name} of leg {k}", v) for k, v in enumerate(values, 1)))
+        for name in ("axis", "pivot", "vertex"):
+            object.__setattr__(self, name, three_points(name, getattr(self, name)))
+        if not isinstance(self.gears, GearTrain):
+            raise GeometryError(f"gears = {self.gears!r} is not a GearTrain; give the numbers of teeth to one")
+        _ = self.platform, self.drives  # their own checks
+
+    @cached_property
+    def platform(self) -> ParallelPlatform:
+        """The three-leg platform in the fixed frame."""
+        turn = directions(self.frame_angle)
+        D, b = np.array(self.pivot) * turn, np.array(self.vertex) * turn
+        return ParallelPlatform((D[0], D[1], D[2]), (b[0], b[1], b[2]), self.l1, self.l2)
+
+    @cached_property
+    def drives(self) -> tuple[FourBarDrive, FourBarDrive, FourBarDrive]:
+        """The three four-bar drives, each in the frame of its leg."""
+        first, second, third = (
+            FourBarDrive(
+                self.axis[k], self.pivot[k], self.crank[k], self.coupler[k], self.rocker[k],
+                self.phase[k] - self.frame_angle[k], self.tau[k],
+            )
+            for k in range(3)
+        )  # fmt: skip
+        return (first, second, third)
+
+    @cached_property
+    def Lc(self) -> float:
+        """Characteristic length: the largest distance of a platform vertex from the reference point, or of a link."""
+        return max(abs(b) for b in self.platform.b) or max(self.platform.l2)
+
+    def drive(self, psi: ArrayLike) -> DriveState:
+        """Rocker angles and derivatives at wheel angles ``psi`` (radians, shape (...)), each of shape (..., 3)."""
+        psi = finite_array("psi", psi)
+        moved = [drive.motion(psi) for drive in self.drives]
+        phi, phi1, phi2, h_phi = (np.stack([getattr(m, n) for m in moved], axis=-1) for n in moved[0]._fields[:4])
+        offset = np.array(self.frame_angle) + np.array(self.delta)
+        return DriveState(phi + offset, phi1, phi2, h_phi, np.stack([m.status for m in moved], axis=-1))
+
+    def drive_turns(self) -> tuple[DriveTurn, DriveTurn, DriveTurn]:
+        """Exact full-turn statement of each drive (section 7.4)."""
+        first, second, third = (drive.turn() for drive in self.drives)
+        return (first, second, third)
+
+    def home_pose(self, psi: float = 0.0) -> Array:
+        """Pose of the home branch at wheel angle ``psi``: followed from zero crank length, shape (3,).
+
+        Raises
+        ------
+        GeometryError
+            If the drives cannot be assembled there, the home pose does not close, or the branch ends on the way.
+        """
+        tracked = self.follow(np.array([finite("psi", psi)]), None, np.inf, accelerations=False)
+        return np.asarray(tracked.pose[0, 0])
+
+    @cached_property
+    def _machine(self) -> Array:
+        return machine_rows(self, directions((
+            self.frame_angle[0] + self.delta[0],
+            self.frame_angle[1] + self.delta[1],
+            self.frame_angle[2] + self.delta[2],
+        )))  # fmt: skip
+
+    def follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
+        """Track the home branch, or the one of ``start``, through wheel angles psi (n,) up to ``stop`` (radians).
+
+        Raises
+        ------
+        GeometryError
+            If there is no such branch at the first angle.
+        """
+        guess = np.array(self.home) if start is None else triple("start", start)
+        tracked = track(
+            self._machine[None], psi, np.array([stop]), guess[None], self.Lc,
+            grown=start is None, accelerations=accelerations,
+        )  # fmt: skip
+        self._require_start(BranchEnd(int(tracked.status[0])), float(psi[0]), float(tracked.end[0, 0]))
+        return tracked
+
+    def _require_start(self, status: BranchEnd, psi: float, scale: float) -> None:
+        if status is BranchEnd.NO_HOME:
+            reach = np.abs(np.array(self.axis) - np.array(self.pivot))
+            sides = np.array(self.rocker), np.array(self.coupler)
+            if bool(np.any((reach > sides[0] + sides[1]) | (reach < np.abs(sides[0] - sides[1])))):
+                raise GeometryError("a drive cannot be assembled at zero crank length; check |OD|, coupler and rocker")
+            raise GeometryError(f"home = {self.home} is not close to an assembled pose; give a pose near the home pose")
+        if status is BranchEnd.HOME_ENDS:
+            raise GeometryError(
+                f"the home branch ends at {scale:.6g} of the crank lengths {self.crank} at psi = {psi}; "
+                "use shorter cranks"
+            )
+        if status is BranchEnd.NO_START:
+            raise GeometryError(f"start is not close to an assembled pose at psi = {psi}; take one of all_poses(psi)")
+
+    def sweep(self, psi: ArrayLike, start: ArrayLike | None = None, *, accelerations: bool = False) -> Sweep:
+        """Follow one branch through increasing wheel angles, fast: without events or comparison with other modes.
+
+        Parameters
+        ----------
+        psi : array_like, shape (n,)
+            Increasing wheel angles, radians; any number of turns.
+        start : array_like, shape (3,), optional
+            A pose close to the branch at the first angle; the home branch if omitted.
+        accelerations : bool
+            Also second derivatives with respect to psi.
+
+        Returns
+        -------
+        Sweep
+            Estimated, not certified.  Rows beyond the end of the branch are NaN; ``reason`` says why it ended.
+
+        Raises
+        ------
+        GeometryError
+            Angles that do not increase, a start that is no assembled pose, a home branch that ends before psi[0].
+
+        Examples
+        --------
+        >>> sweep = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).sweep([0.0, 0.5, 1.0])
+        >>> sweep.complete, sweep.pose[0].round(6).tolist()
+        (True, [0.672631, -5.007799, 0.053385])
+        """
+        angles = wheel_angles(finite_array("psi", psi))
+        barrier = first_barrier(self.drives, float(angles[0]), float(angles[-1]))
+        tracked = self.follow(angles, start, np.inf if barrier is None else barrier.psi, accelerations=accelerations)
+        status = BranchEnd(int(tracked.status[0]))
+        reason = {BranchEnd.SINGULAR: SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
+        return Sweep(
+            psi=angles, pose=tracked.pose[0], velocity=tracked.velocity[0], theta=tracked.theta[0],
+            theta_velocity=tracked.theta1[0], determinant=tracked.determinant[0],
+            acceleration=tracked.acceleration[0] if accelerations else None,
+            theta_acceleration=tracked.theta2[0] if accelerations else None,
+            reached=int(tracked.reached[0]), complete=status is BranchEnd.COMPLETE,
+            end=(float(tracked.end[0, 0]), *map(float, tracked.end[0, 1:])), reason=reason.get(status, ""),
+        )  # fmt: skip
+
+    def full_turn_batch(
+        self,
+        crank: ArrayLike,
+        phase: ArrayLike | None = None,
+        coupler: ArrayLike | None = None,
+        samples: int | ArrayLike = 361,
+        *,
+        accelerations: bool = False,
+    ) -> TurnBatch:
+        """Home branches of many dimension sets over one turn; everything not given is that of this mechanism.
+
+        Parameters
+        ----------
+        crank, phase, coupler : array_like, shape (N, 3)
+            Crank lengths, keying phases (radians) and coupler lengths of N sets.
+        samples : int or array_like
+            Number of wheel angles over [0, 2 pi], or increasing angles (radians).
+        accelerations : bool
+            Also second derivatives with respect to psi.
+
+        Returns
+        -------
+        TurnBatch
+            Estimated, not certified.  A set whose turn cannot be completed has NaN from there on, status and place.
+
+        Raises
+        ------
+        GeometryError
+            Numbers that are not finite, lengths that are not positive, shapes that do not fit.
+
+        Examples
+        --------
+        >>> batch = SingleMotorPlatform().full_turn_batch([[10, 5, 0], [31, 31, 31]], samples=9)
+        >>> [BranchEnd(status).name for status in batch.status.tolist()]
+        ['COMPLETE', 'DRIVE_ENDS']
+        """
+        return turn_batch(self, crank, phase, coupler, wheel_angles(samples), accelerations=accelerations)
+
+    def monodromy(self, samples: int | ArrayLike = 361) -> Monodromy:
+        """Follow all assembly modes over one turn and say which mode becomes which.
+
+        Returns
+        -------
+        Monodromy
+            Estimated, not certified.  A mode whose branch ends has the number -1 and a reason.
+
+        Examples
+        --------
+        >>> SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).monodromy().permutation
+        (0, 1)
+        """
+        return monodromy(self, wheel_angles(samples))
+
+    def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> Motion:
+        """Follow one branch over a turn of the wheels, with events and a closure test.
+
+        Parameters
+        ----------
+        samples : int or array_like
+            Number of wheel angles over [0, 2 pi], or increasing angles (radians).
+        start : array_like, shape (3,), optional
+            A pose close to the branch at the first angle; the home branch if omitted.
+
+        Returns
+        -------
+        Motion
+            Estimated, not certified.  If the branch ends (drive lock, platform singular) the arrays end there and an
+            event says so; the pose is compared with all assembly modes at every sample.
+        """
+        begin = perf_counter()
+        psi = wheel_angles(samples)
+        barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
+        tracked = self.follow(psi, start, np.inf if barrier is None else barrier.psi, accelerations=True)
+        reached = int(tracked.reached[0])
+        pose, theta, determinant = (
+            tracked.pose[0, :reached],
+            tracked.theta[0, :reached],
+            tracked.determinant[0, :reached],
+        )
+        _, leg = self.platform.jacobians(pose, theta)
+        gap, rank, mismatch = compare(self.platform, pose, theta, self.Lc)
+        complete = int(tracked.status[0]) == BranchEnd.COMPLETE
+        monodromy, error, period = None, math.nan, 0
+        if complete and math.isclose(psi[-1] - psi[0], math.tau, rel_tol=1e-12):
+            monodromy, error = self.monodromy(psi), float(distance(pose[-1], pose[0], self.Lc))
+            nearest = int(np.argmin(distance(monodromy.modes, pose[0], self.Lc)))
+            period = monodromy.periods[nearest]
+        sigma = (int(np.sign(leg[0, 0])), int(np.sign(leg[0, 1])), int(np.sign(leg[0, 2])))
+        scale = max(*self.platform.l1, *self.platform.l2) ** 2
+        return Motion(
+            psi=psi[:reached], pose=pose, velocity=tracked.velocity[0, :reached],
+            acceleration=tracked.acceleration[0, :reached], theta=theta,
+            determinant=determinant, leg=leg, drive=self.drive(psi[:reached]).h_phi, gap=gap,
+            residual=float(np.abs(self.platform.closure(pose, theta)).max()) / scale,
+            complete=complete and not mismatch.any(), closed=period > 0, closure_error=error, period=period,
+            events=tuple(events(self, psi, tracked, barrier, leg, mismatch)),
+            label=BranchLabel(self.tau, sigma, int(np.sign(determinant[0])), rank, 0),
+            Lc=self.Lc, method=_METHOD, seconds=perf_counter() - begin, monodromy=monodromy,
+        )  # fmt: skip
+
+    def all_poses(self, psi: float) -> Array:
+        """All assembly modes for the drive branches of this mechanism at ``psi``, shape (m, 3)."""
+        return self.platform.direct(self.drive(psi).theta).poses
+
+    def graph(self) -> MechanismGraph:
+        """Structural graph of the source's Figure 3: 15 links, 19 turning pairs, 3 gear pairs, link 0 the frame."""
+        from graphsynth.structure.graph import MechanismGraph
+
+        joints = [
+            (*map(int, pair.split("-")), mobility)
+            for text, mobility in ((_TURNING, 1), (_GEARED, 2))
+            for pair in text.split()
+        ]
+        return MechanismGraph(15, [(a, b, f) for a, b, f in joints], frame=0)

@@ -1,0 +1,332 @@
+"""Singular loci at a fixed orientation: circles of type I, curves of type II for each working mode."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.checks import checked, finite, whole
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.platform.circles import BoundaryCircle, leg_circles
+from graphsynth.systems.platform.field import characteristic_length, determinant, pose_grid, working_mode
+from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
+from graphsynth.systems.platform.tracing import CurveEquations, Traced, trace
+from graphsynth.systems.platform.workspace import Arc, constant_orientation_workspace
+
+__all__ = [
+    "SingularCurve",
+    "SingularLoci",
+    "isolated_singular_points",
+    "singular_loci",
+    "type_one_circles",
+    "type_two_curves",
+]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_ARC_SAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class SingularCurve:
+    """One curve ``det JX = 0`` of one working mode.
+
+    Attributes
+    ----------
+    sigma : tuple of int
+        Working mode.
+    points : ndarray of complex, shape (n,)
+        Positions of the platform, in order; the first is repeated at the end of a closed curve.
+    theta : ndarray, shape (n, 3)
+        Rocker angles, continuous along the curve.
+    ends : tuple of int
+        Legs (1 to 3) on whose type-I circles the curve begins and ends; empty if it is closed.  0 marks an end that
+        was lost (the step became too small); see ``complete``.
+    residual : float
+        Largest closure error and ``|det JX|``, relative to powers of the characteristic length.
+    """
+
+    sigma: tuple[int, int, int]
+    points: Complex
+    theta: Array
+    ends: tuple[int, ...]
+    residual: float
+
+    @property
+    def closed(self) -> bool:
+        """Whether the curve is a loop."""
+        return not self.ends
+
+    @property
+    def complete(self) -> bool:
+        """Whether the curve was followed to both ends."""
+        return 0 not in self.ends
+
+
+@dataclass(frozen=True, eq=False)
+class SingularLoci:
+    """Loci at one orientation.
+
+    Attributes
+    ----------
+    alpha : float
+    circles : tuple of BoundaryCircle
+        Type I, the same for all working modes; exact.
+    curves : tuple of SingularCurve
+        Type II; estimated, see `type_two_curves`.
+    points : tuple of (sigma, complex)
+        Isolated points of type II, where a loop has shrunk to a point; see `isolated_singular_points`.
+    nodes : int
+        Of the grid.
+    """
+
+    alpha: float
+    circles: tuple[BoundaryCircle, ...]
+    curves: tuple[SingularCurve, ...]
+    points: tuple[tuple[tuple[int, int, int], complex], ...]
+    nodes: int
+
+    def of_mode(self, sigma: tuple[int, ...]) -> tuple[SingularCurve, ...]:
+        """Curves of one working mode."""
+        return tuple(curve for curve in self.curves if curve.sigma == working_mode(sigma))
+
+
+@checked
+def type_one_circles(platform: ParallelPlatform, alpha: float) -> tuple[BoundaryCircle, ...]:
+    """Circles on which a leg is stretched ("outer") or folded ("inner"); exact."""
+    return tuple(leg_circles(platform, finite("alpha", alpha), None, (None, None, None)))
+
+
+@checked
+def singular_loci(platform: ParallelPlatform, alpha: float, *, nodes: int = 120) -> SingularLoci:
+    """Type-I circles and the type-II curves of all eight working modes at orientation ``alpha`` (radians).
+
+    Examples
+    --------
+    >>> loci = singular_loci(ParallelPlatform.mock(), 0.0, nodes=60)
+    >>> len(loci.circles), all(curve.residual < 1e-12 for curve in loci.curves)
+    (6, True)
+    """
+    modes = [working_mode([int(s) for s in mode]) for mode in WORKING_MODES]
+    curves = [curve for mode in modes for curve in type_two_curves(platform, alpha, mode, nodes=nodes)]
+    points = [(mode, p) for mode in modes for p in isolated_singular_points(platform, alpha, mode, nodes=nodes)]
+    return SingularLoci(float(alpha), type_one_circles(platform, alpha), tuple(curves), tuple(points), nodes)
+
+
+@checked
+def type_two_curves(
+    platform: ParallelPlatform, alpha: float, sigma: tuple[int, ...], *, nodes: int = 120
+) -> tuple[SingularCurve, ...]:
+    """Curves ``det JX = 0`` of a working mode at a fixed orientation.
+
+    Parameters
+    ----------
+    platform : ParallelPlatform
+    alpha : float
+        Orientation, radians.
+    sigma : tuple of 3 of {+1, -1}
+    nodes : int, optional
+        Grid nodes along x and y.
+
+    Returns
+    -------
+    tuple of SingularCurve
+        Every point satisfies the equations to rounding.  That no curve is missing is estimated: those that end on the
+        boundary of the workspace are found by sign changes along it (400 samples per arc), closed loops by sign changes
+        on the grid, so a loop smaller than a cell can be missed.
+
+    Raises
+    ------
+    GeometryError
+        A leg with a link of length zero (its working modes coincide), or fewer than 8 nodes.
+
+    Notes
+    -----
+    Specification parallel_platform, section 6.2; pseudo-arclength continuation: Allgower and Georg (1990).
+    """
+    mode = working_mode(sigma)
+    alpha = finite("alpha", alpha)
+    nodes = whole("nodes", nodes, 8, 100_000)  # fewer find no curves
+    for leg, lengths in enumerate(zip(platform.l1, platform.l2), start=1):
+        if min(lengths) == 0.0:
+            raise GeometryError(f"leg {leg} has a link of length zero, so its working modes coincide; give l1, l2 > 0")
+    unit = characteristic_length(platform)
+    equations = CurveEquations(platform, alpha, unit)
+    curves: list[SingularCurve] = []
+    for state, leg in _boundary_seeds(platform, alpha, mode, equations, unit):
+        if not _known(curves, state, unit, ends_only=True):
+            gradient = mode[leg - 1] * equations.reach_gradient(state, leg - 1)
+            curves.append(_curve(mode, leg, [trace(equations, state, mode, gradient)], equations, unit))
+    seeds = _grid_seeds(platform, alpha, mode, nodes, unit)
+    for state in seeds:
+        if _known(curves, state, unit):
+            continue
+        found = equations.correct(state, np.linalg.svd(equations.evaluate(state)[1])[2][-1])
+        if found is None or (np.array(mode) * equations.reach(found[0]) <= 0.0).any():
+            continue
+        along = np.linalg.svd(found[1])[2][-1]
+        parts = [trace(equations, found[0], mode, along)]
+        if parts[0].end != 0:
+            parts.append(trace(equations, found[0], mode, -along))
+        curve = _curve(mode, 0, parts, equations, unit)
+        if not _repeated(curves, curve, unit):
+            curves.append(curve)
+    return tuple(curves)
+
+
+def _repeated(curves: list[SingularCurve], new: SingularCurve, unit: float) -> bool:
+    """Whether a curve is already there: an end belongs to one curve of a mode, a loop is compared by its points."""
+    path = np.column_stack([new.points.real / unit, new.points.imag / unit, new.theta])
+    if new.ends:
+        return any(_known(curves, state, unit, ends_only=True) for state in path[[0, -1]])
+    loops = [curve for curve in curves if curve.closed and abs(len(curve.points) - len(path)) < 0.2 * len(path) + 10]
+    sample = path[:: max(1, len(path) // 12)]
+    return sum(_known(loops, state, unit) for state in sample) > 0.7 * len(sample)
+
+
+@checked
+def isolated_singular_points(
+    platform: ParallelPlatform, alpha: float, sigma: tuple[int, ...], *, nodes: int = 120
+) -> tuple[complex, ...]:
+    """Positions where ``det JX`` touches zero without changing its sign: loops shrunk to a point.
+
+    Local minima of ``|det JX|`` on the grid are refined on smaller grids; kept if the value is below 1e-10 of the
+    product of the rows of JX (estimated; such points exist at single orientations only).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> points = isolated_singular_points(ParallelPlatform.mock(), 2.0 * np.arctan(3.0 / 7.0), (-1, -1, -1))
+    >>> len(points), abs(points[0]) < 1e-3
+    (1, True)
+    """
+    mode, alpha = working_mode(sigma), finite("alpha", alpha)
+    x, y = pose_grid(platform, alpha, nodes)
+    step = max(float(x[1] - x[0]), float(y[1] - y[0]))
+
+    def value(p: Complex) -> Array:
+        X = np.stack([p.real, p.imag, np.full(p.shape, alpha)], axis=-1)
+        JX, _ = platform.jacobians(X, platform.inverse(X, mode).theta)
+        return np.asarray(determinant(JX) / np.linalg.norm(JX, axis=-1).prod(axis=-1))
+
+    g = value(x[:, None] + 1j * y[None, :])
+    inner, size = g[1:-1, 1:-1], np.abs(g)
+    least = np.isfinite(inner) & (np.abs(inner) < 0.05)
+    for i in range(3):
+        for j in range(3):
+            other = (slice(i, i + nodes - 2), slice(j, j + nodes - 2))
+            least &= (size[other] >= np.abs(inner)) & (g[other] * inner > 0.0)
+    rows, columns = np.nonzero(least)
+    if not rows.size:
+        return ()
+    centre, sign = x[rows + 1] + 1j * y[columns + 1], np.sign(inner[rows, columns])
+    local = (np.arange(-3, 4)[:, None] + 1j * np.arange(-3, 4)[None, :]).ravel() / 3.0
+    first, values = centre, np.abs(inner[rows, columns])
+    for _ in range(40):  # the best node of a 7 x 7 grid about each candidate, then a smaller grid
+        around = np.asarray(centre[:, None] + step * local, dtype=np.complex128)
+        size = np.nan_to_num(sign[:, None] * value(around), nan=1.0)
+        best = np.argmin(size, axis=1)
+        centre, values = around[np.arange(len(best)), best], size[np.arange(len(best)), best]
+        step *= 0.6
+    keep = (np.abs(values) <= 1e-10) & (np.abs(centre - first) <= 3.0 * float(x[1] - x[0] + y[1] - y[0]))
+    return tuple(complex(p) for p in centre[keep])
+
+
+def _curve(
+    mode: tuple[int, int, int], leg: int, parts: list[Traced], equations: CurveEquations, unit: float
+) -> SingularCurve:
+    states, last = parts[0].states, max(parts[0].end, 0)
+    if len(parts) == 2:
+        states = np.concatenate([parts[1].states[::-1], states[1:]])
+        ends: tuple[int, ...] = (max(parts[1].end, 0), last)
+    else:
+        ends = () if parts[0].end == 0 else (leg, last)
+    residual = max(float(np.abs(equations.evaluate(state)[0]).max()) for state in states)
+    return SingularCurve(mode, np.asarray(unit * (states[:, 0] + 1j * states[:, 1])), states[:, 2:], ends, residual)
+
+
+def _known(curves: list[SingularCurve], state: Array, unit: float, *, ends_only: bool = False) -> bool:
+    """Whether a state lies on a traced curve (or is one of its ends)."""
+    for curve in curves:
+        path = np.column_stack([curve.points.real / unit, curve.points.imag / unit, curve.theta])
+        if ends_only:
+            path = path[[0, -1]] if curve.ends else path[:0]
+        d = path - state
+        d[:, 2:] -= math.tau * np.round(d[:, 2:] / math.tau)
+        if ends_only:
+            if (np.abs(d).max(axis=1) < 1e-7).any():
+                return True
+            continue
+        chord = np.diff(path, axis=0)
+        length = np.einsum("ij,ij->i", chord, chord)
+        share = np.clip(-np.einsum("ij,ij->i", d[:-1], chord) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
+        gap = np.linalg.norm(d[:-1] + share[:, None] * chord, axis=1)
+        if (gap <= 1e-6 + 0.03 * np.sqrt(length)).any():
+            return True
+    return False
+
+
+def _boundary_seeds(
+    platform: ParallelPlatform, alpha: float, mode: tuple[int, int, int], equations: CurveEquations, unit: float
+) -> list[tuple[Array, int]]:
+    """Find the ends of curves on the boundary of the workspace: states and legs."""
+    seeds = []
+    for arc in constant_orientation_workspace(platform, alpha).arcs:
+        leg = arc.circle.leg
+        t = arc.start + (arc.stop - arc.start) * (np.arange(_ARC_SAMPLES) + 0.5) / _ARC_SAMPLES
+        t = np.concatenate([[arc.start + 1e-9 * (t[1] - t[0])], t, [arc.stop - 1e-9 * (t[1] - t[0])]])
+        values = _on_arc(platform, alpha, mode, arc, t)[0]
+        change = values[:-1] * values[1:] < 0.0
+        a, b, first = t[:-1][change], t[1:][change], values[:-1][change]
+        for _ in range(20 if change.any() else 0):
+            middle = 0.5 * (a + b)
+            same = _on_arc(platform, alpha, mode, arc, middle)[0] * first > 0.0
+            a, b = np.where(same, middle, a), np.where(same, b, middle)
+        _, p, theta = _on_arc(platform, alpha, mode, arc, a)
+        for q, angles in zip(p, theta):
+            found = equations.end(np.array([q.real / unit, q.imag / unit, *angles]), leg - 1)
+            if found is not None:
+                seeds.append((found, leg))
+    return seeds
+
+
+def _on_arc(
+    platform: ParallelPlatform, alpha: float, mode: tuple[int, int, int], arc: Arc, t: Array
+) -> tuple[Array, Complex, Array]:
+    """``det JX``, positions and rocker angles on an arc of the boundary, where the arc's own leg has one angle."""
+    k = arc.circle.leg - 1
+    p = arc.point(t)
+    X = np.stack([p.real, p.imag, np.full(t.shape, alpha)], axis=-1)
+    theta = platform.inverse(X, mode).theta.copy()
+    back = arc.circle.side == "inner" and platform.l1[k] < platform.l2[k]
+    theta[:, k] = t + (math.pi if back else 0.0)
+    return determinant(platform.jacobians(X, theta)[0]), p, theta
+
+
+def _grid_seeds(
+    platform: ParallelPlatform, alpha: float, mode: tuple[int, int, int], nodes: int, unit: float
+) -> list[Array]:
+    """Zeros of ``det JX`` on the edges of the grid."""
+
+    def value(p: Complex) -> tuple[Array, Array]:
+        X = np.stack([p.real, p.imag, np.full(p.shape, alpha)], axis=-1)
+        theta = platform.inverse(X, mode).theta
+        return determinant(platform.jacobians(X, theta)[0]), theta
+
+    x, y = pose_grid(platform, alpha, nodes)
+    p = x[:, None] + 1j * y[None, :]
+    g = value(p)[0]
+    horizontal, vertical = g[:-1] * g[1:] < 0.0, g[:, :-1] * g[:, 1:] < 0.0
+    a = np.concatenate([p[:-1][horizontal], p[:, :-1][vertical]])
+    b = np.concatenate([p[1:][horizontal], p[:, 1:][vertical]])
+    low = np.concatenate([g[:-1][horizontal], g[:, :-1][vertical]])
+    for _ in range(30):
+        middle = 0.5 * (a + b)
+        same = value(middle)[0] * low > 0.0
+        a, b = np.where(same, middle, a), np.where(same, b, middle)
+    g, theta = value(a)
+    return [np.array([q.real / unit, q.imag / unit, *t]) for q, t, v in zip(a, theta, g) if np.isfinite(v)]

@@ -1,0 +1,192 @@
+"""Small-crank theory of the single-motor mechanism: predicted rocker and platform motion, with error orders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import checked, finite_array
+from graphsynth.core.errors import GeometryError
+from graphsynth.systems.platform.harmonics import harmonics
+
+if TYPE_CHECKING:
+    from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+
+__all__ = ["CrankScale", "SmallCrank", "crank_scaling", "small_crank"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class SmallCrank:
+    """The mechanism at zero crank length and its first and second order in the cranks.
+
+    Attributes
+    ----------
+    home : ndarray, shape (3,)
+        Pose for zero cranks.
+    theta, phi : ndarray, shape (3,)
+        Rocker angles there, towards platform and drive, fixed frame.
+    J : ndarray, shape (3, 3)
+        Velocity matrix there.
+    coupler_direction : ndarray, shape (3,)
+        ``beta_u``, angle of the coupler from crank to rocker, fixed frame.
+    sine, cosine : ndarray, shape (3,)
+        ``s``, ``c`` of ``gamma = beta_u - phi``; transmission is good for s near +1 or -1.
+    crank, phase, coupler, rocker : ndarray, shape (3,)
+        Dimensions of the drives.
+    """
+
+    home: Array
+    theta: Array
+    phi: Array
+    J: Array
+    coupler_direction: Array
+    sine: Array
+    cosine: Array
+    crank: Array
+    phase: Array
+    coupler: Array
+    rocker: Array
+
+    @property
+    def gains(self) -> Complex:
+        """Phasor of the pose per unit length of each crank, shape (3, 3): column k belongs to crank k."""
+        turn = np.exp(1j * (self.phase - self.coupler_direction))
+        return np.asarray(self.J * turn / (self.rocker * self.sine))
+
+    @property
+    def first_harmonic(self) -> Complex:
+        """Predicted phasor of ``(x, y, alpha)``; relative error of second order in the cranks."""
+        return np.asarray(self.gains @ self.crank)
+
+    @property
+    def mean_shift(self) -> Array:
+        """Predicted mean of ``phi - phi_home`` of each rocker; relative error of second order."""
+        c, s, g = self.cosine, self.sine, 0.5
+        bracket = g * c / self.rocker**2 - g / (self.coupler * self.rocker)
+        return np.asarray(self.crank**2 / (2.0 * s**3) * bracket)
+
+    @property
+    def second_over_first(self) -> Array:
+        """Predicted ratio of second to first harmonic of each rocker: ``l_B / (4 l_BC)`` at a right-angle home."""
+        tilt = self.cosine / self.rocker - np.exp(2j * np.arctan2(self.sine, self.cosine)) / self.coupler
+        return np.asarray(self.crank * np.abs(tilt) / (4.0 * self.sine**2))
+
+    @checked
+    def rockers(self, psi: ArrayLike) -> Array:
+        """Rocker motion ``phi - phi_home`` at wheel angles, shape (..., 3); error of third order in the cranks."""
+        eta = finite_array("psi", psi, nan=True)[..., None] + self.phase - self.coupler_direction
+        gamma = np.arctan2(self.sine, self.cosine)
+        first = self.crank * np.cos(eta) / (self.rocker * self.sine)
+        bracket = self.cosine * np.cos(eta) ** 2 / self.rocker**2
+        bracket = bracket - np.cos(eta + gamma) ** 2 / (self.coupler * self.rocker)
+        return np.asarray(first + self.crank**2 / (2.0 * self.sine**3) * bracket)
+
+    @checked
+    def poses(self, psi: ArrayLike) -> Array:
+        """Platform motion of first order, shape (..., 3): an ellipse about the home pose."""
+        turn = np.exp(1j * finite_array("psi", psi, nan=True))[..., None]
+        return np.asarray(self.home + (turn * self.first_harmonic).real)
+
+
+class CrankScale(NamedTuple):
+    """Measured harmonics for cranks multiplied by ``scale``; ``predicted`` is the phasor of first order.
+
+    ``first_error`` is the relative error of the predicted first harmonic, ``second`` the total distortion, ``mean`` the
+    mean of the pose relative to home over the first harmonic; all with ``Lc``.
+    """
+
+    scale: float
+    predicted: Complex
+    first: Complex
+    first_error: float
+    second: float
+    mean: float
+
+
+@checked
+def small_crank(mechanism: SingleMotorPlatform) -> SmallCrank:
+    """Evaluate the small-crank theory at the home pose.
+
+    Raises
+    ------
+    GeometryError
+        If the mechanism has no regular home pose: a drive that locks there, or a singular platform.
+
+    Notes
+    -----
+    Specification parallel_platform, section 9.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+    >>> theory = small_crank(SingleMotorPlatform(crank=(9.0, 9.0, 9.0)))
+    >>> theory.second_over_first.round(12).tolist()  # l_B / (4 l_BC)
+    [0.05, 0.05, 0.05]
+    """
+    still = replace(mechanism, crank=(0.0, 0.0, 0.0))
+    state = still.drive(0.0)
+    home = still.home_pose(0.0)
+    frame, delta = np.array(mechanism.frame_angle), np.array(mechanism.delta)
+    phi = state.theta - delta
+    turn = np.exp(1j * frame)
+    rocker = np.array(mechanism.rocker) * np.exp(1j * phi)
+    link = (np.array(mechanism.pivot) - np.array(mechanism.axis)) * turn + rocker
+    direction = np.angle(link)
+    gamma = direction - phi
+    sine = np.sin(gamma)
+    for k in range(3):
+        if abs(sine[k]) < 1e-9:
+            raise GeometryError(
+                f"drive {k + 1} locks at home: coupler and rocker in line; change the coupler or the distance of axes"
+            )
+    return SmallCrank(
+        home, state.theta, phi, mechanism.platform.velocity_matrix(home, state.theta), direction, sine, np.cos(gamma),
+        np.array(mechanism.crank), np.array(mechanism.phase), np.array(mechanism.coupler), np.array(mechanism.rocker),
+    )  # fmt: skip
+
+
+@checked
+def crank_scaling(
+    mechanism: SingleMotorPlatform, scales: Sequence[float] = (1.0, 0.5, 0.25, 0.125), *, samples: int = 64
+) -> tuple[CrankScale, ...]:
+    """Predicted against measured harmonics for cranks multiplied by each scale: the limit to a sinusoid, measured.
+
+    Distortion and mean fall in proportion to the scale, the error of the first harmonic with its square.
+
+    Raises
+    ------
+    GeometryError
+        If a turn is not complete at some scale.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
+    >>> large, small = crank_scaling(SingleMotorPlatform(crank=(4.0, 4.0, 4.0)), (1.0, 0.5))
+    >>> round(large.second / small.second, 1), round(large.first_error / small.first_error, 1)
+    (2.0, 4.0)
+    """
+    weight = np.array([1.0, 1.0, mechanism.Lc])
+    psi = np.linspace(0.0, math.tau, samples + 1)
+    found = []
+    for scale in finite_array("scales", scales).ravel():
+        lengths = [float(scale) * length for length in mechanism.crank]
+        scaled = replace(mechanism, crank=(lengths[0], lengths[1], lengths[2]))
+        theory, motion = small_crank(scaled), scaled.full_turn(psi)
+        if not motion.complete:
+            raise GeometryError(f"cranks {lengths} make no full turn: {motion.stop_reason()}; use smaller scales")
+        measured = harmonics(motion.pose[:-1])
+        first, predicted = measured.order(1), theory.first_harmonic
+        size = float(np.linalg.norm(weight * first))
+        error = float(np.linalg.norm(weight * (first - predicted))) / size
+        mean = float(np.linalg.norm(weight * (measured.mean - theory.home))) / size
+        distortion = measured.total_distortion(mechanism.Lc)
+        found.append(CrankScale(float(scale), predicted, first, error, distortion, mean))
+    return tuple(found)
