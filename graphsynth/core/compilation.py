@@ -26,7 +26,7 @@ from graphsynth.core.native.library import Native
 __all__ = ["Intrinsic", "Kernel", "announce", "kernel", "prepare_numba", "source_digest"]
 
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+(\([^)]*\)|[^#\n]+))?", re.MULTILINE)
-_ROOT = Path(__file__).parent.parent
+_ROOT = Path(__file__).parents[2]
 _VERSIONS = 8  # of one function for one machine that are kept beside each other
 _UNKEPT = (
     "kernels are compiled in memory, anew in every process, as no folder can be written to keep them: name one with "
