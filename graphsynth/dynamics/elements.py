@@ -213,8 +213,8 @@ class JointFriction:
     at once.  In a turning pair v is ``radius`` times the relative speed and the friction torque ``mu radius |F|`` with
     F the pin force; in a sliding pair the friction force is ``mu (|N1| + |N2|)``, N1 and N2 the normal forces at the
     ends of a shoe of the given ``length`` that carry the guide's force and couple (0: the force alone).  Sticking is a
-    state with events, see ``docs/explanation/planar-dynamics.md``; ``regular_speed > 0`` asks for the smooth law
-    ``mu(v) tanh(v/regular_speed)`` instead, which never sticks.
+    state with events, see ``docs/explanation/planar-dynamics.md``; ``smoothing_velocity > 0`` asks for the smooth law
+    ``mu(v) tanh(v/smoothing_velocity)`` instead, which never sticks.
 
     Raises
     ------
@@ -229,7 +229,7 @@ class JointFriction:
     radius: float = 0.0
     length: float = 0.0
     stribeck_speed: float = math.inf
-    regular_speed: float = 0.0
+    smoothing_velocity: float = 0.0
 
     def __post_init__(self) -> None:
         _pair(self, "joint friction")
@@ -241,7 +241,7 @@ class JointFriction:
             raise GeometryError(
                 f"kinetic {name} = {self.kinetic} is above static = {static}; exchange them or make them equal"
             )
-        for part in ("radius", "length", "regular_speed"):
+        for part in ("radius", "length", "smoothing_velocity"):
             object.__setattr__(self, part, not_negative(f"{part} {name}", getattr(self, part)))
         if not (isinstance(self.stribeck_speed, float) and self.stribeck_speed == math.inf):
             object.__setattr__(self, "stribeck_speed", finite(f"stribeck_speed {name}", self.stribeck_speed))
@@ -249,9 +249,9 @@ class JointFriction:
             raise GeometryError(
                 f"static {name} above kinetic needs stribeck_speed, the speed at which friction falls (0: at once)"
             )
-        if static > self.kinetic and self.stribeck_speed == 0.0 < self.regular_speed:
+        if static > self.kinetic and self.stribeck_speed == 0.0 < self.smoothing_velocity:
             raise GeometryError(
-                f"regular_speed {name} cannot represent a coefficient that falls at once; leave it out, or give a "
+                f"smoothing_velocity {name} cannot represent a coefficient that falls at once; leave it out, or give a "
                 "stribeck_speed"
             )
 

@@ -53,7 +53,7 @@ def balance_at(
     elif T.lower.size:
         a, lam = kernels.accelerate(T, x, J, gam, Q, np.zeros(7))
     else:
-        assert own is not None  # massless links: minimal form only
+        assert own is not None  # massless links: one-coordinate form only
         a = own
         lam = np.linalg.lstsq(J.T, Q - T.mass @ a, rcond=1e-12)[0]
     inertial = T.mass @ a

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["simulate_dynamics"]
 
 Array = NDArray[np.float64]
-FormName = Literal["auto", "minimal", "reduced", "constrained"]
-FORMS = ("auto", "minimal", "reduced", "constrained")
+FormName = Literal["auto", "one-coordinate", "partitioned", "augmented"]
+FORMS = ("auto", "one-coordinate", "partitioned", "augmented")
 
 
 def simulate_dynamics(
@@ -63,10 +63,10 @@ def simulate_dynamics(
         A consistent start; found from the next five if not given.
     pose, rates, keep, keep_rates, modes : optional
         As for :func:`consistent_start`.
-    form : {"auto", "minimal", "reduced", "constrained"}
-        Minimal: one coordinate through the planar engine.  Reduced: independent coordinates chosen by pivoted QR,
-        changed where they fail.  Constrained: all coordinates, multipliers, projection.  Auto takes the minimal form
-        where it exists, and the constrained one elsewhere and beyond a fold.
+    form : {"auto", "one-coordinate", "partitioned", "augmented"}
+        One-coordinate: one coordinate through the planar engine.  Partitioned: independent coordinates chosen by
+        pivoted QR, changed where they fail.  Augmented: all coordinates, multipliers, projection.  Auto takes the
+        one-coordinate form where it exists, and the augmented one elsewhere and beyond a fold.
     method : str
         "DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA" of scipy; "CVODE" (extra ``stiff``).
     rtol, atol : float, optional
@@ -75,7 +75,7 @@ def simulate_dynamics(
     outputs : {"interpolated", "exact"}
         Exact: steps end at every output time; dearer, and as accurate as the steps themselves.
     project : bool, optional
-        Project onto the constraints after every accepted step (constrained form).
+        Project onto the constraints after every accepted step (augmented form).
     estimate_error : bool, optional
         Run a second time at a hundredth of the tolerance.
     max_steps : int, optional
@@ -100,7 +100,7 @@ def simulate_dynamics(
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 11), keep={(0, 1): 0.0})
     >>> motion.completed, motion.checks.energy < 1e-10, motion.form
-    (True, True, 'minimal')
+    (True, True, 'one-coordinate')
     """
     grid = _times(times)
     compiled = compile_model(model)
@@ -194,39 +194,40 @@ class _Run:
 
 def make_form(compiled: Compiled, report: StartReport, name: str, project: bool) -> Form:
     """Return the formulation by name."""
-    if name == "minimal":
-        from graphsynth.dynamics.forms.one_coordinate import MinimalForm
+    if name == "one-coordinate":
+        from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm
 
-        return MinimalForm(compiled, report)
-    if name == "reduced":
-        from graphsynth.dynamics.forms.partitioned import ReducedForm
+        return OneCoordinateForm(compiled, report)
+    if name == "partitioned":
+        from graphsynth.dynamics.forms.partitioned import PartitionedForm
 
-        return ReducedForm(compiled, report)
-    from graphsynth.dynamics.forms.augmented import ConstrainedForm
+        return PartitionedForm(compiled, report)
+    from graphsynth.dynamics.forms.augmented import AugmentedForm
 
-    return ConstrainedForm(compiled, report, project)
+    return AugmentedForm(compiled, report, project)
 
 
 def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, options: StepOptions) -> _Run:
-    """Integrate once; in the form "auto" beyond a fold again in the constrained form."""
-    from graphsynth.dynamics.forms.one_coordinate import minimal_obstacle
+    """Integrate once; in the form "auto" beyond a fold again in the augmented form."""
+    from graphsynth.dynamics.forms.one_coordinate import one_coordinate_obstacle
 
     chosen = name
     if name == "auto":
-        chosen = "constrained" if minimal_obstacle(compiled.model) or report.pose_class == "singular" else "minimal"
+        none = one_coordinate_obstacle(compiled.model) or report.pose_class == "singular"
+        chosen = "augmented" if none else "one-coordinate"
     try:
         run = _run(compiled, report, grid, chosen, options)
     except GeometryError as error:
-        if name != "auto" or chosen != "minimal" or compiled.model.massless:
+        if name != "auto" or chosen != "one-coordinate" or compiled.model.massless:
             raise
-        other = _run(compiled, report, grid, "constrained", options)
-        text = f"the minimal form does not start here ({error}); constrained form used"
+        other = _run(compiled, report, grid, "augmented", options)
+        text = f"the one-coordinate form does not start here ({error}); augmented form used"
         other.events.insert(0, DynamicEvent("fold", float(grid[0]), 0.0, text))
         return other
-    if name == "auto" and chosen == "minimal" and run.done < len(grid) and not compiled.model.massless:
-        other = _run(compiled, report, grid, "constrained", options)
+    if name == "auto" and chosen == "one-coordinate" and run.done < len(grid) and not compiled.model.massless:
+        other = _run(compiled, report, grid, "augmented", options)
         why = run.form.why or run.trail.message
-        text = f"the minimal form ends at t = {run.trail.time:.9g} s ({why}); constrained form used"
+        text = f"the one-coordinate form ends at t = {run.trail.time:.9g} s ({why}); augmented form used"
         other.events.insert(0, DynamicEvent("fold", run.trail.time, abs(run.trail.last_step), text))
         return other
     return run
@@ -301,7 +302,7 @@ def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
     rate = max(speed, turn, gravity) or 1.0
     energy = max(0.5 * rate**2 * float((np.diag(T.mass) * unit**2).max()), 1e-300)
     own = getattr(form, "unit", unit)
-    if form.name == "minimal":
+    if form.name == "one-coordinate":
         joint = compiled.model.mechanism.joint(*compiled.model.mechanism.drivers[0].pair)
         own = np.array([T.size if joint.kind == "P" else 1.0])
     return np.concatenate([own, rate * own, [energy]])
@@ -316,7 +317,7 @@ def _result(
     fits: list[FrictionAt | None] = []
     for k in range(done):
         slots = run.slots[k]
-        if run.name != "constrained":
+        if run.name != "augmented":
             from graphsynth.dynamics.values import initial_slots
 
             slots = initial_slots(compiled, run.q[k])
@@ -329,7 +330,7 @@ def _result(
     for k, b in enumerate(balances):
         a[k], lam[k], kinetic[k], potential[k] = b.a, b.multipliers, b.kinetic, b.potential
     second = run.own[:done]
-    if run.name == "constrained":
+    if run.name == "augmented":
         second = second_accelerations(compiled, report, grid[:done], run.q[:done], run.v[:done])
     checks = checks_of(
         compiled,

@@ -125,7 +125,7 @@ class DynamicModel:
     Parameters
     ----------
     mechanism : Mechanism
-        Its drivers name the independent coordinates of the minimal form; they are free to move, their laws unused.
+        Its driver names the coordinate of the one-coordinate form; drivers are free to move, their laws unused.
     bodies : mapping of int to Body
         One for every moving link.
     elements : iterable of Spring, TorsionSpring, Force, Torque, TorqueSource, JointFriction
@@ -231,7 +231,7 @@ class DynamicModel:
 
     @property
     def massless(self) -> tuple[int, ...]:
-        """Links whose mass or inertia is zero: allowed in the minimal form only."""
+        """Links whose mass or inertia is zero: allowed in the one-coordinate form only."""
         return tuple(link for link, body in self.bodies.items() if not (body.mass > 0.0 and body.inertia > 0.0))
 
     @property

@@ -13,7 +13,7 @@ from graphsynth.dynamics.singular import branch_tangents
 from graphsynth.dynamics.values import Values
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.forms.augmented import ConstrainedForm
+    from graphsynth.dynamics.forms.augmented import AugmentedForm
 
 __all__ = ["passed_singular_pose"]
 
@@ -26,7 +26,7 @@ _ZOOMS = 7
 
 
 def passed_singular_pose(
-    form: ConstrainedForm, start: float, middle: float, end: float, first: Any, second: Any, largest: float
+    form: AugmentedForm, start: float, middle: float, end: float, first: Any, second: Any, largest: float
 ) -> DynamicEvent | None:
     """Locate the minimum of the smallest pivot over two steps with interpolants ``first`` and ``second``."""
 
@@ -60,7 +60,7 @@ def _lowest(pivot: Callable[[float], float], low: float, high: float) -> tuple[f
     return t, least
 
 
-def _branches(form: ConstrainedForm, t: float, q: Array, v: Array) -> str:
+def _branches(form: AugmentedForm, t: float, q: Array, v: Array) -> str:
     """Say which branches meet, and which one the motion follows."""
     values = Values(form.compiled, t, form.slots)
     U, S, Vt = np.linalg.svd(values.scaled_jacobian(q))

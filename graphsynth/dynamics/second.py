@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.forms.one_coordinate import MinimalForm, minimal_obstacle
+from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coordinate_obstacle
 from graphsynth.dynamics.model import Rack, Rigid
 from graphsynth.dynamics.reactions import reactions_from_multipliers, world
 from graphsynth.dynamics.start import StartReport
@@ -29,17 +29,17 @@ def second_accelerations(
 ) -> list[Array | None]:
     """Accelerations of given states by a formulation without multipliers.
 
-    Through the planar engine at up to 20 states if there is a minimal form, in a null-space basis elsewhere; None with
-    friction and where a pose is singular.
+    Through the planar engine at up to 20 states if there is a one-coordinate form, in a null-space basis elsewhere;
+    None with friction and where a pose is singular.
     """
     if compiled.tables.friction.size or compiled.model.massless:
         return [None] * len(q)
     found = [_null_space(compiled, float(t), q[k], v[k]) for k, t in enumerate(times)]
-    if not minimal_obstacle(compiled.model):
+    if not one_coordinate_obstacle(compiled.model):
         for k in np.unique(np.linspace(0, len(q) - 1, min(len(q), 20)).astype(int)) if len(q) else ():
             poses, rates, _ = compiled.to_links(q[k], v[k], np.zeros_like(q[k]))
             try:
-                form = MinimalForm(compiled, replace(report, poses=poses, velocities=rates))
+                form = OneCoordinateForm(compiled, replace(report, poses=poses, velocities=rates))
             except GeometryError:  # next to a fold: the null-space value stays
                 continue
             a = form.accelerations(float(times[k]), form.begin())

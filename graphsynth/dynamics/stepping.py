@@ -238,7 +238,7 @@ class Stepper:
         """
         t, y = float(solver.t), np.asarray(solver.y)
         finished = solver.status == "finished"
-        if self.method not in (*_RUNGE_KUTTA, "Radau") and not finished and self.form.name == "constrained":
+        if self.method not in (*_RUNGE_KUTTA, "Radau") and not finished and self.form.name == "augmented":
             return y, step, True
         changed = self.form.accept(t, y)
         proposed = float(getattr(solver, "h_abs", 0.0))

@@ -143,7 +143,7 @@ class Compiled:
         """What to say where masses are too far apart."""
         return (
             f"masses and inertias differ by a factor of {self.spread:.1g}, too much for double precision; leave out "
-            "what hardly weighs, or use form='minimal'"
+            "what hardly weighs, or use form='one-coordinate'"
         )
 
     def driven(self, t: float) -> Array:
@@ -413,6 +413,6 @@ def _frictions(model: DynamicModel, joints: list[Any], first: list[int]) -> tupl
         joint = joints[index]
         ints.append([first[index], 2 if isinstance(joint, Revolute) else 1, joint.a, joint.b])
         stribeck = e.stribeck_speed if math.isfinite(e.stribeck_speed) else 1e300
-        floats.append([e.kinetic, e.static, stribeck, e.regular_speed, e.radius, e.length, BY_SPEED])
+        floats.append([e.kinetic, e.static, stribeck, e.smoothing_velocity, e.radius, e.length, BY_SPEED])
     table = np.array(floats, dtype=np.float64).reshape(-1, 7)
     return np.array(ints, dtype=np.int64).reshape(-1, 4), table

@@ -139,7 +139,7 @@ class Values:
         T = self.compiled.tables
         nothing = np.full(len(q), np.nan), np.full(len(self.compiled.info), np.nan)
         if not T.lower.size:
-            return *nothing, "; accelerations of massless links: minimal form only", "consistent"
+            return *nothing, "; accelerations of massless links: one-coordinate form only", "consistent"
         x = kernels.state_rows(T, q, v)
         Q, _, _, _, good = kernels.load_vector(T, x, applied)
         if not good:

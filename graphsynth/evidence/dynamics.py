@@ -90,12 +90,12 @@ def dynamics_problem(
     default = signature(simulate_dynamics).parameters["rtol"].default
     times = np.linspace(0.0, end, 8)
     tolerances = (1e-4, 1e-8, default) if effort.quick else (1e-4, 1e-6, 1e-8, 1e-10, default)
-    every: tuple[str, ...] = ("minimal", "constrained", "reduced")
+    every: tuple[str, ...] = ("one-coordinate", "augmented", "partitioned")
     right = truth.coordinates(times) if truth else None
     rows = []
     for method in ("DOP853",) if effort.quick else ("DOP853", "RK45", "LSODA"):
         # the forms are told apart by the default integrator, the integrators by the form that is cheapest
-        forms, asked = (every, tolerances) if method == "DOP853" else (("minimal",), (1e-4, 1e-6, 1e-8))
+        forms, asked = (every, tolerances) if method == "DOP853" else (("one-coordinate",), (1e-4, 1e-6, 1e-8))
         found = dynamics_work_precision(
             model, start, times, forms=forms, methods=(method,), tolerances=asked,
             rounds=min(2, effort.rounds), max_steps=5_000,
@@ -117,7 +117,7 @@ def _row(
     done = r.status == "done" and math.isfinite(r.error)
     status = RowStatus.OK if done else RowStatus.UNRELIABLE if math.isfinite(r.error) else RowStatus.FAILED
     more, error = {"steps": float(r.steps)}, float(r.error)
-    other = "constrained" if form == "reduced" else "reduced"
+    other = "augmented" if form == "partitioned" else "partitioned"
     reference = f"{other} form, DOP853 at 2.3e-14"
     if math.isfinite(r.error):
         try:

@@ -32,7 +32,7 @@ def dynamics_work_precision(
     start: StartReport,
     times: ArrayLike,
     *,
-    forms: Sequence[str] = ("minimal", "constrained", "reduced"),
+    forms: Sequence[str] = ("one-coordinate", "augmented", "partitioned"),
     methods: Sequence[str] = ("DOP853", "RK45", "LSODA"),
     tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10),
     rounds: int = 3,
@@ -59,8 +59,8 @@ def dynamics_work_precision(
     -------
     tuple of WorkRow
         ``method`` is "form, method"; the error is the largest of all coordinates at all times, lengths over the
-        characteristic length (estimated).  The reference of the constrained form is the reduced one at 2.3e-14 and the
-        other way round: another formulation, so no method is compared with itself.
+        characteristic length (estimated).  The reference of the augmented form is the partitioned one at 2.3e-14
+        and the other way round: another formulation, so no method is compared with itself.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def dynamics_work_precision(
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> rows = dynamics_work_precision(model, consistent_start(model, keep={(0, 1): 0.0}), [0.0, 1.0],
-    ...     forms=["constrained"], methods=["DOP853"], tolerances=[1e-6, 1e-10])
+    ...     forms=["augmented"], methods=["DOP853"], tolerances=[1e-6, 1e-10])
     >>> [row.method for row in rows], rows[0].error > rows[1].error
     (['constrained, DOP853', 'constrained, DOP853'], True)
     """
@@ -87,12 +87,12 @@ def dynamics_work_precision(
         raise GeometryError(f"tolerances = {tuple(tolerances)} must be 1e-12 or more; the reference must be tighter")
     whole("rounds", rounds, 1, 1000)
     references = {
-        "constrained": _reference(model, start, times, "reduced"),
-        "reduced": _reference(model, start, times, "constrained"),
+        "augmented": _reference(model, start, times, "partitioned"),
+        "partitioned": _reference(model, start, times, "augmented"),
     }
     rows = []
     for form in forms:
-        truth = references["reduced" if form == "reduced" else "constrained"]
+        truth = references["partitioned" if form == "partitioned" else "augmented"]
         for method in methods:
             rows += [_row(model, start, times, form, method, rtol, truth, rounds, max_steps) for rtol in tolerances]
     return tuple(rows)

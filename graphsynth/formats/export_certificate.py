@@ -169,7 +169,7 @@ def certify_export(
     """Run a model in an engine with several settings and compare with the internal reference (estimated).
 
     The reference is :func:`graphsynth.dynamics.simulate_dynamics` at ``rtol``; its error is estimated by its
-    difference to a second formulation (the constrained form), or, where the first is that form already, by a run at
+    difference to a second formulation (the augmented form), or, where the first is that form already, by a run at
     a hundredth of the tolerance.
 
     Parameters
@@ -279,9 +279,9 @@ def _reference(model: DynamicModel, start: StartReport, grid: Array, rtol: float
     from graphsynth.dynamics.integrate import simulate_dynamics
 
     motion = simulate_dynamics(model, grid, start=start, rtol=rtol, outputs="exact")
-    if motion.form != "constrained":
-        other = simulate_dynamics(model, grid, start=start, rtol=rtol, outputs="exact", form="constrained")
-        how = "difference to the constrained form"
+    if motion.form != "augmented":
+        other = simulate_dynamics(model, grid, start=start, rtol=rtol, outputs="exact", form="augmented")
+        how = "difference to the augmented form"
     else:
         other = simulate_dynamics(model, grid, start=start, rtol=max(rtol / 100.0, 2.3e-14), outputs="exact")
         how = "difference to itself at a hundredth of the tolerance"

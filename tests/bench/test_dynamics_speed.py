@@ -2,7 +2,7 @@
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_dynamics_speed.py
 --benchmark-enable -n0``. No time is asserted: machines differ. Every benchmark checks its result.  Targets on one core:
-four-bar 2 s at 1e-9 in 30 ms, seven-body mechanism 0.03 s at 1e-8 in the constrained form in 300 ms.
+four-bar 2 s at 1e-9 in 30 ms, seven-body mechanism 0.03 s at 1e-8 in the augmented form in 300 ms.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def timed(benchmark, run):
     return benchmark.pedantic(run, rounds=5, warmup_rounds=1)
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("form", ["one-coordinate", "augmented", "partitioned"])
 def test_four_bar(benchmark, form):
     model = g1()
     start = consistent_start(model, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1})
@@ -38,7 +38,7 @@ def test_four_bar(benchmark, form):
     benchmark.extra_info["integration alone, ms"] = round(1e3 * motion.seconds, 1)
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("form", ["one-coordinate", "augmented", "partitioned"])
 def test_seven_body_mechanism(benchmark, form):
     model = seven_body()
     start = consistent_start(model, pose=seven_pose())
@@ -108,11 +108,11 @@ def report(capsys, name, ours, theirs):
 
 @pytest.fixture(scope="module")
 def four_bar_runs():
-    """Error of theta(2) and time of the minimal and the constrained form over tolerances."""
+    """Error of theta(2) and time of the one-coordinate and the augmented form over tolerances."""
     model = g1()
     start = consistent_start(model, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1})
     found = []
-    for form in ("minimal", "constrained"):
+    for form in ("one-coordinate", "augmented"):
         for exponent in range(4, 12):
             run = functools.partial(simulate_dynamics, model, [0.0, 2.0], start=start, form=form, rtol=10.0**-exponent)
             seconds, motion = best_of(run)

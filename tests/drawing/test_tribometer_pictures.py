@@ -45,7 +45,7 @@ def test_platforms_picture(motion):
 def test_incomplete_run_is_marked():
     stormy = MODEL.stiffened(1e4, scaled_damping=False).event_driven(1.0, guard=EventGuard(rate=300.0))
     above, _ = platforms_picture(stormy).axes
-    assert above.get_title(loc="left") == "event storm"
+    assert above.get_title(loc="left") == "Zeno behaviour"
 
 
 def test_phase_picture(motion):

@@ -61,7 +61,7 @@ def test_gear_pair(internal):
     alpha = T / (J1 + J2 * ratio**2)
     assert start.accelerations[1, 2] == pytest.approx(alpha, rel=1e-13)
     assert start.accelerations[2, 2] == pytest.approx((1 if internal else -1) * alpha * ratio, rel=1e-13)
-    motion = simulate_dynamics(model, [0.0, 0.1], start=start, form="constrained")
+    motion = simulate_dynamics(model, [0.0, 0.1], start=start, form="augmented")
     tooth = motion.reactions.between(1, 2)
     # tangential force from the moment balance of wheel 2, at the pitch point
     force = J2 * alpha * ratio / 0.05
@@ -75,7 +75,7 @@ def test_gear_pair(internal):
     # wheel 2 is pushed away from wheel 1, a ring is pulled towards the mesh, whatever the sense of the torque
     sense = -1.0 if internal else 1.0
     assert sense * apart[0, 0] > 0.0 and abs(apart[0, 1]) < 1e-14
-    other = simulate_dynamics(gear_pair(internal, [Torque(0, 1, -T)]), [0.0], pose=start.poses, form="constrained")
+    other = simulate_dynamics(gear_pair(internal, [Torque(0, 1, -T)]), [0.0], pose=start.poses, form="augmented")
     assert sense * other.reactions.separating(1, 2, 0.35)[0, 0] > 0.0
     assert sense * other.reactions.separating(2, 1, 0.35)[0, 0] < 0.0
 
@@ -92,14 +92,14 @@ def test_epicyclic_train():
     mechanism = Mechanism(graph, joints, [Driver(0, 1)], pose=pose)
     model = DynamicModel(mechanism, {1: Body(1.0, 1e-3), 2: Body(0.5, 1e-3), 3: Body(0.2, 1e-4)}, [Torque(0, 1, 0.1)],
                          NO_GRAVITY)  # fmt: skip
-    motion = simulate_dynamics(model, np.linspace(0.0, 2.0, 9), keep_rates={(0, 1): 30.0}, form="constrained")
+    motion = simulate_dynamics(model, np.linspace(0.0, 2.0, 9), keep_rates={(0, 1): 30.0}, form="augmented")
     assert motion.completed and motion.warnings == ()
     assert np.allclose(motion.velocities[:, 2, 2] / motion.velocities[:, 1, 2], zs / (zs + zr), rtol=1e-12)
     assert motion.poses[-1, 2, 2] > 2.0 * math.pi  # the carrier turned: the line of centres was followed
     assert motion.checks.position_drift < 1e-12 and motion.checks.newton_euler < 1e-12
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("form", ["one-coordinate", "augmented", "partitioned"])
 def test_harmonic_motion(form):
     k, m, x0 = 50.0, 2.0, 0.1
     model = slider(m, [Spring(0, 1, (-1.0, 0.0), stiffness=k, free_length=1.0)])
@@ -168,18 +168,18 @@ def test_rigid_joint_and_prescribed_motion():
 def test_sliding_friction_against_closed_form():
     """Block on a level guide slowing down: v0 - mu g t, while the speed is far above the regularising one."""
     mu, v0 = 0.3, 5.0
-    model = slider(2.0, [JointFriction(0, 1, mu, regular_speed=1e-3)], (0.0, -9.81))
+    model = slider(2.0, [JointFriction(0, 1, mu, smoothing_velocity=1e-3)], (0.0, -9.81))
     motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 5), keep={(0, 1): 0.0}, keep_rates={(0, 1): v0},
-                               form="constrained")  # fmt: skip
+                               form="augmented")  # fmt: skip
     assert np.abs(motion.velocities[:, 1, 0] - (v0 - mu * 9.81 * motion.times)).max() < 1e-9
     assert motion.checks.contraction == 0.0 and motion.checks.energy < 1e-9
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("form", ["one-coordinate", "augmented", "partitioned"])
 def test_pin_friction_against_closed_form(form):
     """A balanced wheel of weight W on a pin: torque mu r W (implicit, as friction adds no force)."""
     mu, r, J = 0.2, 0.01, 0.05
-    model = wheel(J, (0.0, -9.81), [JointFriction(0, 1, mu, radius=r, regular_speed=1e-5)])
+    model = wheel(J, (0.0, -9.81), [JointFriction(0, 1, mu, radius=r, smoothing_velocity=1e-5)])
     motion = simulate_dynamics(model, [0.0, 1.0], keep={(0, 1): 0.0}, keep_rates={(0, 1): 20.0}, form=form)
     assert motion.velocities[1, 1, 2] == pytest.approx(20.0 - mu * r * 9.81 / J, rel=1e-9)
 
@@ -190,7 +190,7 @@ def test_friction_that_leaves_no_motion_is_a_failure():
     mechanism = Mechanism(graph, [Prismatic(0, 1), Revolute(1, 2)], [Driver(0, 1), Driver(1, 2)])
     bodies = {1: Body(1e-3, 1e-3), 2: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))}
     start = {"keep": {(0, 1): 0.0, (1, 2): 2.0}, "keep_rates": {(0, 1): 1.0, (1, 2): 0.0}}
-    friction = [JointFriction(0, 1, mu, regular_speed=1e-4) for mu in (0.1, 3.0)]
+    friction = [JointFriction(0, 1, mu, smoothing_velocity=1e-4) for mu in (0.1, 3.0)]
     good, bad = (simulate_dynamics(DynamicModel(mechanism, bodies, [f]), [0.0, 0.01], **start) for f in friction)
     assert good.completed and 0.0 < good.checks.contraction < 1.0
     assert (
@@ -214,7 +214,8 @@ def test_functions_and_constants_agree():
     make = lambda force: wheel(0.2, (0.0, -9.81), [Force(1, force, (0.5, 0.0)), TorsionSpring(0, 1, damping=0.1)])  # noqa: E731
     runs = [
         simulate_dynamics(make(force), [0.0, 1.0], keep={(0, 1): 0.0}, form=form)
-        for force in ((0.3, 0.2), lambda t, place, speed: (0.3, 0.2)) for form in ("minimal", "constrained", "reduced")
+        for force in ((0.3, 0.2), lambda t, place, speed: (0.3, 0.2))
+        for form in ("one-coordinate", "augmented", "partitioned")
     ]  # fmt: skip
     for run in runs[1:]:
         assert abs(run.poses[-1, 1, 2] - runs[0].poses[-1, 1, 2]) < 1e-9
@@ -240,7 +241,7 @@ def test_cam_and_slot_reactions_two_ways():
     )  # fmt: skip
     for mechanism in (cam, yoke):
         model = DynamicModel(mechanism, {1: Body(1.0, 0.01), 2: Body(0.5, 0.01)})
-        motion = simulate_dynamics(model, np.linspace(0.0, 0.5, 6), keep_rates={(0, 1): 12.0}, form="constrained")
+        motion = simulate_dynamics(model, np.linspace(0.0, 0.5, 6), keep_rates={(0, 1): 12.0}, form="augmented")
         assert motion.completed and motion.warnings == ()
         assert motion.checks.newton_euler < 1e-12 and motion.checks.second_form < 1e-12
 
@@ -263,7 +264,7 @@ def test_double_pendulum_against_lagrange(m1, m2, t1, t2, w1, w2):
     exact = np.linalg.solve(A, right)
     size = np.abs(exact).max() * np.linalg.cond(A) + 1.0
     assert np.abs(start.accelerations[1:, 2] - exact).max() < 1e-9 * size
-    reduced = simulate_dynamics(model, [0.0], start=start, form="reduced")
+    reduced = simulate_dynamics(model, [0.0], start=start, form="partitioned")
     assert reduced.checks.second_form < 1e-7
 
 
@@ -273,7 +274,7 @@ def test_effective_inertia_is_twice_the_kinetic_energy(theta, omega, m2, m3):
     model = DynamicModel(four_bar(0.2, 0.6, 0.4, 0.6), {1: bar(1.0, 0.2), 2: bar(m2, 0.6), 3: bar(m3, 0.4)})
     J = effective_inertia(model, [theta, theta + 1e-6], modes={0: 1})
     start = consistent_start(model, keep={(0, 1): theta}, keep_rates={(0, 1): omega}, modes={0: 1})
-    motion = simulate_dynamics(model, [0.0], start=start, form="constrained")
+    motion = simulate_dynamics(model, [0.0], start=start, form="augmented")
     assert motion.kinetic[0] == pytest.approx(0.5 * J.inertia[0] * omega**2, rel=1e-11, abs=1e-14)
     assert (J.inertia[1] - J.inertia[0]) / 1e-6 == pytest.approx(J.slope[0], rel=1e-3, abs=1e-4)
 
@@ -308,7 +309,7 @@ def test_prescribed_law_of_time():
     assert motion.work == pytest.approx(motion.kinetic, rel=1e-10)
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("form", ["one-coordinate", "augmented", "partitioned"])
 def test_constant_forces_of_the_world_and_of_the_body_at_points_off_the_origin(form):
     """A pendulum with both, and weight at a slanted centre of mass: its angle against one equation, integrated."""
     mass, inertia, centre = 2.0, 0.3, 0.4 + 0.1j

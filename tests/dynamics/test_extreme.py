@@ -19,7 +19,7 @@ from graphsynth.dynamics import (
     simulate_dynamics,
 )
 from graphsynth.dynamics.energies import warnings_of
-from graphsynth.dynamics.forms.one_coordinate import MinimalForm
+from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm
 from graphsynth.dynamics.integrate import make_form
 from graphsynth.dynamics.result import Checks
 from graphsynth.dynamics.stiff import CvodeStepper
@@ -42,7 +42,7 @@ def test_case_19_parallelogram_through_the_flat_pose():
     if abs(start.poses[2, 2]) > 1e-9:
         start = consistent_start(model, keep={(0, 1): 1.0}, keep_rates={(0, 1): 3.0}, modes={0: 1})
     motion = simulate_dynamics(model, np.linspace(0.0, 3.0, 31), start=start)
-    assert motion.completed and motion.form == "constrained"
+    assert motion.completed and motion.form == "augmented"
     assert motion.events[0].kind == "fold" and "meet" in motion.events[0].statement
     passed = [event for event in motion.events if event.kind == "singular pose"]
     exact = [(k * math.pi - 1.0) / 3.0 for k in (1, 2, 3)]
@@ -59,7 +59,7 @@ def test_case_19_sensitivity_to_the_start():
     ends = []
     for delta in (0.0, 1e-9):
         start = consistent_start(model, keep={(0, 1): 1.0 + delta}, keep_rates={(0, 1): 3.0}, modes={0: 1})
-        ends.append(simulate_dynamics(model, [0.0, 1.0], start=start, form="constrained").poses[-1, 1:, 2])
+        ends.append(simulate_dynamics(model, [0.0, 1.0], start=start, form="augmented").poses[-1, 1:, 2])
     assert np.abs(ends[0] - ends[1]).max() < 1e-6
 
 
@@ -78,7 +78,7 @@ def test_start_at_a_change_point_follows_the_branch_of_its_velocity(branch, spee
     model, pose, motions = flat_start()
     start = consistent_start(model, pose=pose, rates=speed * motions[branch])
     motion = simulate_dynamics(model, np.linspace(0.0, 0.05, 6), start=start)
-    assert motion.form == "constrained" and motion.completed and motion.checks.energy < 1e-10
+    assert motion.form == "augmented" and motion.completed and motion.checks.energy < 1e-10
     theta, kinetic = motion.poses[:, 1, 2], motion.kinetic[0]
     assert np.abs(motion.kinetic / kinetic - 1.0).max() < 1e-11
     middle = 0.5 * (theta[0] + theta[2])
@@ -99,7 +99,7 @@ def test_start_at_rest_at_a_change_point_is_a_failure_with_a_reason():
     model, pose, _ = flat_start()
     model = DynamicModel(model.mechanism, model.bodies, [Torque(0, 1, 0.1)], (0.0, 0.0))
     motion = simulate_dynamics(model, np.linspace(0.0, 0.05, 6), start=consistent_start(model, pose=pose))
-    assert motion.form == "constrained" and motion.status == "failed"
+    assert motion.form == "augmented" and motion.status == "failed"
     assert motion.steps < 2000 and np.isnan(motion.poses[-1]).all()
 
 
@@ -121,7 +121,7 @@ def test_random_parallelograms_pass_their_flat_poses(seed):
     pose = [(0, 0, 0), (0, 0, theta), (a * math.cos(theta), a * math.sin(theta), 0), (b, 0, theta)]
     along = (-a * speed * math.sin(theta), a * speed * math.cos(theta), 0)
     start = consistent_start(model, pose=pose, rates=[(0, 0, 0), (0, 0, speed), along, (0, 0, speed)])
-    motion = simulate_dynamics(model, np.linspace(0.0, 6.0 / abs(speed), 21), start=start, form="constrained")
+    motion = simulate_dynamics(model, np.linspace(0.0, 6.0 / abs(speed), 21), start=start, form="augmented")
     assert motion.completed and motion.steps < 100 and motion.warnings == ()
     assert np.abs(motion.poses[:, 2, 2]).max() < 1e-9
     passed = sum(event.kind == "singular pose" for event in motion.events)
@@ -130,17 +130,17 @@ def test_random_parallelograms_pass_their_flat_poses(seed):
 
 
 def test_fold_of_the_input_is_left_by_the_constrained_form():
-    """A crank that cannot turn fully: the minimal form ends at the fold, the whole motion goes on."""
+    """A crank that cannot turn fully: the one-coordinate form ends at the fold, the whole motion goes on."""
     bodies = {1: bar(0.4, 0.4), 2: bar(0.35, 0.35), 3: bar(0.5, 0.5)}
     model = DynamicModel(four_bar(0.4, 0.35, 0.5, 0.7), bodies, gravity=(0.0, 0.0))
     start = consistent_start(model, keep={(0, 1): 0.5}, keep_rates={(0, 1): 4.0}, modes={0: 1})
-    failed = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start, form="minimal")
+    failed = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start, form="one-coordinate")
     assert failed.status == "failed" and "fold" in failed.message
     assert np.isnan(failed.poses[-1]).all() and 0.0 < failed.reached < 1.0
     motion = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start)
-    assert motion.completed and motion.form == "constrained" and motion.checks.energy < 1e-9
+    assert motion.completed and motion.form == "augmented" and motion.checks.energy < 1e-9
     assert motion.events[0].kind == "fold" and abs(motion.events[0].time - failed.reached) < 1e-3
-    reduced = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start, form="reduced", rtol=1e-9)
+    reduced = simulate_dynamics(model, [0.0, 1.0, 2.0], start=start, form="partitioned", rtol=1e-9)
     assert reduced.completed
     assert any(event.kind == "change of coordinates" for event in reduced.events)
     assert np.abs(reduced.poses - motion.poses).max() < 1e-5
@@ -153,7 +153,7 @@ def test_every_solver_reports_the_fold_as_a_failure(method):
     model = DynamicModel(four_bar(0.4, 0.35, 0.5, 0.7), bodies, gravity=(0.0, 0.0))
     start = consistent_start(model, keep={(0, 1): 0.5}, keep_rates={(0, 1): 4.0}, modes={0: 1})
     times = np.linspace(0.0, 2.0, 201)
-    motion = simulate_dynamics(model, times, start=start, form="minimal", method=method, rtol=1e-8)
+    motion = simulate_dynamics(model, times, start=start, form="one-coordinate", method=method, rtol=1e-8)
     assert motion.status == "failed" and 0.3 < motion.reached < 0.5
     known = np.isfinite(motion.poses).all(axis=(1, 2))
     assert known[times < motion.reached - 0.02].all() and not known[times > motion.reached].any()
@@ -161,7 +161,7 @@ def test_every_solver_reports_the_fold_as_a_failure(method):
 
 def test_wrong_equations_fail_the_checks(monkeypatch):
     """A slope of the transmission that is off by a thousandth: energy and second formulation say so."""
-    right = MinimalForm.transmission
+    right = OneCoordinateForm.transmission
 
     def wrong(self, theta):
         q, q1, q2 = right(self, theta)
@@ -169,10 +169,12 @@ def test_wrong_equations_fail_the_checks(monkeypatch):
 
     def run():
         torque = Torque(0, 1, lambda t, angle, speed: 0.5)  # given as a function: the uncompiled rates
-        return simulate_dynamics(g1(elements=[torque]), [0.0, 0.5, 1.0], keep={(0, 1): 0.3}, form="minimal", rtol=1e-9)
+        return simulate_dynamics(
+            g1(elements=[torque]), [0.0, 0.5, 1.0], keep={(0, 1): 0.3}, form="one-coordinate", rtol=1e-9
+        )
 
     assert run().warnings == ()
-    monkeypatch.setattr(MinimalForm, "transmission", wrong)
+    monkeypatch.setattr(OneCoordinateForm, "transmission", wrong)
     motion = run()
     assert motion.checks.energy > 1e-5 and motion.checks.second_form > 1e-5
     assert "energy balance" in motion.warnings[0] and "formulations" in motion.warnings[-1]
@@ -180,14 +182,14 @@ def test_wrong_equations_fail_the_checks(monkeypatch):
 
 def test_an_output_without_a_pose_is_a_failure(monkeypatch):
     """Interpolated states that cannot be placed are no gaps in a motion that is called completed."""
-    right = MinimalForm.state
+    right = OneCoordinateForm.state
 
     def lost(self, t, y):
         q, v = right(self, t, y)
         return (q * np.nan if 0.5 < t < 0.6 else q), v
 
-    monkeypatch.setattr(MinimalForm, "state", lost)
-    motion = simulate_dynamics(g1(), np.linspace(0.0, 1.0, 21), keep={(0, 1): 0.3}, form="minimal")
+    monkeypatch.setattr(OneCoordinateForm, "state", lost)
+    motion = simulate_dynamics(g1(), np.linspace(0.0, 1.0, 21), keep={(0, 1): 0.3}, form="one-coordinate")
     assert motion.status == "failed" and "no pose" in motion.message and motion.reached <= 0.55
     assert np.isnan(motion.poses[11:]).all() and np.isfinite(motion.poses[:11]).all()
     assert motion.warnings == ()
@@ -200,24 +202,24 @@ def test_a_check_without_a_value_is_a_warning():
 
 
 def test_case_20_nearly_massless_link():
-    """Coupler times 1e-9: the constrained form against the massless limit in the minimal form."""
+    """Coupler times 1e-9: the augmented form against the massless limit in the one-coordinate form."""
     light = {1: bar(0.2, 0.2), 2: Body(0.6e-9, 0.018e-9, (0.3, 0.0)), 3: bar(0.4, 0.4)}
     none = {**light, 2: Body(0.0, 0.0, (0.3, 0.0))}
     keep = {"keep": {(0, 1): 0.0}, "keep_rates": {(0, 1): 10.0}, "modes": {0: 1}}
-    limit = simulate_dynamics(g1(bodies=none), [0.0, 1.0], form="minimal", **keep)
-    near = simulate_dynamics(g1(bodies=light), [0.0, 1.0], form="constrained", **keep)
+    limit = simulate_dynamics(g1(bodies=none), [0.0, 1.0], form="one-coordinate", **keep)
+    near = simulate_dynamics(g1(bodies=light), [0.0, 1.0], form="augmented", **keep)
     assert near.completed and near.start.condition < 1e3
     assert np.abs(near.poses[-1] - limit.poses[-1]).max() < 1e-7
     assert near.checks.dalembert < 1e-9
     with pytest.raises(GeometryError, match=r"links \[2\] have no mass"):
-        simulate_dynamics(g1(bodies=none), [0.0, 1.0], form="constrained", **keep)
+        simulate_dynamics(g1(bodies=none), [0.0, 1.0], form="augmented", **keep)
 
 
 def test_case_21_large_train_ratio():
     G, Jm = 1e3, 8.2e-6
     model = g1(elements=[TorqueSource(0, 1, 1e-3, G, rotor_inertia=Jm)])
-    motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 5), keep={(0, 1): 0.0}, modes={0: 1}, form="constrained")
-    other = simulate_dynamics(model, np.linspace(0.0, 1.0, 5), keep={(0, 1): 0.0}, modes={0: 1}, form="minimal")
+    motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 5), keep={(0, 1): 0.0}, modes={0: 1}, form="augmented")
+    other = simulate_dynamics(model, np.linspace(0.0, 1.0, 5), keep={(0, 1): 0.0}, modes={0: 1}, form="one-coordinate")
     assert motion.checks.second_form < 1e-9 and motion.checks.energy < 1e-9
     assert np.abs(motion.poses - other.poses).max() < 1e-8
 
@@ -231,12 +233,12 @@ def test_case_18_contradicting_start_is_refused():
 def test_spring_of_length_zero_is_a_failure():
     slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])
     model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [Spring(0, 1, (0, 0), (0, 0), 10.0, 0.1)], gravity=(0.0, 0.0))
-    for form in ("minimal", "constrained", "reduced"):
+    for form in ("one-coordinate", "augmented", "partitioned"):
         motion = simulate_dynamics(model, [0.0, 1.0], keep={(0, 1): 0.0}, form=form)
         assert motion.status == "failed" and "length 0" in motion.message and np.isnan(motion.poses[1]).all()
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("form", ["one-coordinate", "augmented", "partitioned"])
 @pytest.mark.parametrize("damping", [0.0, 2.0])
 def test_a_spring_without_free_length_is_smooth_at_length_zero(form, damping):
     """From length 0 at 1 m/s: exp(-d t / 2) sin(w t) / w with w^2 = 100 - d^2 / 4; and at rest it stays at rest."""
@@ -262,7 +264,7 @@ def test_a_damper_alone_needs_no_length():
     assert motion.coordinate(0, 1)[1][-1] == pytest.approx(np.exp(-2.0), rel=1e-10)
 
 
-@pytest.mark.parametrize("form", ["minimal", "constrained", "reduced"])
+@pytest.mark.parametrize("form", ["one-coordinate", "augmented", "partitioned"])
 def test_a_state_that_is_none_blames_nothing(form):
     """Solvers that lose their way ask for NaN states: that is no word on springs or the mechanism."""
     model = g1(elements=[Spring(0, 2, (0.0, 1.0), (0.1, 0.0), 10.0, 0.1)])
@@ -279,7 +281,7 @@ def driven_rocker(*elements):
     return DynamicModel(mechanism, free.bodies, free.elements, prescribed=[Driver(0, 3, law)]), begin.poses
 
 
-@pytest.mark.parametrize(("form", "method"), [("constrained", "DOP853"), ("constrained", "BDF"), ("reduced", "DOP853")])
+@pytest.mark.parametrize(("form", "method"), [("augmented", "DOP853"), ("augmented", "BDF"), ("partitioned", "DOP853")])
 def test_a_lock_under_prescribed_motion_is_called_one(form, method):
     model, pose = driven_rocker(Spring(0, 2, (0.0, 1.0), (0.1, 0.0), 1.0, 0.1))
     motion = simulate_dynamics(model, np.linspace(0.0, 2.0, 5), pose=pose, form=form, method=method, rtol=1e-8)
@@ -298,11 +300,11 @@ def test_masses_too_far_apart_are_named_not_branches():
         start = consistent_start(model, keep={(0, 1): 0.3})
         motion = simulate_dynamics(model, [0.0, 0.2], start=start)
         expected = expected or motion.poses[-1, 1, 2]
-        assert motion.form == "minimal" and motion.poses[-1, 1, 2] == pytest.approx(expected, abs=1e-6)
+        assert motion.form == "one-coordinate" and motion.poses[-1, 1, 2] == pytest.approx(expected, abs=1e-6)
         if mass > 1e20:
             assert "accelerations are not known: masses and inertias differ by a factor of 1e" in start.message
             with pytest.raises(GeometryError, match=r"differ by a factor of 1e.*too much for double precision"):
-                simulate_dynamics(model, [0.0, 0.2], start=start, form="constrained")
+                simulate_dynamics(model, [0.0, 0.2], start=start, form="augmented")
 
 
 def test_step_limit_is_a_failure():
@@ -312,10 +314,10 @@ def test_step_limit_is_a_failure():
 
 @pytest.mark.parametrize("method", ["RK45", "Radau", "LSODA", "BDF"])
 def test_other_methods(method):
-    """Constrained form: Radau restarts after every projection, multistep methods are projected where they land."""
+    """Augmented form: Radau restarts after every projection, multistep methods are projected where they land."""
     reference = simulate_dynamics(g1(), [0.0, 0.1, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, rtol=1e-12)
     motion = simulate_dynamics(
-        g1(), [0.0, 0.1, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, form="constrained", method=method, rtol=1e-7
+        g1(), [0.0, 0.1, 0.2], keep={(0, 1): 0.0}, modes={0: 1}, form="augmented", method=method, rtol=1e-7
     )
     assert motion.completed and motion.method == method
     assert np.abs(motion.poses - reference.poses).max() < 1e-4
@@ -364,13 +366,13 @@ def test_cvode_keeps_the_limit_of_steps():
 def test_stiff_friction_is_reported_not_quiet():
     """Block braking to rest with a law regularised at 1e-8 m/s: right, or a failure with its time."""
     slider = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Prismatic(0, 1)], [Driver(0, 1)])
-    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [JointFriction(0, 1, 0.3, regular_speed=1e-8)])
+    model = DynamicModel(slider, {1: Body(1.0, 1.0)}, [JointFriction(0, 1, 0.3, smoothing_velocity=1e-8)])
     motion = simulate_dynamics(
         model,
         [0.0, 0.2, 0.5],
         keep={(0, 1): 0.0},
         keep_rates={(0, 1): 1.0},
-        form="constrained",
+        form="augmented",
         rtol=1e-8,
         max_steps=3000,
     )
@@ -387,7 +389,7 @@ def test_case_22_long_run():
     """G1 for 1000 s without damping: energy drift, closure; the phase error is what the error estimate says."""
     motion = simulate_dynamics(
         g1(), np.linspace(0.0, 1000.0, 101), keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1},
-        form="constrained", rtol=1e-12, estimate_error=True,
+        form="augmented", rtol=1e-12, estimate_error=True,
     )  # fmt: skip
     assert motion.completed
     # the crank's angle is some 9000 rad at the end: the joints close to its last digit
@@ -401,6 +403,6 @@ def test_seven_bodies_all_forms_agree():
     start = consistent_start(model, pose=seven_pose())
     ends = [
         simulate_dynamics(model, [0.0, 0.003], start=start, form=form, rtol=rtol).poses[-1]
-        for form, rtol in (("minimal", 1e-12), ("constrained", 1e-12), ("reduced", 1e-11))
+        for form, rtol in (("one-coordinate", 1e-12), ("augmented", 1e-12), ("partitioned", 1e-11))
     ]
     assert np.abs(ends[0] - ends[1]).max() < 1e-10 and np.abs(ends[2] - ends[1]).max() < 1e-9

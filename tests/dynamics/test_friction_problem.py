@@ -38,7 +38,7 @@ def problem_of(model, q, v):
     return FrictionProblem(rows, 0.0, np.asarray(q, float), np.asarray(v, float), np.zeros(1))
 
 
-@pytest.mark.parametrize("law", [{}, {"regular_speed": 1e-6}])
+@pytest.mark.parametrize("law", [{}, {"smoothing_velocity": 1e-6}])
 @pytest.mark.parametrize("r", [0.5, 0.87, 0.999, 1.01, 2.0, 1e6])
 @pytest.mark.parametrize("push", [1.0, -1.0])
 def test_a_shoe_with_a_lever(r, push, law):
@@ -68,7 +68,7 @@ def test_a_second_guide_is_refused_with_the_joints_named(at):
     start = consistent_start(model, keep={(0, 1): 0.0}, keep_rates={(0, 1): 1.0})
     assert start.status == "friction: undetermined"
     assert "joint P 0-1" in start.message and "additional 1: P 0-1" in start.message
-    for form in ("constrained", "reduced"):
+    for form in ("augmented", "partitioned"):
         motion = simulate_dynamics(model, [0.0, 0.1], start=start, form=form)
         assert motion.status == "failed" and start.message in motion.message
 
@@ -80,7 +80,7 @@ def test_friction_that_needs_no_open_reaction_goes_on():
     twice = DynamicModel(slider_crank(), bodies, friction, additional=[Prismatic(0, 3, (0.0, 0.02))])
     once = DynamicModel(slider_crank(), bodies, friction)
     state = {"keep": {(0, 1): 0.5}, "keep_rates": {(0, 1): 5.0}, "modes": {0: 1}}
-    one, two = (simulate_dynamics(model, [0.0, 0.2], form="constrained", **state) for model in (once, twice))
+    one, two = (simulate_dynamics(model, [0.0, 0.2], form="augmented", **state) for model in (once, twice))
     assert two.completed and two.start.pose_class == "redundant"
     assert np.abs(one.poses - two.poses).max() < 1e-9 and np.abs(one.friction.load - two.friction.load).max() < 1e-9
     with_guide = DynamicModel(

@@ -106,7 +106,7 @@ def test_automatic_form_goes_on_where_the_engine_does_not_start():
     model, start, _, _ = random_model(8, 8)
     motion = simulate_dynamics(model, [0.0, 0.01], start=start)
     assert motion.completed
-    assert motion.form == "minimal" or "constrained form used" in motion.events[0].statement
+    assert motion.form == "one-coordinate" or "augmented form used" in motion.events[0].statement
 
 
 CASES = [*((6, seed) for seed in range(4)), *((8, seed) for seed in range(8))]
@@ -116,7 +116,7 @@ CASES = [*((6, seed) for seed in range(4)), *((8, seed) for seed in range(8))]
 def test_reactions_against_fifty_digits(links, seed):
     model, start, points, _ = random_model(links, seed)
     assert start.consistent and start.pose_class == "regular" and start.freedom == 1
-    motion = simulate_dynamics(model, [0.0], start=start, form="constrained")
+    motion = simulate_dynamics(model, [0.0], start=start, form="augmented")
     exact = exact_reactions(model, start, points)
     found = np.array([motion.reactions.between(j.a, j.b).force[0] for j in model.mechanism.joints])
     assert np.abs(found - exact).max() < 1e-12 * np.abs(exact).max() * max(1.0, 0.1 * start.condition)
@@ -128,7 +128,10 @@ def test_forms_agree_or_say_why(links, seed):
     """Random mechanisms soon meet folds and near-singular poses: what is returned agrees, or is a failure."""
     model, start, _, _ = random_model(links, seed)
     times = np.linspace(0.0, 0.3, 7)
-    runs = [simulate_dynamics(model, times, start=start, form=form) for form in ("constrained", "reduced", "minimal")]
+    runs = [
+        simulate_dynamics(model, times, start=start, form=form)
+        for form in ("augmented", "partitioned", "one-coordinate")
+    ]
     for run in runs:
         reached = np.isfinite(run.q).all(axis=1)
         assert run.completed == reached.all() and (run.completed or (run.message and run.reached < times[-1]))

@@ -112,7 +112,7 @@ def test_event_storm_is_said() -> None:
     platform = {"mass_kg": 1, "stiffness_N_per_m": 4e8, "damping_N_s_per_m": 2}
     report = execute(changed(*SAID, "plots", "animations", platform=platform, run={"duration_s": 2, "samples": 401}))
     (record,) = report["records"]
-    assert record.good is False and "Event storm" in record.verdict and "time_stepping" in record.verdict
+    assert record.good is False and "Zeno behaviour" in record.verdict and "time_stepping" in record.verdict
     assert report["plots"] and report["animations"]
     assert not any(t.title == "The other methods" for t in report["tables"])
 

@@ -51,7 +51,7 @@ _REASONS = {
     RunStatus.TOO_MANY_STEPS: "{steps} steps were used up at t = {t:.6g} s; raise max_steps or relax rtol",
     RunStatus.NOT_FINITE: "the derivatives are not finite at t = {t:.6g} s: the mechanism cannot be assembled there or "
     "its inertia vanishes",
-    RunStatus.TOO_MANY_EVENTS: "more than {events} events by t = {t:.6g} s: an event storm; raise max_events if wanted",
+    RunStatus.TOO_MANY_EVENTS: "more than {events} events by t = {t:.6g} s: Zeno behaviour; raise max_events if wanted",
 }
 
 

@@ -18,7 +18,7 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import initial_slots
 
-__all__ = ["ConstrainedForm"]
+__all__ = ["AugmentedForm"]
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.stepping import Trail
@@ -39,7 +39,7 @@ _LANDED, _KEPT = 1e-9, 1e-11
 _LENGTHS, _NODES = (2.0, 1.75, 2.3), 3
 
 
-class ConstrainedForm:
+class AugmentedForm:
     """State ``(q, v, work)``; a solver workspace, not a result.
 
     Attributes
@@ -53,7 +53,7 @@ class ConstrainedForm:
         A body without mass or inertia.
     """
 
-    name = "constrained"
+    name = "augmented"
     stall = (
         "at the singular pose there branches meet or nearly meet, and the equations do not tell how the motion goes "
         "on; change the dimensions, or start elsewhere"
@@ -65,7 +65,7 @@ class ConstrainedForm:
         if compiled.model.massless:
             raise GeometryError(
                 f"links {list(compiled.model.massless)} have no mass or no inertia; give them some, or use "
-                "form='minimal', where the effective inertia may stay positive"
+                "form='one-coordinate', where the effective inertia may stay positive"
             )
         if start.message.endswith(compiled.spread_words):  # the start could not tell the accelerations
             raise GeometryError(compiled.spread_words)
@@ -109,7 +109,7 @@ class ConstrainedForm:
         return np.array(self._one[0])
 
     def _run(self, t: float, y: Array, h: float, A: Array, K: Array, low: int, high: int, applied: Array) -> Array:
-        fresh, _ = self._kernels.constrained_stages(
+        fresh, _ = self._kernels.augmented_stages(
             self.compiled.tables,
             y,
             h,

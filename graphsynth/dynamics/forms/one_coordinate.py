@@ -1,4 +1,4 @@
-"""The minimal form: one independent coordinate through the planar engine (spec 5.4)."""
+"""The one-coordinate form: one independent coordinate through the planar engine (spec 5.4)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["EffectiveInertia", "MinimalForm", "effective_inertia", "minimal_obstacle"]
+__all__ = ["EffectiveInertia", "OneCoordinateForm", "effective_inertia", "one_coordinate_obstacle"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -95,8 +95,8 @@ class EffectiveInertia(NamedTuple):
     slope: Array
 
 
-def minimal_obstacle(model: DynamicModel) -> str:
-    """Why a model has no minimal form through the planar engine; empty if it has one."""
+def one_coordinate_obstacle(model: DynamicModel) -> str:
+    """Why a model has no one-coordinate form through the planar engine; empty if it has one."""
     mechanism = model.mechanism
     if model.additional or model.prescribed:
         return "it has additional constraints or prescribed motions"
@@ -138,28 +138,30 @@ def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, r
     return sign * (np.conj(t) * apart).real, sign * rate.real
 
 
-class MinimalForm:
+class OneCoordinateForm:
     """State ``(theta, omega, work)``; a solver workspace, not a result.
 
     Raises
     ------
     GeometryError
-        A model without a minimal form; the message says why.
+        A model without a one-coordinate form; the message says why.
     """
 
-    name = "minimal"
+    name = "one-coordinate"
     loss = 0.0
     stall = (
         "the input is next to a fold or a change point, where two assembly modes merge or meet, and is no coordinate "
-        "there; use form='constrained' or 'reduced'"
+        "there; use form='augmented' or 'partitioned'"
     )
 
     def __init__(self, compiled: Compiled, start: StartReport) -> None:
         from graphsynth.dynamics import kernels
 
-        obstacle = minimal_obstacle(compiled.model)
+        obstacle = one_coordinate_obstacle(compiled.model)
         if obstacle:
-            raise GeometryError(f"there is no minimal form: {obstacle}; use form='constrained' or form='reduced'")
+            raise GeometryError(
+                f"there is no one-coordinate form: {obstacle}; use form='augmented' or form='partitioned'"
+            )
         self.compiled = compiled
         self.changes: list[tuple[float, str]] = []
         self.why = ""
@@ -210,7 +212,7 @@ class MinimalForm:
         return self._one[0].copy() if self._good() else self._failed(y)
 
     def _run(self, y: Array, h: float, A: Array, K: Array, low: int, high: int) -> Array:
-        found = self._kernels.minimal_stages(
+        found = self._kernels.one_coordinate_stages(
             self.compiled.tables, self.E, self.S, self.compiled.centres, self._none, np.ascontiguousarray(y), h, A, K,
             low, high, self._out,
         )  # fmt: skip
@@ -247,7 +249,7 @@ class MinimalForm:
         else:
             self.why = (
                 f"the coordinate cannot go beyond {self.S.u[0]:.9g}: at a fold next to it two assembly modes merge, "
-                "and it is no coordinate there; use form='constrained' or 'reduced'"
+                "and it is no coordinate there; use form='augmented' or 'partitioned'"
             )
         return np.full(3, np.nan)
 
@@ -319,7 +321,7 @@ class MinimalForm:
             if min(before, after) < _CLOSE and slope is not None and before + slope * h < 0.0:
                 self.why = (
                     f"two assembly modes of group {step.group} meet near the input {float(y[0]):.6g}, and the minimal "
-                    "form cannot tell how the motion goes on; use form='constrained'"
+                    "form cannot tell how the motion goes on; use form='augmented'"
                 )
                 return True
         return False
@@ -401,7 +403,7 @@ def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object)
     from graphsynth.dynamics.tables import compile_model
     from graphsynth.kinematics.simulation import simulate
 
-    obstacle = minimal_obstacle(model)
+    obstacle = one_coordinate_obstacle(model)
     if obstacle:
         raise GeometryError(f"there is no effective inertia: {obstacle}")
     compiled = compile_model(model)

@@ -1,4 +1,4 @@
-"""The reduced form: independent coordinates chosen by column-pivoted QR, changed where they fail (spec 5.4)."""
+"""The partitioned form: independent coordinates chosen by column-pivoted QR, changed where they fail (spec 5.4)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import initial_slots
 
-__all__ = ["ReducedForm", "independent_coordinates"]
+__all__ = ["PartitionedForm", "independent_coordinates"]
 
 Array = NDArray[np.float64]
 
@@ -40,14 +40,14 @@ def independent_coordinates(scaled: Array, tolerance: float = 1e-10) -> NDArray[
     return np.sort(order[rank:])
 
 
-class ReducedForm:
+class PartitionedForm:
     """State ``(z, dz/dt, work)`` with z some of the coordinates; a solver workspace, not a result.
 
     Dependent coordinates are solved by Newton's method at every evaluation; ``(N^T M N) z'' = N^T (Q - M a0)`` with
     ``N`` the velocity map and ``a0`` the accelerations at ``z'' = 0``.
     """
 
-    name = "reduced"
+    name = "partitioned"
     stall = (
         "at the singular pose there branches meet or nearly meet, and the equations do not tell how the motion goes "
         "on; change the dimensions, or start elsewhere"
@@ -100,7 +100,7 @@ class ReducedForm:
 
     def _place(self, t: float, y: Array, near: Array) -> tuple[Array, Array, float]:
         """Coordinates, velocities and smallest pivot of the constraints with the chosen coordinates; -1 if not."""
-        found = self._kernels.place_reduced(
+        found = self._kernels.place_partitioned(
             self.compiled.tables, np.ascontiguousarray(y), self.chosen, near, self._metric, self.slots, self._driven(t)
         )
         return found[0], found[1], float(found[2])
@@ -117,7 +117,7 @@ class ReducedForm:
             self._look()
             return q, float("nan")
         applied = applied_loads(self.compiled, t, q, v) if self.compiled.applied else self._none
-        a, P = self._kernels.accelerate_reduced(
+        a, P = self._kernels.accelerate_partitioned(
             self.compiled.tables, q, v, self.chosen, self._metric, self.slots, self._driven(t), applied, self.out
         )
         self._look()
@@ -144,7 +144,7 @@ class ReducedForm:
             return None
 
         def run(t: float, y: Array, h: float, A: Array, K: Array) -> Array:
-            fresh = self._kernels.reduced_stages(
+            fresh = self._kernels.partitioned_stages(
                 self.compiled.tables, y, h, A, K, 1, len(A), self.chosen, self._near, self._metric, self.slots,
                 self.compiled.driven_at(t + h * A.sum(axis=1)), self._none, self.out,
             )  # fmt: skip

@@ -248,6 +248,6 @@ class DryMotion:
         self._recent = [*count[1:], t]
         if self._short >= 3 or t - self._recent[0] < _WINDOW / _RATE:
             trail.message = (
-                f"event storm: more than {_RATE:g} changes between sticking and sliding a second at t = {t:.9g} s; "
-                "give the friction a regular_speed"
+                f"Zeno behaviour: more than {_RATE:g} changes between sticking and sliding a second at t = {t:.9g} s; "
+                "give the friction a smoothing_velocity"
             )

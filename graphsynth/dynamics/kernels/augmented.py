@@ -1,4 +1,4 @@
-"""The constrained form: rates at the stages of a step, projection.
+"""The augmented form: rates at the stages of a step, projection.
 
 Sums are written out: numba takes longer to compile one matrix product or array expression than a kernel of loops.
 """
@@ -51,7 +51,7 @@ def project_state(T, q, v, phi, qd):
 
 
 @kernel
-def constrained_stages(T, y, h, A, K, low, high, phi, driven, applied, out):
+def augmented_stages(T, y, h, A, K, low, high, phi, driven, applied, out):
     """Rates of (q, v, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state, multipliers.
 
     ``driven`` holds the prescribed coordinates of every stage, or one set for all.

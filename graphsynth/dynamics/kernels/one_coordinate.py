@@ -1,4 +1,4 @@
-"""The minimal form through the planar engine: rates at the stages of a step."""
+"""The one-coordinate form through the planar engine: rates at the stages of a step."""
 
 import math
 
@@ -35,7 +35,7 @@ def centre_motion(T, E, S, centres, theta):
 
 
 @kernel
-def minimal_stages(T, E, S, centres, applied, y, h, A, K, low, high, out):
+def one_coordinate_stages(T, E, S, centres, applied, y, h, A, K, low, high, out):
     """Rates of (theta, omega, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state.
 
     Without loads given as functions; NaN where the engine, started at its sample 0, does not reach.  ``out``: effective

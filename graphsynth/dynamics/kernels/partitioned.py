@@ -1,4 +1,4 @@
-"""The reduced form: dependent coordinates by Newton's method, accelerations in the velocity map, rates of a step."""
+"""The partitioned form: dependent coordinates by Newton's method, accelerations in the velocity map, rates."""
 
 import math
 
@@ -28,7 +28,7 @@ def extended(J, chosen):
 
 
 @kernel
-def place_reduced(T, y, chosen, near, metric, phi, qd):
+def place_partitioned(T, y, chosen, near, metric, phi, qd):
     """Coordinates and velocities of a state (z, dz/dt, work), by Newton's method from ``near``; smallest pivot.
 
     The pivot is -1, and the coordinates are NaN, where that does not converge.  ``metric`` is diagonal: one over the
@@ -67,10 +67,10 @@ def place_reduced(T, y, chosen, near, metric, phi, qd):
 
 
 @kernel
-def accelerate_reduced(T, q, v, chosen, metric, phi, qd, applied, out):
+def accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, out):
     """Accelerations by ``(N^T M N) z'' = N^T (Q - M a0)`` and the power of non-conservative loads and drivers.
 
-    Multipliers serve friction alone.  ``out`` as in `constrained_stages`.
+    Multipliers serve friction alone.  ``out`` as in `augmented_stages`.
     """
     n, c, flat = q.shape[0], chosen.shape[0], metric.shape[0] > 0
     x = state_rows(T, q, v)
@@ -123,7 +123,7 @@ def accelerate_reduced(T, q, v, chosen, metric, phi, qd, applied, out):
 
 
 @kernel
-def reduced_stages(T, y, h, A, K, low, high, chosen, near, metric, phi, driven, applied, out):
+def partitioned_stages(T, y, h, A, K, low, high, chosen, near, metric, phi, driven, applied, out):
     """Rates of (z, dz/dt, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state.
 
     ``driven`` holds the prescribed coordinates of every stage, or one set for all.
@@ -133,10 +133,10 @@ def reduced_stages(T, y, h, A, K, low, high, chosen, near, metric, phi, driven, 
     for s in range(low, high):
         state = combined(y, h, K, A[s], s)
         qd = driven[min(s, driven.shape[0] - 1)]
-        q, v, pivot = place_reduced(T, state, chosen, near, metric, phi, qd)
+        q, v, pivot = place_partitioned(T, state, chosen, near, metric, phi, qd)
         if pivot < 0.0:
             out[6] = 3.0
-        a, P = accelerate_reduced(T, q, v, chosen, metric, phi, qd, applied, out)
+        a, P = accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, out)
         for k in range(c):
             K[s, k], K[s, c + k] = state[c + k], a[chosen[k]]
         K[s, 2 * c] = P

@@ -166,7 +166,7 @@ _INSTRUMENTS = _rows(
     9.11  | stick_slip:refusal         | two-coefficient law asked of the regularised form
     9.12* | stick_slip:regularisation  | regularisation from 1e-2 to 1e-8, four solvers
     9.13  | stick_slip:stiff_spring    | stiff spring with scaled damping
-    9.14  | stick_slip:storm           | event storm
+    9.14  | stick_slip:storm           | Zeno behaviour
     9.15  | stick_slip:belt_limits     | belt from 1e-6 to 10 m/s
     9.16  | braider:inductance         | singular perturbation: inductance to zero
     9.17  | braider:fast_reactions     | inertia-dominated reactions

@@ -87,7 +87,7 @@ def dynamic_model(machine: PistonMachine, slot: Literal["sliding", "crowned"] = 
     if not slider:
         pairs["yoke"] = (2, 3)
     elements: list[Element] = [
-        JointFriction(a, b, getattr(friction, name), regular_speed=friction.regular_speed)
+        JointFriction(a, b, getattr(friction, name), smoothing_velocity=friction.smoothing_velocity)
         for name, (a, b) in pairs.items()
         if getattr(friction, name) > 0.0
     ]
@@ -107,7 +107,7 @@ def _gas(machine: PistonMachine, link: int) -> Force:
         gap = outer.piston - (along[0] * place[0] + along[1] * (place[1] - above))
         rate = along[0] * velocity[0] + along[1] * velocity[1]
         given = machine.gas.force(np.array([t]), np.array([gap]), np.array([rate > 0.0]), stroke)
-        size = float(given[0]) + friction.rings * math.tanh(rate / friction.regular_speed)
+        size = float(given[0]) + friction.rings * math.tanh(rate / friction.smoothing_velocity)
         return -along[0] * size, -along[1] * size
 
     return Force(link, law)

@@ -46,7 +46,7 @@ class PistonMasses:
 class PistonFriction:
     """Coefficients of dry friction in the sliding pairs, and the friction of the rings.
 
-    ``mu tanh(v / regular_speed) |N|`` acts against the sliding, N the normal force; pins run without friction.
+    ``mu tanh(v / smoothing_velocity) |N|`` acts against the sliding, N the normal force; pins run without friction.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class PistonFriction:
         Of crosshead on guide, piston on cylinder, piston in the crosshead's slot, block in the yoke.
     rings : float
         Force of the piston rings, N, whatever the side load.
-    regular_speed : float
+    smoothing_velocity : float
         m/s.
     """
 
@@ -63,13 +63,13 @@ class PistonFriction:
     slot: float = 0.0
     yoke: float = 0.0
     rings: float = 0.0
-    regular_speed: float = 1e-3
+    smoothing_velocity: float = 1e-3
 
     def __post_init__(self) -> None:
         for name in ("guide", "cylinder", "slot", "yoke", "rings"):
             object.__setattr__(self, name, not_negative(f"friction {name}", getattr(self, name)))
-        object.__setattr__(self, "regular_speed", positive("regular_speed", self.regular_speed))
-        check_fields(self, ("regular_speed",), small=("guide", "cylinder", "slot", "yoke", "rings"))
+        object.__setattr__(self, "smoothing_velocity", positive("smoothing_velocity", self.smoothing_velocity))
+        check_fields(self, ("smoothing_velocity",), small=("guide", "cylinder", "slot", "yoke", "rings"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -142,7 +142,7 @@ class _Balance:
 
     def _mu(self, name: str, speed: Array) -> Array:
         friction = self.machine.friction
-        return np.asarray(getattr(friction, name) * np.tanh(speed / friction.regular_speed))
+        return np.asarray(getattr(friction, name) * np.tanh(speed / friction.smoothing_velocity))
 
     def _own_forces(self) -> Complex:
         """Force that gas and rings put on the piston."""

@@ -108,7 +108,7 @@ def _machine(table: PistonTable, kind: str) -> PistonMachine:
         ),
         PistonFriction(
             friction.guide, friction.cylinder, friction.slot, friction.yoke if kind == "scotch_yoke" else 0.0,
-            friction.rings_N, friction.regular_speed_m_s,
+            friction.rings_N, friction.smoothing_velocity_m_s,
         ),
         table.speed_rad_s, 0.0, table.gravity_m_s2,
     )  # fmt: skip

@@ -83,7 +83,7 @@ class FrictionTable:
     slot: float = 0.0
     yoke: float = 0.0
     rings_N: float = 0.0
-    regular_speed_m_s: float = 1e-3
+    smoothing_velocity_m_s: float = 1e-3
 
 
 @dataclass(frozen=True, slots=True)

@@ -269,7 +269,7 @@ def _zone(machine: PistonMachine, reversals: list[float]) -> float:
     motion = machine.mechanism.motion(np.array(reversals))
     steep = max(float(np.abs(part.second).max()) for part in (motion.crosshead, motion.piston, motion.slot))
     steep = max(steep, machine.mechanism.drive.crank)
-    return max(_FINEST * friction.regular_speed / (abs(machine.speed) * steep), 1e-9)
+    return max(_FINEST * friction.smoothing_velocity / (abs(machine.speed) * steep), 1e-9)
 
 
 def _valves(machine: PistonMachine) -> list[float]:

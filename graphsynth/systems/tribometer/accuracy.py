@@ -41,7 +41,7 @@ class AccuracyRow:
     method : str
         "event-driven", "time stepping" or the name of the solver of the regularised form.
     parameter : float
-        Relative tolerance, step (s) or regularisation speed (m/s).
+        Relative tolerance, step (s) or smoothing velocity (m/s).
     error : float
         Largest error of x2 at the times of the study, m; NaN if the run failed.
     event_error : float
@@ -215,7 +215,7 @@ def regularisation_study(
     most_calls: int = 600_000,
     rounds: int = 1,
 ) -> AccuracyStudy:
-    """Error of the regularised form against the regularisation speed (section 3.10), failures included.
+    """Error of the regularised form against the smoothing velocity (section 3.10), failures included.
 
     Parameters
     ----------

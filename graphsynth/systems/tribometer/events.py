@@ -1,4 +1,4 @@
-"""The event loop of stick and slip: states, guards against event storms, located events with error estimates."""
+"""The event loop of stick and slip: states, guards against Zeno behaviour, located events with error estimates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RunStatus(Enum):
 
     COMPLETE = "complete"
     UNRELIABLE = "unreliable"
-    STORM = "event storm"
+    STORM = "Zeno behaviour"
     STEP_LIMIT = "step limit"
     UNRESOLVED = "unresolved contact"
     FAILED = "failed"
@@ -59,7 +59,7 @@ class StickSlipEvent(NamedTuple):
 
 @dataclass(frozen=True)
 class EventGuard:
-    """Bounds beyond which the exact automaton stops with the status "event storm".
+    """Bounds beyond which the exact automaton stops with the status "Zeno behaviour".
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effo
     rows = []
     for rtol in effort.some(sorted({1e-6, 1e-8, 1e-10, own}, reverse=True)):
         runs = [
-            simulate_dynamics(general, [0.0, duration], start=start, form="constrained", rtol=rtol)
+            simulate_dynamics(general, [0.0, duration], start=start, form="augmented", rtol=rtol)
             for _ in range(effort.rounds + 1)
         ]
         found = runs[-1]

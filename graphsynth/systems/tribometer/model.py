@@ -191,7 +191,7 @@ class Tribometer:
         rtol : float
             Relative tolerance of integrated slip pieces (1e-14 to 1e-3); closed-form pieces need none.
         guard : EventGuard, optional
-            Bounds against event storms.
+            Bounds against Zeno behaviour.
         estimate : bool
             Estimate the errors by a second run with a larger tolerance and slightly changed data.
 
@@ -221,7 +221,7 @@ class Tribometer:
     ) -> StickSlipMotion:
         """March with fixed steps and friction impulses from a complementarity problem.
 
-        First order; needs no event location, so it survives event storms.
+        First order; needs no event location, so it survives Zeno behaviour.
 
         Parameters
         ----------
@@ -270,7 +270,7 @@ class Tribometer:
         duration : float
             Final time, s.
         speed : float
-            Regularisation speed epsilon, m/s, below the Stribeck velocity.
+            Smoothing velocity epsilon, m/s, below the Stribeck velocity.
         solver : str
             "LSODA", "BDF", "Radau", "DOP853", "RK45" or "RK23" of scipy.
         times : array_like, optional

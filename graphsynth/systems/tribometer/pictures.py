@@ -134,7 +134,7 @@ def phase_picture(
     figure = new_figure(size)
     axes = figure.subplots()
     _plain(axes)
-    # points of the events too, so that no corner is cut; those of an event storm cannot be told apart anyway
+    # points of the events too, so that no corner is cut; those of Zeno behaviour cannot be told apart anyway
     t, x, v, state = motion.t, motion.x2, motion.v2, motion.state
     if motion.path is not None and len(motion.path.nodes) <= _MOST_NODES:
         t = np.unique(np.concatenate([t, motion.path.nodes[:, 0]]))
@@ -185,7 +185,7 @@ def friction_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (6.
 def error_picture(
     studies: Sequence[AccuracyStudy], *, over: str = "time", size: tuple[float, float] = (7.0, 5.0)
 ) -> Figure:
-    """Errors of the methods, log-log: over run time, or over the parameter (regularisation speed, step).
+    """Errors of the methods, log-log: over run time, or over the parameter (smoothing velocity, step).
 
     An error of exactly zero has no place on a logarithmic axis and is left out.
     What failed or is unreliable is a cross in the colour of its method: at its error if it has one, else at the upper
@@ -230,7 +230,7 @@ def error_picture(
     if len(good) < len(rows):
         axes.loglog([], [], "x", color=_SOFT, ms=9, mew=2.5, label="failed or unreliable")
     speeds = all(row.method not in ("time stepping", "event-driven") for row in rows)
-    name = "regularisation speed [m/s]" if speeds else "regularisation speed [m/s], step [s] or tolerance"
+    name = "smoothing velocity [m/s]" if speeds else "smoothing velocity [m/s], step [s] or tolerance"
     axes.set(xlabel="run time [s]" if over == "time" else name, ylabel="largest error of the position [m]")
     axes.margins(0.08, 0.12)
     axes.grid(which="major", color=LIGHT["pale"], lw=0.8)

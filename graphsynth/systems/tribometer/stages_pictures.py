@@ -87,7 +87,7 @@ def plots(
         *_curves(motion),
     ]  # fmt: skip
     if study is not None and any(row.status.value == "complete" and row.error > 0.0 for row in study.rows):
-        for over, name in (("time", "run time"), ("parameter", "tolerance, step and regularisation speed")):
+        for over, name in (("time", "run time"), ("parameter", "tolerance, step and smoothing velocity")):
             svg = _svg(error_picture([study], over=over, size=(5.2, 4.4)))
             pictures.append(Picture(f"Error against {name}", svg, "Crosses: failed or unreliable."))
     return tuple(pictures)
@@ -131,7 +131,7 @@ def _curves(motion: StickSlipMotion) -> list[Picture]:
     if motion.path is None:
         return pictures
     nodes = motion.path.nodes
-    if len(nodes) > _MOST_NODES:  # an event storm has hundreds of thousands
+    if len(nodes) > _MOST_NODES:  # Zeno behaviour has hundreds of thousands
         nodes = nodes[np.linspace(0, len(nodes) - 1, _MOST_NODES).astype(int)]
     stored = 0.5 * model.mass * nodes[:, 2] ** 2 + 0.5 * model.stiffness * nodes[:, 1] ** 2
     at = nodes[:, 0]

@@ -243,7 +243,7 @@ def _statement(motion: StickSlipMotion, duration: float, guard: EventGuard) -> s
         )
     if motion.status is RunStatus.STORM:
         return (
-            f"Event storm: {stopped} after {found} events, the shortest dwell {motion.shortest_dwell:.3g} s "
+            f"Zeno behaviour: {stopped} after {found} events, the shortest dwell {motion.shortest_dwell:.3g} s "
             f"(bound {guard.rate:g} events per second); use time_stepping, or raise the rate of the guard."
         )
     if motion.status is RunStatus.STEP_LIMIT:

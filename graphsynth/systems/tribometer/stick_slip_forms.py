@@ -220,19 +220,19 @@ def _judge(
 
 
 def _refuse(model: Tribometer, speed: float, solver: str) -> None:
-    positive("regularisation speed", speed)
+    positive("smoothing velocity", speed)
     if solver not in SOLVERS:
         raise SpecError(f"The solver {solver!r} is not known; give one of {', '.join(SOLVERS)}.")
     law = model.law
     if type(law).__name__ == "TwoCoefficientLaw" and law.static != law.kinetic:
         raise SpecError(
-            "The regularised form cannot represent the two-coefficient law: it needs a regularisation speed far below "
+            "The regularised form cannot represent the two-coefficient law: it needs a smoothing velocity far below "
             "the Stribeck velocity, and here that is zero; use event_driven or time_stepping, or a StribeckLaw."
         )
     velocity = getattr(law, "velocity", math.inf)
     if not speed < velocity:
         raise SpecError(
-            f"The regularisation speed {speed:g} m/s is not below the Stribeck velocity {velocity:g} m/s, "
+            f"The smoothing velocity {speed:g} m/s is not below the Stribeck velocity {velocity:g} m/s, "
             "so that the static friction would never be reached; give at most a tenth of it."
         )
 

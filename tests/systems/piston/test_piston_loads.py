@@ -94,7 +94,7 @@ def brute_force(machine, phi):
     f = machine.friction
 
     def mu(c, speed):
-        return c * math.tanh(speed / f.regular_speed)
+        return c * math.tanh(speed / f.smoothing_velocity)
 
     piston_speed, slot_speed = (v[2] * np.conj(cyl)).real, v[5].real
     own = -cyl * (machine.gas_force([phi])[0] + mu(f.rings, piston_speed))
@@ -222,7 +222,7 @@ def test_self_stress_balances_every_body():
 def test_friction_of_a_plain_slider_by_hand():
     machine = PistonMachine(
         FloatingPiston(CrankSlider(0.05, 0.2), None), gas=ConstantForce(1000.0), speed=10.0,
-        friction=PistonFriction(cylinder=0.2, rings=30.0, regular_speed=1e-9),
+        friction=PistonFriction(cylinder=0.2, rings=30.0, smoothing_velocity=1e-9),
     )  # fmt: skip
     for phi, sense in ((1.0, -1.0), (4.0, 1.0)):  # away from the head, towards it
         t = 0.25 * math.sin(phi)
@@ -298,7 +298,7 @@ def test_energy_with_a_rod_that_is_hardly_long_enough(slack):
 
 def test_works_against_another_quadrature():
     """The trapezoidal rule of a periodic function, with a friction law so soft that few points are enough."""
-    machine = replace(MACHINES["askew"], friction=replace(RUB, regular_speed=1.0), gas=ConstantForce(500.0))
+    machine = replace(MACHINES["askew"], friction=replace(RUB, smoothing_velocity=1.0), gas=ConstantForce(500.0))
     turn = piston_turn(machine)
     count = 20000
     phi = np.arange(count) * 2.0 * math.pi / count
@@ -380,7 +380,7 @@ def test_free_motion_of_the_model():
     [
         (lambda: PistonMasses(crank=-1.0), "crank = -1.0 must not be negative"),
         (lambda: PistonFriction(guide=-0.1), "friction guide"),
-        (lambda: PistonFriction(regular_speed=0.0), "regular_speed"),
+        (lambda: PistonFriction(smoothing_velocity=0.0), "smoothing_velocity"),
         (lambda: CompressorCycle(0.0, 1e5, 6e5), "bore of the compressor"),
         (lambda: CompressorCycle(0.1, 6e5, 1e5), "below suction"),
         (lambda: ConstantForce(math.nan), "size of the gas force"),

@@ -66,7 +66,7 @@ STIFF_EVENTS = {
 }  # fmt: skip
 #: Damping left at 2 N s/m: factor -> events in the first second, k x2(1) / N.
 CHATTER = {1.0: (4, -0.1650259907), 1e2: (61, -0.9659947263), 1e4: (576, -6.6689532298)}
-#: Section 3.10: regularisation speed -> largest error of x2, m.
+#: Section 3.10: smoothing velocity -> largest error of x2, m.
 REGULARISED = {1e-2: 7.1e-3, 1e-3: 1.14e-3, 1e-4: 1.27e-4, 1e-5: 1.62e-5, 1e-6: 2.0e-6, 1e-7: 2.4e-7, 1e-8: 2.8e-8}
 #: Time stepping: step -> error of x2(10), m.
 STEPPED = {1e-3: 2.34e-5, 1e-4: 2.45e-6, 1e-5: 2.46e-7}

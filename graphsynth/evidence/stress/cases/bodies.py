@@ -64,7 +64,7 @@ def starts(check: Checks) -> None:
     check.says("second guide: rows, rank, freedom, class", given, (10, 8, 1, "redundant"))
     check.says("second guide: undetermined multipliers", int((~double.determined).sum()), 4)
     ends = [
-        simulate_dynamics(m, [0.0, 0.25], start=consistent_start(m, **at), form="constrained", rtol=1e-12)
+        simulate_dynamics(m, [0.0, 0.25], start=consistent_start(m, **at), form="augmented", rtol=1e-12)
         for m in (_slider_crank(), _slider_crank(0.0))
     ]
     check.value(
@@ -147,25 +147,25 @@ def _rest_at_a_change_point(check: Checks) -> None:
 
 
 def massless(check: Checks) -> None:
-    """Coupler times 1e-9: condition number, error against the massless limit of the minimal form."""
+    """Coupler times 1e-9: condition number, error against the massless limit of the one-coordinate form."""
     from graphsynth.dynamics import Body, simulate_dynamics
 
     light = {1: _bar(0.2, 0.2), 2: Body(0.6e-9, 0.018e-9, (0.3, 0.0)), 3: _bar(0.4, 0.4)}
     none = {**light, 2: Body(0.0, 0.0, (0.3, 0.0))}
     at = {"keep": {(0, 1): 0.0}, "keep_rates": {(0, 1): 10.0}, "modes": {0: 1}}
-    limit = simulate_dynamics(_g1(bodies=none), [0.0, 1.0], form="minimal", **at)
-    near = simulate_dynamics(_g1(bodies=light), [0.0, 1.0], form="constrained", **at)
+    limit = simulate_dynamics(_g1(bodies=none), [0.0, 1.0], form="one-coordinate", **at)
+    near = simulate_dynamics(_g1(bodies=light), [0.0, 1.0], form="augmented", **at)
     check.agrees(
         "completed, with its condition number",
         near.completed and near.start.condition < 1e3,
         f"{near.start.condition:.3g}",
     )
     gap = float(np.abs(near.poses[-1] - limit.poses[-1]).max())
-    check.below("distance to the massless limit", gap, 1e-7, source="minimal form")
+    check.below("distance to the massless limit", gap, 1e-7, source="one-coordinate form")
     check.below("d'Alembert", near.checks.dalembert, 1e-9)
     check.refused(
-        "no mass at all in the constrained form",
-        lambda: simulate_dynamics(_g1(bodies=none), [0.0, 1.0], form="constrained", **at), "links [2] have no mass",
+        "no mass at all in the augmented form",
+        lambda: simulate_dynamics(_g1(bodies=none), [0.0, 1.0], form="augmented", **at), "links [2] have no mass",
     )  # fmt: skip
 
 
@@ -176,7 +176,9 @@ def train_ratio(check: Checks) -> None:
     G, Jm = 1e3, 8.2e-6
     model = _g1(elements=[TorqueSource(0, 1, 1e-3, G, rotor_inertia=Jm)])
     at = {"keep": {(0, 1): 0.0}, "modes": {0: 1}}
-    one, two = (simulate_dynamics(model, np.linspace(0.0, 1.0, 5), form=f, **at) for f in ("constrained", "minimal"))
+    one, two = (
+        simulate_dynamics(model, np.linspace(0.0, 1.0, 5), form=f, **at) for f in ("augmented", "one-coordinate")
+    )
     check.below(
         "two formulations, poses", float(np.abs(one.poses - two.poses).max()), 1e-8, source="second formulation"
     )
@@ -193,7 +195,7 @@ def long_run(check: Checks) -> None:
 
     motion = simulate_dynamics(
         _g1(), np.linspace(0.0, 1000.0, 101), keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1},
-        form="constrained", rtol=1e-12, estimate_error=True,
+        form="augmented", rtol=1e-12, estimate_error=True,
     )  # fmt: skip
     check.equals("completed", motion.completed, True)
     check.below("energy drift", motion.checks.energy, 1e-9)

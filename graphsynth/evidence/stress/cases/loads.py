@@ -25,7 +25,7 @@ def wheels(check: Checks) -> None:
         (1.0, 1.0, 1e9), (1.0, 1.0, 1e-9),
     ):  # fmt: skip
         model = DynamicModel(wheel(), {1: Body(1.0, inertia)}, [Torque(0, 1, torque)], (0.0, 0.0))
-        for form in ("minimal", "constrained"):
+        for form in ("one-coordinate", "augmented"):
             motion = simulate_dynamics(model, [0.0, time], keep={(0, 1): 0.0}, form=form)
             what = f"J = {inertia:g}, M = {torque:g}, {time:g} s, {form}"
             speed = torque / inertia * time
@@ -64,7 +64,7 @@ def broken_laws(check: Checks) -> None:
     at = {"keep": {(0, 1): 0.0}, "modes": {0: 1}}
     for bad in (math.nan, math.inf, -math.inf):
         model = _g1(elements=[Torque(0, 1, lambda t, angle, speed, bad=bad: bad if t > 0.1 else 0.1)])
-        for form in ("minimal", "constrained"):
+        for form in ("one-coordinate", "augmented"):
             run = partial(simulate_dynamics, model, [0.0, 0.2], form=form, **at)
             check.refused(f"{bad} after 0.1 s, {form}", run, f"gave {bad}", "finite number")
     for name, given in (("NaN", math.nan), ("infinity", math.inf)):
@@ -78,7 +78,7 @@ def budget(check: Checks) -> None:
     from graphsynth.evidence.stress.cases.bodies import _g1
 
     model, times = _g1(elements=[Torque(0, 1, 1e9)]), [0.0, 1e-5, 0.01]
-    for form in ("minimal", "constrained"):
+    for form in ("one-coordinate", "augmented"):
         motion = simulate_dynamics(model, times, keep={(0, 1): 0.0}, modes={0: 1}, form=form, max_steps=300)
         check.says(f"{form}: status", motion.status, "failed")
         check.mentions(f"{form}: sentence", motion.message, "300 steps")

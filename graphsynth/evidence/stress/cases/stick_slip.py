@@ -26,7 +26,7 @@ STIFF = {
     1e4: (("0.250013191512", "0.25820164414", "0.300833557161"), 3),
     1e6: (("0.250013188262", "0.258209661887", "0.300859108929"), 3),
 }
-#: Section 3.10: regularisation speed -> largest error, m.
+#: Section 3.10: smoothing velocity -> largest error, m.
 ERRORS = {1e-2: 7.1e-3, 1e-3: 1.14e-3, 1e-4: 1.27e-4, 1e-5: 1.62e-5, 1e-6: 2.0e-6, 1e-7: 2.4e-7, 1e-8: 2.8e-8}
 
 
@@ -147,7 +147,7 @@ def storm(check: Checks) -> None:
     severe = base.stiffened(1e6, scaled_damping=False)
     stopped = severe.event_driven(2.0, estimate=False)
     check.says("factor 1e6: status", stopped.status.name, "STORM")
-    check.mentions("factor 1e6: sentence", stopped.statement, "Event storm", "time_stepping")
+    check.mentions("factor 1e6: sentence", stopped.statement, "Zeno behaviour", "time_stepping")
     kept = bool(
         np.isnan(stopped.x2[stopped.t > stopped.end]).all() and np.isfinite(stopped.x2[stopped.t <= stopped.end]).all()
     )
