@@ -20,7 +20,7 @@ from .kinematics.simulation import (
 from .kinematics.simulation import (
     simulate_batch as simulate_batch,
 )
-from .mechanism.four_bar import LambdaLinkage as LambdaLinkage
+from .mechanism.four_bar import TiltedFourBar as TiltedFourBar
 from .mechanism.joints import (
     Cam as Cam,
 )
@@ -83,6 +83,7 @@ from .synthesis.api import (
     sample_mechanisms as sample_mechanisms,
 )
 from .systems.antenna.mechanism import PointingMechanism as PointingMechanism
+from .systems.lambda_linkage.model import LambdaLinkage as LambdaLinkage
 from .systems.piston.machine import PistonMachine as PistonMachine
 from .systems.piston.model import FloatingPiston as FloatingPiston
 from .systems.platform.parallel_platform import ParallelPlatform as ParallelPlatform

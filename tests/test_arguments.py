@@ -32,7 +32,7 @@ from graphsynth.jamming.intersection import (
 )
 from graphsynth.jamming.joints import bearing_limits
 from graphsynth.mechanism import constraints, files, joints, laws
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.mechanism.rank import mobility_report
 from graphsynth.structure.graph import MechanismGraph
@@ -45,7 +45,7 @@ BAD = {
 
 THREE, LINE = Interval(["[1, 2]", "[3, 4]", "[-1, 5]"]), ["[1, 2]"]
 DUAL = intervals.variables(THREE)[0]
-DECK, BEARING = LambdaLinkage(alpha=1 / 30), Bearing()
+DECK, BEARING = TiltedFourBar(alpha=1 / 30), Bearing()
 FIT = Fit.read("H7/g6", 35)
 ARM = Mechanism(
     MechanismGraph(2, [(0, 1)], frame=0), [joints.Revolute(0, 1)], [Driver(0, 1)], pose=[(0, 0, 0), (0, 0, 0)]

@@ -50,7 +50,7 @@ _CLASSES = [
     "ExudynSettings",
     "Fraction",
     "Interval",
-    "LambdaLinkage",
+    "TiltedFourBar",
     "Mechanism",
     "MechanismGraph",
     "MotorDrivenPlatform",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from graphsynth.evidence.position import NODES, Closed, four_bar, precise_points
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Mechanism
 
@@ -61,15 +61,15 @@ def batch_problem(crank: float, largest: float, effort: Effort | None = None) ->
     return Problem("many-sets", question, "relative", tuple(rows), "position")
 
 
-def _crank_rockers(crank: float, largest: float, count: int) -> list[LambdaLinkage]:
+def _crank_rockers(crank: float, largest: float, count: int) -> list[TiltedFourBar]:
     """Draw crank-rockers well away from change points, always the same ones."""
     random = np.random.default_rng(0)
-    found: list[LambdaLinkage] = []
+    found: list[TiltedFourBar] = []
     while len(found) < count:
         l1, l3, l4 = random.uniform(1.2 * crank, largest, 3)
         sides = sorted((l1, l3, l4))
         if crank + sides[2] < sides[0] + sides[1] - 0.05 * crank:
-            found.append(LambdaLinkage(float(l1), crank, float(l3), float(l4)))
+            found.append(TiltedFourBar(float(l1), crank, float(l3), float(l4)))
     return found
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from graphsynth.jamming.joints.report import CoupledReport
     from graphsynth.jamming.joints.scale import ScaleCertificate
     from graphsynth.kinematics.simulation import Motion
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["coupled_problem", "exact_largest", "lambda_problem"]
@@ -29,7 +29,7 @@ _FINE_GAP = 1e-6
 _DIGITS = 50
 
 
-def exact_largest(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Any:
+def exact_largest(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Any:
     """Largest misalignment about the frame line of the source's linkage with three equal bearings, with 50 digits.
 
     Twice the critical tilt of one bearing (specification, section 9.6: the worst pose is 90 degrees).  None for other
@@ -38,8 +38,8 @@ def exact_largest(linkage: LambdaLinkage, bearing: Bearing, condition: Condition
     Examples
     --------
     >>> from graphsynth.jamming import Bearing
-    >>> from graphsynth.mechanism.four_bar import LambdaLinkage
-    >>> print(f"{float(exact_largest(LambdaLinkage(), Bearing())):.16f}")
+    >>> from graphsynth.mechanism.four_bar import TiltedFourBar
+    >>> print(f"{float(exact_largest(TiltedFourBar(), Bearing())):.16f}")
     0.0121287931183128
     """
     import mpmath
@@ -53,14 +53,14 @@ def exact_largest(linkage: LambdaLinkage, bearing: Bearing, condition: Condition
 
 
 def lambda_problem(
-    linkage: LambdaLinkage, bearing: Bearing, direction: float = 0.0, condition: Condition = "A",
+    linkage: TiltedFourBar, bearing: Bearing, direction: float = 0.0, condition: Condition = "A",
     effort: Effort | None = None,
 ) -> Problem:  # fmt: skip
     """Find the largest misalignment of the driven axis of a four-bar linkage with equal bearings in its moving joints.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
         Planar, and its crank turns fully.
     bearing : Bearing
     direction : float

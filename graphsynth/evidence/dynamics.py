@@ -36,11 +36,11 @@ def braider_model(braider: Braider, speed: float) -> tuple[DynamicModel, StartRe
     from graphsynth.dynamics.model import DynamicModel
     from graphsynth.dynamics.start import consistent_start
     from graphsynth.evidence.position import four_bar
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.systems.braider.evidence_four_bar import bodies_of
 
     bar = braider.linkage
-    mechanism, _ = four_bar(LambdaLinkage(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch))
+    mechanism, _ = four_bar(TiltedFourBar(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch))
     model = DynamicModel(mechanism, bodies_of(braider))
     return model, consistent_start(model, pose=mechanism.pose, keep={(0, 1): 0.0}, keep_rates={(0, 1): speed})
 

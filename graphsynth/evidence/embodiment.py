@@ -114,11 +114,11 @@ def path_problem(effort: Effort | None = None) -> Problem:
     """Find a four-bar linkage through eight points at given inputs, taken from a linkage: no error is possible."""
     from graphsynth.kinematics.dimensional.api import embody
     from graphsynth.kinematics.dimensional.goals import Goals, PathGoal
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     effort = effort or Effort()
     inputs = np.arange(8) * math.tau / 8
-    M = LambdaLinkage(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M
+    M = TiltedFourBar(2.2, 1.0, 2.4, 2.3, k=0.7).positions(inputs).M
     points = tuple((float(x), float(y)) for x, y, _ in M)
     goals = Goals(target=PathGoal(points, tuple(inputs.tolist())), min_transmission_angle=math.radians(15))
     own = signature(embody).parameters

@@ -17,7 +17,7 @@ from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 
 if TYPE_CHECKING:
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["NODES", "Closed", "four_bar", "position_problem", "precise_points", "precise_poses"]
@@ -29,15 +29,15 @@ _DIGITS = 50
 NODES = 12  # the reference is computed at these intervals of the range
 
 
-def four_bar(linkage: LambdaLinkage) -> tuple[Mechanism, Closed]:
+def four_bar(linkage: TiltedFourBar) -> tuple[Mechanism, Closed]:
     """Return a planar four-bar linkage as a mechanism, with its closed form for joint B (the origin of link 2's end).
 
     The mechanism's link frames: crank at O, coupler at A, rocker at C; all along the bars.
 
     Examples
     --------
-    >>> from graphsynth import LambdaLinkage
-    >>> mechanism, closed = four_bar(LambdaLinkage())
+    >>> from graphsynth import TiltedFourBar
+    >>> mechanism, closed = four_bar(TiltedFourBar())
     >>> mechanism.graph.links, closed[1](np.array([0.0])).round(9).tolist()
     (4, [(1.5+2.449489743j)])
     """

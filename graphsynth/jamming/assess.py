@@ -20,7 +20,7 @@ from graphsynth.jamming.bearing.parameters import ToleranceBox
 from graphsynth.jamming.bearing.table import JammingTable, table_over
 from graphsynth.jamming.bearing.tilt_arcs import JamArcs, jam_arcs
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.four_bar_turn import FullTurn
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class JammingReport:
         What is proved, with evidence: bounds of the gap, inner and outer arcs, witness.
     """
 
-    linkage: LambdaLinkage
+    linkage: TiltedFourBar
     bearing: Bearing
     verdict: Verdict
     method: str
@@ -139,7 +139,7 @@ class JammingReport:
 # one tilted bearing of a lambda linkage (model L0)
 @overload
 def assess_jamming(
-    subject: LambdaLinkage | None = None,
+    subject: TiltedFourBar | None = None,
     bearing: Bearing | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike = 361,
@@ -165,7 +165,7 @@ def assess_jamming(
 
 @checked
 def assess_jamming(
-    subject: LambdaLinkage | Motion | None = None,
+    subject: TiltedFourBar | Motion | None = None,
     bearing: Bearings | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike | None = None,
@@ -180,9 +180,9 @@ def assess_jamming(
 
     Parameters
     ----------
-    subject : Motion or LambdaLinkage
+    subject : Motion or TiltedFourBar
         A `Motion` of `graphsynth.simulate` is assessed with all its joints (model L1, needs ``tilts``); a
-        `LambdaLinkage` with its tilted motor axis by the model of the source (L0), and may be left out if ``box`` is
+        `TiltedFourBar` with its tilted motor axis by the model of the source (L0), and may be left out if ``box`` is
         given.
     bearing : Bearing, optional
         L0: the bearing at B, by default that of the source (17.5 mm, 10 mm, 0.03 mm).  L1: limits for all joints, or a
@@ -232,15 +232,15 @@ def assess_jamming(
     >>> assess_jamming(motion, Bearing(), tilts=Misalignment(0, 1, 0.011)).verdict.name
     'CERTIFIED_FREE'
     """
-    if subject is not None and not isinstance(subject, LambdaLinkage):
+    if subject is not None and not isinstance(subject, TiltedFourBar):
         _refuse("a motion", {"samples": samples is not None, "box": box is not None})
         return _any_mechanism(subject, bearing, condition, tilts, certify, length_tolerance, seconds)
     given = {"tilts": tilts is not None, "length_tolerance": length_tolerance != 0.0}
-    _refuse("a LambdaLinkage or a box", given)
+    _refuse("a TiltedFourBar or a box", given)
     if box is not None and not isinstance(box, ToleranceBox):
         raise GeometryError(f"box = {box!r} is no ToleranceBox; give ToleranceBox(alpha=..., clearance=..., ...)")
     if bearing is not None and not isinstance(bearing, Bearing):
-        raise GeometryError(f"bearing = {bearing!r} does not fit a LambdaLinkage; give one Bearing(...)")
+        raise GeometryError(f"bearing = {bearing!r} does not fit a TiltedFourBar; give one Bearing(...)")
     return _one_bearing(subject, bearing, condition, 361 if samples is None else samples, box, certify)
 
 
@@ -249,7 +249,7 @@ def _refuse(subject: str, given: dict[str, bool]) -> None:
     wrong = [name for name, there in given.items() if there]
     if wrong:
         other = "the motion of a mechanism (simulate)" if "tilts" in wrong or "length_tolerance" in wrong else "L0"
-        other = "a LambdaLinkage or a ToleranceBox" if other == "L0" else other
+        other = "a TiltedFourBar or a ToleranceBox" if other == "L0" else other
         raise GeometryError(f"{wrong[0]} does not go with {subject}; it belongs to {other}")
 
 
@@ -266,7 +266,7 @@ def _any_mechanism(
     from graphsynth.kinematics.simulation import Motion
 
     if not isinstance(subject, Motion):
-        raise GeometryError(f"subject = {subject!r} is neither a Motion (simulate) nor a LambdaLinkage; give one")
+        raise GeometryError(f"subject = {subject!r} is neither a Motion (simulate) nor a TiltedFourBar; give one")
     if tilts is None:
         raise GeometryError("no axis is misaligned; give tilts=Misalignment(base, link, alpha)")
     if bearings is None:
@@ -278,7 +278,7 @@ def _any_mechanism(
 
 
 def _one_bearing(
-    linkage: LambdaLinkage | None,
+    linkage: TiltedFourBar | None,
     bearing: Bearing | None,
     condition: Condition,
     samples: int | ArrayLike,
@@ -316,13 +316,13 @@ def _one_bearing(
 
 
 def _given(
-    linkage: LambdaLinkage | None, bearing: Bearing | None, box: ToleranceBox | None
-) -> tuple[LambdaLinkage, Bearing, ToleranceBox]:
+    linkage: TiltedFourBar | None, bearing: Bearing | None, box: ToleranceBox | None
+) -> tuple[TiltedFourBar, Bearing, ToleranceBox]:
     """Complete what was given: the box of the models, or the models in the middle of the box."""
     if box is None:
         if linkage is None:
             raise GeometryError(
-                "neither a linkage nor a box is given; give LambdaLinkage(...) or box=ToleranceBox(...)"
+                "neither a linkage nor a box is given; give TiltedFourBar(...) or box=ToleranceBox(...)"
             )
         bearing = Bearing() if bearing is None else bearing
         return linkage, bearing, ToleranceBox.of(linkage, bearing)
@@ -358,7 +358,7 @@ def _angles(samples: int | ArrayLike) -> Array:
     return np.atleast_1d(finite_array("samples", samples))
 
 
-def _worst(linkage: LambdaLinkage, bearing: Bearing, condition: Condition, turn: FullTurn) -> tuple[float, float]:
+def _worst(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, turn: FullTurn) -> tuple[float, float]:
     """Largest gap over the assembled part of the turn, and a crank angle of it.
 
     That is a quarter turn before or after the phase, or a dead point if neither can be reached.

@@ -1,4 +1,4 @@
-"""The lambda linkage with a tilted motor axis: closed-form motion (model L0).
+"""A four-bar linkage with a tilted motor axis: closed-form motion (model L0).
 
 Crank OA = l2 on a motor axis turned by ``alpha`` about ``axis``, coupler AB = l3 prolonged to the tracing point M,
 rocker CB = l4 that stays in the plane z = 0, frame OC = l1.  Joint A is spherical and the bearing at B takes the whole
@@ -31,7 +31,7 @@ from graphsynth.mechanism.four_bar_turn import FullTurn, full_turn
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["AssemblyStatus", "LambdaLinkage", "LambdaPositions", "Straightness"]
+__all__ = ["AssemblyStatus", "FourBarPositions", "Straightness", "TiltedFourBar"]
 
 Array = NDArray[np.float64]
 _BESIDE = 1e-140
@@ -66,7 +66,7 @@ _MESSAGES = {
 
 
 @dataclass(frozen=True, eq=False)
-class LambdaPositions:
+class FourBarPositions:
     """Positions, tilt and derivatives with respect to the crank angle; NaN wherever `assembled` is False.
 
     Attributes
@@ -131,8 +131,8 @@ class Straightness:
 
 
 @dataclass(frozen=True)
-class LambdaLinkage:
-    """Chebyshev's lambda linkage, or any planar four-bar linkage, driven about a tilted axis.
+class TiltedFourBar:
+    """A planar four-bar linkage driven about a tilted axis; the defaults are Chebyshev's proportions.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class LambdaLinkage:
     Examples
     --------
     >>> import numpy as np
-    >>> positions = LambdaLinkage().positions([np.pi / 2])
+    >>> positions = TiltedFourBar().positions([np.pi / 2])
     >>> positions.B[0].round(12).tolist(), positions.M[0].round(12).tolist()
     ([2.0, 2.5, 0.0], [4.0, 4.0, 0.0])
     """
@@ -268,7 +268,7 @@ class LambdaLinkage:
             return math.fsum((l1, -l2, -l4, l3)) * math.fsum((l1, -l2, l4, -l3))
         return math.fsum((l3, l4, -l1, l2)) * math.fsum((l3, l4, l1, -l2))
 
-    def positions(self, f: ArrayLike) -> LambdaPositions:
+    def positions(self, f: ArrayLike) -> FourBarPositions:
         """Positions, tilt and their derivatives at crank angles ``f`` (radians, any shape).
 
         Accurate to a few units in the last place of the largest length, also beside dead points and change points
@@ -301,7 +301,7 @@ class LambdaLinkage:
         theta, sine, cosine, dtheta = self._tilt(az, dA[..., 2], s3)
         M, dM = (1.0 + self.k) * B - self.k * A, (1.0 + self.k) * dB - self.k * dA
         hide = np.where(assembled, 0.0, np.nan)
-        return LambdaPositions(f, A, B, M, status, theta + hide, sine + hide, cosine + hide, dA, dB, dM, dtheta + hide)
+        return FourBarPositions(f, A, B, M, status, theta + hide, sine + hide, cosine + hide, dA, dB, dM, dtheta + hide)
 
     def _status(self, D: Array, az: Array, s3: Array, near: Array, far: Array) -> NDArray[np.int8]:
         status = np.zeros(D.shape, dtype=np.int8)

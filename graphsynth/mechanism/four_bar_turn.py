@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import finite, whole
 from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.rotatability import four_bar_rotation
 
 if TYPE_CHECKING:
-    from graphsynth.mechanism.four_bar import LambdaLinkage, Straightness
+    from graphsynth.mechanism.four_bar import Straightness, TiltedFourBar
 
 __all__ = ["FullTurn", "full_turn", "straightness"]
 
@@ -50,34 +51,32 @@ class FullTurn:
     statement: str
 
 
-def full_turn(linkage: LambdaLinkage) -> FullTurn:
-    """See `LambdaLinkage.full_turn`."""
+def full_turn(linkage: TiltedFourBar) -> FullTurn:
+    """See `TiltedFourBar.full_turn`."""
     if linkage.pin_height == 0.0:
         return _planar_turn(linkage)
     return _tilted_turn(linkage)
 
 
-def _planar_turn(linkage: LambdaLinkage) -> FullTurn:
+def _planar_turn(linkage: TiltedFourBar) -> FullTurn:
     """Compare the extremes of D with |l4 - l3| and l3 + l4 in exact arithmetic (section 2.3)."""
     l1, l2, l3, l4 = (Fraction(length) for length in (linkage.l1, linkage.l2, linkage.l3, linkage.l4))
-    nearest, farthest = abs(l1 - l2), l1 + l2
-    shortest, longest = abs(l4 - l3), l3 + l4
+    kind, touches, bounds = four_bar_rotation(l1 * l1, l2, l3, l4)
+    if kind == "never assembled":
+        return FullTurn(False, kind, (), (), "exact", "the linkage cannot be assembled at any crank angle")
     rotation = linkage.rotation  # about e_z, or a half turn about an axis in the plane: f is shifted or reversed
     phase, sense = math.atan2(rotation[1, 0], rotation[0, 0]), math.copysign(1.0, rotation[2, 2])
-    if farthest < shortest or nearest > longest:
-        return FullTurn(False, "never assembled", (), (), "exact", "the linkage cannot be assembled at any crank angle")
-    changes = [angle for angle, hit in ((0.0, nearest == shortest), (math.pi, farthest == longest)) if hit]
+    changes = [angle for angle, met in zip((0.0, math.pi), touches) if met]
     limits: list[float] = []
-    for bound, blocks in ((shortest, nearest < shortest), (longest, farthest > longest)):
-        if blocks:
-            half = Fraction(bound * bound - nearest * nearest) / (4 * l1 * l2)  # sin^2(f/2)
-            angle = 2.0 * math.atan2(math.sqrt(half), math.sqrt(1 - half))
-            limits += [angle, -angle] if 0 < half < 1 else [angle]
+    for _, reach in bounds:
+        half = (reach * reach - (l1 - l2) ** 2) / (4 * l1 * l2)  # sin^2(f/2)
+        angle = 2.0 * math.atan2(math.sqrt(half), math.sqrt(1 - half))
+        limits += [angle, -angle] if 0 < half < 1 else [angle]
     limits_t = tuple(sorted(sense * (angle - phase) % math.tau for angle in limits))
     changes_t = tuple(sorted(sense * (angle - phase) % math.tau for angle in changes))
-    if nearest == longest or farthest == shortest:
+    if kind == "immovable":
         text = f"nothing moves: the linkage can only lie stretched, at {math.degrees(limits_t[0]):.6g} degrees"
-        return FullTurn(False, "immovable", limits_t, (), "exact", text)
+        return FullTurn(False, kind, limits_t, (), "exact", text)
     if limits_t:
         degrees = ", ".join(f"{math.degrees(angle):.6g}" for angle in limits_t)
         text = f"the crank cannot make a full turn: dead points at {degrees} degrees"
@@ -90,7 +89,7 @@ def _planar_turn(linkage: LambdaLinkage) -> FullTurn:
     return FullTurn(True, "full turn", (), (), "exact", text)
 
 
-def _margins(linkage: LambdaLinkage, f: Array) -> Array:
+def _margins(linkage: TiltedFourBar, f: Array) -> Array:
     """Smallest of the three quantities that must stay positive, relative to the square of the largest length."""
     A, _, _, near, far, _ = linkage._closure(f)
     scale = max(linkage.l1, linkage.l2, linkage.l3, linkage.l4) ** 2
@@ -98,12 +97,12 @@ def _margins(linkage: LambdaLinkage, f: Array) -> Array:
     return np.asarray(np.minimum(np.minimum(near, far), rod) / scale)
 
 
-def _margin(linkage: LambdaLinkage, f: float) -> float:
+def _margin(linkage: TiltedFourBar, f: float) -> float:
     """Return the margin at one angle."""
     return float(_margins(linkage, np.array([f]))[0])
 
 
-def _tilted_turn(linkage: LambdaLinkage) -> FullTurn:
+def _tilted_turn(linkage: TiltedFourBar) -> FullTurn:
     from scipy.optimize import brentq, minimize_scalar
 
     grid = np.linspace(0.0, math.tau, _SAMPLES + 1)
@@ -146,8 +145,8 @@ def _tilted_turn(linkage: LambdaLinkage) -> FullTurn:
     return FullTurn(True, "full turn", (), (), "estimated", text)
 
 
-def straightness(linkage: LambdaLinkage, start: float, stop: float, samples: int) -> Straightness:
-    """See `LambdaLinkage.straightness`."""
+def straightness(linkage: TiltedFourBar, start: float, stop: float, samples: int) -> Straightness:
+    """See `TiltedFourBar.straightness`."""
     from scipy.optimize import minimize_scalar
 
     from graphsynth.mechanism.four_bar import Straightness

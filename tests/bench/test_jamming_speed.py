@@ -9,7 +9,7 @@ import pytest
 from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, jam_arcs, largest_gap, spread, sweep_linkage
 from graphsynth.jamming.assess import assess_jamming
 from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 DECK = ToleranceBox(alpha="1/30")
 BOX = ToleranceBox(
@@ -30,7 +30,7 @@ def best(function, repeat=15):
 
 
 def test_times_beside_plain_floats(capsys: pytest.CaptureFixture[str]) -> None:
-    linkage, bearing = LambdaLinkage(alpha=1 / 30), Bearing()
+    linkage, bearing = TiltedFourBar(alpha=1 / 30), Bearing()
     plain = best(lambda: jam_arcs(linkage, bearing))
     proved, box = best(lambda: certify_jamming(DECK)), best(lambda: certify_jamming(BOX))
     report = best(lambda: assess_jamming(box=DECK))

@@ -11,15 +11,15 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.shapes import Path, Text
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.systems.lambda_linkage.pictures import _View, lambda_sketch, lambda_sketch_3d, lambda_tilt_chart
 
-TILTED = LambdaLinkage(alpha=1 / 30)
+TILTED = TiltedFourBar(alpha=1 / 30)
 
 
 def test_points_in_the_plane() -> None:
     """f = 90 degrees: A (0, 1), B (2, 5/2), M (4, 4); the stroke lies within 4 .. 4.0098."""
-    sketch = lambda_sketch(LambdaLinkage(), math.pi / 2)
+    sketch = lambda_sketch(TiltedFourBar(), math.pi / 2)
     names = {s.text: s for s in sketch.shapes if isinstance(s, Text)}
     for name, point in {"O": 0j, "A": 1j, "B": 2 + 2.5j, "C": 2 + 0j, "M": 4 + 4j}.items():
         assert names[name].at == pytest.approx(point, abs=1e-12)
@@ -42,7 +42,7 @@ def test_projection_is_orthographic_and_only_heights_grow() -> None:
     [(1 / 30, "heights × 10"), (1e-4, "heights × 5000"), (0.6, "heights to scale"), (0.0, "to scale")],
 )
 def test_the_factor_of_heights_is_written(alpha: float, words: str) -> None:
-    svg = lambda_sketch_3d(LambdaLinkage(alpha=alpha), 1.0).svg()
+    svg = lambda_sketch_3d(TiltedFourBar(alpha=alpha), 1.0).svg()
     ET.fromstring(svg)
     assert words in svg and "nan" not in re.sub("dominant", "", svg)
 
@@ -57,13 +57,13 @@ def test_axis_stands_square_to_the_crank_circle_as_drawn() -> None:
 
 
 def test_an_angle_without_assembly_is_a_word_or_a_sentence() -> None:
-    short = LambdaLinkage(2, 1, 1, 1)
+    short = TiltedFourBar(2, 1, 1, 1)
     assert "cannot be assembled" in lambda_sketch(short, math.pi).svg()
     with pytest.raises(GeometryError, match="cannot be assembled at the crank angle"):
         lambda_sketch_3d(short, math.pi)
     with pytest.raises(GeometryError, match=r"exaggeration = 0\.0 must be positive"):
         lambda_sketch_3d(TILTED, 0.0, exaggeration=0.0)
-    ET.fromstring(lambda_sketch(LambdaLinkage(9, 1, 1, 1), 0.0).svg())
+    ET.fromstring(lambda_sketch(TiltedFourBar(9, 1, 1, 1), 0.0).svg())
 
 
 def test_tilt_over_the_turn() -> None:

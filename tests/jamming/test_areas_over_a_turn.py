@@ -13,9 +13,9 @@ from graphsynth.jamming.bearing.area_curve import area_curve, enclose_tilt_sine
 from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
 from graphsynth.jamming.bearing.shoelace import crescent_boxes, interval_shoelace
 from graphsynth.jamming.intersection import Reading, reading_areas, reading_ellipse, reading_problem
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
-DECK = LambdaLinkage(alpha=1 / 30)
+DECK = TiltedFourBar(alpha=1 / 30)
 
 
 def test_curve_holds_the_double_precision_table():
@@ -58,7 +58,7 @@ def test_half_of_the_surrogate_underestimates_the_interference():
     ("axis", "alpha"), [((1.0, 0.0, 0.0), 1 / 30), ((2 / 3, -1 / 3, 2 / 3), 1 / 30), ((0.0, 0.0, 1.0), 0.3)]
 )
 def test_tilt_over_ranges_of_the_crank_angle(axis, alpha):
-    linkage = LambdaLinkage(alpha=alpha, axis=axis)
+    linkage = TiltedFourBar(alpha=alpha, axis=axis)
     f = np.linspace(0.0, 2 * math.pi, 4001)
     values = linkage.positions(f).sin_theta
     wide = enclose_tilt_sine(linkage, Interval.from_bounds(f[:-1], f[1:]))
@@ -70,9 +70,9 @@ def test_tilt_over_ranges_of_the_crank_angle(axis, alpha):
 
 def test_bad_curves_are_refused():
     with pytest.raises(GeometryError, match="not a rigid body"):
-        area_curve(LambdaLinkage(alpha=0.1, rod="deck"))
+        area_curve(TiltedFourBar(alpha=0.1, rod="deck"))
     with pytest.raises(GeometryError, match="rises above l3 at 90 degrees"):
-        area_curve(LambdaLinkage(l3=0.5, alpha=1.0), f=[0.0, math.pi / 2])
+        area_curve(TiltedFourBar(l3=0.5, alpha=1.0), f=[0.0, math.pi / 2])
     with pytest.raises(GeometryError, match="interference fit"):
         area_curve(bearing=Bearing(clearance=-0.01))
 
@@ -166,7 +166,7 @@ def test_lids_are_mirror_images():
 @pytest.mark.parametrize("axis", [(2, -1, 2), (1, 1, 0), (3, 1, -7), (1, 2, 3)])
 def test_the_axis_is_a_unit_vector_up_to_rounding_only(axis):
     """Its doubles, made exact and normalised in 50 digits: the sine lies inside without any allowance."""
-    linkage = LambdaLinkage(alpha=0.9, axis=axis)
+    linkage = TiltedFourBar(alpha=0.9, axis=axis)
     angles = np.linspace(0.1, 6.2, 60)
     found = enclose_tilt_sine(linkage, angles)
     with mpmath.workdps(50):

@@ -27,10 +27,10 @@ from graphsynth.jamming import (
 )
 from graphsynth.jamming.joints import Misalignment
 from graphsynth.jamming.verdict import METHOD_CERTIFIED
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 DEG = math.pi / 180.0
-DECK = LambdaLinkage(alpha=1 / 30)
+DECK = TiltedFourBar(alpha=1 / 30)
 
 # spec 14.2: f, theta, gA, gB, E4 ell\circ, E4 circ\ell, A_lid, A_rim
 TABLE = [
@@ -89,19 +89,19 @@ def test_symmetries():
 )  # fmt: skip
 def test_other_axes(axis, rows):
     degrees, gaps = np.array(rows).T
-    got = assess_jamming(LambdaLinkage(alpha=1 / 30, axis=axis), samples=degrees * DEG).table
+    got = assess_jamming(TiltedFourBar(alpha=1 / 30, axis=axis), samples=degrees * DEG).table
     np.testing.assert_allclose(got.gap_a, gaps, rtol=1e-13, atol=3e-17)
 
 
 def test_general_axis_condition_b():
-    got = assess_jamming(LambdaLinkage(alpha=1 / 30, axis=(2, -1, 2)), samples=np.radians([0, 60, 90, 200])).table
+    got = assess_jamming(TiltedFourBar(alpha=1 / 30, axis=(2, -1, 2)), samples=np.radians([0, 60, 90, 200])).table
     expected = [-0.007107260446920128638161704837, 0.02048844506384219279652856194,
                 0.01487395243316819535703169698, 0.006921796341260882250703825704]  # fmt: skip
     np.testing.assert_allclose(got.gap_b, expected, rtol=1e-13, atol=3e-17)
 
 
 def test_tiny_tilt():
-    got = assess_jamming(LambdaLinkage(alpha=1e-8), samples=[math.pi / 2, 0.0]).table
+    got = assess_jamming(TiltedFourBar(alpha=1e-8), samples=[math.pi / 2, 0.0]).table
     assert got.theta[0] == pytest.approx(3.999999999999999944e-9, rel=1e-15)
     assert got.gap_a[0] == pytest.approx(-0.02999998000000014000000033333, rel=1e-15)
     assert got.gap_b[0] == pytest.approx(-0.02999997999999985976000033333, rel=1e-15)
@@ -109,7 +109,7 @@ def test_tiny_tilt():
 
 
 def test_change_point_linkage_gaps():
-    got = assess_jamming(LambdaLinkage(2, 1, 2, 3, alpha=1 / 30), samples=np.radians([30.0, 90.0])).table
+    got = assess_jamming(TiltedFourBar(2, 1, 2, 3, alpha=1 / 30), samples=np.radians([30.0, 90.0])).table
     np.testing.assert_allclose(
         got.theta, [0.008331886609246326355046407780, 0.01666435169112613254681867559], rtol=1e-14
     )
@@ -131,7 +131,7 @@ def test_change_point_linkage_gaps():
     ],
 )
 def test_arcs(condition, rod, start, stop):
-    arcs = jam_arcs(LambdaLinkage(alpha=1 / 30, rod=rod), Bearing(), condition)
+    arcs = jam_arcs(TiltedFourBar(alpha=1 / 30, rod=rod), Bearing(), condition)
     stop = 180 - start if stop is None else stop
     first, second = arcs.arcs
     assert first.start / DEG == pytest.approx(start, rel=1e-14)
@@ -156,13 +156,13 @@ def test_inverse_questions():
 @pytest.mark.parametrize("condition", ["A", "B"])
 @pytest.mark.parametrize("axis", [(1, 0, 0), (2, -1, 2), (0.3, 0.1, 2)])
 def test_inverse_answers_are_on_the_edge(condition, axis):
-    linkage, bearing = LambdaLinkage(alpha=0.02, axis=axis), Bearing(17.5, 10.0, 0.03)
+    linkage, bearing = TiltedFourBar(alpha=0.02, axis=axis), Bearing(17.5, 10.0, 0.03)
     alpha = largest_misalignment(linkage, bearing, condition).value
     clearance = smallest_clearance(linkage, bearing, condition).value
     height = largest_height(linkage, bearing, condition).value
     for factor, free in ((1 - 1e-9, True), (1 + 1e-9, False)):
         kinds = [
-            assess_jamming(LambdaLinkage(alpha=alpha * factor, axis=axis), bearing, condition, 5),
+            assess_jamming(TiltedFourBar(alpha=alpha * factor, axis=axis), bearing, condition, 5),
             assess_jamming(linkage, Bearing(17.5, 10.0, clearance / factor), condition, 5),
             assess_jamming(linkage, Bearing(17.5, height * factor, 0.03), condition, 5),
         ]
@@ -171,14 +171,14 @@ def test_inverse_answers_are_on_the_edge(condition, axis):
 
 
 def test_no_limits_have_reasons():
-    assert "no limit" in largest_misalignment(LambdaLinkage(axis=(0, 0, 1)), Bearing()).reason
-    assert "no limit" in largest_misalignment(LambdaLinkage(), Bearing(17.5, 1.0, 0.03), "A").reason
-    assert "no height" in largest_height(LambdaLinkage(alpha=1.0), Bearing(), "B").reason
-    assert "no limit" in largest_height(LambdaLinkage(), Bearing()).reason
-    steep = LambdaLinkage(1, 1, 1, 1, alpha=1.2)
+    assert "no limit" in largest_misalignment(TiltedFourBar(axis=(0, 0, 1)), Bearing()).reason
+    assert "no limit" in largest_misalignment(TiltedFourBar(), Bearing(17.5, 1.0, 0.03), "A").reason
+    assert "no height" in largest_height(TiltedFourBar(alpha=1.0), Bearing(), "B").reason
+    assert "no limit" in largest_height(TiltedFourBar(), Bearing()).reason
+    steep = TiltedFourBar(1, 1, 1, 1, alpha=1.2)
     assert smallest_clearance(steep, Bearing(1.0, 0.5, 0.1)).value == pytest.approx(math.hypot(1, 0.25) - 1, rel=1e-14)
     with pytest.raises(GeometryError, match="l3"):
-        smallest_clearance(LambdaLinkage(5, 3, 2, 4, alpha=1.5), Bearing())
+        smallest_clearance(TiltedFourBar(5, 3, 2, 4, alpha=1.5), Bearing())
 
 
 angle = st.floats(-3.0, 3.0)
@@ -190,7 +190,7 @@ angle = st.floats(-3.0, 3.0)
     st.floats(5, 30), st.floats(1, 30), st.floats(1e-4, 0.2), st.sampled_from(["A", "B"]), st.floats(0, 6.28),
 )  # fmt: skip
 def test_arcs_agree_with_the_gap(alpha, axis, R, H, c, condition, f):
-    linkage, bearing = LambdaLinkage(alpha=alpha, axis=axis), Bearing(R, H, c)
+    linkage, bearing = TiltedFourBar(alpha=alpha, axis=axis), Bearing(R, H, c)
     arcs = jam_arcs(linkage, bearing, condition)
     path = linkage.positions(f)
     gap = float(bearing.gap(path.sin_theta, path.cos_theta, condition))
@@ -203,21 +203,21 @@ def test_arcs_agree_with_the_gap(alpha, axis, R, H, c, condition, f):
 
 
 def test_verdicts_of_extreme_cases():
-    assert assess_jamming(LambdaLinkage(), Bearing(), certify=False).verdict is Verdict.FREE_ESTIMATED
-    assert assess_jamming(LambdaLinkage(), Bearing()).verdict is Verdict.CERTIFIED_FREE
-    assert assess_jamming(LambdaLinkage(alpha=0.5, axis=(0, 0, 1)), Bearing()).verdict is Verdict.CERTIFIED_FREE
+    assert assess_jamming(TiltedFourBar(), Bearing(), certify=False).verdict is Verdict.FREE_ESTIMATED
+    assert assess_jamming(TiltedFourBar(), Bearing()).verdict is Verdict.CERTIFIED_FREE
+    assert assess_jamming(TiltedFourBar(alpha=0.5, axis=(0, 0, 1)), Bearing()).verdict is Verdict.CERTIFIED_FREE
     zero = assess_jamming(DECK, Bearing(17.5, 10, 0.0))
     assert zero.verdict is Verdict.CERTIFIED_JAMMED
     assert assess_jamming(DECK, Bearing(17.5, 10, 0.0), certify=False).verdict is Verdict.JAMMED_ESTIMATED
     assert zero.arcs.touching == pytest.approx((0.0, math.pi))
     assert sum(arc.length for arc in zero.arcs.arcs) == pytest.approx(math.tau, rel=1e-15)
-    assert assess_jamming(LambdaLinkage(), Bearing(17.5, 10, 0.0)).verdict is Verdict.UNDECIDED
-    still = assess_jamming(LambdaLinkage(), Bearing(17.5, 10, 0.0), certify=False)
+    assert assess_jamming(TiltedFourBar(), Bearing(17.5, 10, 0.0)).verdict is Verdict.UNDECIDED
+    still = assess_jamming(TiltedFourBar(), Bearing(17.5, 10, 0.0), certify=False)
     assert still.verdict is Verdict.TOUCHING_ESTIMATED
     press = assess_jamming(DECK, Bearing(17.5, 10, -0.01))
     assert press.verdict is Verdict.CANNOT_ASSEMBLE
     assert np.all(press.table.gap > 0)
-    never = assess_jamming(LambdaLinkage(10, 1, 2, 2, alpha=0.1))
+    never = assess_jamming(TiltedFourBar(10, 1, 2, 2, alpha=0.1))
     assert never.verdict is Verdict.CANNOT_ASSEMBLE
     assert np.isnan(never.table.gap).all()
     assert (never.table.status > 1).all()
@@ -226,7 +226,7 @@ def test_verdicts_of_extreme_cases():
 def test_touching():
     bearing = Bearing()
     sine = bearing.critical_tilt("A").sine
-    linkage = LambdaLinkage(alpha=math.asin(2.5 * sine))
+    linkage = TiltedFourBar(alpha=math.asin(2.5 * sine))
     report = assess_jamming(linkage, bearing)
     assert report.verdict is Verdict.UNDECIDED
     assert any("contains 0" in note for note in report.notes)
@@ -235,21 +235,21 @@ def test_touching():
 
 
 def test_partial_turn_is_said():
-    report = assess_jamming(LambdaLinkage(2, 1, 1, 1, alpha=0.1))
+    report = assess_jamming(TiltedFourBar(2, 1, 1, 1, alpha=0.1))
     assert not report.full_turn.possible
     assert any("assembled crank angles only" in note for note in report.notes)
 
 
 def test_units_do_not_matter():
     for factor in (1e-9, 1e9):
-        scaled = LambdaLinkage(2 * factor, factor, 2.5 * factor, 2.5 * factor, alpha=1 / 30)
+        scaled = TiltedFourBar(2 * factor, factor, 2.5 * factor, 2.5 * factor, alpha=1 / 30)
         arcs = jam_arcs(scaled, Bearing(17.5 * factor, 10 * factor, 0.03 * factor))
         assert arcs.arcs[0].start == pytest.approx(27.0592203251509475645179736478 * DEG, rel=1e-13)
 
 
 def test_reversed_axis_exchanges_lids_only():
-    forward = jam_arcs(LambdaLinkage(alpha=0.05, axis=(1, 2, 0)), Bearing())
-    backward = jam_arcs(LambdaLinkage(alpha=-0.05, axis=(1, 2, 0)), Bearing())
+    forward = jam_arcs(TiltedFourBar(alpha=0.05, axis=(1, 2, 0)), Bearing())
+    backward = jam_arcs(TiltedFourBar(alpha=-0.05, axis=(1, 2, 0)), Bearing())
     assert [a.start for a in forward.arcs] == pytest.approx([a.start for a in backward.arcs], rel=1e-14)
 
 
@@ -324,7 +324,7 @@ def test_arguments_of_the_other_model_are_refused():
         ("have no bearings", (motion,), {"tilts": tilt}),
         ("tilts does not go", (DECK,), {"tilts": tilt}),
         ("length_tolerance does not go", (DECK,), {"length_tolerance": 1e-3}),
-        ("does not fit a LambdaLinkage", (DECK, {(0, 1): Bearing()}), {}),
+        ("does not fit a TiltedFourBar", (DECK, {(0, 1): Bearing()}), {}),
         ("neither a Motion", ("shutter",), {"tilts": tilt}),
         ("neither a Motion", (math.nan,), {}),
     ]:
@@ -344,5 +344,5 @@ def test_what_lies_beyond_a_dead_centre_does_not_count():
     assert said <= report.worst_gap < report.certificate.smallest_worst_gap.lo
     frame = report.to_pandas()
     assert frame["certainly_jams"].any() and not frame.loc[frame["status"] != 0, "certainly_jams"].any()
-    never = assess_jamming(LambdaLinkage(10, 1, 1, 1), Bearing())
+    never = assess_jamming(TiltedFourBar(10, 1, 1, 1), Bearing())
     assert never.verdict is Verdict.CANNOT_ASSEMBLE and math.isnan(never.worst_gap)

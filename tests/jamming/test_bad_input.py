@@ -31,10 +31,10 @@ from graphsynth.jamming.bearing.area_curve import area_curve
 from graphsynth.jamming.bearing.areas import lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.areas_enclosed import enclose_lid_area
 from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes, surrogate_problem
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
-DECK = LambdaLinkage(alpha=1 / 30)
-OUT_OF_REACH = LambdaLinkage(2, 3, 1, 2.5, alpha=1.2)  # the pin rises to 2.8 l3
+DECK = TiltedFourBar(alpha=1 / 30)
+OUT_OF_REACH = TiltedFourBar(2, 3, 1, 2.5, alpha=1.2)  # the pin rises to 2.8 l3
 
 
 def box(**changes):
@@ -54,7 +54,7 @@ def box(**changes):
         (lambda: Bearing(Rb=math.nan), "Rb = nan is not finite"),
         (lambda: Bearing(clearance=math.inf), "clearance = inf is not finite"),
         (lambda: Bearing(Hb=-1), "Hb = -1.0 must be zero or more"),
-        (lambda: LambdaLinkage(alpha=math.nan), "alpha = nan is not finite"),
+        (lambda: TiltedFourBar(alpha=math.nan), "alpha = nan is not finite"),
         (lambda: certify_jamming(box()).over(math.nan, 1.0), "start = nan is not finite"),
         (lambda: krawczyk_boxes(circle_ellipse(5, 6, 4), tolerance=math.nan), "tolerance = nan must be positive"),
         (lambda: surrogate_problem(Bearing(), "1.5"), "sine = 1.5 of the tilt exceeds 1"),
@@ -82,7 +82,7 @@ def test_one_clear_sentence(call, words):
 def test_zero_clearance():
     jammed = assess_jamming(DECK, Bearing(clearance=0))
     assert jammed.verdict is Verdict.CERTIFIED_JAMMED and any("no clearance" in note for note in jammed.notes)
-    still = assess_jamming(LambdaLinkage(), Bearing(clearance=0))
+    still = assess_jamming(TiltedFourBar(), Bearing(clearance=0))
     assert still.verdict is Verdict.UNDECIDED and "touch at every angle" in still.certificate.reason
     limit = certified_largest_misalignment(box(clearance=0))
     assert limit.works is None or limit.works == 0.0
@@ -113,7 +113,7 @@ def test_tilt_beyond_the_reach_of_the_linkage():
     assert np.isnan(report.table.gap).all() and math.isnan(report.worst_gap)
     limit = certified_smallest_clearance(ToleranceBox(2, 3, 1, "2.5", "1.2"))
     assert limit.works is None and limit.fails is None and "assembled" in limit.reason
-    partly = assess_jamming(LambdaLinkage(3, 2, 1.5, 2.5, alpha=1.2), Bearing())
+    partly = assess_jamming(TiltedFourBar(3, 2, 1.5, 2.5, alpha=1.2), Bearing())
     assert not partly.full_turn.possible and np.isnan(partly.table.gap).any() and not np.isnan(partly.table.gap).all()
     assert partly.verdict in (Verdict.CERTIFIED_JAMMED, Verdict.UNDECIDED)
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, ToleranceBox, Verdict, certify_jamming, spread
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 DEG = mpmath.mpf
 F = Fraction
@@ -326,7 +326,7 @@ def test_reversed_axis_and_negative_tilt_have_the_same_zones():
 
 
 def test_floats_are_marked():
-    found = certify_jamming(ToleranceBox.of(LambdaLinkage(alpha=1 / 30), Bearing()))
+    found = certify_jamming(ToleranceBox.of(TiltedFourBar(alpha=1 / 30), Bearing()))
     assert not found.exact_input and "floats came in" in found.statement
     assert certify_jamming(deck()).exact_input
 

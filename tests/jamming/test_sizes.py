@@ -8,7 +8,7 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming import Bearing, Verdict, assess_jamming, jam_arcs
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 
 @pytest.mark.parametrize("unit", [1e-300, 1e-160, 1e-80, 1e80, 1e155, 1e300])
@@ -24,7 +24,7 @@ def test_bearings_out_of_range_are_refused(unit: float) -> None:
 @pytest.mark.parametrize("clearance", [1e-300, 5e-324])
 def test_tiny_clearance_is_as_good_as_none(clearance: float) -> None:
     """To first order the critical sine is clearance / (half height)."""
-    arcs = jam_arcs(LambdaLinkage(alpha=1 / 30), Bearing(clearance=clearance))
+    arcs = jam_arcs(TiltedFourBar(alpha=1 / 30), Bearing(clearance=clearance))
     assert [arc.length for arc in arcs.arcs] == pytest.approx([math.pi, math.pi], rel=1e-15)
 
 
@@ -32,7 +32,7 @@ def test_tiny_clearance_is_as_good_as_none(clearance: float) -> None:
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 0.6, 0.8)])
 @pytest.mark.parametrize("rod", ["rigid", "deck"])
 def test_any_tilt_jams_without_clearance(alpha: float, axis: tuple[float, float, float], rod: str) -> None:
-    own = LambdaLinkage(alpha=alpha, axis=axis, rod=rod)
+    own = TiltedFourBar(alpha=alpha, axis=axis, rod=rod)
     arcs = jam_arcs(own, Bearing(clearance=0.0))
     assert [arc.length for arc in arcs.arcs] == [math.pi, math.pi] and arcs.kappa == 0.0
     assert jam_arcs(own, Bearing(clearance=1e-300)).arcs == () if abs(alpha) < 1e-300 else True
@@ -41,6 +41,6 @@ def test_any_tilt_jams_without_clearance(alpha: float, axis: tuple[float, float,
 
 def test_no_tilt_about_the_motor_axis() -> None:
     """A turn about z lifts nothing, however large."""
-    own = LambdaLinkage(alpha=1.0, axis=(0.0, 0.0, 1.0))
+    own = TiltedFourBar(alpha=1.0, axis=(0.0, 0.0, 1.0))
     assert not own.tilted
     assert "touching at every angle" in jam_arcs(own, Bearing(clearance=0.0)).reason

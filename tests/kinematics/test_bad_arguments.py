@@ -14,7 +14,7 @@ from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.certify import certify
 from graphsynth.kinematics.dimensional import PathGoal, PosesGoal, embody
 from graphsynth.kinematics.engine.dyads import solve_rrr
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -29,7 +29,7 @@ JOINTS = [
     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (3.0, 0.0), (3.5, 0.0)), Revolute(0, 3, (4.0, 0.0)),
 ]  # fmt: skip
 FOUR_BAR = Mechanism(CYCLE, JOINTS, [Driver(0, 1)])
-G1, LAMBDA = ParallelPlatform.g1(), LambdaLinkage()
+G1, LAMBDA = ParallelPlatform.g1(), TiltedFourBar()
 
 
 @cache
@@ -68,8 +68,8 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "start of a stroke": lambda bad: LAMBDA.straightness(start=bad),
     "stop of a stroke": lambda bad: LAMBDA.straightness(stop=bad),
     "samples of a stroke": lambda bad: LAMBDA.straightness(samples=bad),
-    "length of a linkage": lambda bad: LambdaLinkage(l1=bad),
-    "axis of a linkage": lambda bad: LambdaLinkage(axis=bad),
+    "length of a linkage": lambda bad: TiltedFourBar(l1=bad),
+    "axis of a linkage": lambda bad: TiltedFourBar(axis=bad),
     "length of a pointing mechanism": lambda bad: PointingMechanism(l1=bad),
     "lengths of a platform": lambda bad: SingleMotorPlatform(l1=bad),
     "pivots of a platform": lambda bad: SingleMotorPlatform(pivot=bad),

@@ -11,7 +11,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.dimensional import FunctionGoal, Goals, LineGoal, PathGoal, PosesGoal, embody
 from graphsynth.kinematics.dimensional.verify import in_order, strip_width, verify
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
@@ -61,7 +61,7 @@ def test_the_lambda_linkage_is_found_again() -> None:
     AM, BM = arms(found.mechanism)
     assert (AM / crank, BM / crank) == pytest.approx((5.0, 2.5), abs=5e-5)
     # as straight as the closed form of the lambda linkage over its stroke, 90 to 270 degrees
-    M = LambdaLinkage().positions(np.linspace(0.5 * math.pi, 1.5 * math.pi, 2001)).M
+    M = TiltedFourBar().positions(np.linspace(0.5 * math.pi, 1.5 * math.pi, 2001)).M
     width = float(np.ptp(M[:, 1]))
     assert width == pytest.approx(0.00976, abs=1e-5)  # the value of the specification
     assert found.figures.goal_error == pytest.approx(width / 4.0, rel=1e-4)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.triad.assembly_modes import assembly_modes
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Linear
 from graphsynth.mechanism.model import Driver, Mechanism
@@ -45,7 +45,7 @@ def pair(z: complex) -> tuple[float, float]:
 @pytest.mark.parametrize("lengths", [(2.0, 1.0, 2.5, 2.5), (4.0, 1.2, 3.1, 3.4), (1.0, 2.0, 2.2, 1.9)])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_four_bar_agrees_with_the_lambda_linkage(lengths: tuple[float, ...], sign: int) -> None:
-    linkage = LambdaLinkage(*lengths, sgn=sign)
+    linkage = TiltedFourBar(*lengths, sgn=sign)
     closed = linkage.positions(TURN)
     assert closed.assembled.all()
     motions = [simulate(four_bar(*lengths), TURN, modes={0: mode}) for mode in (1, -1)]
@@ -514,6 +514,6 @@ def test_table_of_the_motion() -> None:
 
 def test_errors_bound_the_distance_from_the_closed_form() -> None:
     motion = simulate(four_bar(2.0, 1.0, 2.5, 2.5), TURN)
-    closed = LambdaLinkage().positions(TURN)
+    closed = TiltedFourBar().positions(TURN)
     error = np.abs(motion.point(3, (2.5, 0.0)).position - closed.B[:, :2]).max(axis=1)
     assert (error <= motion.errors * motion.Lc).all() and (motion.errors < 1e-13).all()

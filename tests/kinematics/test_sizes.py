@@ -10,7 +10,7 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.assembly_modes import assembly_modes, assembly_modes_batch
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.systems.platform.drive import FourBarDrive
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
@@ -19,8 +19,8 @@ OUTSIDE = [1e-300, 1e-200, 1e-160, 1e-80, 1e80, 1e120, 1e155, 1e300]
 INSIDE = [2.0**-190, 2.0**190]  # powers of two: the ratios of the lengths stay what they are
 
 
-def linkage(unit: float) -> LambdaLinkage:
-    return LambdaLinkage(2 * unit, unit, 2.5 * unit, 2.5 * unit, alpha=1 / 30)
+def linkage(unit: float) -> TiltedFourBar:
+    return TiltedFourBar(2 * unit, unit, 2.5 * unit, 2.5 * unit, alpha=1 / 30)
 
 
 def drive(unit: float, crank: float = 62.0) -> FourBarDrive:
@@ -105,10 +105,10 @@ def test_single_motor_platform_in_any_unit(unit: float) -> None:
 @pytest.mark.parametrize("length", [1e-55, 1e-12])
 def test_tiny_crank_beside_ordinary_links(length: float) -> None:
     """To first order in the crank, B moves by the crank's component along the coupler; the height of A is exact."""
-    own = LambdaLinkage(2.0, length, 2.5, 2.5, alpha=1 / 30)
+    own = TiltedFourBar(2.0, length, 2.5, 2.5, alpha=1 / 30)
     f = np.array([0.3, 2.0])
     found = own.positions(f)
-    still = LambdaLinkage(2.0, 1e-60, 2.5, 2.5).positions(f)
+    still = TiltedFourBar(2.0, 1e-60, 2.5, 2.5).positions(f)
     np.testing.assert_allclose(found.theta, np.sin(f) * math.sin(1 / 30) * length / 2.5, rtol=1e-12)
     np.testing.assert_allclose(found.B, still.B, rtol=0, atol=2 * length + 1e-15)
 
@@ -116,7 +116,7 @@ def test_tiny_crank_beside_ordinary_links(length: float) -> None:
 @pytest.mark.parametrize("alpha", [1e-100, 1e-160, 1e-200, -1e-290])
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.6, 0.0, 0.8), (0.0, 1.0, 0.0)])
 def test_pin_height_of_a_tilt_whose_square_underflows(alpha: float, axis: tuple[float, float, float]) -> None:
-    own = LambdaLinkage(alpha=alpha, axis=axis)
+    own = TiltedFourBar(alpha=alpha, axis=axis)
     assert own.pin_height == pytest.approx(abs(alpha) * math.hypot(axis[0], axis[1]), rel=1e-15)
     assert own.largest_tilt[0] == pytest.approx(own.pin_height / 2.5, rel=1e-15)
 
@@ -125,7 +125,7 @@ def test_pin_height_against_the_rotation() -> None:
     """Largest third component over a turn of ``l2 (R e1 cos f + R e2 sin f)``; a half turn about z lifts nothing."""
     for alpha in (0.1, 1.5, math.pi, 4.0, 2 * math.pi - 1e-8):
         for axis in ((1.0, 0.0, 0.0), (0.3, -0.5, 0.8), (0.0, 0.0, 1.0), (1e-9, 0.0, 1.0)):
-            own = LambdaLinkage(alpha=alpha, axis=axis)
+            own = TiltedFourBar(alpha=alpha, axis=axis)
             right = math.hypot(own.rotation[2, 0], own.rotation[2, 1])
             assert own.pin_height == pytest.approx(right, rel=1e-14, abs=1e-300)
 
@@ -133,14 +133,14 @@ def test_pin_height_against_the_rotation() -> None:
 @pytest.mark.parametrize("k", [2e60, -1e61, 1e300])
 def test_tracing_point_out_of_range(k: float) -> None:
     with pytest.raises(GeometryError, match="change the unit"):
-        LambdaLinkage(k=k)
+        TiltedFourBar(k=k)
 
 
 @pytest.mark.parametrize("f", [1e-139, 1e-150, 1e-174, -1e-200, 1e-300])
 def test_pin_beside_the_rocker_axis(f: float) -> None:
     """Rhombus at f = 0: A runs into C, D^2 underflows; B stays half a coupler's turn away, on the chosen side."""
     for sgn in (1, -1):
-        found = LambdaLinkage(1.0, 1.0, 1.0, 1.0, sgn=sgn).positions([f])
+        found = TiltedFourBar(1.0, 1.0, 1.0, 1.0, sgn=sgn).positions([f])
         assert found.status.tolist() == [0]
         # B = A + C - O, or B = O
         want = [1.0 + sgn * math.copysign(1.0, f), 0.0, 0.0]

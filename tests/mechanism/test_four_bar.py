@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.mechanism.four_bar import AssemblyStatus, LambdaLinkage
+from graphsynth.mechanism.four_bar import AssemblyStatus, TiltedFourBar
 
 DEG = math.pi / 180.0
-DECK = LambdaLinkage(alpha=1 / 30)
+DECK = TiltedFourBar(alpha=1 / 30)
 
 # spec 14.1: f (deg), A, B
 DECK_POSITIONS = [
@@ -69,7 +69,7 @@ def test_deck_positions(degrees, A, B):
 
 
 def test_planar_values():
-    got = LambdaLinkage().positions(np.array([0.0, 90.0, 180.0, 270.0]) * DEG)
+    got = TiltedFourBar().positions(np.array([0.0, 90.0, 180.0, 270.0]) * DEG)
     root = math.sqrt(6.0)
     np.testing.assert_allclose(got.B[:, :2], [(1.5, root), (2, 2.5), (0.5, 2), (0, 1.5)], rtol=0, atol=1e-15)
     np.testing.assert_allclose(got.M[:, :2], [(2, 2 * root), (4, 4), (2, 4), (0, 4)], rtol=0, atol=2e-15)
@@ -77,11 +77,11 @@ def test_planar_values():
 
 
 def test_deck_rod_and_convention():
-    got = LambdaLinkage(alpha=1 / 30, rod="deck").positions([90 * DEG])
+    got = TiltedFourBar(alpha=1 / 30, rod="deck").positions([90 * DEG])
     np.testing.assert_allclose(got.B[0, :2], (1.999583277409820260233159, 2.499999965268456325521706), rtol=4e-16)
     length = np.linalg.norm(got.A[0] - got.B[0])
     assert length == pytest.approx(2.500222130061534921299998, rel=1e-15)
-    mirrored = LambdaLinkage(alpha=1 / 30, convention="deck").positions([1.0])
+    mirrored = TiltedFourBar(alpha=1 / 30, convention="deck").positions([1.0])
     assert mirrored.theta[0] == -DECK.positions([1.0]).theta[0]
     assert got.theta[0] == pytest.approx(0.0133300747342876170473645923467087430, rel=1e-15)
 
@@ -93,7 +93,7 @@ def test_largest_tilt():
 
 
 def test_general_axis():
-    linkage = LambdaLinkage(alpha=1 / 30, axis=(2, -1, 2))
+    linkage = TiltedFourBar(alpha=1 / 30, axis=(2, -1, 2))
     np.testing.assert_allclose(
         linkage.rotation[2],
         (0.01135594433097631525133174464, 0.02209466186513985602939740811, 0.9996913866015936127633669594),
@@ -134,39 +134,39 @@ def test_general_axis():
     ],
 )
 def test_change_point_linkage(alpha, degrees, B):
-    got = LambdaLinkage(2, 1, 2, 3, alpha=alpha).positions([degrees * DEG]).B[0]
+    got = TiltedFourBar(2, 1, 2, 3, alpha=alpha).positions([degrees * DEG]).B[0]
     # B_x is a difference from l1 = 2; B_y keeps its relative accuracy right up to the change point
     assert got[0] == pytest.approx(B[0], rel=0, abs=1e-15)
     assert got[1] == pytest.approx(B[1], rel=2e-15, abs=0)
 
 
 def test_change_point_and_dead_point_statements():
-    change = LambdaLinkage(2, 1, 2, 3).full_turn()
+    change = TiltedFourBar(2, 1, 2, 3).full_turn()
     assert (change.kind, change.change_angles, change.method) == ("change point", (0.0,), "exact")
-    limited = LambdaLinkage(2, 1, 1, 1).full_turn()
+    limited = TiltedFourBar(2, 1, 1, 1).full_turn()
     assert limited.kind == "limited"
     assert limited.limit_angles[0] == pytest.approx(1.318116071652817965745664, rel=1e-15)
     assert limited.limit_angles[1] == pytest.approx(math.tau - 1.318116071652817965745664, rel=1e-15)
-    free = LambdaLinkage().full_turn()
+    free = TiltedFourBar().full_turn()
     assert free.possible
     assert free.method == "exact"
-    assert LambdaLinkage(10, 1, 2, 2).full_turn().kind == "never assembled"
+    assert TiltedFourBar(10, 1, 2, 2).full_turn().kind == "never assembled"
     assert DECK.full_turn().possible
     assert DECK.full_turn().method == "estimated"
 
 
 def test_turned_about_normal_shifts_limits():
-    shifted = LambdaLinkage(2, 1, 1, 1, alpha=0.3, axis=(0, 0, 1)).full_turn()
+    shifted = TiltedFourBar(2, 1, 1, 1, alpha=0.3, axis=(0, 0, 1)).full_turn()
     expected = sorted(((1.318116071652817965745664 * s) - 0.3) % math.tau for s in (1, -1))
     assert shifted.limit_angles == pytest.approx(expected, rel=1e-14)
-    flipped = LambdaLinkage(2, 1, 1, 1, alpha=math.pi, axis=(1, 1, 0))
+    flipped = TiltedFourBar(2, 1, 1, 1, alpha=math.pi, axis=(1, 1, 0))
     for angle in flipped.full_turn().limit_angles:
         around = flipped.positions([angle - 1e-6, angle + 1e-6]).assembled
         assert around[0] != around[1]
 
 
 def test_tilted_limit_angles_are_where_the_status_changes():
-    linkage = LambdaLinkage(2, 1, 1, 1, alpha=0.5, axis=(1, 2, 0.5))
+    linkage = TiltedFourBar(2, 1, 1, 1, alpha=0.5, axis=(1, 2, 0.5))
     turn = linkage.full_turn()
     assert turn.kind == "limited"
     for angle in turn.limit_angles:
@@ -175,7 +175,7 @@ def test_tilted_limit_angles_are_where_the_status_changes():
 
 
 def test_one_sided_derivatives_at_change_point():
-    linkage = LambdaLinkage(2, 1, 2, 3)
+    linkage = TiltedFourBar(2, 1, 2, 3)
     at = linkage.positions([0.0])
     assert at.status[0] == AssemblyStatus.LIMIT
     np.testing.assert_array_equal(at.B[0], (-1.0, 0.0, 0.0))
@@ -188,12 +188,12 @@ def test_one_sided_derivatives_at_change_point():
 @pytest.mark.parametrize(
     ("linkage", "f", "status"),
     [
-        (LambdaLinkage(2, 1, 1, 1), math.pi, AssemblyStatus.TOO_FAR),
-        (LambdaLinkage(2, 1, 1, 5), 0.0, AssemblyStatus.ROCKER_TOO_LONG),
-        (LambdaLinkage(2, 1, 5, 1), 0.0, AssemblyStatus.COUPLER_TOO_LONG),
-        (LambdaLinkage(2, 2, 1, 1), 0.0, AssemblyStatus.INDETERMINATE),
-        (LambdaLinkage(2, 2, 1, 2), 0.0, AssemblyStatus.ROCKER_TOO_LONG),
-        (LambdaLinkage(2, 3, 2, 4, alpha=math.pi / 2), math.pi / 2, AssemblyStatus.TILT_EXCEEDS_ROD),
+        (TiltedFourBar(2, 1, 1, 1), math.pi, AssemblyStatus.TOO_FAR),
+        (TiltedFourBar(2, 1, 1, 5), 0.0, AssemblyStatus.ROCKER_TOO_LONG),
+        (TiltedFourBar(2, 1, 5, 1), 0.0, AssemblyStatus.COUPLER_TOO_LONG),
+        (TiltedFourBar(2, 2, 1, 1), 0.0, AssemblyStatus.INDETERMINATE),
+        (TiltedFourBar(2, 2, 1, 2), 0.0, AssemblyStatus.ROCKER_TOO_LONG),
+        (TiltedFourBar(2, 3, 2, 4, alpha=math.pi / 2), math.pi / 2, AssemblyStatus.TILT_EXCEEDS_ROD),
     ],
 )
 def test_not_assembled_has_a_reason(linkage, f, status):
@@ -206,7 +206,7 @@ def test_not_assembled_has_a_reason(linkage, f, status):
 
 
 def test_nan_only_with_a_status():
-    got = LambdaLinkage(2, 1, 1, 1).positions(np.linspace(-4, 4, 400))
+    got = TiltedFourBar(2, 1, 1, 1).positions(np.linspace(-4, 4, 400))
     for array in (got.B, got.M, got.theta[:, None]):
         np.testing.assert_array_equal(np.isnan(array).any(axis=-1), ~got.assembled)
 
@@ -230,16 +230,16 @@ def test_nan_only_with_a_status():
 )
 def test_bad_input_names_the_parameter(arguments):
     with pytest.raises(GeometryError, match=next(iter(arguments))):
-        LambdaLinkage(**arguments)
+        TiltedFourBar(**arguments)
 
 
 def test_bad_angle():
     with pytest.raises(GeometryError, match="f holds nan"):
-        LambdaLinkage().positions([0.0, math.nan])
+        TiltedFourBar().positions([0.0, math.nan])
 
 
 def test_straightness():
-    stroke = LambdaLinkage().straightness()
+    stroke = TiltedFourBar().straightness()
     assert stroke.chord == pytest.approx(4.0, rel=1e-15)
     assert stroke.lowest == pytest.approx(0.0, abs=1e-14)
     assert 0.009753 < stroke.highest < 0.00976
@@ -247,7 +247,7 @@ def test_straightness():
     tilted = DECK.straightness()
     assert tilted.out_of_plane == pytest.approx(DECK.pin_height, rel=1e-15)
     with pytest.raises(GeometryError, match="not assembled"):
-        LambdaLinkage(2, 1, 1, 1).straightness()
+        TiltedFourBar(2, 1, 1, 1).straightness()
 
 
 def _reference(linkage, f):
@@ -292,7 +292,7 @@ angles = st.floats(-7.0, 7.0)
     angles,
 )
 def test_against_fifty_digits(l1, l2, l3, l4, sgn, alpha, axis, f):
-    linkage = LambdaLinkage(l1, l2, l3, l4, sgn, alpha=alpha, axis=axis)
+    linkage = TiltedFourBar(l1, l2, l3, l4, sgn, alpha=alpha, axis=axis)
     got = linkage.positions(f)
     A, B, theta, y = _reference(linkage, f)
     if B is None:
@@ -317,7 +317,7 @@ def test_against_fifty_digits(l1, l2, l3, l4, sgn, alpha, axis, f):
 @settings(max_examples=60, deadline=None)
 @given(st.floats(-0.5, 0.5), st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 1)), angles)
 def test_invariants(alpha, axis, f):
-    linkage = LambdaLinkage(alpha=alpha, axis=axis)
+    linkage = TiltedFourBar(alpha=alpha, axis=axis)
     got = linkage.positions(f)
     assert np.linalg.norm(got.A - got.B) == pytest.approx(2.5, rel=2e-15)  # the rod is rigid
     assert np.linalg.norm(got.B - (2.0, 0.0, 0.0)) == pytest.approx(2.5, rel=2e-15)
@@ -335,14 +335,14 @@ def test_invariants(alpha, axis, f):
 
 def test_scale_invariance():
     f = np.linspace(0, 6, 50)
-    small = LambdaLinkage(2e-9, 1e-9, 2.5e-9, 2.5e-9, alpha=0.1).positions(f)
-    large = LambdaLinkage(2e9, 1e9, 2.5e9, 2.5e9, alpha=0.1).positions(f)
+    small = TiltedFourBar(2e-9, 1e-9, 2.5e-9, 2.5e-9, alpha=0.1).positions(f)
+    large = TiltedFourBar(2e9, 1e9, 2.5e9, 2.5e9, alpha=0.1).positions(f)
     np.testing.assert_allclose(small.theta, large.theta, rtol=1e-14, atol=1e-17)
     np.testing.assert_allclose(small.B * 1e18, large.B, rtol=1e-14, atol=1e-6)
 
 
 def test_quadrant_for_long_crank():
-    linkage = LambdaLinkage(1, 3, 3, 2)  # l2 > l1: a one-argument arctangent would change quadrant
+    linkage = TiltedFourBar(1, 3, 3, 2)  # l2 > l1: a one-argument arctangent would change quadrant
     got = linkage.positions(np.linspace(0, math.tau, 100))
     assert got.assembled.all()
     steps = np.linalg.norm(np.diff(got.B, axis=0), axis=1)
@@ -352,7 +352,7 @@ def test_quadrant_for_long_crank():
 def test_graph_is_the_four_bar_chain():
     from graphsynth.structure import graph as graph_module
 
-    graph = LambdaLinkage().graph()
+    graph = TiltedFourBar().graph()
     assert isinstance(graph, graph_module.MechanismGraph)
     assert (graph.links, graph.frame) == (4, 0)
     assert [(j.a, j.b) for j in graph.joints] == [(0, 1), (0, 3), (1, 2), (2, 3)]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.four_bar_turn import _margins
 
 CHANGE, STRETCHED = (2.0, 1.0, 2.0, 3.0), (4.0, 1.0, 1.0, 2.0)
@@ -39,7 +39,7 @@ def test_margins_to_a_few_roundings(rod):
     for _ in range(60):
         l1, l2, l3, l4 = rng.uniform(0.5, 3.0, 4)
         tilt = {"alpha": rng.uniform(-3.0, 3.0), "axis": tuple(rng.normal(size=3)), "rod": rod}
-        linkage = LambdaLinkage(l1, l2, l3 + l2, l4, **tilt)
+        linkage = TiltedFourBar(l1, l2, l3 + l2, l4, **tilt)
         f = rng.uniform(0.0, math.tau, 4)
         for angle, found in zip(f, _margins(linkage, f)):
             worst = max(worst, abs(float(min(margins(linkage, mp.mpf(angle))) - mp.mpf(found))))
@@ -52,7 +52,7 @@ def test_margins_to_a_few_roundings(rod):
 def test_near_a_change_point_only_what_lies_beyond_rounding_is_decided(steps, rod, alpha):
     """At f = 0 the pin lies in the plane, where the margin is exactly ((l1 - l2)^2 - (l4 - l3)^2) / l4^2."""
     l1, l2, l3, l4 = CHANGE
-    turn = LambdaLinkage(l1 + steps * 2.0**-51, l2, l3, l4, alpha=alpha, rod=rod).full_turn()
+    turn = TiltedFourBar(l1 + steps * 2.0**-51, l2, l3, l4, alpha=alpha, rod=rod).full_turn()
     assert turn.method == "estimated"
     if abs(steps) >= 2**12:
         assert turn.kind == ("full turn" if steps > 0 else "limited") and turn.possible == (steps > 0)
@@ -69,7 +69,7 @@ def test_near_a_change_point_only_what_lies_beyond_rounding_is_decided(steps, ro
 def test_near_an_immovable_linkage_only_what_lies_beyond_rounding_is_decided(steps, alpha):
     """Stretched at f = 0, where the margin is exactly ((l3 + l4)^2 - (l1 - l2)^2) / l1^2, and largest."""
     l1, l2, l3, l4 = STRETCHED
-    linkage = LambdaLinkage(l1 - steps * 2.0**-51, l2, l3, l4, alpha=alpha)
+    linkage = TiltedFourBar(l1 - steps * 2.0**-51, l2, l3, l4, alpha=alpha)
     turn = linkage.full_turn()
     assert not turn.possible
     if abs(steps) < 2**12:
@@ -88,7 +88,7 @@ def test_a_dip_between_two_samples_is_seen(depth, rod):
     """The smallest margin lies between samples; below zero for less than their distance there are two dead points."""
 
     def lowest(l1):
-        linkage = LambdaLinkage(l1, 1.0, 2.0, 3.0, alpha=0.5, axis=(1.0, 2.0, 0.5), rod=rod)
+        linkage = TiltedFourBar(l1, 1.0, 2.0, 3.0, alpha=0.5, axis=(1.0, 2.0, 0.5), rod=rod)
         grid = np.linspace(0.0, math.tau, 2881)
         f = mp.mpf(float(grid[np.argmin(_margins(linkage, grid))]))
         f = mp.findroot(lambda x: mp.diff(lambda y: margins(linkage, y)[0], x), (f, f + 1e-3), tol=1e-20)
@@ -115,11 +115,11 @@ def test_the_one_angle_of_an_immovable_linkage_is_told(node, tilt):
     """The motor turned back by the angle of a sample, then tilted: stretched there, with a margin of rounding size."""
     angle = node * math.tau / 1440
     turned = (Rotation.from_rotvec([tilt, 0.0, 0.0]) * Rotation.from_rotvec([0.0, 0.0, -angle])).as_rotvec()
-    turn = LambdaLinkage(*STRETCHED, alpha=float(np.linalg.norm(turned)), axis=tuple(turned)).full_turn()
+    turn = TiltedFourBar(*STRETCHED, alpha=float(np.linalg.norm(turned)), axis=tuple(turned)).full_turn()
     assert turn.kind == "immovable" and turn.limit_angles == pytest.approx([angle], abs=1e-9)
 
 
 def test_a_tilt_below_rounding_is_flat():
     """Nothing changes over the turn: one margin, no dips to look for."""
-    turn = LambdaLinkage(2.0, 1e-30, 2.0, 3.0, alpha=0.1).full_turn()
+    turn = TiltedFourBar(2.0, 1e-30, 2.0, 3.0, alpha=0.1).full_turn()
     assert turn.kind == "full turn" and "0.333" in turn.statement

@@ -82,11 +82,11 @@ def test_size_is_the_box_of_joints_and_points_in_cranks(tmp_path: Path) -> None:
 
 
 def test_torque_against_virtual_work(tmp_path: Path) -> None:
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     loads = {"bar_kg_per_m": 1e-9, "force": ["2 N", "-3 N"], "speed": "1 rad/s"}
     found = margins(execute(scene(tmp_path, ["records"], loads=loads)))
-    path = LambdaLinkage(*LENGTHS).positions(np.linspace(0, 2 * np.pi, 73))
+    path = TiltedFourBar(*LENGTHS).positions(np.linspace(0, 2 * np.pi, 73))
     torque = -(path.dM[:, 0] * 2.0 + path.dM[:, 1] * -3.0)
     assert found["largest torque"] == pytest.approx(np.abs(torque).max(), rel=1e-6)
     assert found["mean torque"] == pytest.approx(0.0, abs=1e-9)  # a constant force does no work over a turn

@@ -23,7 +23,7 @@ from graphsynth.core.errors import SceneError
 from graphsynth.jamming.bearing.bearing import Bearing
 from graphsynth.jamming.bearing.inverse import largest_misalignment, smallest_clearance
 from graphsynth.jamming.bearing.tilt_arcs import jam_arcs
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import BudgetTable, Scene, find_scene, load_scene
 from graphsynth.pipeline.stages import Context
@@ -56,7 +56,7 @@ def small(**mechanism: Any) -> Scene:
 def test_classes_against_exact_arithmetic_of_single_linkages(lengths: list[tuple[int, ...]]) -> None:
     kinds, types = classify(np.array(lengths))
     for (g, a, b, c), kind, type_ in zip(lengths, kinds, types, strict=True):
-        assert KINDS[kind] == LambdaLinkage(g, a, b, c).full_turn().kind
+        assert KINDS[kind] == TiltedFourBar(g, a, b, c).full_turn().kind
         assert TYPES[type_] == grashof(g, a, b, c)
 
 
@@ -105,7 +105,7 @@ def test_closed_forms_by_set_against_single_linkages(condition: Any, alpha: floa
     found = close_form(table, lengths)
     bearing = Bearing(17.5, 10, 0.03)
     for i, (g, a, b, c) in enumerate(lengths.tolist()):
-        one = LambdaLinkage(g, a, b, c, alpha=alpha, axis=tuple(axis))
+        one = TiltedFourBar(g, a, b, c, alpha=alpha, axis=tuple(axis))
         assert found.tilt[i] == pytest.approx(one.largest_tilt[0], rel=1e-13)
         part = sum(arc.length for arc in jam_arcs(one, bearing, condition).arcs) / math.tau
         assert found.part[i] == pytest.approx(part, rel=1e-12)

@@ -18,9 +18,10 @@ import graphsynth.testing as testing
 from graphsynth.core.errors import InfeasibleSpecError, SpecError
 from graphsynth.intervals import Interval
 from graphsynth.kinematics.triad.leg import LegStatus
+from graphsynth.mechanism.rotatability import type_of
 from graphsynth.pipeline.scene import Scene
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.testing.strategies.four_bars import CLASSES, classify
+from graphsynth.testing.strategies.four_bars import CLASSES
 from graphsynth.testing.strategies.scenes import toml_text
 from graphsynth.testing.strategies.specs import _values
 
@@ -197,7 +198,7 @@ def test_class_by_the_definition(lengths):
     turns_a = abs(g - a) > abs(b - c) and g + a < b + c  # crank against the frame
     turns_c = abs(g - c) > abs(b - a) and g + c < b + a  # rocker against the frame
     assembled = max(g + a, b + c) > 0 and g + a >= abs(b - c) and abs(g - a) <= b + c
-    kind = classify(*map(Fraction, lengths))
+    kind = type_of(*map(Fraction, lengths))
     if kind == "never assembled":
         assert not assembled
     elif kind == "immovable":

@@ -19,7 +19,7 @@ from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.jamming.bearing.areas_enclosed import enclose_lid_area, enclose_rim_area, enclose_surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,12 +80,12 @@ class AreaCurve:
 
 
 @checked
-def enclose_tilt_sine(linkage: LambdaLinkage, f: ArrayLike | Interval) -> Interval:
+def enclose_tilt_sine(linkage: TiltedFourBar, f: ArrayLike | Interval) -> Interval:
     """Enclose the sine of the tilt of the coupler, ``A_z / l3``.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
         With ``rod="rigid"``; its numbers are taken as the doubles that they are.
     f : array_like or Interval
         Crank angles, radians.
@@ -101,7 +101,7 @@ def enclose_tilt_sine(linkage: LambdaLinkage, f: ArrayLike | Interval) -> Interv
 
     Examples
     --------
-    >>> float(enclose_tilt_sine(LambdaLinkage(alpha=1 / 30), np.pi / 2).width) < 1e-16
+    >>> float(enclose_tilt_sine(TiltedFourBar(alpha=1 / 30), np.pi / 2).width) < 1e-16
     True
     """
     from graphsynth.intervals import functions
@@ -128,13 +128,13 @@ def _points(f: ArrayLike) -> Interval:
 
 @checked
 def area_curve(
-    linkage: LambdaLinkage | None = None, bearing: Bearing | None = None, f: ArrayLike | None = None
+    linkage: TiltedFourBar | None = None, bearing: Bearing | None = None, f: ArrayLike | None = None
 ) -> AreaCurve:
     """Enclose all areas over crank angles.
 
     Parameters
     ----------
-    linkage : LambdaLinkage, optional
+    linkage : TiltedFourBar, optional
         Defaults to the source: its lengths, ``alpha = 1/30`` about x.
     bearing : Bearing, optional
         Its dimensions are read as the decimals they print as.
@@ -157,7 +157,7 @@ def area_curve(
     >>> np.round(curve.lid.mid, 9).tolist(), np.round(curve.source_ordinate, 9).tolist()
     ([0.966036031, 0.0], [0.974968365, 0.0])
     """
-    linkage = LambdaLinkage(alpha=1 / 30) if linkage is None else linkage
+    linkage = TiltedFourBar(alpha=1 / 30) if linkage is None else linkage
     bearing = Bearing() if bearing is None else bearing
     angles = np.radians(np.linspace(90.0, 450.0, 721)) if f is None else np.atleast_1d(finite_array("f", f))
     sine = enclose_tilt_sine(linkage, angles)

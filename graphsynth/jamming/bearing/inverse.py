@@ -12,7 +12,7 @@ from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.jamming.verdict import METHOD_CLOSED_FORM
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 __all__ = ["Limit", "largest_height", "largest_misalignment", "smallest_clearance"]
 
@@ -27,12 +27,12 @@ class Limit:
 
 
 @checked
-def largest_misalignment(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
+def largest_misalignment(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Largest alpha (radians) for which the whole turn is free; None if every alpha is free, or none.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
     bearing : Bearing
         Dimensions in millimetres.
     condition : {"A", "B"}
@@ -50,7 +50,7 @@ def largest_misalignment(linkage: LambdaLinkage, bearing: Bearing, condition: Co
 
     Examples
     --------
-    >>> round(largest_misalignment(LambdaLinkage(), Bearing()).value, 15)
+    >>> round(largest_misalignment(TiltedFourBar(), Bearing()).value, 15)
     0.01516147932502
     """
     critical = bearing.critical_tilt(condition)
@@ -70,7 +70,7 @@ def largest_misalignment(linkage: LambdaLinkage, bearing: Bearing, condition: Co
     return Limit(2.0 * math.asin(math.sqrt(0.5 * deficit / inclination)))
 
 
-def _tilt(linkage: LambdaLinkage) -> tuple[float, float]:
+def _tilt(linkage: TiltedFourBar) -> tuple[float, float]:
     angle, sine = linkage.largest_tilt
     if linkage.rod == "rigid" and linkage.pin_height > linkage.l3:
         raise GeometryError(
@@ -81,12 +81,12 @@ def _tilt(linkage: LambdaLinkage) -> tuple[float, float]:
 
 
 @checked
-def smallest_clearance(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
+def smallest_clearance(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Smallest radial clearance (mm) for which the whole turn is free, for the radius and height of ``bearing``.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
     bearing : Bearing
         Dimensions in millimetres.
     condition : {"A", "B"}
@@ -104,7 +104,7 @@ def smallest_clearance(linkage: LambdaLinkage, bearing: Bearing, condition: Cond
 
     Examples
     --------
-    >>> round(smallest_clearance(LambdaLinkage(alpha=1 / 30), Bearing()).value, 15)
+    >>> round(smallest_clearance(TiltedFourBar(alpha=1 / 30), Bearing()).value, 15)
     0.065099273073546
     """
     S, C = _tilt(linkage)
@@ -121,12 +121,12 @@ def smallest_clearance(linkage: LambdaLinkage, bearing: Bearing, condition: Cond
 
 
 @checked
-def largest_height(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> Limit:
+def largest_height(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Limit:
     """Largest height Hb (mm) for which the whole turn is free, for the radius and clearance of ``bearing``.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
     bearing : Bearing
         Dimensions in millimetres.
     condition : {"A", "B"}

@@ -9,7 +9,7 @@ from graphsynth.core.checks import choice, sign
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Bearing
 from graphsynth.jamming.bearing.ranges import Given, Range
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
@@ -42,7 +42,7 @@ class ToleranceBox:
     hole_length : Given, optional
         Length of the hole for condition "general", millimetres.
     sgn, rod, convention
-        As for `LambdaLinkage`.
+        As for `TiltedFourBar`.
 
     Raises
     ------
@@ -93,7 +93,7 @@ class ToleranceBox:
         object.__setattr__(self, "convention", choice("convention", convention, ("spec", "deck")))
 
     @classmethod
-    def of(cls, linkage: LambdaLinkage, bearing: Bearing | None = None) -> ToleranceBox:
+    def of(cls, linkage: TiltedFourBar, bearing: Bearing | None = None) -> ToleranceBox:
         """Return the box of one linkage and one bearing: their doubles as they are, marked as float input.
 
         Raises
@@ -101,8 +101,8 @@ class ToleranceBox:
         GeometryError
             Something else than a linkage or a bearing.
         """
-        if not isinstance(linkage, LambdaLinkage):
-            raise GeometryError(f"linkage = {linkage!r} is no LambdaLinkage; give one")
+        if not isinstance(linkage, TiltedFourBar):
+            raise GeometryError(f"linkage = {linkage!r} is no TiltedFourBar; give one")
         b = Bearing() if bearing is None else bearing
         if not isinstance(b, Bearing):
             raise GeometryError(f"bearing = {b!r} is no Bearing; give Bearing(Rb, Hb, clearance), or none")
@@ -171,7 +171,7 @@ class ToleranceBox:
         """Return the smallest interval of doubles around the range of a parameter."""
         return self[name].outer
 
-    def nominal(self) -> tuple[LambdaLinkage, Bearing]:
+    def nominal(self) -> tuple[TiltedFourBar, Bearing]:
         """Return the linkage and the bearing in the middle of the box, in doubles (estimated: for tables and plots)."""
         import math
 
@@ -180,7 +180,7 @@ class ToleranceBox:
         n1 = m["n1"] * math.cos(turn) - m["n2"] * math.sin(turn)
         n2 = m["n1"] * math.sin(turn) + m["n2"] * math.cos(turn)
         axis = (m["n1"], m["n2"], m["n3"]) if turn == 0.0 else (n1, n2, m["n3"])
-        linkage = LambdaLinkage(
+        linkage = TiltedFourBar(
             m["l1"], m["l2"], m["l3"], m["l4"], self.sgn, alpha=m["alpha"], axis=axis, rod=self.rod,
             convention=self.convention,
         )  # fmt: skip

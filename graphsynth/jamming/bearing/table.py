@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from graphsynth.jamming.bearing.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,7 +48,7 @@ class JammingTable:
         return pd.DataFrame({name: getattr(self, name) for name in self.__dataclass_fields__})
 
 
-def table_over(linkage: LambdaLinkage, bearing: Bearing, condition: Condition, f: Array) -> JammingTable:
+def table_over(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, f: Array) -> JammingTable:
     """Fill the table at crank angles ``f`` (radians)."""
     path = linkage.positions(f)
     S, C = np.where(path.assembled, path.sin_theta, 0.0), np.where(path.assembled, path.cos_theta, 1.0)

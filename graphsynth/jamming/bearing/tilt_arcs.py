@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from graphsynth.core.checks import checked
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.jamming.verdict import METHOD_CLOSED_FORM
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
 __all__ = ["Arc", "JamArcs", "jam_arcs"]
 
@@ -62,7 +62,7 @@ class JamArcs:
 
 
 @checked
-def jam_arcs(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A") -> JamArcs:
+def jam_arcs(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> JamArcs:
     """Jam arcs of the bearing at B over one turn of the crank (section 7.1).
 
     Exact closed form evaluated in double precision.  ``|kappa - 1|`` below sixteen units in the last place is reported
@@ -70,7 +70,7 @@ def jam_arcs(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
     bearing : Bearing
         Dimensions in millimetres.
     condition : {"A", "B"}
@@ -83,7 +83,7 @@ def jam_arcs(linkage: LambdaLinkage, bearing: Bearing, condition: Condition = "A
 
     Examples
     --------
-    >>> arcs = jam_arcs(LambdaLinkage(alpha=1 / 30), Bearing())
+    >>> arcs = jam_arcs(TiltedFourBar(alpha=1 / 30), Bearing())
     >>> [round(math.degrees(arc.start), 6) for arc in arcs.arcs]
     [27.05922, 207.05922]
     """
@@ -118,7 +118,7 @@ def _ends(phase: float, kappa: float) -> tuple[float, ...]:
     return tuple(sorted((phase + angle) % math.tau for angle in (edge, math.pi - edge, math.pi + edge, -edge)))
 
 
-def _kappa(linkage: LambdaLinkage, sine: float) -> float:
+def _kappa(linkage: TiltedFourBar, sine: float) -> float:
     """Value of ``|sin(f - psi1)|`` at which the tilt becomes critical."""
     if sine == 0.0 or linkage.pin_height == 0.0:  # tilts that underflow
         return math.inf if sine > 0.0 else 0.0

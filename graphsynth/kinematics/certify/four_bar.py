@@ -17,6 +17,7 @@ import flint
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.certify.numbers import ball, rational
 from graphsynth.kinematics.certify.precision import precision
+from graphsynth.mechanism.rotatability import KINDS, four_bar_rotation, rotation_kind, type_of
 
 __all__ = [
     "CrankCertificate",
@@ -104,33 +105,11 @@ def certify_four_bar(ground: Any, crank: Any, coupler: Any, rocker: Any) -> Cran
     g, a, b, c = (
         _length(n, v) for n, v in zip(("ground", "crank", "coupler", "rocker"), (ground, crank, coupler, rocker))
     )
-    kind = _kind(abs(g - a), g + a, abs(b - c), b + c)
-    changes = tuple(angle for angle, hit in (("0", abs(g - a) == abs(b - c)), ("pi", g + a == b + c)) if hit)
-    limits = []
-    if kind in _BOUNDED:
-        for place, reach, blocks in (
-            ("stretched", b + c, g + a > b + c),
-            ("folded", abs(b - c), abs(g - a) < abs(b - c)),
-        ):
-            if blocks:
-                limits.append(_cosine(place, (g * g + a * a - reach * reach) / (2 * g * a)))
-    return _certificate(kind, _type(g, a, b, c), limits, changes if kind != "never assembled" else ())
-
-
-def _type(g: Fraction, a: Fraction, b: Fraction, c: Fraction) -> str:
-    """Grashof's rule: the shortest and longest links against the other two."""
-    s, p, q, longest = sorted((g, a, b, c))
-    if longest >= s + p + q:
-        return "immovable" if longest == s + p + q else "never assembled"
-    if s + longest == p + q:
-        return "change point"
-    if s + longest > p + q:
-        return "triple rocker"
-    if s == g:
-        return "double crank"
-    if s == a:
-        return "crank-rocker"
-    return "rocker-crank" if s == c else "double rocker"
+    kind, touches, bounds = four_bar_rotation(g * g, a, b, c)
+    bounds = bounds if kind in _BOUNDED else ()
+    limits = [_cosine(place, (g * g + a * a - reach * reach) / (2 * g * a)) for place, reach in bounds]
+    changes = tuple(angle for angle, met in zip(("0", "pi"), touches) if met and kind != "never assembled")
+    return _certificate(kind, type_of(g, a, b, c), limits, changes)
 
 
 def certify_slider_crank(crank: Any, coupler: Any, offset: Any = 0) -> CrankCertificate:
@@ -206,13 +185,7 @@ def _length(name: str, value: Any) -> Fraction:
 
 def _kind(nearest: Fraction, farthest: Fraction, least: Fraction, most: Fraction) -> str:
     """Compare the extremes of the reach over a turn with its bounds."""
-    if nearest > most or farthest < least:
-        return "never assembled"
-    if nearest == most or farthest == least:
-        return "immovable"
-    if nearest > least and farthest < most:
-        return "full turn"
-    return "change point" if nearest >= least and farthest <= most else "limited"
+    return KINDS[int(rotation_kind(nearest - least, farthest - most, nearest - most, farthest - least))]
 
 
 def _cosine(place: str, cosine: Fraction) -> LimitAngle:

@@ -40,9 +40,9 @@ def linkage_dynamics(context: Any, effort: Effort) -> Problem:
 def positions(context: Any, effort: Effort) -> Problem:
     """Measure positions of the linkage over a turn."""
     from graphsynth.evidence.position import four_bar, position_problem
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     bar = _braider(context).linkage
-    linkage = LambdaLinkage(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch)
+    linkage = TiltedFourBar(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch)
     mechanism, closed = four_bar(linkage)
     return position_problem(mechanism, "the braider's linkage", closed, effort=effort)

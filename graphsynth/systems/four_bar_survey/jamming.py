@@ -44,11 +44,11 @@ def close_form(table: SurveyTable, lengths: NDArray[np.int64]) -> Jamming:
     (specification lambda_and_jamming, sections 4.7, 7.1, 7.4).
     """
     from graphsynth.jamming.bearing.bearing import Bearing
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     own = table.bearing
     bearing = Bearing(own.radius_mm, own.height_mm, own.clearance_mm)
-    unit = LambdaLinkage(1.0, 1.0, 1.0, 1.0, alpha=table.tilt.alpha_rad, axis=table.tilt.axis)
+    unit = TiltedFourBar(1.0, 1.0, 1.0, 1.0, alpha=table.tilt.alpha_rad, axis=table.tilt.axis)
     ratios, which = np.unique(lengths[:, 1] / lengths[:, 2], return_inverse=True)
     sine = np.minimum(unit.pin_height * ratios, 1.0)
     critical = bearing.critical_tilt(own.condition)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.mechanism.rotatability import KINDS, TYPES, grashof_type, rotation_kind
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.tables import exact_number
 from graphsynth.pipeline.units import Unit
@@ -19,13 +20,6 @@ __all__ = ["KINDS", "LONGEST", "TYPES", "Lattice", "classify", "lattice_of"]
 
 Ints = NDArray[np.int64]
 
-#: Whether the crank turns, as `certify_four_bar` calls it; codes are places in this tuple.
-KINDS = ("full turn", "change point", "limited", "never assembled", "immovable")
-#: Types by Grashof's rule, seen from the crank.
-TYPES = (
-    "crank-rocker", "double crank", "rocker-crank", "double rocker", "change point", "triple rocker", "never assembled",
-    "immovable",
-)  # fmt: skip
 #: Lengths in units of the lattice: products of four stay exact, and margins stay clear of rounding.
 LONGEST = 20_000
 
@@ -127,9 +121,7 @@ def classify(lengths: Ints) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
     Returns
     -------
     kind, type : ndarray of int8, shape (n,)
-        Places in `KINDS` and `TYPES`.  The crank turns if its pin keeps a distance from the rocker's pivot that
-        coupler and rocker can span: ``|c - d| < |a - b|`` and ``a + b < c + d`` (Grashof, 1883).  Kind and type are
-        "immovable" if the longest link is as long as the others together: they can only lie stretched along it.
+        Places in `KINDS` and `TYPES` of `graphsynth.mechanism.rotatability`.
 
     Examples
     --------
@@ -141,18 +133,4 @@ def classify(lengths: Ints) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
     """
     g, a, b, c = lengths.T
     nearest, farthest, least, most = np.abs(g - a), g + a, np.abs(b - c), b + c
-    kind = np.full(len(lengths), KINDS.index("limited"), dtype=np.int8)
-    kind[(nearest >= least) & (farthest <= most)] = KINDS.index("change point")
-    kind[(nearest > least) & (farthest < most)] = KINDS.index("full turn")
-    kind[(nearest == most) | (farthest == least)] = KINDS.index("immovable")
-    kind[(nearest > most) | (farthest < least)] = KINDS.index("never assembled")
-    ordered = np.sort(lengths, axis=1)
-    s, p, q, longest = ordered.T
-    place = np.argmin(lengths, axis=1)  # only read where the shortest link is alone
-    names = ("double crank", "crank-rocker", "double rocker", "rocker-crank")
-    types = np.array([TYPES.index(name) for name in names], dtype=np.int8)[place]
-    types[s + longest > p + q] = TYPES.index("triple rocker")
-    types[s + longest == p + q] = TYPES.index("change point")
-    types[longest == s + p + q] = TYPES.index("immovable")
-    types[longest > s + p + q] = TYPES.index("never assembled")
-    return kind, types
+    return rotation_kind(nearest - least, farthest - most, nearest - most, farthest - least), grashof_type(lengths)

@@ -15,7 +15,7 @@ from graphsynth.drawing.sketch import Sketch, degrees
 
 if TYPE_CHECKING:
     from graphsynth.drawing.plots import Band, Chart, Line
-    from graphsynth.mechanism.four_bar import LambdaLinkage, LambdaPositions
+    from graphsynth.mechanism.four_bar import FourBarPositions, TiltedFourBar
 
 __all__ = ["lambda_animation", "lambda_sketch", "lambda_sketch_3d", "lambda_tilt_chart"]
 
@@ -28,12 +28,12 @@ _SAMPLES = 361
 _TURN, _RAISED = math.radians(-24.0), math.radians(40.0)
 
 
-def _turn(linkage: LambdaLinkage) -> LambdaPositions:
+def _turn(linkage: TiltedFourBar) -> FourBarPositions:
     return linkage.positions(np.linspace(0.0, math.tau, _SAMPLES))
 
 
 def lambda_sketch(
-    linkage: LambdaLinkage,
+    linkage: TiltedFourBar,
     f: float,
     *,
     width: float = 420.0,
@@ -45,7 +45,7 @@ def lambda_sketch(
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
         With a tilted motor axis its projection on the plane is drawn.
     f : float
         Crank angle, radians.
@@ -87,7 +87,7 @@ def lambda_sketch(
 
 
 def _background(
-    linkage: LambdaLinkage, width: float, title: str, stroke: tuple[float, float] | None
+    linkage: TiltedFourBar, width: float, title: str, stroke: tuple[float, float] | None
 ) -> tuple[Sketch, complex, complex]:
     """Draw what does not move: ground, crank circle, path of M; return the corners of the picture too."""
     turn = _turn(linkage)
@@ -109,7 +109,7 @@ def _background(
 
 
 def lambda_animation(
-    linkage: LambdaLinkage,
+    linkage: TiltedFourBar,
     jams: Callable[[float], bool] | None = None,
     *,
     frames: int = 90,
@@ -120,7 +120,7 @@ def lambda_animation(
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
     jams : callable, optional
         Tells of a crank angle whether the bearing jams there.
     frames : int
@@ -165,7 +165,7 @@ def _plane(points: Array) -> list[complex]:
     return [complex(x, y) for x, y in points[:, :2].tolist()]
 
 
-def _exaggeration(linkage: LambdaLinkage) -> float:
+def _exaggeration(linkage: TiltedFourBar) -> float:
     """Return the factor 1, 2, 5, 10, ... that makes the largest height of the crank pin about 0.6 of the crank."""
     if linkage.pin_height <= 0.0:
         return 1.0
@@ -175,13 +175,13 @@ def _exaggeration(linkage: LambdaLinkage) -> float:
 
 
 def lambda_sketch_3d(
-    linkage: LambdaLinkage, f: float, *, exaggeration: float | None = None, width: float = 520.0
+    linkage: TiltedFourBar, f: float, *, exaggeration: float | None = None, width: float = 520.0
 ) -> Sketch:
     """Build a picture of the linkage in space: the tilted motor axis, the crank's circle, the rod out of the plane.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
     f : float
         Crank angle, radians, at which the linkage can be assembled.
     exaggeration : float, optional
@@ -284,12 +284,12 @@ def _ground_plane(points: Array) -> Array:
     return np.array([[x0, y0, 0.0], [x1, y0, 0.0], [x1, y1, 0.0], [x0, y1, 0.0]])
 
 
-def lambda_tilt_chart(linkage: LambdaLinkage, *, bands: Sequence[Band] = (), levels: Sequence[Line] = ()) -> Chart:
+def lambda_tilt_chart(linkage: TiltedFourBar, *, bands: Sequence[Band] = (), levels: Sequence[Line] = ()) -> Chart:
     """Tilt of the coupler at the bearing B over a turn of the crank, in milliradians; a gap where not assembled.
 
     Parameters
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
     bands : sequence of Band
         Shaded ranges of crank angle, for example jam arcs.
     levels : sequence of Line

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from graphsynth.jamming.bearing.certified_limits import CertifiedLimit
     from graphsynth.jamming.bearing.certify import JamCertificate
     from graphsynth.jamming.bearing.circle_sets import Span
-    from graphsynth.mechanism.four_bar import LambdaLinkage, LambdaPositions
+    from graphsynth.mechanism.four_bar import FourBarPositions, TiltedFourBar
 
 __all__ = ["LambdaMotion", "jamming", "judge", "kinematics", "recognise", "tolerance_box"]
 
@@ -32,17 +32,17 @@ class LambdaMotion:
 
     Attributes
     ----------
-    linkage : LambdaLinkage
+    linkage : TiltedFourBar
         With the tilted motor axis.
-    planar, tilted : LambdaPositions
+    planar, tilted : FourBarPositions
         Motion without and with the tilt at the same crank angles, from 0 to 2 pi.
     residual : float
         Largest relative error of the rod length in `tilted`, as recomputed from the positions (estimated error).
     """
 
-    linkage: LambdaLinkage
-    planar: LambdaPositions
-    tilted: LambdaPositions
+    linkage: TiltedFourBar
+    planar: FourBarPositions
+    tilted: FourBarPositions
     residual: float
 
 
@@ -54,7 +54,7 @@ def _table(context: Context) -> LambdaTable:
 
 def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Recognised, ...]:
     """Mark the candidates whose canonical key is that of the four-bar with its frame."""
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.systems.lambda_linkage.model import LambdaLinkage
 
     return recognise_by_key(candidates, LambdaLinkage().graph(), "lambda_linkage")
 
@@ -68,7 +68,7 @@ def _move(table: LambdaTable) -> LambdaMotion:
     import numpy as np
 
     from graphsynth.core.errors import GeometryError
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.systems.lambda_linkage.model import LambdaLinkage
 
     lengths = table.lengths
     linkage = LambdaLinkage(
@@ -313,7 +313,7 @@ def _motion_table(motion: LambdaMotion) -> Table:
     return Table("Motion", ("quantity", "value", "how had"), rows, "Lengths in the unit of the link lengths.")
 
 
-def _stroke(linkage: LambdaLinkage) -> str:
+def _stroke(linkage: TiltedFourBar) -> str:
     """Say how long and how straight the working stroke is, or why there is none."""
     from graphsynth.core.errors import GeometryError
 

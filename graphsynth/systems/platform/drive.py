@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import check_fields, check_sizes, finite, positive, sign
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.leg import solve_leg
+from graphsynth.mechanism.rotatability import FourBarRotation, four_bar_rotation
 from graphsynth.systems.platform.motion import Event
 
 __all__ = ["DriveMotion", "DriveTurn", "FourBarDrive", "first_barrier"]
@@ -139,34 +140,32 @@ class FourBarDrive:
 
     def turn(self) -> DriveTurn:
         """Whether the crank turns fully, decided in exact arithmetic on the given numbers (section 7.4)."""
-        w = (Fraction(self.axis.real) - Fraction(self.pivot.real), Fraction(self.axis.imag) - Fraction(self.pivot.imag))
-        square = w[0] ** 2 + w[1] ** 2
-        crank, rocker, coupler = (Fraction(x) for x in (self.crank, self.rocker, self.coupler))
-        least, most = abs(rocker - coupler), rocker + coupler
-        if crank == 0:
-            inside = least**2 <= square <= most**2
-            return DriveTurn("full turn", None) if inside else DriveTurn("never assembled", ())
-        # far: |OD| + l_B against l_CD + l_BC;  near: ||OD| - l_B| against |l_CD - l_BC|
-        far = _order(square, most - crank)
-        above = _order(square, crank + least)  # > 0: |OD| - l_B exceeds the bound
-        below = -_order(square, crank - least) if crank > least else -1
-        near = max(above, below)
-        if far < 0 and near > 0:
-            return DriveTurn("full turn", None)
-        if far <= 0 and near >= 0:
-            return DriveTurn("change point", None)
-        # one place, crank and frame in line with the dyad: |OD| + l_B = |l_CD - l_BC|, ||OD| - l_B| = l_CD + l_BC
-        short = _order(square, least - crank) if least > crank else 1
-        long = max(_order(square, crank + most), -_order(square, crank - most) if crank > most else -1)
-        if short < 0 or long > 0:
-            return DriveTurn("never assembled", ())
-        kind = "limited" if short and long else "immovable"
-        return DriveTurn(kind, self._limited(float(square), float(least), float(most)))
+        state = self._rotation()
+        if state.kind not in ("limited", "immovable"):
+            return DriveTurn(state.kind, () if state.kind == "never assembled" else None)
+        return DriveTurn(state.kind, self._limited())
 
-    def _limited(self, square: float, least: float, most: float) -> tuple[tuple[float, float], ...]:
+    @property
+    def _square(self) -> Fraction:
+        """Square of the distance of the fixed points, exactly."""
+        x = Fraction(self.axis.real) - Fraction(self.pivot.real)
+        y = Fraction(self.axis.imag) - Fraction(self.pivot.imag)
+        return x * x + y * y
+
+    def _rotation(self) -> FourBarRotation:
+        square = self._square
+        crank, rocker, coupler = (Fraction(x) for x in (self.crank, self.rocker, self.coupler))
+        if crank == 0:
+            inside = (rocker - coupler) ** 2 <= square <= (rocker + coupler) ** 2
+            return FourBarRotation("full turn" if inside else "never assembled", (False, False), ())
+        return four_bar_rotation(square, crank, coupler, rocker)
+
+    def _limited(self) -> tuple[tuple[float, float], ...]:
         """Return the admissible angles of a crank that can be somewhere."""
+        square = float(self._square)
         span = 2.0 * math.sqrt(square) * self.crank
-        low, high = ((bound * bound - square - self.crank**2) / span for bound in (least, most))
+        bounds = abs(self.rocker - self.coupler), self.rocker + self.coupler
+        low, high = ((bound * bound - square - self.crank**2) / span for bound in bounds)
         inner = math.acos(max(-1.0, min(high, 1.0)))
         outer = math.acos(min(1.0, max(low, -1.0)))
         shift = cmath.phase(self.axis - self.pivot) - self.phase
@@ -183,17 +182,13 @@ class FourBarDrive:
 
         The angles are closed forms in double precision; whether there are any is decided exactly (see `turn`).
         """
-        state = self.turn()
-        if state.kind in ("limited", "immovable") and state.admissible is not None:
-            return tuple(sorted((bound % math.tau, "lock") for interval in state.admissible for bound in interval))
+        state = self._rotation()
+        if state.kind in ("limited", "immovable"):
+            return tuple(sorted((bound % math.tau, "lock") for interval in self._limited() for bound in interval))
         if state.kind != "change point":
             return ()
-        shift = cmath.phase(self.axis - self.pivot) - self.phase
-        reach = math.fsum((self.rocker, self.coupler, -self.crank, -abs(self.axis - self.pivot)))
-        scale = self.rocker + self.coupler
-        angles = [shift] if abs(reach) <= 1e-14 * scale else []  # stretched at the far end
-        if abs(abs(abs(self.axis - self.pivot) - self.crank) - abs(self.rocker - self.coupler)) <= 1e-14 * scale:
-            angles.append(shift + math.pi)
+        shift = cmath.phase(self.axis - self.pivot) - self.phase  # the pin is farthest from the pivot here
+        angles = [angle for angle, met in zip((shift + math.pi, shift), state.touches) if met]
         return tuple(sorted((angle % math.tau, "change point") for angle in angles))
 
     def dead_points(self) -> tuple[float, ...]:
@@ -214,13 +209,6 @@ class FourBarDrive:
                 if math.copysign(1.0, (rocker.conjugate() * link).imag) == self.tau:
                     found.append((cmath.phase(direction) - self.phase) % math.tau)
         return tuple(sorted(found))
-
-
-def _order(square: Fraction, bound: Fraction) -> int:
-    """Sign of ``sqrt(square) - bound``, exactly."""
-    if bound < 0:
-        return 1
-    return (square > bound * bound) - (square < bound * bound)
 
 
 def _dot(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> Array:

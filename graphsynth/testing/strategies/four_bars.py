@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from graphsynth.core.errors import SpecError
+from graphsynth.mechanism.rotatability import TYPES, type_of
 from graphsynth.testing.strategies.extra import assume, st
 
 __all__ = ["CLASSES", "FourBarLengths", "four_bars"]
 
-#: Classes, seen from the crank.
-CLASSES = (
-    "crank-rocker", "rocker-crank", "double crank", "double rocker", "triple rocker", "change point",
-    "immovable", "never assembled",
-)  # fmt: skip
+#: Classes, seen from the crank; the last is drawn only where it is asked for.
+CLASSES = (*(kind for kind in TYPES if kind != "never assembled"), "never assembled")
 
 
 @dataclass(frozen=True)
@@ -41,28 +39,6 @@ class FourBarLengths:
     def floats(self) -> tuple[float, float, float, float]:
         """The lengths as doubles, each rounded: near a change point the class of the doubles may differ."""
         return float(self.ground), float(self.crank), float(self.coupler), float(self.rocker)
-
-
-def classify(ground: Fraction, crank: Fraction, coupler: Fraction, rocker: Fraction) -> str:
-    """Class by Grashof's rule, exactly.
-
-    Examples
-    --------
-    >>> classify(Fraction(2), Fraction(1), Fraction(5, 2), Fraction(5, 2))
-    'crank-rocker'
-    """
-    lengths = (ground, crank, coupler, rocker)
-    shortest, longest, total = min(lengths), max(lengths), sum(lengths, Fraction(0))
-    if 2 * longest > total:
-        return "never assembled"
-    if 2 * longest == total:
-        return "immovable"
-    if 2 * (shortest + longest) == total:
-        return "change point"
-    if 2 * (shortest + longest) > total:
-        return "triple rocker"
-    names = ("double crank", "crank-rocker", "double rocker", "rocker-crank")
-    return names[lengths.index(shortest)]
 
 
 _SHORT = {"double crank": 0, "crank-rocker": 1, "double rocker": 2, "rocker-crank": 3}
@@ -92,7 +68,7 @@ def _of_class(draw: st.DrawFn, kind: str, scale: int) -> FourBarLengths:
         more = 0 if kind == "immovable" else draw(near)
         lengths = list(draw(st.permutations((a, b, c, a + b + c + more))))
     ground, crank, coupler, rocker = (Fraction(length, scale) for length in lengths)
-    assume(classify(ground, crank, coupler, rocker) == kind)
+    assume(type_of(ground, crank, coupler, rocker) == kind)
     return FourBarLengths(ground, crank, coupler, rocker, kind)
 
 

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.certify import certify_four_bar, certify_inverted_slider_crank, certify_slider_crank
 from graphsynth.kinematics.certify.balls import Balls, exact
-from graphsynth.mechanism.four_bar import LambdaLinkage
+from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.mechanism.rotatability import type_of
 from graphsynth.systems.platform import TurnVerdict, certify_full_turn
 from graphsynth.systems.platform.certified_equations import PlatformSystem
 from graphsynth.systems.platform.drive import FourBarDrive
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-from graphsynth.testing.strategies.four_bars import classify
 
 LEG = (-5 * math.pi / 6, -math.pi / 6, math.pi / 2)
 
@@ -183,11 +183,11 @@ def test_four_bars_that_can_only_lie_stretched_are_immovable(order: list[int], s
     assert (proof.kind, proof.type, proof.full_turn, proof.change_angles) == ("immovable", "immovable", False, ())
     (limit,) = proof.limits
     assert limit.low in (0.0, math.pi - 2.0**-51, math.pi) and limit.high - limit.low < 1e-14
-    assert classify(*lengths) == "immovable"
+    assert type_of(*lengths) == "immovable"
     below = math.lcm(*(length.denominator for length in lengths))
     whole = [int(length * below) for length in lengths]
     if max(whole) < 2**50:
-        turn = LambdaLinkage(*map(float, whole)).full_turn()
+        turn = TiltedFourBar(*map(float, whole)).full_turn()
         assert (turn.kind, turn.possible, turn.method) == ("immovable", False, "exact")
         assert turn.limit_angles == pytest.approx((round(limit.low / math.pi) * math.pi,))
         g, a, b, c = map(float, whole)
@@ -209,7 +209,7 @@ def test_the_class_changes_exactly_at_the_stretched_length(more: int) -> None:
     found = [n * 2**40 for n in (7, 1, 2, 4)]
     found[0] += more
     g, a, b, c = map(float, found)
-    assert FourBarDrive(0.0, complex(g), a, c, b).turn().kind == kind == LambdaLinkage(g, a, b, c).full_turn().kind
+    assert FourBarDrive(0.0, complex(g), a, c, b).turn().kind == kind == TiltedFourBar(g, a, b, c).full_turn().kind
 
 
 def test_sliders() -> None:

@@ -17,7 +17,7 @@ def no_clearance(check: Checks) -> None:
     """Critical tilt 0, jam wherever there is a tilt, touching elsewhere; "free" cannot be proved."""
     from graphsynth.jamming import Bearing, assess_jamming
     from graphsynth.jamming.bearing.areas import surrogate_areas
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     bearing = Bearing(clearance=0.0)
     for condition in ("A", "B"):
@@ -33,10 +33,10 @@ def no_clearance(check: Checks) -> None:
     areas = ["0", "0.06398060445516362539956021991", "3.750005989749518033035104254"]
     found = surrogate_areas(bearing, S, C).circle_only
     check.values("interference of E4", found, areas, relative=1e-14, source="section 14.4")
-    moving = assess_jamming(LambdaLinkage(alpha=1 / 30), bearing)
+    moving = assess_jamming(TiltedFourBar(alpha=1 / 30), bearing)
     check.equals("verdict with a tilt", moving.verdict.name, "CERTIFIED_JAMMED")
     check.values("touching where A_z = 0", moving.arcs.touching, [0, math.pi], absolute=1e-15)
-    still = assess_jamming(LambdaLinkage(), bearing)
+    still = assess_jamming(TiltedFourBar(), bearing)
     check.says("verdict without a tilt", still.verdict.name, "UNDECIDED")
     check.mentions("its reason", still.certificate.reason if still.certificate else "", "touch")
 
@@ -46,11 +46,11 @@ def press_fit(check: Checks) -> None:
     from graphsynth.jamming import Bearing, assess_jamming, certify_jamming
     from graphsynth.jamming.bearing.areas import lid_area
     from graphsynth.jamming.bearing.parameters import ToleranceBox
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     press = Bearing(17.5, 10, -0.01)
     check.value("gap at t = 0", float(press.gap(0.0, 1.0, "A")), -press.clearance, absolute=4e-18, source="4.2")
-    report = assess_jamming(LambdaLinkage(alpha=1 / 30), press)
+    report = assess_jamming(TiltedFourBar(alpha=1 / 30), press)
     check.says("verdict", report.verdict.name, "CANNOT_ASSEMBLE")
     check.agrees("gap is positive at every angle", (report.table.gap > 0).all())
     check.mentions("critical tilt", press.critical_tilt("A").reason, "interference")
@@ -64,7 +64,7 @@ def never_critical(check: Checks) -> None:
     import mpmath as mp
 
     from graphsynth.jamming import Bearing, assess_jamming
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     low = Bearing(17.5, 1.0, 0.03)
     check.says("critical tilt A", low.critical_tilt("A").angle, None)
@@ -73,7 +73,7 @@ def never_critical(check: Checks) -> None:
         R, c, h = mp.mpf(low.Rb), mp.mpf(low.clearance), mp.mpf(low.h)
         right = mp.acos(R / mp.hypot(R + c, h)) - mp.atan(h / (R + c))
     check.value("critical tilt B", low.critical_tilt("B").angle, right, relative=2e-15, source="closed form of 4.7")
-    verdict = assess_jamming(LambdaLinkage(alpha=1.0), low).verdict.name
+    verdict = assess_jamming(TiltedFourBar(alpha=1.0), low).verdict.name
     check.equals("whole turn, alpha = 1", verdict, "CERTIFIED_FREE")
     equal = Bearing(4.0, 6.0, 1.0)  # h^2 = 9 = c (2R + c)
     touch = equal.critical_tilt("A")
@@ -88,11 +88,11 @@ def disc(check: Checks) -> None:
     import mpmath as mp
 
     from graphsynth.jamming import Bearing, assess_jamming
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     thin = Bearing(17.5, 0.0, 0.03)
     check.says("critical tilt A", thin.critical_tilt("A").angle, None)
-    report = assess_jamming(LambdaLinkage(alpha=1 / 30), thin)
+    report = assess_jamming(TiltedFourBar(alpha=1 / 30), thin)
     check.equals("verdict A", report.verdict.name, "CERTIFIED_FREE")
     check.mentions("reason", report.arcs.reason, "disc")
     with mp.workdps(40):

@@ -20,7 +20,7 @@ def gap_zero(check: Checks) -> None:
     import mpmath as mp
 
     from graphsynth.jamming import Bearing, ToleranceBox, assess_jamming, certify_jamming
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     touching = Fraction(24) * Fraction(63, 65) + 7 * Fraction(16, 65) - (24 + Fraction(64, 65))
     check.value("the gap by exact fractions", touching, 0)
@@ -47,7 +47,7 @@ def gap_zero(check: Checks) -> None:
                 check.agrees(
                     f"{what}: the enclosure of the gap holds 0", gap.lo < 0.0 < gap.hi, f"[{gap.lo:.2g}, {gap.hi:.2g}]"
                 )
-            found = assess_jamming(LambdaLinkage(alpha=float(alpha)), bearing).verdict.name
+            found = assess_jamming(TiltedFourBar(alpha=float(alpha)), bearing).verdict.name
             allowed = (right, "UNDECIDED") if power > 12 else (right,)
             check.agrees(f"{what}: in doubles", found in allowed, found, " or ".join(allowed))
     check.says("some are left open", undecided > 0, True)

@@ -93,11 +93,11 @@ def jamming(check: Checks) -> None:
     """Bearings of 1e-57 to 1e57 have the same zones; boxes of 1e-300 and 1e300 the same certificates."""
     from graphsynth.evidence.stress.cases.turns import ZONE_A
     from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, jam_arcs
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     for exponent in (-190, 190):
         unit = 2.0**exponent
-        linkage = LambdaLinkage(2 * unit, unit, 2.5 * unit, 2.5 * unit, alpha=1 / 30)
+        linkage = TiltedFourBar(2 * unit, unit, 2.5 * unit, 2.5 * unit, alpha=1 / 30)
         arcs = jam_arcs(linkage, Bearing(17.5 * unit, 10 * unit, 0.03 * unit)).arcs
         source = "lambda page, section 14.7"
         check.value(f"unit 2^{exponent}: zone", math.degrees(arcs[0].start), ZONE_A[0], relative=1e-13, source=source)

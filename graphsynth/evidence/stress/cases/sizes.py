@@ -22,7 +22,7 @@ def refused(check: Checks) -> None:
     """Linkages, bearings, platforms, drives, pistons, tribometers beyond 1e-60 and 1e60: one sentence each."""
     from graphsynth.jamming import Bearing
     from graphsynth.kinematics.triad.assembly_modes import assembly_modes
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.systems.braider import FourBar
     from graphsynth.systems.piston.drives import CrankSlider, ScotchYoke
     from graphsynth.systems.platform.drive import FourBarDrive
@@ -33,7 +33,7 @@ def refused(check: Checks) -> None:
     for unit in _OUTSIDE:
         points, legs = tuple((unit * corner).tolist()), (unit, unit, unit)
         for name, call in (
-            ("lambda linkage", partial(LambdaLinkage, 2 * unit, unit, 2.5 * unit, 2.5 * unit)),
+            ("lambda linkage", partial(TiltedFourBar, 2 * unit, unit, 2.5 * unit, 2.5 * unit)),
             ("bearing", partial(Bearing, 17.5 * unit, 10 * unit, 0.03 * unit)),
             ("four-bar of the braider", partial(FourBar, 2 * unit, 6 * unit, 4 * unit, 6 * unit)),
             ("drive", partial(FourBarDrive, 45 * unit, (105 + 45j) * unit, 62 * unit, 45 * unit, 60 * unit)),
@@ -48,14 +48,14 @@ def refused(check: Checks) -> None:
 
 def linkages(check: Checks) -> None:
     """Lambda linkages, four-bars and drives of 1e-57 and 1e57 give the angles of those of 1, and its sentences."""
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.systems.braider import FourBar
     from graphsynth.systems.platform.drive import FourBarDrive
 
     source = "closed form by hand"
     for exponent in (-190, 190):
         unit, what = 2.0**exponent, f"unit 2^{exponent}"
-        own = LambdaLinkage(2 * unit, unit, 2.5 * unit, 2.5 * unit)
+        own = TiltedFourBar(2 * unit, unit, 2.5 * unit, 2.5 * unit)
         B = own.positions([0.5 * math.pi]).B[0] / unit
         check.values(f"{what}: B of the lambda linkage", B, (2.0, 2.5, 0.0), absolute=1e-15, source=source)
         check.equals(f"{what}: its turn", own.full_turn().kind, "full turn", source="Grashof")
@@ -72,11 +72,11 @@ def linkages(check: Checks) -> None:
 def tiny_tilts(check: Checks) -> None:
     """Tilts of 1e-100 to 5e-324 rad: without clearance the bearing jams at every angle, with any it is free."""
     from graphsynth.jamming import Bearing, Verdict, assess_jamming
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     source = "section 7.1: arcs of kappa = 0"
     for alpha in (1e-100, 1e-160, 1e-200, -1e-308, 5e-324):
-        own = LambdaLinkage(alpha=alpha)
+        own = TiltedFourBar(alpha=alpha)
         report = assess_jamming(own, Bearing(clearance=0.0), samples=3, certify=False)
         what = f"alpha = {alpha:g}, no clearance"
         check.values(
@@ -86,7 +86,7 @@ def tiny_tilts(check: Checks) -> None:
         check.mentions(f"{what}: sentence", report.arcs.reason, "jams at every angle with a tilt")
         free = assess_jamming(own, Bearing(clearance=1e-9), samples=3, certify=False)
         check.equals(f"alpha = {alpha:g}, clearance 1e-9 mm", free.verdict.name, "FREE_ESTIMATED", source="section 7.1")
-    proved = assess_jamming(LambdaLinkage(alpha=1e-200), Bearing(clearance=0.0), samples=3).verdict
+    proved = assess_jamming(TiltedFourBar(alpha=1e-200), Bearing(clearance=0.0), samples=3).verdict
     allowed = (Verdict.CERTIFIED_JAMMED, Verdict.UNDECIDED)
     check.agrees("alpha = 1e-200, no clearance: proof", proved in allowed, proved.name, "jammed, or not decided")
 

@@ -22,12 +22,12 @@ def no_tilt(check: Checks) -> None:
     from graphsynth.intervals import Status
     from graphsynth.jamming import Bearing, assess_jamming, jam_arcs
     from graphsynth.jamming.intersection import exact_hull, surrogate_problem
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     f = np.linspace(0.0, 6.0, 7)
     for name, linkage in (
-        ("alpha = 0", LambdaLinkage()),
-        ("axis along z", LambdaLinkage(alpha=0.5, axis=(0, 0, 1))),
+        ("alpha = 0", TiltedFourBar()),
+        ("axis along z", TiltedFourBar(alpha=0.5, axis=(0, 0, 1))),
     ):
         report = assess_jamming(linkage, Bearing(), samples=f)
         check.value(f"{name}: largest |theta|", np.abs(report.table.theta).max(), 0)
@@ -46,9 +46,9 @@ def tiny_tilt(check: Checks) -> None:
     from graphsynth.intervals import Status
     from graphsynth.jamming import Bearing, assess_jamming
     from graphsynth.jamming.intersection import exact_hull, surrogate_problem
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
-    table = assess_jamming(LambdaLinkage(alpha=1e-8), samples=[math.pi / 2, 0.0]).table
+    table = assess_jamming(TiltedFourBar(alpha=1e-8), samples=[math.pi / 2, 0.0]).table
     check.value("theta at 90 degrees", table.theta[0], "3.999999999999999944e-9", relative=1e-15)
     check.value("gap A", table.gap_a[0], "-0.02999998000000014000000033333", relative=1e-15)
     check.value("gap B", table.gap_b[0], "-0.02999997999999985976000033333", relative=1e-15)
@@ -66,7 +66,7 @@ def steep_tilt(check: Checks) -> None:
 
     from graphsynth.jamming import Bearing
     from graphsynth.jamming.bearing.areas import rim_area, surrogate_areas
-    from graphsynth.mechanism.four_bar import AssemblyStatus, LambdaLinkage
+    from graphsynth.mechanism.four_bar import AssemblyStatus, TiltedFourBar
 
     bearing, t = Bearing(1.0, 1.6, 0.1), 1.2
     with mp.workdps(40):
@@ -84,45 +84,45 @@ def steep_tilt(check: Checks) -> None:
     check.value("area of the rim", float(area), 2 * outside.mean(), relative=1e-6, source="strips of a quadrature")
     open_lid = surrogate_areas(Bearing(), math.sin(1.0), math.cos(1.0))
     check.agrees("E4 is still defined at 1 rad", np.isfinite(open_lid.circle_only), float(open_lid.circle_only))
-    upright = LambdaLinkage(alpha=math.pi / 2).positions(math.pi / 2)
+    upright = TiltedFourBar(alpha=math.pi / 2).positions(math.pi / 2)
     # A = (0, 0, 1): D = l1 = 2, plan length s3 = sqrt(5.25), xB = (4 + 6.25 - 5.25)/4 = 1.25
     check.value("alpha = pi/2: B_x", upright.B[0], "0.75", absolute=1e-15, source="closed form of 3.3")
     with mp.workdps(40):
         tilt = mp.asin(mp.mpf("0.4"))
     check.value("alpha = pi/2: theta", abs(float(upright.theta)), tilt, relative=1e-15, source="closed form of 3.3")
-    beyond = LambdaLinkage(2, 3, 2, 4, alpha=math.pi / 2).positions(math.pi / 2)
+    beyond = TiltedFourBar(2, 3, 2, 4, alpha=math.pi / 2).positions(math.pi / 2)
     check.says("pin above the rod", AssemblyStatus(int(beyond.status)).name, "TILT_EXCEEDS_ROD")
 
 
 def not_assembled(check: Checks) -> None:
     """Each violated inequality has its own status and sentence; NaN never without one."""
     from graphsynth.jamming import Bearing, assess_jamming
-    from graphsynth.mechanism.four_bar import AssemblyStatus, LambdaLinkage
+    from graphsynth.mechanism.four_bar import AssemblyStatus, TiltedFourBar
 
     for name, linkage, f, status in (
-        ("D above l3 + l4", LambdaLinkage(2, 1, 1, 1), math.pi, "TOO_FAR"),
-        ("rocker too long", LambdaLinkage(2, 1, 1, 5), 0.0, "ROCKER_TOO_LONG"),
-        ("coupler too long", LambdaLinkage(2, 1, 5, 1), 0.0, "COUPLER_TOO_LONG"),
-        ("|A_z| above l3", LambdaLinkage(2, 3, 2, 4, alpha=math.pi / 2), math.pi / 2, "TILT_EXCEEDS_ROD"),
+        ("D above l3 + l4", TiltedFourBar(2, 1, 1, 1), math.pi, "TOO_FAR"),
+        ("rocker too long", TiltedFourBar(2, 1, 1, 5), 0.0, "ROCKER_TOO_LONG"),
+        ("coupler too long", TiltedFourBar(2, 1, 5, 1), 0.0, "COUPLER_TOO_LONG"),
+        ("|A_z| above l3", TiltedFourBar(2, 3, 2, 4, alpha=math.pi / 2), math.pi / 2, "TILT_EXCEEDS_ROD"),
     ):
         found = linkage.positions(f)
         check.says(name, AssemblyStatus(int(found.status)).name, status)
         check.mentions(f"{name}: sentence", " ".join(found.reasons()), AssemblyStatus[status].message)
         check.agrees(f"{name}: no number is shown", np.isnan(found.B).all() and np.isnan(found.theta))
-    turn = LambdaLinkage(2, 1, 1, 1).positions(np.linspace(-4, 4, 801))
+    turn = TiltedFourBar(2, 1, 1, 1).positions(np.linspace(-4, 4, 801))
     agree = np.array_equal(np.isnan(turn.B).any(axis=-1), ~turn.assembled)
     check.agrees("NaN exactly where the status says so", agree)
     # D^2 = 5 - 4 cos f exceeds (l3 + l4)^2 = 4 from arccos(1/4)
     right = np.cos(np.linspace(-4, 4, 801)) > 0.25
     check.agrees("assembled exactly where cos f > 1/4", np.array_equal(right, turn.assembled), source="closed form")
-    out = assess_jamming(LambdaLinkage(2, 3, 1, 2.5, alpha=1.2), Bearing())
+    out = assess_jamming(TiltedFourBar(2, 3, 1, 2.5, alpha=1.2), Bearing())
     check.says("jamming of what is never assembled", out.verdict.name, "CANNOT_ASSEMBLE")
 
 
 def bad_input(check: Checks) -> None:
     """One sentence that names the parameter."""
     from graphsynth.jamming import Bearing, ToleranceBox
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     arguments: dict[str, Any]
     for arguments in (
@@ -130,19 +130,19 @@ def bad_input(check: Checks) -> None:
         {"l2": -1}, {"l3": math.nan}, {"l4": math.inf},
     ):  # fmt: skip
         name, value = next(iter(arguments.items()))
-        check.refused(f"{name} = {value}", partial(LambdaLinkage, **arguments), name)
+        check.refused(f"{name} = {value}", partial(TiltedFourBar, **arguments), name)
     for arguments in ({"Rb": 0}, {"Rb": math.nan}, {"Hb": -1}, {"clearance": math.nan}, {"clearance": math.inf}):
         name, value = next(iter(arguments.items()))
         check.refused(f"{name} = {value}", partial(Bearing, **arguments), name)
     check.refused("box with Rb = NaN", lambda: ToleranceBox(alpha="1/30", Rb=math.nan), "Rb")
-    check.refused("f = NaN", lambda: LambdaLinkage().positions([math.nan]), "f holds nan")
+    check.refused("f = NaN", lambda: TiltedFourBar().positions([math.nan]), "f holds nan")
 
 
 def printed_extremes(check: Checks) -> None:
     """Change-point linkage, pins in holes and crescents with all printed digits."""
     from graphsynth.jamming.bearing.areas import ellipse_circle, ellipse_circle_stable
     from graphsynth.jamming.bearing.bearing import Bearing
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     for alpha, degrees, x, y in (
         (0.0, 1e-6, "-0.9999999999999978786133348643", "1.128198563676370905924991809e-7"),
@@ -152,7 +152,7 @@ def printed_extremes(check: Checks) -> None:
         (1 / 30, 30.0, "0.1635393708613023042000500113", "2.372216760252633120165984711"),
         (1 / 30, 90.0, "0.8934610987931061261585619328", "2.788471204820992939813570057"),
     ):
-        B = LambdaLinkage(2, 1, 2, 3, alpha=alpha).positions([math.radians(degrees)]).B[0]
+        B = TiltedFourBar(2, 1, 2, 3, alpha=alpha).positions([math.radians(degrees)]).B[0]
         check.value(f"B_x at {degrees:g} degrees, alpha = {alpha:.3g}", B[0], x, absolute=1e-15)
         check.value(f"B_y at {degrees:g} degrees, alpha = {alpha:.3g}", B[1], y, relative=2e-15)
     for R, hp, hh, t, D in (

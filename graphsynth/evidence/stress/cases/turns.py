@@ -19,17 +19,17 @@ ZONE_A = ("27.0592203251509475645179736478", "152.940779674849052435482026352")
 def touching(check: Checks) -> None:
     """Largest tilt is the critical tilt: zone of length zero, "touching", no certificate of either."""
     from graphsynth.jamming import Bearing, assess_jamming
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     bearing = Bearing()
-    linkage = LambdaLinkage(alpha=math.asin(2.5 * bearing.critical_tilt("A").sine))
+    linkage = TiltedFourBar(alpha=math.asin(2.5 * bearing.critical_tilt("A").sine))
     report = assess_jamming(linkage, bearing)
     check.says("certified", report.verdict.name, "UNDECIDED")
     check.says("estimated", assess_jamming(linkage, bearing, certify=False).verdict.name, "TOUCHING_ESTIMATED")
     check.says("jam arcs", len(report.arcs.arcs), 0)
     check.values("touching at", report.arcs.touching, [math.pi / 2, 3 * math.pi / 2], absolute=1e-15)
     for factor, verdict in ((1 - 1e-12, "CERTIFIED_FREE"), (1 + 1e-12, "CERTIFIED_JAMMED")):
-        near = assess_jamming(LambdaLinkage(alpha=linkage.alpha * factor), bearing)
+        near = assess_jamming(TiltedFourBar(alpha=linkage.alpha * factor), bearing)
         check.equals(f"alpha times 1 {factor - 1:+.0e}", near.verdict.name, verdict, source="kappa = 1 is the border")
 
 
@@ -61,9 +61,9 @@ def change_points(check: Checks) -> None:
     """Both branches and a flag at a change point; dead points located; ``D = 0`` never divided by."""
     import mpmath as mp
 
-    from graphsynth.mechanism.four_bar import AssemblyStatus, LambdaLinkage
+    from graphsynth.mechanism.four_bar import AssemblyStatus, TiltedFourBar
 
-    change = LambdaLinkage(2, 1, 2, 3)
+    change = TiltedFourBar(2, 1, 2, 3)
     check.says("change point: kind", change.full_turn().kind, "change point")
     check.values("change point: angles", change.full_turn().change_angles, [0])
     at = change.positions([0.0])
@@ -73,16 +73,16 @@ def change_points(check: Checks) -> None:
     with mp.workdps(30):
         root = mp.sqrt(12)
         for sgn in (1, -1):
-            right, left = LambdaLinkage(2, 1, 2, 3, sgn).positions([1e-9, -1e-9]).dB[:, 1]
+            right, left = TiltedFourBar(2, 1, 2, 3, sgn).positions([1e-9, -1e-9]).dB[:, 1]
             check.value(f"branch {sgn:+d}: slope to the right", right, 3 + sgn * root, absolute=1e-7)
             check.value(f"branch {sgn:+d}: slope to the left", left, 3 - sgn * root, absolute=1e-7)
         limit = mp.acos(mp.mpf(1) / 4)
-        dead = LambdaLinkage(2, 1, 1, 1).full_turn()
+        dead = TiltedFourBar(2, 1, 1, 1).full_turn()
         check.says("dead point: kind", dead.kind, "limited")
         check.values("dead points", dead.limit_angles, [limit, 2 * mp.pi - limit], relative=1e-15)
-    met = LambdaLinkage(2, 2, 1, 1).positions(0.0)
+    met = TiltedFourBar(2, 2, 1, 1).positions(0.0)
     check.says("D = 0, l3 = l4", AssemblyStatus(int(met.status)).name, "INDETERMINATE")
-    apart = LambdaLinkage(2, 2, 1, 2).positions(0.0)
+    apart = TiltedFourBar(2, 2, 1, 2).positions(0.0)
     check.says("D = 0, l3 unequal to l4", AssemblyStatus(int(apart.status)).name, "ROCKER_TOO_LONG")
     _through_a_change_point(check)
 
@@ -103,11 +103,11 @@ def _through_a_change_point(check: Checks) -> None:
 
 def long_crank(check: Checks) -> None:
     """``l2 >= l1``: no jump of a quadrant, and the closed form at every angle."""
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     f = np.linspace(0.0, math.tau, 721)
     for lengths in ((1.0, 3.0, 3.0, 2.0), (2.0, 2.6, 3.0, 3.5)):
-        linkage = LambdaLinkage(*lengths)
+        linkage = TiltedFourBar(*lengths)
         found = linkage.positions(f[1:-1])
         A, B = found.A[:, :2], found.B[:, :2]
         check.agrees(f"{lengths}: assembled", found.assembled.all())
@@ -124,15 +124,15 @@ def long_crank(check: Checks) -> None:
 def reversed_axis(check: Checks) -> None:
     """Zones stay the same for ``n3 = 0``; the sign of the tilt changes."""
     from graphsynth.jamming import Bearing, assess_jamming, jam_arcs
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     f = np.radians([13.0, 64.2, 193.0])
     tilt = ["0.002998796481990437225089870257", "0.01200231556422492917626611296", "-0.002998796481990437225089870257"]
     gap = ["-0.01508472683198013806918781056", "0.02874966581393647831345638987", "-0.01508472683198013806918781056"]
     reversed_tilt = [text.removeprefix("-") if text.startswith("-") else f"-{text}" for text in tilt]
     for name, other in (
-        ("axis reversed", LambdaLinkage(alpha=1 / 30, axis=(-1, 0, 0))),
-        ("alpha negative", LambdaLinkage(alpha=-1 / 30)),
+        ("axis reversed", TiltedFourBar(alpha=1 / 30, axis=(-1, 0, 0))),
+        ("alpha negative", TiltedFourBar(alpha=-1 / 30)),
     ):
         table = assess_jamming(other, samples=f).table
         # an angle in degrees is rounded to a double: a unit in the last place of f
@@ -149,11 +149,11 @@ def units(check: Checks) -> None:
 
     from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, jam_arcs
     from graphsynth.jamming.intersection import circle_ellipse, exact_hull
-    from graphsynth.mechanism.four_bar import LambdaLinkage
+    from graphsynth.mechanism.four_bar import TiltedFourBar
 
     for power in (-9, 9):
         unit = 10.0**power
-        linkage = LambdaLinkage(2 * unit, unit, 2.5 * unit, 2.5 * unit, alpha=1 / 30)
+        linkage = TiltedFourBar(2 * unit, unit, 2.5 * unit, 2.5 * unit, alpha=1 / 30)
         arcs = jam_arcs(linkage, Bearing(17.5 * unit, 10 * unit, 0.03 * unit)).arcs
         check.value(f"1e{power}: start of the zone", math.degrees(arcs[0].start), ZONE_A[0], relative=1e-13)
         check.value(f"1e{power}: end of the zone", math.degrees(arcs[0].stop), ZONE_A[1], relative=1e-13)
