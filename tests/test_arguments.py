@@ -21,7 +21,7 @@ from graphsynth.core.errors import GeometryError, GraphsynthError, IntervalError
 from graphsynth.intervals import Dual, Interval, Search
 from graphsynth.jamming import Bearing, Fit, ToleranceBox
 from graphsynth.jamming.bearing import areas as circle_areas
-from graphsynth.jamming.bearing.ranges import Range
+from graphsynth.jamming.bearing.parameters import Range
 from graphsynth.jamming.bearing.sweep import PieceGap
 from graphsynth.jamming.intersection import (
     Reading,

@@ -19,7 +19,7 @@ from graphsynth.atlas.stored import data_of, fingerprint, mechanism_in
 from graphsynth.core.errors import GraphError, GraphsynthError, SpecError
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.joints.turn import TurnCertificate
+    from graphsynth.jamming.joints.certify import TurnCertificate
     from graphsynth.kinematics.dimensional.api import Embodiment
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism

@@ -20,8 +20,7 @@ from graphsynth.core.arguments import Count, Positive
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
-from graphsynth.jamming.bearing.parameters import ToleranceBox
-from graphsynth.jamming.bearing.ranges import Range
+from graphsynth.jamming.bearing.parameters import Range, ToleranceBox
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,9 +161,9 @@ def area_errors(
     >>> rows["closed form, enclosed"] < 1e-12, rows["interval shoelace sum"] > 800
     (True, True)
     """
+    from graphsynth.jamming.bearing.area_curve import crescent_boxes, interval_shoelace
     from graphsynth.jamming.bearing.areas import ellipse_circle, surrogate_areas
     from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
-    from graphsynth.jamming.bearing.shoelace import crescent_boxes, interval_shoelace
 
     bearing, S = bearing or Bearing(), Range.read("sine", sine).middle
     R, c, h = repr(bearing.Rb), repr(bearing.clearance), repr(bearing.h)
@@ -196,7 +195,7 @@ def area_errors(
 
 def _polygon(R: float, a: float, b: float, count: int) -> float:
     """Shoelace sum of points on both crescents of the ellipse outside the circle."""
-    from graphsynth.jamming.bearing.shoelace import crescent_points
+    from graphsynth.jamming.bearing.area_curve import crescent_points
 
     x, y = crescent_points(R, a, b, count).T
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
@@ -251,8 +250,8 @@ def arc_errors(
     >>> [row.method for row in rows], rows[0].error < 1e-13
     (['closed form, enclosed', 'interval sweep', 'samples, doubles'], True)
     """
+    from graphsynth.jamming.bearing.arcs import total_length
     from graphsynth.jamming.bearing.certify import certify_jamming
-    from graphsynth.jamming.bearing.circle_sets import total_length
     from graphsynth.jamming.bearing.sweep import sweep_linkage
 
     given = ToleranceBox(alpha="1/30") if box is None else box

@@ -15,8 +15,8 @@ from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 
 if TYPE_CHECKING:
     from graphsynth.jamming.bearing.bearing import Bearing, Condition
+    from graphsynth.jamming.joints.assess import CoupledReport
     from graphsynth.jamming.joints.limits import Misalignment
-    from graphsynth.jamming.joints.report import CoupledReport
     from graphsynth.jamming.joints.scale import ScaleCertificate
     from graphsynth.kinematics.simulation import Motion
     from graphsynth.mechanism.four_bar import TiltedFourBar

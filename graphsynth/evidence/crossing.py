@@ -236,7 +236,7 @@ def _direct_areas(R: Any, a: Any, b: Any) -> Any:
 
 def _polygon(R: float, a: float, b: float, count: int) -> float:
     """Shoelace sum of points on both crescents of the ellipse outside the circle."""
-    from graphsynth.jamming.bearing.shoelace import crescent_points
+    from graphsynth.jamming.bearing.area_curve import crescent_points
 
     x, y = crescent_points(R, a, b, count).T
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
@@ -277,7 +277,7 @@ def _enclosed_area(bearing: Bearing, sine: str, many: int, truth: Any, effort: E
 
 
 def _shoelace_row(R: float, a: float, b: float, boxes: int, truth: Any, effort: Effort) -> Row:
-    from graphsynth.jamming.bearing.shoelace import crescent_boxes, interval_shoelace
+    from graphsynth.jamming.bearing.area_curve import crescent_boxes, interval_shoelace
 
     found, seconds, rounds = best_of(lambda: interval_shoelace(crescent_boxes(R, a, b, boxes)) * 2, effort)
     return _area_row("interval shoelace sum", f"{boxes} boxes", found, 1, truth, seconds, rounds)

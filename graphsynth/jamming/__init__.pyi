@@ -1,14 +1,37 @@
 from .assess import (
     JammingReport as JammingReport,
 )
+from .assess import JammingTable as JammingTable
 from .assess import (
     assess_jamming as assess_jamming,
+)
+from .bearing.arcs import (
+    Arc as Arc,
+)
+from .bearing.arcs import (
+    ArcEnclosure as ArcEnclosure,
+)
+from .bearing.arcs import (
+    CertifiedArcs as CertifiedArcs,
+)
+from .bearing.arcs import (
+    Enclosure as Enclosure,
+)
+from .bearing.arcs import (
+    JamArcs as JamArcs,
+)
+from .bearing.arcs import Span as Span
+from .bearing.arcs import (
+    jam_arcs as jam_arcs,
 )
 from .bearing.bearing import (
     Bearing as Bearing,
 )
 from .bearing.bearing import (
     CriticalTilt as CriticalTilt,
+)
+from .bearing.branch_and_bound import (
+    Samples as Samples,
 )
 from .bearing.branch_and_bound import (
     Supremum as Supremum,
@@ -19,35 +42,16 @@ from .bearing.branch_and_bound import (
 from .bearing.branch_and_bound import (
     maximise as maximise,
 )
-from .bearing.certificate import (
+from .bearing.branch_and_bound import (
+    sample_gaps as sample_gaps,
+)
+from .bearing.certify import (
     JamCertificate as JamCertificate,
 )
-from .bearing.certificate import (
+from .bearing.certify import (
     Witness as Witness,
 )
-from .bearing.certified_arcs import (
-    ArcEnclosure as ArcEnclosure,
-)
-from .bearing.certified_arcs import (
-    CertifiedArcs as CertifiedArcs,
-)
-from .bearing.certified_arcs import (
-    Enclosure as Enclosure,
-)
-from .bearing.certified_limits import (
-    CertifiedLimit as CertifiedLimit,
-)
-from .bearing.certified_limits import (
-    certified_largest_height as certified_largest_height,
-)
-from .bearing.certified_limits import (
-    certified_largest_misalignment as certified_largest_misalignment,
-)
-from .bearing.certified_limits import (
-    certified_smallest_clearance as certified_smallest_clearance,
-)
 from .bearing.certify import certify_jamming as certify_jamming
-from .bearing.circle_sets import Span as Span
 from .bearing.fits import (
     STANDARD_FITS as STANDARD_FITS,
 )
@@ -81,30 +85,36 @@ from .bearing.friction import (
 from .bearing.friction import (
     wedging as wedging,
 )
-from .bearing.inverse import (
+from .bearing.limits import (
+    CertifiedLimit as CertifiedLimit,
+)
+from .bearing.limits import (
     Limit as Limit,
 )
-from .bearing.inverse import (
+from .bearing.limits import (
+    certified_largest_height as certified_largest_height,
+)
+from .bearing.limits import (
+    certified_largest_misalignment as certified_largest_misalignment,
+)
+from .bearing.limits import (
+    certified_smallest_clearance as certified_smallest_clearance,
+)
+from .bearing.limits import (
     largest_height as largest_height,
 )
-from .bearing.inverse import (
+from .bearing.limits import (
     largest_misalignment as largest_misalignment,
 )
-from .bearing.inverse import (
+from .bearing.limits import (
     smallest_clearance as smallest_clearance,
 )
-from .bearing.parameters import ToleranceBox as ToleranceBox
-from .bearing.ranges import (
+from .bearing.parameters import (
     Range as Range,
 )
-from .bearing.ranges import (
+from .bearing.parameters import ToleranceBox as ToleranceBox
+from .bearing.parameters import (
     spread as spread,
-)
-from .bearing.sampling import (
-    Samples as Samples,
-)
-from .bearing.sampling import (
-    sample_gaps as sample_gaps,
 )
 from .bearing.sweep import (
     TurnPartition as TurnPartition,
@@ -114,15 +124,5 @@ from .bearing.sweep import (
 )
 from .bearing.sweep import (
     sweep_turn as sweep_turn,
-)
-from .bearing.table import JammingTable as JammingTable
-from .bearing.tilt_arcs import (
-    Arc as Arc,
-)
-from .bearing.tilt_arcs import (
-    JamArcs as JamArcs,
-)
-from .bearing.tilt_arcs import (
-    jam_arcs as jam_arcs,
 )
 from .verdict import Verdict as Verdict

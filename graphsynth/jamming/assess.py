@@ -1,4 +1,4 @@
-"""Assess jamming: a lambda linkage with its bearing over a turn, or any mechanism over a motion."""
+"""Assess jamming: one tilted bearing of a linkage over a full rotation, or all joints of a mechanism over a motion."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.arcs import JamArcs, jam_arcs, strictly_inside
+from graphsynth.jamming.bearing.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
-from graphsynth.jamming.bearing.circle_sets import strictly_inside
-from graphsynth.jamming.bearing.inverse import Limit, largest_misalignment, smallest_clearance
+from graphsynth.jamming.bearing.limits import Limit, largest_misalignment, smallest_clearance
 from graphsynth.jamming.bearing.parameters import ToleranceBox
-from graphsynth.jamming.bearing.table import JammingTable, table_over
-from graphsynth.jamming.bearing.tilt_arcs import JamArcs, jam_arcs
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.four_bar_turn import FullTurn
@@ -26,17 +25,72 @@ from graphsynth.mechanism.four_bar_turn import FullTurn
 if TYPE_CHECKING:
     import pandas as pd
 
-    from graphsynth.jamming.bearing.certificate import JamCertificate
+    from graphsynth.jamming.bearing.certify import JamCertificate
+    from graphsynth.jamming.joints.assess import CoupledReport
     from graphsynth.jamming.joints.limits import Misalignment
-    from graphsynth.jamming.joints.problem import Bearings
-    from graphsynth.jamming.joints.report import CoupledReport
+    from graphsynth.jamming.joints.program import Bearings
     from graphsynth.kinematics.simulation import Motion
 
-__all__ = ["JammingReport", "JammingTable", "assess_jamming"]
-
-_MOST_SAMPLES = 10_000_000
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class JammingTable:
+    """Values over the crank angles ``f``; every array has the shape of ``f``.
+
+    Angles in radians, gaps in mm, areas in mm^2.  ``status`` is an `AssemblyStatus`; the other columns are NaN where
+    the linkage cannot be assembled, and the two areas of the surrogate E4 also where its ellipse is not defined.
+    ``rim_by_quadrature`` marks the angles at which the area of the rim is not a closed form.
+    """
+
+    f: Array
+    status: NDArray[np.int8]
+    theta: Array
+    gap_a: Array
+    gap_b: Array
+    gap: Array
+    surrogate_gap_area: Array
+    surrogate_interference_area: Array
+    lid_area: Array
+    rim_area: Array
+    rim_by_quadrature: NDArray[np.bool_]
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the table as a `pandas.DataFrame` (pandas is imported here)."""
+        import pandas as pd
+
+        return pd.DataFrame({name: getattr(self, name) for name in self.__dataclass_fields__})
+
+
+def table_over(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, f: Array) -> JammingTable:
+    """Fill the table at crank angles ``f`` (radians)."""
+    path = linkage.positions(f)
+    S, C = np.where(path.assembled, path.sin_theta, 0.0), np.where(path.assembled, path.cos_theta, 1.0)
+    hide = np.where(path.assembled, 0.0, np.nan)
+    if bearing.clearance >= 0.0:
+        crescent = surrogate_areas(bearing, S, C)
+        lid, (rim, by_quadrature) = lid_area(bearing, S, C), rim_area(bearing, S, C)
+    else:  # an interference fit has no free position to measure from
+        lid = rim = hide * np.nan
+        crescent = CrescentAreas(lid, rim)
+        by_quadrature = np.zeros(f.shape, dtype=bool)
+    return JammingTable(
+        f=f,
+        status=path.status,
+        theta=path.theta,
+        gap_a=bearing.gap(S, C, "A") + hide,
+        gap_b=bearing.gap(S, C, "B") + hide,
+        gap=bearing.gap(S, C, condition) + hide,
+        surrogate_gap_area=crescent[0] + hide,
+        surrogate_interference_area=crescent[1] + hide,
+        lid_area=lid + hide,
+        rim_area=rim + hide,
+        rim_by_quadrature=by_quadrature,
+    )
+
+
+_MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +161,7 @@ class JammingReport:
             frame[name] = [strictly_inside(spans, angle) for angle in self.table.f]
         if self.certificate and self.certificate.assembles != "always":
             from graphsynth.intervals import Interval
-            from graphsynth.jamming.bearing.poses import pose
+            from graphsynth.jamming.bearing.corners import pose
 
             f = Interval.from_bounds(self.table.f, self.table.f)
             frame["certainly_jams"] &= pose(self.certificate.box, f).assembled

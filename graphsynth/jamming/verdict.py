@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from enum import Enum
 
-__all__ = ["METHOD_CERTIFIED", "METHOD_CLOSED_FORM", "Verdict"]
-
 METHOD_CLOSED_FORM = "closed form, double precision, not certified"
 METHOD_CERTIFIED = "certified: interval arithmetic with outward rounding"
 

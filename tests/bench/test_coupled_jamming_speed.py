@@ -17,7 +17,7 @@ from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_ch
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import JointLimits, Misalignment, certify_coupled, compare_loosening, largest_scale
 from graphsynth.jamming.joints.closure import force_rows, joint_places, moment_rows, shifts, work_row
-from graphsynth.jamming.joints.problem import problem
+from graphsynth.jamming.joints.program import problem
 from graphsynth.kinematics.dimensional import embody
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 37)

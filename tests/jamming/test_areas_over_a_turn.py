@@ -9,9 +9,8 @@ import pytest
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, assess_jamming
-from graphsynth.jamming.bearing.area_curve import area_curve, enclose_tilt_sine
+from graphsynth.jamming.bearing.area_curve import area_curve, crescent_boxes, enclose_tilt_sine, interval_shoelace
 from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
-from graphsynth.jamming.bearing.shoelace import crescent_boxes, interval_shoelace
 from graphsynth.jamming.intersection import Reading, reading_areas, reading_ellipse, reading_problem
 from graphsynth.mechanism.four_bar import TiltedFourBar
 

@@ -34,8 +34,8 @@ from graphsynth.jamming import (
     tightest_free_fit,
     wedging,
 )
-from graphsynth.jamming.bearing import fits, sampling
-from graphsynth.jamming.bearing.circle_sets import Span, complement, contains, merge_outer, strictly_inside, subtract
+from graphsynth.jamming.bearing import branch_and_bound, fits
+from graphsynth.jamming.bearing.arcs import Span, complement, contains, merge_outer, strictly_inside, subtract
 from graphsynth.jamming.bearing.sweep import PieceGap
 
 
@@ -371,7 +371,7 @@ def test_the_share_of_mechanisms_is_not_that_of_positions():
     assert seen.jamming_positions < 0.3 * seen.jamming_mechanisms
     for hits, count in ((0, 50), (17, 50), (50, 50)):
         wanted = stats.binomtest(hits, count).proportion_ci(0.95, "exact")
-        assert sampling._binomial_range(hits, count) == pytest.approx((wanted.low, wanted.high), abs=1e-12)
+        assert branch_and_bound._binomial_range(hits, count) == pytest.approx((wanted.low, wanted.high), abs=1e-12)
 
 
 def test_a_million_samples():

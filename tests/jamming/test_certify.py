@@ -357,7 +357,7 @@ def test_arcs_hold_every_member_of_a_box(data):
     f = np.linspace(0.0, math.tau, 721)
     path = linkage.positions(f)
     gap = bearing.gap(path.sin_theta, path.cos_theta, condition)
-    from graphsynth.jamming.bearing.circle_sets import contains
+    from graphsynth.jamming.bearing.arcs import contains
 
     for angle, g in zip(f, gap):
         if g > 1e-12:

@@ -9,8 +9,7 @@ import pytest
 
 from graphsynth.intervals import Interval
 from graphsynth.jamming import ToleranceBox
-from graphsynth.jamming.bearing.corners import sine_of
-from graphsynth.jamming.bearing.poses import turns_freely
+from graphsynth.jamming.bearing.corners import sine_of, turns_freely
 from graphsynth.jamming.bearing.sweep import _split
 
 

@@ -20,9 +20,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import SceneError
+from graphsynth.jamming.bearing.arcs import jam_arcs
 from graphsynth.jamming.bearing.bearing import Bearing
-from graphsynth.jamming.bearing.inverse import largest_misalignment, smallest_clearance
-from graphsynth.jamming.bearing.tilt_arcs import jam_arcs
+from graphsynth.jamming.bearing.limits import largest_misalignment, smallest_clearance
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import BudgetTable, Scene, find_scene, load_scene

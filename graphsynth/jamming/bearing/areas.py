@@ -16,11 +16,6 @@ from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Bearing
 
-__all__ = [
-    "CrescentAreas", "ellipse_circle", "ellipse_circle_stable", "lid_area", "lid_crossing", "rim_area", "rim_crossing",
-    "surrogate_areas",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 # xms(x) = x - sin x = x^3/3! - x^5/5! + ...; the first term left out is below 1e-17 of the first for |x| < 2.  Direct

@@ -18,8 +18,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make
 
-__all__ = ["EnclosedCrescents", "enclose_crescents", "enclose_lid_area", "enclose_rim_area", "enclose_surrogate_areas"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

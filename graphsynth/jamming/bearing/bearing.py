@@ -17,8 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import check_fields, choice, finite, finite_array, positive
 from graphsynth.core.errors import GeometryError
 
-__all__ = ["CONDITIONS", "Bearing", "Condition", "CriticalTilt"]
-
 Array = NDArray[np.float64]
 Condition = Literal["A", "B", "general"]
 CONDITIONS = ("A", "B", "general")

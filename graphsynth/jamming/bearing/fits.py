@@ -16,11 +16,8 @@ from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.bearing.certify import certify_jamming
-from graphsynth.jamming.bearing.parameters import ToleranceBox
-from graphsynth.jamming.bearing.ranges import Given, Range
+from graphsynth.jamming.bearing.parameters import Given, Range, ToleranceBox
 from graphsynth.jamming.verdict import Verdict
-
-__all__ = ["STANDARD_FITS", "Fit", "FitVerdict", "assess_fits", "tightest_free_fit"]
 
 _SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
 _GRADES = {  # micrometres

@@ -11,15 +11,12 @@ import numpy as np
 
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.arcs import Enclosure
 from graphsynth.jamming.bearing.bearing import Condition
-from graphsynth.jamming.bearing.certified_arcs import Enclosure
-from graphsynth.jamming.bearing.parameters import ToleranceBox
-from graphsynth.jamming.bearing.ranges import Given, Range
+from graphsynth.jamming.bearing.parameters import Given, Range, ToleranceBox
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
-
-__all__ = ["InsertionDiagram", "Region", "Wedging", "WedgingReport", "insertion_diagram", "wedging"]
 
 
 class Wedging(Enum):

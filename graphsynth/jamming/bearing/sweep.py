@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 from graphsynth.core.arguments import Budget, Count, Real
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
+from graphsynth.jamming.bearing.arcs import TURN_HIGH, Span, total_length
 from graphsynth.jamming.bearing.bearing import Condition
-from graphsynth.jamming.bearing.circle_sets import TURN_HIGH, Span, total_length
 from graphsynth.jamming.bearing.parameters import ToleranceBox
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
 
-__all__ = ["PieceGap", "TurnPartition", "sweep_linkage", "sweep_turn"]
 
 Mask = NDArray[np.bool_]
 _FREE, _JAMS, _OPEN, _OUT = 0, 1, 2, 3
@@ -218,7 +217,7 @@ def sweep_linkage(
     >>> len(found.inner), len(found.missing), found.undecided_part < 1e-3
     (2, 0, True)
     """
-    from graphsynth.jamming.bearing.poses import pose_gap
+    from graphsynth.jamming.bearing.corners import pose_gap
 
     def gap(f: Interval) -> PieceGap:
         value, found = pose_gap(box, f, condition)

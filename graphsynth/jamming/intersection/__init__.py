@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from graphsynth.jamming.intersection.boxes import CrossingBoxes, krawczyk_boxes
-from graphsynth.jamming.intersection.check import CrossCheck, cross_check
+from graphsynth.jamming.intersection.boxes import CrossCheck, CrossingBoxes, cross_check, krawczyk_boxes
 from graphsynth.jamming.intersection.hull import CrossingHull, exact_hull, mirrored
-from graphsynth.jamming.intersection.problem import CircleEllipse, circle_ellipse, surrogate_problem
+from graphsynth.jamming.intersection.problem import CircleEllipse, Reason, circle_ellipse, surrogate_problem
 from graphsynth.jamming.intersection.readings import (
     Reading,
     TiltedEllipse,
@@ -13,7 +12,6 @@ from graphsynth.jamming.intersection.readings import (
     reading_ellipse,
     reading_problem,
 )
-from graphsynth.jamming.intersection.reasons import Reason
 
 __all__ = [
     "CircleEllipse",

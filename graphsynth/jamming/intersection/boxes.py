@@ -1,7 +1,7 @@
 """Circle and ellipse by Krawczyk's method in (x, y) with bisection, as in the source, but with sound statuses.
 
-Specification, sections 6.4 and 6.5: an empty image proves that there is no crossing, an image in the interior of its
-box that there is exactly one, and an overlap proves nothing.
+Specification, sections 6.4 and 6.5: an empty image proves that there is no intersection, an image in the interior of
+its box that there is exactly one, and an overlap proves nothing.  `cross_check` compares with the exact hull.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +21,10 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.status import Status
-from graphsynth.jamming.intersection.criterion import spectral_radius
-from graphsynth.jamming.intersection.hull import mirrored
-from graphsynth.jamming.intersection.problem import CircleEllipse
-from graphsynth.jamming.intersection.reasons import Reason
-
-__all__ = ["CrossingBoxes", "krawczyk_boxes", "krawczyk_data"]
+from graphsynth.jamming.intersection.hull import CrossingHull, exact_hull, mirrored, spectral_radius
+from graphsynth.jamming.intersection.problem import CircleEllipse, Reason
 
 Array = NDArray[np.float64]
-
 #: Boxes treated between two looks at the clock.
 _BATCH = 4096
 _MOST_PROVED = 16
@@ -277,3 +273,68 @@ def _outcome(
         reasons.append(Reason.RESOLUTION if finished else Reason.BOXES if full else Reason.SECONDS)
     rows = (enclosures, domains, inner, rest)
     return CrossingBoxes(problem, status, tuple(reasons), rows, finished, tested, seconds)
+
+
+@dataclass(frozen=True, eq=False)
+class CrossCheck:
+    """Both solutions of one problem, and whether they can be true together.
+
+    Attributes
+    ----------
+    hull : CrossingHull
+    boxes : CrossingBoxes
+    hull_in_boxes : bool
+        The exact hull lies in the hull of all boxes; implied if both are right and the hull is tight.
+    inner_in_hull : bool
+        The inner boxes, which are solutions, lie in the exact hull.
+    statuses_agree : bool
+        Neither has proved what the other has disproved.
+    """
+
+    hull: CrossingHull
+    boxes: CrossingBoxes
+    hull_in_boxes: bool
+    inner_in_hull: bool
+    statuses_agree: bool
+
+    @property
+    def consistent(self) -> bool:
+        """Whether nothing contradicts; False means a defect of the program."""
+        return self.hull_in_boxes and self.inner_in_hull and self.statuses_agree
+
+
+@checked
+def cross_check(problem: CircleEllipse, **limits: Any) -> CrossCheck:
+    """Solve a problem by both methods and compare what they prove.
+
+    Parameters
+    ----------
+    problem : CircleEllipse
+    **limits
+        As for `krawczyk_boxes`.
+
+    Returns
+    -------
+    CrossCheck
+        Both outcomes, and whether all they prove can hold together (certified).
+
+    Examples
+    --------
+    >>> from graphsynth.jamming.intersection import circle_ellipse
+    >>> found = cross_check(circle_ellipse(5, 6, 4, eps="1e-6"))
+    >>> found.consistent, found.hull.status is found.boxes.status
+    (True, True)
+    """
+    hull, boxes = exact_hull(problem), krawczyk_boxes(problem, **limits)
+    covered = not hull.tight or bool(hull.hull.subset(boxes.outer).all())
+    if boxes.status is Status.UNIQUE and hull.tight:
+        covered = covered and bool(hull.hull.subset(boxes.proved[0]).all())
+    return CrossCheck(hull, boxes, covered, bool(boxes.inside.subset(hull.hull).all()), _agree(hull, boxes))
+
+
+def _agree(hull: CrossingHull, boxes: CrossingBoxes) -> bool:
+    if boxes.status is Status.EMPTY or hull.status is Status.EMPTY:
+        found = len(boxes.proved) + len(boxes.inner) > 0
+        return not found and (boxes.status is not Status.EMPTY or hull.status is Status.EMPTY)
+    # a crossing proved for every choice of the parameters cannot vanish or be double for some
+    return len(boxes.proved) == 0 or hull.status is Status.UNIQUE or not hull.tight

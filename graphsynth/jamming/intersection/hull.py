@@ -1,4 +1,4 @@
-"""Exact hull of the crossing of a circle and an ellipse with tolerances, in the squares of the coordinates.
+"""Exact hull of the intersection of a circle and an ellipse with tolerances, in the squares of the coordinates.
 
 With ``u = x^2`` and ``v = y^2`` the problem is linear, its solution set a parallelogram cut by the axes.  The hull is
 computed in rational numbers and rounded outward once, at the square root.  Specification, sections 6.2, 6.3, 6.6, 12.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +16,43 @@ from graphsynth.core.checks import checked
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.status import Status
-from graphsynth.jamming.intersection.criterion import RHO_LIMIT, spectral_radius
-from graphsynth.jamming.intersection.exact import Range, outward, root_bounds
-from graphsynth.jamming.intersection.problem import CircleEllipse
-from graphsynth.jamming.intersection.reasons import Reason
+from graphsynth.jamming.intersection.problem import CircleEllipse, Range, Reason, outward, root_bounds
 
-__all__ = ["CrossingHull", "exact_hull", "mirrored"]
+if TYPE_CHECKING:
+    from graphsynth.jamming.intersection.problem import CircleEllipse
+
+
+#: On the exact hull enlarged by s the image has radius 1 + s^2 rho: below s for some s only if rho < 1/4 (section 6.6).
+RHO_LIMIT = 0.25
+
+
+@checked
+def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
+    """Spectral radius of ``|I - Y L|`` on a box of the quadrant, Y the inverse of mid L.
+
+    An estimate in double precision.  As ``I - Y mid L = 0``, it is the radius of ``|Y| rad L``; infinite where mid L
+    is singular (a circle, or a box at the origin).
+
+    Examples
+    --------
+    >>> from graphsynth.jamming.intersection import circle_ellipse
+    >>> box = Interval.from_bounds([4.0, 2.9], [4.1, 3.0])
+    >>> round(spectral_radius(circle_ellipse(5, 6, 4), box), 4)
+    0.0733
+    """
+    if box.is_empty.any():
+        return 0.0
+    unit = problem.R1.hi  # lengths in units of the radius, so that no unit of the data overflows
+    x, y, rx, ry = (np.concatenate([box.mid, box.rad]) / float(unit)).tolist()
+    bounds = [(unit**2 / r.hi**2, unit**2 / r.lo**2) for r in (problem.a, problem.b)]
+    (alpha, beta), (da, db) = [float((p + q) / 2) for p, q in bounds], [float((q - p) / 2) for p, q in bounds]
+    difference = float(sum(bounds[1]) - sum(bounds[0])) / 2
+    determinant = 4.0 * x * y * difference
+    if determinant == 0.0:
+        return float("inf")
+    inverse = np.abs(np.array([[2 * beta * y, -2 * y], [-2 * alpha * x, 2 * x]]) / determinant)
+    radius = 2.0 * np.array([[rx, ry], [alpha * rx + da * (x + rx), beta * ry + db * (y + ry)]])
+    return float(np.abs(np.linalg.eigvals(inverse @ radius)).max())
 
 
 @dataclass(frozen=True, eq=False)

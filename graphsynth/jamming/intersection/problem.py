@@ -1,4 +1,4 @@
-"""The interval problem of the source: where a circle and an ellipse with tolerances cross.
+"""The interval problem of the source: where a circle and an ellipse with tolerances intersect.
 
 ``x^2 + y^2`` in ``R1^2 + [-e1, e1]`` and ``x^2/a^2 + y^2/b^2`` in ``1 + [-e2, e2]``, ``a >= b > 0``; radii may be
 ranges.  All numbers are kept as rational numbers, so that cases of touching are decided, not guessed.
@@ -7,18 +7,120 @@ Source: Mitrofanova and Bazhenov (2020); specification lambda_and_jamming, secti
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from enum import Enum
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 from graphsynth.core.arguments import Count
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
+from graphsynth.intervals.interval import Interval
+from graphsynth.intervals.reading import lower_bound, upper_bound
+from graphsynth.jamming.bearing import parameters
 from graphsynth.jamming.bearing.bearing import Bearing
-from graphsynth.jamming.intersection.exact import Range, exact_range, root_bounds
+
+
+class Range(NamedTuple):
+    """A closed range of numbers with rational ends; a point if they are equal."""
+
+    lo: Fraction
+    hi: Fraction
+
+    @property
+    def is_point(self) -> bool:
+        """Whether it holds one number only."""
+        return self.lo == self.hi
+
+    def outward(self) -> Interval:
+        """Enclose in an interval of doubles."""
+        return outward(self.lo, self.hi)
+
+
+def outward(lo: Fraction, hi: Fraction) -> Interval:
+    """Return the tightest interval of doubles around two rational numbers."""
+    return Interval.from_bounds(lower_bound(lo) + 0.0, upper_bound(hi) + 0.0)  # no negative zero
+
+
+def exact_range(name: str, value: Any) -> Range:
+    """Read a number or a range without rounding.
+
+    Parameters
+    ----------
+    name : str
+        For the message.
+    value : int, Fraction, Decimal, float, str, Interval or pair
+        A float is the binary number it is.  Text: ``"17.53"``, ``"1/30"``, ``"[17.4, 17.6]"``, ``"17.5 +- 0.005"``.
+
+    Raises
+    ------
+    GeometryError
+        For what is no finite real number, and for reversed bounds.
+
+    Examples
+    --------
+    >>> exact_range("c", "0.03").lo
+    Fraction(3, 100)
+    """
+    if isinstance(value, Range):
+        return value
+    if isinstance(value, Fraction):  # also beyond the range of doubles: units far from 1
+        return Range(value, value)
+    found = parameters.Range.read(name, value)
+    return Range(found.lower, found.upper)
+
+
+def root_bounds(value: Fraction, bits: int = 64) -> Range:
+    """Enclose the square root of ``value >= 0`` in rational numbers, to ``bits`` significant bits; exact if rational.
+
+    Examples
+    --------
+    >>> root_bounds(Fraction(9, 4)).is_point, float(root_bounds(Fraction(2)).lo)
+    (True, 1.4142135623730951)
+    """
+    if value == 0:
+        return Range(Fraction(0), Fraction(0))
+    size = value.numerator.bit_length() - value.denominator.bit_length()
+    shift = bits - size // 2  # value 4^shift has about 2 bits digits
+    up, down = max(2 * shift, 0), max(-2 * shift, 0)
+    whole, rest = divmod(value.numerator << up, value.denominator << down)
+    root = math.isqrt(whole)
+    exact = rest == 0 and root * root == whole
+    unit = Fraction(1, 1 << shift) if shift >= 0 else Fraction(1 << -shift)
+    if exact:
+        return Range(root * unit, root * unit)
+    perfect = math.isqrt(value.numerator), math.isqrt(value.denominator)
+    if perfect[0] ** 2 == value.numerator and perfect[1] ** 2 == value.denominator:
+        return Range(Fraction(*perfect), Fraction(*perfect))
+    return Range(root * unit, (root + 1) * unit)
+
+
+class Reason(Enum):
+    """Reason of a status; the value is a sentence for the reader.
+
+    Examples
+    --------
+    >>> Reason.TOUCHES_X.value
+    'touches axis x = 0: for some parameters the crossing lies on it, or there is none'
+    """
+
+    CROSSING = "one crossing in each quadrant for every choice of the parameters"
+    CIRCLE_OUTSIDE = "the circle encloses the ellipse: no crossing"
+    CIRCLE_INSIDE = "the ellipse encloses the circle: no crossing"
+    TOUCHES_X = "touches axis x = 0: for some parameters the crossing lies on it, or there is none"
+    TOUCHES_Y = "touches axis y = 0: for some parameters the crossing lies on it, or there is none"
+    TANGENT_LONG = "tangent at the ends of the long axis: a double point on y = 0"
+    TANGENT_SHORT = "tangent at the ends of the short axis: a double point on x = 0"
+    COINCIDENT = "coincident: circle and ellipse are the same curve, every point of it is a solution"
+    RING = "a = b: the solutions form a ring, not separate crossings"
+    NOT_SEPARATED = "the ranges of a and b overlap: the ellipse may be a circle"
+    BOXES = "the limit in boxes was reached"
+    SECONDS = "the limit in seconds was reached"
+    RESOLUTION = "boxes at the limit of the resolution are left: the solution set is thick, or a solution is multiple"
+
 
 _MOST_BITS = 10_000
-__all__ = ["CircleEllipse", "bearing_radii", "circle_ellipse", "surrogate_problem"]
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,15 @@ from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.areas import CrescentAreas, ellipse_circle_stable, lid_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing
-from graphsynth.jamming.intersection.exact import Range, exact_range, root_bounds
-from graphsynth.jamming.intersection.problem import CircleEllipse, bearing_radii, circle_ellipse, surrogate_problem
-
-__all__ = ["Reading", "TiltedEllipse", "reading_areas", "reading_ellipse", "reading_problem"]
+from graphsynth.jamming.intersection.problem import (
+    CircleEllipse,
+    Range,
+    bearing_radii,
+    circle_ellipse,
+    exact_range,
+    root_bounds,
+    surrogate_problem,
+)
 
 Array = NDArray[np.float64]
 

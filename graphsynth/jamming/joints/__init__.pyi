@@ -1,9 +1,10 @@
+from .assess import CoupledReport as CoupledReport
 from .assess import assess_coupled as assess_coupled
-from .directions import (
-    DirectionMap as DirectionMap,
+from .certify import (
+    TurnCertificate as TurnCertificate,
 )
-from .directions import (
-    direction_map as direction_map,
+from .certify import (
+    certify_coupled as certify_coupled,
 )
 from .limits import (
     FREE as FREE,
@@ -26,26 +27,25 @@ from .limits import (
 from .limits import (
     bearing_limits as bearing_limits,
 )
-from .loosening import (
-    Loosened as Loosened,
+from .scale import (
+    DirectionMap as DirectionMap,
 )
-from .loosening import (
-    LooseningTable as LooseningTable,
-)
-from .loosening import (
-    compare_loosening as compare_loosening,
-)
-from .report import CoupledReport as CoupledReport
 from .scale import (
     ScaleCertificate as ScaleCertificate,
 )
 from .scale import (
+    direction_map as direction_map,
+)
+from .scale import (
     largest_scale as largest_scale,
 )
-from .turn import (
-    TurnCertificate as TurnCertificate,
+from .search import Witness as Witness
+from .sensitivity import (
+    Loosened as Loosened,
 )
-from .turn import (
-    certify_coupled as certify_coupled,
+from .sensitivity import (
+    LooseningTable as LooseningTable,
 )
-from .witness import Witness as Witness
+from .sensitivity import (
+    compare_loosening as compare_loosening,
+)

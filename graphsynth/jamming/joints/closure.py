@@ -25,7 +25,6 @@ from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Layout", "joint_places", "lay_out", "moment_rows", "work_row"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]

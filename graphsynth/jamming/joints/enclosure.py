@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval, cos, sin
 from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Layout, moment_rows
-from graphsynth.jamming.joints.linear import enclosed_solve, points
 from graphsynth.jamming.joints.program import PoseSolution, Units
+from graphsynth.jamming.joints.tubes import enclosed_solve, points
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.exact import Neglected
 
-__all__ = ["Moving", "Pieces", "factor_bounds", "lower_bounds", "shifts_enclosed", "start_tilts", "upper_bounds"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -25,14 +25,13 @@ from numpy.typing import NDArray
 from graphsynth.intervals import Dual, Interval, Status, image, variables
 from graphsynth.intervals.dual import jacobian_of
 from graphsynth.jamming.joints.closure import ROUND, Layout
-from graphsynth.jamming.joints.linear import enclosed_solve
 from graphsynth.jamming.joints.positions import Moved, Positions
+from graphsynth.jamming.joints.tubes import enclosed_solve
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.tubes import Tubes
 
-__all__ = ["Neglected", "neglected"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -1,14 +1,14 @@
-"""What each joint can give: tilt limits and axial play, and which axes are misaligned.
+"""Limits of joints and misalignments of axes, each with a tolerance box; without one the range is the value itself.
 
-Tilts in radians; axial play in the length unit of the mechanism.  Every number is kept as a nominal value and a range
-``(low, high)`` that certificates use; without tolerance the range is the value itself.
+A bearing's limit is its critical tilt, enclosed over the box of its dimensions.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import TypeAlias
 
 import numpy as np
@@ -16,14 +16,11 @@ import numpy as np
 from graphsynth.core.arguments import Real
 from graphsynth.core.checks import checked, choice, finite
 from graphsynth.core.errors import GeometryError
+from graphsynth.intervals import Interval
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
-__all__ = ["FREE", "RIGID", "SPHERICAL", "JointLimits", "Limits", "Misalignment", "SlideLimits", "bearing_limits"]
-
 Range: TypeAlias = tuple[float, float]
-
-
 #: Smallest limit above zero: products of smaller ones would vanish.
 _SMALLEST = 1e-150
 
@@ -115,7 +112,6 @@ class SlideLimits:
 
 
 Limits: TypeAlias = JointLimits | SlideLimits
-
 #: No clearance at all; any tilt but no slip; neither (a gear or cam contact).
 RIGID = JointLimits(0.0)
 SPHERICAL = JointLimits(math.inf)
@@ -223,8 +219,6 @@ def bearing_limits(
     >>> round(bearing_limits(Bearing()).tilt, 15)
     0.006064396559156
     """
-    from graphsynth.jamming.joints.critical import critical_range, pushed
-
     choice("condition", condition, ("A", "B", "general"))
     bearing = pushed(bearing, radial_offset, clearance_tolerance)
     boxes = (radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance)
@@ -282,3 +276,90 @@ def _checked(joint: JointGeometry, own: Bearing | Limits | None, condition: Cond
     if isinstance(joint, Gear | Cam) and own != FREE:
         raise GeometryError(f"{name} is a {joint.kind} contact, which guides nothing out of the plane; leave it FREE")
     return own
+
+
+def critical_range(
+    bearing: Bearing, condition: str, tolerances: tuple[float, float, float, float], nominal: float
+) -> tuple[float, float]:
+    """Enclose the critical tilt for ``Rb``, ``Hb``, ``clearance``, ``hole_length`` within the tolerances (mm).
+
+    "A" and "B" from their two corners.  A pin in a hole ("general") touches where it would both as a short bearing and
+    as a long shaft in that hole, so that its critical tilt is the larger of the two; each is enclosed by itself.
+    """
+    radius, height, clearance = (
+        _around(name, value, tolerance)
+        for name, value, tolerance in zip(
+            ("Rb", "Hb", "clearance"), (bearing.Rb, bearing.Hb, bearing.clearance), tolerances[:3]
+        )
+    )
+    if condition != "general":
+        least, most = _over(radius, height, clearance, condition)
+    else:
+        assert bearing.hole_length is not None  # checked with the nominal tilt
+        hole = _around("hole_length", bearing.hole_length, tolerances[3])
+        ends = (_over(radius, height, clearance, "A"), _over(radius, hole, clearance, "B"))
+        least, most = (max(pair) for pair in zip(*ends))
+    return min(least, nominal), max(most, nominal)
+
+
+def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
+    """Return a bearing with the clearance that is left beside an axis pushed off the middle, rounded down.
+
+    In the direction of the push both rims reach ``offset`` further, so that all three contact conditions hold with the
+    clearance less the offset; in other directions more is left.  Specification, section 9.7, level L2.
+
+    Raises
+    ------
+    GeometryError
+        An offset that is negative or more than the smallest clearance.
+    """
+    if not 0.0 <= offset < math.inf:
+        raise GeometryError(f"radial_offset = {offset} must be a distance of zero or more, in mm; correct the value")
+    if offset == 0.0:
+        return bearing
+    if offset + tolerance > bearing.clearance:
+        raise GeometryError(
+            f"radial_offset = {offset} mm is more than the smallest clearance, "
+            f"{bearing.clearance - tolerance:.9g} mm; the pin cannot be pushed so far"
+        )
+    exact = Fraction(bearing.clearance) - Fraction(offset)
+    left = float(exact)
+    return replace(bearing, clearance=left if Fraction(left) <= exact else math.nextafter(left, 0.0))
+
+
+_Ends = tuple[Fraction, Fraction]
+
+
+def _over(radius: _Ends, height: _Ends, clearance: _Ends, condition: str) -> tuple[float, float]:
+    """Lower bound at the tightest corner, upper bound at the loosest one."""
+    sense = 1 if condition == "A" else -1
+    least = _tilt(radius[::sense][0], height[1], clearance[0], condition)[0]
+    return least, _tilt(radius[::sense][1], height[0], clearance[1], condition)[1]
+
+
+def _around(name: str, value: float, tolerance: float) -> tuple[Fraction, Fraction]:
+    low, high = Fraction(value) - Fraction(tolerance), Fraction(value) + Fraction(tolerance)
+    if low < 0 or (name in ("Rb", "hole_length") and low == 0):
+        raise GeometryError(f"{name} = {value} mm with tolerance {tolerance} mm reaches {float(low)}; reduce it")
+    return low, high
+
+
+def _tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> tuple[float, float]:
+    """``2 arctan(c / (h + w))`` of section 4.7; infinite where there is no critical tilt (exact decision)."""
+    h = H / 2
+    room = h * h - c * (2 * R + c) if condition == "A" else h * h + c * (2 * R + c)
+    if condition == "A" and (room <= 0 or h == 0):
+        return math.inf, math.inf
+    divisor = Interval(h) + Interval(room).sqrt()
+    if c == 0:
+        return 0.0, 0.0
+    q = Interval(c) / divisor
+    cube = q * q * q
+    # alternating series with falling terms for q <= 1: q - q^3/3 <= arctan q <= q - q^3/3 + q^5/5
+    if float(q.hi) <= 1e-3:
+        angle = q - cube / 3 + Interval.from_bounds(0.0, 1.0) * (cube * q * q) / 5
+    else:
+        from graphsynth.intervals import atan
+
+        angle = atan(q)
+    return float((2 * angle).lo), float((2 * angle).hi)

@@ -20,7 +20,6 @@ from graphsynth.mechanism.rank import characteristic_length
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Moved", "Placement", "Positions", "Unsupported", "law_enclosed"]
 
 Array = NDArray[np.float64]
 Pair = tuple[Any, Any]

@@ -5,26 +5,42 @@ Two quantities, of the same program:
 * ``"tilt"``: T*, the smallest factor on the tilt limits that lets the mechanism assemble, axial plays as they are;
 * ``"scale"``: the smallest factor on tilt limits and plays together.  It is proportional to the misalignment, so its
   inverse is the factor by which all misalignments may grow.  Both pass 1 together.
+
+`problem` puts a mechanism, its limits and its misalignments together for it and for the certificates.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.jamming.joints.closure import Layout, force_rows, moment_rows, work_row
-from graphsynth.jamming.joints.cones import ConeSolution, solve_cones
-from graphsynth.jamming.joints.polish import polish
+from graphsynth.jamming.bearing.bearing import Bearing, Condition
+from graphsynth.jamming.joints.closure import (
+    ROLL,
+    ROUND,
+    Layout,
+    force_rows,
+    joint_places,
+    lay_out,
+    moment_rows,
+    shifts,
+    work_row,
+)
+from graphsynth.jamming.joints.cones import ConeSolution, polish, solve_cones
+from graphsynth.jamming.joints.limits import Limits, Misalignment, complete
 
-__all__ = ["PoseSolution", "Units", "solve_poses"]
+if TYPE_CHECKING:
+    from graphsynth.mechanism.model import Mechanism
+
 
 Array = NDArray[np.float64]
 Mode = Literal["tilt", "scale"]
-
 _RANK = 1e-11
 
 
@@ -302,3 +318,67 @@ def _write(
         share = np.where(cost > 0.0, 1.0 / cost, 0.0)
     out.moment[poses] = moment * share[:, None]
     out.force[poses] = force * rows.factor * share[:, None]
+
+
+Bearings: TypeAlias = Bearing | Limits | Mapping[tuple[int, int], Bearing | Limits]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A mechanism with limits and misalignments; what the solvers and the certificates start from."""
+
+    mechanism: Mechanism
+    limits: tuple[Limits, ...]
+    misalignments: tuple[Misalignment, ...]
+    layout: Layout
+
+    @property
+    def names(self) -> tuple[tuple[tuple[int, int], str], ...]:
+        """Joint and kind of every limit on tilt."""
+        kinds = ["tilt" if axis == ROUND else "roll" if axis == ROLL else "pitch" for axis in self.layout.block_axis]
+        return tuple((self.pairs[place], kind) for place, kind in zip(self.layout.block_joint, kinds))
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Links of every joint of the layout."""
+        return tuple(self.mechanism.joints[k].pair for k in self.layout.joints)
+
+    def solve(self, poses: Array, mode: Mode = "tilt", turned: float = 0.0) -> PoseSolution:
+        """Solve at poses (N, links, 3); all misalignments turned by ``turned`` radians."""
+        r, e, base = joint_places(self.mechanism, self.layout.joints, poses)
+        return solve_poses(self.layout, r, e, shifts(self.layout, base, turned), mode)
+
+
+def check_motion(motion: Any) -> None:
+    """Refuse anything that is no `Motion`."""
+    from graphsynth.kinematics.simulation import Motion
+
+    if not isinstance(motion, Motion):
+        raise GeometryError(f"motion = {motion!r} is no Motion; give the result of simulate(mechanism, inputs)")
+
+
+def problem(
+    mechanism: Mechanism, bearings: Bearings, tilts: Misalignment | Iterable[Misalignment], condition: Condition = "A"
+) -> Problem:
+    """Put a mechanism, limits and misalignments together; see `assess_coupled` for the arguments.
+
+    Raises
+    ------
+    GeometryError
+        A joint without limits, limits that do not fit a joint, a misalignment of a joint that does not exist.
+    """
+    chosen = tuple(tilts) if isinstance(tilts, Iterable) else (tilts,)
+    for tilt in chosen:
+        if not isinstance(tilt, Misalignment):
+            raise GeometryError(
+                f"tilts = {tilt!r} is no misalignment; give Misalignment(base, link, alpha), or several"
+            )
+    by_pair: dict[tuple[int, int], Misalignment] = {}
+    for tilt in chosen:
+        pair = (min(tilt.base, tilt.link), max(tilt.base, tilt.link))
+        mechanism.joint(*pair)  # raises if there is none
+        if pair in by_pair:
+            raise GeometryError(f"joint {pair[0]}-{pair[1]} has two misalignments; give their sum")
+        by_pair[pair] = tilt
+    limits = complete(mechanism.joints, bearings, by_pair, condition)
+    return Problem(mechanism, limits, chosen, lay_out(mechanism, limits, chosen))

@@ -1,20 +1,32 @@
-"""The search over the range of a motion: pieces are cut until each is decided or no cut can decide it."""
+"""The search over the range of a motion, and the search for one member of the tolerance boxes that binds.
+
+Pieces are cut until each is decided or no cut can decide it.  Where the boxes as a whole prove nothing, floating point
+looks for a member that binds: limits and plays at their low ends, misalignments at the ends of their boxes, dimensions
+at the corner that the sensitivities point to.  Then that member alone is proved to bind at one input, in an assembly
+that lies in the box of a piece proved to hold exactly one assembly for every member: the branch of the motion.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.intervals.reading import shortened
+from graphsynth.jamming.joints.limits import JointLimits, Limits, Misalignment, SlideLimits
 from graphsynth.jamming.joints.pieces import Found, Work, cut
+from graphsynth.jamming.joints.program import Problem, problem
 
-__all__ = ["Budget", "peak_inputs", "search"]
+if TYPE_CHECKING:
+    from graphsynth.mechanism.model import Mechanism
+
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
 _PEAKS = 4
 #: So many pieces may be cut without asking whether it can help.
 _FEW = 8
@@ -129,3 +141,170 @@ def _open(lo: Array, hi: Array, size: int) -> Found:
     none = np.zeros(len(lo))
     box = np.full((len(lo), size), np.nan)
     return Found(lo, hi, none, none + np.inf, none > 1.0, box, box, none.astype(np.int8))
+
+
+#: Directions tried over the range of each.
+_DIRECTIONS = 9
+#: Relative step back from the corner of the dimensions, so that rounding leaves them inside their box.
+_INSIDE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """A member of the tolerance boxes that is proved to jam (certified).
+
+    Attributes
+    ----------
+    input : float
+        Where it jams.
+    factor : float
+        Proved lower bound of the factor on limits and plays there; above 1.
+    misalignments, limits : tuple
+        Of this member, without tolerance; limits in the order of ``mechanism.joints``.
+    mechanism : Mechanism
+        With the dimensions of this member.
+    exact : bool
+        Whether it is proved with exact tilts; else with small ones only (first order).
+    """
+
+    input: float
+    factor: float
+    misalignments: tuple[Misalignment, ...]
+    limits: tuple[Limits, ...]
+    mechanism: Mechanism
+    exact: bool = True
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "input": self.input,
+            "factor": self.factor,
+            "exact": self.exact,
+            "misalignments": [
+                {"base": m.base, "link": m.link, "alpha": m.alpha, "direction": m.direction} for m in self.misalignments
+            ],
+            "limits": [{"joint": list(j.pair), **_values(own)} for j, own in zip(self.mechanism.joints, self.limits)],
+            "dimensions": [[list(joint.at_a), list(joint.at_b)] for joint in self.mechanism.joints],
+        }
+
+    @property
+    def sentence(self) -> str:
+        """What is proved."""
+        tilts = ", ".join(f"alpha = {m.alpha:.9g} at {m.direction:.9g} rad" for m in self.misalignments)
+        return (
+            f"a member of the tolerance boxes ({tilts}) jams at the input {self.input!r}, proved"
+            f"{'' if self.exact else ' with small tilts (first order) only'}: its limits would "
+            f"have to be {shortened(self.factor, -1, 9)} times as large or more with small tilts"
+        )
+
+
+def _values(own: Limits) -> dict[str, float]:
+    names = ("tilt", "play") if isinstance(own, JointLimits) else ("roll", "pitch", "play")
+    return {name: getattr(own, name) for name in names}
+
+
+def jamming_member(work: Work, pieces: Found, own: Mask) -> Witness | None:
+    """Return a member proved to jam in one of the pieces ``own`` (proved to be on the branch), or None."""
+    left = np.flatnonzero(own & (pieces.upper > 1.0))
+    if left.size == 0 or not _has_tolerance(work):
+        return None
+    limits = tuple(_tightest(limit) for limit in work.given.limits)
+    member = _member(work, work.given.mechanism, limits, tuple(_sharp(m) for m in work.given.misalignments))
+    at = peak_inputs(member, pieces, left)
+    # dimensions last: their corner depends on which way the axes are tilted
+    for adjust in (_worst_tilts, _worst_dimensions):
+        member = adjust(work, member, at)
+    at = peak_inputs(member, pieces, left)
+    points = member.evaluate(at, at)
+    place = np.clip(np.searchsorted(pieces.lo, at, side="right") - 1, 0, None)
+    inside = own[place] & points.proved & (at <= pieces.hi[place])
+    inside &= ((points.box_lo >= pieces.box_lo[place]) & (points.box_hi <= pieces.box_hi[place])).all(axis=1)
+    exact = bool((inside & (points.sure == -1)).any())
+    factor = np.where(inside & ((points.sure == -1) | (not exact)), points.lower, 0.0)
+    top = int(np.argmax(factor))
+    if factor[top] <= 1.0:
+        return None
+    given = member.given
+    return Witness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism, exact)
+
+
+def _has_tolerance(work: Work) -> bool:
+    boxes = [m.alpha_range for m in work.given.misalignments] + [m.direction_range for m in work.given.misalignments]
+    for limit in work.given.limits:
+        boxes += [getattr(limit, f"{name}_range") for name in _values(limit)]
+    return work.tolerance > 0.0 or any(box is not None and box[0] < box[1] for box in boxes)
+
+
+def _tightest(limit: Limits) -> Limits:
+    if isinstance(limit, JointLimits):
+        assert limit.tilt_range is not None and limit.play_range is not None  # filled when made
+        return JointLimits(limit.tilt_range[0], limit.play_range[0])
+    assert limit.roll_range is not None and limit.pitch_range is not None and limit.play_range is not None
+    return SlideLimits(limit.roll_range[0], limit.pitch_range[0], limit.play_range[0])
+
+
+def _sharp(tilt: Misalignment, alpha: float | None = None, direction: float | None = None) -> Misalignment:
+    return Misalignment(
+        tilt.base, tilt.link, tilt.alpha if alpha is None else alpha,
+        tilt.direction if direction is None else direction, tilt.rigid,
+    )  # fmt: skip
+
+
+def _member(work: Work, mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
+    """Work of one member, from the start of the motion."""
+    rigid = {(min(t.base, t.link), max(t.base, t.link)) for t in tilts if t.rigid}
+    table = {joint.pair: own for joint, own in zip(mechanism.joints, limits) if joint.pair not in rigid}
+    given: Problem = problem(mechanism, table, tilts)
+    return Work(given, replace(work.motion, mechanism=mechanism), 0.0)
+
+
+def _choices(tilt: Misalignment) -> Iterator[Misalignment]:
+    """Members of the box of a misalignment: both ends of alpha with directions over the range."""
+    assert tilt.alpha_range is not None and tilt.direction_range is not None  # filled when made
+    low, high = tilt.direction_range
+    angles = {low, high, *np.clip(np.linspace(low, high, _DIRECTIONS), low, high).tolist()}
+    for alpha in sorted(set(tilt.alpha_range)):
+        for direction in sorted(angles):
+            yield _sharp(tilt, alpha, direction)
+
+
+def _worst_tilts(work: Work, member: Work, at: NDArray[np.float64]) -> Work:
+    """Take one misalignment after the other to where the factor is largest (it is convex in each alpha)."""
+    best, most = member, float(member.estimate(at).max())
+    for k, tilt in enumerate(work.given.misalignments):
+        for choice in _choices(tilt):
+            tilts = (*best.given.misalignments[:k], choice, *best.given.misalignments[k + 1 :])
+            other = _member(work, member.given.mechanism, member.given.limits, tilts)
+            value = float(other.estimate(at).max())
+            if value > most:
+                best, most = other, value
+    return best
+
+
+def _worst_dimensions(work: Work, member: Work, at: NDArray[np.float64]) -> Work:
+    """Take every coordinate of a joint to the end of its box that raises the factor at the worst of the inputs."""
+    if work.tolerance == 0.0:
+        return member
+    mechanism, step = member.given.mechanism, work.tolerance * (1.0 - _INSIDE)
+    value = member.estimate(at)
+    worst = at[[int(np.argmax(value))]]
+    most = float(value.max())
+
+    def moved(signs: NDArray[np.float64]) -> Work:
+        grow = (1.0 + step * signs).reshape(-1, 4)
+        joints = [
+            replace(joint, at_a=(joint.at_a[0] * g[0], joint.at_a[1] * g[1]),
+                    at_b=(joint.at_b[0] * g[2], joint.at_b[1] * g[3]))
+            for joint, g in zip(mechanism.joints, grow.tolist())
+        ]  # fmt: skip
+        other = replace(mechanism, joints=tuple(joints))
+        return _member(work, other, member.given.limits, member.given.misalignments)
+
+    signs = np.zeros(4 * len(mechanism.joints))
+    given = np.array([value for joint in mechanism.joints for value in (*joint.at_a, *joint.at_b)])
+    for k in np.flatnonzero(given != 0.0):
+        one = np.zeros_like(signs)
+        one[k] = 1.0
+        signs[k] = np.sign(moved(one).estimate(worst)[0] - most)
+    other = moved(signs)
+    return other if float(other.estimate(worst)[0]) > most else member

@@ -154,8 +154,7 @@ def _prove(context: Context, lattice: Lattice, sets: tuple[int, ...]) -> list[Ce
 
 def box_of(context: Context, lattice: Lattice, lengths: list[int]) -> ToleranceBox:
     """Return the exact dimensions of a set with the tolerances of the scene."""
-    from graphsynth.jamming.bearing.parameters import ToleranceBox
-    from graphsynth.jamming.bearing.ranges import spread
+    from graphsynth.jamming.bearing.parameters import ToleranceBox, spread
 
     table: SurveyTable = context.scene.mechanism
     relative = _written(context, ("tolerances",), "lengths_percent", table.tolerances) / 100

@@ -16,9 +16,9 @@ from graphsynth.systems.lambda_linkage.system import LambdaTable
 
 if TYPE_CHECKING:
     from graphsynth.jamming.assess import JammingReport
-    from graphsynth.jamming.bearing.certified_limits import CertifiedLimit
+    from graphsynth.jamming.bearing.arcs import Span
     from graphsynth.jamming.bearing.certify import JamCertificate
-    from graphsynth.jamming.bearing.circle_sets import Span
+    from graphsynth.jamming.bearing.limits import CertifiedLimit
     from graphsynth.mechanism.four_bar import FourBarPositions, TiltedFourBar
 
 __all__ = ["LambdaMotion", "jamming", "judge", "kinematics", "recognise", "tolerance_box"]
@@ -160,7 +160,7 @@ def _nominal(context: Context, condition: _C) -> JamCertificate:
 
 def _limits(context: Context, condition: _C) -> dict[str, CertifiedLimit]:
     """Bracket the smallest clearance and the largest tilt of the axis, for the dimensions without tolerances."""
-    from graphsynth.jamming.bearing.certified_limits import certified_largest_misalignment, certified_smallest_clearance
+    from graphsynth.jamming.bearing.limits import certified_largest_misalignment, certified_smallest_clearance
 
     box = tolerance_box(context, tolerances=False)
     return {

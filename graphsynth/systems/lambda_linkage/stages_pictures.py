@@ -14,7 +14,7 @@ from graphsynth.systems.lambda_linkage.system import LambdaTable
 if TYPE_CHECKING:
     from graphsynth.drawing.plots import Band
     from graphsynth.jamming.assess import JammingReport
-    from graphsynth.jamming.bearing.tilt_arcs import Arc
+    from graphsynth.jamming.bearing.arcs import Arc
     from graphsynth.systems.lambda_linkage.stages import LambdaMotion
 
 __all__ = ["animations", "plots", "sketches"]

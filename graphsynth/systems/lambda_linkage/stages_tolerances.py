@@ -47,8 +47,7 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
         For a tolerance with an unknown name, one that is no number, or one so large that a dimension may vanish.
     """
     from graphsynth.core.errors import GeometryError
-    from graphsynth.jamming.bearing.parameters import ToleranceBox
-    from graphsynth.jamming.bearing.ranges import Range, spread
+    from graphsynth.jamming.bearing.parameters import Range, ToleranceBox, spread
 
     table = _table(context)
     raw = context.scene.raw.get("mechanism", {})

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import Interval, Status
 from graphsynth.jamming.intersection import Reason, circle_ellipse, cross_check, exact_hull, kernels, krawczyk_boxes
-from graphsynth.jamming.intersection.boxes import _bounds, _carried, krawczyk_data
-from graphsynth.jamming.intersection.check import _agree
+from graphsynth.jamming.intersection.boxes import _agree, _bounds, _carried, krawczyk_data
 
 
 def surrogate(t):

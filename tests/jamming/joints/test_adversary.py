@@ -16,8 +16,7 @@ from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import RIGID, SPHERICAL, JointLimits, Misalignment, SlideLimits
 from graphsynth.jamming.joints.closure import joint_places, lay_out, shifts
 from graphsynth.jamming.joints.enclosure import Pieces, factor_bounds
-from graphsynth.jamming.joints.problem import problem
-from graphsynth.jamming.joints.program import solve_poses
+from graphsynth.jamming.joints.program import problem, solve_poses
 
 MARGINS = (1e-3, 1e-6, 1e-9)
 

@@ -16,8 +16,8 @@ from graphsynth import simulate
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import RIGID, JointLimits, Misalignment, certify_coupled, direction_map, largest_scale
 from graphsynth.jamming.joints.closure import lay_out
-from graphsynth.jamming.joints.corners import corner_layouts
-from graphsynth.jamming.joints.problem import problem
+from graphsynth.jamming.joints.pieces import corner_layouts
+from graphsynth.jamming.joints.program import problem
 
 TURN = np.linspace(0.0, 2.0 * math.pi, 25)
 

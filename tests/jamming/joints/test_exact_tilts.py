@@ -24,8 +24,7 @@ from graphsynth.jamming.joints.closure import joint_places, shifts
 from graphsynth.jamming.joints.enclosure import Pieces, lower_bounds, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, _movements, neglected
 from graphsynth.jamming.joints.pieces import Work
-from graphsynth.jamming.joints.problem import problem
-from graphsynth.jamming.joints.program import solve_poses
+from graphsynth.jamming.joints.program import problem, solve_poses
 from graphsynth.jamming.joints.tubes import prove_tubes
 
 FREE, JAMMED = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED

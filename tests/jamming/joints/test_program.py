@@ -26,7 +26,7 @@ from graphsynth.jamming.joints import (
     direction_map,
 )
 from graphsynth.jamming.joints.closure import body_rows, joint_places, shifts
-from graphsynth.jamming.joints.problem import problem
+from graphsynth.jamming.joints.program import problem
 
 
 def random_limits(mechanism, seed, plays=(0.0, 0.0, 0.02, 0.2)):

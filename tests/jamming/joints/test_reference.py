@@ -8,7 +8,7 @@ import pytest
 from graphsynth import simulate
 from graphsynth.jamming import Bearing, Verdict
 from graphsynth.jamming.joints import RIGID, SPHERICAL, JointLimits, Misalignment, assess_coupled
-from graphsynth.jamming.joints.problem import problem
+from graphsynth.jamming.joints.program import problem
 
 T_A = 0.006064396559156420060266102798724801172486
 T_B = 0.005938219994357610895366507614303110074863

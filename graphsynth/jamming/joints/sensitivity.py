@@ -1,8 +1,8 @@
 """Which joint to loosen first: every limit is loosened by itself and the whole range solved again.
 
-The allowed scale of one pose is a concave function of all limits and plays together (more of each never hurts), and so
-is the smallest over a range.  The price of a limit therefore promises at most what loosening it gains; a second joint,
-or another input, may bind next.  That is why the answer is solved for and not extrapolated.
+The allowed scale of one pose is a concave function of all limits and axial clearances together (more of each never
+hurts), and so is the smallest over a range.  The shadow price of a limit therefore promises at most what loosening it
+gains; a second joint, or another input, may bind next.  That is why the answer is solved for and not extrapolated.
 Specification, sections 9.3 and 9.4.
 """
 
@@ -20,15 +20,13 @@ from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.limits import Misalignment
-from graphsynth.jamming.joints.problem import Bearings, Problem, check_motion, problem
+from graphsynth.jamming.joints.program import Bearings, Problem, check_motion, problem
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
 
-__all__ = ["Loosened", "LooseningTable", "compare_loosening"]
 
 Array = NDArray[np.float64]
-
 #: Relative gains below this are rounding.
 _NOTHING = 1e-9
 
