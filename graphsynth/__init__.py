@@ -6,6 +6,26 @@ script pays only for what it asks.
 
 import lazy_loader as _lazy
 
+from .core import shown as _shown
+
 __version__ = "0.1.0"
 
 __getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
+
+# the methods whose work is done above the room of their object; this file lies above all rooms
+_shown.WORK.update(
+    {
+        "simulate": "graphsynth.kinematics.simulation:simulate",
+        "modes": "graphsynth.kinematics.assembly:assembly_modes",
+        "embody": "graphsynth.kinematics.dimensional.api:embody",
+        "draw graph": "graphsynth.drawing.methods:draw_graph",
+        "graph picture": "graphsynth.drawing.methods:graph_picture",
+        "draw mechanism": "graphsynth.drawing.methods:draw_posed",
+        "plot mechanism": "graphsynth.drawing.methods:plot_posed",
+        "mechanism picture": "graphsynth.drawing.methods:mechanism_picture",
+        "draw motion": "graphsynth.drawing.methods:draw_motion",
+        "plot motion": "graphsynth.drawing.methods:plot_motion",
+        "animate motion": "graphsynth.drawing.methods:animate_motion",
+        "motion picture": "graphsynth.drawing.methods:motion_picture",
+    }
+)

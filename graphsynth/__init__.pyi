@@ -1,6 +1,8 @@
 __version__: str
 
 from .atlas.catalogue import Catalogue as Catalogue
+from .core.angles import degrees as degrees
+from .core.errors import GraphsynthError as GraphsynthError
 from .intervals.interval import Interval as Interval
 from .intervals.paving import pave as pave
 from .intervals.proving import krawczyk as krawczyk

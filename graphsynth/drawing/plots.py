@@ -113,6 +113,12 @@ class Chart:
             self._draw(figure.add_subplot())
         return themed_svg(figure, _RC)
 
+    def _repr_svg_(self) -> str:
+        return self.svg()
+
+    def __repr__(self) -> str:
+        return f"Chart of {len(self.lines)} curves: {self.ylabel} over {self.xlabel}; .save(path) writes it"
+
     def save(self, path: str | Path) -> None:
         """Write to a file, as its suffix says: ``.svg`` themed, ``.png``, ``.pdf`` and what else matplotlib writes."""
         if Path(path).suffix.lower() == ".svg":

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.angles import angles
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.assembly import whole_range
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.kinematics.engine.events import ending, touches
@@ -21,19 +24,25 @@ from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
 from graphsynth.kinematics.engine.reversals import dead_centres
 from graphsynth.kinematics.engine.start import initial, started
+from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism
+
+if TYPE_CHECKING:
+    from graphsynth.kinematics.dimensional.api import Embodiment
 
 __all__ = ["BatchMotion", "Motion", "simulate", "simulate_batch"]
 
 Array = NDArray[np.float64]
 
 _TURNS = 12
+#: Samples of a motion without inputs, and the part of a range that is left out before each of its limits.
+_SAMPLES, _EDGE = 361, 1e-3
 _CLOSED = 1e-9
 
 
 def simulate(
-    mechanism: Mechanism,
-    inputs: ArrayLike,
+    mechanism: Mechanism | Embodiment,
+    inputs: ArrayLike | str | None = None,
     *,
     modes: Mapping[int, int] | None = None,
     start: ArrayLike | None = None,
@@ -43,12 +52,14 @@ def simulate(
 
     Parameters
     ----------
-    mechanism : Mechanism
-        With as many drivers as its mobility.
-    inputs : array_like, shape (n,)
+    mechanism : Mechanism or Embodiment
+        With as many drivers as its mobility; of what `embody` returns, its mechanism.
+    inputs : array_like, shape (n,), or str, optional
         Inputs u in the order of the motion, strictly increasing or decreasing; each driver's law turns u into its
         coordinate (the input itself by default: radians or lengths; a `UnitWarning` is shown where turning inputs look
-        like degrees, as 0 to 360 do).
+        like degrees, as 0 to 360 do).  Degrees are ``gs.degrees(...)``, "0..360 deg" (361 samples) or a list of texts
+        with units.  Without inputs: a full rotation from the mechanism's pose on; where there is none, all that is
+        reached from there in both directions, up to a thousandth of the range before each limit.
     modes : mapping of int to int, optional
         Assembly mode by group index: +1 or -1 for a dyad, the rank among all its modes at the first input for a
         larger group (0 by default).  The sign is that of the third point left of the way from the lower link's
@@ -69,22 +80,56 @@ def simulate(
     ------
     GeometryError
         Inputs that are not finite or not monotonic, a mode that does not exist, or drivers that do not fit the
-        mobility.
+        mobility; an embodiment that found no mechanism.
 
     Examples
     --------
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph, Revolute
-    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> rocker = Mechanism(graph, [
-    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
-    ...     Revolute(0, 3, (2.0, 0.0)),
-    ... ], [Driver(0, 1)])
-    >>> motion = simulate(rocker, np.linspace(0.0, 2.0 * np.pi, 73))
+    >>> motion = simulate(Mechanism.four_bar(2, 1, 2.5, 2.5), np.linspace(0.0, 2.0 * np.pi, 73))
     >>> motion.completed, motion.closure.closed, motion.residual < 1e-14
     (True, True, True)
     """
+    mechanism = _mechanism(mechanism)
+    if inputs is None:
+        return _simulate_whole(mechanism, modes, start, events)
+    return _simulate(mechanism, monotonic(angles("inputs", inputs)), modes, start, events)
+
+
+def _mechanism(given: Any) -> Mechanism:
+    if isinstance(given, Mechanism):
+        return given
+    from graphsynth.kinematics.dimensional.api import Embodiment
+
+    if not isinstance(given, Embodiment):
+        raise GeometryError(f"{type(given).__name__} is not a Mechanism; give one, or what embody returns")
+    if given.mechanism is None:
+        raise GeometryError(f"there is no mechanism to move: {given.statement}")
+    return given.mechanism
+
+
+def _simulate_whole(
+    mechanism: Mechanism, modes: Mapping[int, int] | None, start: ArrayLike | None, events: bool
+) -> Motion:
+    """Simulate a full rotation, or all that is reached from the start in both directions."""
+    first, last = whole_range(mechanism)
+    forward = _simulate(mechanism, np.linspace(first, last, _SAMPLES), modes, start, events)
+    sliding = isinstance(mechanism.joint(*mechanism.drivers[0].pair), Prismatic)
+    if (forward.completed and not sliding) or not forward.assembled[0]:
+        return forward
+    backward = _simulate(mechanism, np.linspace(first, 2.0 * first - last, _SAMPLES), modes, start, events)
+    low = backward.inputs[-1] if backward.completed else backward.stopped_at
+    high = forward.inputs[-1] if forward.completed else forward.stopped_at
+    # the limits are dead-centre positions, where velocities are infinite
+    edge = _EDGE * (high - low)
+    u = np.linspace(low + edge, high - edge, _SAMPLES)
+    there = _simulate(mechanism, np.linspace(first, u[0], _SAMPLES), modes, start, False)
+    signs = {step.group: int(there.modes[0, step.group]) for step in there.steps if step.has_two_modes}
+    return _simulate(mechanism, u, signs, there.poses[-1], events)
+
+
+def _simulate(
+    mechanism: Mechanism, u: Array, modes: Mapping[int, int] | None, start: ArrayLike | None, events: bool
+) -> Motion:
     begin = perf_counter()
-    u = monotonic(inputs)
     program = compile_program(mechanism)
     warn_of_degrees(mechanism, u)
     given = start if start is not None else mechanism.pose

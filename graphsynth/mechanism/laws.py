@@ -1,4 +1,4 @@
-"""Motion laws of drivers: joint coordinate q as a function of the input u, with two derivatives.
+"""Drivers and their motion laws: joint coordinate q as a function of the input u, with two derivatives.
 
 A law is called with an array of inputs and returns ``(q, dq/du, d2q/du2)`` of the same shape; any callable that does
 so is a law, but only the classes here can be written to a file.
@@ -7,17 +7,17 @@ so is a law, but only the classes here can be written to a file.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import finite
+from graphsynth.core.checks import finite, link_number
 from graphsynth.core.errors import GeometryError
 
-__all__ = ["LAWS", "Harmonic", "Law", "Linear", "Polynomial", "Table"]
+__all__ = ["LAWS", "Driver", "Harmonic", "Law", "Linear", "Polynomial", "Table"]
 
 Array = NDArray[np.float64]
 Law = Callable[[Array], tuple[Array, Array, Array]]
@@ -140,3 +140,37 @@ def _numbers(name: str, values: Any, least: int) -> tuple[float, ...]:
 
 #: Class by kind, for readers and writers.
 LAWS: dict[str, Any] = {law.kind: law for law in (Linear, Harmonic, Polynomial, Table)}
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A joint whose relative coordinate is prescribed.
+
+    Parameters
+    ----------
+    base, link : int
+        The two links of the joint; the coordinate is that of ``link`` relative to ``base``: the angle
+        ``theta_link - theta_base`` of a turning pair, the displacement along the line of a sliding pair.
+    law : Law
+        Coordinate as a function of the input; the input itself by default.
+
+    Raises
+    ------
+    GeometryError
+        Links that are no numbers, a law that cannot be called.
+    """
+
+    base: int
+    link: int
+    law: Law = field(default_factory=Linear)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "base", link_number("base of a driver", self.base))
+        object.__setattr__(self, "link", link_number("link of a driver", self.link))
+        if not callable(self.law):
+            raise GeometryError(f"law = {self.law!r} of driver {self.base}-{self.link} is not callable; give a law")
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """The two links, ascending."""
+        return min(self.base, self.link), max(self.base, self.link)

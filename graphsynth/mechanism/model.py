@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import Point, finite, link_number, point
 from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.constructors import Constructors
 from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Law, Linear
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.methods import Methods
 from graphsynth.structure.graph import MechanismGraph
 
 if TYPE_CHECKING:
@@ -32,42 +34,8 @@ class TracePoint(NamedTuple):
     at: Point
 
 
-@dataclass(frozen=True)
-class Driver:
-    """A joint whose relative coordinate is prescribed.
-
-    Parameters
-    ----------
-    base, link : int
-        The two links of the joint; the coordinate is that of ``link`` relative to ``base``: the angle
-        ``theta_link - theta_base`` of a turning pair, the displacement along the line of a sliding pair.
-    law : Law
-        Coordinate as a function of the input; the input itself by default.
-
-    Raises
-    ------
-    GeometryError
-        Links that are no numbers, a law that cannot be called.
-    """
-
-    base: int
-    link: int
-    law: Law = field(default_factory=Linear)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "base", link_number("base of a driver", self.base))
-        object.__setattr__(self, "link", link_number("link of a driver", self.link))
-        if not callable(self.law):
-            raise GeometryError(f"law = {self.law!r} of driver {self.base}-{self.link} is not callable; give a law")
-
-    @property
-    def pair(self) -> tuple[int, int]:
-        """The two links, ascending."""
-        return min(self.base, self.link), max(self.base, self.link)
-
-
-@dataclass(frozen=True)
-class Mechanism:
+@dataclass(frozen=True, repr=False)
+class Mechanism(Constructors, Methods):
     """A dimensioned planar mechanism.
 
     Parameters

@@ -8,11 +8,15 @@ from operator import index
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from graphsynth.core.errors import FormatError, GraphError
+from graphsynth.core.shown import work
 from graphsynth.structure.checks import integer, packed_joints
 from graphsynth.structure.levels import bits, breadth_first, component_of, components_of
 from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, encode_graph6, encode_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from graphsynth.drawing.methods import Drawing
     from graphsynth.structure.canonical import Labelling
     from graphsynth.structure.loop_rank import GenericMobility
     from graphsynth.structure.rigidity import RigidSubchain
@@ -396,6 +400,19 @@ class MechanismGraph:
         """Read the one-line form of :meth:`to_text`; anything else is a :class:`FormatError` with the field."""
         links, joints, frame, space = decode_text(text)
         return cls(links, joints, frame=frame, space=space)
+
+    def draw(self, path: str | Path | None = None, **options: Any) -> Drawing:
+        """Draw its kinematic diagram, and write it to a file (.svg, .png, .pdf, .tikz, .dxf) if a path is given.
+
+        ``driver``, ``width``, ``height``, ``numbers`` and ``title`` are those of
+        :func:`graphsynth.drawing.graphs.graph_sketch`.
+        """
+        found: Drawing = work("draw graph")(self, path, **options)
+        return found
+
+    def _repr_svg_(self) -> str:
+        picture: str = work("graph picture")(self)
+        return picture
 
     def to_networkx(self) -> Any:
         """Return a ``networkx.Graph``: edge attribute ``mobility``, graph attributes ``frame`` and ``space``."""

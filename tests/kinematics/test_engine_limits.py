@@ -81,7 +81,7 @@ def test_kite_at_its_coincidence_is_not_called_impossible() -> None:
 )
 def test_inputs_that_look_like_degrees_are_told(inputs: np.ndarray) -> None:
     mechanism = four_bar(1.0, 2.5, 2.5, 2.0)
-    with pytest.warns(UnitWarning, match="as radians.*numpy.radians"):
+    with pytest.warns(UnitWarning, match="as radians.*gs.degrees"):
         motion = simulate(mechanism, inputs, events=False)
     assert motion.poses[-1, 1, 2] == pytest.approx(inputs[-1] - math.tau * round(inputs[0] / math.tau))
     with pytest.warns(UnitWarning, match="as radians"):

@@ -55,9 +55,9 @@ def warn_of_degrees(mechanism: Mechanism, u: Array) -> None:
         if turns and isinstance(driver.law, Linear) and abs(driver.law.rate) == 1.0:
             warnings.warn(
                 f"the inputs run from {u[0]:g} to {u[-1]:g}, and driver {driver.base}-{driver.link} takes them as "
-                f"radians ({span / math.tau:.3g} turns); if they are degrees, give numpy.radians(inputs)",
+                f"radians ({span / math.tau:.3g} turns); if they are degrees, give gs.degrees(inputs)",
                 UnitWarning,
-                stacklevel=3,
+                stacklevel=4,
             )
             return
 

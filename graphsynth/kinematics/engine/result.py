@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import link_number, point
 from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.methods import MotionMethods
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Prismatic
 
@@ -84,8 +85,8 @@ class PointPath(NamedTuple):
         return float(np.abs(chord[0] * (p[:, 1] - p[0, 1]) - chord[1] * (p[:, 0] - p[0, 0])).max() / np.hypot(*chord))
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(MotionMethods):
     """One branch of a mechanism over the inputs (estimated: floating point; NaN where the branch does not reach).
 
     Attributes
