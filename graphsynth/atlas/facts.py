@@ -273,7 +273,7 @@ def _as_words(array: NDArray[np.uint64]) -> NDArray[np.void]:
 
 def _drivers(drives: NDArray[np.uint64]) -> list[int | str]:
     """Driven links of each mechanism: a number, or text for several."""
-    from graphsynth.structure.levels import bits
+    from graphsynth.structure.connectivity import bits
 
     names: dict[int, int | str] = {}
     for mask in np.unique(drives).tolist():

@@ -90,7 +90,7 @@ def _family(
 
 def expected_of(problem: Problem, executor: Executor | None) -> int:
     """Count the chains of a family without listing them."""
-    from graphsynth.synthesis.parallel import counts
+    from graphsynth.synthesis.problem import counts
 
     return sum(counts(problem.pieces(listing=False), executor))
 

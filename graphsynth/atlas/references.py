@@ -62,7 +62,7 @@ def group_key(links: int, pairs: tuple[tuple[int, int], ...]) -> str:
 
 def wanted_class(pairs: list[tuple[int, int]]) -> int:
     """Class of a group with base 0 by the minimum cycle basis of networkx."""
-    from graphsynth.structure.contours import contour_class
+    from graphsynth.structure.assur import contour_class
 
     return contour_class((a, b, 1) if a else (b, -1, 1) for a, b in pairs)
 

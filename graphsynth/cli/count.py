@@ -14,7 +14,7 @@ __all__ = ["run"]
 
 def run(options: argparse.Namespace) -> int:
     """Print the count; the number stands alone on the last line."""
-    from graphsynth.synthesis.parallel import processes
+    from graphsynth.synthesis.problem import processes
     from graphsynth.synthesis.writing import count_with_checkpoint
 
     begin = time.perf_counter()

@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
         raise SpecError("--json needs -o FILE.jsonl here: the graphs go to the file, a summary to standard output")
     if options.output is None and (options.resume or options.force):
         raise SpecError("--resume and --force need -o FILE")
-    from graphsynth.synthesis.parallel import processes
+    from graphsynth.synthesis.problem import processes
 
     begin = time.perf_counter()
     entry = _other_format(options.output) if options.output else None
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     weight = sum(piece.weight for piece in problem.pieces(listing=True))
     with processes(workers_for(options.workers, weight > BIG)) as executor:
         if options.output is None:
-            from graphsynth.synthesis.parallel import texts
+            from graphsynth.synthesis.problem import texts
             from graphsynth.synthesis.shards import shard_of
 
             for data, _ in texts(shard_of(problem.pieces(listing=True), options.shard), executor):
@@ -108,7 +108,7 @@ def _other_format(path: Path) -> str | None:
 def _write_whole(problem: Problem, options: argparse.Namespace, executor: Executor | None) -> int:
     """Write all graphs in another format; the file appears when it is complete."""
     from graphsynth.formats.registry import read_stream, write
-    from graphsynth.synthesis.parallel import texts
+    from graphsynth.synthesis.problem import texts
     from graphsynth.synthesis.shards import shard_of
 
     if options.output.exists() and not options.force:

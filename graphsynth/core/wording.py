@@ -1,8 +1,14 @@
-"""Text that comes from elsewhere, fit to be shown."""
+"""Values that come from elsewhere: shown in a message, read as whole numbers, and the word that was meant."""
 
 from __future__ import annotations
 
-__all__ = ["plain"]
+import operator
+from collections.abc import Iterable
+from typing import Any
+
+from graphsynth.core.errors import SpecError
+
+__all__ = ["index_of", "nearest", "plain", "shown", "whole"]
 
 
 def plain(text: str) -> str:
@@ -14,3 +20,52 @@ def plain(text: str) -> str:
     red \x1b[31m
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` for the nearest of ``words``, or nothing."""
+    import difflib
+
+    word = word[:60]
+    close = difflib.get_close_matches(word, list(words), n=1, cutoff=0.5)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def shown(value: Any) -> str:
+    """Write a value for a message, shortly."""
+    if isinstance(value, int) and value.bit_length() > 200:
+        return f"a number of {value.bit_length()} bits"
+    try:
+        text = repr(value)
+    except Exception:  # whatever a foreign __repr__ raises; of an integer of thousands of digits inside, ValueError
+        text = f"a value of type {type(value).__name__}"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def whole(value: Any, name: str, least: int, most: int | None = None) -> int:
+    """Return a whole number of any integer type as an int.
+
+    Raises
+    ------
+    SpecError
+        For anything else, a truth value too, and for a number out of its bounds.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> whole(np.uint8(4), "links", 2, 255)
+    4
+    """
+    number = None if isinstance(value, bool) else index_of(value)
+    if number is None or number < least or (most is not None and number > most):
+        bounds = f", at least {least}" if most is None else f" from {least} to {most}"
+        raise SpecError(f"{name} = {shown(value)} must be a whole number{bounds}")
+    return number
+
+
+def index_of(value: Any) -> int | None:
+    """Return a value of any integer type as an int; None for anything else."""
+    try:
+        return operator.index(value)
+    except Exception:  # whatever a foreign __index__ raises
+        return None

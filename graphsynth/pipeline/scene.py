@@ -11,10 +11,10 @@ from typing import Any, Literal
 
 from graphsynth.core.errors import SceneError
 from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
+from graphsynth.core.wording import nearest
 from graphsynth.pipeline.stages import RANK, STRUCTURE, Stage
 from graphsynth.pipeline.system import System, system, system_names
 from graphsynth.pipeline.tables import Place, read_table, require, suggest
-from graphsynth.structure.system.variables import nearest
 
 __all__ = [
     "TABLES",

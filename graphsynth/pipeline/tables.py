@@ -22,9 +22,9 @@ from functools import lru_cache
 from typing import Annotated, Any, Literal, TypeVar, Union
 
 from graphsynth.core.errors import SceneError
+from graphsynth.core.wording import nearest
 from graphsynth.pipeline.lines import key_lines, line_of
 from graphsynth.pipeline.units import Unit, convert, split_suffix, split_value
-from graphsynth.structure.system.variables import nearest
 
 __all__ = [
     "ANY_LENGTH",

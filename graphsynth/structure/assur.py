@@ -26,8 +26,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GraphError
-from graphsynth.structure.contours import contour_class
-from graphsynth.structure.levels import bits
+from graphsynth.structure.connectivity import bits
 from graphsynth.structure.rigidity import PebbleGame, is_sparse, rigid_bodies
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ class AssurGroup:
     inner, outer : tuple of Joint
         Joints inside the group, and joints to links placed before it.
     group_class : int
-        Class: the largest number of joints on a contour (see :func:`.contours.contour_class`); 2 for a dyad.
+        Class: the largest number of joints on a contour (see `contour_class`); 2 for a dyad.
     order : int
         Order: the number of outer joints.
     stage : int
@@ -427,3 +426,44 @@ def _list(links: Iterable[int]) -> str:
 
 def _roman(number: int) -> str:
     return _ROMAN[number] if number < len(_ROMAN) else str(number)
+
+
+def contour_class(joints: Iterable[tuple[int, int, int]]) -> int:
+    """Return the class of a group: the largest number of joints on one of its contours, 2 at least.
+
+    A contour is rigid, a link with three or more joints of the group; or movable, a closed loop of links of the
+    group.  Of the loops those of a minimum cycle basis count; their lengths do not depend on the basis.  A joint of
+    mobility 2 or more counts as a link with two joints in its place.
+
+    Parameters
+    ----------
+    joints : iterable of (a, b, mobility)
+        Inner joints, and outer joints with -1 for ``b``.
+
+    Examples
+    --------
+    A dyad, a triad on its ternary link, and four links in a loop:
+
+    >>> contour_class([(1, 2, 1), (1, -1, 1), (2, -1, 1)])
+    2
+    >>> contour_class([(0, 1, 1), (0, 2, 1), (0, 3, 1), (1, -1, 1), (2, -1, 1), (3, -1, 1)])
+    3
+    >>> contour_class([(0, 1, 1), (1, 2, 1), (2, 3, 1), (0, 3, 1), (0, -1, 1), (2, -1, 1)])
+    4
+    """
+    degree: dict[int, int] = {}
+    edges: list[tuple[object, object]] = []
+    for a, b, mobility in joints:
+        degree[a] = degree.get(a, 0) + 1
+        if b < 0:
+            continue
+        degree[b] = degree.get(b, 0) + 1
+        middle = ("joint", len(edges))
+        edges += [(a, b)] if mobility == 1 else [(a, middle), (middle, b)]
+    largest = max(2, *degree.values())
+    nodes = {node for edge in edges for node in edge}
+    if len(edges) < max(len(nodes), 1):
+        return largest  # inner joints without a loop
+    import networkx
+
+    return max(largest, *map(len, networkx.minimum_cycle_basis(networkx.Graph(edges))))

@@ -15,7 +15,7 @@ from math import isqrt, prod
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import FormatError
-from graphsynth.structure.levels import bits, breadth_first
+from graphsynth.structure.connectivity import bits, breadth_first
 from graphsynth.structure.search import Search
 from graphsynth.structure.text import LINKS_MAX
 

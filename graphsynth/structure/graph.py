@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.core.shown import work
 from graphsynth.structure.checks import integer, packed_joints
-from graphsynth.structure.levels import bits, breadth_first, component_of, components_of
+from graphsynth.structure.connectivity import bits, breadth_first, component_of, components_of
 from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, encode_graph6, encode_text
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import TooLargeError
-from graphsynth.structure.levels import bits
-from graphsynth.structure.system.variables import whole
+from graphsynth.core.wording import whole
+from graphsynth.structure.connectivity import bits
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from graphsynth.structure.levels import bits
+from graphsynth.structure.connectivity import bits
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import Joint, MechanismGraph

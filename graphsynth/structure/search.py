@@ -31,7 +31,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from graphsynth.core.errors import TooLargeError
-from graphsynth.structure.levels import bits
+from graphsynth.structure.connectivity import bits
 
 __all__ = ["WORK_MAX", "Search"]
 

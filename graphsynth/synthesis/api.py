@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
+from typing import TYPE_CHECKING
 
-from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
-from graphsynth.synthesis import parallel, sampling
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import Problem, counts, graphs
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
 
 __all__ = [
     "count_assur_groups",
@@ -24,11 +26,11 @@ __all__ = [
 
 
 def _list(problem: Problem, executor: Executor | None) -> Iterator[MechanismGraph]:
-    return parallel.graphs(problem.pieces(listing=True), executor)
+    return graphs(problem.pieces(listing=True), executor)
 
 
 def _count(problem: Problem, executor: Executor | None) -> int:
-    return sum(parallel.counts(problem.pieces(listing=False), executor))
+    return sum(counts(problem.pieces(listing=False), executor))
 
 
 def enumerate_chains(
@@ -213,7 +215,9 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     >>> len(sample_mechanisms(StructuralSpec(W=1, links=10), 5, seed=1))
     5
     """
-    return sampling.sample(Problem.mechanisms(spec, None), k, seed)
+    from graphsynth.synthesis.sampling import sample
+
+    return sample(Problem.mechanisms(spec, None), k, seed)
 
 
 def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Iterator[MechanismGraph]:

@@ -13,11 +13,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from graphsynth.structure.connectivity import bits, components_of
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.kernels import canon_packed
-from graphsynth.structure.levels import bits, components_of
-from graphsynth.synthesis.families import chain_families
-from graphsynth.synthesis.rings import rings
+from graphsynth.synthesis.families import chain_families, rings
 from graphsynth.synthesis.units import cut, graphs_of
 
 __all__ = ["Higher", "blocks_of", "fractionated_chains"]

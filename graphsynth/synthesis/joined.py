@@ -20,9 +20,8 @@ from math import comb
 from operator import le, sub
 
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.synthesis.families import chain_families, chain_joints
+from graphsynth.synthesis.families import chain_families, chain_joints, rings
 from graphsynth.synthesis.fractionated import Higher, blocks_of
-from graphsynth.synthesis.rings import rings
 from graphsynth.synthesis.units import count_unit, cut
 
 __all__ = ["count_fractionated"]

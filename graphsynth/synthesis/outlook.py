@@ -7,13 +7,14 @@ questions are counted, and the ratio of one number to the next, which grows by a
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NoReturn
 
 from graphsynth.core.errors import TooLargeError
-from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
+from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS
 from graphsynth.synthesis.families import chain_families, truss_families
 from graphsynth.synthesis.units import count_unit, cut
 
-__all__ = ["check_loops", "extrapolated"]
+__all__ = ["extrapolated", "refuse"]
 
 LISTED_PER_SECOND = 1e6  # order of magnitude, one core
 MOST_LOOPS = 10  # what the kernels are laid out for
@@ -22,18 +23,16 @@ _COUNTED_LOOPS = 6  # counts of so many loops take a moment
 _KNOWN = (2, 16, 230, 6856, 318162, 19819281, 1535380884)
 
 
-def check_loops(
+def refuse(
     loops: int, links: int, mobility: int, space: int, higher: Mapping[int, int], *, framed: bool = False
-) -> None:
-    """Refuse at once what cannot finish.
+) -> NoReturn:
+    """Refuse what cannot finish.
 
     Raises
     ------
     TooLargeError
-        For more loops than there are contracted graphs for.
+        Always: with an estimate of what it would take.
     """
-    if has_contracted_graphs(loops, links):
-        return
     count = extrapolated(loops, links, mobility, space, higher, framed=framed)
     what = "mechanisms" if framed and mobility else "groups" if framed else "chains" if mobility else "trusses"
     estimate = f"about {count:.0e} {what} answer it, by those with fewer loops; listing them would take "

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from hashlib import sha256
+from itertools import chain
+from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import InfeasibleSpecError, SpecError
-from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.levels import components_of
-from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
-from graphsynth.structure.system.variables import shown, whole
+from graphsynth.core.ordered import in_order
+from graphsynth.core.ordered import processes as processes_of
+from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.contracted import has_contracted_graphs
 from graphsynth.synthesis.families import (
     MOST_LINKS,
@@ -24,89 +27,29 @@ from graphsynth.synthesis.families import (
     mechanism_families,
     truss_families,
 )
-from graphsynth.synthesis.fractionated import fractionated_chains
-from graphsynth.synthesis.joined import count_fractionated
-from graphsynth.synthesis.outlook import check_loops
-from graphsynth.synthesis.rings import rings
+from graphsynth.synthesis.one_by_one import OneByOne
 from graphsynth.synthesis.units import Unit, count_unit, cut, graphs_of, text_of
 
-__all__ = ["Piece", "Problem", "count_piece", "graphs_of_piece", "text_of_piece"]
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
+
+__all__ = [
+    "Piece",
+    "Problem",
+    "count_piece",
+    "counts",
+    "graphs",
+    "graphs_of_piece",
+    "processes",
+    "text_of_piece",
+    "texts",
+]
 
 _PRIMES = (2, 3, 5, 7, 11, 13)
 
 
-@dataclass(frozen=True)
-class Handful:
-    """Rings, or fractionated chains: few enough to be made one by one (to count, most need not be made).
-
-    ``assortment`` and ``levels`` restrict mechanisms, ``symmetry`` asks for an automorphism of that prime order.
-    """
-
-    kind: str  # "rings" or "fractionated"
-    links: int
-    mobility: int
-    space: int
-    higher: tuple[tuple[int, int], ...]
-    framed: bool
-    assortment: LinkAssortment | None = None
-    levels: Levels = ()
-    symmetry: int = 0
-    weight: float = 1.0
-
-    def graphs(self) -> Iterator[MechanismGraph]:
-        """Yield the graphs."""
-        for graph in self._all():
-            if self.symmetry and graph.automorphism_order % self.symmetry:  # Cauchy: p divides the order of the group
-                continue
-            if self._fits(graph):
-                yield graph
-
-    @property
-    def restricted(self) -> bool:
-        """Whether only some of the chains are wanted."""
-        return bool(self.assortment or self.levels or self.symmetry)
-
-    def count(self) -> int:
-        """Count the graphs; fractionated chains without any restriction are not made."""
-        if self.kind == "fractionated" and not self.restricted:
-            return count_fractionated(self.links, self.mobility, self.space, self.higher, self.framed)
-        return sum(1 for _ in self.graphs())
-
-    def _all(self) -> Iterator[MechanismGraph]:
-        if self.kind == "rings":
-            yield from rings(self.links, self.mobility, self.space, dict(self.higher), self.framed)
-            return
-        for chain in fractionated_chains(self.links, self.mobility, self.space, self.higher):
-            if self.framed:
-                yield from (_by_levels(graph) for graph in chain.inversions())
-            else:
-                yield chain
-
-    def _fits(self, graph: MechanismGraph) -> bool:
-        wanted = self.assortment
-        if wanted is not None:
-            if graph.degrees[0] != wanted.frame_joints or graph.assortment != {
-                a: n for a, n in wanted.n_a.items() if n
-            }:
-                return False
-            parts = len(components_of(graph.neighbours, (1 << graph.links) - 2))  # without the frame
-            if wanted.frame_loops != wanted.frame_joints - parts:
-                return False
-        return all(
-            low <= (len(graph.levels[at]) if -len(graph.levels) <= at < len(graph.levels) else 0) <= high
-            for at, low, high in self.levels
-        )
-
-
-def _by_levels(graph: MechanismGraph) -> MechanismGraph:
-    order = [link for level in graph.levels for link in sorted(level)]
-    place = [0] * graph.links
-    for position, link in enumerate(order):
-        place[link] = position
-    return graph.relabelled(place)
-
-
-Piece = Unit | Handful
+Piece = Unit | OneByOne
 
 
 @dataclass(frozen=True)
@@ -119,7 +62,7 @@ class Problem:
         One line for people; also identifies the problem when interrupted work is resumed.
     families : tuple of Family
         What the search kernels generate.
-    handfuls : tuple of Handful
+    one_by_one : tuple of OneByOne
         What is made one by one; listed first.
     symmetry : int
         0, or the prime order of a required automorphism.
@@ -129,7 +72,7 @@ class Problem:
 
     title: str
     families: tuple[Family, ...]
-    handfuls: tuple[Handful, ...] = ()
+    one_by_one: tuple[OneByOne, ...] = ()
     symmetry: int = 0
     reason: str = field(default="", repr=False, compare=False)
 
@@ -173,13 +116,13 @@ class Problem:
         loops = -1 if joints is None else joints + sum(count for _, count in placed) - links + 1
         if loops < (links > 2):
             return cls(title, (), reason=_reason(links, mobility, space, higher))
-        check_loops(loops, links, mobility, space, higher, framed=framed)
+        _check_loops(loops, links, mobility, space, higher, framed=framed)
         common = (links, mobility, space, placed, framed)
-        handfuls = [Handful("rings", *common, symmetry=order)]
+        one_by_one = [OneByOne("rings", *common, symmetry=order)]
         if fractionated and mobility > 1:
-            handfuls.append(Handful("fractionated", *common, symmetry=order))
+            one_by_one.append(OneByOne("fractionated", *common, symmetry=order))
         families = chain_families(links, mobility, space, higher, framed)
-        return cls(title + (f" symmetry={order}" if order else ""), tuple(families), tuple(handfuls), order)
+        return cls(title + (f" symmetry={order}" if order else ""), tuple(families), tuple(one_by_one), order)
 
     @classmethod
     def mechanisms(cls, question: StructuralSpec | LinkAssortment, symmetry: int | None) -> Problem:
@@ -192,6 +135,8 @@ class Problem:
         TooLargeError
             More loops than there are contracted graphs.
         """
+        from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
+
         order = check_symmetry(symmetry)
         levels: Levels = ()
         fractionated = False
@@ -208,25 +153,24 @@ class Problem:
                 f"{shown(question)} is not a structural question: give a StructuralSpec or a LinkAssortment"
             )
         families: list[Family] = []
-        handfuls: list[Handful] = []
+        one_by_one: list[OneByOne] = []
         for assortment in assortments:
             if assortment.mobility < 1:
                 raise InfeasibleSpecError(
                     f"W = {assortment.mobility} must be at least 1 for a mechanism: fix W, or ask for Assur groups"
                 )
             higher = tuple((i, count) for i, count in enumerate(assortment.p_i, 1) if i > 1 and count)
-            if not has_contracted_graphs(assortment.loops, assortment.links):
-                numbers = assortment.loops, assortment.links, assortment.mobility, assortment.space
-                check_loops(*numbers, dict(higher), framed=True)
+            numbers = assortment.loops, assortment.links, assortment.mobility, assortment.space
+            _check_loops(*numbers, dict(higher), framed=True)
             families += mechanism_families(assortment, levels)
             common = (assortment.moving_links + 1, assortment.mobility, assortment.space, higher, True)
             if assortment.loops == 1:
-                handfuls.append(Handful("rings", *common, assortment, levels, order))
+                one_by_one.append(OneByOne("rings", *common, assortment, levels, order))
             if fractionated and assortment.mobility > 1:
-                handfuls.append(Handful("fractionated", *common, assortment, levels, order))
+                one_by_one.append(OneByOne("fractionated", *common, assortment, levels, order))
         title = question.describe() if isinstance(question, StructuralSpec) else str(question)
         title = " ".join(title.split()) + (f" symmetry={order}" if order else "")
-        return cls(title, tuple(families), tuple(handfuls), order)
+        return cls(title, tuple(families), tuple(one_by_one), order)
 
     @classmethod
     def groups(cls, moving: int, space: int) -> Problem:
@@ -257,13 +201,22 @@ class Problem:
         title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
         if joints is None:
             return cls(title, (), reason=_reason(links, 0, space, {}))
-        check_loops(joints - links + 1, links, 0, space, {}, framed=framed)
-        return cls(title, tuple(truss_families(links, space, framed)), (Handful("rings", links, 0, space, (), framed),))
+        _check_loops(joints - links + 1, links, 0, space, {}, framed=framed)
+        ring = OneByOne("rings", links, 0, space, (), framed)
+        return cls(title, tuple(truss_families(links, space, framed)), (ring,))
 
 
 @lru_cache(maxsize=4)
 def _pieces(problem: Problem, listing: bool) -> tuple[Piece, ...]:
-    return (*problem.handfuls, *cut(problem.families, listing=listing, symmetry=problem.symmetry))
+    return (*problem.one_by_one, *cut(problem.families, listing=listing, symmetry=problem.symmetry))
+
+
+def _check_loops(loops: int, links: int, mobility: int, space: int, higher: Mapping[int, int], *, framed: bool) -> None:
+    """Refuse at once what has more loops than there are contracted graphs for, with an estimate."""
+    if not has_contracted_graphs(loops, links):
+        from graphsynth.synthesis.outlook import refuse
+
+        refuse(loops, links, mobility, space, higher, framed=framed)
 
 
 def check_symmetry(symmetry: int | None) -> int:
@@ -331,3 +284,46 @@ def text_of_piece(piece: Piece) -> Iterator[tuple[bytes, int]]:
     lines = [graph.to_text() + "\n" for graph in piece.graphs()]
     if lines:
         yield "".join(lines).encode("ascii"), len(lines)
+
+
+def _text(piece: Piece) -> tuple[bytes, int]:
+    blocks = list(text_of_piece(piece))
+    return b"".join(block for block, _ in blocks), sum(lines for _, lines in blocks)
+
+
+def _packed(piece: Piece) -> list[MechanismGraph]:
+    return list(graphs_of_piece(piece))
+
+
+def counts(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[int]:
+    """Yield the number of graphs of each piece."""
+    return in_order(executor, count_piece, pieces)
+
+
+def texts(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[tuple[bytes, int]]:
+    """Yield each piece as (lines of the text form, number of lines)."""
+    return in_order(executor, _text, pieces)
+
+
+def graphs(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[MechanismGraph]:
+    """Yield the graphs of all pieces, in order."""
+    return chain.from_iterable(
+        map(graphs_of_piece, pieces) if executor is None else in_order(executor, _packed, pieces)
+    )
+
+
+def processes(workers: int) -> AbstractContextManager[Executor | None]:
+    """Give a pool of worker processes, or None for one worker (then everything is done in this process).
+
+    The kernels are compiled here first, so that the workers find them in the cache.  When the block is left by an
+    exception (Ctrl-C), the workers are stopped at once; what was already written stays.
+    """
+    return processes_of(workers, _compile_kernels)
+
+
+def _compile_kernels() -> None:
+    smallest = Problem.chains(6, 1, 3, None, False, None)
+    for piece in smallest.pieces(listing=False):
+        count_piece(piece)
+    for piece in smallest.pieces(listing=True):
+        _text(piece)

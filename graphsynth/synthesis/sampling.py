@@ -16,8 +16,8 @@ from random import Random
 import numpy as np
 
 from graphsynth.core.errors import InfeasibleSpecError, SpecError, TooLargeError
+from graphsynth.core.wording import whole
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.system.variables import whole
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.kernels.drawing_lots import decode_fixed, fixed_table, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed
@@ -44,7 +44,7 @@ def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
     k, seed = whole(k, "k", 0, 10**9), whole(seed, "seed", -(10**100), 10**100)  # None would draw others every time
     if problem.symmetry or any(family.levels for family in problem.families):
         raise SpecError("sampling with a required symmetry or wanted levels is not supported: list them and choose")
-    listed = [graph for handful in problem.handfuls for graph in handful.graphs()]
+    listed = [graph for made in problem.one_by_one for graph in made.graphs()]
     sources: list[tuple[Family, int]] = []
     weights: list[int] = []
     for family in problem.families:

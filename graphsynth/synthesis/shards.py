@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.structure.system.variables import shown, whole
+from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.families import Family
 from graphsynth.synthesis.joined import count_fractionated
 from graphsynth.synthesis.kernels.counting import COUNTING, LISTING, MAKING, weigh_block
-from graphsynth.synthesis.problem import Handful, Piece
+from graphsynth.synthesis.one_by_one import OneByOne
+from graphsynth.synthesis.problem import Piece
 from graphsynth.synthesis.units import Unit, estimates, workspace
 
 __all__ = ["shard_of", "share_of", "works"]
@@ -127,7 +128,7 @@ def _atoms(pieces: tuple[Piece, ...], purpose: int) -> list[Costs]:
     known: dict[Family, Costs] = {}
     atoms = []
     for piece in pieces:
-        if isinstance(piece, Handful):
+        if isinstance(piece, OneByOne):
             atoms.append(np.array([_made(piece, purpose)]))
             continue
         if piece.symmetry:  # few labellings are searched; nobody knows how many
@@ -141,12 +142,12 @@ def _atoms(pieces: tuple[Piece, ...], purpose: int) -> list[Costs]:
     return atoms
 
 
-def _made(handful: Handful, purpose: int) -> float:
+def _made(listed: OneByOne, purpose: int) -> float:
     """Estimate the work of what is made one by one."""
-    if handful.kind == "rings" or (purpose == COUNTING and not handful.restricted):
+    if listed.kind == "rings" or (purpose == COUNTING and not listed.restricted):
         return _EFFORT if purpose == MAKING else 100.0
-    numbers = handful.links, handful.mobility, handful.space, handful.higher
-    count = count_fractionated(*numbers, handful.framed)
+    numbers = listed.links, listed.mobility, listed.space, listed.higher
+    count = count_fractionated(*numbers, listed.framed)
     return _EFFORT * (1 + count) if purpose == MAKING else 100.0 + _MADE * count
 
 

@@ -6,18 +6,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import TooLargeError
-from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis.alphabet import Alphabet
 from graphsynth.synthesis.families import Family, Levels
 from graphsynth.synthesis.kernels.counting import NO_ROOM, count_block
-from graphsynth.synthesis.kernels.expanding import Spelling, expand_packed, expand_text
 from graphsynth.synthesis.kernels.layout import Work, make_work
-from graphsynth.synthesis.kernels.listing import HEADER, list_rows, rewind
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.synthesis.kernels.expanding import Spelling
 
 __all__ = [
     "Unit",
@@ -142,6 +144,8 @@ def count_unit(unit: Unit) -> int:
 
 @lru_cache(maxsize=64)
 def _spelling(alphabet: Alphabet, levels: Levels) -> Spelling:
+    from graphsynth.synthesis.kernels.expanding import Spelling
+
     labels = alphabet.flat
     number = {word: i for i, word in enumerate(alphabet.words)}
     widest = max((len(label.words) for label in labels), default=1)
@@ -170,6 +174,8 @@ def spelling_of(family: Family) -> Spelling:
 
 def _blocks(unit: Unit) -> Iterator[tuple[NDArray[np.int32], int]]:
     """Stream the labellings of a unit as (rows, count); the rows are overwritten by the next step."""
+    from graphsynth.synthesis.kernels.listing import HEADER, list_rows, rewind
+
     family, alphabet = unit.family, unit.family.alphabet
     work = make_work(alphabet.resources, key_words=1 << 14)
     rows = np.zeros((_ROWS, HEADER + family.loops + family.vertices), np.int32)
@@ -191,6 +197,8 @@ def _blocks(unit: Unit) -> Iterator[tuple[NDArray[np.int32], int]]:
 
 def packed_of(unit: Unit) -> Iterator[NDArray[np.uint8]]:
     """Stream the chains of a unit as blocks of packed joints ``(chains, 3 * joints)``."""
+    from graphsynth.synthesis.kernels.expanding import expand_packed
+
     family = unit.family
     spelling = spelling_of(family)
     for rows, count in _blocks(unit):
@@ -201,6 +209,8 @@ def packed_of(unit: Unit) -> Iterator[NDArray[np.uint8]]:
 
 def graphs_of(unit: Unit) -> Iterator[MechanismGraph]:
     """Stream the chains of a unit."""
+    from graphsynth.structure.graph import MechanismGraph
+
     links, space = unit.family.links, unit.family.space
     frame = 0 if unit.family.framed else None
     size = 3 * unit.family.joints
@@ -213,6 +223,8 @@ def graphs_of(unit: Unit) -> Iterator[MechanismGraph]:
 
 def text_of(unit: Unit) -> Iterator[tuple[bytes, int]]:
     """Stream the chains of a unit as (lines of the text form, number of lines)."""
+    from graphsynth.synthesis.kernels.expanding import expand_text
+
     family = unit.family
     if family.links > _ONE_BYTE:
         yield from ((f"{graph.to_text()}\n".encode(), 1) for graph in graphs_of(unit))

@@ -18,9 +18,9 @@ from typing import Any, BinaryIO
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.journal import Journal, Work, digest_of
+from graphsynth.core.ordered import in_order
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.synthesis import parallel
-from graphsynth.synthesis.problem import Piece, Problem, graphs_of_piece, text_of_piece
+from graphsynth.synthesis.problem import Piece, Problem, counts, graphs, graphs_of_piece, text_of_piece, texts
 from graphsynth.synthesis.shards import shard_of
 from graphsynth.synthesis.units import Unit
 
@@ -135,7 +135,7 @@ def write_listing(
 
 
 def _blocks(pieces: Sequence[Piece], form: str, executor: Executor | None) -> Iterator[tuple[bytes, int]]:
-    return parallel.in_order(executor, _json_lines, pieces) if form == "jsonl" else parallel.texts(pieces, executor)
+    return in_order(executor, _json_lines, pieces) if form == "jsonl" else texts(pieces, executor)
 
 
 def estimated_size(
@@ -154,7 +154,7 @@ def estimated_size(
         return weight, weight * line
     chosen = units[:: max(1, len(units) // _SAMPLED)]
     made = [sum(lines for _, lines in text_of_piece(unit)) for unit in chosen]
-    some = [next(parallel.graphs([unit], None)) for unit, lines in zip(chosen, made) if lines]
+    some = [next(graphs([unit], None)) for unit, lines in zip(chosen, made) if lines]
     size = sum(map(len, map(_json_line if _form(path) == "jsonl" else _text_line, some))) / max(len(some), 1)
     graphs = weight * sum(made) / sum(unit.weight for unit in chosen)
     return graphs, graphs * size
@@ -230,7 +230,7 @@ def count_with_checkpoint(
         count = sum(known)
         done = sum(piece.weight for piece in pieces[: len(known)])
         rest = pieces[len(known) :]
-        for piece, found in zip(rest, parallel.counts(rest, executor)):
+        for piece, found in zip(rest, counts(rest, executor)):
             count += found
             done += piece.weight
             journal.append(str(found))

@@ -7,8 +7,7 @@ import pytest
 
 from graphsynth import MechanismGraph, count_assur_groups, enumerate_assur_groups, enumerate_chains
 from graphsynth.atlas.facts import Rows, analyse_block, rows_of
-from graphsynth.structure.assur import decompose, find_fault
-from graphsynth.structure.contours import contour_class
+from graphsynth.structure.assur import contour_class, decompose, find_fault
 
 FAMILIES = [(4, 1), (6, 1), (8, 1), (5, 2), (7, 2), (9, 2), (6, 3), (8, 3), (7, 4), (9, 4)]
 

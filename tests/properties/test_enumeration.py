@@ -27,8 +27,7 @@ from graphsynth import (
     sample_mechanisms,
 )
 from graphsynth.synthesis.families import chain_families, truss_families
-from graphsynth.synthesis.parallel import texts
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import Problem, texts
 from graphsynth.synthesis.shards import shard_of
 from graphsynth.synthesis.units import Unit, cut, graphs_of, text_of
 from graphsynth.testing import chains, specs
@@ -273,7 +272,7 @@ def test_shards_one_after_the_other_are_the_whole(at, shards):
 
 @pytest.mark.parametrize("at", range(len(PROBLEMS)))
 def test_text_is_the_text_of_the_graphs(at):
-    from graphsynth.synthesis.parallel import graphs
+    from graphsynth.synthesis.problem import graphs
 
     lines = [g.to_text() for g in graphs(PROBLEMS[at].pieces(listing=True), None)]
     assert "".join(f"{line}\n" for line in lines).encode() == _text(at)

@@ -4,8 +4,7 @@ import random
 import pytest
 
 from graphsynth.core.errors import GraphError
-from graphsynth.structure.assur import decompose, find_fault, is_assur_group, is_baranov_truss
-from graphsynth.structure.contours import contour_class
+from graphsynth.structure.assur import contour_class, decompose, find_fault, is_assur_group, is_baranov_truss
 from graphsynth.structure.graph import MechanismGraph
 
 FOUR_BAR = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)], frame=0)

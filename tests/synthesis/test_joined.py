@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from graphsynth import StructuralSpec, count_chains, count_mechanisms
-from graphsynth.synthesis import problem
+from graphsynth.synthesis import fractionated
 from graphsynth.synthesis.fractionated import fractionated_chains
 from graphsynth.synthesis.joined import count_fractionated
-from graphsynth.synthesis.problem import Problem, count_piece
+from graphsynth.synthesis.problem import Problem, count_piece, graphs_of_piece
 
 SMALL = [
     *[(links, 2, 3, ()) for links in (5, 7, 9, 11)],
@@ -41,7 +41,7 @@ def test_two_blocks_are_pairs_of_mechanisms():
     ("links", "mobility", "chains"), [(15, 2, 1519853), (14, 3, 97194), (13, 4, 5915), (13, 2, 29685), (12, 3, 2422)]
 )
 def test_no_fractionated_chain_is_made_to_be_counted(links, mobility, chains, monkeypatch):
-    monkeypatch.setattr(problem, "fractionated_chains", None)
+    monkeypatch.setattr(fractionated, "fractionated_chains", None)
     assert count_chains(links, mobility, fractionated=True) == chains
 
 
@@ -52,5 +52,5 @@ def test_restricted_counts_are_those_of_the_listing():
     assert count_chains(9, 2, fractionated=True, symmetry=3) == sum(
         chain.automorphism_order % 3 == 0
         for piece in Problem.chains(9, 2, 3, None, True, None).pieces(listing=True)
-        for chain in problem.graphs_of_piece(piece)
+        for chain in graphs_of_piece(piece)
     )

@@ -13,7 +13,8 @@ import pytest
 from graphsynth import StructuralSpec, count_chains, count_mechanisms, enumerate_chains, enumerate_mechanisms
 from graphsynth.cli import main
 from graphsynth.core.errors import GraphsynthError, SpecError
-from graphsynth.synthesis import parallel
+from graphsynth.core.ordered import AHEAD, in_order
+from graphsynth.synthesis import problem as parallel
 from graphsynth.synthesis.problem import Problem
 from graphsynth.synthesis.shards import shard_of
 from graphsynth.synthesis.writing import count_with_checkpoint, write_listing
@@ -108,17 +109,17 @@ def test_order_and_memory_do_not_depend_on_who_is_first():
             asked.append(i)
             yield i
 
-    results = parallel.in_order(executor, lambda i: i * i, pieces())
+    results = in_order(executor, lambda i: i * i, pieces())
     for i, result in enumerate(results):
         assert result == i * i
-        assert len(asked) <= i + parallel.AHEAD + 1  # no piece is asked for long before it can be read
+        assert len(asked) <= i + AHEAD + 1  # no piece is asked for long before it can be read
     assert i == 199
     executor.pool.shutdown()
 
 
 def test_stopping_early_cancels_the_rest():
     with ThreadPoolExecutor(1) as executor:
-        results = parallel.in_order(executor, lambda i: time.sleep(0.01) or i, iter(range(10**9)))
+        results = in_order(executor, lambda i: time.sleep(0.01) or i, iter(range(10**9)))
         assert next(results) == 0
         results.close()
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from graphsynth.core.errors import SpecError
-from graphsynth.structure.system.variables import LARGEST, Counts, shown, whole
+from graphsynth.core.wording import shown, whole
+from graphsynth.structure.system.variables import LARGEST, Counts
 
 __all__ = ["LinkAssortment", "solutions_table"]
 

@@ -8,17 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from graphsynth.core.errors import FormatError, SpecError
-from graphsynth.structure.system.variables import (
-    ALIASES,
-    LARGEST,
-    Range,
-    is_variable,
-    nearest,
-    read_range,
-    show_range,
-    shown,
-    whole,
-)
+from graphsynth.core.wording import nearest, shown, whole
+from graphsynth.structure.system.variables import ALIASES, LARGEST, Range, is_variable, read_range, show_range
 
 __all__ = [
     "assigned_question",

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from graphsynth.core.errors import FormatError, SpecError, TooLargeError
+from graphsynth.core.wording import shown, whole
 from graphsynth.structure.system import reading
 from graphsynth.structure.system.assortment import LinkAssortment, solutions_table
 from graphsynth.structure.system.clash import explain
 from graphsynth.structure.system.equations import Problem
 from graphsynth.structure.system.solving import number_of_solutions, solutions
-from graphsynth.structure.system.variables import SPACES, Range, order_key, show_range, shown, whole
+from graphsynth.structure.system.variables import SPACES, Range, order_key, show_range
 
 __all__ = ["LinkAssortment", "StructuralSpec", "solutions_table"]
 

@@ -6,13 +6,12 @@ equations) and a descriptive name; both are accepted wherever a variable is name
 
 from __future__ import annotations
 
-import difflib
-import operator
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
 
 from graphsynth.core.errors import SpecError
+from graphsynth.core.wording import index_of, nearest, shown
 
 __all__ = ["ALIASES", "LARGEST", "SPACES", "Counts", "Range", "nearest", "order_key", "read_range", "show_range"]
 
@@ -55,13 +54,6 @@ def order_key(symbol: str) -> tuple[int, int]:
     if family:
         return _ORDER.index(family[1] + "_"), int(family[2])
     return _ORDER.index(symbol), 0
-
-
-def nearest(word: str, words: Iterable[str]) -> str:
-    """Return ``"; did you mean 'x'?"`` for the nearest of ``words``, or nothing."""
-    word = word[:60]
-    close = difflib.get_close_matches(word, list(words), n=1, cutoff=0.5)
-    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def is_variable(symbol: str) -> bool:
@@ -111,50 +103,11 @@ def _natural(symbol: str) -> tuple[int, int]:
     return _LEAST.get(symbol, 0), LARGEST
 
 
-def whole(value: Any, name: str, least: int, most: int | None = None) -> int:
-    """Return a whole number of any integer type as an int.
-
-    Raises
-    ------
-    SpecError
-        For anything else, a truth value too, and for a number out of its bounds.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> whole(np.uint8(4), "links", 2, 255)
-    4
-    """
-    number = None if isinstance(value, bool) else _index(value)
-    if number is None or number < least or (most is not None and number > most):
-        bounds = f", at least {least}" if most is None else f" from {least} to {most}"
-        raise SpecError(f"{name} = {shown(value)} must be a whole number{bounds}")
-    return number
-
-
-def _index(value: Any) -> int | None:
-    try:
-        return operator.index(value)
-    except Exception:  # whatever a foreign __index__ raises
-        return None
-
-
 def _integer(symbol: str, value: Any) -> int:
-    number = None if isinstance(value, bool) else _index(value)
+    number = None if isinstance(value, bool) else index_of(value)
     if number is not None:
         return number
     raise SpecError(f"{symbol} = {shown(value)} is not an integer: give an integer or a pair (lowest, highest)")
-
-
-def shown(value: Any) -> str:
-    """Write a value for a message, shortly."""
-    if isinstance(value, int) and value.bit_length() > 200:
-        return f"a number of {value.bit_length()} bits"
-    try:
-        text = repr(value)
-    except Exception:  # whatever a foreign __repr__ raises; of an integer of thousands of digits inside, ValueError
-        text = f"a value of type {type(value).__name__}"
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def show_range(value: Range) -> str:
@@ -199,7 +152,7 @@ class Counts(Mapping[int, int]):
         for candidate, number in self._items:
             if candidate == kind:
                 return number
-        if _index(kind) is not None:
+        if index_of(kind) is not None:
             return 0
         raise KeyError(kind)
 
