@@ -1,33 +1,33 @@
-from .approach import ApproachToFold as ApproachToFold
-from .charts import ChartReport as ChartReport
-from .comparison import (
+from .closed_form import AssemblyModes as AssemblyModes
+from .closed_form import CrankAngles as CrankAngles
+from .closed_form import (
     ModelComparison as ModelComparison,
 )
-from .comparison import (
+from .closed_form import (
     Reading as Reading,
 )
-from .cranks import CrankAngles as CrankAngles
 from .folds import (
     DeadPoint as DeadPoint,
 )
 from .folds import (
     Fold as Fold,
 )
-from .mechanism import PointingMechanism as PointingMechanism
-from .modes import AssemblyModes as AssemblyModes
-from .newton import (
+from .loop_equations import ChartReport as ChartReport
+from .loop_equations import (
     LoopSolution as LoopSolution,
 )
-from .newton import (
+from .loop_equations import PassiveAngles as PassiveAngles
+from .loop_equations import (
     RootSurvey as RootSurvey,
 )
-from .passive import PassiveAngles as PassiveAngles
-from .rates import Rates as Rates
-from .results import (
+from .mechanism import PointingMechanism as PointingMechanism
+from .model import (
     Poses as Poses,
 )
-from .results import (
+from .model import (
     PoseStatus as PoseStatus,
 )
+from .precise import ApproachToFold as ApproachToFold
+from .rates import Rates as Rates
 from .sweep import PointingSweep as PointingSweep
 from .tolerance import Tolerance as Tolerance

@@ -1,23 +1,29 @@
-"""Closed form of the reflector angles on one assembly mode (specification instruments_and_dynamics, section 2.5)."""
+"""Closed forms: poses on one assembly mode and on all, crank angles for a wanted pose, two models compared.
+
+Specification instruments_and_dynamics, sections 2.5 and 2.8.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import finite_array, sign
-from graphsynth.systems.antenna.legs import scale_of, solution_order
-from graphsynth.systems.antenna.results import Poses, PoseStatus
-
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna.mechanism import PointingMechanism
-
-__all__ = ["crank_arrays", "poses"]
+from graphsynth.core.checks import choice, finite_array, sign
+from graphsynth.systems.antenna.model import (
+    Leg,
+    PointingDimensions,
+    Poses,
+    PoseStatus,
+    legs,
+    orientation,
+    scale_of,
+    solution_order,
+)
 
 Array = NDArray[np.float64]
-
 #: Codes of the kernel in terms of the legs, for each gimbal order.
 _CODES = {
     "YX": (0, PoseStatus.FOLD_X, PoseStatus.FOLD_Y, PoseStatus.LEG_X_OUT_OF_REACH, PoseStatus.LEG_Y_OUT_OF_REACH, 5),
@@ -31,7 +37,7 @@ def crank_arrays(phi_x: ArrayLike, phi_y: ArrayLike) -> tuple[Array, Array]:
     return x, y
 
 
-def poses(mechanism: PointingMechanism, phi_x: ArrayLike, phi_y: ArrayLike, s_y: int, s_x: int) -> Poses:
+def poses(mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike, s_y: int = 1, s_x: int = -1) -> Poses:
     """Reflector angles at the given crank angles; see `PointingMechanism.poses`."""
     from graphsynth.systems.antenna.kernels.poses import triangular
 
@@ -70,3 +76,275 @@ def poses(mechanism: PointingMechanism, phi_x: ArrayLike, phi_y: ArrayLike, s_y:
         s_x=int(s_x),
         order=mechanism.order,
     )
+
+
+#: Branch signs ``(s_y, s_x)`` of the four modes; the rest pose lies on the first.
+SIGNS = ((1, -1), (1, 1), (-1, -1), (-1, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyModes:
+    """All assembly modes; the last axis runs over `SIGNS`.
+
+    Attributes
+    ----------
+    a, b : ndarray, shape (..., 4)
+        Elevation and azimuth, radians; NaN where the mode does not exist.
+    status : ndarray of int8, shape (..., 4)
+        `PoseStatus`.
+    deficit : ndarray, shape (..., 4)
+        Missing length, 0 where assembled.
+    distinct : ndarray of bool, shape (..., 4)
+        The mode exists and is not the second copy of a mode that a fold has merged with it.
+    signs : tuple of (int, int)
+        `SIGNS`.
+    """
+
+    a: NDArray[np.float64]
+    b: NDArray[np.float64]
+    status: NDArray[np.int8]
+    deficit: NDArray[np.float64]
+    distinct: NDArray[np.bool_]
+    signs: tuple[tuple[int, int], ...] = SIGNS
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Number of different real modes, 0 to 4."""
+        return np.asarray(self.distinct.sum(axis=-1))
+
+
+def solve(mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike) -> AssemblyModes:
+    """All assembly modes; see `PointingMechanism.solve`."""
+    found = [poses(mechanism, phi_x, phi_y, *signs) for signs in SIGNS]
+    a, b, status, deficit = (
+        np.stack([getattr(mode, name) for mode in found], axis=-1) for name in ("a", "b", "status", "deficit")
+    )
+    distinct = status <= PoseStatus.FOLD_X
+    for later in range(1, 4):
+        for earlier in range(later):
+            same = (a[..., later] == a[..., earlier]) & (b[..., later] == b[..., earlier])
+            distinct[..., later] &= ~same
+    return AssemblyModes(a, b, status, deficit, distinct)
+
+
+class CrankStatus(IntEnum):
+    """Whether a crank can be set so that its rod meets the reflector."""
+
+    OK = 0
+    DEAD_POINT = 1  #: crank and rod in one plane with the crank axis: two settings meet
+    OUT_OF_REACH = 2
+    INDETERMINATE = 3  #: the cardan lies on the crank axis
+
+    @property
+    def message(self) -> str:
+        """One sentence that says what the status means."""
+        return (
+            "the crank reaches the pose",
+            "the crank reaches the pose at a dead point: the reflector cannot drive it",
+            "no setting of the crank reaches the pose",
+            "not determined: the cardan lies on the crank axis and every setting is equally good",
+        )[self]
+
+
+@dataclass(frozen=True, eq=False)
+class CrankAngles:
+    """Crank angles that point the reflector.
+
+    Attributes
+    ----------
+    a, b : ndarray, shape (...)
+        Wanted elevation and azimuth, radians.
+    phi_x, phi_y : ndarray, shape (...)
+        Crank angles, radians in (-pi, pi]; NaN where the crank does not reach.
+    status_y, status_x : ndarray of int8, shape (...)
+        `CrankStatus` of leg Y (crank angle ``phi_x``) and of leg X (``phi_y``).
+    deficit_y, deficit_x : ndarray, shape (...)
+        ``|K| - hypot(A, B)`` where a crank does not reach, unit of the lengths; 0 elsewhere.
+    margin_y, margin_x : ndarray, shape (...)
+        Sine of the angle by which each crank is away from its dead point.
+    s_y, s_x : ndarray of int8, shape (...)
+        Branch signs of the assembly mode in which these crank angles give the wanted pose; 0 at a fold or without pose.
+    """
+
+    a: Array
+    b: Array
+    phi_x: Array
+    phi_y: Array
+    status_y: NDArray[np.int8]
+    status_x: NDArray[np.int8]
+    deficit_y: Array
+    deficit_x: Array
+    margin_y: Array
+    margin_x: Array
+    s_y: NDArray[np.int8]
+    s_x: NDArray[np.int8]
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """True where both cranks reach the pose."""
+        return np.asarray(
+            (self.status_y <= CrankStatus.DEAD_POINT) & (self.status_x <= CrankStatus.DEAD_POINT), dtype=bool
+        )
+
+
+def _one_leg(leg: Leg, l1: float, point: Array, elbow: int) -> tuple[Array, ...]:
+    """Crank angle, status, deficit, margin of a leg whose cardan lies at ``point`` (P, Q, across), shape (..., 3)."""
+    p, q, across = point[..., 0] - (l1 - leg.crank), point[..., 1] - leg.side * leg.rod, point[..., 2]
+    reach = np.hypot(p, q)
+    k = (p * p + q * q + across * across + (leg.crank - leg.rod) * (leg.crank + leg.rod)) / (2.0 * leg.crank)
+    rest = (reach - np.abs(k)) * (reach + np.abs(k))
+    status = np.where(rest > 0.0, CrankStatus.OK, CrankStatus.DEAD_POINT)
+    status = np.where(rest < 0.0, CrankStatus.OUT_OF_REACH, status)
+    status = np.where((reach == 0.0) & (k == 0.0), CrankStatus.INDETERMINATE, status).astype(np.int8)
+    root = np.sqrt(np.where(status <= CrankStatus.DEAD_POINT, np.maximum(rest, 0.0), np.nan))
+    angle = np.arctan2(q * k + elbow * p * root, p * k - elbow * q * root)
+    deficit = np.where(status == CrankStatus.OUT_OF_REACH, np.abs(k) - reach, 0.0)
+    return angle, status, deficit, root / np.where(reach > 0.0, reach, np.nan)
+
+
+def _branch(leg: Leg, l1: float, phi: Array, point: Array, axis: Array) -> NDArray[np.int8]:
+    """Branch sign of a leg from the sense in which turning about its gimbal axis stretches the rod."""
+    ball = np.stack(
+        [l1 - leg.crank + leg.crank * np.cos(phi), leg.side * leg.rod + leg.crank * np.sin(phi), np.zeros_like(phi)], -1
+    )
+    pull = np.einsum("...i,...i->...", np.cross(axis, point), ball)
+    return np.asarray(np.nan_to_num(-np.sign(pull)), dtype=np.int8)
+
+
+def cranks(
+    mechanism: PointingDimensions, a: ArrayLike, b: ArrayLike, elbow_y: int | None, elbow_x: int | None
+) -> CrankAngles:
+    """Crank angles for a wanted pose; see `PointingMechanism.cranks`."""
+    wanted_a, wanted_b = np.broadcast_arrays(finite_array("a", a), finite_array("b", b))
+    scale = scale_of(mechanism)
+    leg_y, leg_x = legs(mechanism, scale)
+    elbow_y = sign("elbow_y", leg_y.side if elbow_y is None else elbow_y)
+    elbow_x = sign("elbow_x", leg_x.side if elbow_x is None else elbow_x)
+    l1 = mechanism.l1 / scale
+    R = orientation(wanted_a, wanted_b, mechanism.order)
+    # coordinates (P, Q, across) of each leg: (y, z, x) for leg Y, (x, -z, y) for leg X; both are right-handed or not
+    to_y, to_x = np.array([1, 2, 0]), np.array([0, 2, 1])
+    flip = np.array([1.0, -1.0, 1.0])
+    point_y, point_x = l1 * R[..., :, 1][..., to_y], l1 * R[..., :, 0][..., to_x] * flip
+    phi_x, status_y, deficit_y, margin_y = _one_leg(leg_y, l1, point_y, elbow_y)
+    phi_y, status_x, deficit_x, margin_x = _one_leg(leg_x, l1, point_x, elbow_x)
+    axis_y, axis_x = _gimbal_axes(wanted_a, wanted_b, mechanism.order)
+    s_y = _branch(leg_y, l1, phi_x, point_y, axis_y[..., to_y])
+    s_x = _branch(leg_x, l1, phi_y, point_x, axis_x[..., to_x] * flip)
+    return CrankAngles(
+        a=wanted_a, b=wanted_b, phi_x=phi_x, phi_y=phi_y, status_y=status_y.astype(np.int8),
+        status_x=status_x.astype(np.int8), deficit_y=deficit_y * scale, deficit_x=deficit_x * scale,
+        margin_y=margin_y, margin_x=margin_x, s_y=s_y, s_x=s_x,
+    )  # fmt: skip
+
+
+def _gimbal_axes(a: Array, b: Array, order: str) -> tuple[Array, Array]:
+    """Directions in the ground about which the elevation and the azimuth turn the reflector."""
+    zero, one = np.zeros_like(a), np.ones_like(a)
+    if order == "YX":
+        return np.stack([np.cos(b), zero, -np.sin(b)], -1), np.stack([zero, one, zero], -1)
+    return np.stack([one, zero, zero], -1), np.stack([zero, np.cos(a), np.sin(a)], -1)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a model reads its inputs and outputs.
+
+    Parameters
+    ----------
+    sense_y, sense_x : {+1, -1}
+        -1 reverses the crank of leg Y or X.
+    side_y, side_x : {+1, -1}
+        -1 mounts a leg on the negative side of its axis (mounting angle turned by half a turn): crank pivot, ball joint
+        and cardan are mirrored, the senses of all rotations are kept.
+    output : {"gimbal", "normal"}
+        "normal" reads the tilt of the reflector's normal ``n``: ``atan2(-n_y, n_z)`` and ``atan2(n_x, n_z)``.
+    """
+
+    sense_y: int = 1
+    sense_x: int = 1
+    side_y: int = 1
+    side_x: int = 1
+    output: str = "gimbal"
+
+    def __post_init__(self) -> None:
+        for name in ("sense_y", "sense_x", "side_y", "side_x"):
+            object.__setattr__(self, name, sign(name, getattr(self, name)))
+        choice("output", self.output, ("gimbal", "normal"))
+
+
+@dataclass(frozen=True, eq=False)
+class ModelComparison:
+    """Outputs of two models at the same crank angles.
+
+    Attributes
+    ----------
+    phi_x, phi_y : ndarray, shape (...)
+        Crank angles, radians.
+    a, b : ndarray, shape (2, ...)
+        Elevation and azimuth of the first and of the second model, radians; NaN where a model cannot be assembled.
+    status : ndarray of int8, shape (2, ...)
+        `PoseStatus`.
+    """
+
+    phi_x: Array
+    phi_y: Array
+    a: Array
+    b: Array
+    status: NDArray[np.int8]
+
+    @property
+    def means(self) -> Array:
+        """Mean of elevation and azimuth of each model, shape (2, ...), radians."""
+        return 0.5 * (self.a + self.b)
+
+    @property
+    def difference(self) -> Array:
+        """Mean of the second model minus mean of the first, radians."""
+        return np.asarray(0.5 * ((self.a[1] - self.a[0]) + (self.b[1] - self.b[0])))
+
+    @property
+    def arcminutes(self) -> Array:
+        """`difference` in minutes of arc."""
+        return np.degrees(self.difference) * 60.0
+
+    @property
+    def separation(self) -> Array:
+        """Elevation minus azimuth of each model, shape (2, ...), radians."""
+        return self.a - self.b
+
+    @property
+    def assembled(self) -> NDArray[np.bool_]:
+        """True where both models can be assembled."""
+        return np.asarray((self.status <= PoseStatus.FOLD_X).all(axis=0))
+
+
+def read_angles(
+    mechanism: PointingDimensions, reading: Reading, phi_x: Array, phi_y: Array
+) -> tuple[Array, Array, NDArray[np.int8]]:
+    """Elevation, azimuth and status as a model with the given conventions reads them.
+
+    A leg on the negative side is the mirror image of the leg in the plane through the other gimbal axis: crank angle
+    and output change their signs together, and the other output enters through its cosine only.
+    """
+    at = poses(mechanism, reading.side_y * reading.sense_y * phi_x, reading.side_x * reading.sense_x * phi_y)
+    a, b = reading.side_y * at.a, reading.side_x * at.b
+    if reading.output == "normal":
+        normal = orientation(a, b, mechanism.order)[..., :, 2]
+        a, b = np.arctan2(-normal[..., 1], normal[..., 2]), np.arctan2(normal[..., 0], normal[..., 2])
+    return a, b, at.status
+
+
+def compare(
+    mechanism: PointingDimensions,
+    other: PointingDimensions,
+    phi_x: ArrayLike,
+    phi_y: ArrayLike | None,
+    reading: Reading,
+    other_reading: Reading,
+) -> ModelComparison:
+    """Compare two models; see `PointingMechanism.compare`."""
+    x, y = crank_arrays(phi_x, phi_x if phi_y is None else phi_y)
+    one, two = read_angles(mechanism, reading, x, y), read_angles(other, other_reading, x, y)
+    a, b = np.stack([one[0], two[0]]), np.stack([one[1], two[1]])
+    return ModelComparison(x, y, a, b, np.stack([one[2], two[2]]))

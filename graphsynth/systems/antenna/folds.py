@@ -1,25 +1,228 @@
-"""Folds (output singularities) and dead points (input singularities) of each leg, over a full turn (section 2.7).
+"""Folds (output singularities) and dead-centre positions (input singularities) of each leg (section 2.7).
 
 Where a discriminant vanishes, two assembly modes or two crank settings meet.  For the leg that is solved first it is a
 product of two sinusoids of the crank angle, for the other leg a trigonometric polynomial of degree two: all of its
-roots are found.
+roots over a full rotation are found.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.core.checks import choice, finite
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.antenna.legs import Leg, scale_of, solution_order
-from graphsynth.systems.antenna.trigonometric import TrigRoot, quadratic_roots, sinusoid_roots
+from graphsynth.systems.antenna.model import Leg, PointingDimensions, scale_of, solution_order
+from graphsynth.systems.antenna.rates import rates
 
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna.mechanism import PointingMechanism
+#: A local extremum of this part of the sum of the coefficients counts as a double root.
+TOUCH = 1e-13
+#: The turn is cut here beyond pi, at no special angle, so that no root of a simple problem lies on the cut.
+SEAM = 0.0123456789
 
-__all__ = ["DeadPoint", "Fold", "dead_points", "fold_on_path", "folds"]
+
+class TrigRoot(NamedTuple):
+    """A root in (-pi, pi] and its order: 1, or 2 where the function touches zero."""
+
+    angle: float
+    order: int
+
+
+def _wrap(angle: float) -> float:
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+def sinusoid_roots(a: float, b: float, c: float) -> list[TrigRoot]:
+    """Roots of ``a cos t + b sin t = c`` in closed form, without cancellation between ``hypot(a, b)`` and ``|c|``."""
+    reach = math.hypot(a, b)
+    rest = (reach - c) * (reach + c)
+    if reach == 0.0 or rest < -TOUCH * reach * reach:
+        return []
+    if rest <= TOUCH * reach * reach:
+        return [TrigRoot(math.atan2(math.copysign(b, b * c), math.copysign(a, a * c)), 2)]
+    root = math.sqrt(rest)
+    return sorted(TrigRoot(math.atan2(b * c + s * a * root, a * c - s * b * root), 1) for s in (-1.0, 1.0))
+
+
+def quadratic_roots(coefficients: tuple[float, float, float, float, float]) -> list[TrigRoot]:
+    """Roots of ``c0 + c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t``, at most four counted with their order.
+
+    Brackets between the critical points (eigenvalues of a companion matrix) make every sign change found; a critical
+    value below 1e-13 of the coefficients is reported as a double root.
+    """
+    from scipy.optimize import brentq
+
+    c0, c1, s1, c2, s2 = coefficients
+    size = sum(map(abs, coefficients))
+    if size == 0.0:
+        return []
+
+    def value(t: float) -> float:
+        return c0 + c1 * math.cos(t) + s1 * math.sin(t) + c2 * math.cos(2 * t) + s2 * math.sin(2 * t)
+
+    critical = _critical_points(c1, s1, c2, s2)
+    double = [t for t in critical if abs(value(t)) <= TOUCH * size]
+    found = [TrigRoot(t, 2) for t in double]
+
+    def touched(t: float, distance: float = 1e-9) -> bool:
+        return any(abs(math.remainder(t - other, math.tau)) < distance for other in double)
+
+    # around a double root the sign is rounding noise: no mark there but the root itself
+    even = [t for t in (np.linspace(-math.pi, math.pi, 17)[1:] + SEAM).tolist() if not touched(t, 1e-3)]
+    marks = sorted({*(t if t > SEAM - math.pi else t + math.tau for t in critical), *even})
+    for left, right in zip([marks[-1] - math.tau, *marks[:-1]], marks):
+        f, g = value(left), value(right)
+        if touched(left) or touched(right):
+            # beside a double root the sign is that of the other end: an odd number of changes is left to it
+            near, far = (left, right) if touched(left) else (right, left)
+            inner = value(near + math.copysign(1e-4, far - near)) if abs(far - near) > 1e-3 else 0.0
+            if not touched(far) and inner * value(far) < 0.0:
+                low, high = sorted((near + math.copysign(1e-4, far - near), far))
+                found.append(TrigRoot(_wrap(brentq(value, low, high, xtol=4e-16, rtol=8.9e-16)), 1))
+        elif f < 0.0 < g or g < 0.0 < f:
+            found.append(TrigRoot(_wrap(brentq(value, left, right, xtol=4e-16, rtol=8.9e-16)), 1))
+        elif g == 0.0:
+            found.append(TrigRoot(_wrap(right), 1))
+    return sorted(found)
+
+
+def _critical_points(c1: float, s1: float, c2: float, s2: float) -> list[float]:
+    """Angles where the derivative vanishes, improved by Newton's method."""
+    # derivative: s1 cos t - c1 sin t + 2 s2 cos 2t - 2 c2 sin 2t, as a polynomial in z = exp(i t)
+    polynomial: NDArray[np.complex128] = np.array(
+        [s2 + 1j * c2, 0.5 * (s1 + 1j * c1), 0.0, 0.5 * (s1 - 1j * c1), s2 - 1j * c2]
+    )
+    largest = np.abs(polynomial).max()
+    if largest < 1e-280:
+        return []
+    z = np.roots(np.where(np.abs(polynomial) < 1e-30 * largest, 0.0, polynomial / largest))
+    points: list[float] = []
+    for t in np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-4]).tolist():
+        for _ in range(3):
+            slope = s1 * math.cos(t) - c1 * math.sin(t) + 2 * (s2 * math.cos(2 * t) - c2 * math.sin(2 * t))
+            bend = -s1 * math.sin(t) - c1 * math.cos(t) - 4 * (s2 * math.sin(2 * t) + c2 * math.cos(2 * t))
+            if bend == 0.0 or abs(slope) > 0.01 * abs(bend):
+                break
+            t -= slope / bend
+        if not any(abs(math.remainder(t - other, math.tau)) < 1e-9 for other in points):
+            points.append(_wrap(t))
+    return points
+
+
+class AtFold(NamedTuple):
+    """Outputs at a fold, its square-root coefficient, and the side on which the mechanism can be assembled."""
+
+    a: float
+    b: float
+    coefficient: float
+    side: int
+
+
+class _Own(NamedTuple):
+    """P, Q, K of a leg and their derivatives along the path."""
+
+    p: float
+    q: float
+    k: float
+    dp: float
+    dq: float
+    dk: float
+
+
+@dataclass(frozen=True)
+class Path:
+    """Crank angles ``offset + t * direction`` on one assembly mode."""
+
+    mechanism: PointingDimensions
+    offset: tuple[float, float]
+    direction: tuple[float, float]
+    s_y: int = 1
+    s_x: int = -1
+
+    def legs(self) -> tuple[Leg, Leg, float]:
+        """Return the leg solved first, the other one, and l1, all scaled."""
+        scale = scale_of(self.mechanism)
+        return (*solution_order(self.mechanism, scale), self.mechanism.l1 / scale)
+
+    def sign(self, leg: Leg) -> int:
+        """Branch sign of a leg."""
+        return self.s_y if leg.name == "Y" else self.s_x
+
+    def _own(self, leg: Leg, l1: float, t: float) -> _Own:
+        index = 0 if leg.name == "Y" else 1
+        rate = self.direction[index]
+        phi = self.offset[index] + t * rate
+        s, c = leg.crank * math.sin(phi), leg.crank * math.cos(phi)
+        bend = leg.crank * 2.0 * math.sin(0.5 * phi) ** 2
+        p, q = l1 - bend, leg.side * leg.rod + s
+        k = 0.5 * (l1 * l1 + p * p + s * (2.0 * leg.side * leg.rod + s)) / l1
+        return _Own(p, q, k, -s * rate, c * rate, rate * (q * c - p * s) / l1)
+
+    def first(self, t: float) -> float:
+        """Angle u of the fixed gimbal axis; NaN out of reach."""
+        leg, _, l1 = self.legs()
+        own = self._own(leg, l1, t)
+        square = own.p * own.p + own.q * own.q
+        rest = square - own.k * own.k
+        if rest < 0.0 or square == 0.0:
+            return math.nan
+        root = self.sign(leg) * math.sqrt(rest)
+        return math.atan2(own.q * own.k + own.p * root, own.p * own.k - own.q * root)
+
+    def discriminant(self, t: float, which: int) -> float:
+        """``A^2 + B^2 - K^2`` of the first (0) or second (1) leg, scaled; NaN where the first is out of reach."""
+        first, second, l1 = self.legs()
+        if which == 0:
+            own = self._own(first, l1, t)
+            return own.p * own.p + own.q * own.q - own.k * own.k
+        u = self.first(t)
+        own = self._own(second, l1, t)
+        q = own.q * math.cos(u)
+        return own.p * own.p + q * q - own.k * own.k
+
+    def at_fold(self, name: str, t: float) -> AtFold:
+        """Return what happens at a fold of leg ``name``; its own output comes from ``atan2`` without the square root.
+
+        ``C = sqrt(2 |dF/dt| / |d2F/dy2|)`` with ``F = A cos y + B sin y - K``; there ``d2F/dy2 = -K``.
+        """
+        first, second, l1 = self.legs()
+        one = self._own(first, l1, t)
+        turned = 0.0 if one.k > 0.0 else math.pi
+        if first.name == name:
+            u = math.remainder(math.atan2(one.q, one.p) + turned, math.tau)
+            slope = one.dp * math.cos(u) + one.dq * math.sin(u) - one.dk
+            v = self._second_output(second, l1, t, u)
+            coefficient, side = _square_root(slope, one.k)
+        else:
+            u = self.first(t)
+            two = self._own(second, l1, t)
+            f_u = -one.p * math.sin(u) + one.q * math.cos(u)
+            du = -(one.dp * math.cos(u) + one.dq * math.sin(u) - one.dk) / f_u if f_u != 0.0 else math.nan
+            b = two.q * math.cos(u)
+            db = two.dq * math.cos(u) - two.q * math.sin(u) * du
+            v = math.remainder(math.atan2(b, two.p) + (0.0 if two.k > 0.0 else math.pi), math.tau)
+            slope = two.dp * math.cos(v) + db * math.sin(v) - two.dk
+            coefficient, side = _square_root(slope, two.k)
+        return AtFold(u, v, coefficient, side) if first.name == "Y" else AtFold(v, u, coefficient, side)
+
+    def _second_output(self, second: Leg, l1: float, t: float, u: float) -> float:
+        own = self._own(second, l1, t)
+        q = own.q * math.cos(u)
+        rest = own.p * own.p + q * q - own.k * own.k
+        if rest < 0.0:
+            return math.nan
+        root = self.sign(second) * math.sqrt(rest)
+        return math.atan2(q * own.k + own.p * root, own.p * own.k - q * root)
+
+
+def _square_root(slope: float, k: float) -> tuple[float, int]:
+    """Return the coefficient, and +1 if the root is real for growing t: ``dF + F_yy dy^2 / 2 = 0``."""
+    return math.sqrt(2.0 * abs(slope / k)), 1 if slope * k > 0.0 else -1
 
 
 @dataclass(frozen=True)
@@ -127,17 +330,16 @@ def _planar_folds(leg: Leg, l1: float) -> list[TrigRoot]:
     return sorted(found)
 
 
-def _first_output(mechanism: PointingMechanism, leg: Leg, phi: float, sign: int) -> float:
+def _first_output(mechanism: PointingDimensions, leg: Leg, phi: float, sign: int) -> float:
     """Angle u of the leg that is solved first."""
     angles = {"X": (0.0, phi), "Y": (phi, 0.0)}[leg.name]
     signs = (1, sign) if leg.name == "X" else (sign, -1)
     # its own equation does not contain the other crank; only a pose in reach of both legs gives both outputs
-    from graphsynth.systems.antenna.path import Path
 
     return Path(mechanism, angles, (0.0, 0.0), *signs).first(0.0)
 
 
-def folds(mechanism: PointingMechanism, leg: str, phi_other: float, s_other: int | None) -> tuple[Fold, ...]:
+def folds(mechanism: PointingDimensions, leg: str, phi_other: float, s_other: int | None) -> tuple[Fold, ...]:
     """All folds of one leg over a turn of its crank; see `PointingMechanism.folds`.
 
     Raises
@@ -168,7 +370,7 @@ def folds(mechanism: PointingMechanism, leg: str, phi_other: float, s_other: int
 
 
 def fold_on_path(
-    mechanism: PointingMechanism,
+    mechanism: PointingDimensions,
     leg: str,
     parameter: float,
     offset: tuple[float, float],
@@ -178,8 +380,6 @@ def fold_on_path(
     multiplicity: int = 1,
 ) -> Fold:
     """Describe a fold whose place on a path is known."""
-    from graphsynth.systems.antenna.path import Path
-
     path = Path(mechanism, offset, direction, s_y, s_x)
     at = path.at_fold(leg, parameter)
     merging = ((1, s_x), (-1, s_x)) if leg == "Y" else ((s_y, 1), (s_y, -1))
@@ -191,7 +391,9 @@ def fold_on_path(
     )  # fmt: skip
 
 
-def dead_points(mechanism: PointingMechanism, leg: str, phi_other: float, s_other: int | None) -> tuple[DeadPoint, ...]:
+def dead_points(
+    mechanism: PointingDimensions, leg: str, phi_other: float, s_other: int | None
+) -> tuple[DeadPoint, ...]:
     """All dead points of one crank; see `PointingMechanism.dead_points`.
 
     Raises
@@ -238,7 +440,7 @@ def dead_points(mechanism: PointingMechanism, leg: str, phi_other: float, s_othe
 
 
 def _dead_point(
-    mechanism: PointingMechanism,
+    mechanism: PointingDimensions,
     leg: str,
     phi: float,
     other_angle: float,
@@ -255,7 +457,7 @@ def _dead_point(
     candidates.sort(key=lambda signs: (signs[1] if leg == "Y" else signs[0]) != rest)
     best: tuple[float, int, int, float, float, float] | None = None
     for s_y, s_x in candidates:
-        got = mechanism.rates(phi_x, phi_y, s_y=s_y, s_x=s_x)
+        got = rates(mechanism, phi_x, phi_y, (0.0, 0.0), (0.0, 0.0), s_y, s_x)
         a, b = float(got.poses.a), float(got.poses.b)
         miss = abs(math.remainder((a if leg == "Y" else b) - output, math.tau))
         slope = float(got.jacobian[0, 0] if leg == "Y" else got.jacobian[1, 1])

@@ -1,25 +1,104 @@
-"""The twelve loop equations with their analytic Jacobian (specification instruments_and_dynamics, section 2.3).
+"""The twelve loop equations: passive joint angles, analytic Jacobian, rank of the coordinates, Newton's method.
 
 Each leg is a product of one-step matrices: rotations by an unknown or given angle, shifts, one mounting rotation.
-Position rows are divided by ``l1``, so that lengths and angles weigh alike.
+Position rows are divided by ``l1``, so that lengths and angles weigh alike (specification instruments_and_dynamics,
+sections 2.3 to 2.5).
+
+Newton's method is independent of the closed form.  A root counts only if the orientation reached through each leg
+agrees with the gimbal: the scalar equations are also satisfied when it is off by half a turn about a coordinate axis.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GeometryError
-
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna.mechanism import PointingMechanism
-
-__all__ = ["CHARTS", "LoopEquations", "loop_equations"]
+from graphsynth.systems.antenna.closed_form import crank_arrays, poses
+from graphsynth.systems.antenna.model import PointingDimensions, Poses
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PassiveAngles:
+    """The twelve unknowns of the loop equations.
+
+    Attributes
+    ----------
+    x : ndarray, shape (..., 12)
+        ``x1 ... x12`` of section 2.3, radians: cardan and ball joint of leg Y, elevation, cardan and ball joint of leg
+        X, azimuth.  NaN where the mechanism cannot be assembled.
+    margin : ndarray, shape (...)
+        Smallest cosine of ``x2, x4, x8, x10``: 0 means that a cardan or the angles of a ball joint are locked.
+    """
+
+    x: Array
+    margin: Array
+
+
+def _turn(axis: int, angle: Array) -> Array:
+    """Rotation about a coordinate axis, shape (..., 3, 3)."""
+    c, s = np.cos(angle), np.sin(angle)
+    matrix = np.zeros((*np.shape(angle), 3, 3))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix[..., axis, axis] = 1.0
+    matrix[..., i, i] = matrix[..., j, j] = c
+    matrix[..., j, i], matrix[..., i, j] = s, -s
+    return matrix
+
+
+def _ball_joints(mechanism: PointingDimensions, poses: Poses) -> tuple[Array, Array]:
+    """Return positions of the two ball joints in the ground, shape (..., 3)."""
+    l1, l2, l3, l4, l5 = mechanism.lengths
+    zero = np.zeros(np.shape(poses.phi_x))
+    y = np.stack([zero, l1 - l3 + l3 * np.cos(poses.phi_x), -l2 + l3 * np.sin(poses.phi_x)], -1)
+    x = np.stack([l1 - l5 + l5 * np.cos(poses.phi_y), zero, -l4 - l5 * np.sin(poses.phi_y)], -1)
+    return y, x
+
+
+def _rotations(mechanism: PointingDimensions, poses: Poses) -> tuple[Array, Array, Array, Array]:
+    """Return cardan angles (..., 2) of legs Y and X and the rotations E_Y, E_X of their ball joints."""
+    R = poses.rotation
+    ball_y, ball_x = _ball_joints(mechanism, poses)
+    dy = np.einsum("...ji,...j->...i", R, ball_y - mechanism.l1 * R[..., :, 1])
+    dx = np.einsum("...ji,...j->...i", R, ball_x - mechanism.l1 * R[..., :, 0])
+    x2, x1 = np.arctan2(dy[..., 0], np.hypot(dy[..., 1], dy[..., 2])), np.arctan2(-dy[..., 1], -dy[..., 2])
+    x8, x7 = np.arctan2(-dx[..., 1], np.hypot(dx[..., 0], dx[..., 2])), np.arctan2(dx[..., 0], -dx[..., 2])
+    E_y = _turn(0, -poses.phi_x) @ R @ _turn(0, -x1) @ _turn(1, -x2)
+    E_x = _turn(1, -poses.phi_y) @ R @ _turn(1, -x7) @ _turn(0, -x8)
+    return np.stack([x1, x2], -1), np.stack([x7, x8], -1), E_y, E_x
+
+
+def passive_angles(mechanism: PointingDimensions, poses: Poses) -> PassiveAngles:
+    """All twelve unknowns of the corrected loop equations for known poses; see `PointingMechanism.passive_angles`."""
+    cardan_y, cardan_x, E, F = _rotations(mechanism, poses)
+    x = np.empty((*np.shape(poses.a), 12))
+    x[..., 0:2], x[..., 6:8] = cardan_y, cardan_x
+    x[..., 2] = np.arctan2(-E[..., 1, 2], E[..., 1, 1])
+    x[..., 3] = np.arctan2(E[..., 1, 0], np.hypot(E[..., 1, 1], E[..., 1, 2]))
+    x[..., 4] = np.arctan2(-E[..., 2, 0], E[..., 0, 0])
+    x[..., 5] = poses.a
+    x[..., 8] = np.arctan2(F[..., 0, 2], F[..., 0, 0])
+    x[..., 9] = np.arctan2(-F[..., 0, 1], np.hypot(F[..., 0, 0], F[..., 0, 2]))
+    x[..., 10] = np.arctan2(F[..., 2, 1], F[..., 1, 1])
+    x[..., 11] = poses.b
+    return PassiveAngles(x, np.cos(x[..., [1, 3, 7, 9]]).min(axis=-1))
+
+
+def printed_ball_joint(mechanism: PointingDimensions, poses: Poses) -> Array:
+    """Angles ``x3, x4, x5`` of the ball joint of leg Y in the printed order y-x-y, shape (..., 3); 0 + x5 if locked."""
+    _, _, E, _ = _rotations(mechanism, poses)
+    x4 = np.arctan2(np.hypot(E[..., 0, 1], E[..., 2, 1]), E[..., 1, 1])
+    locked = np.hypot(E[..., 0, 1], E[..., 2, 1]) < 1e-15
+    x3 = np.where(locked, 0.0, np.arctan2(E[..., 1, 0], -E[..., 1, 2]))
+    x5 = np.where(locked, np.arctan2(E[..., 0, 2], E[..., 0, 0]), np.arctan2(E[..., 0, 1], E[..., 2, 1]))
+    return np.stack([x3, np.where(locked, 0.0, x4), x5], -1)
+
 
 #: "corrected": ball joint of leg Y turned about y, z, x.  "printed": about y, x, y, singular at rest.
 CHARTS = ("corrected", "printed")
@@ -46,7 +125,7 @@ class LoopEquations(NamedTuple):
     traces: Array
 
 
-def _chains(mechanism: PointingMechanism, chart: str) -> tuple[list[_Turn | _Shift], list[_Turn | _Shift]]:
+def _chains(mechanism: PointingDimensions, chart: str) -> tuple[list[_Turn | _Shift], list[_Turn | _Shift]]:
     l1, l2, l3, l4, l5 = mechanism.lengths
     axes = (2, 0) if chart == "corrected" else (0, 1)
     leg_y: list[_Turn | _Shift] = [
@@ -98,13 +177,13 @@ def _product(steps: list[_Turn | _Shift], angles: Array) -> tuple[Array, dict[in
 
 
 def loop_equations(
-    mechanism: PointingMechanism, x: Array, phi: Array, chart: str = "corrected", *, scaled: bool = True
+    mechanism: PointingDimensions, x: Array, phi: Array, chart: str = "corrected", *, scaled: bool = True
 ) -> LoopEquations:
     """Evaluate the twelve equations and their derivatives.
 
     Parameters
     ----------
-    mechanism : PointingMechanism
+    mechanism : PointingDimensions
     x : ndarray, shape (n, 12)
         Unknowns ``x1 ... x12``, radians.
     phi : ndarray, shape (n, 2)
@@ -156,3 +235,241 @@ def loop_equations(
                 full[:, row, source] = part[:, i, j]
         traces[:, leg] = np.trace(D[:, :3, :3], axis1=1, axis2=2)
     return LoopEquations(residual, full[:, :, :12], full[:, :, 12:], traces)
+
+
+#: A singular value below this part of the largest counts as zero, and so does a smaller sine of the angle to a fold:
+#: beside a fold both fall with the square root of the distance, 1e-8 at one unit of rounding.
+RANK_TOLERANCE = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class ChartReport:
+    """Rank of the 12 x 12 Jacobian in one set of coordinates (estimated: floating-point singular values).
+
+    Attributes
+    ----------
+    chart : str
+        Coordinates asked for.
+    rank : int
+        Number of singular values above 1e-7 of the largest.
+    singular_values : ndarray, shape (12,)
+        Position rows divided by ``l1`` (unless asked otherwise), falling.
+    other_rank : int
+        Rank at the same pose in the other coordinates.
+    fold_margin : float
+        Sine of the angle to the nearest fold of the mechanism, from the closed form: independent of coordinates.
+    verdict : str
+        "regular", "coordinates singular, mechanism regular" or "mechanism singular".
+    use : str
+        Coordinates to use at this pose; empty if none is regular.
+    """
+
+    chart: str
+    rank: int
+    singular_values: NDArray[np.float64]
+    other_rank: int
+    fold_margin: float
+    verdict: str
+    use: str
+
+    @property
+    def condition(self) -> float:
+        """Ratio of the largest to the smallest singular value."""
+        smallest = float(self.singular_values[-1])
+        return float(self.singular_values[0]) / smallest if smallest > 0.0 else float("inf")
+
+
+def _singular_values(
+    mechanism: PointingDimensions, x: NDArray[np.float64], phi: NDArray[np.float64], chart: str, scaled: bool
+) -> tuple[NDArray[np.float64], int]:
+    values = np.linalg.svd(loop_equations(mechanism, x[None], phi[None], chart, scaled=scaled).jacobian[0])[1]
+    return values, int((values > RANK_TOLERANCE * values[0]).sum())
+
+
+def check_chart(
+    mechanism: PointingDimensions, phi_x: float, phi_y: float, chart: str, s_y: int, s_x: int, scaled: bool
+) -> ChartReport:
+    """Judge the coordinates at a pose; see `PointingMechanism.check_chart`."""
+    if chart not in CHARTS:
+        raise GeometryError(f"chart = {chart!r} is unknown; use one of {', '.join(map(repr, CHARTS))}")
+    pose = poses(mechanism, phi_x, phi_y, s_y, s_x)
+    if not pose.assembled:
+        raise GeometryError(f"no rank at phi_x = {phi_x}, phi_y = {phi_y}: {pose.reasons()[0]}; choose another pose")
+    corrected = passive_angles(mechanism, pose).x
+    printed = corrected.copy()
+    printed[2:5] = printed_ball_joint(mechanism, pose)
+    unknowns = {"corrected": corrected, "printed": printed}
+    phi = np.array([float(phi_x), float(phi_y)])
+    found = {name: _singular_values(mechanism, unknowns[name], phi, name, scaled) for name in CHARTS}
+    values, rank = found[chart]
+    other_rank = found[CHARTS[1 - CHARTS.index(chart)]][1]
+    margin = float(min(pose.margin_x, pose.margin_y))
+    regular = [name for name in CHARTS if found[name][1] == 12]
+    if margin < RANK_TOLERANCE:
+        verdict = "mechanism singular"
+    else:
+        verdict = "regular" if rank == 12 else "coordinates singular, mechanism regular"
+    return ChartReport(chart, rank, values, other_rank, margin, verdict, regular[0] if regular else "")
+
+
+#: A residual (lengths divided by l1) below this is a root.
+RESIDUAL = 1e-12
+#: Turn of the cranks between two continuation steps, radians.
+STEP = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class LoopSolution:
+    """Newton's solution of the twelve equations.
+
+    Attributes
+    ----------
+    x : ndarray, shape (..., 12)
+        Unknowns; NaN where Newton's method found no root or a false one.
+    residual : ndarray, shape (...)
+        Largest absolute residual of the returned root, position rows divided by ``l1``.
+    error : ndarray, shape (...)
+        Largest component of the last Newton step (estimate of the error).
+    converged, genuine : ndarray of bool, shape (...)
+        A root was found; its orientations agree (both traces are 3).
+    iterations : ndarray of int64, shape (...)
+        Iterations in all continuation steps together.
+    chart : str
+        Coordinates that were used: the regular ones if those asked for are singular at the start.
+    start_rank : ndarray of int64, shape (...)
+        Rank of the 12 x 12 Jacobian at the start, in the coordinates asked for.
+    message : str
+        One sentence on the coordinates.
+    """
+
+    x: Array
+    residual: Array
+    error: Array
+    converged: NDArray[np.bool_]
+    genuine: NDArray[np.bool_]
+    iterations: NDArray[np.int64]
+    chart: str
+    start_rank: NDArray[np.int64]
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class RootSurvey:
+    """Roots of the twelve scalar equations found from random starts.
+
+    Attributes
+    ----------
+    starts, failed, false, genuine : int
+        Random starts; those without a root; false orientation roots (rejected); genuine roots.
+    modes : ndarray, shape (m, 2)
+        Different pairs ``(a, b)`` of the genuine roots, radians, sorted.
+    """
+
+    starts: int
+    failed: int
+    false: int
+    genuine: int
+    modes: Array
+
+
+def newton(
+    mechanism: PointingDimensions, x: Array, phi: Array, chart: str, limit: int = 40
+) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+    """Newton's method with halved steps on many poses; returns x, residual, last step and iterations.
+
+    A pose whose Jacobian is singular takes the step of least norm.
+    """
+    x = x.copy()
+    found = loop_equations(mechanism, x, phi, chart)
+    size = np.abs(found.residual).max(axis=1)
+    last, iterations = np.full(len(x), np.inf), np.zeros(len(x), dtype=np.int64)
+    active = np.arange(len(x))
+    for _ in range(limit):
+        step = _steps(found.jacobian, found.residual)
+        length = np.abs(step).max(axis=1)
+        factor = np.minimum(1.0, 1.0 / np.maximum(length, 1e-300))  # no step turns a joint by more than 1 rad
+        for _ in range(12):
+            trial = loop_equations(mechanism, x[active] - factor[:, None] * step, phi[active], chart)
+            worse = np.linalg.norm(trial.residual, axis=1) > np.maximum(np.linalg.norm(found.residual, axis=1), 1e-15)
+            if not worse.any():
+                break
+            factor[worse] *= 0.5
+        x[active] -= factor[:, None] * step
+        size[active], last[active] = np.abs(trial.residual).max(axis=1), length
+        iterations[active] += 1
+        going = (length > 1e-14) & ~((size[active] < 4e-16) & (length < 1e-7))
+        active = active[going]
+        if active.size == 0:
+            break
+        found = type(found)(*(part[going] for part in trial))
+    return x, size, last, iterations
+
+
+def _steps(jacobian: Array, residual: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(jacobian, residual[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        return np.asarray((np.linalg.pinv(jacobian, rcond=1e-13) @ residual[..., None])[..., 0])
+
+
+def solve_loops(
+    mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike, start: ArrayLike | None, chart: str
+) -> LoopSolution:
+    """Solve the twelve equations; see `PointingMechanism.solve_loops`."""
+    given_x, given_y = crank_arrays(phi_x, phi_y)
+    phi = np.stack([given_x.ravel(), given_y.ravel()], axis=1)
+    n = len(phi)
+    total = np.zeros(n, dtype=np.int64)
+    message = f"coordinates {chart!r}"
+    if start is None:
+        # every angle is zero at rest, in any coordinates and for any lengths
+        report = check_chart(mechanism, 0.0, 0.0, chart, 1, -1, scaled=True)
+        ranks = np.full(n, report.rank, dtype=np.int64)
+        if report.rank < 12 and report.use:
+            message = (
+                f"at the start rank {report.rank} of 12: {report.verdict}; {report.use!r} used instead of {chart!r}"
+            )
+            chart = report.use
+        x = np.zeros((n, 12))
+        stages = max(1, int(np.ceil(np.abs(phi).max(initial=0.0) / STEP)))
+        for stage in range(1, stages):
+            x, _, _, used = newton(mechanism, x, phi * (stage / stages), chart)
+            total += used
+    else:
+        x = np.broadcast_to(np.asarray(start, dtype=np.float64), (*given_x.shape, 12)).reshape(n, 12)
+        values = np.linalg.svd(loop_equations(mechanism, x, phi, chart).jacobian, compute_uv=False)
+        ranks = (values > RANK_TOLERANCE * values[:, :1]).sum(axis=1)
+    x, size, last, used = newton(mechanism, x, phi, chart)
+    traces = loop_equations(mechanism, x, phi, chart).traces
+    converged = size < RESIDUAL
+    genuine = converged & (np.abs(traces - 3.0) < 1e-6).all(axis=1)
+    shape = given_x.shape
+    x = np.where(genuine[:, None], x - 2.0 * np.pi * np.round(x / (2.0 * np.pi)), np.nan)
+    return LoopSolution(
+        x=x.reshape(*shape, 12), residual=size.reshape(shape), error=last.reshape(shape),
+        converged=converged.reshape(shape), genuine=genuine.reshape(shape), iterations=(total + used).reshape(shape),
+        chart=chart, start_rank=ranks.reshape(shape), message=message,
+    )  # fmt: skip
+
+
+def survey_roots(
+    mechanism: PointingDimensions, phi_x: float, phi_y: float, starts: int, seed: int, chart: str
+) -> RootSurvey:
+    """Newton's method from random starts at one pose; see `PointingMechanism.survey_roots`.
+
+    Raises
+    ------
+    GeometryError
+        A number of starts below 1.
+    """
+    if starts < 1:
+        raise GeometryError(f"starts = {starts} must be at least 1; give a number of random starts")
+    random = np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, 12))
+    found = solve_loops(mechanism, np.full(starts, phi_x), np.full(starts, phi_y), random, chart)
+    pairs = found.x[found.genuine][:, [5, 11]]
+    modes: list[Array] = []
+    for pair in pairs[np.lexsort(pairs.T[::-1])] if len(pairs) else pairs:
+        if all(np.abs(np.exp(1j * pair) - np.exp(1j * other)).max() > 1e-7 for other in modes):
+            modes.append(pair)
+    converged, genuine = int(found.converged.sum()), int(found.genuine.sum())
+    return RootSurvey(starts, starts - converged, converged - genuine, genuine, np.array(modes).reshape(-1, 2))

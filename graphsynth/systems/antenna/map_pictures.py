@@ -18,7 +18,7 @@ from graphsynth.drawing.palette import LIGHT, WHITE
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.systems.antenna.comparison import ModelComparison, Reading
+    from graphsynth.systems.antenna.closed_form import ModelComparison, Reading
     from graphsynth.systems.antenna.mechanism import PointingMechanism
 
 __all__ = ["difference_map_picture", "fold_map_picture", "tolerance_map_picture"]
@@ -79,7 +79,7 @@ def difference_map_picture(
 
 def _between_beams(found: ModelComparison, orders: tuple[str, str]) -> Array:
     """Angle between the normals of both reflectors, minutes of arc, from half their chord."""
-    from graphsynth.systems.antenna.results import orientation
+    from graphsynth.systems.antenna.model import orientation
 
     first, second = (orientation(found.a[k], found.b[k], orders[k])[..., :, 2] for k in (0, 1))
     chord = np.linalg.norm(first - second, axis=-1)

@@ -7,22 +7,18 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from graphsynth.systems.antenna.dimensions import PointingDimensions
+from graphsynth.systems.antenna.model import PointingDimensions
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from graphsynth.systems.antenna.approach import ApproachToFold
-    from graphsynth.systems.antenna.charts import ChartReport
-    from graphsynth.systems.antenna.comparison import ModelComparison, Reading
-    from graphsynth.systems.antenna.cranks import CrankAngles
+    from graphsynth.systems.antenna.closed_form import AssemblyModes, CrankAngles, ModelComparison, Reading
     from graphsynth.systems.antenna.folds import DeadPoint, Fold
-    from graphsynth.systems.antenna.modes import AssemblyModes
-    from graphsynth.systems.antenna.newton import LoopSolution, RootSurvey
-    from graphsynth.systems.antenna.passive import PassiveAngles
+    from graphsynth.systems.antenna.loop_equations import ChartReport, LoopSolution, PassiveAngles, RootSurvey
+    from graphsynth.systems.antenna.model import Poses
+    from graphsynth.systems.antenna.precise import ApproachToFold
     from graphsynth.systems.antenna.rates import Rates
-    from graphsynth.systems.antenna.results import Poses
     from graphsynth.systems.antenna.sweep import PointingSweep
     from graphsynth.systems.antenna.tolerance import Tolerance
 
@@ -95,7 +91,7 @@ class PointingMechanism(PointingDimensions):
         >>> PointingMechanism().solve(0.2, 0.3).count
         array(4)
         """
-        from graphsynth.systems.antenna.modes import solve
+        from graphsynth.systems.antenna.closed_form import solve
 
         return solve(self, phi_x, phi_y)
 
@@ -121,13 +117,13 @@ class PointingMechanism(PointingDimensions):
         >>> np.degrees([found.phi_x, found.phi_y]).round(6).tolist()
         [17.001794, -8.466231]
         """
-        from graphsynth.systems.antenna.cranks import cranks
+        from graphsynth.systems.antenna.closed_form import cranks
 
         return cranks(self, a, b, elbow_y, elbow_x)
 
     def passive_angles(self, poses: Poses) -> PassiveAngles:
         """Angles of all passive joints at known poses: the twelve unknowns of the loop equations (section 2.5)."""
-        from graphsynth.systems.antenna.passive import passive_angles
+        from graphsynth.systems.antenna.loop_equations import passive_angles
 
         return passive_angles(self, poses)
 
@@ -151,7 +147,7 @@ class PointingMechanism(PointingDimensions):
         LoopSolution
             Roots whose orientations do not agree are rejected.
         """
-        from graphsynth.systems.antenna.newton import solve_loops
+        from graphsynth.systems.antenna.loop_equations import solve_loops
 
         return solve_loops(self, phi_x, phi_y, start, chart)
 
@@ -159,7 +155,7 @@ class PointingMechanism(PointingDimensions):
         self, phi_x: float, phi_y: float, *, starts: int = 200, seed: int = 0, chart: str = "corrected"
     ) -> RootSurvey:
         """Newton's method from random starts: genuine roots by assembly mode, false orientation roots counted."""
-        from graphsynth.systems.antenna.newton import survey_roots
+        from graphsynth.systems.antenna.loop_equations import survey_roots
 
         return survey_roots(self, phi_x, phi_y, starts, seed, chart)
 
@@ -174,7 +170,7 @@ class PointingMechanism(PointingDimensions):
         >>> report.rank, report.verdict, report.use
         (11, 'coordinates singular, mechanism regular', 'corrected')
         """
-        from graphsynth.systems.antenna.charts import check_chart
+        from graphsynth.systems.antenna.loop_equations import check_chart
 
         return check_chart(self, phi_x, phi_y, chart, s_y, s_x, scaled)
 
@@ -296,7 +292,7 @@ class PointingMechanism(PointingDimensions):
         branch : {+1, -1}
             Branch sign of the folding leg.
         """
-        from graphsynth.systems.antenna.approach import approach
+        from graphsynth.systems.antenna.precise import approach
 
         return approach(self, fold, distances, branch)
 
@@ -326,7 +322,7 @@ class PointingMechanism(PointingDimensions):
         >>> found.arcminutes.round(6).tolist()
         [0.656059, 30.989576]
         """
-        from graphsynth.systems.antenna.comparison import Reading, compare
+        from graphsynth.systems.antenna.closed_form import Reading, compare
 
         return compare(self, other, phi_x, phi_y, reading or Reading(), other_reading or Reading())
 

@@ -18,9 +18,9 @@ from graphsynth.drawing.palette import LIGHT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.systems.antenna.comparison import ModelComparison, Reading
+    from graphsynth.systems.antenna.closed_form import ModelComparison, Reading
     from graphsynth.systems.antenna.mechanism import PointingMechanism
-    from graphsynth.systems.antenna.results import Poses
+    from graphsynth.systems.antenna.model import Poses
 
 __all__ = ["comparison_picture", "pointing_picture"]
 

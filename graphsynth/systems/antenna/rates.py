@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite_array
 from graphsynth.systems.antenna.closed_form import poses
-from graphsynth.systems.antenna.legs import Leg, scale_of, solution_order
-from graphsynth.systems.antenna.loop_equations import loop_equations
-from graphsynth.systems.antenna.passive import passive_angles
-from graphsynth.systems.antenna.results import Poses, PoseStatus
-
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna.mechanism import PointingMechanism
-
-__all__ = ["Rates", "passive_rates", "rates"]
+from graphsynth.systems.antenna.loop_equations import loop_equations, passive_angles
+from graphsynth.systems.antenna.model import Leg, PointingDimensions, Poses, PoseStatus, scale_of, solution_order
 
 Array = NDArray[np.float64]
 
@@ -75,7 +68,7 @@ def _motion(leg: Leg, l1: float, phi: Array, dphi: Array, ddphi: Array) -> _LegM
 
 
 def rates(
-    mechanism: PointingMechanism,
+    mechanism: PointingDimensions,
     phi_x: ArrayLike,
     phi_y: ArrayLike,
     speeds: tuple[ArrayLike, ArrayLike],
@@ -138,7 +131,7 @@ def _derivatives(one: _LegMotion, two: _LegMotion, u: Array, v: Array) -> tuple[
     return u1, v1, v2, du, dv, ddu, ddv
 
 
-def passive_rates(mechanism: PointingMechanism, found: Poses, dphi_x: ArrayLike, dphi_y: ArrayLike) -> Array:
+def passive_rates(mechanism: PointingDimensions, found: Poses, dphi_x: ArrayLike, dphi_y: ArrayLike) -> Array:
     """Rates of all twelve unknowns from ``J12 dx = -(d res / d phi) dphi``; see `PointingMechanism.passive_rates`."""
     x = passive_angles(mechanism, found).x
     shape = x.shape[:-1]

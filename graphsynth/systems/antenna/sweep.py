@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite, finite_array, sign
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.antenna.folds import Fold, fold_on_path
-from graphsynth.systems.antenna.path import Path
-from graphsynth.systems.antenna.results import Poses, PoseStatus
-
-if TYPE_CHECKING:
-    from graphsynth.systems.antenna.mechanism import PointingMechanism
-
-__all__ = ["PointingSweep", "sweep"]
+from graphsynth.systems.antenna.closed_form import poses
+from graphsynth.systems.antenna.folds import Fold, Path, fold_on_path
+from graphsynth.systems.antenna.model import PointingDimensions, Poses, PoseStatus
 
 #: Samples of a discriminant per radian of crank angle, between which a dip is refined.
 DENSITY = 60
@@ -52,7 +46,7 @@ class PointingSweep:
 
 
 def sweep(
-    mechanism: PointingMechanism,
+    mechanism: PointingDimensions,
     t: ArrayLike,
     direction: tuple[float, float],
     offset: tuple[float, float],
@@ -73,26 +67,24 @@ def sweep(
     dx, dy = (finite(f"direction[{i}]", part) for i, part in enumerate(direction))
     ox, oy = (finite(f"offset[{i}]", part) for i, part in enumerate(offset))
     path = Path(mechanism, (ox, oy), (dx, dy), sign("s_y", s_y), sign("s_x", s_x))
-    poses = mechanism.poses(ox + values * dx, oy + values * dy, s_y, s_x)
-    if not poses.assembled[0]:
+    found = poses(mechanism, ox + values * dx, oy + values * dy, s_y, s_x)
+    if not found.assembled[0]:
         nothing = np.zeros(values.size, dtype=bool)
-        why = PoseStatus(int(poses.status[0])).message
-        return PointingSweep(values, _hide(poses, nothing), nothing, None, f"the sweep cannot start: {why}")
+        why = PoseStatus(int(found.status[0])).message
+        return PointingSweep(values, _hide(found, nothing), nothing, None, f"the sweep cannot start: {why}")
     stop = _first_zero(path, float(values[0]), float(values[-1]))
     if stop is None:
-        return PointingSweep(values, poses, poses.assembled, None, "the whole sweep lies on one assembly mode")
+        return PointingSweep(values, found, found.assembled, None, "the whole sweep lies on one assembly mode")
     which, place, multiplicity = stop
     first, second, _ = path.legs()
     leg = (first, second)[which].name
     fold = fold_on_path(mechanism, leg, place, (ox, oy), (dx, dy), path.s_y, path.s_x, multiplicity)
     reached = (values <= place) if change[0] > 0.0 else (values >= place)
-    reached &= poses.assembled
-    return PointingSweep(values, _hide(poses, reached), reached, fold, f"stopped at t = {place:.12g}: {fold.message}")
+    reached &= found.assembled
+    return PointingSweep(values, _hide(found, reached), reached, fold, f"stopped at t = {place:.12g}: {fold.message}")
 
 
 def _hide(poses: Poses, reached: NDArray[np.bool_]) -> Poses:
-    from dataclasses import replace
-
     return replace(poses, a=np.where(reached, poses.a, np.nan), b=np.where(reached, poses.b, np.nan))
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna import PointingMechanism, Reading
-from graphsynth.systems.antenna.comparison import read_angles
-from graphsynth.systems.antenna.results import orientation
+from graphsynth.systems.antenna.closed_form import read_angles
+from graphsynth.systems.antenna.model import orientation
 
 ART = PointingMechanism()
 DEGREES = np.array([5.0, 10.0, 15.0, 20.0, 30.0, 40.0])

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna import PointingMechanism, PoseStatus
+from graphsynth.systems.antenna.folds import quadratic_roots, sinusoid_roots
 from graphsynth.systems.antenna.precise import precise_angles, precise_fold
-from graphsynth.systems.antenna.trigonometric import quadratic_roots, sinusoid_roots
 
 ART = PointingMechanism()
 PARALLELOGRAM = PointingMechanism(l3=0.1, l5=0.1)

@@ -175,7 +175,7 @@ def test_every_assembly_mode_is_a_root_that_attracts(order):
 
 def test_false_roots_are_half_turns():
     random = np.random.default_rng(5).uniform(-np.pi, np.pi, (60, 12))
-    from graphsynth.systems.antenna.newton import newton
+    from graphsynth.systems.antenna.loop_equations import newton
 
     phi = np.full((60, 2), 0.2)
     x, size, _, _ = newton(ART, random, phi, "corrected")
@@ -274,7 +274,7 @@ def test_all_assembly_modes_by_brute_force():
             S_x = np.array([l1 - l5 + l5 * np.cos(phi_y), 0.0, -l4 - l5 * np.sin(phi_y)])
 
             def gap(a, b, leg, order=order, S=(S_y, S_x), l=(l1, l2, l4)):
-                from graphsynth.systems.antenna.results import orientation
+                from graphsynth.systems.antenna.model import orientation
 
                 R = orientation(a, b, order)
                 return np.linalg.norm(l[0] * R[..., :, 1 - leg] - S[leg], axis=-1) - l[1 + leg]

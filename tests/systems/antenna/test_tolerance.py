@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna import PointingMechanism
-from graphsynth.systems.antenna.enclosure import LengthBoxProblem, NoProof, middle_of
-from graphsynth.systems.antenna.tolerance import ToleranceStatus, outward_text
+from graphsynth.systems.antenna.tolerance import LengthBoxProblem, NoProof, ToleranceStatus, middle_of, outward_text
 
 ART = PointingMechanism()
 PARALLELOGRAM = PointingMechanism(l3=0.1, l5=0.1)

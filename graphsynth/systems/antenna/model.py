@@ -1,14 +1,98 @@
-"""Status and arrays of the poses of the pointing mechanism."""
+"""What the mechanism is: dimensions, structural graph, its two legs, and the poses that everything else computes.
+
+With ``u`` the angle of the fixed gimbal axis and ``v`` that of the carried one, both gimbal orders lead to the same
+triangular pair of equations (specification instruments_and_dynamics, section 2.5)::
+
+    P1 cos u + Q1 sin u = K1
+    P2 cos v + Q2 cos u sin v = K2
+
+where a leg of crank ``c`` and rod ``r`` has its ball joint at ``P = l1 - c + c cos phi``, ``Q = side r + c sin phi``.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["PoseStatus", "Poses"]
+from graphsynth.core.checks import choice, positive
+
+if TYPE_CHECKING:
+    from graphsynth.structure.graph import MechanismGraph
+
+
+@dataclass(frozen=True)
+class PointingDimensions:
+    """Lengths, gimbal order and structural graph of a `PointingMechanism`, which describes the parameters."""
+
+    l1: float = 0.1
+    l2: float = 0.15
+    l3: float = 0.0592
+    l4: float = 0.15
+    l5: float = 0.0592
+    order: str = "YX"
+
+    def __post_init__(self) -> None:
+        for name in ("l1", "l2", "l3", "l4", "l5"):
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
+        choice("order", self.order, ("YX", "XY"))
+
+    @property
+    def lengths(self) -> tuple[float, float, float, float, float]:
+        """The five lengths l1 to l5."""
+        return self.l1, self.l2, self.l3, self.l4, self.l5
+
+    def graph(self) -> MechanismGraph:
+        """Structural graph in space: universal, spherical and revolute joints have 2, 3 and 1 sub-edges.
+
+        Links 0 to 5: ground, reflector, rod Y, rod X, crank Y, crank X.
+
+        Examples
+        --------
+        >>> graph = PointingDimensions().graph()
+        >>> graph.mobility, graph.loops, 6 * graph.loops
+        (2, 2, 12)
+        """
+        from graphsynth.structure.graph import MechanismGraph
+
+        joints = [(0, 1, 2), (1, 2, 2), (1, 3, 2), (2, 4, 3), (3, 5, 3), (0, 4, 1), (0, 5, 1)]
+        return MechanismGraph(6, joints, frame=0, space=6)
+
+
+class Leg(NamedTuple):
+    """One leg: name, crank, rod, side of the rod at rest, branch sign of the rest pose."""
+
+    name: str
+    crank: float
+    rod: float
+    side: float
+    rest: int
+
+
+def scale_of(mechanism: PointingDimensions) -> float:
+    """Power of two near the largest length; dividing by it rounds nothing."""
+    largest = max(mechanism.l1, mechanism.l2, mechanism.l3, mechanism.l4, mechanism.l5)
+    return math.ldexp(1.0, math.frexp(largest)[1])
+
+
+def legs(mechanism: PointingDimensions, scale: float = 1.0) -> tuple[Leg, Leg]:
+    """Leg Y and leg X, lengths divided by ``scale``."""
+    m = mechanism
+    return (
+        Leg("Y", m.l3 / scale, m.l2 / scale, -1.0, 1),
+        Leg("X", m.l5 / scale, m.l4 / scale, 1.0, -1),
+    )
+
+
+def solution_order(mechanism: PointingDimensions, scale: float = 1.0) -> tuple[Leg, Leg]:
+    """Return the leg that is solved first (it turns the axis fixed to the ground) and the other one."""
+    y, x = legs(mechanism, scale)
+    return (x, y) if mechanism.order == "YX" else (y, x)
+
 
 Array = NDArray[np.float64]
 
