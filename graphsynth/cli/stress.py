@@ -26,6 +26,14 @@ def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help="platform-12.5, or all of platform-12, or of platform (default: all)"
     )
+    parser.add_argument(
+        "--cases",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="run the cases of this TOML file instead (its expressions are evaluated: name only files that you trust)",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="write stress.html and stress.csv there")
     parser.add_argument("--fast", action="store_true", help="leave out cases that take more than about two seconds")
     parser.add_argument("--list", action="store_true", help="list the cases, run none")
@@ -40,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
     with _progress() as progress:
-        report = run_stress(options.names, slow=not options.fast, progress=progress)
+        report = run_stress(options.names, slow=not options.fast, files=options.cases, progress=progress)
     if options.out:
         from graphsynth.evidence.stress.page import write_report
 
@@ -62,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
 def _list(options: argparse.Namespace) -> int:
     from graphsynth.evidence.stress import stress_cases
 
-    chosen = stress_cases(options.names, slow=not options.fast)
+    chosen = stress_cases(options.names, slow=not options.fast, files=options.cases)
     if options.json:
         console.put_json([{"name": case.name, "title": case.title, "slow": case.slow} for case in chosen])
         return 0
@@ -86,9 +94,12 @@ def _show(report: StressReport) -> None:
         worst, status = outcome.worst, outcome.status.value
         numbers = (f"{worst.error:.1e}", f"{worst.bound:.1e}") if worst and worst.error == worst.error else ("", "")
         table.add_row(
-            outcome.case.name, f"[{colours[status]}]{status}[/]", *numbers, f"{outcome.seconds:.2f}",
+            outcome.case.name,
+            f"[{colours[status]}]{status}[/]",
+            *numbers,
+            f"{outcome.seconds:.2f}",
             escape(outcome.case.title),
-        )  # fmt: skip
+        )
     if report.outcomes:
         screen.print(table)
     for outcome in report.outcomes:
@@ -110,8 +121,11 @@ def _progress() -> Iterator[Callable[[Case, int, int], None] | None]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns: tuple[Any, ...] = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-    )  # fmt: skip
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("starting", total=None)
 

@@ -1,7 +1,7 @@
-from .catalogue import (
+from .cases import (
     Case as Case,
 )
-from .catalogue import (
+from .cases import (
     stress_cases as stress_cases,
 )
 from .checks import (

@@ -138,7 +138,7 @@ class Checks:
         """
         wanted, found = exact(right), exact(given)
         if wanted is None:
-            raise ValueError(f"what is right for {what} is not finite: use says() for reports")
+            raise ValueError(f"what is right for {what} is not finite: use reports() for reports")
         bound = Fraction(relative) * abs(wanted) + Fraction(absolute)
         error = math.inf if found is None else abs(found - wanted)
         status = Status.OK if error <= bound else Status.WRONG
@@ -162,7 +162,7 @@ class Checks:
         for k, (found, wanted) in enumerate(zip_longest(given, right, fillvalue=missing)):
             name = f"{what} [{k}]"
             if found is missing or wanted is missing:
-                self.says(
+                self.reports(
                     name,
                     "missing" if found is missing else _text(found),
                     "nothing" if wanted is missing else _text(wanted),
@@ -174,7 +174,7 @@ class Checks:
         """Require a number of zero or more below a bound: a residual, an error, a drift."""
         self.value(what, given, 0, absolute=bound, source=source)
 
-    def says(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
+    def reports(self, what: str, given: Any, right: Any, *, source: str = "") -> None:
         """Require a report of something extreme: a status, an event, a flag, a proof withheld; others: `equals`."""
         good = bool(given == right)
         status = Status.FLAGGED if good else Status.WRONG
@@ -186,7 +186,7 @@ class Checks:
         status = Status.OK if good else Status.WRONG
         self.rows.append(Check(what, _text(right), _text(given), source or self.source, math.nan, math.nan, status))
 
-    def agrees(self, what: str, good: object, given: Any = "", right: str = "yes", *, source: str = "") -> None:
+    def holds(self, what: str, good: object, given: Any = "", right: str = "yes", *, source: str = "") -> None:
         """Require a statement to hold; ``given`` shows what was found."""
         shown = _text(given) if given != "" else ("yes" if good else "no")
         status = Status.OK if good else Status.WRONG
@@ -206,7 +206,7 @@ class Checks:
         except GraphsynthError as error:
             text = str(error)
             if "\n" in text:
-                self.agrees(what, False, repr(text), "a refusal in one line", source=source)
+                self.holds(what, False, repr(text), "a refusal in one line", source=source)
             else:
                 self.mentions(what, text, *words, source=source)
         else:

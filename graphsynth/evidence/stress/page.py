@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import graphsynth
 from graphsynth.drawing.pages import whole_page
-from graphsynth.evidence.stress.catalogue import PAGES
 from graphsynth.evidence.stress.checks import SEVERITY, Check, Status
 
 if TYPE_CHECKING:
@@ -67,8 +66,8 @@ def stress_html(report: StressReport) -> str:
     )
     pages = [
         f"<h2>{escape(title)}</h2>{_HEAD}" + "".join(map(_case, chosen))
-        for page, title in PAGES.items()
-        if (chosen := [o for o in report.outcomes if o.case.page == page])
+        for title in dict.fromkeys(o.case.page_title for o in report.outcomes)
+        if (chosen := [o for o in report.outcomes if o.case.page_title == title])
     ]
     left, lost = (", ".join(case.name for case in cases) for cases in (report.left_out, report.not_reached))
     return whole_page(

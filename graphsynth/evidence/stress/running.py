@@ -9,12 +9,13 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import MissingExtraError
-from graphsynth.evidence.stress.catalogue import PAGES, Case, stress_cases
+from graphsynth.evidence.stress.cases import Case, stress_cases
 from graphsynth.evidence.stress.checks import SEVERITY, Check, Checks, Status
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def _nearness(check: Check) -> float:
 def run_case(case: Case) -> Outcome:
     """Run one case; whatever it raises becomes its reason.
 
-    Warnings are not shown: a case that a library warns about is judged by what it returns.
+    Warnings are not shown: what a case returns counts, whatever a library warns about.
 
     Parameters
     ----------
@@ -174,7 +175,7 @@ def run_case(case: Case) -> Outcome:
         Its comparisons, or the reason why it was not run or failed; time and status.
     """
     section = case.name.partition("-")[2].partition(".")[0]
-    checks = Checks(f"{PAGES[case.page]}, section {section}")
+    checks = Checks(f"{case.page_title}, section {section}")
     start, reason, missing = perf_counter(), "", False
     try:
         with warnings.catch_warnings():
@@ -188,7 +189,11 @@ def run_case(case: Case) -> Outcome:
 
 
 def run_stress(
-    names: Iterable[str] = (), *, slow: bool = True, progress: Callable[[Case, int, int], None] | None = None
+    names: Iterable[str] = (),
+    *,
+    slow: bool = True,
+    files: Iterable[Path] = (),
+    progress: Callable[[Case, int, int], None] | None = None,
 ) -> StressReport:
     """Run stress cases one after the other.
 
@@ -198,6 +203,8 @@ def run_stress(
         See `stress_cases`; none: all.
     slow : bool
         With False, slow cases are left out, and listed in ``left_out``.
+    files : iterable of Path
+        Files of own cases, run instead of the shipped ones; they are programs, so name only files that you trust.
     progress : callable, optional
         Called before each case with the case, its number from 0, and how many there are.
 
@@ -218,9 +225,9 @@ def run_stress(
     >>> report.statement
     '1 stress case with 7 checks: 1 ok, 0 flagged, 0 WRONG.'
     """
-    names = list(names)
-    chosen = stress_cases(names, slow=slow)
-    left_out = tuple(case for case in stress_cases(names) if case not in chosen)
+    names, files = list(names), list(files)
+    chosen = stress_cases(names, slow=slow, files=files)
+    left_out = tuple(case for case in stress_cases(names, files=files) if case not in chosen)
     start = perf_counter()
     outcomes: list[Outcome] = []
     with _interrupts() as received, suppress(KeyboardInterrupt):

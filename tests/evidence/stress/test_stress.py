@@ -23,12 +23,14 @@ import pytest
 from graphsynth.cli import main
 from graphsynth.core.errors import GraphsynthError, MissingExtraError, SpecError
 from graphsynth.evidence.stress import Case, Checks, Status, run_case, run_stress, stress_cases
+from graphsynth.evidence.stress import cases as cases_module
 from graphsynth.evidence.stress import running as running_module
-from graphsynth.evidence.stress.catalogue import CASES, PAGES
+from graphsynth.evidence.stress.cases import PAGES
 from graphsynth.evidence.stress.checks import exact
 from graphsynth.evidence.stress.page import stress_html, write_report
 from graphsynth.evidence.stress.running import Outcome, StressReport
 
+CASES = stress_cases()
 DOCS = Path(__file__).parents[3] / "docs"
 
 
@@ -82,9 +84,9 @@ def test_lists_of_different_length_are_wrong():
 
 
 def test_reports_and_statements():
-    assert status_of(("says", (1, 1), {}), ("says", (1, 2), {})) == [Status.FLAGGED, Status.WRONG]
+    assert status_of(("reports", (1, 1), {}), ("reports", (1, 2), {})) == [Status.FLAGGED, Status.WRONG]
     assert status_of(("equals", (5, 5), {}), ("equals", (5, 6), {})) == [Status.OK, Status.WRONG]
-    assert status_of(("agrees", (True,), {}), ("agrees", (0,), {})) == [Status.OK, Status.WRONG]
+    assert status_of(("holds", (True,), {}), ("holds", (0,), {})) == [Status.OK, Status.WRONG]
     assert status_of(("mentions", ("leg 2 is short", "leg 2"), {})) == [Status.FLAGGED]
     assert status_of(("mentions", ("leg 2 is short", "leg 3"), {})) == [Status.WRONG]
     assert status_of(("mentions", ("", ""), {})) == [Status.WRONG]
@@ -142,7 +144,7 @@ def test_a_missing_extra_after_a_check(monkeypatch):
 def wrong_report() -> StressReport:
     checks = Checks("section 1")
     checks.value("x <of> A", 1.0, 2, relative=0.1)
-    checks.says("verdict", "FREE", "FREE")
+    checks.reports("verdict", "FREE", "FREE")
     good = Checks("section 1")
     good.value("y", 1.0, 1)
     outcomes = (Outcome(CASES[0], tuple(checks.rows), 0.5), Outcome(CASES[1], tuple(good.rows), 0.25))
@@ -313,3 +315,107 @@ def test_progress_is_told_before_each_case(monkeypatch):
     monkeypatch.setattr(running_module, "run_case", lambda case: Outcome(case, (), 0.0))
     run_stress(["structure-2"], progress=lambda case, number, total: seen.append((case.name, number, total)))
     assert seen == [(f"structure-2.{k + 1}", k, 3) for k in range(3)]
+
+
+OWN = """
+about = "Own cases"
+use = ["graphsynth.jamming: Bearing"]
+let.bearings = "[Bearing(clearance=c) for c in (0.0, 0.03)]"
+
+[[case]]
+id = "mine-1.10"
+title = "twice"
+[[case.step]]
+for = ["k in (0, 1)", "(a, b), c in (((1, 2), 3),)"]
+when = "k == 1"
+let."low, high" = "(a, c)"
+equals = "{k}: {low:+d} to {high}"
+given = "(low, high, b)"
+is = [1, 3, 2]
+
+[[case]]
+id = "mine-1.2"
+title = "no clearance"
+[[case.step]]
+let.seen = "[]"
+[[case.step]]
+for = "bearing in bearings"
+collect.seen = "bearing.critical_tilt('A').angle"
+[[case.step]]
+value = "critical tilt"
+given = "seen[0]"
+is = "0"
+[[case.step]]
+digits = 50
+let.third = "mp.mpf(1) / 3"
+value = "a third"
+given = "third"
+is = "0.33333333333333333333333333333333333333333333333333"
+absolute = 1e-49
+[[case.step]]
+refused = "a negative radius"
+call = "Bearing(-1.0)"
+words = ["Rb"]
+"""
+
+
+def test_own_cases(capsys, tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(OWN, encoding="utf-8")
+    assert main(["stress", "--cases", str(mine), "--json"]) == 0
+    first, second = json.loads(capsys.readouterr().out)["cases"]
+    assert (first["name"], second["name"]) == ("mine-1.2", "mine-1.10")
+    assert [check["status"] for check in first["checks"]] == ["ok", "ok", "flagged"]
+    assert [check["what"] for check in second["checks"]] == ["1: +1 to 3"]
+    assert main(["stress", "--cases", str(mine), "mine-1.2", "--list"]) == 0
+    assert capsys.readouterr().out.startswith("mine-1.2 ")
+    mine.write_text(OWN.replace("is = [1, 3, 2]", "is = [1, 3, 4]"), encoding="utf-8")
+    assert main(["stress", "--cases", str(mine)]) == 1
+    assert "mine-1.10: 1: +1 to 3: right is (1, 3, 4), given is (1, 3, 2)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('title = "twice"', "", "mine-1.10: title missing"),
+        ('id = "mine-1.2"', 'id = "mine"', "such as mine-1.2"),
+        ('id = "mine-1.2"', 'id = "mine-1.10"', "two stress cases are called mine-1.10"),
+        ("absolute = 1e-49", "absolut = 1e-49", "case mine-1.2: unknown key 'absolut'; did you mean absolute"),
+        ('value = "critical tilt"', 'value = "x"\nbelow = "y"', "one comparison, not value and below"),
+        ('words = ["Rb"]', "words = [", "cannot read stress cases from"),
+    ],
+)
+def test_files_that_are_written_wrongly(tmp_path, old, new, words):
+    assert old in OWN
+    (tmp_path / "mine.toml").write_text(OWN.replace(old, new), encoding="utf-8")
+    with pytest.raises(SpecError, match=re.escape(words)):
+        stress_cases(files=[tmp_path / "mine.toml"])
+
+
+def test_a_name_that_does_not_exist_makes_a_case_wrong(tmp_path):
+    (tmp_path / "mine.toml").write_text(OWN.replace("Bearing(-1.0)", "bering(-1.0)"), encoding="utf-8")
+    (case, _) = stress_cases(files=[tmp_path / "mine.toml"])
+    outcome = run_case(case)
+    assert outcome.status is Status.WRONG and "NameError" in outcome.reason and len(outcome.checks) == 2
+
+
+def test_the_cases_of_a_wheel_are_found(tmp_path, monkeypatch):
+    """A wheel has the files inside of the package, where they come first."""
+    module = tmp_path / "evidence" / "stress" / "cases.py"
+    (tmp_path / "evidence" / "shipped_stress").mkdir(parents=True)
+    (tmp_path / "evidence" / "shipped_stress" / "mine.toml").write_text(OWN, encoding="utf-8")
+    monkeypatch.setattr(cases_module, "__file__", str(module))
+    assert [case.name for case in cases_module._shipped.__wrapped__()] == ["mine-1.2", "mine-1.10"]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_what_a_case_uses_exists(case):
+    case.load()
+    for step in all_steps(case.steps):
+        assert step, case
+
+
+def all_steps(steps):
+    for step in steps:
+        yield step
+        yield from all_steps(step.get("step", ()))
