@@ -1,11 +1,11 @@
-"""What the scenes of the drives share: rows of quantities, how a run was had, motions in closed form for animations."""
+"""What the scenes of the drives share: method and errors of a run, motions in closed form for animations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.pipeline.products import Quantity, Table
+from graphsynth.pipeline.display import quantity_table, table
+from graphsynth.pipeline.products import Table
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.driven.reduction import ReductionStudy
@@ -14,29 +14,9 @@ if TYPE_CHECKING:
 
 __all__ = ["balance_rows", "limit_table", "quantity_table", "shown_motion"]
 
-_COLUMNS = ("quantity", "value", "how had", "error")
-
-
-def quantity_table(title: str, quantities: Iterable[Quantity], note: str = "") -> Table:
-    """Lay out quantities, each with how it was had and how far it may be off.
-
-    Examples
-    --------
-    >>> quantity_table("Motion", [Quantity("speed", 2.0, "rad/s", "estimated", 1e-9)]).rows
-    (('speed', '2 rad/s', 'estimated', '1e-09 rad/s'),)
-    """
-    rows = tuple((q.name, q.text, q.guarantee, _error(q)) for q in quantities)
-    return Table(title, _COLUMNS, rows, note)
-
-
-def _error(quantity: Quantity) -> str:
-    if quantity.error is None:
-        return ""
-    return f"{quantity.error:.1g}{' ' + quantity.unit if quantity.unit else ''}"
-
 
 def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
-    """Say how a run was had: model, method, errors, balances, cost."""
+    """Return model, method, errors, balances and cost of a run."""
     names = ("angle", "speed", *(f"current {k}" for k in range(1, run.currents.shape[1] + 1)))
     units = ("rad", "rad/s", *("A",) * run.currents.shape[1])
     errors = ", ".join(f"{name} {value:.1e} {unit}" for name, value, unit in zip(names, run.error, units))
@@ -55,14 +35,10 @@ def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
 
 def limit_table(study: ReductionStudy) -> Table:
     """Distance from the limit L -> 0 for each inductance."""
-    orders = ("", *(f"{order:.3f}" for order in study.order))
-    rows = tuple(
-        (f"{L:.0e}", f"{angle:.3e}", f"{speed:.3e}", order, str(steps))
-        for L, angle, speed, order, steps in zip(study.inductance, study.angle, study.speed, orders, study.steps)
-    )
-    columns = ("inductance [H]", "angle [rad]", "speed [rad/s]", "order", "steps")
+    rows = zip(study.inductance, study.angle, study.speed, (None, *study.order), map(str, study.steps))
+    columns = ("inductance [H] | .0e", "angle [rad] | .3e", "speed [rad/s] | .3e", "order | .3f", "steps")
     note = "Largest differences from the motor with L = 0 after the electrical transient; the order is 1 in the limit."
-    return Table("The limit L -> 0", columns, rows, note)
+    return table("The limit L -> 0", columns, rows, note)
 
 
 def shown_motion(mechanism: Any, inputs: Any, poses: Any, *, closed: bool) -> Motion:

@@ -1,4 +1,4 @@
-"""What stages hand to one another and to the report: plain frozen data in which a number says how it was had."""
+"""What stages hand to one another and to the report: plain frozen data in which a number names its guarantee."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeVar
 
 from graphsynth.core.errors import GraphsynthError
+from graphsynth.pipeline.units import Unit
 
 __all__ = [
     "Attempt",
@@ -112,7 +113,7 @@ class Recognised:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number with its unit, how it was had and how far it may be off.
+    """A number with its unit, its guarantee and how far it may be off.
 
     Attributes
     ----------
@@ -127,6 +128,20 @@ class Quantity:
     unit: str = ""
     guarantee: Guarantee = "estimated"
     error: float | None = None
+
+    @classmethod
+    def of_si(
+        cls, name: str, value: float, unit: str = "", guarantee: Guarantee = "estimated", error: float | None = None
+    ) -> Quantity:
+        """Return the quantity of an SI value and its SI error, shown in `unit`.
+
+        Examples
+        --------
+        >>> Quantity.of_si("tilt", 0.5, "mrad").text
+        '500 mrad'
+        """
+        shown = Unit.parse(unit)
+        return cls(name, shown.from_si(float(value)), unit, guarantee, None if error is None else shown.from_si(error))
 
     @property
     def text(self) -> str:
@@ -145,7 +160,7 @@ class Record:
     status : {"assessed", "not recognised", "rejected", "failed"}
         A candidate that no module recognises or that a goal rejects is not a failure; all but the first carry a reason.
     good : bool or None
-        Whether the verdict is what a designer hopes for; None if there is none.
+        Whether the verdict is favourable; None if there is none.
     cause : str
         The reason in words that can be counted; empty if the reason is that already.
     """
@@ -171,7 +186,7 @@ class Finding:
     text : str
         The sentence; with a value its caption.
     good : bool or None
-        Whether a designer hopes for it; None if it is neither good nor bad.
+        Whether it is favourable; None if it is neither.
     value : str
         Printed large, over the caption; empty for a sentence.
     """

@@ -196,10 +196,10 @@ class Running:
         """Say which budget is used up, or nothing."""
         budget = self._context.scene.budget
         spent = time.perf_counter() - self._started
-        if budget.time_s is not None and spent > budget.time_s:
-            return f"the time of {budget.time_s:g} s is used up"
-        if budget.memory_MB is not None and (used := memory_in_use()) > budget.memory_MB:
-            return f"{used:.0f} MB of memory are in use, [budget] allows {budget.memory_MB:g} MB"
+        if budget.time is not None and spent > budget.time:
+            return f"the time of {budget.time:g} s is used up"
+        if budget.memory is not None and (used := 1e6 * memory_in_use()) > budget.memory:
+            return f"{used / 1e6:.0f} MB of memory are in use, [budget] allows {budget.memory / 1e6:g} MB"
         return ""
 
     def _refuse_if_used_up(self, stage: Stage) -> None:

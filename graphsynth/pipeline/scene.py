@@ -7,14 +7,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from graphsynth.core.errors import SceneError
 from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
 from graphsynth.core.wording import nearest
 from graphsynth.pipeline.stages import RANK, STRUCTURE, Stage
 from graphsynth.pipeline.system import System, system, system_names
-from graphsynth.pipeline.tables import Place, read_table, require, suggest
+from graphsynth.pipeline.tables import In, Place, read_table, require, suggest
 
 __all__ = [
     "TABLES",
@@ -133,22 +133,17 @@ class BudgetTable:
 
     Attributes
     ----------
-    time_s : float or None
-        Wall time; looked at after each candidate and between stages.
-    memory_MB : float or None
-        Resident memory of the process that runs the scene; looked at at the same places.
+    time : float or None
+        Wall time, seconds; looked at after each candidate and between stages.
+    memory : float or None
+        Resident memory, bytes, of the process that runs the scene; looked at at the same places.
     boxes : int or None
         For stages that pave or prove: the most boxes they may look at.
     """
 
-    time_s: float | None = None
-    memory_MB: float | None = None
-    boxes: int | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("time_s", "memory_MB", "boxes"):
-            value = getattr(self, name)
-            require(value is None or value > 0, f"has {name} = {value}; it must be positive")
+    time: Annotated[float | None, In("s", above=0)] = None
+    memory: Annotated[float | None, In("MB", above=0)] = None
+    boxes: Annotated[int | None, In(above=0)] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,10 +153,7 @@ class ObjectiveTable:
     quantity: str
     goal: Literal["min", "max"] = "min"
     target: float | None = None
-    weight: float = 1.0
-
-    def __post_init__(self) -> None:
-        require(self.weight > 0, f"has weight = {self.weight}; it must be positive")
+    weight: Annotated[float, In(above=0)] = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,11 +161,10 @@ class RankingTable:
     """``[ranking]``: the objectives, and how many candidates the report lists."""
 
     objectives: tuple[ObjectiveTable, ...]
-    show: int = 10
+    show: Annotated[int, In(least=1, why="it must be at least 1")] = 10
 
     def __post_init__(self) -> None:
         require(bool(self.objectives), "has no objectives; name at least one quantity")
-        require(self.show >= 1, f"has show = {self.show}; it must be at least 1")
 
 
 #: Every table of a scene but ``[mechanism]``, which its system describes.
@@ -333,7 +324,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
 
     Examples
     --------
-    >>> load_scene("lambda").mechanism.tilt.alpha_rad == 1 / 30
+    >>> load_scene("lambda").mechanism.tilt.alpha == 1 / 30
     True
     """
     path = find_scene(name_or_path)

@@ -7,12 +7,12 @@ import json
 import types
 import typing
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Union, cast
+from typing import Any, Literal, Union, cast
 
 from graphsynth.core.errors import SceneError
 from graphsynth.pipeline.scene import TABLES
 from graphsynth.pipeline.system import system, system_names
-from graphsynth.pipeline.tables import aliases, unit_of
+from graphsynth.pipeline.tables import fields_of
 
 __all__ = ["scene_schema", "schema_text", "table_schema"]
 
@@ -74,25 +74,25 @@ def table_schema(schema: type) -> dict[str, Any]:
     >>> sorted(found["properties"]), found["description"]
     (['radius', 'radius_mm'], 'A bearing.')
     """
-    hints = typing.get_type_hints(schema, include_extras=True)
-    short = {name: alias for alias, name in aliases(hints).items()}
     properties: dict[str, Any] = {}
     required: list[str] = []
     either: list[dict[str, Any]] = []
-    for field in dataclasses.fields(cast(Any, schema)):
-        unit = unit_of(field.name, hints[field.name]).text
-        value = _value(hints[field.name], unit, True)
-        needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+    for field in fields_of(schema):
+        unit = field.unit.text
+        value = _value(field.kind, unit, True)
         if isinstance(field.default, str | int | float) and str(field.default) not in ("nan", "inf", "-inf"):
-            value = {**value, "default": field.default}
-        properties[field.name] = value
-        alias = short.get(field.name)
-        if alias:
-            properties[alias] = _value(hints[field.name], unit, False)
-            names = [{"required": [field.name]}, {"required": [alias]}]
-            either.append({"oneOf": names} if needed else {"not": {"required": [field.name, alias]}})
-        elif needed:
-            required.append(field.name)
+            written = isinstance(field.default, float) and field.si
+            value = {
+                **value,
+                "default": float(f"{field.unit.from_si(field.default):.12g}") if written else field.default,
+            }
+        properties[field.key] = value
+        if field.alias:
+            properties[field.alias] = _value(field.kind, unit, False)
+            names = [{"required": [field.key]}, {"required": [field.alias]}]
+            either.append({"oneOf": names} if field.required else {"not": {"required": [field.key, field.alias]}})
+        elif field.required:
+            required.append(field.key)
     found: dict[str, Any] = {"type": "object", "properties": properties, "additionalProperties": False}
     summary = (schema.__doc__ or "").strip().partition("\n")[0]
     if summary and not summary.startswith(schema.__name__ + "("):
@@ -105,8 +105,6 @@ def _value(kind: Any, unit: str, bare: bool) -> dict[str, Any]:
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if dataclasses.is_dataclass(kind):
         return table_schema(cast(type, kind))
-    if origin is Annotated:
-        return _value(inner[0], unit, bare)
     if origin is Literal:
         return {"enum": list(inner)}
     if origin in (Union, types.UnionType):

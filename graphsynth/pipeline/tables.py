@@ -1,11 +1,13 @@
-"""Reading a TOML table into a frozen dataclass, with an answer for every mistake.
+"""Reading a TOML table into a frozen dataclass of SI values, with an answer for every mistake.
 
-The dataclass *is* the schema: its field names are the keys, its annotations the types, its defaults the defaults.
-An unknown key, a value of a wrong type or unit and a missing key give one `~graphsynth.core.errors.SceneError` that
-names the file, the line, the key, what was expected and, for a misspelt key, the nearest valid one.
+The dataclass *is* the schema: its annotations are the types, its defaults the defaults.  ``radius: Annotated[float,
+In("mm", above=0)]`` is the key ``radius_mm``, whose bare numbers are millimetres; the file may also write
+``radius_mm = "1.75 cm"`` or ``radius = "1.75 cm"``, and the field holds metres whichever it is.  A field without
+`In` whose own name ends in a unit, ``radius_mm: float``, holds millimetres, as its name says.
 
-The ending of a key says its unit: ``radius_mm = 17.5``.  Instead, a unit may be written: ``radius_mm = "1.75 cm"``, or
-``radius = "1.75 cm"``.  A field whose name does not say its unit carries it: ``Annotated[float, Unit.parse("N/m")]``.
+An unknown key, a value of a wrong type or unit, one out of bounds and a missing key give one
+`~graphsynth.core.errors.SceneError` that names the file, the line, the key, what was expected and, for a misspelt key,
+the nearest valid one.
 """
 
 from __future__ import annotations
@@ -24,19 +26,19 @@ from typing import Annotated, Any, Literal, TypeVar, Union
 from graphsynth.core.errors import SceneError
 from graphsynth.core.wording import nearest
 from graphsynth.pipeline.lines import key_lines, line_of
-from graphsynth.pipeline.units import Unit, convert, split_suffix, split_value
+from graphsynth.pipeline.units import SUFFIXES, Unit, convert, split_suffix, split_value
 
 __all__ = [
     "ANY_LENGTH",
+    "Field",
+    "In",
     "Place",
-    "aliases",
-    "check_positions",
+    "Positions",
+    "fields_of",
     "read_table",
     "require",
-    "require_positive",
     "shortened",
     "suggest",
-    "unit_of",
     "unknown",
     "written",
 ]
@@ -44,7 +46,7 @@ __all__ = [
 T = TypeVar("T")
 
 _WORDS: dict[type, str] = {str: "a string", int: "an integer", float: "a number", bool: "true or false"}
-_NAMED = re.compile(r"(?:has|gives) (\w+)")
+_NAMED = re.compile(r"(?:has|gives|lacks) (\w+)")
 _lines = lru_cache(maxsize=4)(key_lines)
 
 #: Sizes of numbers that are not zero, in the unit of their key: beyond, products of a few of them overflow or vanish.
@@ -52,6 +54,49 @@ SMALLEST, LARGEST = 1e-30, 1e18
 
 #: Annotation of lengths that may be in any one unit: all of them with a written unit, or none.
 ANY_LENGTH = Unit("mm", Fraction(1, 1000), 0, (1, 0, 0, 0, 0, 0))
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class In:
+    """Annotation of a number: the unit of a bare number in the file, and its bounds in that unit.
+
+    Parameters
+    ----------
+    unit : str
+        As `SUFFIXES` lists them, or any other unit; empty for a plain number.
+    above, least, below, most : float
+        Bounds, the first and third excluded.
+    why : str
+        Ends the message; without it the bounds do.
+    """
+
+    unit: str = ""
+    above: float = -math.inf
+    least: float = -math.inf
+    below: float = math.inf
+    most: float = math.inf
+    why: str = ""
+
+    def refusal(self, number: float) -> str:
+        """Return what to do if a number is out of bounds, and nothing if it is within.
+
+        Examples
+        --------
+        >>> In("mm", above=0).refusal(-1.0), In(least=2, most=9).refusal(1), In(above=0).refusal(3.0)
+        ('it must be positive', 'use 2 to 9', '')
+        """
+        if self.above < number < self.below and self.least <= number <= self.most:
+            return ""
+        if self.why or self.below == self.most == math.inf:
+            return self.why or ("it must be positive" if self.above == 0 else f"it must be at least {self.least:g}")
+        if self.least > -math.inf and self.most < math.inf:
+            return f"use {self.least:.15g} to {self.most:.15g}"
+        start = f"more than {self.above:g}" if self.above > -math.inf else f"{self.least:g} or more"
+        return f"use {start} and {f'at most {self.most:g}' if self.most < math.inf else f'less than {self.below:g}'}"
+
+
+#: A number of crank positions of a full rotation.
+Positions = Annotated[int, In(least=8, most=1_000_000, why="use 8 to 1000000 crank positions per turn")]
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -111,18 +156,6 @@ def require(condition: bool, sentence: str) -> None:
         raise SceneError(sentence)
 
 
-def require_positive(table: object, names: Iterable[str], why: str = "it must be positive") -> None:
-    """Raise a `SceneError` unless these keys of a table are positive; `why` ends the sentence."""
-    for name in names:
-        value = getattr(table, name)
-        require(value > 0, f"has {name} = {value}; {why}")
-
-
-def check_positions(positions: int) -> None:
-    """Refuse a number of positions per turn that nobody can mean."""
-    require(8 <= positions <= 1_000_000, f"has positions = {positions}; use 8 to 1000000 crank positions per turn")
-
-
 def suggest(word: str, choices: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` for the nearest choice, or the list of choices if none is near.
 
@@ -149,8 +182,9 @@ def read_table(schema: type[T], table: object, place: Place) -> T:
     ----------
     schema : type
         A dataclass whose fields are ``str``, ``bool``, ``int``, ``float``, ``Literal``, tuples of these,
-        ``X | None``, nested dataclasses or ``Mapping[str, object]`` (kept as it is). A ``float`` field also takes a
-        fraction, ``"1/30"``, because TOML has no exact way to write it, and a number with a unit, ``"2 deg"``.
+        ``X | None``, nested dataclasses or ``Mapping[str, object]`` (kept as it is); numbers may be annotated with
+        `In`. A ``float`` field also takes a fraction, ``"1/30"``, because TOML has no exact way to write it, and a
+        number with a unit, ``"2 deg"``.
     table : object
         The value found in the file.
     place : Place
@@ -164,80 +198,124 @@ def read_table(schema: type[T], table: object, place: Place) -> T:
     Examples
     --------
     >>> @dataclasses.dataclass(frozen=True)
-    ... class Tilt:
-    ...     alpha_rad: float
-    ...     axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
-    >>> read_table(Tilt, {"alpha_rad": "1/4"}, Place("x.toml"))
-    Tilt(alpha_rad=0.25, axis=(1.0, 0.0, 0.0))
-    >>> read_table(Tilt, {"alpha": "250 mrad"}, Place("x.toml")).alpha_rad
+    ... class Bearing:
+    ...     tilt: Annotated[float, In("rad")]
+    ...     radius: Annotated[float, In("mm", above=0)] = 0.01
+    >>> read_table(Bearing, {"tilt_rad": "1/4", "radius_mm": 17.5}, Place("x.toml"))
+    Bearing(tilt=0.25, radius=0.0175)
+    >>> read_table(Bearing, {"tilt": "250 mrad"}, Place("x.toml")).tilt
     0.25
     """
     if not isinstance(table, Mapping):
         raise place.error(f"must be a table, not {_shown(table)}")
-    hints = typing.get_type_hints(schema, include_extras=True)
-    fields = {f.name: f for f in dataclasses.fields(typing.cast(Any, schema))}
-    keys = _keys(table, hints, place)
-    _check_together(hints, table, place)
+    fields = fields_of(typing.cast(type, schema))
+    keys = _keys(table, fields, place)
+    _check_together(fields, table, place)
     values: dict[str, Any] = {}
-    for name, field in fields.items():
-        if name in keys:
-            unit, key = unit_of(name, hints[name]), keys[name]
-            values[name] = _read(hints[name], table[key], place / key, unit, key != name)
-        elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
-            raise place.error(f"lacks the key {name!r} ({_expected(hints[name], unit_of(name, hints[name]))})")
+    for field in fields:
+        if field.name in keys:
+            key = keys[field.name]
+            values[field.name] = _read(field.kind, table[key], place / key, field, key != field.key)
+        elif field.required:
+            raise place.error(f"lacks the key {field.key!r} ({_expected(field.kind, field.unit)})")
     try:
         return schema(**values)
     except SceneError as error:
         named = _NAMED.match(str(error))
-        raise place.error(str(error), keys.get(named[1], "") if named else "") from None
+        by_key = {field.key: keys.get(field.name, "") for field in fields}
+        raise place.error(str(error), by_key.get(named[1], "") if named else "") from None
 
 
-def aliases(hints: Mapping[str, Any]) -> dict[str, str]:
-    """Return the keys that may stand for a field when their value says its unit: name without unit -> field.
+@dataclasses.dataclass(frozen=True, slots=True)
+class Field:
+    """One key of a table.
+
+    Attributes
+    ----------
+    name, key : str
+        Of the field of the dataclass, and in the file.
+    alias : str
+        The key for a value with a written unit; empty if there is none.
+    kind : type
+        The annotation without `In` and unit.
+    unit : Unit
+        Of a bare number.
+    bounds : In or None
+    si : bool
+        The field holds SI; otherwise a number in `unit`.
+    default : object
+        `dataclasses.MISSING` if the key must be given, or if each table has its own.
+    required : bool
+    """
+
+    name: str
+    key: str
+    alias: str
+    kind: Any
+    unit: Unit
+    bounds: In | None
+    si: bool
+    default: Any
+    required: bool
+
+
+_SUFFIX_OF = {unit: suffix for suffix, unit in reversed(SUFFIXES.items())}
+
+
+@lru_cache
+def fields_of(schema: type) -> tuple[Field, ...]:
+    """Return the keys of a table from its frozen dataclass.
 
     Examples
     --------
-    >>> aliases({"radius_mm": float, "teeth": int})
-    {'radius': 'radius_mm'}
+    >>> @dataclasses.dataclass(frozen=True)
+    ... class Gear:
+    ...     radius: Annotated[float, In("mm")]
+    ...     teeth: int = 20
+    >>> [(field.key, field.alias, field.required) for field in fields_of(Gear)]
+    [('radius_mm', 'radius', True), ('teeth', '', False)]
     """
-    short: dict[str, list[str]] = {}
-    for name, kind in hints.items():
-        bare, unit = split_suffix(name)
-        if unit and _is_number(kind):
-            short.setdefault(bare, []).append(name)
-    return {bare: names[0] for bare, names in short.items() if len(names) == 1 and bare not in hints}
+    hints = typing.get_type_hints(schema, include_extras=True)
+    found: list[Field] = []
+    for field in dataclasses.fields(typing.cast(Any, schema)):
+        kind = hints[field.name]
+        notes = typing.get_args(kind)[1:] if typing.get_origin(kind) is Annotated else ()
+        kind = typing.get_args(kind)[0] if notes else kind
+        bounds = next((note for note in notes if isinstance(note, In)), None)
+        si = bounds is not None and bool(bounds.unit)
+        bare, suffix = split_suffix(field.name)
+        known = bounds.unit if bounds and si else suffix
+        unit = next((note for note in notes if isinstance(note, Unit)), Unit.parse(known))
+        key = f"{field.name}_{_SUFFIX_OF[known]}" if si and known in _SUFFIX_OF else field.name
+        alias = field.name if key != field.name else bare if suffix and _is_number(kind) else ""
+        missing = field.default is dataclasses.MISSING
+        required = missing and field.default_factory is dataclasses.MISSING
+        found.append(Field(field.name, key, alias, kind, unit, bounds, si, field.default, required))
+    taken = [key for field in found for key in {field.key, field.alias}]
+    return tuple(dataclasses.replace(f, alias=f.alias if taken.count(f.alias) == 1 else "") for f in found)
 
 
 def _is_number(kind: Any) -> bool:
     return kind is float or any(_is_number(inner) for inner in typing.get_args(kind))
 
 
-def _keys(table: Mapping[str, object], hints: Mapping[str, Any], place: Place) -> dict[str, str]:
+def _keys(table: Mapping[str, object], fields: Iterable[Field], place: Place) -> dict[str, str]:
     """Map each field that is given to the key that gives it."""
-    short = aliases(hints)
+    known = {key: field.name for field in fields for key in (field.key, field.alias) if key}
     keys: dict[str, str] = {}
     for key in table:
-        name = key if key in hints else short.get(key)
+        name = known.get(key)
         if name is None:
-            raise unknown(place, str(key), hints)
+            raise unknown(place, str(key), [field.key for field in fields])
         if name in keys:
             raise place.error(f"gives both {keys[name]!r} and {key!r}; remove one", key)
         keys[name] = key
     return keys
 
 
-def unit_of(name: str, kind: Any) -> Unit:
-    """Return the unit of a bare number: as annotated, else as the ending of the key says."""
-    if typing.get_origin(kind) is Annotated:
-        for note in typing.get_args(kind)[1:]:
-            if isinstance(note, Unit):
-                return note
-    return Unit.parse(split_suffix(name)[1])
-
-
-def _check_together(hints: Mapping[str, Any], table: Mapping[str, object], place: Place) -> None:
+def _check_together(fields: Iterable[Field], table: Mapping[str, object], place: Place) -> None:
     """Refuse lengths "in any one unit" of which some have a written unit and some have none."""
-    names = [name for name, kind in hints.items() if unit_of(name, kind) is ANY_LENGTH and name in table]
+    names = [field.key for field in fields if field.unit is ANY_LENGTH and field.key in table]
     bare = [name for name in names if not (isinstance(table[name], str) and _has_unit(str(table[name])))]
     if bare and len(bare) < len(names):
         raise place.error(
@@ -278,30 +356,42 @@ def exact_number(value: object, unit: Unit) -> Fraction | None:
     return converted if exact and not isinstance(value, bool) else None
 
 
-def _read(kind: Any, value: object, place: Place, unit: Unit, unit_needed: bool = False) -> Any:
+def _read(kind: Any, value: object, place: Place, field: Field, unit_needed: bool) -> Any:
     """Read one value of the annotated `kind`."""
     origin = typing.get_origin(kind)
     if dataclasses.is_dataclass(kind):
         return read_table(typing.cast(type, kind), value, place)
-    if origin is Annotated:
-        return _read(typing.get_args(kind)[0], value, place, unit, unit_needed)
     if origin is Literal:
         return _read_choice(typing.get_args(kind), value, place)
     if origin in (Union, types.UnionType):
         (inner,) = (a for a in typing.get_args(kind) if a is not type(None))
-        return _read(inner, value, place, unit, unit_needed)
+        return _read(inner, value, place, field, unit_needed)
     if origin is tuple:
-        return _read_tuple(typing.get_args(kind), value, place, unit, unit_needed)
+        return _read_tuple(typing.get_args(kind), value, place, field, unit_needed)
     if origin is not None and issubclass(origin, Mapping):
         if not isinstance(value, Mapping):
             raise place.error(f"must be a table, not {_shown(value)}")
         return dict(value)
     if kind is float:
-        return _read_float(value, place, unit, unit_needed)
+        number = _read_float(value, place, field.unit, unit_needed)
+        _check_bounds(number, place, field)
+        return field.unit.to_si(number) if field.si else number
     # bool is a subclass of int: `positions = true` must not pass for 1.
     if isinstance(value, kind) and not (kind is int and isinstance(value, bool)):
+        if kind is int:
+            _check_bounds(value, place, field)
         return value
     raise place.error(f"must be {_WORDS[kind]}, not {_shown(value)}")
+
+
+def _check_bounds(number: float, place: Place, field: Field) -> None:
+    why = field.bounds.refusal(number) if field.bounds else ""
+    if why and place.keys[-1].isdigit():
+        raise place.error(f"is {number}; {why}")
+    if why:
+        raise dataclasses.replace(place, keys=place.keys[:-1]).error(
+            f"has {place.keys[-1]} = {number}; {why}", place.keys[-1]
+        )
 
 
 def _read_float(value: object, place: Place, unit: Unit, unit_needed: bool) -> float:
@@ -317,7 +407,7 @@ def _read_float(value: object, place: Place, unit: Unit, unit_needed: bool) -> f
         raise place.error(f"must be {_wanted(unit, unit_needed)}, not {_shown(value)}")
     if number and not SMALLEST <= abs(number) <= LARGEST:
         raise place.error(
-            f"is {_shown(value)}, which no mechanism has; use 0 or a size from {SMALLEST:g} to {LARGEST:g}"
+            f"is {_shown(value)}, out of range; use 0 or a size from {SMALLEST:g} to {LARGEST:g}"
             f"{' ' + unit.text if unit.text else ''}"
         )
     return number
@@ -336,7 +426,7 @@ def _read_written(value: str, place: Place, unit: Unit, unit_needed: bool) -> fl
             given = Unit.parse(text)
         except ValueError as error:
             raise place.error(
-                f"must be {_wanted(unit, unit_needed)}, not {_shown(value)}: nobody knows the unit {str(error)!r}"
+                f"must be {_wanted(unit, unit_needed)}, not {_shown(value)}: unknown unit {str(error)!r}"
             ) from None
         if not given.agrees(unit):
             raise place.error(f"must be {_wanted(unit, unit_needed)}, not {_shown(value)}, which is {given.quantity}")
@@ -364,7 +454,9 @@ def _read_choice(choices: tuple[Any, ...], value: object, place: Place) -> Any:
     raise place.error(f"must be one of {', '.join(map(repr, choices))}, not {_shown(value)}{hint}")
 
 
-def _read_tuple(kinds: tuple[Any, ...], value: object, place: Place, unit: Unit, unit_needed: bool) -> tuple[Any, ...]:
+def _read_tuple(
+    kinds: tuple[Any, ...], value: object, place: Place, field: Field, unit_needed: bool
+) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
         raise place.error(f"must be a list, not {_shown(value)}")
     if kinds[-1] is Ellipsis:
@@ -372,14 +464,12 @@ def _read_tuple(kinds: tuple[Any, ...], value: object, place: Place, unit: Unit,
     if len(kinds) != len(value):
         raise place.error(f"must be a list of {len(kinds)} values, not {len(value)}")
     pairs = enumerate(zip(kinds, value, strict=True))
-    return tuple(_read(kind, item, place / str(i), unit, unit_needed) for i, (kind, item) in pairs)
+    return tuple(_read(kind, item, place / str(i), field, unit_needed) for i, (kind, item) in pairs)
 
 
 def _expected(kind: Any, unit: Unit) -> str:
     """Say in words what a field takes."""
     origin = typing.get_origin(kind)
-    if origin is Annotated:
-        return _expected(typing.get_args(kind)[0], unit)
     if kind is float and unit.text:
         return _wanted(unit)
     if kind in _WORDS:

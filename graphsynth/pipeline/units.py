@@ -6,15 +6,21 @@ second, ampere, radian and byte.  A value is converted exactly and rounded once.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from typing import Any, TypeVar
 
-__all__ = ["SUFFIXES", "Unit", "convert", "split_suffix", "split_value", "unit_of_key"]
+__all__ = ["DEGREE", "SUFFIXES", "Unit", "convert", "split_suffix", "split_value"]
+
+T = TypeVar("T")
 
 Dimensions = tuple[int, int, int, int, int, int]
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
+#: One degree, radians.
+DEGREE = math.pi / 180.0
 _NONE: Dimensions = (0, 0, 0, 0, 0, 0)
 
 
@@ -40,9 +46,33 @@ class Unit:
         Raises
         ------
         ValueError
-            For a symbol nobody knows; its text is the symbol.
+            For an unknown symbol; its text is the symbol.
         """
         return _parse(text.strip())
+
+    def to_si(self, number: float) -> float:
+        """Return a number in this unit in SI, radians for angles.
+
+        Examples
+        --------
+        >>> Unit.parse("mm").to_si(17.5), Unit.parse("deg").to_si(180.0)
+        (0.0175, 3.141592653589793)
+        """
+        if self.pi == 0:
+            return float(Fraction(number) * self.factor)
+        return math.radians(float(Fraction(number) * self.factor * 180)) * math.pi ** (self.pi - 1)
+
+    def from_si(self, value: T) -> T:
+        """Return an SI value, or an array of them, in this unit.
+
+        Examples
+        --------
+        >>> Unit.parse("°").from_si(math.pi), Unit.parse("mm").from_si(0.002)
+        (180.0, 2.0)
+        """
+        factor = 1 / self.factor if self.pi == 0 else 1 / (self.factor * 180)
+        scaled: Any = value if self.pi == 0 else value * (180.0 / math.pi) / math.pi ** (self.pi - 1)  # type: ignore[operator]
+        return scaled * float(factor) if factor != 1 else scaled  # type: ignore[no-any-return]
 
     def agrees(self, other: Unit) -> bool:
         """Whether both measure the same quantity; a radian may be left out of mechanical and electrical units."""
@@ -76,6 +106,7 @@ def _table() -> dict[str, tuple[Fraction, int, Dimensions]]:
         "min": (Fraction(60), 0, time), "h": (Fraction(3600), 0, time), "t": (Fraction(1000), 0, base["g"]),
         "deg": (Fraction(1, 180), 1, angle), "°": (Fraction(1, 180), 1, angle), "turn": (Fraction(2), 1, angle),
         "arcmin": (Fraction(1, 10800), 1, angle), "arcsec": (Fraction(1, 648000), 1, angle),
+        "′": (Fraction(1, 10800), 1, angle), "″": (Fraction(1, 648000), 1, angle),
         "rpm": (Fraction(1, 30), 1, (0, 0, -1, 0, 1, 0)), "Nm": (Fraction(1), 0, base["J"]),
         "mNm": (Fraction(1, 1000), 0, base["J"]), "Nmm": (Fraction(1, 1000), 0, base["J"]),
         "Ω": (Fraction(1), 0, base["ohm"]),
@@ -84,7 +115,7 @@ def _table() -> dict[str, tuple[Fraction, int, Dimensions]]:
 
 
 _UNITS = _table()
-_SYMBOL = re.compile(r"([^\W\d]+|[%‰°Ω]|1)(?:\^?(-?[1-9])|([²³]))?")
+_SYMBOL = re.compile(r"([^\W\d²³]+|[%‰°′″Ω]|1)(?:\^?(-?[1-9])|([²³]))?")
 
 
 @cache
@@ -149,11 +180,6 @@ def split_suffix(key: str) -> tuple[str, str]:
         if unit:
             return "_".join(parts[:start]), unit
     return key, ""
-
-
-def unit_of_key(key: str) -> Unit:
-    """Return the unit a bare number of this key has."""
-    return Unit.parse(split_suffix(key)[1])
 
 
 _NUMBER = re.compile(

@@ -88,7 +88,7 @@ def test_the_same_bytes_under_dask(springs: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_time_budget_stops_with_what_there_is_and_more_goes_on(springs: Path, tmp_path: Path) -> None:
     scene = with_mechanism(load_scene(springs), pause_s=0.05)
-    report = run(replace(scene, budget=BudgetTable(time_s=0.2)), out=tmp_path / "out")
+    report = run(replace(scene, budget=BudgetTable(time=0.2)), out=tmp_path / "out")
     assert 0 < len(report["records"]) < 20
     assert "time of 0.2 s is used up" in report.notes[0] and "run again" in report.notes[0]
     assert report.notes[0] in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -105,9 +105,9 @@ def test_memory_budget_and_a_budget_before_any_candidate(springs: Path) -> None:
     with pytest.raises(
         SceneError, match=r"\[budget\] stops the run before stage .*MB of memory are in use.*1 MB; raise"
     ):
-        execute(replace(scene, budget=BudgetTable(memory_MB=1.0)))
+        execute(replace(scene, budget=BudgetTable(memory=1e6)))
     with pytest.raises(SceneError, match=r"time of 1e-09 s is used up"):
-        execute(replace(scene, budget=BudgetTable(time_s=1e-9)))
+        execute(replace(scene, budget=BudgetTable(time=1e-9)))
 
 
 def test_a_product_of_another_package_is_found_by_its_name(springs: Path) -> None:

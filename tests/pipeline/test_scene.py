@@ -28,7 +28,7 @@ def test_lambda_scene_has_the_published_dimensions() -> None:
         2.5,
         2.5,
     )
-    assert mechanism.tilt.alpha_rad == 1 / 30
+    assert mechanism.tilt.alpha == 1 / 30
     assert (mechanism.bearing.radius_mm, mechanism.bearing.height_mm, mechanism.bearing.clearance_mm) == (
         17.5,
         10,

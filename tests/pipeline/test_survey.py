@@ -359,7 +359,7 @@ def test_a_time_budget_stops_and_more_goes_on(tmp_path: Path, monkeypatch: pytes
 
     usual = stages.evaluate
     monkeypatch.setattr(stages, "evaluate", lambda c, s: (time.sleep(0.05), usual(c, s))[1])
-    report = run(replace(small(), budget=BudgetTable(time_s=0.15)), out=tmp_path)
+    report = run(replace(small(), budget=BudgetTable(time=0.15)), out=tmp_path)
     assert "time of 0.15 s is used up" in report.notes[0]
     monkeypatch.undo()
     run(small(), out=tmp_path)

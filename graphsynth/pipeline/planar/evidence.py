@@ -6,7 +6,6 @@ has an Assur group of more than two links, or else the first that moves.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -44,7 +43,7 @@ def coupled_joints(context: Any, effort: Effort) -> Problem:
     mechanism, name, span = _own(context)
     driver = mechanism.drivers[0]
     bearing = Bearing(table.radius_mm, table.height_mm, table.clearance_mm)
-    tilt = Misalignment(driver.base, driver.link, math.radians(table.alpha_deg), math.radians(table.direction_deg))
+    tilt = Misalignment(driver.base, driver.link, table.alpha, table.direction)
     return coupled_problem(
         mechanism, bearing_limits(bearing, table.condition), tilt, name, condition=table.condition, inputs=(0.0, span),
         effort=effort,
@@ -63,7 +62,7 @@ def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     mechanism, name, _ = _own(context)
     model = model_of(table, mechanism)
     pair = mechanism.drivers[0].pair
-    start = consistent_start(model, pose=mechanism.pose, keep={pair: 0.0}, keep_rates={pair: table.speed_rad_s})
+    start = consistent_start(model, pose=mechanism.pose, keep={pair: 0.0}, keep_rates={pair: table.speed})
     return dynamics_problem(model, start, 0.5 if effort.quick else 1.0, f"{name}, free", effort)
 
 
@@ -97,7 +96,7 @@ def _own(context: Any) -> tuple[Mechanism, str, float]:
     from graphsynth.pipeline.planar.stages import embody, move, take
     from graphsynth.structure.assur import decompose
 
-    span = math.radians(context.scene.mechanism.motion.span_deg)
+    span = context.scene.mechanism.motion.span
     first, why = None, "there is none"
     for design in islice(take(context), _LOOKED_AT):
         try:

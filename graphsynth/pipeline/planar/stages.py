@@ -120,7 +120,7 @@ def embody(context: Context, design: Candidate | FileCandidate) -> Built:
     margins = [Quantity("length ratio", found.figures.length_ratio)]
     if math.isfinite(found.figures.goal_error):
         margins.insert(0, Quantity("deviation", found.figures.goal_error))
-    mechanism = scaled(found.mechanism, _size(table) / _crank(found.mechanism))
+    mechanism = scaled(found.mechanism, (table.crank or 1.0) / _crank(found.mechanism))
     return Built(f"No. {design.number}", mechanism, tuple(margins))
 
 
@@ -128,32 +128,22 @@ def goals_of(table: EmbodyTable) -> Goals:
     """Return the goals of ``[mechanism.embody]``."""
     from graphsynth.kinematics.dimensional.goals import Goals
 
-    return Goals(
-        math.radians(table.span_deg), math.radians(table.min_transmission_deg), table.max_length_ratio, _target(table)
-    )
+    return Goals(table.span, table.min_transmission, table.max_length_ratio, _target(table))
 
 
 def _target(table: EmbodyTable) -> Target | None:
     from graphsynth.kinematics.dimensional.goals import FunctionGoal, LineGoal, PathGoal, PosesGoal
 
-    def radians(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(map(math.radians, values))
-
     if (line := table.line) is not None:
-        return LineGoal(line.length, math.radians(line.span_deg), line.link, line.on_bar, line.tolerance)
+        return LineGoal(line.length, line.span, line.link, line.on_bar, line.tolerance)
     if (path := table.path) is not None:
-        return PathGoal(path.points, radians(path.inputs_deg) or None, path.link, path.tolerance)
+        return PathGoal(path.points, path.inputs or None, path.link, path.tolerance)
     if (poses := table.poses) is not None:
-        rows = tuple((*p, a) for p, a in zip(poses.points, radians(poses.angles_deg), strict=True))
-        return PosesGoal(rows, radians(poses.inputs_deg), poses.link, poses.tolerance)
+        rows = tuple((*p, a) for p, a in zip(poses.points, poses.angles, strict=True))
+        return PosesGoal(rows, poses.inputs, poses.link, poses.tolerance)
     if (wanted := table.function) is not None:
-        tolerance = math.radians(wanted.tolerance_deg)
-        return FunctionGoal(radians(wanted.inputs_deg), radians(wanted.outputs_deg), wanted.link, tolerance)
+        return FunctionGoal(wanted.inputs, wanted.outputs, wanted.link, wanted.tolerance)
     return None
-
-
-def _size(table: PlanarTable) -> float:
-    return 1.0 if table.crank_mm is None else table.crank_mm / 1000.0
 
 
 def _crank(mechanism: Mechanism) -> float:
@@ -202,18 +192,16 @@ def move(context: Context, built: Built) -> Moved:
     from graphsynth.kinematics.simulation import simulate
 
     table: PlanarTable = context.scene.mechanism
-    span = math.radians(table.motion.span_deg)
-    motion = simulate(built.mechanism, np.linspace(0.0, span, table.motion.positions + 1))
+    motion = simulate(built.mechanism, np.linspace(0.0, table.motion.span, table.motion.positions + 1))
     if not motion.completed:
         raise Rejected("the range is not completed", motion.reason)
-    angle = math.degrees(smallest_transmission(motion))
-    if angle < table.motion.min_transmission_deg:
-        raise Rejected(
-            "the transmission angle is too small", f"{angle:.2f} deg, {table.motion.min_transmission_deg:g} is asked"
-        )
+    angle = smallest_transmission(motion)
+    if angle < table.motion.min_transmission:
+        degrees, least = math.degrees(angle), math.degrees(table.motion.min_transmission)
+        raise Rejected("the transmission angle is too small", f"{degrees:.2f} deg, {least:.10g} is asked")
     margins = (
         *built.margins,
-        Quantity("transmission angle", angle, "deg"),
+        Quantity.of_si("transmission angle", angle, "deg"),
         Quantity("distance to singularity", float(motion.singularity_distance.min())),
         Quantity("size", _extent(motion) / _crank(built.mechanism)),
         exact("links", built.mechanism.graph.links),

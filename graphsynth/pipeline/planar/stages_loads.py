@@ -63,7 +63,7 @@ def jamming(context: Context, moved: Moved) -> Jammed:
             limits,
             tilt,
             condition=table.condition,
-            length_tolerance=table.length_tolerance_percent / 100.0,
+            length_tolerance=table.length_tolerance,
             max_pieces=context.scene.budget.boxes or _PIECES,
             seconds=math.inf,
         )
@@ -73,8 +73,8 @@ def jamming(context: Context, moved: Moved) -> Jammed:
         raise Rejected("the bearings jam" if good is False else "the bearings are not proved free", reason)
     margins = (
         Quantity("use of the clearances", report.worst_factor),
-        Quantity("tilt allowed", table.alpha_deg * report.smallest_scale, "deg"),
-        Quantity("worst input", math.degrees(report.worst_input), "deg"),
+        Quantity.of_si("tilt allowed", table.alpha * report.smallest_scale, "deg"),
+        Quantity.of_si("worst input", report.worst_input, "deg"),
     )
     return Jammed(f"bearings: {verdict.value}", good, margins, reason if verdict is Verdict.UNDECIDED else "")
 
@@ -92,12 +92,12 @@ def _tilt(table: BearingsTable, mechanism: Mechanism) -> Misalignment:
     from graphsynth.jamming.joints.limits import Misalignment
 
     driver = mechanism.drivers[0]
-    alpha, spread = math.radians(table.alpha_deg), math.radians(table.alpha_tolerance_deg)
+    alpha, spread = table.alpha, table.alpha_tolerance
     return Misalignment(
         driver.base,
         driver.link,
         alpha,
-        math.radians(table.direction_deg),
+        table.direction,
         alpha_range=(max(alpha - spread, 0.0), alpha + spread) if spread else None,
         direction_range=(0.0, math.tau) if table.any_direction else None,
     )
@@ -111,7 +111,7 @@ def dynamics(context: Context, moved: Moved) -> Driven:
 
     table: LoadsTable = context.scene.mechanism.loads
     model = model_of(table, moved.motion.mechanism)
-    needed = inverse_dynamics(model, moved.motion, table.speed_rad_s)
+    needed = inverse_dynamics(model, moved.motion, table.speed)
     torque = needed.efforts[:, 0]
     u = moved.motion.inputs
     mean = float(np.trapezoid(torque, u) / (u[-1] - u[0]))
@@ -133,10 +133,10 @@ def model_of(table: LoadsTable, mechanism: Mechanism, elements: tuple[Any, ...] 
     from graphsynth.dynamics.model import DynamicModel
 
     bodies = {link: _body(table, mechanism, link) for link in range(mechanism.graph.links) if link != mechanism.frame}
-    if any(table.force_N) and mechanism.points:
+    if any(table.force) and mechanism.points:
         point = next(iter(mechanism.points.values()))
-        elements = (*elements, Force(point.link, table.force_N, point.at))
-    return DynamicModel(mechanism, bodies, elements, table.gravity_m_s2)
+        elements = (*elements, Force(point.link, table.force, point.at))
+    return DynamicModel(mechanism, bodies, elements, table.gravity)
 
 
 def _body(table: LoadsTable, mechanism: Mechanism, link: int) -> Body:
@@ -160,17 +160,17 @@ def _start_up(table: LoadsTable, motor: MotorTable, moved: Moved) -> tuple[str, 
 
     mechanism = moved.motion.mechanism
     driver = mechanism.drivers[0]
-    slope = motor.stall_Nm / motor.no_load_rad_s
+    slope = motor.stall / motor.no_load
     angle = moved.motion.poses[:2, driver.link, 2] - moved.motion.poses[:2, driver.base, 2]
     sense = math.copysign(1.0, angle[1] - angle[0])  # in which the input grows
 
     def torque(t: float, angle: float, speed: float) -> float:
-        return sense * motor.stall_Nm - slope * speed
+        return sense * motor.stall - slope * speed
 
-    source = TorqueSource(driver.base, driver.link, torque, rotor_inertia=motor.inertia_kg_m2)
+    source = TorqueSource(driver.base, driver.link, torque, rotor_inertia=motor.inertia)
     run = simulate_dynamics(
         model_of(table, mechanism, (source,)),
-        np.linspace(0.0, motor.end_s, _SAMPLES),
+        np.linspace(0.0, motor.end, _SAMPLES),
         pose=moved.motion.poses[0],
         rtol=1e-7,
         atol=1e-9,

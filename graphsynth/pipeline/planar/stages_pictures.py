@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from graphsynth.pipeline.planar.stages import restored
@@ -26,7 +25,7 @@ def _best(context: Context, written: tuple[Outcome, ...], ranking: Ranking) -> l
 
     table: PlanarTable = context.scene.mechanism
     outcomes = {outcome.number: outcome for outcome in written}
-    inputs = np.linspace(0.0, math.radians(table.motion.span_deg), 181)
+    inputs = np.linspace(0.0, table.motion.span, 181)
     return [(n, simulate(restored(outcomes[n]), inputs)) for n in ranking.numbers[: table.pictures]]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -9,10 +10,14 @@ from graphsynth.core.errors import SceneError
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import COLLECT, Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import check_positions, require, require_positive
-from graphsynth.pipeline.units import Unit
+from graphsynth.pipeline.tables import In, Positions, require
+from graphsynth.pipeline.units import DEGREE
 
 __all__ = ["SYSTEM", "BearingsTable", "EmbodyTable", "LoadsTable", "MotionTable", "MotorTable", "PlanarTable"]
+
+
+Deg = Annotated[float, In("deg")]
+Degs = Annotated[tuple[float, ...], In("deg")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +25,7 @@ class LineTable:
     """A point draws a straight segment: length in cranks, part of the turn, largest width over length."""
 
     length: float
-    span_deg: float = 180.0
+    span: Deg = math.pi
     tolerance: float = 0.01
     on_bar: bool = False
     link: int | None = None
@@ -31,7 +36,7 @@ class PathTable:
     """A point passes points in order, at given inputs or at free ones; largest distance over the size of the set."""
 
     points: tuple[tuple[float, float], ...]
-    inputs_deg: tuple[float, ...] = ()
+    inputs: Degs = ()
     tolerance: float = 0.01
     link: int | None = None
 
@@ -41,15 +46,15 @@ class PosesTable:
     """A link passes poses at given inputs: points, and the angles there."""
 
     points: tuple[tuple[float, float], ...]
-    angles_deg: tuple[float, ...]
-    inputs_deg: tuple[float, ...]
+    angles: Degs
+    inputs: Degs
     tolerance: float = 0.01
     link: int | None = None
 
     def __post_init__(self) -> None:
         require(
-            len(self.points) == len(self.angles_deg),
-            f"has {len(self.points)} points and {len(self.angles_deg)} angles_deg; give one angle for each point",
+            len(self.points) == len(self.angles),
+            f"has {len(self.points)} points and {len(self.angles)} angles_deg; give one angle for each point",
         )
 
 
@@ -57,9 +62,9 @@ class PosesTable:
 class FunctionTable:
     """The angle of a link on the frame is a function of the input; only differences of outputs count."""
 
-    inputs_deg: tuple[float, ...]
-    outputs_deg: tuple[float, ...]
-    tolerance_deg: float = 0.5
+    inputs: Degs
+    outputs: Degs
+    tolerance: Deg = 0.5 * DEGREE
     link: int | None = None
 
 
@@ -67,21 +72,17 @@ class FunctionTable:
 class EmbodyTable:
     """Goals for dimensions: bounds, at most one target, and how much work each candidate may cost."""
 
-    span_deg: float = 360.0
-    min_transmission_deg: float = 25.0
+    span: Deg = math.tau
+    min_transmission: Deg = 25.0 * DEGREE
     max_length_ratio: float = 6.0
-    tries: int = 12
-    effort: float = 1.0
+    tries: Annotated[int, In(least=1, most=10_000)] = 12
+    effort: Annotated[float, In(above=0, most=100)] = 1.0
     line: LineTable | None = None
     path: PathTable | None = None
     poses: PosesTable | None = None
     function: FunctionTable | None = None
 
     def __post_init__(self) -> None:
-        require(1 <= self.tries <= 10_000, f"has tries = {self.tries}; use 1 to 10000")
-        require(
-            0 < self.effort <= 100, f"has effort = {self.effort}; use more than 0 and at most 100, 1 is the usual work"
-        )
         targets = [name for name in ("line", "path", "poses", "function") if getattr(self, name) is not None]
         require(len(targets) < 2, f"has {' and '.join(targets)}; only one target works")
 
@@ -90,64 +91,50 @@ class EmbodyTable:
 class MotionTable:
     """The range of the input and what the motion must keep."""
 
-    span_deg: float = 360.0
-    positions: int = 360
-    min_transmission_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_positions(self.positions)
-        require(
-            0 < self.span_deg <= 36_000, f"has span_deg = {self.span_deg}; use more than 0 and at most 36000, 100 turns"
-        )
+    span: Annotated[float, In("deg", above=0, most=36_000, why="use more than 0 and at most 36000, 100 turns")] = (
+        math.tau
+    )
+    positions: Positions = 360
+    min_transmission: Deg = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class BearingsTable:
     """All bearings alike, the driven axis tilted; tolerances are plus or minus, and only certificates use them."""
 
-    radius_mm: float
-    height_mm: float
-    clearance_mm: float
-    alpha_deg: float
+    radius_mm: Annotated[float, In(above=0)]
+    height_mm: Annotated[float, In(above=0)]
+    clearance_mm: Annotated[float, In(least=0)]
+    alpha: Annotated[float, In("deg", above=0)]
     condition: Literal["A", "B"] = "A"
-    direction_deg: float = 0.0
+    direction: Deg = 0.0
     any_direction: bool = False
     certify: bool = False
     must_be_free: bool = False
-    alpha_tolerance_deg: float = 0.0
+    alpha_tolerance: Deg = 0.0
     clearance_tolerance_mm: float = 0.0
-    length_tolerance_percent: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive(self, ("radius_mm", "height_mm", "alpha_deg"))
-        require(self.clearance_mm >= 0, f"has clearance_mm = {self.clearance_mm}; it must not be negative")
+    length_tolerance: Annotated[float, In("%")] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class MotorTable:
     """A motor with a straight characteristic on the driven link: torque at rest, speed without load."""
 
-    stall_Nm: float
-    no_load_rad_s: float
-    end_s: float
-    inertia_kg_m2: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive(self, ("stall_Nm", "no_load_rad_s", "end_s"))
+    stall: Annotated[float, In("Nm", above=0)]
+    no_load: Annotated[float, In("rad/s", above=0)]
+    end: Annotated[float, In("s", above=0)]
+    inertia: Annotated[float, In("kg m^2")] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class LoadsTable:
     """Links as uniform bars between joints, gravity, a force on the first named point; a constant speed, a motor."""
 
-    bar_kg_per_m: Annotated[float, Unit.parse("kg/m")]
-    gravity_m_s2: tuple[float, float] = (0.0, 0.0)
-    force_N: tuple[float, float] = (0.0, 0.0)
-    speed_rad_s: float = 1.0
+    bar_kg_per_m: Annotated[float, In("kg/m", above=0)]
+    gravity: Annotated[tuple[float, float], In("m/s^2")] = (0.0, 0.0)
+    force: Annotated[tuple[float, float], In("N")] = (0.0, 0.0)
+    speed: Annotated[float, In("rad/s")] = 1.0
     motor: MotorTable | None = None
-
-    def __post_init__(self) -> None:
-        require(self.bar_kg_per_m > 0, f"has bar_kg_per_m = {self.bar_kg_per_m}; it must be positive")
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,18 +143,16 @@ class PlanarTable:
 
     module: Literal["planar"]
     files: tuple[str, ...] = ()
-    crank_mm: float | None = None
+    crank: Annotated[float | None, In("mm", above=0)] = None
     embody: EmbodyTable = field(default_factory=EmbodyTable)
     motion: MotionTable = field(default_factory=MotionTable)
     bearings: BearingsTable | None = None
     loads: LoadsTable | None = None
-    pictures: int = 10
+    pictures: Annotated[int, In(least=1)] = 10
 
     def __post_init__(self) -> None:
-        require(self.crank_mm is None or self.crank_mm > 0, f"has crank_mm = {self.crank_mm}; it must be positive")
-        require(self.pictures >= 1, f"has pictures = {self.pictures}; use 1 or more")
         require(
-            bool(self.files) or self.crank_mm is not None or self.loads is None,
+            bool(self.files) or self.crank is not None or self.loads is None,
             "has [mechanism.loads] but no crank_mm; masses need the size of the mechanism: give it",
         )
 

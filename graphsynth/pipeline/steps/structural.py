@@ -105,7 +105,7 @@ def _refuse_none(context: Context, count: int, solutions: tuple[LinkAssortment, 
 
 def _mechanisms(context: Context) -> Iterator[MechanismGraph]:
     """Yield what passes the filters, as long as listing alone does not use up the time of ``[budget]``."""
-    budget = context.scene.budget.time_s
+    budget = context.scene.budget.time
     spent, listed, source = 0.0, 0, _filtered(context)
     while True:
         start = time.perf_counter()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from graphsynth.evidence.rows import Effort, Problem
@@ -16,4 +15,4 @@ def poses(context: Any, effort: Effort) -> Problem:
     from graphsynth.systems.antenna.stages import antenna_of
 
     antenna = antenna_of(context)
-    return pose_problem(antenna, math.radians(context.scene.mechanism.sweep.largest_deg), effort)
+    return pose_problem(antenna, context.scene.mechanism.sweep.largest, effort)

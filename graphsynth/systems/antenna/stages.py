@@ -1,4 +1,4 @@
-"""The antenna of a scene: poses over a sweep, a second model, the twelve equations, singular poses, tolerances."""
+"""The antenna of a scene: a sweep, a second model, the twelve equations, singular poses, tolerances, and the tables."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.pipeline.products import Table
+from graphsynth.pipeline.display import quantity_table, table, unit_in
+from graphsynth.pipeline.products import Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.antenna.system import AntennaTable
 
@@ -30,26 +31,16 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "LENGTH_NAMES",
-    "AntennaMotion",
-    "SecondWay",
-    "SingularPoses",
-    "antenna_of",
-    "compare",
-    "other_model",
-    "second_way",
-    "singular_poses",
-    "solvers",
-    "sweep",
-    "table_of",
-    "tolerances",
-    "widths_of",
-]
+    "AntennaMotion", "CrossCheck", "SingularPoses", "antenna_of", "assess", "compare", "cross_check", "other_model",
+    "singular_poses", "solvers", "sweep", "table_of", "tolerances", "widths_of",
+]  # fmt: skip
 
 #: Keys of the lengths in the order l1 to l5.
-LENGTH_NAMES = ("cardan_mm", "rod_y_mm", "crank_y_mm", "rod_x_mm", "crank_x_mm")
-_SECOND_WAY_POSES = 9
+LENGTH_NAMES = ("cardan", "rod_y", "crank_y", "rod_x", "crank_x")
+_CHECKED_POSES = 9
 _STARTS = 60
+_ROWS = 8
+_ROUNDING = 4.0 * 2.0**-52
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +54,7 @@ class AntennaMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class SecondWay:
+class CrossCheck:
     """The twelve equations solved by Newton's method: largest differences from the closed form, radians."""
 
     phi: NDArray[np.float64]
@@ -99,7 +90,7 @@ def antenna_of(context: Context) -> PointingMechanism:
 
     table = table_of(context)
     try:
-        l1, l2, l3, l4, l5 = (getattr(table.lengths, name) / 1e3 for name in LENGTH_NAMES)
+        l1, l2, l3, l4, l5 = (getattr(table.lengths, name) for name in LENGTH_NAMES)
         return PointingMechanism(l1, l2, l3, l4, l5, order=table.order)
     except GeometryError as error:
         raise (context.scene.place / "mechanism" / "lengths").error(f"cannot be built: {error}") from error
@@ -108,7 +99,7 @@ def antenna_of(context: Context) -> PointingMechanism:
 def widths_of(context: Context) -> list[float]:
     """Tolerances of the five lengths, metres."""
     table = table_of(context).tolerances
-    return [getattr(table, name) / 1e3 for name in LENGTH_NAMES]
+    return [getattr(table, name) for name in LENGTH_NAMES]
 
 
 def other_model(context: Context) -> tuple[PointingMechanism, Reading]:
@@ -128,7 +119,7 @@ def _equal_cranks(context: Context) -> NDArray[np.float64]:
     import numpy as np
 
     table = table_of(context).sweep
-    return np.linspace(0.0, math.radians(table.largest_deg), table.samples)
+    return np.linspace(0.0, table.largest, table.samples)
 
 
 def sweep(context: Context) -> AntennaMotion:
@@ -151,14 +142,14 @@ def compare(context: Context) -> ModelComparison:
     return antenna_of(context).compare(other, _equal_cranks(context), other_reading=reading)
 
 
-def second_way(context: Context, motion: AntennaMotion) -> SecondWay | None:
+def cross_check(context: Context, motion: AntennaMotion) -> CrossCheck | None:
     """Solve the twelve equations at some poses of the sweep; None if it cannot start."""
     import numpy as np
 
     antenna, reached = antenna_of(context), np.flatnonzero(motion.path.reached)
     if reached.size == 0:
         return None
-    chosen = np.unique(reached[np.linspace(0, reached.size - 1, _SECOND_WAY_POSES).round().astype(int)])
+    chosen = np.unique(reached[np.linspace(0, reached.size - 1, _CHECKED_POSES).round().astype(int)])
     phi = motion.phi[chosen]
     found = antenna.solve_loops(phi, phi)
     turned = np.remainder(found.x - motion.passive.x[chosen] + math.pi, math.tau) - math.pi
@@ -169,7 +160,7 @@ def second_way(context: Context, motion: AntennaMotion) -> SecondWay | None:
     last = float(phi[-1])
     charts = antenna.check_chart(0.0, 0.0, "printed"), antenna.check_chart(0.0, 0.0, "corrected")
     survey = antenna.survey_roots(last, last, starts=_STARTS, seed=context.scene.scene.seed)
-    return SecondWay(
+    return CrossCheck(
         phi, found.x, float(found.residual.max()), float(np.abs(turned).max()), float(rates_gap), charts, survey,
         int(antenna.solve(last, last).count),
     )  # fmt: skip
@@ -187,13 +178,12 @@ def singular_poses(context: Context) -> SingularPoses:
 
 
 def tolerances(context: Context) -> tuple[tuple[float, Tolerance], ...]:
-    """Prove bounds of both outputs at the equal crank angles asked for, degrees."""
+    """Prove bounds of both outputs at the equal crank angles asked for, radians."""
     antenna, widths = antenna_of(context), widths_of(context)
     found = []
-    for degrees in table_of(context).tolerances.at_deg:
-        phi = math.radians(degrees)
+    for phi in table_of(context).tolerances.at:
         try:
-            found.append((degrees, antenna.tolerance(phi, phi, widths, converted=True)))
+            found.append((phi, antenna.tolerance(phi, phi, widths, converted=True)))
         except GeometryError as error:
             raise (context.scene.place / "mechanism" / "tolerances").error(f"cannot be used: {error}") from error
     return tuple(found)
@@ -203,7 +193,295 @@ def solvers(context: Context) -> tuple[Table, ...]:
     """Error against run time of the closed form and of the twelve equations; not part of the shipped outputs."""
     from graphsynth.systems.antenna.accuracy import pointing_errors
 
-    found = pointing_errors(antenna_of(context), math.radians(table_of(context).sweep.largest_deg))
-    rows = tuple((row.method, row.setting, f"{row.error:.1e}", f"{1e6 * row.seconds:.3g}") for row in found)
-    columns = ("method", "setting", "error [rad]", "time per pose [µs]")
-    return (Table("Error against run time", columns, rows, "Largest error of both angles, against 50 digits."),)
+    found = pointing_errors(antenna_of(context), table_of(context).sweep.largest)
+    rows = ((row.method, row.setting, row.error, row.seconds) for row in found)
+    columns = ("method", "setting", "error [rad] | .1e", "time per pose [µs] | .3g")
+    return (table("Error against run time", columns, rows, "Largest error of both angles, against 50 digits."),)
+
+
+def assess(
+    context: Context,
+    motion: AntennaMotion,
+    comparison: ModelComparison,
+    check: CrossCheck | None,
+    singular: SingularPoses,
+    bounds: tuple[tuple[float, Tolerance], ...],
+) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
+    """Give the verdict and the tables."""
+    margins = _margins(context, motion, comparison, bounds)
+    record = _verdict(context, motion, comparison, bounds, margins)
+    note = "Angles are of the closed form, bounds are proved by intervals."
+    tables = [
+        quantity_table("Results", margins, note),
+        _structure_table(context),
+        _sweep_table(motion, comparison),
+        _conventions_table(context),
+        _tolerance_table(context, bounds),
+        _rates_table(motion),
+        _modes_table(context),
+        _singular_table(singular),
+    ]
+    if check is not None:
+        tables += [_check_table(check), _unknowns_table(check)]
+    return (record,), tuple(tables)
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.10g}°"
+
+
+def _every(count: int, rows: int = _ROWS) -> list[int]:
+    return sorted({round(i * (count - 1) / rows) for i in range(rows + 1)})
+
+
+def _margins(
+    context: Context,
+    motion: AntennaMotion,
+    comparison: ModelComparison,
+    bounds: tuple[tuple[float, Tolerance], ...],
+) -> tuple[Quantity, ...]:
+    import numpy as np
+
+    limits = table_of(context).sweep
+    poses, last, ends = motion.path.poses, motion.phi.size - 1, f"at {_degrees(limits.largest)}"
+    found = []
+    if motion.path.reached[last]:
+        error = _ROUNDING / float(poses.margin_y[last] * poses.margin_x[last])  # of both angles, radians, estimated
+        separation = float(poses.a[last] - poses.b[last])
+        found += [
+            Quantity.of_si(f"elevation {ends}", poses.a[last], "°", "estimated", error),
+            Quantity.of_si(f"azimuth {ends}", poses.b[last], "°", "estimated", error),
+            Quantity.of_si(f"separation of the two {ends}", separation, "′", "estimated", 2.0 * error),
+        ]
+        for at in (limits.largest, limits.working):
+            value = float(np.interp(at, motion.phi, comparison.arcminutes))
+            computed = at == limits.largest or np.isclose(motion.phi, at, rtol=0, atol=1e-12).any()
+            if computed and math.isfinite(value):
+                name = f"difference of the two models at {_degrees(at)}"
+                found.append(Quantity(name, value, "′", "estimated", unit_in("[′]").from_si(4.0 * error)))
+    for at, tolerance in reversed(bounds):  # the widest rotation first
+        for name, side in (("elevation", tolerance.a), ("azimuth", tolerance.b)):
+            worst = max(map(abs, side.deviation))
+            if math.isfinite(worst):
+                found.append(Quantity(f"largest deviation of the {name} at {_degrees(at)}", worst, "″", "certified"))
+    return tuple(found)
+
+
+def _verdict(
+    context: Context,
+    motion: AntennaMotion,
+    comparison: ModelComparison,
+    bounds: tuple[tuple[float, Tolerance], ...],
+    margins: tuple[Quantity, ...],
+) -> Record:
+    name = "pointing mechanism"
+    if not motion.path.reached.all():
+        return Record(recognised_as=name, verdict=motion.path.message, good=False, margins=margins)
+    undecided = [at for at, found in bounds if found.status]
+    difference = float(comparison.arcminutes[-1])
+    words = "the second model cannot be assembled throughout"
+    if math.isfinite(difference):
+        words = f"the two models differ by {difference:.2f}′ at {_degrees(table_of(context).sweep.largest)}"
+    if undecided:
+        words += f"; tolerances undecided at {', '.join(map(_degrees, undecided))}"
+    elif bounds:
+        from graphsynth.systems.antenna.tolerance import outward_text
+
+        worst = max(max(map(abs, side.deviation)) for _, found in bounds for side in (found.a, found.b))
+        words += f"; tolerances move the beam by at most {outward_text(worst, 1, 2)[1:]}″ about either axis (certified)"
+    return Record(recognised_as=name, verdict=words, good=not undecided, margins=margins)
+
+
+def _structure_table(context: Context) -> Table:
+    graph = antenna_of(context).graph()
+    counts = {
+        "links with the ground": graph.links,
+        "joints": len(graph.joints),
+        "mobility in space": graph.mobility,
+        "independent loops": graph.loops,
+        "loop equations": 6 * graph.loops,
+        "passive coordinates": 6 * graph.loops,
+    }
+    rows = [(name, count, "exact") for name, count in counts.items()]
+    note = "A universal joint counts as 2, a ball joint as 3, a crank pivot as 1. No link can spin about its own axis."
+    return table("Structure", ("quantity", "value", "guarantee"), rows, note)
+
+
+def _sweep_table(motion: AntennaMotion, comparison: ModelComparison) -> Table:
+    poses = motion.path.poses
+    rows = (
+        (
+            motion.phi[k], poses.a[k], poses.b[k], poses.a[k] - poses.b[k], comparison.a[1, k], comparison.b[1, k],
+            f"{comparison.arcminutes[k]:.9g}",
+        )
+        for k in _every(motion.phi.size)
+    )  # fmt: skip
+    columns = (
+        "cranks [°] | .6g",
+        "elevation [°] | 12 .12g",
+        "azimuth [°] | 12 .12g",
+        "elevation − azimuth [′] | 10 .9g",
+        "elevation, second model [°] | 12 .12g",
+        "azimuth, second model [°] | 12 .12g",
+        "difference of means [′]",
+    )
+    ended = motion.path.message
+    note = f"Closed form; rounding error about 1e-16 rad over the sines to the folds. {ended[:1].upper()}{ended[1:]}."
+    return table("Both cranks together, two models", columns, rows, note)
+
+
+def _conventions_table(context: Context) -> Table:
+    """Compare other conventions and length errors: which of them could explain a difference that was seen."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from graphsynth.systems.antenna import Reading
+
+    antenna, largest = antenna_of(context), table_of(context).sweep.largest
+    phi = largest * np.array([0.125, 0.25, 0.375, 0.5, 0.75, 1.0])
+    swapped = replace(antenna, order="XY" if antenna.order == "YX" else "YX")
+    cases: list[tuple[str, PointingMechanism, Reading]] = [
+        (f"gimbal order {swapped.order}", swapped, Reading()),
+        ("both cranks reversed", antenna, Reading(-1, -1)),
+        ("crank of leg Y reversed", antenna, Reading(sense_y=-1)),
+        ("crank of leg X reversed", antenna, Reading(sense_x=-1)),
+        ("leg Y on the other side", antenna, Reading(side_y=-1)),
+        ("tilt of the normal as output", antenna, Reading(output="normal")),
+        ("rod of leg Y longer by 1 mm", replace(antenna, l2=antenna.l2 + 1e-3), Reading()),
+        ("cardans farther by 0.5 mm", replace(antenna, l1=antenna.l1 + 5e-4), Reading()),
+        ("crank of leg Y longer by 0.5 mm", replace(antenna, l3=antenna.l3 + 5e-4), Reading()),
+    ]
+    rows = []
+    for name, other, reading in cases:
+        minutes = antenna.compare(other, phi, other_reading=reading).arcminutes
+        if name.endswith("reversed"):
+            minutes = _sizes(antenna, phi, reading)
+        rows.append((name, *minutes))
+    columns = ("change", *(f"{math.degrees(x):g}° | 3 .3f" for x in phi))
+    note = (
+        "Difference of the means of both angles, minutes of arc, closed form. Of reversed cranks the outputs are "
+        "reversed back. Conventions grow with the third power of the angle or faster; length errors show at once."
+    )
+    return table("What makes two models disagree", columns, rows, note)
+
+
+def _sizes(antenna: PointingMechanism, phi: NDArray[np.float64], reading: Reading) -> NDArray[np.float64]:
+    """Difference of means, minutes of arc, if reversed cranks are counted positive in the direction they turn."""
+    import numpy as np
+
+    here, there = antenna.poses(phi, phi), antenna.poses(reading.sense_y * phi, reading.sense_x * phi)
+    gap = reading.sense_y * there.a - here.a + reading.sense_x * there.b - here.b
+    return np.asarray(0.5 * unit_in("[′]").from_si(gap))
+
+
+def _tolerance_table(context: Context, bounds: tuple[tuple[float, Tolerance], ...]) -> Table:
+    from graphsynth.systems.antenna.tolerance import outward_text
+
+    rows: list[tuple[object, ...]] = []
+    for phi, found in bounds:
+        for name, side in (("elevation", found.a), ("azimuth", found.b)):
+            if found.status:
+                rows.append((phi, name, side.nominal, found.reason, "", "", ""))
+                continue
+            certified = " .. ".join(outward_text(value, end) for value, end in zip(side.deviation, (-1, 1)))
+            corners = " .. ".join(f"{round(value, 4) + 0.0:+.4f}" for value in side.corner_deviation)
+            first = f"±{unit_in('[″]').from_si(side.first_order):.4f}"
+            rows.append((phi, name, side.nominal, certified, corners, first, _excess(side.excess)))
+    columns = (
+        "cranks [°] | g", "angle", "nominal [°] | 9 .9f", "certified [″]", "corners [″]", "first order [″]",
+        "too wide by",
+    )  # fmt: skip
+    widths = ", ".join(
+        f"{name.replace('_', ' ')} ±{unit_in('[mm]').from_si(w):g} mm"
+        for name, w in zip(LENGTH_NAMES, widths_of(context))
+    )
+    note = (
+        f"{widths}. Certified: mean-value form with outward rounding, for all lengths at once; corners: the extremes "
+        "of the 32 corners (estimated, from inside); first order: sum of the derivatives."
+    )
+    return table("What tolerances cost", columns, rows, note)
+
+
+def _excess(excess: float) -> str:
+    """Overestimation in per cent; rounding of the corner values hides a smaller one."""
+    if not math.isfinite(excess):
+        return ""
+    return f"{100 * excess:.1e} %" if excess > 1e-9 else "< 1e-7 %"
+
+
+def _rates_table(motion: AntennaMotion) -> Table:
+    rows = ((motion.phi[k], *motion.rates.jacobian[k].ravel()) for k in _every(motion.phi.size))
+    ratios = ("∂elevation/∂φx", "∂elevation/∂φy", "∂azimuth/∂φx", "∂azimuth/∂φy")
+    columns = ("cranks [°] | .6g", *(f"{name} | 14 .12g" for name in ratios))
+    return table("Velocities of the reflector over those of the cranks", columns, rows, "Closed form; no unit.")
+
+
+def _modes_table(context: Context) -> Table:
+    shown = table_of(context).shown
+    found = antenna_of(context).solve(*shown)
+    rows = [
+        (
+            f"({'+' if sy > 0 else '−'}, {'+' if sx > 0 else '−'})",
+            found.a[k],
+            found.b[k],
+            "contains the rest pose" if (sy, sx) == (1, -1) else "",
+        )
+        for k, (sy, sx) in enumerate(found.signs)
+        if found.distinct[k]
+    ]
+    angles = "φx = {}, φy = {}".format(*map(_degrees, shown))
+    note = f"All {int(found.count)} at cranks {angles} (closed form: no other exists)."
+    columns = ("signs (leg Y, leg X)", "elevation [°] | 9 .9f", "azimuth [°] | 9 .9f", "")
+    return table("Assembly modes", columns, rows, note)
+
+
+def _singular_table(singular: SingularPoses) -> Table:
+    rows = []
+    for fold in singular.folds + ((singular.sweep_fold,) if singular.sweep_fold else ()):
+        words = f"C = {fold.coefficient:.9g} rad^½" if fold.order == 2 else "branches cross"
+        rows.append((f"fold of leg {fold.leg}", fold.phi_x, fold.phi_y, fold.a, fold.b, words))
+    for point in singular.dead_points:
+        name = f"dead centre of leg {point.leg}"
+        rows.append((name, point.phi_x, point.phi_y, point.a, point.b, f"crank {point.kind}"))
+    note = (
+        "Over a full rotation of one crank with the other at rest. At a fold two assembly modes meet and the angle "
+        "moves like C times the square root of the distance; at a dead centre the reflector cannot drive the crank. "
+        f"Cranks turned together up to 180°: {singular.sweep_message}."
+    )
+    angles = (f"{name} [°] | 9 .9f" for name in ("φx", "φy", "elevation", "azimuth"))
+    return table("Folds and dead centres", ("what", *angles, ""), rows, note)
+
+
+def _check_table(check: CrossCheck) -> Table:
+    printed, corrected = check.charts
+    survey = check.survey
+    rows = (
+        ("largest difference of an angle from the closed form", f"{check.difference:.1e} rad"),
+        ("largest residual of the twelve equations", f"{check.residual:.1e}"),
+        ("largest difference of a velocity, from the 12 × 12 Jacobian", f"{check.rates_difference:.1e}"),
+        ("poses compared", str(check.phi.size)),
+        ("rank at rest, equations as printed in the article", f"{printed.rank} of 12: {printed.verdict}"),
+        (
+            "rank at rest, corrected equations",
+            f"{corrected.rank} of 12: {corrected.verdict}, condition {corrected.condition:.2f}",
+        ),
+        (
+            f"random starts at {math.degrees(check.phi[-1]):g}°",
+            f"{survey.starts}: {survey.genuine} genuine roots on {len(survey.modes)} of {check.modes} modes, "
+            f"{survey.false} false orientations rejected, {survey.failed} without root",
+        ),
+    )
+    note = "Newton's method from the rest pose with an analytic Jacobian; the closed form is not used."
+    return table("The twelve loop equations, solved independently", ("", ""), rows, note)
+
+
+def _unknowns_table(check: CrossCheck) -> Table:
+    ends = (0, check.phi.size // 2, check.phi.size - 1)
+    names = (
+        "x1 cardan of leg Y", "x2", "x3 ball joint of leg Y", "x4", "x5", "x6 elevation", "x7 cardan of leg X", "x8",
+        "x9 ball joint of leg X", "x10", "x11", "x12 azimuth",
+    )  # fmt: skip
+    rows = ((name, *(check.angles[k, i] for k in ends)) for i, name in enumerate(names))
+    columns = ("angle", *(f"at cranks {math.degrees(check.phi[k]):g}° [°] | 12 .12g" for k in ends))
+    return table("The twelve unknowns", columns, rows, "Of the equations; the closed form gives the same.")

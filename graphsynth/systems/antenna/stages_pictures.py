@@ -27,11 +27,11 @@ def sketches(context: Context) -> tuple[Picture, ...]:
     """Draw the mechanism in space, then every assembly mode at the same crank angles."""
     from graphsynth.systems.antenna.pictures import pointing_picture
 
-    antenna, shown = antenna_of(context), table_of(context).shown_deg
-    x, y = (math.radians(value) for value in shown)
+    antenna, shown = antenna_of(context), table_of(context).shown
+    x, y = shown
     modes = antenna.solve(x, y)
     there = [signs for k, signs in enumerate(modes.signs) if modes.distinct[k]]
-    at = f"cranks at {shown[0]:g}° and {shown[1]:g}°"
+    at = f"cranks at {math.degrees(x):g}° and {math.degrees(y):g}°"
     pictures = []
     if (1, -1) in there:
         caption = (
@@ -54,7 +54,7 @@ def animations(context: Context, motion: AntennaMotion) -> tuple[Picture, ...]:
 
     from graphsynth.systems.antenna.animation import pointing_animation
 
-    antenna, largest = antenna_of(context), math.radians(table_of(context).sweep.largest_deg)
+    antenna, largest = antenna_of(context), table_of(context).sweep.largest
     turn = np.linspace(0.0, math.tau, _FRAMES)
     x, y = largest * np.sin(turn), largest * np.sin(2.0 * turn)
     words = "The cranks swing by the largest angle of the sweep, leg X twice as fast as leg Y"
@@ -76,10 +76,10 @@ def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) 
 
     table, antenna = table_of(context), antenna_of(context)
     other, reading = other_model(context)
-    largest = math.radians(table.sweep.largest_deg)
+    largest = table.sweep.largest
     figure4 = comparison_picture(
         antenna, other, other_reading=reading, largest=largest, samples=table.sweep.samples,
-        working=math.radians(table.sweep.working_deg), size=(8.6, 3.7),
+        working=table.sweep.working, size=(8.6, 3.7),
     )  # fmt: skip
     pictures = [
         Picture(
@@ -105,37 +105,32 @@ def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) 
 
 
 def _curves(motion: AntennaMotion, comparison: ModelComparison) -> list[Picture]:
-    import numpy as np
+    from graphsynth.drawing.plots import Line
+    from graphsynth.pipeline.display import chart, unit_in
 
-    from graphsynth.drawing.plots import Line, line_plot
-
-    degrees, poses = np.degrees(motion.phi), motion.path.poses
-    x = "crank angle [°]"
-    separation = 60.0 * np.degrees(poses.a - poses.b)
-    apart = line_plot(
-        [Line(degrees, comparison.arcminutes, "means of two models", "a"),
-         Line(degrees, separation, "a − b of one model", "b", "--")], x, "difference [′]",
-    )  # fmt: skip
-    J = motion.rates.jacobian
-    slopes = line_plot(
-        [Line(degrees, J[:, 0, 0], "∂a/∂φx", "a"), Line(degrees, J[:, 0, 1], "∂a/∂φy", "b", "--"),
-         Line(degrees, J[:, 1, 0], "∂b/∂φx", "c", ":"), Line(degrees, J[:, 1, 1], "∂b/∂φy", "d", "-.")],
-        x, "velocity ratio",
-    )  # fmt: skip
-    angles = np.degrees(motion.passive.x)
-    leg_y = line_plot(_lines(degrees, angles, (0, 1, 2, 3, 4)), x, "angle [°]")
-    leg_x = line_plot(_lines(degrees, angles, (6, 7, 8, 9, 10)), x, "angle [°]")
+    phi, poses, J, passive = motion.phi, motion.path.poses, motion.rates.jacobian, motion.passive.x
+    x, minute = "crank angle [°]", unit_in("[′]").to_si(1.0)
+    growth = [
+        Line(phi, comparison.arcminutes * minute, "means of two models", "a"),
+        Line(phi, poses.a - poses.b, "a − b of one model", "b", "--"),
+    ]
+    slopes = [
+        Line(phi, J[:, row, column], f"∂{angle}/∂φ{crank}", colour, style)
+        for (row, column, angle, crank), colour, style in zip(
+            ((0, 0, "a", "x"), (0, 1, "a", "y"), (1, 0, "b", "x"), (1, 1, "b", "y")), "abcd", ("-", "--", ":", "-.")
+        )
+    ]
+    ratios = "Of the reflector (a elevation, b azimuth) to the cranks (φx leg Y, φy leg X)."
+    leg_y, leg_x = _lines(phi, passive, range(5)), _lines(phi, passive, range(6, 11))
     return [
-        Picture("Growth of the differences", apart, "Equal cranks; a: elevation, b: azimuth."),
-        Picture(
-            "Velocity ratios", slopes, "Of the reflector (a elevation, b azimuth) to the cranks (φx leg Y, φy leg X)."
-        ),
-        Picture("Passive angles of leg Y", leg_y, "x1, x2: cardan; x3, x4, x5: ball joint."),
-        Picture("Passive angles of leg X", leg_x, "x7, x8: cardan; x9, x10, x11: ball joint."),
+        chart("Growth of the differences", growth, x, "difference [′]", "Equal cranks; a: elevation, b: azimuth."),
+        chart("Velocity ratios", slopes, x, "velocity ratio", ratios),
+        chart("Passive angles of leg Y", leg_y, x, "angle [°]", "x1, x2: cardan; x3, x4, x5: ball joint."),
+        chart("Passive angles of leg X", leg_x, x, "angle [°]", "x7, x8: cardan; x9, x10, x11: ball joint."),
     ]
 
 
-def _lines(x: Any, columns: Any, which: tuple[int, ...]) -> list[Any]:
+def _lines(x: Any, columns: Any, which: range) -> list[Any]:
     from graphsynth.drawing.plots import Line
 
     colours, styles = ("a", "b", "c", "d", "note"), ("-", "--", "-.", ":", "-")

@@ -3,47 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import require, require_positive
+from graphsynth.pipeline.tables import In, require
+from graphsynth.pipeline.units import DEGREE
 
 __all__ = ["SYSTEM", "AntennaComparison", "AntennaLengths", "AntennaSweep", "AntennaTable", "AntennaTolerances"]
+
+_Length = Annotated[float, In("mm", above=0, why="a length must be positive")]
+_Tolerance = Annotated[float, In("mm", least=0, why="a tolerance must not be negative")]
 
 
 @dataclass(frozen=True, slots=True)
 class AntennaLengths:
     """Distance of both cardans from the centre, rods and cranks of leg Y (elevation) and leg X (azimuth)."""
 
-    cardan_mm: float
-    rod_y_mm: float
-    crank_y_mm: float
-    rod_x_mm: float
-    crank_x_mm: float
-
-    def __post_init__(self) -> None:
-        require_positive(
-            self, ("cardan_mm", "rod_y_mm", "crank_y_mm", "rod_x_mm", "crank_x_mm"), "a length must be positive"
-        )
+    cardan: _Length
+    rod_y: _Length
+    crank_y: _Length
+    rod_x: _Length
+    crank_x: _Length
 
 
 @dataclass(frozen=True, slots=True)
 class AntennaSweep:
     """Equal angles of both cranks, from 0 to `largest_deg`; the article calls `working_deg` the working limit."""
 
-    largest_deg: float = 40.0
-    samples: int = 161
-    working_deg: float = 15.0
+    largest: Annotated[float, In("deg", above=0, most=360, why="use 0 to 360 degrees")] = 40.0 * DEGREE
+    samples: Annotated[int, In(least=9, most=100_000)] = 161
+    working: Annotated[float, In("deg", above=0)] = 15.0 * DEGREE
 
     def __post_init__(self) -> None:
-        require(0 < self.largest_deg <= 360, f"has largest_deg = {self.largest_deg}; use 0 to 360 degrees")
-        require(9 <= self.samples <= 100_000, f"has samples = {self.samples}; use 9 to 100000")
-        require(
-            0 < self.working_deg <= self.largest_deg,
-            f"has working_deg = {self.working_deg}; it must be positive and not above largest_deg",
-        )
+        require(self.working <= self.largest, f"has working_deg = {self.working / DEGREE:g}, above largest_deg; make it smaller")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +56,13 @@ class AntennaComparison:
 class AntennaTolerances:
     """Plus and minus of every length, the equal crank angles at which bounds are proved, and the nodes of the map."""
 
-    cardan_mm: float = 0.0
-    rod_y_mm: float = 0.0
-    crank_y_mm: float = 0.0
-    rod_x_mm: float = 0.0
-    crank_x_mm: float = 0.0
-    at_deg: tuple[float, ...] = (0.0, 15.0, 40.0)
-    map_nodes: int = 9
-
-    def __post_init__(self) -> None:
-        for name in ("cardan_mm", "rod_y_mm", "crank_y_mm", "rod_x_mm", "crank_x_mm"):
-            require(getattr(self, name) >= 0, f"has {name} = {getattr(self, name)}; a tolerance must not be negative")
-        require(2 <= self.map_nodes <= 101, f"has map_nodes = {self.map_nodes}; use 2 to 101 along each axis")
+    cardan: _Tolerance = 0.0
+    rod_y: _Tolerance = 0.0
+    crank_y: _Tolerance = 0.0
+    rod_x: _Tolerance = 0.0
+    crank_x: _Tolerance = 0.0
+    at: Annotated[tuple[float, ...], In("deg")] = (0.0, 15.0 * DEGREE, 40.0 * DEGREE)
+    map_nodes: Annotated[int, In(least=2, most=101, why="use 2 to 101 along each axis")] = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +79,7 @@ class AntennaTable:
     sweep: AntennaSweep = field(default_factory=AntennaSweep)
     comparison: AntennaComparison = field(default_factory=AntennaComparison)
     tolerances: AntennaTolerances = field(default_factory=AntennaTolerances)
-    shown_deg: tuple[float, float] = (35.0, 25.0)
+    shown: Annotated[tuple[float, float], In("deg")] = (35.0 * DEGREE, 25.0 * DEGREE)
 
 
 _HERE = "graphsynth.systems.antenna"
@@ -100,12 +89,12 @@ SYSTEM = System(
     stages=(
         Stage("sweep", f"{_HERE}.stages:sweep", (), ("sweep",)),
         Stage("compare models", f"{_HERE}.stages:compare", (), ("comparison",)),
-        Stage("solve the twelve equations", f"{_HERE}.stages:second_way", ("sweep",), ("second_way",)),
+        Stage("solve the twelve equations", f"{_HERE}.stages:cross_check", ("sweep",), ("second_way",)),
         Stage("find singular poses", f"{_HERE}.stages:singular_poses", (), ("singular_poses",)),
         Stage("prove tolerances", f"{_HERE}.stages:tolerances", (), ("tolerances",)),
         Stage(
-            "judge",
-            f"{_HERE}.stages_tables:judge",
+            "assess",
+            f"{_HERE}.stages:assess",
             ("sweep", "comparison", "second_way", "singular_poses", "tolerances"),
             ("records", "tables"),
         ),

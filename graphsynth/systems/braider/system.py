@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import check_positions, require, require_positive
+from graphsynth.pipeline.tables import In, Positions, require
 
 __all__ = ["SYSTEM", "BraiderTable", "MotorTable", "StartTable", "SwitchTable", "ThreadTable", "TrainTable"]
+
+_Length = Annotated[float, In(above=0, why="a length must be positive")]
 
 
 @dataclass(frozen=True, slots=True)
 class LinkageTable:
     """Crank O1A, coupler AB, rocker BO2, frame O1O2; +1: B on the left of the line from A to O2."""
 
-    crank_mm: float
-    coupler_mm: float
-    rocker_mm: float
-    frame_mm: float
+    crank_mm: _Length
+    coupler_mm: _Length
+    rocker_mm: _Length
+    frame_mm: _Length
     branch: Literal[1, -1] = 1
-
-    def __post_init__(self) -> None:
-        require_positive(self, ("crank_mm", "coupler_mm", "rocker_mm", "frame_mm"), "a length must be positive")
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +111,10 @@ class BraiderTable:
     motor: MotorTable
     start: StartTable = field(default_factory=StartTable)
     speed_rad_s: float = 1.803
-    positions: int = 360
+    positions: Positions = 360
     inductances_H: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
 
     def __post_init__(self) -> None:
-        check_positions(self.positions)
         require(self.speed_rad_s != 0, "has speed_rad_s = 0; give the speed of the crank for the sensors")
         require(all(x > 0 for x in self.inductances_H), "has an inductances_H that is not positive; each must be")
 

@@ -28,7 +28,7 @@ def _box(context: Any) -> Any:
     crank = Fraction(repr(table.lengths.crank))
     bearing = table.bearing
     return ToleranceBox(
-        2 * crank, crank, crank * 5 / 2, crank * 5 / 2, repr(table.tilt.alpha_rad), table.tilt.axis,
+        2 * crank, crank, crank * 5 / 2, crank * 5 / 2, repr(table.tilt.alpha), table.tilt.axis,
         Rb=repr(bearing.radius_mm), Hb=repr(bearing.height_mm), clearance=repr(bearing.clearance_mm),
     )  # fmt: skip
 

@@ -48,7 +48,7 @@ def close_form(table: SurveyTable, lengths: NDArray[np.int64]) -> Jamming:
 
     own = table.bearing
     bearing = Bearing(own.radius_mm, own.height_mm, own.clearance_mm)
-    unit = TiltedFourBar(1.0, 1.0, 1.0, 1.0, alpha=table.tilt.alpha_rad, axis=table.tilt.axis)
+    unit = TiltedFourBar(1.0, 1.0, 1.0, 1.0, alpha=table.tilt.alpha, axis=table.tilt.axis)
     ratios, which = np.unique(lengths[:, 1] / lengths[:, 2], return_inverse=True)
     sine = np.minimum(unit.pin_height * ratios, 1.0)
     critical = bearing.critical_tilt(own.condition)

@@ -174,11 +174,12 @@ def box_of(context: Context, lattice: Lattice, lengths: list[int]) -> ToleranceB
 def _written(context: Context, path: tuple[str, ...], field: str, table: object) -> Fraction:
     """Return a number as it stands in the file; as the double it is if the scene was changed after reading."""
     from graphsynth.pipeline.tables import written
+    from graphsynth.pipeline.units import split_suffix
 
     raw: Any = context.scene.raw.get("mechanism", {})
     for key in path:
         raw = raw.get(key, {}) if isinstance(raw, dict) else {}
-    value = float(getattr(table, field))
+    value = float(getattr(table, field if hasattr(table, field) else split_suffix(field)[0]))
     number = written(raw, field)
     return number if number is not None and float(number) == value else Fraction(value)
 

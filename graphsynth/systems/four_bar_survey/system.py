@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import require
+from graphsynth.pipeline.tables import In, require
 from graphsynth.systems.lambda_linkage.system import BearingTable, Tilt
 
 __all__ = ["SYSTEM", "Grashof", "RangeTable", "SurveyLengths", "SurveyLimits", "SurveyTable", "SurveyTolerances"]
 
 _MOST = 10**8
+_Length = Annotated[float, In(above=0, why="a length must be positive")]
+_Tolerance = Annotated[float, In(least=0, why="a tolerance is zero or more")]
 
 Grashof = Literal["crank-rocker", "double crank"]
 Column = Literal[
@@ -27,13 +29,11 @@ Column = Literal[
 class RangeTable:
     """Lengths from `first` to `last` in steps of `step`."""
 
-    first: float
+    first: _Length
     last: float
-    step: float
+    step: Annotated[float, In(above=0)]
 
     def __post_init__(self) -> None:
-        require(self.first > 0, f"has first = {self.first}; a length must be positive")
-        require(self.step > 0, f"has step = {self.step}; it must be positive")
         require(self.last >= self.first, f"has last = {self.last}, less than first = {self.first}; exchange them")
 
 
@@ -44,10 +44,9 @@ class SurveyLengths:
     frame: RangeTable
     coupler: RangeTable
     rocker: RangeTable
-    crank: float = 1.0
+    crank: _Length = 1.0
 
     def __post_init__(self) -> None:
-        require(self.crank > 0, f"has crank = {self.crank}; a length must be positive")
         sets = math.prod((r.last - r.first) / r.step + 1.0 for r in (self.frame, self.coupler, self.rocker))
         require(
             sets <= 1.001 * _MOST,
@@ -61,32 +60,23 @@ class SurveyLimits:
     """What a set must keep to be ranked; only sets whose crank turns fully are."""
 
     types: tuple[Grashof, ...] = ("crank-rocker",)
-    transmission_deg: float = 30.0
+    transmission_deg: Annotated[float, In(least=0, below=90)] = 30.0
     free: bool = True
 
     def __post_init__(self) -> None:
         require(bool(self.types), "has no types; name crank-rocker, double crank or both")
-        require(
-            0 <= self.transmission_deg < 90,
-            f"has transmission_deg = {self.transmission_deg}; an angle of 0 or more and less than 90 degrees is asked",
-        )
 
 
 @dataclass(frozen=True, slots=True)
 class SurveyTolerances:
     """Plus or minus, for the certificates: of all four lengths, the tilt and its azimuth, the bearing."""
 
-    lengths_percent: float = 0.0
-    alpha_rad: float = 0.0
-    azimuth_rad: float = 0.0
-    radius_mm: float = 0.0
-    height_mm: float = 0.0
-    clearance_mm: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            require(value >= 0, f"has {name} = {value}; a tolerance is zero or more")
+    lengths_percent: _Tolerance = 0.0
+    alpha_rad: _Tolerance = 0.0
+    azimuth_rad: _Tolerance = 0.0
+    radius_mm: _Tolerance = 0.0
+    height_mm: _Tolerance = 0.0
+    clearance_mm: _Tolerance = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +90,8 @@ class SurveyTable:
     limits: SurveyLimits = field(default_factory=SurveyLimits)
     tolerances: SurveyTolerances = field(default_factory=SurveyTolerances)
     positions: int = 72
-    shard: int = 20_000
-    certify: int = 1000
+    shard: Annotated[int, In(least=100, most=1_000_000, why="use 100 to 1000000 sets")] = 20_000
+    certify: Annotated[int, In(least=1, most=1_000_000, why="use 1 to 1000000 sets")] = 1000
     rows: Literal["all", "passing"] = "passing"
     columns: tuple[Column, ...] = (
         "frame", "coupler", "rocker", "type", "transmission angle", "rocker swing", "size", "largest axis tilt",
@@ -113,10 +103,8 @@ class SurveyTable:
             8 <= self.positions <= 3600 and self.positions % 2 == 0,
             f"has positions = {self.positions}; give an even number from 8 to 3600, so that both dead centres are met",
         )
-        require(100 <= self.shard <= 1_000_000, f"has shard = {self.shard}; use 100 to 1000000 sets")
-        require(1 <= self.certify <= 1_000_000, f"has certify = {self.certify}; use 1 to 1000000 sets")
         require(bool(self.columns), "has columns = []; name at least one")
-        require(abs(self.tilt.alpha_rad) < math.pi / 4, "has a tilt of 45 degrees or more; no bearing is meant for it")
+        require(abs(self.tilt.alpha) < math.pi / 4, "has a tilt of 45 degrees or more; no bearing is meant for it")
 
 
 _HERE = "graphsynth.systems.four_bar_survey"

@@ -77,7 +77,7 @@ def _move(table: LambdaTable) -> LambdaMotion:
         lengths.coupler,
         lengths.rocker,
         sgn=table.branch,
-        alpha=table.tilt.alpha_rad,
+        alpha=table.tilt.alpha,
         axis=table.tilt.axis,
     )
     f = np.linspace(0.0, math.tau, table.positions + 1)

@@ -55,7 +55,8 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
     given: dict[str, Any] = {"azimuth": 0}
     for name, place in _TOLERANCES.values():
         if place:
-            given[name] = _exact(_inside(raw, *place), getattr(getattr(table, place[0]), place[1]))
+            part = getattr(table, place[0])
+            given[name] = _exact(_inside(raw, *place), getattr(part, place[1].removesuffix("_rad")))
     axis = [_exact(number, value) for number, value in zip(_axis(raw), table.tilt.axis)]
     for key, size in table.tolerances.items() if tolerances else ():
         name = _tolerance_name(context, key)

@@ -10,49 +10,42 @@ from typing import Annotated, Literal
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import ANY_LENGTH, check_positions, require, require_positive
+from graphsynth.pipeline.tables import ANY_LENGTH, In, Positions, require
 
 __all__ = ["SYSTEM", "BearingTable", "LambdaLengths", "LambdaTable", "Tilt"]
+
+_Length = Annotated[float, ANY_LENGTH, In(above=0, why="a length must be positive")]
 
 
 @dataclass(frozen=True, slots=True)
 class LambdaLengths:
     """Link lengths of the four-bar, in any one unit: the model only uses their ratios."""
 
-    frame: Annotated[float, ANY_LENGTH]
-    crank: Annotated[float, ANY_LENGTH]
-    coupler: Annotated[float, ANY_LENGTH]
-    rocker: Annotated[float, ANY_LENGTH]
-
-    def __post_init__(self) -> None:
-        require_positive(self, ("frame", "crank", "coupler", "rocker"), "a length must be positive")
+    frame: _Length
+    crank: _Length
+    coupler: _Length
+    rocker: _Length
 
 
 @dataclass(frozen=True, slots=True)
 class Tilt:
     """Tilt of the motor axis: by `alpha_rad` about the direction `axis`."""
 
-    alpha_rad: float
+    alpha: Annotated[float, In("rad", above=-math.pi / 2, below=math.pi / 2, why="it must be within pi/2")]
     axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         require(any(self.axis), "has axis [0, 0, 0]; a direction must not vanish")
-        require(abs(self.alpha_rad) < math.pi / 2, f"has alpha_rad = {self.alpha_rad}; it must be within pi/2")
 
 
 @dataclass(frozen=True, slots=True)
 class BearingTable:
     """The bearing at B: radius, height and radial clearance in millimetres, and the contact condition."""
 
-    radius_mm: float
-    height_mm: float
-    clearance_mm: float
+    radius_mm: Annotated[float, In(above=0)]
+    height_mm: Annotated[float, In(above=0)]
+    clearance_mm: Annotated[float, In(least=0)]
     condition: Literal["A", "B"] = "A"
-
-    def __post_init__(self) -> None:
-        require(self.radius_mm > 0, f"has radius_mm = {self.radius_mm}; it must be positive")
-        require(self.height_mm > 0, f"has height_mm = {self.height_mm}; it must be positive")
-        require(self.clearance_mm >= 0, f"has clearance_mm = {self.clearance_mm}; it must not be negative")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +57,8 @@ class LambdaTable:
     tilt: Tilt
     bearing: BearingTable
     branch: Literal[1, -1] = 1
-    positions: int = 360
+    positions: Positions = 360
     tolerances: Mapping[str, object] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        check_positions(self.positions)
 
 
 _HERE = "graphsynth.systems.lambda_linkage"

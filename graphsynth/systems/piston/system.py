@@ -9,7 +9,7 @@ from typing import Literal
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import check_positions, require
+from graphsynth.pipeline.tables import Positions, require
 
 __all__ = ["SYSTEM", "DriveTable", "FrictionTable", "GasTable", "GroupTable", "MassTable", "PistonTable"]
 
@@ -105,10 +105,9 @@ class PistonTable:
     gravity_m_s2: tuple[float, float] = (0.0, 0.0)
     piston_length_mm: float | None = None
     square_errors_deg: tuple[float, ...] = (0.0, 1.0, 2.0, 5.0, 10.0)
-    positions: int = 24
+    positions: Positions = 24
 
     def __post_init__(self) -> None:
-        check_positions(self.positions)
         require(bool(self.kinds), "has no kinds; name crank_slider, scotch_yoke or both")
         require(len(set(self.kinds)) == len(self.kinds), f"has kinds that repeat in {list(self.kinds)}; remove one")
         require(self.speed_rad_s != 0, "has speed_rad_s = 0; a turn needs a speed")

@@ -54,11 +54,11 @@ def drive(context: Any, effort: Effort) -> Problem:
         raise GeometryError("the scene has no table [mechanism.drive], so no motor")
     from graphsynth.systems.platform.motor_stages import dc_motor
 
-    motor = dc_motor(table.motor, table.resistances_ohm[0])
+    motor = dc_motor(table.motor, table.resistances[0])
     model = MotorDrivenPlatform.of_machine(
-        _mechanism(context), motor, mass=table.mass_kg, gyration=table.gyration_mm / 1e3,
-        mass_centre=complex(*table.mass_centre_mm) / 1e3, wheel_inertia=table.wheel_inertia_kg_m2,
-        pinion_inertia=table.pinion_inertia_kg_m2, efficiency=table.efficiency, friction=table.friction_Nm_s_per_rad,
-        load=table.load_Nm,
+        _mechanism(context), motor, mass=table.mass, gyration=table.gyration,
+        mass_centre=complex(*table.mass_centre), wheel_inertia=table.wheel_inertia,
+        pinion_inertia=table.pinion_inertia, efficiency=table.efficiency, friction=table.friction,
+        load=table.load,
     )  # fmt: skip
-    return drive_problem(model.plant(), model.motor, model.train, table.end_s, effort)
+    return drive_problem(model.plant(), model.motor, model.train, table.end, effort)

@@ -17,8 +17,8 @@ def drive(context: Any, effort: Effort) -> Problem:
     table = context.scene.mechanism
     from graphsynth.systems.platform.motor_stages import drive_of
 
-    model = drive_of(context, table.resistances_ohm[0])
-    return drive_problem(model.plant(), model.motor, model.train, table.end_s, effort)
+    model = drive_of(context, table.resistances[0])
+    return drive_problem(model.plant(), model.motor, model.train, table.end, effort)
 
 
 def small_inductance(context: Any, effort: Effort) -> Problem:
@@ -28,9 +28,9 @@ def small_inductance(context: Any, effort: Effort) -> Problem:
     from graphsynth.evidence.drives import reduction_problem
 
     limit = context.scene.mechanism.limit
-    if len(limit.inductances_H) < 3:
+    if len(limit.inductances) < 3:
         raise GeometryError("the scene names fewer than three inductances, so there is no limit to compare")
     from graphsynth.systems.platform.motor_stages import drive_of
 
-    model = drive_of(context, limit.resistance_ohm)
-    return reduction_problem(model, np.linspace(0.0, limit.end_s, 26), limit.inductances_H, effort)
+    model = drive_of(context, limit.resistance)
+    return reduction_problem(model, np.linspace(0.0, limit.end, 26), limit.inductances, effort)

@@ -70,14 +70,14 @@ def dc_motor(
 
     return DCMotor(
         resistance=resistance,
-        inductance=m.inductance_H if inductance is None else inductance,
-        torque_constant=m.torque_constant_Nm_per_A,
-        emf_constant=m.emf_constant_V_per_rad_s,
-        gain=m.gain_V_per_rad_s,
-        speed=m.speed_rad_s if speed is None else speed,
-        voltage_limit=math.inf if m.voltage_limit_V is None else m.voltage_limit_V,
-        rotor_inertia=m.rotor_inertia_kg_m2,
-        friction=m.friction_Nm_s_per_rad,
+        inductance=m.inductance if inductance is None else inductance,
+        torque_constant=m.torque_constant,
+        emf_constant=m.emf_constant,
+        gain=m.gain,
+        speed=m.speed if speed is None else speed,
+        voltage_limit=math.inf if m.voltage_limit is None else m.voltage_limit,
+        rotor_inertia=m.rotor_inertia,
+        friction=m.friction,
     )
 
 
@@ -92,8 +92,8 @@ def drive_of(
     moved = table.platform
     motor = dc_motor(table.motor, resistance, inductance, speed)
     return MotorDrivenPlatform(
-        EffectiveInertia.of_slider(moved.mass_kg, moved.amplitude_mm / 1e3), motor, base_inertia=moved.inertia_kg_m2,
-        friction=moved.friction_Nm_s_per_rad, load=moved.load_Nm,
+        EffectiveInertia.of_slider(moved.mass, moved.amplitude), motor, base_inertia=moved.inertia,
+        friction=moved.friction, load=moved.load,
     )  # fmt: skip
 
 
@@ -109,10 +109,10 @@ def drive(context: Context) -> tuple[LabelledRun, ...]:
     import numpy as np
 
     table = table_of(context)
-    times = np.linspace(0.0, table.end_s, table.samples)
+    times = np.linspace(0.0, table.end, table.samples)
     found = []
     try:
-        for resistance in table.resistances_ohm:
+        for resistance in table.resistances:
             model = drive_of(context, resistance)
             found.append(LabelledRun(resistance, model, model.simulate(times, rtol=table.tolerance)))
     except SpecError as error:
@@ -128,19 +128,18 @@ def without_inertia(context: Context) -> WithoutInertia:
 
     table = table_of(context)
     w = table.without_inertia
-    times = np.linspace(0.0, w.end_s, 501)
+    times = np.linspace(0.0, w.end, 501)
     try:
-        full = drive_of(context, w.resistance_ohm, w.inductance_H)
+        full = drive_of(context, w.resistance, w.inductance)
         motor = replace(full.motor, rotor_inertia=0.0)
         bare = replace(full, motor=motor, base_inertia=0.0)
-        source = bare.simulate(times, speed=w.start_speed_rad_s, rtol=1e-12)
+        source = bare.simulate(times, speed=w.start_speed, rtol=1e-12)
         runs = tuple(
-            replace(bare, base_inertia=value).simulate(times, speed=w.start_speed_rad_s, rtol=1e-11)
-            for value in w.inertias_kg_m2
+            replace(bare, base_inertia=value).simulate(times, speed=w.start_speed, rtol=1e-11) for value in w.inertias
         )
     except SpecError as error:
         raise _refuse(context, error, "without_inertia") from error
-    return WithoutInertia(source, w.inertias_kg_m2, runs)
+    return WithoutInertia(source, w.inertias, runs)
 
 
 def claim(context: Context) -> Claim:
@@ -150,17 +149,17 @@ def claim(context: Context) -> Claim:
     from graphsynth.systems.platform.resistance import resistance_effect, ripple_map
 
     c = table_of(context).claim
-    first, last = c.resistances_ohm[0], c.resistances_ohm[-1]
+    first, last = c.resistances[0], c.resistances[-1]
     try:
         effects = {
             f"L = {L:g} H, w_d = {speed:g} rad/s": resistance_effect(
-                drive_of(context, first, L, speed), c.resistances_ohm, simulate=True, revolutions=c.revolutions
+                drive_of(context, first, L, speed), c.resistances, simulate=True, revolutions=c.revolutions
             )
             for L, speed in c.cases
         }
         values = np.geomspace(first, last, c.map_resistances)
         mapped = ripple_map(
-            drive_of(context, first), values.tolist(), c.map_inductances_H, revolutions=c.revolutions
+            drive_of(context, first), values.tolist(), c.map_inductances, revolutions=c.revolutions
         )  # fmt: skip
     except SpecError as error:
         raise _refuse(context, error, "claim") from error
@@ -172,13 +171,13 @@ def limit(context: Context) -> ReductionStudy | None:
     import numpy as np
 
     t = table_of(context).limit
-    if not t.inductances_H:
+    if not t.inductances:
         return None
-    times = np.linspace(0.0, t.end_s, 26)
-    transient = 20.0 * max(t.inductances_H) / t.resistance_ohm if t.resistance_ohm > 0.0 else 0.0
+    times = np.linspace(0.0, t.end, 26)
+    transient = 20.0 * max(t.inductances) / t.resistance if t.resistance > 0.0 else 0.0
     try:  # the same times for every inductance
-        after = min(transient, 0.5 * t.end_s)
-        return drive_of(context, t.resistance_ohm).inductance_study(times, t.inductances_H, after=after)
+        after = min(transient, 0.5 * t.end)
+        return drive_of(context, t.resistance).inductance_study(times, t.inductances, after=after)
     except SpecError as error:
         raise _refuse(context, error, "limit") from error
 
@@ -190,9 +189,9 @@ def solvers(context: Context) -> tuple[Table, ...]:
     from graphsynth.evidence.driven import drive_work_precision, rows_as_text
 
     table = table_of(context)
-    model = drive_of(context, table.resistances_ohm[0])
+    model = drive_of(context, table.resistances[0])
     try:
-        found = drive_work_precision(model, np.linspace(0.0, table.end_s, 11))
+        found = drive_work_precision(model, np.linspace(0.0, table.end, 11))
     except SpecError as error:
         raise _refuse(context, error) from error
     return (Table("Error against run time", *rows_as_text(found)),)

@@ -40,21 +40,21 @@ def drive(context: Context, motions: tuple[Attempt, ...]) -> tuple[LabelledRun, 
     moved: Any = next((a.value for a in motions if not a.failed), None)
     if moved is None:
         return ()
-    times = np.linspace(0.0, table.end_s, table.samples)
+    times = np.linspace(0.0, table.end, table.samples)
     found = []
     try:
-        for resistance in table.resistances_ohm:
+        for resistance in table.resistances:
             model = MotorDrivenPlatform.of_machine(
                 moved.mechanism,
                 dc_motor(table.motor, resistance),
-                mass=table.mass_kg,
-                gyration=table.gyration_mm / 1e3,
-                mass_centre=complex(*table.mass_centre_mm) / 1e3,
-                wheel_inertia=table.wheel_inertia_kg_m2,
-                pinion_inertia=table.pinion_inertia_kg_m2,
+                mass=table.mass,
+                gyration=table.gyration,
+                mass_centre=complex(*table.mass_centre),
+                wheel_inertia=table.wheel_inertia,
+                pinion_inertia=table.pinion_inertia,
                 efficiency=table.efficiency,
-                friction=table.friction_Nm_s_per_rad,
-                load=table.load_Nm,
+                friction=table.friction,
+                load=table.load,
             )
             found.append(LabelledRun(resistance, model, model.simulate(times, rtol=table.tolerance)))
     except (SpecError, GeometryError) as error:
@@ -98,7 +98,7 @@ def curves(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ..
     felt = 1e6 * (inertia.value(q) + model.constant_inertia)
     own = Line((), 1e6 * model.constant_inertia, "rotor, pinion, wheels", "soft", "--")
     turn = line_plot([Line(np.degrees(q), felt)], "wheel angle [°]", "inertia [kg mm²]", xticks=ticks, levels=[own])
-    w = table.motor.speed_rad_s / model.train.ratio
+    w = table.motor.speed / model.train.ratio
     held = line_plot(
         [Line(np.degrees(q), 1e3 * model.torque_at_speed(q, w))], "wheel angle [°]", "torque [mN m]", xticks=ticks
     )

@@ -31,15 +31,15 @@ def sketches(context: Context) -> tuple[Picture, ...]:
     moved = table_of(context).platform
     q = np.linspace(0.0, math.tau, 361)
     pictures = []
-    if moved.amplitude_mm > 0.0:
-        mechanism, poses = _yoke(moved.amplitude_mm / 1e3, q)
+    if moved.amplitude > 0.0:
+        mechanism, poses = _yoke(moved.amplitude, q)
         caption = (
             "Link 1 is the crank, whose pin moves the platform, link 2, along its guide: y = amplitude sin(angle)."
         )
         svg = mechanism_sketch(mechanism, poses, width=420, height=360).svg(poses[52].tolist())
         pictures.append(Picture("Crank and platform", svg, caption))
-    own = moved.inertia_kg_m2
-    total = 1e3 * (EffectiveInertia.of_slider(moved.mass_kg, moved.amplitude_mm / 1e3).value(q) + own)
+    own = moved.inertia
+    total = 1e3 * (EffectiveInertia.of_slider(moved.mass, moved.amplitude).value(q) + own)
     curve = line_plot(
         [Line(np.degrees(q), total)], "crank angle [°]", "effective inertia [g m²]", xticks=range(0, 361, 45),
         levels=[Line((), 1e3 * own, "constant part", "soft", "--")],
@@ -79,7 +79,7 @@ def animations(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture
 
     from graphsynth.drawing.animation import animated_svg
 
-    amplitude = table_of(context).platform.amplitude_mm / 1e3
+    amplitude = table_of(context).platform.amplitude
     usable = [item for item in runs if item.run.complete and item.run.angle[-1] - item.run.angle[0] > math.tau]
     if not usable or amplitude == 0.0:
         return ()
@@ -174,7 +174,7 @@ def _bare_pictures(context: Context, bare: WithoutInertia) -> list[Picture]:
     from graphsynth.drawing.plots import Chart, Line, Mark
 
     run = bare.source
-    root = math.sqrt(table_of(context).platform.mass_kg) or 1.0
+    root = math.sqrt(table_of(context).platform.mass) or 1.0
     marks = [Mark(event.time, event.kind, "soft" if event.kind == "dead centre" else "b") for event in run.events]
     moving = Chart([Line(run.time, run.momentum / root)], "time [s]", "speed of the platform [m/s]", marks=marks)
     spike = float(np.nanpercentile(np.abs(run.speed), 97.0))

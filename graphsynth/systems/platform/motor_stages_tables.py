@@ -171,8 +171,8 @@ def _trend(values: object) -> str:
 
 def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
     moved = table_of(context).platform
-    root = math.sqrt(moved.mass_kg)
-    reach = moved.amplitude_mm / 1e3 * root
+    root = math.sqrt(moved.mass)
+    reach = moved.amplitude * root
     rows = tuple(
         (
             e.kind, f"{e.angle / math.pi:.12g}", f"{e.time:.14g}", f"{e.fictitious_time * reach:.14g}",

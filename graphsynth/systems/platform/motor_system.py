@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import require
+from graphsynth.pipeline.tables import In, require
 
 __all__ = [
     "SYSTEM",
@@ -22,68 +21,73 @@ __all__ = [
 ]
 
 
+_Positive = "each must be positive"
+_Friction = Annotated[float, In("N m s/rad")]
+_Inertia = Annotated[float, In("kg m^2")]
+_Resistances = Annotated[tuple[float, ...], In("ohm")]
+_Samples = Annotated[int, In(least=20, most=100_000, why="use 20 to 100000 output times")]
+_Second = Annotated[float, In("s", above=0)]
+
+
 @dataclass(frozen=True, slots=True)
 class DCMotorTable:
     """Independent excitation, speed control ``U = gain (speed - motor speed)``; the resistances stand apart."""
 
-    inductance_H: float
-    torque_constant_Nm_per_A: float
-    emf_constant_V_per_rad_s: float
-    gain_V_per_rad_s: float
-    speed_rad_s: float
-    rotor_inertia_kg_m2: float = 0.0
-    friction_Nm_s_per_rad: float = 0.0
-    voltage_limit_V: float | None = None
+    inductance: Annotated[float, In("H")]
+    torque_constant: Annotated[float, In("N m/A")]
+    emf_constant: Annotated[float, In("V s/rad")]
+    gain: Annotated[float, In("V s/rad")]
+    speed: Annotated[float, In("rad/s")]
+    rotor_inertia: _Inertia = 0.0
+    friction: _Friction = 0.0
+    voltage_limit: Annotated[float | None, In("V")] = None
 
 
 @dataclass(frozen=True, slots=True)
 class MovedTable:
     """Platform that moves as ``amplitude * sin(crank angle)``; constant inertia J_0, friction and load at the crank."""
 
-    mass_kg: float
-    amplitude_mm: float
-    inertia_kg_m2: float = 0.0
-    friction_Nm_s_per_rad: float = 0.0
-    load_Nm: float = 0.0
+    mass: Annotated[float, In("kg")]
+    amplitude: Annotated[float, In("mm")]
+    inertia: _Inertia = 0.0
+    friction: _Friction = 0.0
+    load: Annotated[float, In("Nm")] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class WithoutInertiaTable:
     """The model of the source without rotor inertia, regularised, and the model with J_0 that tends to it."""
 
-    resistance_ohm: float = 10.0
-    inductance_H: float = 1.0
-    start_speed_rad_s: float = 1.0
-    end_s: float = 0.5
-    inertias_kg_m2: tuple[float, ...] = (1e-4, 1e-6, 1e-8)
-
-    def __post_init__(self) -> None:
-        require(self.end_s > 0, f"has end_s = {self.end_s}; it must be positive")
-        require(all(x > 0 for x in self.inertias_kg_m2), "has an inertias_kg_m2 that is not positive; each must be")
+    resistance: Annotated[float, In("ohm")] = 10.0
+    inductance: Annotated[float, In("H")] = 1.0
+    start_speed: Annotated[float, In("rad/s")] = 1.0
+    end: _Second = 0.5
+    inertias: Annotated[tuple[float, ...], In("kg m^2", above=0, why=_Positive)] = (1e-4, 1e-6, 1e-8)
 
 
 @dataclass(frozen=True, slots=True)
 class ClaimTable:
     """Does a larger armature resistance calm the machine?  Pairs [inductance, demanded speed], and a map."""
 
-    resistances_ohm: tuple[float, ...] = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-    cases: tuple[tuple[float, float], ...] = ((0.2, 20.0), (0.05, 20.0), (0.01, 20.0), (0.01, 60.0))
-    map_resistances: int = 9
-    map_inductances_H: tuple[float, ...] = (0.005, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)
+    resistances: _Resistances = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+    cases: Annotated[tuple[tuple[float, float], ...], In(above=0, why=_Positive)] = (
+        (0.2, 20.0),
+        (0.05, 20.0),
+        (0.01, 20.0),
+        (0.01, 60.0),
+    )
+    map_resistances: Annotated[int, In(least=2, most=200)] = 9
+    map_inductances: Annotated[tuple[float, ...], In("H", above=0, why=_Positive)] = (
+        *(0.005, 0.01, 0.02, 0.05, 0.1),
+        *(0.15, 0.2, 0.3, 0.5, 0.8),
+    )
     revolutions: int = 40
 
     def __post_init__(self) -> None:
-        given = self.resistances_ohm
+        given = self.resistances
         require(
             len(given) >= 2 and given[0] > 0 and list(given) == sorted(set(given)),
             f"has resistances_ohm = {list(given)}; give at least two positive ones in increasing order",
-        )
-        require(2 <= self.map_resistances <= 200, f"has map_resistances = {self.map_resistances}; use 2 to 200")
-        require(
-            all(x > 0 for pair in self.cases for x in pair), f"has cases = {list(self.cases)}; all must be positive"
-        )
-        require(
-            all(x > 0 for x in self.map_inductances_H), "has a map_inductances_H that is not positive; each must be"
         )
 
 
@@ -91,9 +95,9 @@ class ClaimTable:
 class LimitTable:
     """Inductances that are compared with the limit L -> 0 over a time."""
 
-    inductances_H: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
-    resistance_ohm: float = 1.0
-    end_s: float = 0.05
+    inductances: Annotated[tuple[float, ...], In("H")] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12)
+    resistance: Annotated[float, In("ohm")] = 1.0
+    end: Annotated[float, In("s")] = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,16 +107,16 @@ class PlatformDriveTable:
     module: Literal["platform_drive"]
     motor: DCMotorTable
     platform: MovedTable
-    resistances_ohm: tuple[float, ...] = (5.0, 20.0)
-    end_s: float = 2.0
-    samples: int = 1001
+    resistances: _Resistances = (5.0, 20.0)
+    end: _Second = 2.0
+    samples: _Samples = 1001
     tolerance: float = 1e-11
     without_inertia: WithoutInertiaTable = field(default_factory=WithoutInertiaTable)
     claim: ClaimTable = field(default_factory=ClaimTable)
     limit: LimitTable = field(default_factory=LimitTable)
 
     def __post_init__(self) -> None:
-        _check_runs(self.resistances_ohm, self.end_s, self.samples)
+        _check_resistances(self.resistances)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,27 +128,25 @@ class MachineDriveTable:
     """
 
     motor: DCMotorTable
-    mass_kg: float
-    gyration_mm: float
-    mass_centre_mm: tuple[float, float] = (0.0, 0.0)
-    wheel_inertia_kg_m2: float = 0.0
-    pinion_inertia_kg_m2: float = 0.0
+    mass: Annotated[float, In("kg")]
+    gyration: Annotated[float, In("mm")]
+    mass_centre: Annotated[tuple[float, float], In("mm")] = (0.0, 0.0)
+    wheel_inertia: _Inertia = 0.0
+    pinion_inertia: _Inertia = 0.0
     efficiency: float = 1.0
-    friction_Nm_s_per_rad: float = 0.0
-    load_Nm: float = 0.0
-    resistances_ohm: tuple[float, ...] = (5.0, 20.0)
-    end_s: float = 2.0
-    samples: int = 1001
+    friction: _Friction = 0.0
+    load: Annotated[float, In("Nm")] = 0.0
+    resistances: _Resistances = (5.0, 20.0)
+    end: _Second = 2.0
+    samples: _Samples = 1001
     tolerance: float = 1e-11
 
     def __post_init__(self) -> None:
-        _check_runs(self.resistances_ohm, self.end_s, self.samples)
+        _check_resistances(self.resistances)
 
 
-def _check_runs(resistances: tuple[float, ...], end: float, samples: int) -> None:
+def _check_resistances(resistances: tuple[float, ...]) -> None:
     require(1 <= len(resistances) <= 4, f"has {len(resistances)} resistances_ohm; give one to four, in ohm")
-    require(math.isfinite(end) and end > 0, f"has end_s = {end}; it must be positive")
-    require(20 <= samples <= 100_000, f"has samples = {samples}; use 20 to 100000 output times")
 
 
 _STEPS = "graphsynth.systems.platform.motor_stages"

@@ -90,10 +90,10 @@ def _mechanism(table: PlatformTable) -> SingleMotorPlatform:
     def point(pair: tuple[float, float]) -> tuple[complex, complex, complex]:
         return (complex(*pair),) * 3
 
-    first, second, third = map(math.radians, table.leg_directions_deg)
+    first, second, third = table.leg_directions
     return SingleMotorPlatform(
         crank=table.crank_mm,
-        phase=table.crank_phase_rad,
+        phase=table.crank_phase,
         coupler=thrice(table.coupler_mm),
         rocker=thrice(table.rocker_mm),
         axis=point(table.wheel_axis_mm),
@@ -102,7 +102,7 @@ def _mechanism(table: PlatformTable) -> SingleMotorPlatform:
         l1=thrice(table.arm_mm),
         l2=thrice(table.intermediate_mm),
         frame_angle=(first, second, third),
-        delta=thrice(math.radians(table.rocker_angle_deg)),
+        delta=thrice(table.rocker_angle),
         tau=(table.drive_branch,) * 3,
         gears=GearTrain(table.pinion_teeth, table.wheel_teeth),
     )

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from graphsynth.evidence.registry import plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import check_positions, require, require_positive
+from graphsynth.pipeline.tables import In, Positions
 from graphsynth.systems.platform.motor_system import MachineDriveTable
 
 __all__ = ["SYSTEM", "PlatformTable"]
+
+_Length = Annotated[float, In(above=0, why="a length must be positive")]
+_Teeth = Annotated[int, In(above=0, why="a gear needs teeth")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,29 +25,23 @@ class PlatformTable:
     """
 
     module: Literal["single_motor_platform"]
-    leg_directions_deg: tuple[float, float, float]
+    leg_directions: Annotated[tuple[float, float, float], In("deg")]
     wheel_axis_mm: tuple[float, float]
     rocker_pivot_mm: tuple[float, float]
     platform_vertex_mm: tuple[float, float]
-    arm_mm: float
-    intermediate_mm: float
-    rocker_mm: float
-    coupler_mm: float
-    crank_mm: tuple[float, float, float]
-    crank_phase_rad: tuple[float, float, float]
-    rocker_angle_deg: float
-    pinion_teeth: int
-    wheel_teeth: int
+    arm_mm: _Length
+    intermediate_mm: _Length
+    rocker_mm: _Length
+    coupler_mm: _Length
+    crank_mm: Annotated[tuple[float, float, float], In(least=0, why="a crank must not be negative")]
+    crank_phase: Annotated[tuple[float, float, float], In("rad")]
+    rocker_angle: Annotated[float, In("deg")]
+    pinion_teeth: _Teeth
+    wheel_teeth: _Teeth
     drive_branch: Literal[1, -1] = 1
     working_mode: tuple[Literal[1, -1], Literal[1, -1], Literal[1, -1]] = (-1, -1, -1)
-    positions: int = 360
+    positions: Positions = 360
     drive: MachineDriveTable | None = None
-
-    def __post_init__(self) -> None:
-        require_positive(self, ("arm_mm", "intermediate_mm", "rocker_mm", "coupler_mm"), "a length must be positive")
-        require_positive(self, ("pinion_teeth", "wheel_teeth"), "a gear needs teeth")
-        require(min(self.crank_mm) >= 0, f"has crank_mm = {list(self.crank_mm)}; a crank must not be negative")
-        check_positions(self.positions)
 
 
 _HERE = "graphsynth.systems.platform"

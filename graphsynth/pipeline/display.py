@@ -1,0 +1,135 @@
+"""Tables and charts from SI values: each column and each axis names its unit, and the conversion is done here alone.
+
+A label ends with its unit in brackets, ``"crank [°]"``; behind a stroke a column says how its numbers are written, as a
+format of Python, ``"crank [°] | .6g"``.  A ``z`` in it drops the sign of a zero; a number before it rounds to so
+many decimals first, so that rounding noise at rest is written as zero: ``"tilt [°] | 9 .9f"``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Literal
+
+from graphsynth.pipeline.products import Finding, Picture, Quantity, Table
+from graphsynth.pipeline.units import Unit
+
+if TYPE_CHECKING:
+    from graphsynth.drawing.plots import Line
+
+__all__ = ["chart", "quantity_table", "shown", "table", "unit_in"]
+
+_COLUMN = re.compile(r"(.*?)(?: \| (?:(\d+) )?(\S+))?")
+_UNIT = re.compile(r".*\[([^\]]*)\]")
+
+#: Ticks of an axis over one rotation, degrees.
+TURN = tuple(range(0, 361, 45))
+
+
+@lru_cache
+def unit_in(label: str) -> Unit:
+    """Return the unit in the brackets of a label; a plain number if there are none.
+
+    Examples
+    --------
+    >>> unit_in("inertia [kg mm²]").from_si(2e-6)
+    2.0
+    """
+    match = _UNIT.fullmatch(label)
+    return Unit.parse(match[1] if match else "")
+
+
+def shown(value: object, column: str) -> str:
+    """Return a cell as text: an SI number in the unit of its column, anything else as it is; nothing for None.
+
+    Examples
+    --------
+    >>> shown(0.25, "height [mm]"), shown(-1e-17, "tilt [°] | 9 .3f"), shown(True, "agree"), shown(3, "sets")
+    ('250', '0.000', 'yes', '3')
+    """
+    if value is None or isinstance(value, str):
+        return value or ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Quantity):
+        return value.text
+    match = _COLUMN.fullmatch(column)
+    assert match is not None  # every text matches
+    if isinstance(value, int) and not match[3]:
+        return str(value)
+    number = unit_in(match[1]).from_si(float(value))  # type: ignore[arg-type]
+    if match[2]:
+        number = round(number, int(match[2])) + 0.0
+    return format(number, match[3] or ".6g")
+
+
+def table(
+    title: str, columns: Sequence[str], rows: Iterable[Iterable[object]], note: str = "", *findings: Finding
+) -> Table:
+    """Lay out SI values under the columns.
+
+    Examples
+    --------
+    >>> table("Poses", ("crank [°] | .4g", "pose"), [(0.5, "open")]).rows
+    (('28.65', 'open'),)
+    """
+    cells = tuple(tuple(shown(value, column) for value, column in zip(row, columns, strict=True)) for row in rows)
+    return Table(title, tuple(column.partition(" | ")[0] for column in columns), cells, note, findings)
+
+
+def quantity_table(title: str, quantities: Iterable[Quantity], note: str = "", *findings: Finding) -> Table:
+    """Lay out quantities, each with its guarantee and how far it may be off.
+
+    Examples
+    --------
+    >>> quantity_table("Motion", [Quantity("speed", 2.0, "rad/s", "estimated", 1e-9)]).rows
+    (('speed', '2 rad/s', 'estimated', '1e-09 rad/s'),)
+    """
+    rows = [(q.name, q, q.guarantee, "" if q.error is None else f"{q.error:.1g} {q.unit}".rstrip()) for q in quantities]
+    return table(title, ("quantity", "value", "guarantee", "error"), rows, note, *findings)
+
+
+def chart(
+    title: str,
+    lines: Sequence[Line],
+    x: str,
+    y: str,
+    caption: str = "",
+    *,
+    levels: Sequence[Line] = (),
+    bands: Sequence[Any] = (),
+    size: Literal["small", "normal", "wide"] = "normal",
+    **options: Any,
+) -> Picture:
+    """Draw curves of SI values over one axis; what :func:`graphsynth.drawing.plots.line_plot` takes more is passed on.
+
+    Parameters
+    ----------
+    lines, levels : sequence of Line
+        In SI.
+    x, y : str
+        Labels of the axes, with their units in brackets.
+    bands : sequence of Band
+        In SI of `x`.
+    """
+    import numpy as np
+
+    from graphsynth.drawing.plots import line_plot
+
+    across, up = unit_in(x), unit_in(y)
+
+    def converted(line: Line) -> Line:
+        return replace(line, x=across.from_si(np.asarray(line.x)), y=up.from_si(np.asarray(line.y)))
+
+    bands = [replace(band, start=across.from_si(band.start), stop=across.from_si(band.stop)) for band in bands]
+    svg = line_plot(
+        [converted(line) for line in lines],
+        x,
+        y,
+        levels=[replace(level, y=up.from_si(level.y)) for level in levels],
+        bands=bands,
+        **options,
+    )
+    return Picture(title, svg, caption, size)
