@@ -37,7 +37,8 @@ class AntennaSweep:
     working: Annotated[float, In("deg", above=0)] = 15.0 * DEGREE
 
     def __post_init__(self) -> None:
-        require(self.working <= self.largest, f"has working_deg = {self.working / DEGREE:g}, above largest_deg; make it smaller")
+        sentence = f"has working_deg = {self.working / DEGREE:g}, above largest_deg; make it smaller"
+        require(self.working <= self.largest, sentence)
 
 
 @dataclass(frozen=True, slots=True)
