@@ -7,6 +7,9 @@ from .elements import (
     JointFriction as JointFriction,
 )
 from .elements import (
+    MotorDrive as MotorDrive,
+)
+from .elements import (
     Pulse as Pulse,
 )
 from .elements import (

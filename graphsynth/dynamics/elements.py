@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from graphsynth.core.checks import Point, finite, link_number, point, positive
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics.motors import DCMotor, IdealTorque, LinearCharacteristic, Motor, SynchronousMotor
+from graphsynth.dynamics.trains import Train
 
-__all__ = ["Element", "Force", "JointFriction", "Pulse", "Spring", "Torque", "TorqueSource", "TorsionSpring"]
+__all__ = [
+    "Element", "Force", "JointFriction", "MotorDrive", "Pulse", "Spring", "Torque", "TorqueSource", "TorsionSpring",
+]  # fmt: skip
 
 #: (t, place, velocity of the point) -> (fx, fy), world coordinates.
 ForceLaw = Callable[[float, Point, Point], Sequence[float]]
@@ -206,6 +210,79 @@ class TorqueSource:
 
 
 @dataclass(frozen=True)
+class MotorDrive:
+    """A motor behind a train, from link a (its housing) to link b, with its electrical states.
+
+    The shaft turns at ``train.ratio`` times the speed of b relative to a; the inertia of rotor and train is taken on
+    that relative angle, as in a `TorqueSource`.  Currents are states of the motion; a voltage limit and the direction
+    of the power flow (trains with losses) switch at located events.
+
+    Parameters
+    ----------
+    a, b : int
+        Links with a turning joint between them.
+    motor : DCMotor, SynchronousMotor, LinearCharacteristic or IdealTorque
+        Without inductance its limit L -> 0 is taken, which is exact.
+    train : Train, optional
+        Direct coupling by default.
+    currents : sequence of float, optional
+        At the start, A; zero by default.
+
+    Raises
+    ------
+    GeometryError
+        No motor with a torque, no train, or currents that do not fit the motor.
+
+    Examples
+    --------
+    >>> MotorDrive(0, 1, DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0), Train(5.0)).currents
+    (0.0,)
+    """
+
+    a: int
+    b: int
+    motor: Motor
+    train: Train = field(default_factory=Train)
+    currents: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        _pair(self, "motor drive")
+        name = f"of motor drive {self.a}-{self.b}"
+        if not isinstance(self.motor, DCMotor | SynchronousMotor | LinearCharacteristic | IdealTorque):
+            raise GeometryError(
+                f"motor {name} = {self.motor!r} has no torque of its own; give a DCMotor, SynchronousMotor, "
+                "LinearCharacteristic or IdealTorque (a given speed is a prescribed Driver)"
+            )
+        if not isinstance(self.train, Train):
+            raise GeometryError(f"train {name} = {self.train!r} is not a Train; give Train(ratio)")
+        count = {DCMotor: 1, SynchronousMotor: 2}.get(type(self.equation), 0)
+        if not isinstance(self.currents, Iterable):
+            raise GeometryError(f"currents {name} = {self.currents!r} are not a list; leave them out or give amperes")
+        given = tuple(finite(f"current {name}", part) for part in self.currents)
+        if given and len(given) != count:
+            raise GeometryError(f"{len(given)} currents {name} given for a motor with {count}; leave them out")
+        object.__setattr__(self, "currents", given or (0.0,) * count)
+
+    @property
+    def equation(self) -> DCMotor | SynchronousMotor | LinearCharacteristic:
+        """The motor as it is integrated: without inductance its limit."""
+        idle = isinstance(self.motor, IdealTorque) or getattr(self.motor, "inductance", 1.0) == 0.0
+        return self.motor.reduced() if idle else self.motor  # type: ignore[union-attr,return-value]
+
+    @property
+    def switches(self) -> bool:
+        """Whether its equations change at events: a voltage limit, or losses in the train."""
+        return self.train.efficiency < 1.0 or getattr(self.motor, "voltage_limit", math.inf) < math.inf
+
+    @property
+    def idle(self) -> TorqueSource:
+        """The same without torque: inertia and friction alone, for inverse dynamics."""
+        ratio, motor = self.train.ratio, self.motor
+        inertia = motor.rotor_inertia + self.train.inertia / ratio**2
+        return TorqueSource(self.a, self.b, 0.0, ratio, 1.0, inertia, motor.friction)
+
+
+@dataclass(frozen=True)
 class JointFriction:
     """Dry friction in an R or P joint: at rest up to ``static`` times the load, sliding ``mu(v)`` times the load.
 
@@ -256,4 +333,4 @@ class JointFriction:
             )
 
 
-Element = Spring | TorsionSpring | Force | Torque | TorqueSource | JointFriction
+Element = Spring | TorsionSpring | Force | Torque | TorqueSource | MotorDrive | JointFriction

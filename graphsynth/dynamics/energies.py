@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.friction.history import FrictionAt
-from graphsynth.dynamics.result import Checks, FrictionHistory
+from graphsynth.dynamics.result import Checks, FrictionHistory, MotorHistory
+from graphsynth.dynamics.switching import motor_torques, shaft_speeds
 from graphsynth.dynamics.tables import Compiled
 
 __all__ = ["Balance", "balance_at", "checks_of", "warnings_of"]
 
 Array = NDArray[np.float64]
+#: Part of the largest accelerations of a motion below which those of a state are no measure of an error.
+_ROUNDED = 1e-9
 
 
 class Balance(NamedTuple):
@@ -34,8 +37,9 @@ class Balance(NamedTuple):
 
 
 def balance_at(
-    compiled: Compiled, t: float, q: Array, v: Array, slots: Array, own: Array | None, fit: FrictionAt | None = None
-) -> Balance:
+    compiled: Compiled, t: float, q: Array, v: Array, currents: Array, slots: Array, own: Array | None,
+    fit: FrictionAt | None = None,
+) -> Balance:  # fmt: skip
     """Evaluate one state; ``own`` are accelerations of another formulation, used where masses vanish."""
     from graphsynth.dynamics import kernels
 
@@ -43,7 +47,7 @@ def balance_at(
     driven = compiled.driven(t)
     x = kernels.state_rows(T, q, v)
     applied = applied_loads(compiled, t, q, v)
-    Q, Qc, V, P, _ = kernels.load_vector(T, x, applied)
+    Q, Qc, V, P, _ = kernels.load_vector(T, x, applied, currents)
     C, J, gam, vel = kernels.constraint_system(T, x, slots, driven)
     rubbing, rubbed = np.zeros_like(Q), 0.0
     if fit is not None:
@@ -95,11 +99,11 @@ def energy_error(times: Array, kinetic: Array, potential: Array, work: Array, po
 
 def checks_of(
     compiled: Compiled, times: Array, balances: list[Balance], work: Array, second: list[Array | None], newton: float,
-    loss: float, contraction: float,
+    loss: float, contraction: float, electric: float,
 ) -> Checks:  # fmt: skip
     """Collect the checks over all output times reached."""
     if not balances:
-        return Checks(*[float("nan")] * 9)
+        return Checks(*[float("nan")] * 10)
     kinetic, potential, power = (
         np.array([getattr(b, name) for b in balances]) for name in ("kinetic", "potential", "power")
     )
@@ -107,16 +111,51 @@ def checks_of(
     errors = np.array([b.power_error for b in balances])
     scale = max(b.power_scale for b in balances)
     unit = np.tile([compiled.tables.size, compiled.tables.size, 1.0], compiled.n // 3)
+    sizes = [float(np.abs(b.a / unit).max()) for b in balances]
+    largest = max((size for size in sizes if size == size), default=0.0)
+    least = max(_ROUNDED * largest, 1e-300)  # what is far below the others is rounding
     apart = [
-        float(np.abs((b.a - other) / unit).max()) / max(float(np.abs(b.a / unit).max()), 1e-300)
-        for b, other in zip(balances, second) if other is not None
+        float(np.abs((b.a - other) / unit).max()) / max(size, least)
+        for b, other, size in zip(balances, second, sizes) if other is not None
     ]  # fmt: skip
     return Checks(
         max(b.position for b in balances), max(b.velocity for b in balances),
         energy_error(times[:n], kinetic, potential, work[:n], power, np.array([b.bodies for b in balances])),
         float(errors.max()) / scale if scale > 0.0 else 0.0, max(b.dalembert for b in balances),
-        max(apart, default=float("nan")), newton, loss, contraction,
+        max(apart, default=float("nan")), newton, loss, contraction, electric,
     )  # fmt: skip
+
+
+def motor_histories(
+    compiled: Compiled, v: Array, currents: Array, modes: NDArray[np.int64]
+) -> tuple[MotorHistory, ...]:
+    """Speed, torque, currents and torque behind the train of every motor."""
+    shafts, found = shaft_speeds(compiled, v), []
+    torques = np.array([motor_torques(compiled, w, i) for w, i in zip(shafts, currents)])
+    first = 0
+    for k, drive in enumerate(compiled.drives):
+        eta = np.where(modes[:, k, 1] < 0, 1.0 / drive.train.efficiency, drive.train.efficiency)
+        last = first + len(drive.currents)
+        name, torque = f"motor {drive.a}-{drive.b}", torques[:, k]
+        output = drive.train.ratio * eta * torque
+        found.append(MotorHistory(name, shafts[:, k], torque, currents[:, first:last].copy(), output))
+        first = last
+    return tuple(found)
+
+
+def electric_error(compiled: Compiled, times: Array, tail: Array, motors: tuple[MotorHistory, ...]) -> float:
+    """Largest defect of the energy of the currents over the energies in play; NaN without currents."""
+    good = np.isfinite(tail[:, -1])
+    if not len(compiled.currents) or not good.any():
+        return float("nan")
+    stored, moved = np.zeros(good.sum()), 0.0
+    for drive, motor in zip(compiled.drives, motors):
+        inductance = getattr(drive.equation, "inductance", 0.0) * (1.5 if motor.currents.shape[1] == 2 else 1.0)
+        stored += 0.5 * inductance * (motor.currents[good] ** 2).sum(axis=1)
+        moved += float(np.abs(np.trapezoid(np.abs(motor.torque * motor.speed)[good], times[good])))
+    error = float(np.abs(stored - stored[0] - tail[good, -2]).max())
+    scale = max(float(stored.max()), moved)
+    return error / scale if scale > 0.0 else 0.0
 
 
 def warnings_of(checks: Checks, rtol: float, friction: FrictionHistory | None = None) -> tuple[str, ...]:
@@ -133,6 +172,11 @@ def warnings_of(checks: Checks, rtol: float, friction: FrictionHistory | None = 
         found.append(
             f"the energy balance is off by {checks.energy:.2g} of the energies in play, at a relative tolerance of "
             f"{rtol:g}; tighten rtol"
+        )
+    if checks.electric > max(1e-9, 100.0 * rtol):
+        found.append(
+            f"the electrical energy balance is off by {checks.electric:.2g} of the energies in play, at a relative "
+            f"tolerance of {rtol:g}; tighten rtol"
         )
     if checks.position_drift > 1e-9:
         found.append(

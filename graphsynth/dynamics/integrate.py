@@ -13,13 +13,22 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.extras import need
-from graphsynth.dynamics.energies import Balance, balance_at, checks_of, warnings_of
+from graphsynth.dynamics.energies import (
+    Balance,
+    balance_at,
+    checks_of,
+    electric_error,
+    motor_histories,
+    warnings_of,
+)
 from graphsynth.dynamics.friction.history import FrictionAt, friction_at, friction_history
 from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.motors import current_scale
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
 from graphsynth.dynamics.second import newton_euler_difference, second_accelerations
 from graphsynth.dynamics.start import StartReport, check_start, start_compiled
 from graphsynth.dynamics.stepping import StepOptions, Trail, integrate
+from graphsynth.dynamics.switching import starting_modes
 from graphsynth.dynamics.tables import Compiled, compile_model
 
 if TYPE_CHECKING:
@@ -160,6 +169,7 @@ class Form(Protocol):
     """What a formulation gives the integrator."""
 
     name: str
+    compiled: Compiled
     why: str
     stall: str
     loss: float
@@ -182,7 +192,8 @@ class _Run:
     v: Array
     own: list[Array | None]
     slots: Array
-    work: Array
+    tail: Array
+    modes: NDArray[np.int64]
     done: int
     trail: Trail
     form: Form
@@ -235,18 +246,21 @@ def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, optio
 
 def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, options: StepOptions) -> _Run:
     begin = perf_counter()
+    if compiled.drives:
+        compiled = compiled.with_modes(starting_modes(compiled, report.v))
     form = make_form(compiled, report, name, options.project)
     n, count = compiled.n, len(grid)
     run = _Run(
         name, np.full((count, n), np.nan), np.full((count, n), np.nan), [None] * count,
-        np.zeros((count, len(report.slots))), np.full(count, np.nan), 0, Trail(), form, 0.0,
+        np.zeros((count, len(report.slots))), np.full((count, len(compiled.tail)), np.nan),
+        np.zeros((count, *compiled.tables.modes.shape), dtype=np.int64), 0, Trail(), form, 0.0,
         senses=[None] * count,
     )  # fmt: skip
 
     def show(form: Form, k: int, t: float, y: Array, senses: Senses | None) -> None:
         run.q[k], run.v[k] = form.state(t, y)
         run.slots[k] = getattr(form, "slots", report.slots)
-        run.work[k] = y[-1]
+        run.tail[k], run.modes[k] = y[len(y) - len(compiled.tail) :], form.compiled.tables.modes
         own = getattr(form, "accelerations", None)
         run.own[k] = None if own is None else own(t, y)
         run.senses[k] = senses
@@ -267,7 +281,7 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
         run.done = int(lost[0])
         run.trail.time = min(run.trail.time, float(grid[run.done]))
         run.trail.message = f"the state at the output time {float(grid[run.done]):.9g} s has no pose"
-        run.q[run.done :], run.v[run.done :], run.work[run.done :] = np.nan, np.nan, np.nan
+        run.q[run.done :], run.v[run.done :], run.tail[run.done :] = np.nan, np.nan, np.nan
     run.events += run.trail.events
     run.events += [DynamicEvent("change of coordinates", t, 0.0, text) for t, text in run.form.changes]
     return run
@@ -305,7 +319,8 @@ def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
     if form.name == "one-coordinate":
         joint = compiled.model.mechanism.joint(*compiled.model.mechanism.drivers[0].pair)
         own = np.array([T.size if joint.kind == "P" else 1.0])
-    return np.concatenate([own, rate * own, [energy]])
+    currents = [size for drive in compiled.drives for size in [current_scale(drive.equation)] * len(drive.currents)]
+    return np.concatenate([own, rate * own, currents, [energy] * (len(compiled.tail) - len(currents))])
 
 
 def _result(
@@ -313,6 +328,7 @@ def _result(
 ) -> DynamicMotion:
     begin = perf_counter()
     count, done = len(grid), run.done
+    work, currents = run.tail[:, -1], run.tail[:, : len(compiled.currents)]
     balances: list[Balance] = []
     fits: list[FrictionAt | None] = []
     for k in range(done):
@@ -323,7 +339,8 @@ def _result(
             slots = initial_slots(compiled, run.q[k])
         t = float(grid[k])
         fit = None if run.rows is None else friction_at(run.rows, t, run.q[k], run.v[k], slots, run.senses[k])
-        balances.append(balance_at(compiled, t, run.q[k], run.v[k], slots, run.own[k], fit))
+        own = compiled.with_modes(run.modes[k])
+        balances.append(balance_at(own, t, run.q[k], run.v[k], currents[k], slots, run.own[k], fit))
         fits.append(fit)
     a, lam = np.full((count, compiled.n), np.nan), np.full((count, len(compiled.info)), np.nan)
     kinetic, potential = np.full(count, np.nan), np.full(count, np.nan)
@@ -331,17 +348,15 @@ def _result(
         a[k], lam[k], kinetic[k], potential[k] = b.a, b.multipliers, b.kinetic, b.potential
     second = run.own[:done]
     if run.name == "augmented":
-        second = second_accelerations(compiled, report, grid[:done], run.q[:done], run.v[:done])
+        second = _by_mode(
+            compiled, run.modes[:done],
+            lambda own, at: second_accelerations(own, report, grid[at], run.q[at], run.v[at], currents[at]),
+        )  # fmt: skip
+    motors = motor_histories(compiled, run.v, currents, run.modes)
     checks = checks_of(
-        compiled,
-        grid,
-        balances,
-        run.work,
-        second,
-        _newton(compiled, run, grid, a, lam),
-        run.form.loss,
-        run.form.contraction,
-    )
+        compiled, grid, balances, work, second, _newton(compiled, run, grid, a, lam), run.form.loss,
+        run.form.contraction, electric_error(compiled, grid, run.tail, motors),
+    )  # fmt: skip
     poses, velocities, accelerations = compiled.to_links(run.q, run.v, a)
     for array in (poses, velocities, accelerations):
         array[done:] = np.nan
@@ -352,10 +367,10 @@ def _result(
     warnings, backend = warnings_of(checks, options.rtol, friction), _backend(options.method)
     return DynamicMotion(
         compiled.model, compiled, grid, poses, velocities, accelerations, run.q, run.v, a, lam, run.slots, kinetic,
-        potential, run.work, "completed" if completed else "failed", message, run.trail.time,
+        potential, work, "completed" if completed else "failed", message, run.trail.time,
         events, report, checks, warnings, estimate, run.name, options.method, backend, options.rtol,
         run.trail.evaluations, run.trail.steps, run.seconds,
-        perf_counter() - begin, friction,
+        perf_counter() - begin, friction, motors,
     )  # fmt: skip
 
 
@@ -377,4 +392,27 @@ def _backend(method: str) -> str:
 def _newton(compiled: Compiled, run: _Run, grid: Array, a: Array, lam: Array) -> float:
     """Largest difference of the reactions to body-by-body equilibrium, at up to 20 instants."""
     chosen = np.unique(np.linspace(0, run.done - 1, min(run.done, 20)).astype(int)) if run.done else np.empty(0, int)
-    return newton_euler_difference(compiled, grid[chosen], run.q[chosen], run.v[chosen], a[chosen], lam[chosen])
+    currents = run.tail[:, : len(compiled.currents)]
+
+    def difference(own: Compiled, among: NDArray[np.intp]) -> list[float]:
+        at = chosen[among]
+        found = newton_euler_difference(own, grid[at], run.q[at], run.v[at], a[at], lam[at], currents[at])
+        return [found] * len(at)
+
+    return max(_by_mode(compiled, run.modes[chosen], difference), default=float("nan"))
+
+
+def _by_mode(
+    compiled: Compiled, modes: NDArray[np.int64], values: Callable[[Compiled, NDArray[np.intp]], list[Any]]
+) -> list[Any]:
+    """Values at instants, asked for together where the modes of the motors are the same."""
+    count = len(modes)
+    if not count or not modes.size:
+        return values(compiled, np.arange(count))
+    found: list[Any] = [None] * count
+    flat = modes.reshape(count, -1)
+    for own in np.unique(flat, axis=0):
+        at = np.flatnonzero((flat == own).all(axis=1))
+        for k, value in zip(at, values(compiled.with_modes(modes[at[0]]), at)):
+            found[k] = value
+    return found

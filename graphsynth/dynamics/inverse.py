@@ -11,11 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.applied import applied_loads
+from graphsynth.dynamics.elements import MotorDrive
 from graphsynth.dynamics.friction.loads import fitting_loads
 from graphsynth.dynamics.friction.problem import joint_names
 from graphsynth.dynamics.friction.rows import FrictionElement, FrictionRows
 from graphsynth.dynamics.model import DynamicModel
+from graphsynth.dynamics.motors import torque_constant
 from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
+from graphsynth.dynamics.result import MotorHistory
 from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.mechanism.model import Driver
@@ -46,6 +49,9 @@ class InverseDynamics:
         Largest ``|drivers' power - (dE/dt - power of other loads)|`` over the largest power in play.
     newton_euler : float
         Largest difference of the reactions to body-by-body equilibrium, over the largest force.
+    motors : tuple of MotorHistory
+        What the motors at the drivers' joints must give: their speeds, torques, and currents (of a synchronous motor
+        with i_d = 0).
     """
 
     inputs: Array
@@ -55,6 +61,7 @@ class InverseDynamics:
     power: Array
     power_error: float
     newton_euler: float
+    motors: tuple[MotorHistory, ...] = ()
 
 
 def inverse_dynamics(
@@ -70,7 +77,8 @@ def inverse_dynamics(
     Parameters
     ----------
     model : DynamicModel
-        Massless links are allowed.
+        Massless links are allowed.  A motor drive counts with its inertia and friction; it must act at a driver's
+        joint, and what it has to give is among the results.
     motion : Motion
         Of :func:`graphsynth.kinematics.simulate` for ``model.mechanism``.
     speed, acceleration : array_like, scalar or shape (n,)
@@ -88,7 +96,7 @@ def inverse_dynamics(
     ------
     GeometryError
         If the motion is of another mechanism, numbers have another shape, loads are functions and their times are not
-        known, or friction leaves no loads, several, or needs an open reaction.
+        known, friction leaves no loads, several, or needs an open reaction, or a motor is not at a driver's joint.
 
     Examples
     --------
@@ -105,7 +113,8 @@ def inverse_dynamics(
     """
     _check(model, motion)
     held = tuple(Driver(d.base, d.link) for d in (*model.prescribed, *motion.mechanism.drivers))  # laws are not asked
-    compiled = compile_model(replace(model, prescribed=held))
+    passive = tuple(e.idle if isinstance(e, MotorDrive) else e for e in model.elements)
+    compiled = compile_model(replace(model, elements=passive, prescribed=held))
     n = len(motion.inputs)
     rate, second = (
         _by_sample(name, given, n)[:, None, None] for name, given in (("speed", speed), ("acceleration", acceleration))
@@ -127,7 +136,10 @@ def inverse_dynamics(
     chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good
     return InverseDynamics(
         motion.inputs, instants, efforts, reactions, power, error / scale,
-        newton_euler_difference(compiled, instants[chosen], q[chosen], v[chosen], a[chosen], lam[chosen]),
+        newton_euler_difference(
+            compiled, instants[chosen], q[chosen], v[chosen], a[chosen], lam[chosen], np.zeros((len(chosen), 0))
+        ),
+        _motors(model, motion, efforts, rates),
     )  # fmt: skip
 
 
@@ -145,6 +157,29 @@ def _check(model: DynamicModel, motion: Motion) -> None:
         )
     if motion.mechanism.graph != model.mechanism.graph or motion.mechanism.joints != model.mechanism.joints:
         raise GeometryError("the motion is of another mechanism than the model; simulate model.mechanism")
+
+
+def _motors(model: DynamicModel, motion: Motion, efforts: Array, rates: Array) -> tuple[MotorHistory, ...]:
+    """Return what the motors have to give: the losses of a train are on the side that supplies."""
+    pairs = [driver.pair for driver in motion.mechanism.drivers]
+    found = []
+    for drive in (e for e in model.elements if isinstance(e, MotorDrive)):
+        pair, name = (min(drive.a, drive.b), max(drive.a, drive.b)), f"motor {drive.a}-{drive.b}"
+        if pair not in pairs:
+            raise GeometryError(f"{name} is not at the joint of a driver; name a driver there, or leave the motor out")
+        k = pairs.index(pair)
+        sense = 1.0 if motion.mechanism.drivers[k].link == drive.b else -1.0
+        output = sense * efforts[:, k]
+        speed = drive.train.ratio * (rates[:, drive.b, 2] - rates[:, drive.a, 2])
+        eta = np.where(output * speed >= 0.0, drive.train.efficiency, 1.0 / drive.train.efficiency)
+        torque = output / (drive.train.ratio * eta)
+        constant = torque_constant(drive.equation)
+        currents = np.full((len(torque), len(drive.currents)), 0.0)
+        if currents.size:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                currents[:, -1] = torque / constant
+        found.append(MotorHistory(name, speed, torque, currents, output))
+    return tuple(found)
 
 
 def _by_sample(name: str, given: ArrayLike, n: int) -> Array:
@@ -188,7 +223,7 @@ def _multipliers(
 
     T = compiled.tables
     x = kernels.state_rows(T, q, v)
-    Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v))
+    Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v), compiled.currents)
     _, J, _, _ = kernels.constraint_system(T, x, initial_slots(compiled, q), np.zeros((max(1, len(compiled.laws)), 3)))
     unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
     inertial = T.mass @ a

@@ -33,12 +33,12 @@ def _tables() -> tuple[Array, Array, Array]:
 
 
 class GaussStep:
-    """The collocation polynomial: accelerations (stages, n) and powers (stages,) over ``[t, t + h]`` from ``y``."""
+    """The collocation polynomial: accelerations (stages, n) and rates of the tail over ``[t, t + h]`` from ``y``."""
 
-    def __init__(self, t: float, h: float, y: Array, a: Array, power: Array) -> None:
+    def __init__(self, t: float, h: float, y: Array, a: Array, tail: Array) -> None:
         self._t, self._h, self._y = t, h, y
         _, basis, _ = _tables()
-        self._a, self._power = basis.T @ a, basis.T @ power
+        self._a, self._tail = basis.T @ a, basis.T @ tail
 
     def __call__(self, t: float) -> Array:
         """State (q, v, work) at time t."""
@@ -48,12 +48,12 @@ class GaussStep:
         q, v = self._y[:n], self._y[n : 2 * n]
         return np.concatenate([
             q + x * h * v + h * h * (twice @ self._a), v + h * (once @ self._a),
-            self._y[2 * n :] + h * (once @ self._power),
+            self._y[2 * n :] + h * (once @ self._tail),
         ])  # fmt: skip
 
 
 def gauss_step(
-    evaluate: Callable[[float, Array, Array], tuple[Array, float]], t: float, y: Array, h: float,
+    evaluate: Callable[[float, Array, Array, Array], tuple[Array, Array]], t: float, y: Array, h: float,
     guess: Callable[[float], Array], unit: Array,
 ) -> GaussStep | None:  # fmt: skip
     """Solve the collocation equations by fixed-point iteration; None if it does not settle.
@@ -61,7 +61,7 @@ def gauss_step(
     Parameters
     ----------
     evaluate : callable
-        ``(t, q, v)`` near the constraints to accelerations and power at the nearest state on them.
+        ``(t, q, v, tail)`` near the constraints to accelerations and rates of the tail at the nearest state on them.
     guess : callable
         State at a time, on the branch wanted.
     unit : ndarray
@@ -71,19 +71,21 @@ def gauss_step(
     n = len(unit)
     q0, v0 = y[:n], y[n : 2 * n]
     first = [guess(t + h * c) for c in nodes]
-    Q, V = np.array([s[:n] for s in first]), np.array([s[n : 2 * n] for s in first])
+    Q, V, tails = (np.array([s[part] for s in first]) for part in (slice(n), slice(n, 2 * n), slice(2 * n, None)))
     last = np.inf
     for _ in range(_ROUNDS):
-        found = [evaluate(t + h * c, q, v) for c, q, v in zip(nodes, Q, V)]
-        a, power = np.array([part[0] for part in found]), np.array([part[1] for part in found])
+        found = [evaluate(t + h * c, *state) for c, *state in zip(nodes, Q, V, tails)]
+        a, rates = np.array([part[0] for part in found]), np.array([part[1] for part in found])
         if not np.isfinite(a).all():
             return None
         fresh = q0 + h * nodes[:, None] * v0 + h * h * (A @ (A @ a))
-        V = v0 + h * (A @ a)
+        V, moved = v0 + h * (A @ a), y[2 * n :] + h * (A @ rates)
         change = float(np.abs((fresh - Q) / unit).max())
-        Q = fresh
+        if tails.shape[1] > 1:  # currents act back on the motion
+            change = max(change, float(np.abs((moved - tails) / (np.abs(moved).max(axis=0) + 1e-300)).max()))
+        Q, tails = fresh, moved
         if change < 1e-14 or (change < 1e-10 and change > 0.5 * last):
-            return GaussStep(t, h, y, a, power)
+            return GaussStep(t, h, y, a, rates)
         last = change
     return None
 
@@ -91,9 +93,8 @@ def gauss_step(
 class HermiteLeap:
     """Polynomials through states ``(q, v, work)`` and their rates at several times."""
 
-    def __init__(self, times: list[float], states: list[Array], rates: list[Array]) -> None:
-        self._n = (len(states[0]) - 1) // 2
-        n = self._n
+    def __init__(self, n: int, times: list[float], states: list[Array], rates: list[Array]) -> None:
+        self._n = n
         self._centre, self._unit = times[-1], times[-1] - times[0]
         nodes = (np.array(times) - self._centre) / self._unit
         u = self._unit

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from graphsynth.core.checks import Point, finite, link_number, point, positive
@@ -12,6 +12,7 @@ from graphsynth.dynamics.elements import (
     Element,
     Force,
     JointFriction,
+    MotorDrive,
     Spring,
     Torque,
     TorqueSource,
@@ -115,7 +116,7 @@ class Rigid:
 
 
 Coupling = Rack | Rigid
-_ELEMENTS = (Spring, TorsionSpring, Force, Torque, TorqueSource, JointFriction)
+_ELEMENTS = (Spring, TorsionSpring, Force, Torque, TorqueSource, MotorDrive, JointFriction)
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,7 @@ class DynamicModel:
         Its driver names the coordinate of the one-coordinate form; drivers are free to move, their laws unused.
     bodies : mapping of int to Body
         One for every moving link.
-    elements : iterable of Spring, TorsionSpring, Force, Torque, TorqueSource, JointFriction
+    elements : iterable of Spring, TorsionSpring, Force, Torque, TorqueSource, MotorDrive, JointFriction
     gravity : (gx, gy), optional
         m/s^2; (0, -9.81) by default, (0, 0) for a horizontal mechanism.
     prescribed : iterable of Driver
@@ -139,8 +140,8 @@ class DynamicModel:
     Raises
     ------
     GeometryError
-        A moving link without body, a negative mass, a link that does not exist, a massless frame body, friction in
-        a joint that is not there.
+        A moving link without body, a negative mass, a link that does not exist, a massless frame body, friction or a
+        motor in a joint that is not there, friction beside a motor with states of its own.
 
     Examples
     --------
@@ -153,10 +154,10 @@ class DynamicModel:
 
     mechanism: Mechanism
     bodies: Mapping[int, Body]
-    elements: tuple[Element, ...] = ()
+    elements: Sequence[Element] = ()
     gravity: Point = (0.0, -9.81)
-    prescribed: tuple[Driver, ...] = ()
-    additional: tuple[JointGeometry | Coupling, ...] = field(default=())
+    prescribed: Sequence[Driver] = ()
+    additional: Sequence[JointGeometry | Coupling] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.mechanism, Mechanism):
@@ -168,6 +169,7 @@ class DynamicModel:
                 raise GeometryError(f"{name} = {getattr(self, name)!r} is not a list; leave it out or give ()")
         object.__setattr__(self, "bodies", self._checked_bodies(self.bodies))
         object.__setattr__(self, "elements", tuple(self._checked(element) for element in self.elements))
+        self._check_together()
         object.__setattr__(self, "gravity", point("gravity", self.gravity))
         object.__setattr__(self, "additional", tuple(self._checked_additional(self.additional)))
         object.__setattr__(self, "prescribed", self._checked_drivers(tuple(self.prescribed)))
@@ -200,6 +202,10 @@ class DynamicModel:
             self._link(link, f"a {type(element).__name__}")
         if isinstance(element, JointFriction):
             self._check_friction(element)
+        if isinstance(element, MotorDrive) and not isinstance(
+            self.mechanism.joint(element.a, element.b), Revolute | PinSlot
+        ):
+            raise GeometryError(f"a motor drive needs a turning joint, and joint {element.a}-{element.b} is none")
         return element
 
     def _check_friction(self, element: JointFriction) -> None:
@@ -209,6 +215,17 @@ class DynamicModel:
                 raise GeometryError(f"friction in turning pair {element.a}-{element.b} needs the radius of the pin")
         elif not isinstance(joint, Prismatic):
             raise GeometryError(f"friction in joint {element.a}-{element.b}: only R and P joints, not {joint.kind}")
+
+    def _check_together(self) -> None:
+        for element in self.elements:
+            if not isinstance(element, MotorDrive) or not (element.currents or element.switches):
+                continue
+            if any(isinstance(other, JointFriction) for other in self.elements):
+                raise GeometryError(
+                    f"dry friction beside motor drive {element.a}-{element.b}, which has currents or switches: the "
+                    "friction problem does not know them; take the motor's limit motor.reduced() and a train without "
+                    "losses, or leave the friction out"
+                )
 
     def _checked_additional(self, items: Iterable[Any]) -> Iterable[JointGeometry | Coupling]:
         for item in items:

@@ -292,6 +292,23 @@ class SynchronousMotor:
 Motor = DCMotor | SynchronousMotor | LinearCharacteristic | IdealTorque
 
 
+def torque_constant(motor: Motor) -> float:
+    """Torque per ampere of the current that makes it, N m/A; 0 without currents."""
+    if isinstance(motor, SynchronousMotor):
+        return 1.5 * motor.pole_pairs * motor.flux
+    return motor.torque_constant if isinstance(motor, DCMotor) else 0.0
+
+
+def current_scale(motor: Motor) -> float:
+    """Size of the currents to expect, A."""
+    if isinstance(motor, DCMotor):
+        volts = min(motor.gain * abs(motor.speed), motor.voltage_limit)
+        return volts / (motor.resistance + 10.0 * motor.inductance) or 1.0
+    if isinstance(motor, SynchronousMotor):
+        return math.hypot(motor.ud, motor.uq) / motor.resistance or 1.0
+    return 1.0
+
+
 def check_motor(motor: object) -> None:
     """Raise `SpecError` for anything that is neither a motor with a torque nor an ideal speed."""
     if not isinstance(motor, (DCMotor, SynchronousMotor, LinearCharacteristic, IdealTorque, IdealSpeed)):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.reactions import Reactions
     from graphsynth.dynamics.tables import Compiled
 
-__all__ = ["Checks", "DynamicEvent", "DynamicMotion", "FrictionHistory"]
+__all__ = ["Checks", "DynamicEvent", "DynamicMotion", "FrictionHistory", "MotorHistory"]
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 class DynamicEvent(NamedTuple):
     """Something at one time.
 
-    Kinds: "singular pose", "fold", "change of coordinates", "break", and of dry friction "stick", "slip", "reversal".
+    Kinds: "singular pose", "fold", "change of coordinates", "break", of dry friction "stick", "slip", "reversal", of
+    motors "voltage limit", "direction of power flow".
     """
 
     kind: str
@@ -49,6 +50,20 @@ class FrictionHistory(NamedTuple):
     shared: tuple[tuple[str, ...], ...]
 
 
+class MotorHistory(NamedTuple):
+    """A motor over n output times.
+
+    ``name``; ``speed`` of its shaft (rad/s), its own ``torque`` (N m), ``currents`` (n, 0, 1 or 2) in A (i_d and i_q of
+    a synchronous motor), ``output`` (N m) on its link b behind the losses of the train, without inertia and friction.
+    """
+
+    name: str
+    speed: Array
+    torque: Array
+    currents: Array
+    output: Array
+
+
 class Checks(NamedTuple):
     """Numbers that tell whether a result can be trusted (spec 5.8); NaN where a check does not apply.
 
@@ -59,7 +74,8 @@ class Checks(NamedTuple):
     accelerations of two formulations over their largest size, counted at regular poses.  ``newton_euler``: the same
     of the reactions, against body-by-body equilibrium.  ``projection_loss``: energy taken by projection (J).
     ``contraction``: the largest factor with which a load that friction makes returned to it; 0 without friction, below
-    1 a motion is the only one.
+    1 a motion is the only one.  ``electric``: largest defect of the energy of the motors' currents over the energies
+    in play; NaN without currents.
     """
 
     position_drift: float
@@ -71,6 +87,7 @@ class Checks(NamedTuple):
     newton_euler: float
     projection_loss: float
     contraction: float
+    electric: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +124,8 @@ class DynamicMotion:
         Of the integration; ``seconds_checks`` of the checks.
     friction : FrictionHistory or None
         Friction of the joints that have it.
+    motors : tuple of MotorHistory
+        In the order of the elements.
     """
 
     model: Any
@@ -140,6 +159,7 @@ class DynamicMotion:
     seconds: float
     seconds_checks: float
     friction: FrictionHistory | None = None
+    motors: tuple[MotorHistory, ...] = ()
 
     #: How the numbers were had.
     label = "estimated"

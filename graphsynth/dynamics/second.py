@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 def second_accelerations(
-    compiled: Compiled, report: StartReport, times: Array, q: Array, v: Array
+    compiled: Compiled, report: StartReport, times: Array, q: Array, v: Array, currents: Array
 ) -> list[Array | None]:
     """Accelerations of given states by a formulation without multipliers.
 
@@ -34,7 +34,7 @@ def second_accelerations(
     """
     if compiled.tables.friction.size or compiled.model.massless:
         return [None] * len(q)
-    found = [_null_space(compiled, float(t), q[k], v[k]) for k, t in enumerate(times)]
+    found = [_null_space(compiled, float(t), q[k], v[k], currents[k]) for k, t in enumerate(times)]
     if not one_coordinate_obstacle(compiled.model):
         for k in np.unique(np.linspace(0, len(q) - 1, min(len(q), 20)).astype(int)) if len(q) else ():
             poses, rates, _ = compiled.to_links(q[k], v[k], np.zeros_like(q[k]))
@@ -42,14 +42,16 @@ def second_accelerations(
                 form = OneCoordinateForm(compiled, replace(report, poses=poses, velocities=rates))
             except GeometryError:  # next to a fold: the null-space value stays
                 continue
-            a = form.accelerations(float(times[k]), form.begin())
-            _, q1, _ = form.transmission(float(form.begin()[0]))
+            y = form.begin()
+            compiled.currents_of(y)[:] = currents[k]
+            a = form.accelerations(float(times[k]), y)
+            _, q1, _ = form.transmission(float(y[0]))
             if found[k] is not None and np.isfinite(a).all() and float(np.abs(q1).max()) < 1e3:
                 found[k] = a
     return found
 
 
-def _null_space(compiled: Compiled, t: float, q: Array, v: Array) -> Array | None:
+def _null_space(compiled: Compiled, t: float, q: Array, v: Array, currents: Array) -> Array | None:
     """Solve ``(N^T M N) y = N^T (Q - M a0)`` with N an orthonormal basis of the null space; None at a singular pose."""
     values = Values(compiled, t, initial_slots(compiled, q))
     T = compiled.tables
@@ -61,11 +63,13 @@ def _null_space(compiled: Compiled, t: float, q: Array, v: Array) -> Array | Non
         return None
     a0 = scale * (Vt[:rank].T @ ((U.T @ (gam / unit))[:rank] / S[:rank]))
     N = scale[:, None] * Vt[rank:].T
-    Q = _loads(compiled, t, q, v)
+    Q = _loads(compiled, t, q, v, currents)
     return np.asarray(a0 + N @ np.linalg.solve(N.T @ T.mass @ N, N.T @ (Q - T.mass @ a0)))
 
 
-def newton_euler(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> list[tuple[complex, float, complex]]:
+def newton_euler(
+    compiled: Compiled, t: float, q: Array, v: Array, a: Array, currents: Array
+) -> list[tuple[complex, float, complex]]:
     """Joint reactions from force and moment balance of every body, given the accelerations.
 
     Unknowns are the contact forces themselves, placed by geometry, not by the constraint Jacobian: pin forces, guide
@@ -90,7 +94,7 @@ def newton_euler(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> 
                     moment = (np.conj(arm) * force).imag + couple
                     matrix[k : k + 3, column] += sign * np.array([force.real, force.imag, moment])
             column += 1
-    right = compiled.tables.mass @ a - _loads(compiled, t, q, v)
+    right = compiled.tables.mass @ a - _loads(compiled, t, q, v, currents)
     scale = np.tile([1.0, 1.0, 1.0 / compiled.tables.size], compiled.n // 3)
     solution = np.linalg.lstsq(matrix * scale[:, None], right * scale, rcond=1e-12)[0]
     results, column = [], 0
@@ -103,12 +107,12 @@ def newton_euler(compiled: Compiled, t: float, q: Array, v: Array, a: Array) -> 
     return results
 
 
-def _loads(compiled: Compiled, t: float, q: Array, v: Array) -> Array:
+def _loads(compiled: Compiled, t: float, q: Array, v: Array, currents: Array) -> Array:
     from graphsynth.dynamics import kernels
 
     T = compiled.tables
     x = kernels.state_rows(T, q, v)
-    Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v))
+    Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v), currents)
     return np.asarray(Q)
 
 
@@ -153,7 +157,9 @@ def _cam_normal(compiled: Compiled, joint: Cam, place: Array, roller: complex) -
     return -1j * tangent / abs(tangent)
 
 
-def newton_euler_difference(compiled: Compiled, times: Array, q: Array, v: Array, a: Array, lam: Array) -> float:
+def newton_euler_difference(
+    compiled: Compiled, times: Array, q: Array, v: Array, a: Array, lam: Array, currents: Array
+) -> float:
     """Largest difference of determined reactions between both ways, over the largest force; NaN with friction."""
     equal = [
         joint for joint in compiled.joints
@@ -165,7 +171,7 @@ def newton_euler_difference(compiled: Compiled, times: Array, q: Array, v: Array
     worst, size = 0.0, 1e-300
     for k in range(len(q)):
         for joint, (force, couple, at) in zip(
-            reactions.joints, newton_euler(compiled, float(times[k]), q[k], v[k], a[k])
+            reactions.joints, newton_euler(compiled, float(times[k]), q[k], v[k], a[k], currents[k])
         ):
             arm = complex(*joint.point[k]) - at
             moment = couple - (np.conj(arm) * force).imag

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.dynamics.result import DynamicEvent
 from graphsynth.dynamics.stalling import lock, stalled
+from graphsynth.dynamics.switching import KINDS, Switches
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.friction.guard import Guard
@@ -28,6 +29,8 @@ _RUNGE_KUTTA = ("DOP853", "RK45", "RK23")
 _STALL, _STALLED = 1e-2, 200
 #: The same for steps shorter than this part of the whole time.
 _TINY = 1e-5
+#: Events of one motion.
+_EVENTS = 2_000
 
 
 @dataclass(frozen=True)
@@ -76,12 +79,27 @@ def integrate(
     for t in inner:
         trail.events.append(DynamicEvent("break", t, 0.0, f"loads are not smooth at t = {t:.9g} s"))
     ends = [*inner, float(grid[-1])]
-    for end in ends:
-        stepper = Stepper(form, trail, method, rtol, atol, exact, end, at_break=end in inner)
+    watching = any(drive.switches for drive in form.compiled.drives)
+    flipped: list[tuple[int, int]] = []
+    while ends:
+        began = trail.time
+        guard = Switches(form, trail.time, y, flipped) if watching else None
+        stepper = Stepper(form, trail, method, rtol, atol, exact, ends[0], at_break=ends[0] in inner, guard=guard)
         last = stepper.run(y, grid, max_steps, output)
         if last is None:
             break
         y = last
+        if trail.time > began:
+            flipped = []
+        if guard is not None and guard.hit is not None:
+            flipped.append(guard.hit)
+            if len(trail.events) >= _EVENTS:
+                trail.message = f"Zeno behaviour: more than {_EVENTS} events by t = {trail.time:.9g} s"
+                break
+            kind = KINDS[guard.hit[1]]
+            trail.events.append(DynamicEvent(kind, trail.time, 4.0 * np.spacing(trail.time), guard.flip(trail.time, y)))
+        if trail.time >= ends[0]:
+            ends.pop(0)
     return trail
 
 
@@ -90,7 +108,7 @@ class Stepper:
 
     def __init__(
         self, form: Form, trail: Trail, method: str, rtol: float, atol: Array | float, exact: bool, end: float,
-        at_break: bool, guard: Guard | None = None,
+        at_break: bool, guard: Guard | Switches | None = None,
     ) -> None:  # fmt: skip
         self.form, self.trail, self.method, self.rtol, self.atol = form, trail, method, rtol, atol
         self.longest, self.stalled, self.lost = 0.0, 0, False
@@ -122,6 +140,13 @@ class Stepper:
         if first is not None:
             options["first_step"] = min(first, bound - t)
         return getattr(scipy_integrate, self.method)(self.rates, t, y, bound, **options)
+
+    def reached(self, t0: float, y0: Array, t: float) -> Array | None:
+        """State at a time, by steps of their own from a node; None if they fail."""
+        solver = self.solver(t0, y0, t, t - t0)
+        while solver.status == "running":
+            solver.step()
+        return None if solver.status == "failed" else np.asarray(solver.y)
 
     def run(self, y: Array, grid: Array, max_steps: int, output: Output) -> Array | None:
         """Integrate to the end of the piece, or to where the guard ends it; None if that fails."""

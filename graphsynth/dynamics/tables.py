@@ -9,14 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.elements import Force, JointFriction, Spring, Torque, TorqueSource, TorsionSpring
+from graphsynth.dynamics.elements import (
+    Force,
+    JointFriction,
+    MotorDrive,
+    Spring,
+    Torque,
+    TorqueSource,
+    TorsionSpring,
+)
 from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
+from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
@@ -52,8 +62,11 @@ class Tables(NamedTuple):
     force_table: Array  #: point, force
     sources: IntArray  #: (torques, 2) links
     source_table: Array  #: torque behind the train, efficiency
+    motors: IntArray  #: (motors, 4) links, kind, first current
+    motor_table: Array  #: ratio, efficiency, electrical data by kind
+    modes: IntArray  #: (motors, 2) voltage at its limit (-1, 0, 1), power flow (1 drives); changed in place
     friction: IntArray  #: (frictions, 4) first row, rows, a, b
-    friction_table: Array  #: kinetic, static, Stribeck speed, regular speed, radius, length, sense of sliding
+    friction_table: Array  #: kinetic, static, Stribeck speed, smoothing velocity, radius, length, sense of sliding
     size: float  #: characteristic length
 
 
@@ -132,6 +145,31 @@ class Compiled:
             target[..., self.moving, 2] = part[..., 2]
         return pose, rate, second
 
+    @cached_property
+    def drives(self) -> tuple[MotorDrive, ...]:
+        """Motors, in the order of the elements."""
+        return tuple(e for e in self.model.elements if isinstance(e, MotorDrive))
+
+    @cached_property
+    def currents(self) -> Array:
+        """Currents of all motors at the start."""
+        return np.array([part for drive in self.drives for part in drive.currents])
+
+    @property
+    def tail(self) -> Array:
+        """Start of what stands in every state behind the motion: currents, their energy, work."""
+        count = len(self.currents)
+        return np.concatenate([self.currents, np.zeros(2 if count else 1)])
+
+    def currents_of(self, y: Array) -> Array:
+        """Currents in a state of any form."""
+        count = len(self.currents)
+        return np.asarray(y[len(y) - count - 2 : len(y) - 2] if count else y[:0])
+
+    def with_modes(self, modes: IntArray) -> Compiled:
+        """Return the same with modes of the motors of its own."""
+        return replace(self, tables=self.tables._replace(modes=modes.copy())) if self.drives else self
+
     @property
     def spread(self) -> float:
         """Largest mass over the smallest, inertias taken by the characteristic length; infinite without mass."""
@@ -199,9 +237,10 @@ def compile_model(model: DynamicModel) -> Compiled:
     diagonal = not (mass - np.diag(np.diag(mass))).any()
     lower: Array = np.zeros((0, 0)) if model.massless else np.asarray(np.linalg.cholesky(mass), dtype=np.float64)
     springs, torsions, forces, sources = _loads(model, centres)
+    motors, motor_table, modes = _motors(model)
     tables = Tables(
         column, rows, table, slots, mass, lower, diagonal, np.array(model.gravity), *springs, *torsions, *forces,
-        *sources, *_frictions(model, joints, first), _size(model),
+        *sources, motors, motor_table, modes, *_frictions(model, joints, first), _size(model),
     )  # fmt: skip
     applied = tuple(
         element for element in model.elements
@@ -365,9 +404,10 @@ def _mass_matrix(model: DynamicModel, column: IntArray) -> Array:
         mass[k, k] = mass[k + 1, k + 1] = body.mass
         mass[k + 2, k + 2] = body.inertia
     for element in model.elements:
-        if isinstance(element, TorqueSource) and element.rotor_inertia > 0.0:
-            reflected = element.ratio**2 * element.rotor_inertia
-            ends = [(int(column[link]) + 2, sign) for link, sign in ((element.a, -1.0), (element.b, 1.0))]
+        source = element.idle if isinstance(element, MotorDrive) else element
+        if isinstance(source, TorqueSource) and source.rotor_inertia > 0.0:
+            reflected = source.ratio**2 * source.rotor_inertia
+            ends = [(int(column[link]) + 2, sign) for link, sign in ((source.a, -1.0), (source.b, 1.0))]
             for i, si in ends:
                 for j, sj in ends:
                     if i >= 2 and j >= 2:
@@ -378,7 +418,7 @@ def _mass_matrix(model: DynamicModel, column: IntArray) -> Array:
 def _loads(model: DynamicModel, centres: Array) -> list[tuple[IntArray, Array]]:
     """Springs, torsion springs, forces, torques: links and numbers of each."""
     springs, torsions, forces, sources = [], [], [], []
-    for e in model.elements:
+    for e in (e.idle if isinstance(e, MotorDrive) else e for e in model.elements):
         if isinstance(e, Spring):
             ends = (*_shifted(e.at_a, centres[e.a]), *_shifted(e.at_b, centres[e.b]))
             springs.append(((e.a, e.b), (*ends, e.stiffness, e.free_length, e.damping)))
@@ -401,6 +441,25 @@ def _loads(model: DynamicModel, centres: Array) -> list[tuple[IntArray, Array]]:
         )
         for items, width in kinds
     ]
+
+
+def _motors(model: DynamicModel) -> tuple[IntArray, Array, IntArray]:
+    """Links, kind and first current of every motor; its numbers; its modes, which a run sets."""
+    drives = [e for e in model.elements if isinstance(e, MotorDrive)]
+    ints, table, first = np.zeros((len(drives), 4), dtype=np.int64), np.zeros((len(drives), 9)), 0
+    for k, e in enumerate(drives):
+        motor = e.equation
+        if isinstance(motor, DCMotor):
+            kind, names = 1, "inductance resistance emf_constant torque_constant gain speed voltage_limit"
+        elif isinstance(motor, SynchronousMotor):
+            kind, names = 2, "inductance resistance pole_pairs flux ud uq"
+        else:
+            kind, names = 0, "stall slope"
+        numbers = [float(getattr(motor, name)) for name in names.split()]
+        ints[k] = e.a, e.b, kind, first
+        table[k, : 2 + len(numbers)] = e.train.ratio, e.train.efficiency, *numbers
+        first += len(e.currents)
+    return ints, table, np.tile(np.array([0, 1]), (len(drives), 1)).astype(np.int64)
 
 
 def _frictions(model: DynamicModel, joints: list[Any], first: list[int]) -> tuple[IntArray, Array]:

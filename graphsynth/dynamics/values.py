@@ -141,7 +141,7 @@ class Values:
         if not T.lower.size:
             return *nothing, "; accelerations of massless links: one-coordinate form only", "consistent"
         x = kernels.state_rows(T, q, v)
-        Q, _, _, _, good = kernels.load_vector(T, x, applied)
+        Q, _, _, _, good = kernels.load_vector(T, x, applied, self.compiled.currents)
         if not good:
             return *nothing, "; a spring has length 0, so its direction is not defined", "consistent"
         if T.friction.size:

@@ -196,7 +196,7 @@ def test_an_output_without_a_pose_is_a_failure(monkeypatch):
 
 
 def test_a_check_without_a_value_is_a_warning():
-    good = Checks(*[0.0] * 9)
+    good = Checks(*[0.0] * 10)
     assert warnings_of(good, 1e-9) == ()
     assert "no value of energy" in warnings_of(good._replace(energy=math.nan), 1e-9)[0]
 

@@ -65,9 +65,9 @@ def test_complex_roots_are_none():
 
 
 def test_warnings_begin_at_their_bounds():
-    good = Checks(*[0.0] * 9)
+    good = Checks(*[0.0] * 10)
     for name, bound in (("energy", 1e-7), ("position_drift", 1e-9), ("power", 1e-9), ("dalembert", 1e-9),
-                        ("second_form", 1e-7)):  # fmt: skip
+                        ("second_form", 1e-7), ("electric", 1e-7)):  # fmt: skip
         assert warnings_of(good._replace(**{name: 0.9 * bound}), 1e-9) == ()
         assert len(warnings_of(good._replace(**{name: 1.5 * bound}), 1e-9)) == 1
 
@@ -76,9 +76,9 @@ def test_the_second_form_is_that_of_the_planar_engine_where_there_is_one(monkeyp
     compiled = compile_model(g1())
     report = consistent_start(g1(), keep={(0, 1): 0.3})
     q, v = report.q, report.v
-    own = second_form.second_accelerations(compiled, report, np.zeros(1), q[None], v[None])[0]
-    monkeypatch.setattr(second_form, "_null_space", lambda compiled, t, q, v: np.zeros_like(q))
-    other = second_form.second_accelerations(compiled, report, np.zeros(1), q[None], v[None])[0]
+    own = second_form.second_accelerations(compiled, report, np.zeros(1), q[None], v[None], np.zeros((1, 0)))[0]
+    monkeypatch.setattr(second_form, "_null_space", lambda compiled, t, q, v, currents: np.zeros_like(q))
+    other = second_form.second_accelerations(compiled, report, np.zeros(1), q[None], v[None], np.zeros((1, 0)))[0]
     assert np.abs(own).max() > 1e-3
     np.testing.assert_allclose(other, own, rtol=1e-9, atol=1e-12)
 

@@ -40,7 +40,7 @@ _LENGTHS, _NODES = (2.0, 1.75, 2.3), 3
 
 
 class AugmentedForm:
-    """State ``(q, v, work)``; a solver workspace, not a result.
+    """State ``(q, v, currents, work)``; a solver workspace, not a result.
 
     Attributes
     ----------
@@ -86,9 +86,9 @@ class AugmentedForm:
         self.pivot = 1.0
         self._kernels = kernels
         self._fixed = compiled.driven(0.0)
-        self._none, self._one = np.zeros(compiled.n), np.empty((1, 2 * compiled.n + 1))
+        self._none, self._one = np.zeros(compiled.n), np.empty((1, 2 * compiled.n + len(compiled.tail)))
         self._unit = np.tile([compiled.tables.size, compiled.tables.size, 1.0], compiled.n // 3)
-        self._begin = np.concatenate([start.q, start.v, [0.0]])
+        self._begin = np.concatenate([start.q, start.v, compiled.tail])
 
     def begin(self) -> Array:
         """Start state."""
@@ -259,7 +259,7 @@ class AugmentedForm:
         if len(self._nodes) == 1:
             return lambda at: np.concatenate([y[:n] + (at - t) * y[n : 2 * n], y[n:]])
         times, states = zip(*self._nodes)
-        return HermiteLeap(list(times), list(states), [self.rates(at, state) for at, state in zip(times, states)])
+        return HermiteLeap(n, list(times), list(states), [self.rates(at, state) for at, state in zip(times, states)])
 
     def _across(
         self, t: float, h: float, guess: Callable[[float], Array]
@@ -267,10 +267,10 @@ class AugmentedForm:
         """One step of length h over a singular pose; None if it does not land where it should."""
         y, n = self._nodes[-1][1], self.compiled.n
 
-        def evaluate(at: float, q: Array, v: Array) -> tuple[Array, float]:
+        def evaluate(at: float, q: Array, v: Array, tail: Array) -> tuple[Array, Array]:
             q, v, _, pivot = self._kernels.project_state(self.compiled.tables, q, v, self.slots, self.driven(at))
-            found = self.rates(at, np.concatenate([q, v, y[2 * n :]]))
-            return found[n : 2 * n] if pivot > _REGULAR else np.full(n, np.nan), float(found[2 * n])
+            found = self.rates(at, np.concatenate([q, v, tail]))
+            return found[n : 2 * n] if pivot > _REGULAR else np.full(n, np.nan), found[2 * n :]
 
         path = gauss_step(evaluate, t, y, h, guess, self._unit)
         if path is None:
@@ -283,7 +283,7 @@ class AugmentedForm:
         speed = float(np.abs(v / self._unit).max())
         missed = max(float(np.abs((q - raw[:n]) / self._unit).max()),
                      float(np.abs((v - raw[n : 2 * n]) / self._unit).max()) / speed)  # fmt: skip
-        kept = abs(self._energy(t + h, fresh) - self._energy(t, y) - float(raw[2 * n] - y[2 * n]))
+        kept = abs(self._energy(t + h, fresh) - self._energy(t, y) - float(raw[-1] - y[-1]))
         if not missed < _LANDED or not kept <= _KEPT * float(v @ self.compiled.tables.mass @ v):
             return None
         self.loss += loss
@@ -292,7 +292,9 @@ class AugmentedForm:
     def _energy(self, t: float, y: Array) -> float:
         q, v = self._halves(y)
         T = self.compiled.tables
-        _, _, potential, _, _ = self._kernels.load_vector(T, self._kernels.state_rows(T, q, v), self._none)
+        _, _, potential, _, _ = self._kernels.load_vector(
+            T, self._kernels.state_rows(T, q, v), self._none, self.compiled.currents
+        )
         return 0.5 * float(v @ T.mass @ v) + float(potential)
 
     def watch(self, trail: Trail, before: float, solver: Any) -> None:

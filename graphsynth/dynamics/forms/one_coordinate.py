@@ -139,7 +139,7 @@ def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, r
 
 
 class OneCoordinateForm:
-    """State ``(theta, omega, work)``; a solver workspace, not a result.
+    """State ``(theta, omega, currents, work)``; a solver workspace, not a result.
 
     Raises
     ------
@@ -183,8 +183,8 @@ class OneCoordinateForm:
         self.trace = self.tracker.blank(np.array([theta, theta]))
         self.E, self.S = engine_tables(self.tracker), engine_buffers(self.trace, compiled.n)
         self._seed(theta, start.poses)
-        self._begin = np.array([theta, omega, 0.0])
-        self._none, self._out, self._one = np.zeros(compiled.n), np.zeros(4), np.empty((1, 3))
+        self._begin = np.concatenate([[theta, omega], compiled.tail])
+        self._none, self._out, self._one = np.zeros(compiled.n), np.zeros(4), np.empty((1, len(self._begin)))
 
     def _seed(self, theta: float, poses: Array) -> None:
         """Start the engine at the start pose, in its sample 0."""
@@ -239,7 +239,7 @@ class OneCoordinateForm:
     def _failed(self, y: Array) -> Array:
         """Say why; the integrator tries a shorter step, and gives up where none is short enough."""
         if not np.isfinite(y).all():  # asked by a solver that has lost its way: no word on the mechanism
-            return np.full(3, np.nan)
+            return np.full(len(y), np.nan)
         if self.S.done[0] == 2:
             self.why = (
                 "a spring has length 0, so its direction is not defined" if self._out[3] == 0.0
@@ -251,12 +251,14 @@ class OneCoordinateForm:
                 f"the coordinate cannot go beyond {self.S.u[0]:.9g}: at a fold next to it two assembly modes merge, "
                 "and it is no coordinate there; use form='augmented' or 'partitioned'"
             )
-        return np.full(3, np.nan)
+        return np.full(len(y), np.nan)
 
     def transmission(self, theta: float) -> tuple[Array, Array, Array]:
         """Coordinates and their first and second derivatives by the input; NaN out of reach."""
         if self.S.done[0] < 2 or self.S.u[1] != theta:  # else the engine has just been there
-            self._run(np.array([theta, 0.0, 0.0]), 0.0, ONE_STAGE, self._one, 0, 1)
+            y = np.zeros(len(self._begin))
+            y[0] = theta
+            self._run(y, 0.0, ONE_STAGE, self._one, 0, 1)
         if self.S.done[0] < 2:
             return (np.full(self.compiled.n, np.nan),) * 3
         q, q1, q2 = self.S.centres.copy()
@@ -267,10 +269,11 @@ class OneCoordinateForm:
         q, q1, q2 = self.transmission(float(y[0]))
         if not np.isfinite(q).all():
             return self._failed(y)
-        w, T = float(y[1]), self.compiled.tables
+        y, T = np.ascontiguousarray(y), self.compiled.tables
+        w = float(y[1])
         v = q1 * w
         x = self._kernels.state_rows(T, q, v)
-        Q, _, _, P, good = self._kernels.load_vector(T, x, applied_loads(self.compiled, t, q, v))
+        Q, _, _, P, good = self._kernels.load_vector(T, x, applied_loads(self.compiled, t, q, v), y[2:])
         Mq = T.mass @ q1
         inertia = float(Mq @ q1)
         self._out[0], self._out[3] = inertia, float(good)
@@ -278,11 +281,14 @@ class OneCoordinateForm:
             rubbed = self._rub(t, q, v, x, Q)
             if not np.isfinite(rubbed):
                 self.why = NO_LOADS
-                return np.full(3, np.nan)
+                return np.full(len(y), np.nan)
             P += rubbed
         if not self._good():
             return self._failed(y)
-        return np.array([w, float(Q @ q1 - Mq @ q2 * w * w) / inertia, P])
+        found = np.empty((1, len(y)))
+        found[0, :2] = w, float(Q @ q1 - Mq @ q2 * w * w) / inertia
+        self._kernels.finish(T, x, y, found, 0, 2, float(P))
+        return np.asarray(found[0])
 
     def _rub(self, t: float, q: Array, v: Array, x: Array, Q: Array) -> float:
         """Add friction to the generalised forces; returns its power, NaN if there is none that fits."""

@@ -41,7 +41,7 @@ def independent_coordinates(scaled: Array, tolerance: float = 1e-10) -> NDArray[
 
 
 class PartitionedForm:
-    """State ``(z, dz/dt, work)`` with z some of the coordinates; a solver workspace, not a result.
+    """State ``(z, dz/dt, currents, work)`` with z some of the coordinates; a solver workspace, not a result.
 
     Dependent coordinates are solved by Newton's method at every evaluation; ``(N^T M N) z'' = N^T (Q - M a0)`` with
     ``N`` the velocity map and ``a0`` the accelerations at ``z'' = 0``.
@@ -71,7 +71,7 @@ class PartitionedForm:
         self._fixed, self._none, self.out = compiled.driven(0.0), np.zeros(compiled.n), np.zeros(7)
         self._near = start.q.copy()
         self._choose(start.time, start.q, start.v)
-        self._begin = np.concatenate([start.q[self.chosen], start.v[self.chosen], [0.0]])
+        self._begin = np.concatenate([start.q[self.chosen], start.v[self.chosen], compiled.tail])
 
     @property
     def unit(self) -> Array:
@@ -84,7 +84,6 @@ class PartitionedForm:
         x = self._kernels.state_rows(T, q, v)
         J = self._kernels.constraint_system(T, x, self.slots, self._driven(t))[1]
         self.chosen = independent_coordinates(J * self._scale / self._row_scale[:, None])
-        self._one = np.empty((1, 2 * len(self.chosen) + 1))
         self._fresh = self._place(t, np.concatenate([q[self.chosen], v[self.chosen], [0.0]]), q)[2]
 
     def _driven(self, t: float) -> Array:
@@ -109,19 +108,22 @@ class PartitionedForm:
         """Accelerations of all coordinates."""
         return self._accelerate(t, y)[0]
 
-    def _accelerate(self, t: float, y: Array) -> tuple[Array, float]:
-        """Accelerations, and the power of the non-conservative loads and drivers."""
+    def _accelerate(self, t: float, y: Array) -> tuple[Array, Array]:
+        """Accelerations, and the rates of what stands behind the motion in the state."""
         q, v, pivot = self._place(t, y, self._near)
+        tail = np.full((1, len(y) - 2 * len(self.chosen)), np.nan)
         if pivot < 0.0:
             self.out[6] = 3.0 if np.isfinite(y).all() else 0.0  # a state that is none says nothing of the mechanism
             self._look()
-            return q, float("nan")
+            return q, tail[0]
+        T, own = self.compiled.tables, np.ascontiguousarray(y[2 * len(self.chosen) :])
         applied = applied_loads(self.compiled, t, q, v) if self.compiled.applied else self._none
         a, P = self._kernels.accelerate_partitioned(
-            self.compiled.tables, q, v, self.chosen, self._metric, self.slots, self._driven(t), applied, self.out
+            T, q, v, self.chosen, self._metric, self.slots, self._driven(t), applied, own, self.out
         )
+        self._kernels.finish(T, self._kernels.state_rows(T, q, v), own, tail, 0, 0, P)
         self._look()
-        return a, float(P)
+        return a, tail[0]
 
     def _look(self) -> None:
         """Note what the kernels found wrong."""
@@ -134,8 +136,8 @@ class PartitionedForm:
     def rates(self, t: float, y: Array) -> Array:
         """Return the derivative of the state; NaN where the mechanism cannot be assembled."""
         k = len(self.chosen)
-        a, power = self._accelerate(t, y)
-        return np.concatenate([y[k : 2 * k], a[self.chosen], [power]])
+        a, tail = self._accelerate(t, y)
+        return np.concatenate([y[k : 2 * k], a[self.chosen], tail])
 
     @property
     def stages(self) -> Stages | None:
@@ -170,7 +172,7 @@ class PartitionedForm:
             return y
         text = f"independent coordinates {self._named(before)} fail here; {self._named(self.chosen)} from now on"
         self.changes.append((t, text))
-        return np.concatenate([q[self.chosen], v[self.chosen], y[-1:]])
+        return np.concatenate([q[self.chosen], v[self.chosen], y[2 * len(before) :]])
 
     def _named(self, chosen: NDArray[np.intp]) -> str:
         links = self.compiled.moving

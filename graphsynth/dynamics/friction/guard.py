@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.friction.problem import FrictionProblem
 from graphsynth.dynamics.friction.state import Piece, decide, state_values
+from graphsynth.dynamics.switching import Finding
 from graphsynth.dynamics.values import initial_slots
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.integrate import Form
     from graphsynth.dynamics.stepping import Stepper
 
-__all__ = ["Finding", "Guard"]
+__all__ = ["Guard"]
 
 Array = NDArray[np.float64]
 
@@ -30,14 +31,6 @@ _UNRESOLVED = (
 )
 #: Rounds of the search for an event.
 _ROUNDS = 40
-
-
-class Finding(NamedTuple):
-    """What to do after a step: go on (nothing), again with a step, up to an event, or stop with a message."""
-
-    step: float | None = None
-    event: float | None = None
-    message: str = ""
 
 
 class Guard:
@@ -176,7 +169,7 @@ class Guard:
             return t0
         last: tuple[float, float] | None = None
         for _ in range(_ROUNDS):
-            y = _reached(stepper, t0, y0, t)
+            y = stepper.reached(t0, y0, t)
             if y is None:
                 break
             values, slopes, _ = self._values(min(t, stepper.latest), y)
@@ -226,11 +219,3 @@ def _root(value: Callable[[float], float], low: float, high: float, at_low: floa
     if not value(low) > 0.0 or not value(high) <= 0.0:  # the interpolant does not meet the ends to the last digit
         return high
     return float(brentq(value, low, high, xtol=1e-9 * (high - low), rtol=8.9e-16))
-
-
-def _reached(stepper: Stepper, t0: float, y0: Array, t: float) -> Array | None:
-    """State at a time, by steps of their own from the last node."""
-    solver = stepper.solver(t0, y0, t, t - t0)
-    while solver.status == "running":
-        solver.step()
-    return None if solver.status == "failed" else np.asarray(solver.y)

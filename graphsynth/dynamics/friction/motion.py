@@ -145,7 +145,7 @@ class DryMotion:
         """Return the formulation of a piece, from the present state on."""
         if piece.still:
             self._v = np.zeros_like(self._v)
-            return RestForm(self._q, self._slots)
+            return RestForm(piece.compiled, self._q, self._slots)
         poses, rates, _ = self.rows.compiled.to_links(self._q, self._v, np.zeros_like(self._q))
         start = replace(
             self.report, time=trail.time, q=self._q, v=self._v, slots=self._slots,

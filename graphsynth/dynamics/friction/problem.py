@@ -82,7 +82,9 @@ class FrictionProblem:
         compiled = rows.compiled
         T = compiled.tables
         self._J, gam, self.W, _, offset = rows.directions(t, q, v, slots)
-        Q, _, _, _, self.good = kernels.load_vector(T, kernels.state_rows(T, q, v), applied_loads(compiled, t, q, v))
+        Q, _, _, _, self.good = kernels.load_vector(
+            T, kernels.state_rows(T, q, v), applied_loads(compiled, t, q, v), compiled.currents
+        )
         self.rates = self.W @ v
         size = np.tile([T.size, T.size, 1.0], compiled.n // 3)
         self.speed = max(speed, float(np.abs(v / size).max()))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.friction.state import state_values
+from graphsynth.dynamics.tables import Compiled
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.friction.guard import Guard
@@ -29,7 +30,8 @@ class RestForm:
     loss = contraction = 0.0
     pivot = 1.0
 
-    def __init__(self, q: Array, slots: Array) -> None:
+    def __init__(self, compiled: Compiled, q: Array, slots: Array) -> None:
+        self.compiled = compiled
         self.changes: list[tuple[float, str]] = []
         self.slots, self._q = slots, q
 

@@ -181,7 +181,7 @@ def state_values(piece: Piece, t: float, q: Array, v: Array, slots: Array) -> tu
         x = state_rows(T, q, v)
         _, J, gam, _ = constraint_system(rows.all.tables, x, slots, rows.all.driven(t))
         own = [*range(m), *(m + f for f in piece.kept)]
-        Q = load_vector(T, x, applied_loads(base, t, q, v))[0]
+        Q = load_vector(T, x, applied_loads(base, t, q, v), base.currents)[0]
         out = np.zeros(7)
         a, lam = accelerate(T, x, np.ascontiguousarray(J[own]), gam[own], Q, out)
         u, du, forces, factor = J[m:] @ v, J[m:] @ a - gam[m:], np.zeros(count), float(out[3])

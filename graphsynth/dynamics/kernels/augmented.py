@@ -8,9 +8,8 @@ import math
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.dynamics.kernels.combining import combined
 from graphsynth.dynamics.kernels.solving import accelerate, solve_rows
-from graphsynth.dynamics.kernels.systems import constraint_system, load_vector, state_rows
+from graphsynth.dynamics.kernels.systems import combined, constraint_system, finish, load_vector, state_rows
 
 #: Smallest pivot (rows of length 1) below which a state is projected before its accelerations are computed.
 NEAR = 0.03
@@ -52,7 +51,7 @@ def project_state(T, q, v, phi, qd):
 
 @kernel
 def augmented_stages(T, y, h, A, K, low, high, phi, driven, applied, out):
-    """Rates of (q, v, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state, multipliers.
+    """Rates of (q, v, currents, work) at ``y + h A[s] K`` into K[s], for stages low..high-1; last state, multipliers.
 
     ``driven`` holds the prescribed coordinates of every stage, or one set for all.
     ``out`` as in `accelerate`, then potential energy and a flag.  The flag is set, and the rates are NaN, for a spring
@@ -66,7 +65,7 @@ def augmented_stages(T, y, h, A, K, low, high, phi, driven, applied, out):
         q, v = state[:n], state[n : 2 * n]
         for attempt in range(2):
             x = state_rows(T, q, v)
-            Q, _, V, P, good = load_vector(T, x, applied)
+            Q, _, V, P, good = load_vector(T, x, applied, state[2 * n :])
             _, J, gam, vel = constraint_system(T, x, phi, qd)
             a, lam = accelerate(T, x, J, gam, Q, out)
             if attempt == 1 or not out[1] < NEAR:
@@ -82,5 +81,5 @@ def augmented_stages(T, y, h, A, K, low, high, phi, driven, applied, out):
             P = math.nan
         for j in range(n):
             K[s, j], K[s, n + j] = (v[j], a[j]) if P == P else (P, P)
-        K[s, 2 * n] = P
+        finish(T, x, state, K, s, 2 * n, P)
     return state, lam

@@ -3,8 +3,7 @@
 import math
 
 from graphsynth.core.compilation import kernel
-from graphsynth.dynamics.kernels.combining import combined
-from graphsynth.dynamics.kernels.systems import load_vector, state_rows
+from graphsynth.dynamics.kernels.systems import combined, finish, load_vector, state_rows
 from graphsynth.kinematics.engine.kernels.rows import nearest_turn
 from graphsynth.kinematics.engine.kernels.running import run
 
@@ -36,7 +35,7 @@ def centre_motion(T, E, S, centres, theta):
 
 @kernel
 def one_coordinate_stages(T, E, S, centres, applied, y, h, A, K, low, high, out):
-    """Rates of (theta, omega, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state.
+    """Rates of (theta, omega, currents, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; last state.
 
     Without loads given as functions; NaN where the engine, started at its sample 0, does not reach.  ``out``: effective
     inertia, half its derivative, potential energy, whether all springs have a length.  What the engine finds stays in
@@ -56,7 +55,8 @@ def one_coordinate_stages(T, E, S, centres, applied, y, h, A, K, low, high, out)
         run(E.steps, E.touched, E.rows, E.RP, E.core, E.elim, E.EP, E.drv, E.DP, E.need, E.wanted, S.q, S.u, E.modes,
             E.poses, E.centres, S.X, S.TH, S.V, S.W, S.PHI, S.M, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM,
             S.done, S.why, E.first, E.Lc, E.far, E.derivs)  # fmt: skip
-        K[s, 0] = K[s, 1] = K[s, 2] = math.nan
+        for i in range(K.shape[1]):
+            K[s, i] = math.nan
         if S.done[0] < 2:
             out[0] = 0.0
             continue
@@ -64,13 +64,15 @@ def one_coordinate_stages(T, E, S, centres, applied, y, h, A, K, low, high, out)
         v = q1.copy()
         for i in range(n):
             v[i] *= w
-        Q, _, V, P, good = load_vector(T, state_rows(T, q, v), applied)
+        x = state_rows(T, q, v)
+        Q, _, V, P, good = load_vector(T, x, applied, state[2:])
         inertia, half, load = 0.0, 0.0, 0.0
         for i in range(n):
             load += Q[i] * q1[i]
             for j in range(n):
                 inertia += T.mass[i, j] * q1[i] * q1[j]
                 half += T.mass[i, j] * q1[i] * q2[j]
-        K[s, 0], K[s, 1], K[s, 2] = w, (load - half * w * w) / inertia, P
+        K[s, 0], K[s, 1] = w, (load - half * w * w) / inertia
+        finish(T, x, state, K, s, 2, P)
         out[0], out[1], out[2], out[3] = inertia, half, V, 1.0 if good else 0.0
     return state

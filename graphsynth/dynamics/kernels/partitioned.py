@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.dynamics.kernels.combining import combined
 from graphsynth.dynamics.kernels.rubbing import friction_loads
 from graphsynth.dynamics.kernels.solving import accelerate, back_lower, factor_rows, forth_lower, least_step
-from graphsynth.dynamics.kernels.systems import constraint_system, load_vector, state_rows
+from graphsynth.dynamics.kernels.systems import combined, constraint_system, finish, load_vector, state_rows
 from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE
 
 ROUNDS = 12
@@ -67,14 +66,14 @@ def place_partitioned(T, y, chosen, near, metric, phi, qd):
 
 
 @kernel
-def accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, out):
+def accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, currents, out):
     """Accelerations by ``(N^T M N) z'' = N^T (Q - M a0)`` and the power of non-conservative loads and drivers.
 
     Multipliers serve friction alone.  ``out`` as in `augmented_stages`.
     """
     n, c, flat = q.shape[0], chosen.shape[0], metric.shape[0] > 0
     x = state_rows(T, q, v)
-    Q, _, _, P, good = load_vector(T, x, applied)
+    Q, _, _, P, good = load_vector(T, x, applied, currents)
     _, J, gam, _ = constraint_system(T, x, phi, qd)
     m = gam.shape[0]
     if T.friction.shape[0] > 0:
@@ -124,7 +123,7 @@ def accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, out):
 
 @kernel
 def partitioned_stages(T, y, h, A, K, low, high, chosen, near, metric, phi, driven, applied, out):
-    """Rates of (z, dz/dt, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state.
+    """Rates of (z, dz/dt, currents, work) at ``y + h A[s] K`` into K[s], for the stages low..high-1; the last state.
 
     ``driven`` holds the prescribed coordinates of every stage, or one set for all.
     """
@@ -136,8 +135,8 @@ def partitioned_stages(T, y, h, A, K, low, high, chosen, near, metric, phi, driv
         q, v, pivot = place_partitioned(T, state, chosen, near, metric, phi, qd)
         if pivot < 0.0:
             out[6] = 3.0
-        a, P = accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, out)
+        a, P = accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, state[2 * c :], out)
         for k in range(c):
             K[s, k], K[s, c + k] = state[c + k], a[chosen[k]]
-        K[s, 2 * c] = P
+        finish(T, state_rows(T, q, v), state, K, s, 2 * c, P)
     return state

@@ -9,6 +9,32 @@ from graphsynth.kinematics.engine.codes import DRIVE_ANGLE, DRIVE_SLIDE, PBX, PB
 from graphsynth.kinematics.engine.kernels.rows import gamma, row
 
 RACK_KIND = 20
+#: Kinds of motors; columns of their table, the electrical ones by kind.
+DIRECT, SYNCHRONOUS = 1, 2
+RATIO, EFFICIENCY, INDUCTANCE, RESISTANCE = 0, 1, 2, 3
+STALL, SLOPE = 2, 3
+EMF, TORQUE, GAIN, DEMAND, LIMIT = 4, 5, 6, 7, 8
+POLES, FLUX, UD, UQ = 4, 5, 6, 7
+
+
+@kernel
+def combined(y, h, K, weights, count):
+    """Return the state ``y + h sum weights K`` of a stage."""
+    found = y.copy()
+    for s in range(count):
+        if weights[s] != 0.0:
+            for i in range(y.shape[0]):
+                found[i] += h * weights[s] * K[s, i]
+    return found
+
+
+@kernel
+def finish(T, x, state, K, s, at, P):
+    """Rates of what stands behind the motion in row ``s`` of K: currents, their energy, work."""
+    last = state.shape[0] - 1
+    if last > at:
+        K[s, last - 1] = current_rates(T, x, state[at:], K[s], at)
+    K[s, last] = P
 
 
 @kernel
@@ -85,7 +111,38 @@ def twist(T, Q, x, a, b, torque):
 
 
 @kernel
-def load_vector(T, x, applied):
+def motor_torque(T, s, currents, shaft):
+    """Torque of motor ``s`` on its own shaft."""
+    p, first = T.motor_table[s], T.motors[s, 3]
+    if T.motors[s, 2] == DIRECT:
+        return p[TORQUE] * currents[first]
+    if T.motors[s, 2] == SYNCHRONOUS:
+        return 1.5 * p[POLES] * p[FLUX] * currents[first + 1]
+    return p[STALL] - p[SLOPE] * shaft
+
+
+@kernel
+def current_rates(T, x, currents, rates, at):
+    """Rates of the currents into ``rates[at:]``; the rate of their energy: power supplied less lost less shaft's."""
+    surplus = 0.0
+    for s in range(T.motors.shape[0]):
+        p, first, kind = T.motor_table[s], T.motors[s, 3], T.motors[s, 2]
+        shaft = p[RATIO] * (x[T.motors[s, 1], 7] - x[T.motors[s, 0], 7])
+        if kind == DIRECT:
+            i = currents[first]
+            volt = p[GAIN] * (p[DEMAND] - shaft) if T.modes[s, 0] == 0 else T.modes[s, 0] * p[LIMIT]
+            rates[at + first] = (volt - p[RESISTANCE] * i - p[EMF] * shaft) / p[INDUCTANCE]
+            surplus += i * (volt - p[RESISTANCE] * i - p[EMF] * shaft)
+        if kind == SYNCHRONOUS:
+            d, i, turn = currents[first], currents[first + 1], p[POLES] * shaft
+            rates[at + first] = (p[UD] - p[RESISTANCE] * d) / p[INDUCTANCE] + turn * i
+            rates[at + first + 1] = (p[UQ] - p[RESISTANCE] * i - turn * p[FLUX]) / p[INDUCTANCE] - turn * d
+            surplus += 1.5 * (p[UD] * d + (p[UQ] - turn * p[FLUX]) * i - p[RESISTANCE] * (d * d + i * i))
+    return surplus
+
+
+@kernel
+def load_vector(T, x, applied, currents):
     """Generalised forces with potential V and power P of the others; False if a spring pushes without a direction.
 
     That is at length 0 with a free length; without one the force is smooth there, and the damper is taken along the
@@ -146,6 +203,11 @@ def load_vector(T, x, applied):
         torque, eta = T.source_table[s, 0], T.source_table[s, 1]
         torque = torque * eta if torque * (x[b, 7] - x[a, 7]) >= 0.0 else torque / eta
         P += twist(T, Qn, x, a, b, torque)
+    for s in range(T.motors.shape[0]):
+        a, b = T.motors[s, 0], T.motors[s, 1]
+        ratio, eta = T.motor_table[s, RATIO], T.motor_table[s, EFFICIENCY]
+        torque = ratio * motor_torque(T, s, currents, ratio * (x[b, 7] - x[a, 7]))
+        P += twist(T, Qn, x, a, b, torque * eta if T.modes[s, 1] > 0 else torque / eta)
     for i in range(n):
         Qn[i] += Qc[i]
     return Qn, Qc, V, P, good
