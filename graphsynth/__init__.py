@@ -17,6 +17,7 @@ _shown.WORK.update(
     {
         "simulate": "graphsynth.kinematics.simulation:simulate",
         "modes": "graphsynth.kinematics.assembly:assembly_modes",
+        "static forces": "graphsynth.dynamics.static:static_forces",
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",
         "graph picture": "graphsynth.drawing.methods:graph_picture",

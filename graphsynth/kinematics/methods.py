@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.shown import Shown, work
+from graphsynth.kinematics.instantaneous import (
+    Circles,
+    Polodes,
+    bresse_circle,
+    inflection_circle,
+    instant_centre,
+    mechanical_advantage,
+    polodes,
+    transmission_index,
+)
 from graphsynth.mechanism.joints import Prismatic
 
 if TYPE_CHECKING:
     from graphsynth.drawing.methods import Drawing
     from graphsynth.drawing.plots import Chart
-    from graphsynth.kinematics.engine.result import Closure, MotionEvent
+    from graphsynth.dynamics.static import StaticForces
+    from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
     from graphsynth.mechanism.model import Mechanism
 
 __all__ = ["MotionMethods"]
@@ -91,6 +103,41 @@ class MotionMethods(Shown):
     def draw(self, path: str | Path | None = None, sample: int = 0, **options: Any) -> Drawing:
         """Draw the mechanism at one sample with the paths of its named points; see `Mechanism.draw`."""
         found: Drawing = work("draw motion")(self, path, sample, **options)
+        return found
+
+    def instant_centre(self, link: int, base: int | None = None) -> Array:
+        """Return the instant centre of a link; see :func:`graphsynth.kinematics.instantaneous.instant_centre`."""
+        return instant_centre(cast("Motion", self), link, base)
+
+    def polodes(self, link: int, base: int | None = None) -> Polodes:
+        """Return fixed and moving polode of a link; see :func:`graphsynth.kinematics.instantaneous.polodes`."""
+        return polodes(cast("Motion", self), link, base)
+
+    def inflection_circle(self, link: int, base: int | None = None) -> Circles:
+        """Return the inflection circle of a link; see :func:`graphsynth.kinematics.instantaneous.inflection_circle`."""
+        return inflection_circle(cast("Motion", self), link, base)
+
+    def bresse_circle(self, link: int, base: int | None = None) -> Circles:
+        """Return the second circle of Bresse; see :func:`graphsynth.kinematics.instantaneous.bresse_circle`."""
+        return bresse_circle(cast("Motion", self), link, base)
+
+    def transmission_index(self) -> dict[int, Array]:
+        """Return the sine of every transmission angle, by group of the mechanism."""
+        return transmission_index(cast("Motion", self))
+
+    def mechanical_advantage(self, link: int) -> Array:
+        """Return effort on a link over the driver's, without losses.
+
+        See :func:`graphsynth.kinematics.instantaneous.mechanical_advantage`.
+        """
+        return mechanical_advantage(cast("Motion", self), link)
+
+    def forces(self, loads: Mapping[str | int, Any], **options: Any) -> StaticForces:
+        """Return the static forces in all joints under loads, as in ``motion.forces({"P": (0.0, -100.0)})``.
+
+        See :func:`graphsynth.dynamics.static.static_forces`.
+        """
+        found: StaticForces = work("static forces")(self, loads, **options)
         return found
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from numpy.typing import ArrayLike
 
@@ -12,11 +12,14 @@ from graphsynth.core.shown import Shown, work
 from graphsynth.mechanism.joints import JointGeometry
 
 if TYPE_CHECKING:
+    import sympy
+
     from graphsynth.drawing.methods import Drawing
     from graphsynth.kinematics.assembly import AssemblyMode
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.laws import Driver
-    from graphsynth.mechanism.model import TracePoint
+    from graphsynth.mechanism.model import Mechanism, TracePoint
+    from graphsynth.mechanism.symbolic import CouplerCurve
     from graphsynth.structure.graph import MechanismGraph
 
 __all__ = ["Methods"]
@@ -65,6 +68,18 @@ class Methods(Shown):
     def animate(self, path: str | Path | None = None, **options: Any) -> Drawing:
         """Animate ``self.simulate()``; see `Motion.animate`."""
         return self.simulate().animate(path, **options)
+
+    def closure_equations(self) -> list[sympy.Expr]:
+        """Return the equations of all joints as formulas; see :mod:`graphsynth.mechanism.symbolic`."""
+        from graphsynth.mechanism.symbolic import closure_equations
+
+        return closure_equations(cast("Mechanism", self))
+
+    def coupler_curve(self, name_or_link: str | int, at: tuple[float, float] | None = None) -> CouplerCurve:
+        """Return the equation of the curve of a coupler point; see :mod:`graphsynth.mechanism.symbolic`."""
+        from graphsynth.mechanism.symbolic import coupler_curve
+
+        return coupler_curve(cast("Mechanism", self), name_or_link, at)
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
         kinds = ", ".join(f"{joint.a}-{joint.b} {joint.kind}" for joint in self.joints)

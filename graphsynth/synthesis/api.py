@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from graphsynth.synthesis.problem import Problem, counts, graphs
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
+    from graphsynth.synthesis.listed import Graphs
 
 __all__ = [
     "count_assur_groups",
@@ -25,8 +26,10 @@ __all__ = [
 ]
 
 
-def _list(problem: Problem, executor: Executor | None) -> Iterator[MechanismGraph]:
-    return graphs(problem.pieces(listing=True), executor)
+def _list(what: str, problem: Problem, executor: Executor | None) -> Graphs:
+    from graphsynth.synthesis.listed import Graphs
+
+    return Graphs(what, lambda: graphs(problem.pieces(listing=True), executor))
 
 
 def _count(problem: Problem, executor: Executor | None) -> int:
@@ -42,7 +45,7 @@ def enumerate_chains(
     fractionated: bool = False,
     symmetry: int | None = None,
     executor: Executor | None = None,
-) -> Iterator[MechanismGraph]:
+) -> Graphs:
     """Enumerate kinematic chains: every one, each once up to isomorphism, none with a rigid sub-chain (exact).
 
     Parameters
@@ -84,7 +87,7 @@ def enumerate_chains(
     ['Er`G', 'E]`G']
     """
     problem = Problem.chains(links, mobility, space, joints_by_mobility, fractionated, symmetry)
-    return _list(problem, executor)
+    return _list(f"chains of {links} links, mobility {mobility}", problem, executor)
 
 
 def count_chains(
@@ -126,7 +129,7 @@ def count_chains(
 
 def enumerate_mechanisms(
     spec: StructuralSpec | LinkAssortment, *, symmetry: int | None = None, executor: Executor | None = None
-) -> Iterator[MechanismGraph]:
+) -> Graphs:
     """Enumerate the mechanisms that answer a structural question: every one, each once (exact).
 
     Parameters
@@ -154,7 +157,7 @@ def enumerate_mechanisms(
     >>> sum(1 for _ in enumerate_mechanisms(StructuralSpec(W=1, links=8)))
     71
     """
-    return _list(Problem.mechanisms(spec, symmetry), executor)
+    return _list("mechanisms that answer the question", Problem.mechanisms(spec, symmetry), executor)
 
 
 def count_mechanisms(
@@ -220,7 +223,7 @@ def sample_mechanisms(spec: StructuralSpec | LinkAssortment, k: int, seed: int) 
     return sample(Problem.mechanisms(spec, None), k, seed)
 
 
-def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Iterator[MechanismGraph]:
+def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs:
     """Enumerate the Assur groups with n moving links and mobility-1 joints, each once (exact).
 
     The group is given with the frame, contracted to one link, as link 0.
@@ -250,7 +253,7 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
     >>> [group.to_text() for group in enumerate_assur_groups(2)]
     ['Bw f0']
     """
-    return _list(Problem.groups(links, space), executor)
+    return _list(f"Assur groups of {links} links", Problem.groups(links, space), executor)
 
 
 def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None = None) -> int:
@@ -282,9 +285,7 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
     return _count(Problem.groups(links, space), executor)
 
 
-def enumerate_baranov_trusses(
-    links: int, *, space: int = 3, executor: Executor | None = None
-) -> Iterator[MechanismGraph]:
+def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> Graphs:
     """Enumerate the Baranov trusses with N links and mobility-1 joints, each once (exact).
 
     Parameters
@@ -312,7 +313,7 @@ def enumerate_baranov_trusses(
     >>> sum(1 for _ in enumerate_baranov_trusses(9))
     28
     """
-    return _list(Problem.trusses(links, space, False), executor)
+    return _list(f"Baranov trusses of {links} links", Problem.trusses(links, space, False), executor)
 
 
 def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | None = None) -> int:

@@ -1,0 +1,207 @@
+"""Equations of a mechanism as formulas of sympy: closure equations, and the curve of a coupler point."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from graphsynth.core.checks import point
+from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
+
+if TYPE_CHECKING:
+    import sympy
+
+    from graphsynth.mechanism.model import Mechanism
+
+__all__ = ["CouplerCurve", "closure_equations", "coupler_curve"]
+
+
+class CouplerCurve(NamedTuple):
+    """The algebraic curve on which a coupler point lies.
+
+    ``equation`` is a polynomial in the symbols x and y with integer coefficients, zero on the curve; ``degree`` its
+    degree; ``circularity`` how often the curve passes through each of the two circular points at infinity.
+    """
+
+    equation: sympy.Poly
+    degree: int
+    circularity: int
+
+
+def closure_equations(mechanism: Mechanism) -> list[sympy.Expr]:
+    """Return the equations of all joints as expressions that vanish, for export to other programs.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Joints R, P and pin in slot.
+
+    Returns
+    -------
+    list of sympy.Expr
+        In the symbols ``x_k``, ``y_k``, ``theta_k`` of the moving links k; two for a joint of mobility 1, one for a pin
+        in a slot, in the order of ``mechanism.joints``.  Numbers are those given, as fractions (exact).
+
+    Raises
+    ------
+    GeometryError
+        Gears or cams, whose equations are not algebraic in the poses.
+
+    Examples
+    --------
+    >>> from graphsynth import Mechanism
+    >>> Mechanism.four_bar(2, 1, 2.5, 2.5).closure_equations()[:2]
+    [x_1, y_1]
+    """
+    import sympy
+
+    poses = [
+        (sympy.Integer(0),) * 3 if k == mechanism.frame else sympy.symbols(f"x_{k} y_{k} theta_{k}", real=True)
+        for k in range(mechanism.graph.links)
+    ]
+    found: list[sympy.Expr] = []
+    for joint in mechanism.joints:
+        found += _of_joint(joint, poses)
+    return found
+
+
+def _number(value: float) -> Any:
+    import sympy
+
+    return sympy.Rational(Fraction(value))
+
+
+def _of_joint(joint: JointGeometry, poses: list[Any]) -> list[Any]:
+    import sympy
+
+    def place(link: int, at: tuple[float, float]) -> tuple[Any, Any]:
+        (x, y, theta), (p, q) = poses[link], map(_number, at)
+        c, s = sympy.cos(theta), sympy.sin(theta)
+        return x + c * p - s * q, y + s * p + c * q
+
+    if isinstance(joint, Gear | Cam):
+        raise GeometryError(
+            f"the {joint.kind} {joint.a}-{joint.b} has no closure equation here; R, P and pin-slot have"
+        )
+    (ax, ay), (bx, by) = place(joint.a, joint.at_a), place(joint.b, joint.at_b)
+    if isinstance(joint, Revolute):
+        return [bx - ax, by - ay]
+    along = poses[joint.a][2] + _number(joint.angle_a)
+    found = [sympy.cos(along) * (by - ay) - sympy.sin(along) * (bx - ax)]
+    if isinstance(joint, Prismatic):
+        found.append(along - poses[joint.b][2] - _number(joint.angle_b))
+    return found
+
+
+def coupler_curve(mechanism: Mechanism, name_or_link: str | int, at: tuple[float, float] | None = None) -> CouplerCurve:
+    """Return the equation of the curve of a coupler point, with its degree and circularity (exact).
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        One in which two points of the link are held, each on a circle (by a link that turns about the frame) or on a
+        straight line (by a slider on the frame, or a slot in it): four-bar, slider-crank, elliptic trammel.
+    name_or_link : str or int
+        A named point, or a link.
+    at : (x, y), optional
+        The point of the link, in its frame.
+
+    Returns
+    -------
+    CouplerCurve
+        Of the whole curve, both assembly modes.  The numbers of the mechanism are taken as the fractions they are.
+
+    Raises
+    ------
+    GeometryError
+        Another kind of mechanism, or a point that does not exist.
+
+    Notes
+    -----
+    With ``A = P - R(theta) a`` each condition is linear in ``cos theta`` and ``sin theta``; Cramer's rule and
+    ``cos^2 + sin^2 = 1`` eliminate the angle.  For a four-bar it is Roberts' tricircular sextic: S. Roberts, On
+    three-bar motion in plane space, Proc. London Math. Soc. 7 (1875) 14-23; Hunt (1978), section 7.4.
+
+    Examples
+    --------
+    >>> from graphsynth import Mechanism
+    >>> curve = Mechanism.four_bar(2, 1, 2.5, 2.5, coupler_point=(5, 0)).coupler_curve("P")
+    >>> curve.degree, curve.circularity
+    (6, 3)
+    """
+    import sympy
+
+    if isinstance(name_or_link, str):
+        if name_or_link not in mechanism.points:
+            raise GeometryError(f"point {name_or_link!r} is not defined; the mechanism has {list(mechanism.points)}")
+        link, local = mechanism.points[name_or_link]
+    else:
+        link, local = name_or_link, point("at", (0.0, 0.0) if at is None else at)
+    own_joints = [joint for joint in mechanism.joints if link in (joint.a, joint.b)]
+    if len(own_joints) != 2 or mechanism.frame == link:
+        raise GeometryError(f"link {link} is not held by two joints; give the coupler of a four-bar or slider-crank")
+    held = [_held(mechanism, joint, link) for joint in own_joints]
+    x, y = sympy.symbols("x y", real=True)
+    px, py = map(_number, local)
+    rows = []
+    for (own, kind), numbers in held:
+        a, b = px - _number(own[0]), py - _number(own[1])  # from the held point to P, in the link
+        if kind == "circle":
+            u, v, r = x - numbers[0], y - numbers[1], numbers[2]
+            rows.append((2 * (u * a + v * b), 2 * (v * a - u * b), u * u + v * v + a * a + b * b - r * r))
+        else:
+            nx, ny, d = numbers
+            rows.append((nx * a + ny * b, ny * a - nx * b, nx * x + ny * y - d))
+    (a1, b1, c1), (a2, b2, c2) = rows
+    determinant = a1 * b2 - a2 * b1
+    equation = sympy.Poly((c1 * b2 - c2 * b1) ** 2 + (a1 * c2 - a2 * c1) ** 2 - determinant**2, x, y)
+    if equation.is_zero:
+        raise GeometryError("every point of the plane fulfils the conditions: the coupler moves by itself")
+    equation = equation.clear_denoms()[1].primitive()[1]
+    z, w = sympy.symbols("z w")
+    isotropic = sympy.Poly(equation.as_expr().subs({x: (z + w) / 2, y: (z - w) / (2 * sympy.I)}), z, w)
+    degree = equation.total_degree()
+    return CouplerCurve(equation, degree, degree - isotropic.degree(z))
+
+
+def _held(
+    mechanism: Mechanism, joint: JointGeometry, link: int
+) -> tuple[tuple[tuple[float, float], str], tuple[Any, ...]]:
+    """Point of a link that a joint holds, on what, and its numbers: centre and radius, or normal and distance."""
+    frame = mechanism.frame
+    own, at, other = (joint.at_a, joint.at_b, joint.b) if joint.a == link else (joint.at_b, joint.at_a, joint.a)
+    if isinstance(joint, PinSlot) and joint.a == frame:
+        return (own, "line"), _line(joint.at_a, joint.angle_a)
+    if isinstance(joint, Revolute):
+        for second in mechanism.joints:
+            if second.pair != (min(frame, other), max(frame, other)) or other == frame:
+                continue
+            on_frame, on_other = (second.at_a, second.at_b) if second.a == frame else (second.at_b, second.at_a)
+            if isinstance(second, Revolute):
+                radius2 = sum((_number(p) - _number(q)) ** 2 for p, q in zip(at, on_other))
+                return (own, "circle"), (*map(_number, on_frame), radius2 ** _number(0.5))
+            if isinstance(second, Prismatic):
+                return (own, "line"), _slider_line(second, frame, at)
+    raise GeometryError(f"joint {joint.a}-{joint.b} holds no point of link {link} on a circle or a line of the frame")
+
+
+def _line(at: tuple[float, float], angle: float) -> tuple[Any, Any, Any]:
+    """Return normal and distance of a line; directions along the axes are exact."""
+
+    def plain(value: float) -> Any:
+        return _number(round(value) if abs(value - round(value)) < 1e-15 else value)
+
+    nx, ny = plain(-math.sin(angle)), plain(math.cos(angle))
+    return nx, ny, nx * _number(at[0]) + ny * _number(at[1])
+
+
+def _slider_line(joint: Prismatic, frame: int, at: tuple[float, float]) -> tuple[Any, Any, Any]:
+    """Line of a point of a slider: through the guide's, shifted by the place of the point across the slide."""
+    first = joint.a == frame
+    guide, block = (joint.at_a, joint.at_b) if first else (joint.at_b, joint.at_a)
+    on_frame, on_block = (joint.angle_a, joint.angle_b) if first else (joint.angle_b, joint.angle_a)
+    nx, ny, d = _line(guide, on_frame)
+    mx, my, _ = _line((0.0, 0.0), on_block)
+    return nx, ny, d + mx * (_number(at[0]) - _number(block[0])) + my * (_number(at[1]) - _number(block[1]))
