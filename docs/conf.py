@@ -6,10 +6,14 @@ import re
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import pages
 import public_api
+from docutils import nodes
+from docutils.utils.math import MathError, latex2mathml
 
 ROOT = Path(__file__).resolve().parents[1]
 META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -20,7 +24,8 @@ project_copyright = author
 version = release = META["version"]
 
 extensions = ["myst_parser"]
-myst_enable_extensions = ["deflist"]
+myst_enable_extensions = ["deflist", "dollarmath"]
+html_math_renderer = "mathml"
 myst_heading_anchors = 4
 exclude_patterns = ["pictures/*.py"]
 html_theme = "furo"
@@ -51,14 +56,26 @@ def _plain_links(text: str, page: str) -> str:
 
 
 def _read(app: object, page: str, source: list[str]) -> None:
-    source[0] = _plain_links(source[0], page)
+    source[0] = pages.with_links_to_references(_plain_links(source[0], page), page)
     if page == "index":
         source[0] = _toctrees(source[0])
     elif page == "reference/api":
         source[0] = source[0].replace("<!-- docstrings -->", public_api.reference())
 
 
-def setup(app: object) -> dict[str, bool]:
+def _mathml(writer: Any, node: Any) -> None:
+    """Formulas as MathML, which browsers draw themselves: the site needs no script and no network."""
+    block = node.tagname == "math_block"
+    try:
+        markup = latex2mathml.tex2mathml(node.astext(), as_block=block)
+    except MathError as error:
+        raise ValueError(f"formula {node.astext()!r}: {error}") from error
+    writer.body.append(f'<div class="math">{markup}</div>' if block else markup)
+    raise nodes.SkipNode
+
+
+def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
-    app.connect("source-read", _read)  # type: ignore[attr-defined]
+    app.connect("source-read", _read)
+    app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
