@@ -214,7 +214,8 @@ def test_the_first_run_is_as_the_tutorial_tells(tmp_path, monkeypatch):
     values = {margin.name: margin.text for margin in report["records"][0].margins}
     assert [(name, value) for name, value in rows if not name.startswith("jam arc") and values[name] != value] == []
     arcs = [re.findall(r"[\d.]+", value) for name, value in rows if name.startswith("jam arc")]
-    critical = math.asin(math.sin(float(values["critical tilt"].split()[0])) / (0.4 * math.sin(1 / 30)))  # spec 7.2
+    # theory/jam-arcs 2
+    critical = math.asin(math.sin(float(values["critical tilt"].split()[0])) / (0.4 * math.sin(1 / 30)))
     first = [math.degrees(critical), 180 - math.degrees(critical)]
     assert np.allclose([float(x) for arc in arcs for x in arc], [*first, *(180 + x for x in first)], atol=1e-6)
 

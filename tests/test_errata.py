@@ -16,8 +16,9 @@ import pytest
 from scipy.optimize import brentq
 
 PAGE = (Path(__file__).parents[1] / "docs" / "explanation" / "errata.md").read_text("utf-8")
-T_A = 2 * math.atan(0.03 / (5 + math.sqrt(5**2 - 0.03 * (35 + 0.03))))  # critical tilt of the deck's bearing, spec 4.7
-TILT = math.asin(0.4 * math.sin(1 / 30))  # largest tilt of the coupler, spec 3.4
+# critical tilt of the deck's bearing, theory/bearing-contact 7
+T_A = 2 * math.atan(0.03 / (5 + math.sqrt(5**2 - 0.03 * (35 + 0.03))))
+TILT = math.asin(0.4 * math.sin(1 / 30))  # largest tilt of the coupler, theory/four-bar-and-tilt 8
 R, RH, HALF = 17.5, 17.53, 5.0
 
 
@@ -64,7 +65,10 @@ def test_second_harmonic_of_a_leg():
 
 
 def test_share_of_energy_off_the_direction():
-    """Equal global crank angles: the best first-order approximation to a translation; home Jacobian of spec 14.5."""
+    """Equal global crank angles: the best first-order approximation to a translation; home Jacobian.
+
+    See theory/values-of-the-platform 5.
+    """
     printed("17.6 %")
     jacobian = np.array([
         [-7.1253866082107153671847253656753, -21.674613391789284632815274634325, 28.8],
@@ -85,7 +89,8 @@ def test_tilted_linkage():
     assert math.hypot(2.5, math.sin(1 / 30)) == pytest.approx(2.500222130061535, abs=1e-14)
     assert round(math.degrees(1 / 30), 4) == 1.9099
     assert round(math.asin(math.sin(T_A) / 0.4), 5) == 0.01516
-    assert round(2 * T_A, 5) == 0.01213  # tilt alpha/2 at every one of three equal bearings, spec 9.6
+    # tilt alpha/2 at every one of three equal bearings, theory/joints-that-share-a-tilt 6
+    assert round(2 * T_A, 5) == 0.01213
     with mp.workdps(40):
         n, c, s = mp.matrix([2, -1, 2]) / 3, mp.cos(mp.mpf(1) / 30), mp.sin(mp.mpf(1) / 30)
         skew = mp.matrix([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
@@ -155,7 +160,7 @@ def shift(axis, length):
 
 
 def antenna_equations(x, leg_y):
-    """Twelve residuals at rest, spec 2.3; ``leg_y`` names the axes of x4 and x3."""
+    """Twelve residuals at rest, theory/antenna 3; ``leg_y`` names the axes of x4 and x3."""
     l1, l2, l3 = 0.1, 0.15, 0.0592
     first = rotation("y", x[4]) @ shift("y", l3) @ rotation(leg_y[0], x[3]) @ rotation(leg_y[1], x[2])
     first = first @ shift("z", l2) @ rotation("y", x[1]) @ rotation("x", x[0])

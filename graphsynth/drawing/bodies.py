@@ -128,7 +128,7 @@ def bounds(mechanism: Mechanism, poses: Array) -> tuple[complex, complex]:
 
 
 def hull(points: list[complex]) -> list[complex]:
-    """Corners of the convex hull, anticlockwise (monotone chain, Andrew 1979); fewer than three if they are in line."""
+    """Corners of the convex hull, anticlockwise (monotone chain [Andrew 1979]); fewer than three if in line."""
     ordered = sorted(set(points), key=lambda z: (z.real, z.imag))
     if len(ordered) < 3:
         return ordered

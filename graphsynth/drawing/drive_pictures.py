@@ -29,7 +29,7 @@ __all__ = [
     "start_up_picture",
 ]  # fmt: skip
 
-#: Readable in grey and by colour-blind readers (Okabe and Ito 2008).
+#: Readable in grey and by colour-blind readers [Okabe & Ito 2008].
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 _STYLES = ("-", (0, (5, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2)), (0, (2, 2)))
 _JOINTS = ("O1: frame on crank", "A: crank on coupler", "B: coupler on rocker", "O2: frame on rocker")

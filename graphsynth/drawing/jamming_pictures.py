@@ -1,6 +1,6 @@
 """Pictures of a jammed bearing: crossings and their boxes, the region between the curves, the section, the areas.
 
-The pictures of the source (Mitrofanova and Bazhenov 2020), from certified results.  Every function returns a matplotlib
+The pictures of the source [Mitrofanova & Bazhenov 2020], from certified results.  Every function returns a matplotlib
 figure that belongs to no window; write it with ``figure.savefig(path)``.  `area_chart` is themed SVG too.
 """
 

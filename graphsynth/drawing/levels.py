@@ -15,7 +15,7 @@ __all__ = ["draw_levels", "level_order", "levels_sketch"]
 def level_order(graph: MechanismGraph, sweeps: int = 12) -> tuple[tuple[int, ...], ...]:
     """Order the links inside each adjacency level so that edges cross little.
 
-    The barycentre heuristic (Sugiyama, Tagawa and Toda 1981): each level in turn is sorted by the mean position of its
+    The barycentre heuristic [Sugiyama et al. 1981]: each level in turn is sorted by the mean position of its
     neighbours, down and up, and the order with the fewest crossings of all passes is kept. Ties go to link numbers, so
     the result depends on the graph alone.
 

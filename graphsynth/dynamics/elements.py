@@ -50,7 +50,7 @@ def _times(element: Any) -> None:
 
 @dataclass(frozen=True)
 class Spring:
-    """Spring and damper between a point of link a and a point of link b (spec 5.3).
+    """Spring and damper between a point of link a and a point of link b (theory/planar-dynamics 3).
 
     ``f = stiffness (l - free_length) + damping dl/dt`` pulls the points together; N/m, m, N s/m.
     """
@@ -173,10 +173,10 @@ class Pulse:
 class TorqueSource:
     """A motor with a given torque behind a train, from link a to link b.
 
-    Shaft torque on b: ``eta G T - G^2 J d2phi - G^2 B dphi`` (spec 5.3), phi the angle of b relative to a, G the ratio
-    motor speed / speed of b, J the rotor's inertia (kg m^2), B its viscous friction (N m s).  ``eta`` becomes
-    ``1/eta`` while power flows back.  ``torque=0`` leaves the reflected inertia alone: a flywheel behind a train.
-    The inertia is taken as ``G^2 J`` on the relative angle: right for a fixed a, and for large ratios.
+    Shaft torque on b: ``eta G T - G^2 J d2phi - G^2 B dphi`` (theory/planar-dynamics 3), phi the angle of b relative to
+    a, G the ratio motor speed / speed of b, J the rotor's inertia (kg m^2), B its viscous friction (N m s).  ``eta``
+    becomes ``1/eta`` while power flows back.  ``torque=0`` leaves the reflected inertia alone: a flywheel behind a
+    train. The inertia is taken as ``G^2 J`` on the relative angle: right for a fixed a, and for large ratios.
 
     Raises
     ------

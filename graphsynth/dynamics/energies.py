@@ -1,4 +1,4 @@
-"""Energies and checks of a computed motion (spec 5.8)."""
+"""Energies and checks of a computed motion (theory/planar-dynamics 8)."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def simulate_dynamics(
     estimate_error: bool = False,
     max_steps: int = 1_000_000,
 ) -> DynamicMotion:
-    """Integrate the equations of motion, with all checks of spec 5.8.
+    """Integrate the equations of motion, with all checks of theory/planar-dynamics 8.
 
     Parameters
     ----------

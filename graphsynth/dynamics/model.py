@@ -75,8 +75,9 @@ class Rack:
     """Rack and pinion: link ``rack`` slides along ``angle`` of the frame, a wheel of link ``pinion`` rolls on it.
 
     ``e . (r_rack - c) - radius theta_pinion`` keeps its value at the start; e is the direction ``angle`` of the frame,
-    c the pinion's ``centre`` (in its link frame), which must be fixed, as the rack must not turn (spec 5.2).  The tooth
-    force acts along e at the pitch point, so the reactions in guide and bearing contain it.
+    c the pinion's ``centre`` (in its link frame), which must be fixed, as the rack must not turn
+    (theory/planar-dynamics 2).  The tooth force acts along e at the pitch point, so the reactions in guide and bearing
+    contain it.
 
     Raises
     ------

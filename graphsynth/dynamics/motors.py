@@ -177,7 +177,7 @@ class DCMotor:
 
     Notes
     -----
-    Specification parallel_platform, section 11.1.
+    See theory/motor-drive 1.
 
     Examples
     --------
@@ -254,7 +254,7 @@ class SynchronousMotor:
 
     Notes
     -----
-    Specification instruments_and_dynamics, section 4.4; ``T_e = 1.5 p psi i_q``.
+    See theory/braider 4; ``T_e = 1.5 p psi i_q``.
 
     Examples
     --------

@@ -103,7 +103,8 @@ class Reactions:
         """Separating force that the teeth of gear pair a-b exert on its link b, shape (n, 2), N.
 
         ``|tangential force| tan(pressure_angle)`` along the line of centres: it pushes a wheel with outer teeth from
-        the pitch point towards its own centre.  The bearings must carry it besides what they carry already (spec 5.7).
+        the pitch point towards its own centre.  The bearings must carry it besides what they carry already
+        (theory/planar-dynamics 7).
 
         Raises
         ------

@@ -65,7 +65,7 @@ class MotorHistory(NamedTuple):
 
 
 class Checks(NamedTuple):
-    """Numbers that tell whether a result can be trusted (spec 5.8); NaN where a check does not apply.
+    """Numbers that tell whether a result can be trusted (theory/planar-dynamics 8); NaN where a check does not apply.
 
     ``position_drift``, ``velocity_drift``: largest violation of scaled rows at the output times (lengths over the
     characteristic length).  ``energy``: largest ``|E - E(0) - W|`` over the scale of energies in play.  ``power``:

@@ -33,7 +33,7 @@ class BranchTangents(NamedTuple):
 def classify_pose(
     values: Values, q: Array, rank: int, left: Array, null: Array, tolerance: float
 ) -> tuple[PoseClass, int, BranchTangents | None]:
-    """Compare the rank at ``q`` with that at nearby poses on the constraints (spec 5.6, step 3).
+    """Compare the rank at ``q`` with that at nearby poses on the constraints (theory/planar-dynamics 6, step 3).
 
     Parameters
     ----------

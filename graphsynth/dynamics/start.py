@@ -34,7 +34,7 @@ _REST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class StartReport:
-    """A start state and everything that is known about it (estimated: floating point; spec 5.6).
+    """A start state and everything that is known about it (estimated: floating point; theory/planar-dynamics 6).
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ def consistent_start(
     modes: Mapping[int, int] | None = None,
     time: float = 0.0,
 ) -> StartReport:
-    """Find the state nearest to a guess that satisfies all constraints, and classify it (spec 5.6).
+    """Find the state nearest to a guess that satisfies all constraints, and classify it (theory/planar-dynamics 6).
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """A dynamic model as flat tables for the kernels.
 
-Coordinates are those of spec 5.1: for every moving link, ascending, ``(x, y, theta)`` of its centre of mass.  Joint
-points are shifted to the centres of mass, so the rows of the planar engine apply as they are.
+Coordinates are those of theory/planar-dynamics 1: for every moving link, ascending, ``(x, y, theta)`` of its centre of
+mass.  Joint points are shifted to the centres of mass, so the rows of the planar engine apply as they are.
 """
 
 from __future__ import annotations

@@ -202,7 +202,10 @@ def _polygon(R: float, a: float, b: float, count: int) -> float:
 
 
 def _exact_gap_area(R: str, c: str, h: str, sine: str) -> float:
-    """Ellipse minus circle of the surrogate by the direct formula of section 5.2 in 50 digits, rounded once."""
+    """Ellipse minus circle of the surrogate by the direct formula in 50 digits, rounded once.
+
+    See theory/circle-and-ellipse 2.
+    """
     import mpmath
 
     with mpmath.workdps(50):

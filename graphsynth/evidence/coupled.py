@@ -32,8 +32,8 @@ _DIGITS = 50
 def exact_largest(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Any:
     """Largest misalignment about the frame line of the source's linkage with three equal bearings, with 50 digits.
 
-    Twice the critical tilt of one bearing (specification, section 9.6: the worst pose is 90 degrees).  None for other
-    proportions than (2, 1, 5/2, 5/2), for which no closed form is known.
+    Twice the critical tilt of one bearing (theory/joints-that-share-a-tilt 6: the worst pose is 90 degrees).  None for
+    other proportions than (2, 1, 5/2, 5/2), for which no closed form is known.
 
     Examples
     --------

@@ -166,7 +166,7 @@ def precise_area(bearing: Bearing, sine: str) -> Any:
     --------
     >>> from graphsynth.jamming import Bearing
     >>> from graphsynth.evidence.bearing import WORST_SINE
-    >>> round(float(precise_area(Bearing(), WORST_SINE)), 16)  # specification, section 13, point 14
+    >>> round(float(precise_area(Bearing(), WORST_SINE)), 16)  # docs/explanation/errata.md
     0.9749683652811658
     """
     import mpmath

@@ -18,7 +18,7 @@ from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 __all__ = ["drive_problem", "reduction_problem", "work_rows"]
 
 _L = "inductance [H]"
-_PRECISE = f"{NAME} on the equations of the specification"
+_PRECISE = f"{NAME} on the equations of theory/motor-drive"
 _KIND = "largest error of speed and currents over their largest values"
 #: A scipy solver that needs more calls of the right-hand side is a failure here.
 _MOST_CALLS = 30_000

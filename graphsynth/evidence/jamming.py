@@ -1,4 +1,4 @@
-"""Jam arcs: rows of the room of jamming, against the contact condition of the specification in 50 digits."""
+"""Jam arcs: rows of the room of jamming, against the contact condition of theory/bearing-contact in 50 digits."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _rows(found: Sequence[Any], effort: Effort, kinds: dict[str, str], reference
 def precise_arc_ends(box: ToleranceBox, condition: Condition = "A") -> tuple[float, ...]:
     """Crank angles in [0, 2 pi) at which the bearing begins and ceases to jam, from the plain formulas with 50 digits.
 
-    The contact condition as it stands in the specification, sections 4.2 and 4.3, solved by bisection; the height of
+    The contact condition as it stands in theory/bearing-contact 2 and 3, solved by bisection; the height of
     the crank pin from the rotation of the motor axis (Rodrigues).
 
     Parameters

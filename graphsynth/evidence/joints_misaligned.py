@@ -1,7 +1,7 @@
 """Error against run time of the coupled model, on a linkage whose largest misalignment is known exactly.
 
 The lambda linkage with three equal bearings and a motor tilted about the x axis is free over the whole turn up to twice
-the critical tilt of a bearing, and not beyond (specification, section 9.6).
+the critical tilt of a bearing, and not beyond (theory/joints-that-share-a-tilt 6).
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Error against run time of a mechanism: every form and integrator beside an independent reference (spec section 8)."""
+"""Error against run time of a mechanism: every form and integrator beside an independent reference.
+
+See theory/solvers 4.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["dynamics_work_precision"]
 
 Array = NDArray[np.float64]
-#: Beyond this the error is not what was asked for (spec section 8, point 6).
+#: Beyond this the error is not what was asked for (theory/solvers 4, point 6).
 _MISSED = 1e3
 
 

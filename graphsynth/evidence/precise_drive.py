@@ -1,9 +1,8 @@
 """A motor with a mechanism in more digits than a double has: the yardstick of the integrators of drives.
 
-An implementation of its own: the equations of the specification (parallel_platform, section 11;
-instruments_and_dynamics, section 4.4) in numpy's long doubles, integrated by extrapolation of the modified midpoint
-rule (Gragg 1965, Bulirsch and Stoer 1966).  It shares no code with the compiled right-hand sides or with any solver
-that is measured.
+An implementation of its own: the equations of theory/motor-drive and theory/braider 4 in numpy's long doubles,
+integrated by extrapolation of the modified midpoint rule ([Gragg 1965], [Bulirsch & Stoer 1966]).  It shares no code
+with the compiled right-hand sides or with any solver that is measured.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The export certificate: does an engine run the mechanism that graphsynth meant, and how well (spec 7.4)."""
+"""The export certificate: does an engine run the mechanism that graphsynth meant, and how well (theory/exports 4)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Trial:
         Largest violation of any joint at the output times, m.
     error : float
         Largest difference to the reference over output times and coordinates of all links: lengths over the reference
-        length, angles in rad (spec 8).
+        length, angles in rad (theory/solvers 4).
     velocity_error : float
         The same of the velocities over the largest angular speed of the reference.
     energy_error : float
@@ -197,7 +197,7 @@ def certify_export(
 
     References
     ----------
-    Specification of instruments and dynamics, sections 7.4 and 8.
+    See theory/exports 4 and theory/solvers 4.
     """
     trials = _checked(settings, tolerance)
     grid = np.atleast_1d(finite_array("times", times))
@@ -293,7 +293,7 @@ def _reference(model: DynamicModel, start: StartReport, grid: Array, rtol: float
 
 
 def _distance(found: Array, expected: Array, size: float) -> float:
-    """Norm of spec 8: lengths over the reference length, angles in rad, the largest of all."""
+    """Norm of theory/solvers 4: lengths over the reference length, angles in rad, the largest of all."""
     return float((np.abs(found - expected) / np.array([size, size, 1.0])).max())
 
 

@@ -1,4 +1,7 @@
-"""A dynamic model in exudyn: absolute coordinates, every joint a constraint, implicit integration (spec 7.2)."""
+"""A dynamic model in exudyn: absolute coordinates, every joint a constraint, implicit integration.
+
+See theory/exports 2.
+"""
 
 from __future__ import annotations
 
@@ -153,7 +156,7 @@ def to_exudyn(model: DynamicModel, start: StartReport) -> ExudynModel:
 
     References
     ----------
-    Specification of instruments and dynamics, section 7.2; Gerstmayr (2023), Exudyn.
+    See theory/exports 2; [Gerstmayr 2024], Exudyn.
     """
     check_common(model, start, "exudyn")
     work = _Work(model, start)

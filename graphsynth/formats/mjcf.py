@@ -1,4 +1,4 @@
-"""A dynamic model as MuJoCo XML (MJCF): a tree of bodies, loops closed by equality constraints (spec 7.2).
+"""A dynamic model as MuJoCo XML (MJCF): a tree of bodies, loops closed by equality constraints (theory/exports 2).
 
 The model is written in its start pose, and ``ref`` of every joint is the joint coordinate there, so that ``qpos`` are
 the joint coordinates of graphsynth: ``theta_b - theta_a`` of a turning pair, the displacement of a sliding pair.
@@ -144,7 +144,7 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
 
     References
     ----------
-    Specification of instruments and dynamics, section 7.2; Todorov, Erez, Tassa (2012), MuJoCo.
+    See theory/exports 2; [Todorov et al. 2012], MuJoCo.
 
     Examples
     --------

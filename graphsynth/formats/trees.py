@@ -1,4 +1,7 @@
-"""Spanning tree of a mechanism and the joints that are cut: what an engine of joint coordinates needs (spec 7.2)."""
+"""Spanning tree of a mechanism and the joints that are cut: what an engine of joint coordinates needs.
+
+See theory/exports 2.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +58,7 @@ def spanning_tree(mechanism: Mechanism) -> SpanningTree:
 
     References
     ----------
-    Specification of instruments and dynamics, section 7.2.
+    See theory/exports 2.
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 A status holds for every parameter value at once, so a wide parameter box often proves nothing although every single
 value would.  Here the cells of a subdivision are paved one by one and their statuses combined: what holds in every cell
-holds for every value.  Source: specification, section 6.5 (last requirement) and 11.1, item 9.
+holds for every value.  Source: theory/interval-tests 2 (last rule) and 4, item 9.
 """
 
 from __future__ import annotations

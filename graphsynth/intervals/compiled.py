@@ -86,7 +86,7 @@ def pave_compiled(
     Notes
     -----
     Depth first, with epsilon-inflation; the decisions are those of `pave`, the order of the boxes is another.  Source:
-    specification, section 6.5.
+    theory/interval-tests 2.
 
     Examples
     --------

@@ -4,7 +4,7 @@ Every bound of this package comes from operations rounded to nearest, with gradu
 same process may have left the processor rounding upward (codac does) or flushing tiny numbers to zero (shared
 libraries linked with ``-ffast-math`` do).  Bounds would then be silently wrong, so `check_rounding` runs when the
 package is imported and at the start of every public solve, and `check_quickly` in every operation on an `Interval`.
-Specification: section 11.1, item 1.
+See theory/interval-tests 4, item 1.
 """
 
 from __future__ import annotations

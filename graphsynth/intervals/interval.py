@@ -67,7 +67,7 @@ class Interval(Measures):
     -----
     Guarantee: certified.  + - * /, squares and square roots give the tightest bounds for operands of any size;
     elementary functions at most one or two steps more; a power n at most 2 n steps more.  Every operation checks that
-    the processor rounds to nearest.  Source: specification section 11; Dekker (1971); Rump, Zimmermann, Boldo,
+    the processor rounds to nearest.  Source: theory/interval-tests 4; [Dekker 1971]; Rump, Zimmermann, Boldo,
     Melquiond (2009); proofs in ``docs/explanation/intervals.md``.
 
     Examples

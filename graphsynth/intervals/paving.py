@@ -3,7 +3,7 @@
 Breadth first: a batch of boxes from the front of the queue is tested by Krawczyk's operator, contracted, kept or cut.
 The search is an iterator; it can be stopped, saved as plain arrays, loaded and resumed, and gives the same boxes
 however it is interrupted.  Nothing is lost: at any time the kept and the waiting boxes hold every solution of the
-start box.  Source: specification, section 6.5.
+start box.  Source: theory/interval-tests 2.
 """
 
 from __future__ import annotations

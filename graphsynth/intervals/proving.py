@@ -5,8 +5,8 @@ matrix Y near the inverse of mid L,
 
     K(X) = z - Y F(z, [p]) + (I - Y L) (X - z).
 
-What follows from K(X) is listed in `Status`; nothing follows from a mere overlap.  Sources: Krawczyk (1969), Moore
-(1977), Neumaier (1990); specification, section 6.4.
+What follows from K(X) is listed in `Status`; nothing follows from a mere overlap.  Sources: [Krawczyk 1969], [Moore
+1977], [Neumaier 1990]; theory/interval-tests 1.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class KrawczykResult:
         Last Krawczyk image.
     spectral_radius : float
         Estimate of ``rho(|I - Y L|)`` on the last box; the textbook condition ``< 1`` is necessary for success but
-        not sufficient (specification, section 6.6).
+        not sufficient (theory/interval-tests 3).
     contraction : float
         Largest ratio of the radii of the image and of the box it came from; below 1 where the test succeeds.
     rounds : int
@@ -270,7 +270,7 @@ def krawczyk(
 
     Notes
     -----
-    Source: specification, sections 6.4 to 6.6.  UNIQUE from an enlarged box is given only if its image lies inside the
+    Source: theory/interval-tests 1 to 3.  UNIQUE from an enlarged box is given only if its image lies inside the
     given box: all solutions of the given box lie in the enlarged one, which has exactly one, in the image.
 
     Examples

@@ -48,7 +48,7 @@ def two_product(a: Array, b: Array) -> tuple[Array, Array]:
 def add(a: Array, b: Array) -> tuple[Array, Mask, Mask]:
     """Return the sum, and where it is a lower and where an upper bound of the exact sum.
 
-    The error of a sum with the larger operand first is exact and overflows only with the sum itself (Dekker 1971).
+    The error of a sum with the larger operand first is exact and overflows only with the sum itself [Dekker 1971].
     """
     s = a + b
     first = np.abs(a) >= np.abs(b)

@@ -8,7 +8,7 @@ __all__ = ["Status"]
 
 
 class Status(IntEnum):
-    """What is proved about a box X, for all parameter values at once (specification, section 6.4).
+    """What is proved about a box X, for all parameter values at once (theory/interval-tests 1).
 
     With K the Krawczyk image of X:
 

@@ -14,14 +14,15 @@ class Verdict(Enum):
     One vocabulary for both models: one tilted bearing (L0) and joints that share the misalignment (L1).
 
     ============================= ============================== ==================================================
-    member                        name in the specification 10.1 what is proved
+    member                        what is proved (theory/jam-arcs 5)
     ============================= ============================== ==================================================
     ``CERTIFIED_FREE``            ``NO_JAM_CERTIFIED``           g < 0 for every angle and every parameter vector
     ``CERTIFIED_JAMMED``          ``JAM_FOR_ALL``                every parameter vector jams at some angle or input
     ``CERTIFIED_JAMMED_FOR_SOME`` ``JAM_FOR_SOME``               some parameter vector jams at some angle or input
     ``UNDECIDED``                 ``TOUCHING``, ``UNDECIDED``    nothing; the reason says what stands in the way
-    ``CANNOT_ASSEMBLE``           (section 12)                   interference fit, or no position of the linkage
-    ============================= ============================== ==================================================
+    ``CANNOT_ASSEMBLE``           (theory/extreme-cases 1)                   interference fit, or no position of the
+    linkage ============================= ==============================
+    ==================================================
 
     Members whose name ends in ESTIMATED rest on closed forms or samples in floating point: no rounding error is
     included, so none of them is a certificate.

@@ -159,7 +159,7 @@ class TiltedFourBar:
 
     Notes
     -----
-    Model L0 of Mitrofanova and Bazhenov (2020), corrected; specification lambda_and_jamming, sections 2 and 3.
+    Model L0 of [Mitrofanova & Bazhenov 2020], corrected; theory/four-bar-and-tilt.
 
     Examples
     --------
@@ -272,7 +272,8 @@ class TiltedFourBar:
         """Positions, tilt and their derivatives at crank angles ``f`` (radians, any shape).
 
         Accurate to a few units in the last place of the largest length, also beside dead points and change points
-        (sections 2.2, 2.3 and 3.2 to 3.4).  An angle at which the linkage cannot be assembled gets NaN and a status.
+        (theory/four-bar-and-tilt 2, 3, 6 to 8).  An angle at which the linkage cannot be assembled gets NaN and a
+        status.
 
         Raises
         ------
@@ -334,7 +335,9 @@ class TiltedFourBar:
         return np.arctan2(az, s3), sine, cosine, rate
 
     def full_turn(self) -> FullTurn:
-        """Say whether the crank can make a full turn, with limit angles or change points if it cannot (section 2.3).
+        """Say whether the crank can make a full turn, with limit angles or change points if it cannot.
+
+        See theory/four-bar-and-tilt 3.
 
         Exact (rational arithmetic on the given lengths) when the crank pin stays in the plane; estimated from the sign
         changes of the discriminants otherwise, and labelled so.

@@ -59,7 +59,7 @@ def full_turn(linkage: TiltedFourBar) -> FullTurn:
 
 
 def _planar_turn(linkage: TiltedFourBar) -> FullTurn:
-    """Compare the extremes of D with |l4 - l3| and l3 + l4 in exact arithmetic (section 2.3)."""
+    """Compare the extremes of D with |l4 - l3| and l3 + l4 in exact arithmetic (theory/four-bar-and-tilt 3)."""
     l1, l2, l3, l4 = (Fraction(length) for length in (linkage.l1, linkage.l2, linkage.l3, linkage.l4))
     kind, touches, bounds = four_bar_rotation(l1 * l1, l2, l3, l4)
     if kind == "never assembled":

@@ -13,7 +13,7 @@ game.
 A driver away from the frame can lock a loop of moving links (a hydraulic cylinder in a boom): such links are one body
 of their group, assembled first, from *floating* groups that hang on one of its links.
 
-Sources: L. V. Assur (1914); I. I. Artobolevsky, *Theory of Mechanisms and Machines*, on class and order;
+Sources: [Assur 1914]; I. I. Artobolevsky, *Theory of Mechanisms and Machines*, on class and order;
 C. Galletti, *A note on modular approaches to planar linkage kinematic analysis*, Mech. Mach. Theory 21 (1986);
 O. Shai, A. Sljoka and W. Whiteley, *Directed graphs, decompositions, and spatial linkages*, Discrete Appl. Math. 161
 (2013) 3028-3047.

@@ -64,7 +64,7 @@ def generic_mobility(graph: MechanismGraph, seed: int = 0) -> GenericMobility:
 
     Each joint of mobility f gets f random screws of the Pi-dimensional space: in the plane a revolute joint at a random
     point, for f = 2 a pin in a random slot.  Each independent loop gives Pi rows.  By Tay's theorem and its
-    extension to hinges (Whiteley 1988) random screws have the rank of random joints.
+    extension to hinges [Whiteley 1988] random screws have the rank of random joints.
 
     Parameters
     ----------

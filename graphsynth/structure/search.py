@@ -1,6 +1,6 @@
 """Canonical labelling of a coloured graph by individualisation and refinement, in plain Python for any size.
 
-The search is that of McKay (1981), with pruning by automorphisms.  A node of the search tree is an ordered partition
+The search is that of [McKay 1981], with pruning by automorphisms.  A node of the search tree is an ordered partition
 of the vertices, refined until every cell sees every other cell evenly (1-dimensional Weisfeiler-Leman, all edge
 colours at once); its children make one vertex of the target cell a cell of its own.  A leaf orders the vertices; the
 canonical form is the adjacency of the leaf that is greatest by (trace of the refinements, adjacency).  That

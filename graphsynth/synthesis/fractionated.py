@@ -3,7 +3,8 @@
 A chain is a tree of blocks: non-fractionated chains, and single joints between two links.  Its mobility is the sum of
 the mobilities of the blocks, and it has a rigid sub-chain exactly when a block has one.  Chains grow by gluing one
 block at a link of a smaller chain.  A chain is kept only when the block just glued is equivalent to its canonical leaf
-block, so each chain arises from one parent only and nothing has to be remembered (canonical augmentation, McKay 1998).
+block, so each chain arises from one parent only and nothing has to be remembered (canonical augmentation, [McKay
+1998]).
 """
 
 from __future__ import annotations

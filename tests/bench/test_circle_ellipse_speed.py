@@ -84,7 +84,7 @@ def test_boxes_to_the_limit(benchmark):
 
 
 def lid_direct(number, S, sqrt, atan2):
-    """Direct form of A_lid (specification 5.4) in any arithmetic."""
+    """Direct form of A_lid (theory/circle-and-ellipse 4) in any arithmetic."""
     R, c, h = number("17.5"), number("0.03"), number("5")
     C, q = sqrt(1 - S * S), number("17.53")
     p, d = q * C, h * S

@@ -48,7 +48,7 @@ def test_seven_body_mechanism(benchmark, form):
 
 
 def plain_equations():
-    """Right-hand side of the four-bar written by hand (spec 4.2, 4.4), in Python."""
+    """Right-hand side of the four-bar written by hand (theory/braider 2, 4), in Python."""
     a, b, c, g, gravity = 0.2, 0.6, 0.4, 0.6, 9.81
     m1, m2, m3 = 0.2, 0.6, 0.4
 

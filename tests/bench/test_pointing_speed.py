@@ -127,7 +127,7 @@ def test_twelve_equations_by_fsolve(benchmark):
 
 
 def test_the_trap_of_tiny_unknowns():
-    """Section 2.11: started from 1e-41, fsolve returns the start.
+    """theory/antenna 10: started from 1e-41, fsolve returns the start.
 
     The difference step underflows, and so does the first trust region (100 times the start): with an analytic
     Jacobian it is trapped all the same.

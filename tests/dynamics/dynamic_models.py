@@ -1,4 +1,4 @@
-"""Mechanisms of the reference problems of spec 5.9 and others, for the tests of planar dynamics."""
+"""Mechanisms of the reference problems of theory/planar-dynamics 9 and others, for the tests of planar dynamics."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def seven_pose():
 
 
 def braider(load=True):
-    """Four-bar of the braiding mechanism (spec 4), rocker and switch one body, thread force at the switch."""
+    """Four-bar of the braiding mechanism (theory/braider), rocker and switch one body, thread force at the switch."""
     a, b, c, g, r, delta = 0.020, 0.060, 0.040, 0.060, 0.035, math.radians(150.0)
     tip = (r * math.cos(delta), r * math.sin(delta))
 

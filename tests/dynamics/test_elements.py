@@ -1,4 +1,4 @@
-"""Exact small tests of spec 5.9 and closed forms of every element."""
+"""Exact small tests of theory/planar-dynamics 9 and closed forms of every element."""
 
 import math
 
@@ -81,7 +81,7 @@ def test_gear_pair(internal):
 
 
 def test_epicyclic_train():
-    """Ring fixed: carrier speed / sun speed = zs / (zs + zr) (spec 5.9)."""
+    """Ring fixed: carrier speed / sun speed = zs / (zs + zr) (theory/planar-dynamics 9)."""
     zs, zp, zr = 0.02, 0.015, 0.05
     graph = MechanismGraph(4, [(0, 1), (0, 2), (2, 3), (1, 3, 2), (0, 3, 2)], frame=0)
     joints = [
@@ -201,7 +201,7 @@ def test_friction_that_leaves_no_motion_is_a_failure():
 
 
 def test_pulse_conserves_impulse():
-    """Case 23 of section 9: a torque of a microsecond; its edges are breaks."""
+    """Case 23 of theory/extreme-cases 3: a torque of a microsecond; its edges are breaks."""
     pulse = Pulse(0.1, 1e-6, 5e4)
     model = wheel(0.2, elements=[Torque(0, 1, pulse)])
     motion = simulate_dynamics(model, [0.0, 0.05, 0.2], keep={(0, 1): 0.0})

@@ -1,4 +1,4 @@
-"""Extreme cases of spec section 9 that concern planar dynamics: right, or flagged, never silently wrong."""
+"""Extreme cases of theory/extreme-cases 3 that concern planar dynamics: right, or flagged, never silently wrong."""
 
 import math
 
@@ -64,7 +64,7 @@ def test_case_19_sensitivity_to_the_start():
 
 
 def flat_start():
-    """Four-bar of spec 4.8 in its flat pose: two branches cross, the velocity chooses one."""
+    """Four-bar of theory/braider 8 in its flat pose: two branches cross, the velocity chooses one."""
     bodies = {1: bar(1.0, 0.02), 2: bar(1.0, 0.05), 3: bar(1.0, 0.03)}
     model = DynamicModel(four_bar(0.02, 0.05, 0.03, 0.06), bodies, gravity=(0.0, 0.0))
     pose = [(0.0, 0.0, 0.0), (0.0, 0.0, np.pi), (-0.02, 0.0, 0.0), (0.06, 0.0, np.pi)]

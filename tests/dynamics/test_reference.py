@@ -1,4 +1,4 @@
-"""Reference problems G1, G2, G3 of spec 5.9 (36-digit extrapolation), and the seven-body benchmark."""
+"""Reference problems G1, G2, G3 of theory/planar-dynamics 9 (36-digit extrapolation), and the seven-body benchmark."""
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ def test_checks_at_the_default_tolerance(name, form):
 
 
 def test_projection_ends_the_drift():
-    """Spec 5.5: the closure gap grows without projection and is rounding with it."""
+    """theory/planar-dynamics 5: the closure gap grows without projection and is rounding with it."""
     gaps = [
         simulate_dynamics(
             g1(), [0.0, 2.0], start=start_of("G1"), form="augmented", rtol=1e-6, project=flag
@@ -144,7 +144,7 @@ def test_seven_body_mechanism(form):
     assert motion.checks.second_form < 1e-12 and motion.checks.newton_euler < 1e-12
 
 
-#: Spec 4.7 at w = 1.803 rad/s: F01, F12, F23, F03, T.
+#: theory/braider 7 at w = 1.803 rad/s: F01, F12, F23, F03, T.
 BRAIDER = {
     0: (-0.006639487131696429, -0.003951007279825856, -0.006151865781696429, -0.003951007279825856,
         -0.002128989644196429, -0.003536324300019061, -0.01051207169116947, -0.01275680216780750,
@@ -169,7 +169,7 @@ FAST = {
 
 @pytest.mark.parametrize(("speed", "table"), [(1.803, BRAIDER), (180.3, FAST)])
 def test_inverse_dynamics_of_the_braider(speed, table):
-    """Cases of spec 4.7, the second where inertia dominates (case 17 of section 9)."""
+    """Cases of theory/braider 7, the second where inertia dominates (case 17 of theory/extreme-cases 3)."""
     model = braider()
     motion = simulate(model.mechanism, np.radians(sorted(table)), modes={0: 1})
     found = inverse_dynamics(model, motion, speed)

@@ -1,4 +1,4 @@
-"""Consistent start: the table of spec 5.6, nearest states, kept coordinates, bad input."""
+"""Consistent start: the table of theory/planar-dynamics 6, nearest states, kept coordinates, bad input."""
 
 import numpy as np
 import pytest
@@ -80,7 +80,7 @@ def test_change_point():
 
 
 def test_contradicting_rates():
-    k3 = -0.5  # at theta = 0 for the proportions of G1 (spec 4.7)
+    k3 = -0.5  # at theta = 0 for the proportions of G1 (theory/braider 7)
     model, keep = g1(), {(0, 1): 0.0}
     good = consistent_start(model, keep=keep, keep_rates={(0, 1): 10.0, (0, 3): 10.0 * k3}, modes={0: 1})
     assert good.consistent and abs(good.velocities[3, 2] + 5.0) < 1e-12

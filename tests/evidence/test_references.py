@@ -20,7 +20,7 @@ from graphsynth.systems.platform.evidence_eigenvalues import eigenvalue_modes
 
 
 def test_modes_of_g1_of_the_specification():
-    g1 = ParallelPlatform.g1()  # section 14.3
+    g1 = ParallelPlatform.g1()  # theory/values-of-the-platform 3
     modes = precise_modes(precise_anchors(g1, np.zeros(3)), g1.b, g1.l2)
     right = [
         (2.201176574824335152, 0.85920239409603039, -0.16764789067400023),
@@ -30,7 +30,7 @@ def test_modes_of_g1_of_the_specification():
 
 
 def test_modes_of_g1_at_another_pose_of_the_specification():
-    g1 = ParallelPlatform.g1()  # section 14.1
+    g1 = ParallelPlatform.g1()  # theory/values-of-the-platform 1
     theta = np.array([1.820203731367051943, -2.644475043988912944, -0.1619825351011604738])
     modes = precise_modes(precise_anchors(g1, theta), g1.b, g1.l2)
     right = [(1.170779876116247461, 1.0132616187106641, -1.20068946437938629), (1.2, 0.9, 0.15)]
@@ -62,7 +62,7 @@ def test_eigenvalues_find_the_same_modes():
 
 
 def test_arc_ends_of_the_specification():
-    ends = precise_arc_ends(ToleranceBox(alpha="1/30"))  # section 6: condition A
+    ends = precise_arc_ends(ToleranceBox(alpha="1/30"))  # theory/jam-arcs 1: condition A
     right = [27.0592203251509475645179736478, 152.940779674849052435482026352]
     assert np.abs(np.degrees(ends) - [*right, 180 + right[0], 180 + right[1]]).max() < 1e-13
 
@@ -106,7 +106,7 @@ def test_strip_of_the_lambda_linkage():
 
 
 def test_positions_of_the_specification():
-    # section 14.1: at 90 degrees B lies at (2, 2.5)
+    # theory/four-bar-and-tilt 4: at 90 degrees B lies at (2, 2.5)
     mechanism, (_, closed) = four_bar(LambdaLinkage())
     assert abs(precise_points(mechanism, np.array([math.pi / 2]))[0] - (2 + 2.5j)) < 1e-15
     assert abs(closed(np.array([math.pi / 2]))[0] - (2 + 2.5j)) < 1e-15
@@ -154,7 +154,7 @@ def test_branch_is_one_of_all_poses_of_the_platform():
 def test_area_of_the_specification():
     from graphsynth.evidence.bearing import WORST_SINE
 
-    # section 13, point 14: the free gap at the worst pose, 25 digits
+    # docs/explanation/errata.md: the free gap at the worst pose, 25 digits
     with mpmath.workdps(30):
         assert abs(precise_area(Bearing(), WORST_SINE) - mpmath.mpf("0.9749683652811658362854900")) < mpmath.mpf(
             "1e-24"
@@ -164,13 +164,13 @@ def test_area_of_the_specification():
 def test_the_closed_form_of_coupled_joints_keeps_its_digits():
     from graphsynth.evidence.coupled import exact_largest
 
-    found = exact_largest(LambdaLinkage(), Bearing())  # section 9.6
+    found = exact_largest(LambdaLinkage(), Bearing())  # theory/joints-that-share-a-tilt 6
     with mpmath.workdps(45):
         assert abs(found - mpmath.mpf("0.012128793118312840120532205597449602345")) < mpmath.mpf("1e-38")
 
 
 def test_critical_tilt_of_the_specification():
-    with mpmath.workdps(45):  # section 9.6: the whole turn is free up to twice this
+    with mpmath.workdps(45):  # theory/joints-that-share-a-tilt 6: the whole turn is free up to twice this
         twice = 2 * precise_critical_tilt(Bearing())
         assert abs(twice - mpmath.mpf("0.012128793118312840120532205597449602345")) < mpmath.mpf("1e-38")
 

@@ -75,7 +75,7 @@ def test_energy_is_the_internal_one():
     kinetic, total = mechanical_energy(model, motion.poses, motion.velocities)
     assert kinetic == pytest.approx(motion.kinetic, rel=1e-9, abs=1e-12)
     assert total == pytest.approx(motion.energy, rel=1e-10)
-    assert total[0] == pytest.approx(1.96409966368430366891, rel=1e-13)  # spec 5.9
+    assert total[0] == pytest.approx(1.96409966368430366891, rel=1e-13)  # theory/planar-dynamics 9
 
 
 def test_bad_settings(start):

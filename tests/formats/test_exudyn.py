@@ -1,4 +1,7 @@
-"""The exported model in exudyn: spec 5.9 and 7.3, and every kind of joint and load against the internal motion."""
+"""The exported model in exudyn: every kind of joint and load against the internal motion.
+
+See theory/planar-dynamics 9 and theory/exports 3.
+"""
 
 import engine_models as models
 import numpy as np
@@ -73,7 +76,7 @@ def test_uniform_acceleration_is_exact(name):
     model, start = getattr(models, name)()
     times = np.linspace(0.0, 0.4, 3)
     run = run_exudyn(model, start, times, ExudynSettings(1e-3))
-    if name == "gear_pair":  # spec 5.9
+    if name == "gear_pair":  # theory/planar-dynamics 9
         expected = 0.5 * 0.7 / (0.02 + 0.3 * 0.4**2) * times**2
         assert run.poses[:, 1, 2] == pytest.approx(expected, abs=1e-12)
     else:  # the wedge falls by tan(0.4) of what the other one moves: one coordinate, constant acceleration

@@ -1,4 +1,7 @@
-"""MuJoCo runs the exported model: spec 5.9 and 7.3, and every kind of joint and load against the internal motion."""
+"""MuJoCo runs the exported model: every kind of joint and load against the internal motion.
+
+See theory/planar-dynamics 9 and theory/exports 3.
+"""
 
 import re
 import xml.etree.ElementTree as ET
@@ -67,7 +70,7 @@ def test_default_loops_are_springs(start):
     ],
 )
 def test_floors_of_the_spec_in_an_open_reference_pose(start, settings, error):
-    """Spec 7.3 has its floors from a model written with all angles 0: the engine scales its springs there."""
+    """theory/exports 3 has its floors from a model written with all angles 0: the engine scales its springs there."""
     mujoco = pytest.importorskip("mujoco")
     text = re.sub(r' (quat|ref)="[^"]*"', "", to_mjcf(g1(), start, settings).xml)
     model = mujoco.MjModel.from_xml_string(text)
@@ -112,7 +115,7 @@ def test_every_joint_and_load(name):
 
 
 def test_gear_pair_closed_form():
-    """Spec 5.9: alpha = T / (J1 + J2 (z1/z2)^2)."""
+    """theory/planar-dynamics 9: alpha = T / (J1 + J2 (z1/z2)^2)."""
     pytest.importorskip("mujoco")
     model, start = models.gear_pair(0.7)
     run = run_mujoco(model, start, [0.0, 0.5], MujocoSettings(1e-3))

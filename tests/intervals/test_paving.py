@@ -21,7 +21,7 @@ def deck(e1, e2):
     return Interval([f"306.25 +- {e1}", f"1 +- {e2}", "17.53", B_90])
 
 
-# eps, x_lo, x_hi, y_lo, y_hi of section 14.5
+# eps, x_lo, x_hi, y_lo, y_hi of theory/values-of-bearings 5
 HULLS = [
     ("0", "13.11490802879096276551727", "13.11490802879096276551727",
      "11.58659515976778845911871", "11.58659515976778845911871"),
@@ -37,7 +37,7 @@ HULLS = [
 
 
 def exact_hull(r, e1, a, b, e2):
-    """Closed form of section 6.2 in intervals, unclipped; the corners are monotone in every argument."""
+    """Closed form in intervals (theory/circle-and-ellipse 7), unclipped; the corners are monotone in every argument."""
     down, up = (Interval(a).sqr() - Interval(b).sqr()), Interval(1)
     u = [a.sqr() * (r.sqr() + s * e1 - b.sqr() * (up - s * e2)) / down for s in (-1, 1)]
     v = [b.sqr() * (a.sqr() * (up - s * e2) - r.sqr() - s * e1) / down for s in (-1, 1)]
@@ -57,7 +57,7 @@ def test_closed_form_gives_the_hulls_of_the_specification(row):
 
 @pytest.mark.parametrize("row", HULLS[:4], ids=lambda row: row[0])
 def test_subdivided_krawczyk_encloses_the_hulls_of_the_specification(row):
-    """Up to eps = 1e-6 the test succeeds in (x, y), where rho on the hull is below 1/4 (section 6.6)."""
+    """Up to eps = 1e-6 the test succeeds in (x, y), where rho on the hull is below 1/4 (theory/interval-tests 3)."""
     eps, *ends = row
     found = pave(circle_and_ellipse, ["[0, 18]", "[0, 18]"], deck(eps, eps))
     assert found.finished
@@ -83,7 +83,7 @@ def test_different_tolerances_of_the_specification():
 
 
 def test_tangent_curves_are_undecided_and_enclosed():
-    """R1 = a: a double point on the axis y = 0; R1 above a: nothing (section 12)."""
+    """R1 = a: a double point on the axis y = 0; R1 above a: nothing (theory/extreme-cases 1)."""
     p = Interval([Fraction("17.53") ** 2, 1, "17.53", B_90])
     found = pave(circle_and_ellipse, ["[0, 18]", "[0, 18]"], p, tolerance=1e-4)
     assert found.finished
@@ -95,7 +95,7 @@ def test_tangent_curves_are_undecided_and_enclosed():
 
 
 def test_where_the_textbook_method_cannot_certify():
-    """Section 6.6: rho is 0.67 at eps = 1e-5, above 1/4; an honest 'undecided'."""
+    """theory/interval-tests 3: rho is 0.67 at eps = 1e-5, above 1/4; an honest 'undecided'."""
     result = krawczyk(circle_and_ellipse, ["[13.08, 13.15]", "[11.55, 11.62]"], deck("1e-5", "1e-5"))
     assert result.status is Status.UNDECIDED
     assert result.spectral_radius > 0.25

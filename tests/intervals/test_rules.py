@@ -1,4 +1,4 @@
-"""The rules of the specification, section 11.1, one by one: the naive way fails where this package does not."""
+"""The rules of theory/interval-tests 4, one by one: the naive way fails where this package does not."""
 
 import copy
 import math

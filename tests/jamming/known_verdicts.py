@@ -41,7 +41,7 @@ def rational(x, digits=60) -> Fraction:
 
 
 def touching_sine(condition, R, h, c, hole):
-    """Sine of the tilt at which the bearing touches (specification 4.7), or None."""
+    """Sine of the tilt at which the bearing touches (theory/bearing-contact 7), or None."""
     found = []
     for reading, half in (("A", h), ("B", hole if condition == "general" else h)):
         if condition not in (reading, "general"):
@@ -130,7 +130,7 @@ def gap_at(point, f, condition):
 
 
 def gap_of(p, S, condition):
-    """Gap function from distances of points (specification 4.2 to 4.4)."""
+    """Gap function from distances of points (theory/bearing-contact 2 to 4)."""
     C, R, h, Rh = mpmath.sqrt((1 - S) * (1 + S)), p["Rb"], p["Hb"] / 2, p["Rb"] + p["clearance"]
     if condition == "B":
         return R - (Rh * C - h * S)

@@ -22,7 +22,7 @@ from graphsynth.jamming.bearing.areas_enclosed import (
 from graphsynth.jamming.bearing.bearing import Bearing
 
 DIGITS = 50
-# specification 14.2: f in degrees, E4 ellipse minus circle, E4 circle minus ellipse, A_lid, A_rim
+# theory/values-of-bearings 2: f in degrees, E4 ellipse minus circle, E4 circle minus ellipse, A_lid, A_rim
 REFERENCE = """
 0    3.301499719657513714300391931 0 0 0
 13   2.471409694573719309924230225 0 0 0
@@ -100,7 +100,7 @@ def test_reference_crescents(R1, pa, qb, ell, cir):
 
 
 def test_double_precision_claim_over_random_crescents():
-    """Relative error below 2e-15 with pa/R1 and qb/R1 down to 1e-12 (specification 5.3), and up to 10."""
+    """Relative error below 2e-15 with pa/R1 and qb/R1 down to 1e-12 (theory/circle-and-ellipse 3), and up to 10."""
     rng = np.random.default_rng(3)
     R = np.exp(rng.uniform(-3, 3, 1500))
     pa, qb = R * 10 ** rng.uniform(-12, 1, 1500), R * np.minimum(10 ** rng.uniform(-12, 0, 1500), 0.999)

@@ -47,7 +47,7 @@ def test_ordinate_of_the_source_jumps_at_the_onset_and_falls_towards_the_worst_p
 
 
 def test_half_of_the_surrogate_underestimates_the_interference():
-    """By 26 to 29 per cent (specification 5.4)."""
+    """By 26 to 29 per cent (theory/circle-and-ellipse 4)."""
     curve = area_curve(f=np.radians([26.5, 30, 45, 90]))
     short = 1 - 0.5 * curve.surrogate_jam.mid / curve.lid.mid
     assert ((short > 0.25) & (short < 0.295)).all()
@@ -129,7 +129,7 @@ def test_areas_of_the_readings_against_counting(reading, t):
 
 
 def test_readings_that_ignore_the_height_need_a_larger_tilt():
-    """E1 and E2 start at arccos(R/Rh); E4 and E3 at t_B (specification 5.1)."""
+    """E1 and E2 start at arccos(R/Rh); E4 and E3 at t_B (theory/circle-and-ellipse 1)."""
     late, early = 0.05851222627558999787339087, 0.005938219994357610895366507614
     jam = {
         Reading.IMAGE: (late, 1), Reading.SECTION: (late, 0), Reading.LID: (early, 1), Reading.SURROGATE: (early, 1),

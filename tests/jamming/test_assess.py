@@ -32,7 +32,7 @@ from graphsynth.mechanism.four_bar import TiltedFourBar
 DEG = math.pi / 180.0
 DECK = TiltedFourBar(alpha=1 / 30)
 
-# spec 14.2: f, theta, gA, gB, E4 ell\circ, E4 circ\ell, A_lid, A_rim
+# theory/values-of-bearings 2: f, theta, gA, gB, E4 ell\circ, E4 circ\ell, A_lid, A_rim
 TABLE = [
     (0, 0, -0.03, -0.03, 3.301499719657513714300391931, 0, 0, 0),
     (13, 0.002998796481990437225089870257, -0.01508472683198013806918781056, -0.01492721840235467538782847698, 2.471409694573719309924230225, 0, 0, 0),
@@ -284,7 +284,10 @@ def test_import_is_cheap():
 
 
 def test_a_motion_is_assessed_with_all_its_joints():
-    """The same entry and the same words for any mechanism: three equal bearings are free up to 2 t_A (spec 9.6)."""
+    """The same entry and the same words for any mechanism: three equal bearings are free up to 2 t_A.
+
+    See theory/joints-that-share-a-tilt 6.
+    """
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     joints = [
         Revolute(0, 1),

@@ -199,7 +199,7 @@ def test_stable_crescents_against_fifty_digits(R1, log_pa, log_qb):
 
 
 def _disc_minus_lid(R, Rh, h, t):
-    """Area by strips y = const, midpoint rule in the angle: the independent path of section 5.4."""
+    """Area by strips y = const, midpoint rule in the angle: the independent path of theory/circle-and-ellipse 4."""
     count = 400_000
     angle = (np.arange(count) + 0.5) * (0.5 * math.pi / count)
     y, half = R * np.sin(angle), R * np.cos(angle)
@@ -323,7 +323,7 @@ def test_zero_clearance():
 
 
 def test_crossing_points_at_the_worst_pose():
-    """Specification 14.2, below the table: f = 90 degrees of the deck's motion."""
+    """theory/values-of-bearings 2, below the table: f = 90 degrees of the deck's motion."""
     sine = 0.4 * math.sin(1.0 / 30.0)
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     u, v = lid_crossing(DECK, sine, cosine)

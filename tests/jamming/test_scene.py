@@ -14,7 +14,7 @@ from graphsynth.pipeline.scene import OutputsTable, load_scene
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.lambda_linkage.stages import tolerance_box
 
-EXAMPLE = {  # specification 10.3
+EXAMPLE = {  # theory/jam-arcs 7
     "crank": "1e-2 %", "coupler": "1e-2 %", "alpha_rad": "1e-2 %", "azimuth_rad": 0.05, "radius_mm": 0.005,
     "height_mm": 0.05, "clearance_mm": 0.003,
 }  # fmt: skip

@@ -16,7 +16,7 @@ from graphsynth.mechanism.four_bar import AssemblyStatus, TiltedFourBar
 DEG = math.pi / 180.0
 DECK = TiltedFourBar(alpha=1 / 30)
 
-# spec 14.1: f (deg), A, B
+# theory/values-of-bearings 1: f (deg), A, B
 DECK_POSITIONS = [
     (0, (1, 0, 0), (1.5, 2.449489742783178098197284075)),
     (
@@ -251,7 +251,10 @@ def test_straightness():
 
 
 def _reference(linkage, f):
-    """B and theta at 50 digits from the double-precision input, by the plain formulas of sections 2.2 and 3."""
+    """B and theta at 50 digits from the double-precision input, by the plain formulas.
+
+    See theory/four-bar-and-tilt 2, 5.
+    """
     with mp.workdps(max(50, mp.mp.dps)):
         l1, l2, l3, l4 = (mp.mpf(v) for v in (linkage.l1, linkage.l2, linkage.l3, linkage.l4))
         n = [mp.mpf(v) for v in linkage.axis]

@@ -40,13 +40,13 @@ def test_published_values(report: Any) -> None:
     assert record.status == "assessed" and record.good
     assert "differ by 30.99′ at 40°" in record.verdict and "certified" in record.verdict
     value = {m.name: m for m in record.margins}
-    # section 2.9
+    # theory/values-of-the-antenna 1
     assert value["elevation at 40°"].value == pytest.approx(23.7120800164849915647, abs=1e-13)
     assert value["azimuth at 40°"].value == pytest.approx(22.44785725383752382049, abs=1e-13)
     assert value["separation of the two at 40°"].value == pytest.approx(75.8533657588, abs=1e-10)
     assert value["difference of the two models at 40°"].value == pytest.approx(30.9895760535, abs=1e-10)
     assert value["difference of the two models at 15°"].value == pytest.approx(0.656058727127, abs=1e-10)
-    # section 2.10
+    # theory/antenna 9
     for name, exact in (("elevation", 44.4258857627), ("azimuth", 43.0183614472)):
         bound = value[f"largest deviation of the {name} at 15°"]
         assert bound.guarantee == "certified"
@@ -63,7 +63,7 @@ def test_structure_and_cross_check(report: Any) -> None:
 
 
 def test_table_of_conventions(report: Any) -> None:
-    """Section 2.8, to the printed digits."""
+    """theory/antenna 8, to the printed digits."""
     rows = {row[0]: [float(x) for x in row[1:]] for row in table(report, "What makes").rows}
     assert rows["gimbal order XY"] == pytest.approx([0.008, 0.130, 0.656, 2.060, 10.201, 30.990], abs=6e-4)
     assert rows["both cranks reversed"] == rows["gimbal order XY"]

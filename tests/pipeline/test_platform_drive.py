@@ -38,7 +38,7 @@ def report() -> Any:
     return run(tables, "runs", "without_inertia", "claim", "limit", "records", "tables")
 
 
-# section 11.5: speed (rad/s) and current (A), peak to peak
+# theory/motor-drive 5: speed (rad/s) and current (A), peak to peak
 PRINTED = [
     [(20.46, 42.8), (20.96, 42.5), (21.44, 41.2), (20.05, 34.1), (16.26, 22.5), (13.91, 12.3)],
     [(3.43, 28.9), (3.78, 28.1), (4.33, 26.3), (6.02, 21.9), (9.04, 17.5), (11.53, 11.5)],

@@ -132,7 +132,7 @@ def test_lambda_run_writes_a_whole_folder(tmp_path: Path) -> None:
     assert page.count("<svg") == 12 and "jams on part of the turn" in page
 
 
-# Section 14.5 of the platform's reference values: psi/pi, x, y [mm], alpha [rad], det JX [mm^4].
+# theory/values-of-the-platform 5: psi/pi, x, y [mm], alpha [rad], det JX [mm^4].
 TURN = [
     (0.0, 0.6726309905203590802261, -5.007798833182029853049, 0.0533847814110077176268, -188253854.0504867671045),
     (0.25, 2.0030859414710400173073, -3.391552232148333278478, 0.0698791060028457918095, -187287228.0329033806575),

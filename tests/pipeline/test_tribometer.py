@@ -39,7 +39,7 @@ def table(report: Any, title: str) -> Any:
 
 
 def test_published_events(report: Any) -> None:
-    """Section 3.9, to the printed digits (accurate to about 1e-14)."""
+    """theory/tribometer 9, to the printed digits (accurate to about 1e-14)."""
     rows = table(report, "Events: 37").rows
     printed = [
         (0.365311879706055, "SLIP(-1)", -9.33904293982135), (0.608830310579125, "STICK", -2.62488891175237),
@@ -69,7 +69,7 @@ def test_verdict_cycle_and_energies(report: Any) -> None:
 
 
 def test_methods_keep_failures(report: Any) -> None:
-    """Section 3.10: errors of the smoothed law, and what LSODA does at the end of the range."""
+    """theory/tribometer 10: errors of the smoothed law, and what LSODA does at the end of the range."""
     rows = table(report, "The other methods").rows
     smooth = {row[1]: row for row in rows if row[0] == "LSODA"}
     for speed, error in (
@@ -99,7 +99,7 @@ def test_the_page(tmp_path: Any) -> None:
 def test_exact_belt_cycle() -> None:
     report = execute(changed(*SAID, **BELT))
     rows = dict(table(report, "Limit cycle").rows)
-    # section 3.7
+    # theory/tribometer 7
     assert float(rows["exact: period"].split()[0]) == pytest.approx(0.551496439575209089, abs=1e-15)
     assert float(rows["period"].split()[0]) == pytest.approx(0.551496439575209089, abs=1e-12)
     (record,) = report["records"]

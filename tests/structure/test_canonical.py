@@ -270,7 +270,7 @@ def planar_one_freedom_chains(links):
 @pytest.mark.skipif(shutil.which("nauty-geng") is None, reason="nauty is not installed")
 @pytest.mark.parametrize(("links", "chains", "asymmetric", "inversions"), [(8, 16, 2, 71), (10, 230, 87, 1834)])
 def test_published_chains_and_inversions(links, chains, asymmetric, inversions):
-    # Spec section 5: chains, those with a trivial group, mechanisms with a frame.
+    # theory/enumeration 2: chains, those with a trivial group, mechanisms with a frame.
     graphs = [MechanismGraph.from_graph6(line) for line in planar_one_freedom_chains(links)]
     assert len({graph.key for graph in graphs}) == len(graphs) == chains
     assert sum(graph.automorphism_order == 1 for graph in graphs) == asymmetric

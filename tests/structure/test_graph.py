@@ -14,7 +14,7 @@ FOUR_BAR = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)], frame=0)
 WATT = MechanismGraph(6, [(0, 1), (1, 2), (2, 3), (3, 0), (3, 4), (4, 5), (5, 2)])
 STEPHENSON = MechanismGraph(6, [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 5), (4, 5)])
 
-# The source's Figure 3, spec section 2.
+# The source's Figure 3, theory/structural-system 2.
 FIGURE_3_LOWER = "0-1 0-2 0-3 0-4 2-5 3-6 4-7 5-8 6-9 7-10 0-8 0-9 0-10 8-11 9-12 10-13 11-14 12-14 13-14"
 FIGURE_3_HIGHER = "1-2 1-3 1-4"
 FIGURE_3 = MechanismGraph(

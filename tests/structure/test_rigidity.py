@@ -9,7 +9,7 @@ from graphsynth.structure.rigidity import is_sparse
 
 
 def dof(graph, links):
-    """Definition of spec section 3, joint by joint."""
+    """Definition of theory/structural-system 3, joint by joint."""
     inside = [m for a, b, m in graph.joints if a in links and b in links]
     return graph.space * (len(links) - 1) - sum(graph.space - m for m in inside)
 

@@ -44,7 +44,7 @@ def linear_response(
 
     Notes
     -----
-    Specification parallel_platform, section 14.10.
+    See theory/motor-drive 6.
 
     Examples
     --------

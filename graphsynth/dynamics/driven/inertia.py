@@ -46,7 +46,7 @@ class EffectiveInertia:
 
     Notes
     -----
-    Specification parallel_platform, section 11.2.
+    See theory/motor-drive 2.
 
     Examples
     --------

@@ -111,7 +111,7 @@ def inductance_study(
 
     Notes
     -----
-    Specification parallel_platform, section 11.4, and instruments_and_dynamics, section 4.6.
+    See theory/motor-drive 4 and theory/braider 6.
 
     Examples
     --------

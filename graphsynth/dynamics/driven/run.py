@@ -141,7 +141,7 @@ def run(
     currents : tuple of float, optional
         At the start, A; zero by default.
     regular : bool
-        Use the regularised form ``dt = sqrt(J) ds`` (section 11.3), which passes dead centres without inertia.
+        Use the regularised form ``dt = sqrt(J) ds`` (theory/motor-drive 3), which passes dead centres without inertia.
     rtol : float
         Tolerance per step, 1e-13 to 1e-3.
     max_steps, max_events : int

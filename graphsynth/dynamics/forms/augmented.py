@@ -1,4 +1,4 @@
-"""The index-1 form with projection: all coordinates, multipliers at every evaluation (spec 5.5)."""
+"""The index-1 form with projection: all coordinates, multipliers at every evaluation (theory/planar-dynamics 5)."""
 
 from __future__ import annotations
 

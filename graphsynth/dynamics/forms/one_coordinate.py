@@ -1,4 +1,4 @@
-"""The one-coordinate form: one independent coordinate through the planar engine (spec 5.4)."""
+"""The one-coordinate form: one independent coordinate through the planar engine (theory/planar-dynamics 4)."""
 
 from __future__ import annotations
 

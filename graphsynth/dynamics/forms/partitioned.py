@@ -1,4 +1,7 @@
-"""The partitioned form: independent coordinates chosen by column-pivoted QR, changed where they fail (spec 5.4)."""
+"""The partitioned form: independent coordinates chosen by column-pivoted QR, changed where they fail.
+
+See theory/planar-dynamics 4.
+"""
 
 from __future__ import annotations
 

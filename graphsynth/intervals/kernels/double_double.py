@@ -69,7 +69,7 @@ def divide(ah, al, bh, bl):
 
 @kernel(forceinline=True)
 def root(ah, al):
-    """Square root of a positive number (Lefevre, Louvet, Muller, Picot, Rideau 2023: 25/8 u^2)."""
+    """Square root of a positive number ([Lefèvre et al. 2023]: 25/8 u^2)."""
     s = sqrt(ah)
     r = fma(-s, s, ah)
     return quick_two_sum(s, (al + r) / (s + s))

@@ -1,6 +1,6 @@
 """Branch and prune compiled: all solutions of a compiled system in a box, depth first, with epsilon-inflation.
 
-Specification, section 6.5.  A box in work is a row of bounds; the waiting ones are a stack.  Invariant: every solution
+See theory/interval-tests 2.  A box in work is a row of bounds; the waiting ones are a stack.  Invariant: every solution
 of the start box lies in a waiting box, in a kept one, or in the domain of a kept one that is UNIQUE, which then holds
 that solution.  So the search can be stopped between any two boxes.
 """

@@ -42,7 +42,7 @@ def up(x, exact):
 
 @kernel(forceinline=True)
 def _sum(a, b):
-    """Sum and its error, which overflows only with the sum (Dekker 1971)."""
+    """Sum and its error, which overflows only with the sum [Dekker 1971]."""
     s = a + b
     first = abs(a) >= abs(b)
     return s, (b if first else a) - (s - (a if first else b))

@@ -1,7 +1,7 @@
 """Sine, cosine and tangent: certified bounds at points and over intervals.
 
-Arguments beyond pi/4 are reduced with pi/2 in exact pieces (Cody and Waite 1980), beyond a million by exact integer
-arithmetic with 1344 bits of 2/pi (Payne and Hanek 1983); the rest is a Taylor polynomial in double-double arithmetic.
+Arguments beyond pi/4 are reduced with pi/2 in exact pieces [Cody & Waite 1980], beyond a million by exact integer
+arithmetic with 1344 bits of 2/pi [Payne & Hanek 1983]; the rest is a Taylor polynomial in double-double arithmetic.
 Every error bound is proved in ``docs/explanation/intervals.md``.
 """
 
@@ -37,7 +37,7 @@ _32 = np.uint64(32)
 
 @kernel
 def reduce_moderate(x):
-    """Do what `reduce` does, for ``|x| <= 1e6``, with pi/2 in pieces (Cody and Waite 1980)."""
+    """Do what `reduce` does, for ``|x| <= 1e6``, with pi/2 in pieces [Cody & Waite 1980]."""
     k = np.floor(x * 0.6366197723675814 + 0.5)
     h, l = dd.two_sum(x, -k * _FIRST)
     h, l = dd.add_double(h, l, -k * _SECOND)

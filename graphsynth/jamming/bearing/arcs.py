@@ -1,7 +1,7 @@
 """Arcs of the turn where a bearing that takes the whole tilt binds (model L0): in closed form, and with proved bounds.
 
 A `Span` runs counter-clockwise from ``start`` to ``stop`` (radians, ``stop`` may exceed a turn).  Outer sets of spans
-are only ever enlarged by rounding, inner sets only shrunk.  Specification, sections 7.1 and 7.3.
+are only ever enlarged by rounding, inner sets only shrunk.  See theory/jam-arcs 1, 3.
 """
 
 from __future__ import annotations
@@ -346,7 +346,7 @@ class JamArcs:
 
 @checked
 def jam_arcs(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> JamArcs:
-    """Jam arcs of the bearing at B over one turn of the crank (section 7.1).
+    """Jam arcs of the bearing at B over one turn of the crank (theory/jam-arcs 1).
 
     Exact closed form evaluated in double precision.  ``|kappa - 1|`` below sixteen units in the last place is reported
     as touching, because the sign of the difference is then a matter of rounding.

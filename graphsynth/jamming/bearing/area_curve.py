@@ -2,10 +2,11 @@
 
 The source plots "the part of the ellipse not crossed by the circle" over [90, 450] degrees.  That is the free gap of
 the surrogate ellipse, zero where there is no intersection: it jumps at the onset and falls towards the worst pose.  The
-true interference, `AreaCurve.lid` and `AreaCurve.rim`, does the opposite.  Specification 5.4, 7.2, 13 (14 to 16).
+true interference, `AreaCurve.lid` and `AreaCurve.rim`, does the opposite.  See theory/circle-and-ellipse 4,
+theory/jam-arcs 2.
 
 The interval shoelace sum of the source is kept as a warning: its width does not shrink with finer boxes, because every
-vertex appears in two products and the dependency error is hundreds of times the area (section 5.5).
+vertex appears in two products and the dependency error is hundreds of times the area (theory/circle-and-ellipse 5).
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def enclose_tilt_sine(linkage: TiltedFourBar, f: ArrayLike | Interval) -> Interv
 
     Notes
     -----
-    Specification 3.1 to 3.4.  Certified; a pin that rises above l3 gives a sine beyond 1.
+    See theory/four-bar-and-tilt 5 to 8.  Certified; a pin that rises above l3 gives a sine beyond 1.
 
     Examples
     --------

@@ -50,7 +50,9 @@ def _segment_difference(difference: Array, total: Array) -> Array:
 
 
 def ellipse_circle(R1: ArrayLike, a: ArrayLike, b: ArrayLike) -> CrescentAreas:
-    """Areas between a centred ellipse (semi-axes a >= b > 0) and a circle of radius R1, direct form (section 5.2).
+    """Areas between a centred ellipse (semi-axes a >= b > 0) and a circle of radius R1, direct form.
+
+    See theory/circle-and-ellipse 2.
 
     Loses digits when a, b and R1 nearly agree; `ellipse_circle_stable` does not.
 
@@ -81,7 +83,7 @@ def ellipse_circle(R1: ArrayLike, a: ArrayLike, b: ArrayLike) -> CrescentAreas:
 
 
 def ellipse_circle_stable(R1: ArrayLike, pa: ArrayLike, qb: ArrayLike) -> CrescentAreas:
-    """Areas of `ellipse_circle` from the differences ``pa = a - R1`` and ``qb = R1 - b`` (section 5.3).
+    """Areas of `ellipse_circle` from the differences ``pa = a - R1`` and ``qb = R1 - b`` (theory/circle-and-ellipse 3).
 
     Relative error of a few units in the last place down to the thinnest crescents.
 
@@ -140,7 +142,7 @@ def _tilts(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array,
 
 @checked
 def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> CrescentAreas:
-    """Free gap and interference of the centred surrogate ellipse E4 (section 5.1), mm^2.
+    """Free gap and interference of the centred surrogate ellipse E4 (theory/circle-and-ellipse 1), mm^2.
 
     Ellipse ``a = Rh``, ``b = Rh C - h S`` against the disc of radius R.  Where the tilt is so steep that ``b <= 0`` the
     surrogate is not defined: NaN there (use `lid_area`, which is defined everywhere).
@@ -160,8 +162,8 @@ def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Cre
 def _lid_crossing(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, h: float) -> tuple[Array, Array]:
     """Distances of the crossing points of disc and lid ellipse from the centre, against the tilt and across it.
 
-    The discriminant of section 5.4 simplifies: ``H^2 - k G = (S wB / (C q^2))^2`` with ``wB`` of section 4.7, so that
-    the crossing point needs neither a division by C nor a subtraction.
+    The discriminant of theory/circle-and-ellipse 4 simplifies: ``H^2 - k G = (S wB / (C q^2))^2`` with ``wB`` of
+    theory/bearing-contact 7, so that the crossing point needs neither a division by C nor a subtraction.
     """
     m = gap * (R + h * S + Rh * C) / (S * (R * S + h + C * math.sqrt(h * h + ring)))
     return R - m, np.sqrt(np.maximum(m * (2.0 * R - m), 0.0))
@@ -179,7 +181,7 @@ def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, 
 
 @checked
 def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
-    """A_lid: disc of radius R outside one lid of the tilted hole (condition B, section 5.4), mm^2.
+    """A_lid: disc of radius R outside one lid of the tilted hole (condition B, theory/circle-and-ellipse 4), mm^2.
 
     Exact closed form in double precision, including the second crescent at very large tilt.  Zero while ``gB <= 0``;
     NaN for NaN.
@@ -203,7 +205,7 @@ def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
 
 @checked
 def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-    """A_rim: rim of the tilted bearing outside the disc of radius Rh (condition A, section 5.4), mm^2.
+    """A_rim: rim of the tilted bearing outside the disc of radius Rh (condition A, theory/circle-and-ellipse 4), mm^2.
 
     Returns
     -------
@@ -238,7 +240,9 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
 
 @checked
 def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
-    """Crossing point of the disc of radius R and the near side of one lid (condition B, section 5.4), mm.
+    """Crossing point of the disc of radius R and the near side of one lid (condition B), mm.
+
+    See theory/circle-and-ellipse 4.
 
     Returns
     -------
@@ -267,7 +271,7 @@ def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[
 
 @checked
 def rim_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
-    """Crossing point of the rim of the tilted bearing and the hole (condition A, section 5.4), mm.
+    """Crossing point of the rim of the tilted bearing and the hole (condition A, theory/circle-and-ellipse 4), mm.
 
     Returns
     -------
@@ -289,7 +293,7 @@ def rim_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[
 
 
 def _rim_crossing(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, gap: Array) -> tuple[Array, Array]:
-    """Crossing point of rim and hole; the discriminant of section 5.4 is ``(S wA / C)^2``."""
+    """Crossing point of rim and hole; the discriminant of theory/circle-and-ellipse 4 is ``(S wA / C)^2``."""
     m = gap * (R * C + Rh - h * S) / (S * (h - Rh * S + C * math.sqrt(max(h * h - ring, 0.0))))
     return Rh - m, np.sqrt(np.maximum(m * (2.0 * Rh - m), 0.0))
 

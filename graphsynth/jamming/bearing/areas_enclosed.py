@@ -2,8 +2,7 @@
 
 Each area is evaluated at the two corners of the ranges at which it is smallest and largest, so that wide ranges of
 tilt, height and clearance give their exact range up to rounding; the radius of the bearing is carried as it is.  Why
-the areas are monotone: ``docs/explanation/circle-and-ellipse.md``.  Specification lambda_and_jamming,
-sections 5.2 to 5.5.
+the areas are monotone: ``docs/explanation/circle-and-ellipse.md``.  See theory/circle-and-ellipse 2 to 5.
 """
 
 from __future__ import annotations
@@ -154,7 +153,7 @@ def enclose_crescents(R1: Any, pa: Any, qb: Any) -> EnclosedCrescents:
 
 
 def _crescents_at(R1: Interval, pa: Interval, qb: Interval) -> EnclosedCrescents:
-    """Section 5.3 with its branches; ``pa`` is a point, ``qb`` a point or narrow."""
+    """theory/circle-and-ellipse 3 with its branches; ``pa`` is a point, ``qb`` a point or narrow."""
     ex = R1 * (qb - pa) + pa * qb
     crossing = (pa.hi > 0.0) & (qb.hi > 0.0)
     one = Interval(1)
@@ -355,7 +354,7 @@ def _twice(x: Interval) -> Interval:
 
 
 def _rim_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
-    """Section 5.4, condition A, with its branches."""
+    """theory/circle-and-ellipse 4, condition A, with its branches."""
     one, full = Interval(1), _tilt(S)
     usable = (full.S.lo > 0.0) & (full.C.lo > 0.0)
     gap = h * S - c - R * full.bend

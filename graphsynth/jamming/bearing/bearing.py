@@ -65,7 +65,7 @@ class Bearing:
 
     Notes
     -----
-    Specification lambda_and_jamming, section 4.  Both parts are axially centred; their axes cross at the centre.
+    See theory/bearing-contact.  Both parts are axially centred; their axes cross at the centre.
 
     Examples
     --------
@@ -117,8 +117,8 @@ class Bearing:
     def gap(self, sine: ArrayLike, cosine: ArrayLike, condition: Condition = "A") -> Array:
         """Gap function g (millimetres) for the sine and cosine of the tilt: free < 0, touching = 0, jam > 0.
 
-        Stable forms of section 4.6; relative error of a few units in the last place of the largest term, so that gaps
-        of a micrometre keep ten digits.  Only ``|sine|`` and a non-negative cosine matter.
+        Stable forms of theory/bearing-contact 6; relative error of a few units in the last place of the largest term,
+        so that gaps of a micrometre keep ten digits.  Only ``|sine|`` and a non-negative cosine matter.
 
         Parameters
         ----------
@@ -145,11 +145,11 @@ class Bearing:
         return np.asarray(half * S - self.clearance + self.Rh * S * S / (1.0 + C))
 
     def _saturated(self) -> float:
-        """``sqrt(R^2 + h^2) - Rh`` without cancellation (second branch of section 4.2)."""
+        """``sqrt(R^2 + h^2) - Rh`` without cancellation (second branch of theory/bearing-contact 2)."""
         return float(Fraction(self.h) ** 2 - self._slack) / (math.hypot(self.Rb, self.h) + self.Rh)
 
     def critical_tilt(self, condition: Condition = "A") -> CriticalTilt:
-        """Smallest tilt at which the parts touch, or None with the reason (section 4.7).
+        """Smallest tilt at which the parts touch, or None with the reason (theory/bearing-contact 7).
 
         The existence test is exact for the given double-precision dimensions; the angle is a closed form in double
         precision.

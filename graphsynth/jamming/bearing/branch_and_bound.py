@@ -1,10 +1,10 @@
 """Bounds that do not rest on monotonicity: branch and bound, and Monte-Carlo samples with a search over corners.
 
-Branch and bound encloses the largest value of a function over a box with proof (specification, section 10.2): for
+Branch and bound encloses the largest value of a function over a box with proof (theory/jam-arcs 6): for
 quantities that are not monotone in every parameter, and for functions of the user.  All boxes of a round are evaluated
 at once; derivatives, where the function gives them, remove variables in which it is monotone and tell where to cut.
 
-Samples prove nothing about freedom (section 10.4).  They show how far the certified bound is from what is seen: a
+Samples prove nothing about freedom (theory/jam-arcs 8).  They show how far the certified bound is from what is seen: a
 sample above the bound would be a bug, a large distance would mean overestimation.
 """
 
@@ -349,7 +349,7 @@ class Samples:
         Part of the parameter vectors that have a positive gap somewhere in the turn: the probability that a mechanism
         drawn from the box jams (estimated), whether that position can be assembled or not.
     jamming_mechanisms_range : (float, float)
-        Confidence interval of that probability, 95 %, exact for the binomial distribution (Clopper and Pearson 1934).
+        Confidence interval of that probability, 95 %, exact for the binomial distribution [Clopper & Pearson 1934].
     corner_gap : float
         Largest gap over all corners of the box at the worst angle, mm (estimated).
     corners : int

@@ -225,7 +225,7 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     Notes
     -----
     The gap is monotone in every parameter, so that its extremes over the box are values at two exact corners
-    (specification 10.2); a jam also needs a position that can be assembled, which interval kinematics proves.
+    (theory/jam-arcs 6); a jam also needs a position that can be assembled, which interval kinematics proves.
 
     Examples
     --------

@@ -2,11 +2,11 @@
 
 A "corner pair" is an `Interval` of shape (2,): entry 0 encloses the smallest value over the box, entry 1 the largest.
 Every parameter occurs in them at an exact end of its range, itself enclosed by neighbouring doubles, so that both
-bounds of both entries are proofs about the exact box.  Specification: sections 4.6, 4.7, 7.1, 7.3 and 10.2; the
+bounds of both entries are proofs about the exact box.  See theory/bearing-contact 6, 7 and theory/jam-arcs 1, 3, 6; the
 monotonicity is derived in ``docs/explanation/bearing-jamming.md``.
 
-`pose` is the kinematics of sections 2.2 and 3.2 to 3.4 for whole pieces of the turn at once.  It shares no formula with
-the closed form of the arcs, so that each checks the other.
+`pose` is the kinematics of theory/four-bar-and-tilt 2, 6 to 8 for whole pieces of the turn at once.  It shares no
+formula with the closed form of the arcs, so that each checks the other.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Tilt(NamedTuple):
 
 
 def sines(box: ToleranceBox) -> Tilt:
-    """Enclose the largest sine of tilt over a turn at its two corners (section 3.2 and 3.4)."""
+    """Enclose the largest sine of tilt over a turn at its two corners (theory/four-bar-and-tilt 6, 8)."""
     amplitude = _height(box) * ends(box, "l2") / ends(box, "l3", falling=True)
     return Tilt(amplitude, sine_of(amplitude, box.rod))
 
@@ -122,7 +122,10 @@ def cosine(sine: Interval) -> Interval:
 
 
 def _gap_a(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
-    """Condition A with both branches of section 4.2, in stable form; nondecreasing in S, h, nonincreasing in R, c."""
+    """Condition A with both branches, in stable form; nondecreasing in S, h, nonincreasing in R, c.
+
+    See theory/bearing-contact 2.
+    """
     rising = h * S - c - R * S.sqr() / (1 + C)
     across, along = R * S, h * C
     if (across.hi <= along.lo).all():
@@ -143,7 +146,7 @@ def gap_values(S: Interval, R: Interval, h: Interval, c: Interval, hole: Interva
     """Enclose the gap g (mm) elementwise for given intervals of sine, radius, half height, clearance, half hole.
 
     Condition "general" is ``min(gA, gB / C)``: the pin jams where it would both as a short bearing in a long hole and
-    as a long shaft in a hole of this length (section 4.4).
+    as a long shaft in a hole of this length (theory/bearing-contact 4).
     """
     C = cosine(S)
     if condition == "A":
@@ -164,7 +167,7 @@ def slanted(S: Interval, R: Interval, hole: Interval, c: Interval) -> Interval:
 
 
 def gap_corners(box: ToleranceBox, sine: Interval, condition: Condition) -> Interval:
-    """Pair of the smallest and the largest gap (mm) over the box, for a pair of sines of tilt (section 10.2)."""
+    """Pair of the smallest and the largest gap (mm) over the box, for a pair of sines of tilt (theory/jam-arcs 6)."""
     check_condition(box, condition)
     h, c = ends(box, "Hb") / 2, ends(box, "clearance", falling=True)
     if condition != "general":
@@ -208,7 +211,7 @@ def _largest_over_radius(
 
 
 def critical_sines(box: ToleranceBox, condition: Condition) -> Interval:
-    """Pair of the sine of the critical tilt (section 4.7); an infinite bound means "no critical tilt".
+    """Pair of the sine of the critical tilt (theory/bearing-contact 7); an infinite bound means "no critical tilt".
 
     Condition A: grows with c and R, falls with h, and exists where ``h^2 > c (2R + c)``, decided exactly; equality,
     contact without overlap, counts in the lower bound only.  Condition B: grows with c, falls with R and h.  General:
@@ -259,7 +262,7 @@ def _exists(box: ToleranceBox, height: str, corner: int, condition: str) -> bool
 
 
 def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, float]:
-    """Bounds of kappa over the box: the bearing jams where ``|sin(f - psi1)| > kappa`` (section 7.1).
+    """Bounds of kappa over the box: the bearing jams where ``|sin(f - psi1)| > kappa`` (theory/jam-arcs 1).
 
     Infinite where there is no critical tilt or no tilt.
     """
@@ -318,7 +321,10 @@ def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:
 
 
 def _balanced_radius(box: ToleranceBox, ends: dict[str, Fraction]) -> Fraction:
-    """Radius at which both readings of the general pin are about equal: ``R S = hp C - hh`` (section 4.4)."""
+    """Radius at which both readings of the general pin are about equal: ``R S = hp C - hh``.
+
+    See theory/bearing-contact 4.
+    """
     linkage, _ = box.nominal()
     sine = linkage.largest_tilt[1]
     if sine == 0.0:
@@ -371,7 +377,7 @@ def turns_freely(box: ToleranceBox, amplitude: float) -> bool:
     -----
     With ``z`` the largest ``|A_z|``: the pin runs at a plan radius in ``[sqrt(l2^2 - z^2), l2]``, the plan length s3 of
     the coupler lies in ``[sqrt(l3^2 - z^2), l3]``, and ``sqrt(1 - x^2) >= 1 - x^2`` keeps all bounds rational.  Then
-    ``|l4 - s3| <= D <= l4 + s3`` (specification 2.3 and 3.3) holds for every D between the bounds of ``|A - C|``.
+    ``|l4 - s3| <= D <= l4 + s3`` (theory/four-bar-and-tilt 3, 7) holds for every D between the bounds of ``|A - C|``.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Friction of a tilted bearing: wedging, torque amplification, Whitney's diagram (specification, section 8)."""
+"""Friction of a tilted bearing: wedging, torque amplification, Whitney's diagram.
+
+See theory/friction-of-a-tilted-bearing.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,8 @@ class WedgingReport:
         Range over the box of the least friction coefficient that wedges (``mu_A`` or ``mu_B``); infinite if the parts
         cannot touch in this condition.
     amplification : Enclosure
-        Range of ``mu / limit``: friction torque about the axis per tilting moment (section 8.2).
+        Range of ``mu / limit``: friction torque about the axis per tilting moment
+        (theory/friction-of-a-tilted-bearing 2).
     lever : Enclosure
         Range of half the distance w of the contacts along the axis, mm; the normal forces are ``M_t / (2 w)``.
     condition, reason : str
@@ -57,7 +61,9 @@ class WedgingReport:
 
 @checked
 def wedging(box: ToleranceBox, friction: Given, condition: Condition = "A") -> WedgingReport:
-    """Decide whether two-point contact can wedge for an interval of friction coefficients (section 8.1 and 8.2).
+    """Decide whether two-point contact can wedge for an interval of friction coefficients.
+
+    See theory/friction-of-a-tilted-bearing 1, 2.
 
     The line through both contacts lies inside both friction cones if ``mu >= wA / Rh`` (condition A) or ``wB / R``
     (condition B).  Both limits are monotone in h, c and R, so that two exact corners enclose them.
@@ -216,9 +222,11 @@ class InsertionDiagram:
 
 
 def insertion_diagram(friction: Given, depth: Given, radius: Given) -> InsertionDiagram:
-    """Return Whitney's diagram of a peg of given radius at a given depth of insertion (section 8.3).
+    """Return Whitney's diagram of a peg of given radius at a given depth of insertion.
 
-    Source: Whitney (1982), Quasi-static assembly of compliantly supported rigid parts.
+    See theory/friction-of-a-tilted-bearing 3.
+
+    Source: [Whitney 1982], Quasi-static assembly of compliantly supported rigid parts.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Inverse questions: how much misalignment, how little clearance, how much height is still free (section 7.4).
+"""Inverse questions: how much misalignment, how little clearance, how much height is still free (theory/jam-arcs 4).
 
 Closed forms in double precision are estimates.  The certified answers are brackets: the value ``works`` is certified to
 leave the whole turn free for the whole tolerance box, the value ``fails`` to bind for at least one parameter vector.

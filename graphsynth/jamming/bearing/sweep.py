@@ -1,7 +1,7 @@
 """The turn cut into pieces: free, jammed or undecided with proof, for motions without a closed form.
 
 The gap is enclosed on every piece of the turn; undecided pieces are halved until a resolution or a budget ends the
-search (specification, section 7.3).  For the lambda linkage `sweep_linkage` uses interval kinematics, which shares no
+search (theory/jam-arcs 3).  For the lambda linkage `sweep_linkage` uses interval kinematics, which shares no
 formula with the closed form of the arcs.
 """
 

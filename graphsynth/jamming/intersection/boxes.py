@@ -1,6 +1,6 @@
 """Circle and ellipse by Krawczyk's method in (x, y) with bisection, as in the source, but with sound statuses.
 
-Specification, sections 6.4 and 6.5: an empty image proves that there is no intersection, an image in the interior of
+See theory/interval-tests 1, 2: an empty image proves that there is no intersection, an image in the interior of
 its box that there is exactly one, and an overlap proves nothing.  `cross_check` compares with the exact hull.
 """
 

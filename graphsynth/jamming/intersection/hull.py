@@ -1,7 +1,8 @@
 """Exact hull of the intersection of a circle and an ellipse with tolerances, in the squares of the coordinates.
 
 With ``u = x^2`` and ``v = y^2`` the problem is linear, its solution set a parallelogram cut by the axes.  The hull is
-computed in rational numbers and rounded outward once, at the square root.  Specification, sections 6.2, 6.3, 6.6, 12.
+computed in rational numbers and rounded outward once, at the square root.  See theory/circle-and-ellipse 7, 8,
+theory/interval-tests 3 and theory/extreme-cases 1.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from graphsynth.jamming.intersection.problem import CircleEllipse
 
 
-#: On the exact hull enlarged by s the image has radius 1 + s^2 rho: below s for some s only if rho < 1/4 (section 6.6).
+#: On the exact hull enlarged by s the image has radius 1 + s^2 rho: below s for some s only if rho < 1/4
+#: (theory/interval-tests 3).
 RHO_LIMIT = 0.25
 
 
@@ -88,7 +90,10 @@ class CrossingHull:
 
     @property
     def krawczyk_can_certify(self) -> bool:
-        """Whether Krawczyk's test in (x, y) can succeed on one box, to first order: ``rho < 1/4`` (section 6.6)."""
+        """Whether Krawczyk's test in (x, y) can succeed on one box, to first order: ``rho < 1/4``.
+
+        See theory/interval-tests 3.
+        """
         return self.status is Status.UNIQUE and self.spectral_radius < RHO_LIMIT
 
     @property
@@ -117,8 +122,8 @@ def exact_hull(problem: CircleEllipse) -> CrossingHull:
 
     Notes
     -----
-    Specification 6.2; for ranges of the radii the same two corners of the parameters are extreme (6.3, with eps too:
-    ``u = A (Q - B)/(A - B)`` grows with Q and falls with A and B while B <= Q <= A).
+    See theory/circle-and-ellipse 7; for ranges of the radii the same two corners of the parameters are extreme (6.3,
+    with eps too: ``u = A (Q - B)/(A - B)`` grows with Q and falls with A and B while B <= Q <= A).
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 ``x^2 + y^2`` in ``R1^2 + [-e1, e1]`` and ``x^2/a^2 + y^2/b^2`` in ``1 + [-e2, e2]``, ``a >= b > 0``; radii may be
 ranges.  All numbers are kept as rational numbers, so that cases of touching are decided, not guessed.
-Source: Mitrofanova and Bazhenov (2020); specification lambda_and_jamming, section 6.
+Source: [Mitrofanova & Bazhenov 2020]; theory/circle-and-ellipse 6.
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ def bearing_radii(bearing: Bearing) -> tuple[Fraction, Fraction, Fraction]:
 def surrogate_problem(
     bearing: Bearing, sine: Any, e1: Any = 0, e2: Any = 0, *, eps: Any = None, bits: Count = 128
 ) -> CircleEllipse:
-    """Pose the problem for the centred surrogate ellipse E4 of a tilted bearing (specification, section 5.1).
+    """Pose the problem for the centred surrogate ellipse E4 of a tilted bearing (theory/circle-and-ellipse 1).
 
     Parameters
     ----------

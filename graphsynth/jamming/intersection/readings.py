@@ -1,4 +1,4 @@
-"""The four readings of "the ellipse" of the source (specification lambda_and_jamming, section 5.1)."""
+"""The four readings of "the ellipse" of the source (theory/circle-and-ellipse 1)."""
 
 from __future__ import annotations
 

@@ -205,7 +205,7 @@ def assess_coupled(
 
     Notes
     -----
-    Specification lambda_and_jamming, section 9.
+    See theory/joints-that-share-a-tilt.
 
     Examples
     --------

@@ -230,7 +230,7 @@ def certify_coupled(
 
     Notes
     -----
-    Specification lambda_and_jamming, sections 9.4, 9.5 and 10.
+    See theory/joints-that-share-a-tilt 4, 5 and theory/jam-arcs 5.
 
     Examples
     --------

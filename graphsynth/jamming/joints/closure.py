@@ -7,7 +7,7 @@ joint j between bodies a and b, ``tau_j = omega_b - omega_a - d_j`` (d_j the mis
 A set of moments and axial forces in equilibrium on every moving body is a combination of loops: the loop l carries the
 wrench ``(M_l, f_l)`` about the origin, and joint j the sum ``(M, f)_j`` of the loops through it, with sign, so that its
 moment is ``m_j = M_j - f_j J(r_j)``, ``J(r) = (r_y, -r_x)``.  Equilibrium then holds identically in the positions.
-Specification, sections 9.2 to 9.4.
+See theory/joints-that-share-a-tilt 2 to 4.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ upper bound of T from ``q`` and ``tau`` alone.
 With this division the conditions are smooth equations in ``(q, T, tau, zeta)``, and each step doubles the digits.
 Where the division is not clear the result is no better than before and the caller keeps what it had.
 
-Source: Nesterov and Todd (1997); Vandenberghe, "The CVXOPT linear and quadratic cone program solvers" (2010).
+Source: [Nesterov & Todd 1997]; Vandenberghe, "The CVXOPT linear and quadratic cone program solvers" (2010).
 """
 
 from __future__ import annotations
@@ -338,7 +338,7 @@ def _least(matrix: Array, right: Array, k: int) -> Array:
     """Solve symmetric systems that may be singular, by the proximal point method.
 
     The block of q is negative semidefinite, so with ``-delta`` there and ``+delta`` in the rest the matrix is
-    quasi-definite: always regular (Vanderbei 1995).  Repeating the solve on the residual takes the error of delta away.
+    quasi-definite: always regular [Vanderbei 1995].  Repeating the solve on the residual takes the error of delta away.
     """
     sound = np.asarray(np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(right).all(axis=1))
     n = matrix.shape[1]

@@ -4,7 +4,7 @@ Both start from floating-point numbers that need not be right.  Below: loop wren
 positions (`graphsynth.jamming.joints.closure`); where a joint must carry no moment or no force, the wrenches are
 corrected by an enclosed linear solve.  Above: the tilts are corrected by an enclosed linear solve until every loop
 closes, for every position in the box.  Then limits and work are evaluated with outward rounding.
-Specification, sections 9.4 and 9.5.
+See theory/joints-that-share-a-tilt 4, 5.
 """
 
 from __future__ import annotations

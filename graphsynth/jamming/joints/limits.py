@@ -207,7 +207,7 @@ def bearing_limits(
     JointLimits
         ``tilt`` is infinite if there is no critical tilt.  The range is certified (outward rounding): t_A
         grows with the clearance and the radius and falls with the height; t_B falls with the radius and the height; a
-        pin in a hole has the larger one of both (specification, sections 4.4 and 4.7).
+        pin in a hole has the larger one of both (theory/bearing-contact 4, 7).
 
     Raises
     ------
@@ -306,7 +306,7 @@ def pushed(bearing: Bearing, offset: float, tolerance: float) -> Bearing:
     """Return a bearing with the clearance that is left beside an axis pushed off the middle, rounded down.
 
     In the direction of the push both rims reach ``offset`` further, so that all three contact conditions hold with the
-    clearance less the offset; in other directions more is left.  Specification, section 9.7, level L2.
+    clearance less the offset; in other directions more is left.  See theory/joints-that-share-a-tilt 7, level L2.
 
     Raises
     ------
@@ -345,7 +345,10 @@ def _around(name: str, value: float, tolerance: float) -> tuple[Fraction, Fracti
 
 
 def _tilt(R: Fraction, H: Fraction, c: Fraction, condition: str) -> tuple[float, float]:
-    """``2 arctan(c / (h + w))`` of section 4.7; infinite where there is no critical tilt (exact decision)."""
+    """``2 arctan(c / (h + w))``; infinite where there is no critical tilt (exact decision).
+
+    See theory/bearing-contact 7.
+    """
     h = H / 2
     room = h * h - c * (2 * R + c) if condition == "A" else h * h + c * (2 * R + c)
     if condition == "A" and (room <= 0 or h == 0):

@@ -4,7 +4,7 @@ The factor on limits and plays is a seminorm of the misalignments together (a ma
 largest value over a set is that over the corners of any polygon around the set, and of one misalignment alone only the
 largest ``|alpha|`` counts.  An arc of radius A lies in the polygon with corners at the radius ``A / cos(delta / 2)``,
 delta apart.  So "up to alpha, in any direction" needs a dozen corners instead of one wide box.
-Specification, sections 9.3 and 10.2.
+See theory/joints-that-share-a-tilt 3 and theory/jam-arcs 6.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ def solve_poses(layout: Layout, r: Array, e: Array, d: Array, mode: Mode = "tilt
 
     Notes
     -----
-    Specification, sections 9.3 and 9.4; loop form.
+    See theory/joints-that-share-a-tilt 3, 4; loop form.
 
     Raises
     ------

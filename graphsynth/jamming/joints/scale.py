@@ -230,7 +230,7 @@ def direction_map(
 
     Notes
     -----
-    Specification lambda_and_jamming, section 9.6: the direction of the tilt matters.
+    See theory/joints-that-share-a-tilt 6: the direction of the tilt matters.
     """
     if not isinstance(directions, int | np.integer) or not 3 <= directions <= _MOST:
         few = "many" if isinstance(directions, int | np.integer) and directions > _MOST else "few"

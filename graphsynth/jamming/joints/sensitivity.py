@@ -3,7 +3,7 @@
 The allowed scale of one pose is a concave function of all limits and axial clearances together (more of each never
 hurts), and so is the smallest over a range.  The shadow price of a limit therefore promises at most what loosening it
 gains; a second joint, or another input, may bind next.  That is why the answer is solved for and not extrapolated.
-Specification, sections 9.3 and 9.4.
+See theory/joints-that-share-a-tilt 3, 4.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def compare_loosening(
 
     Notes
     -----
-    Specification lambda_and_jamming, sections 9.3 and 9.4.
+    See theory/joints-that-share-a-tilt 3, 4.
 
     Examples
     --------

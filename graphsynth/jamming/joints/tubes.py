@@ -32,7 +32,7 @@ def enclosed_solve(matrix: Interval, right: Interval) -> tuple[Interval, Mask]:
     """Enclose the solutions of N systems (N, k, k) for all members; False where a matrix may be singular.
 
     With C near the inverse of the midpoint, ``x - x0 = C (b - A x0) + (1 - C A)(x - x0)``; a weighted norm of the last
-    matrix below 1 bounds ``x - x0`` and proves every A regular (Rump 1980).
+    matrix below 1 bounds ``x - x0`` and proves every A regular [Rump 1980].
     """
     k = matrix.shape[-1]
     middle = np.where(np.isfinite(matrix.mid), matrix.mid, 0.0)

@@ -1,6 +1,6 @@
 """Arrays of balls in double precision: a midpoint, real or complex, and a radius that covers every rounding error.
 
-Every operation rounds to nearest and adds to the radius a bound of its own error (Rump 1999, midpoint-radius
+Every operation rounds to nearest and adds to the radius a bound of its own error ([Rump 1999], midpoint-radius
 arithmetic), so the result encloses the exact result for all members of the operands.  Directions come from a
 table made with python-flint and a series with its tail bounded, so no assumption on the mathematical library is made.
 """

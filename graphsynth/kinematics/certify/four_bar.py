@@ -2,7 +2,7 @@
 
 A crank of length a turns the pin B of a dyad.  The dyad can be assembled while a reach stays within bounds that depend
 on the lengths alone, so the extremes of the reach over a turn decide, in rational arithmetic (Grashof 1883; for the
-sliders, specification lambda_and_jamming, section 2.3, with one length infinite).
+sliders, theory/four-bar-and-tilt 3, with one length infinite).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Why there is always something to begin with: at a sketch where the structure wit
 a crank whose joints all lie close to its pivot on the frame moves every other joint a little only, so by the implicit
 function theorem the whole turn exists.  The population holds cranks of many sizes; the search enlarges what lives.
 
-Sources: R. Storn and K. Price (1997), J. Global Optim. 11, 341-359 (differential evolution); K. Deb (2000), Comput.
+Sources: [Storn & Price 1997], J. Global Optim. 11, 341-359 (differential evolution); [Deb 2000], Comput.
 Methods Appl. Mech. Eng. 186, 311-338 (complete motions before bounds, bounds before aims).
 """
 

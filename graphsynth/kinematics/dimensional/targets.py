@@ -2,7 +2,7 @@
 
 Moving, turning and scaling the whole mechanism, and moving the tracing point on its link, change a curve linearly:
 with z the origin and theta the angle of the link, every curve it can draw is ``s z + q exp(i theta) + t`` with complex
-s, q, t.  So these are not searched but solved for (variable projection: Golub and Pereyra, 1973): six numbers less.
+s, q, t.  So these are not searched but solved for (variable projection: [Golub & Pereyra 1973]): six numbers less.
 """
 
 from __future__ import annotations

@@ -190,7 +190,7 @@ def strip_width(z: NDArray[np.complex128]) -> float:
 def in_order(z: NDArray[np.complex128], goal: NDArray[np.complex128]) -> float:
     """Smallest bound e such that the curve passes the goals in order, each within e.
 
-    The curve is the polyline through the samples; like the discrete Frechet distance (Eiter and Mannila, 1994).
+    The curve is the polyline through the samples; like the discrete Frechet distance [Eiter & Mannila 1994].
 
     >>> in_order(np.array([0j, 1, 2, 3]), np.array([0j, 2.25 + 0.25j, 3]))
     0.25

@@ -47,7 +47,7 @@ class AssemblyModes:
     self_motion : str
         Description of a continuous family of poses; empty if there is none.
     consistent : bool
-        The number of modes is even and the signs of ``det JX`` cancel (section 5.4).
+        The number of modes is even and the signs of ``det JX`` cancel (theory/platform-direct 4).
     note : str
         Remark, for instance on a drop of the degree.
     method : str
@@ -97,7 +97,7 @@ class AssemblyModeBatch:
     near_double_root : ndarray of bool, shape (N,)
         Double precision does not decide this problem.  If it was not escalated its modes are incomplete or inaccurate.
     consistent : ndarray of bool, shape (N,)
-        Even number of modes and vanishing sum of ``sign(det JX)`` (section 5.4), double modes left out.
+        Even number of modes and vanishing sum of ``sign(det JX)`` (theory/platform-direct 4), double modes left out.
     escalated : ndarray of bool, shape (N,)
         Solved again at 50 digits.
     remarks : dict of int to str
@@ -170,8 +170,9 @@ def assembly_modes_batch(
     Returns
     -------
     AssemblyModeBatch
-        The count is guaranteed for the computed coefficients where ``near_double_root`` is False (section 5.2); every
-        pose is polished on the closure equations and accurate to about 3e-12 of the largest length, or flagged.
+        The count is guaranteed for the computed coefficients where ``near_double_root`` is False
+        (theory/platform-direct 2); every pose is polished on the closure equations and accurate to about 3e-12 of the
+        largest length, or flagged.
 
     Raises
     ------
@@ -312,7 +313,7 @@ def assembly_modes(
     Examples
     --------
     >>> import numpy as np
-    >>> corner = np.exp(2j * np.pi * np.arange(3) / 3)  # similar triangles: two mirror modes (section 5.3)
+    >>> corner = np.exp(2j * np.pi * np.arange(3) / 3)  # similar triangles: two mirror modes (theory/platform-direct 3)
     >>> modes = assembly_modes(2 * corner, corner, [1.5, 1.5, 1.5])
     >>> len(modes), modes.consistent
     (2, True)

@@ -67,7 +67,7 @@ def escalate(
 
 
 def _coefficients(mp: Any, A: list[Any], b: list[Any], l2: list[Any]) -> tuple[list[Any], list[Any], list[Any]]:
-    """g, n and d of section 5.1."""
+    """g, n and d of theory/platform-direct 1."""
     c = mp.conj
     a2, a3, b2, b3, L = A[1] - A[0], A[2] - A[0], b[1] - b[0], b[2] - b[0], l2[0] ** 2
     w20 = l2[1] ** 2 - L - abs(a2) ** 2 - abs(b2) ** 2
@@ -88,7 +88,7 @@ def _roots(mp: Any, g: list[Any]) -> list[tuple[Any, bool]] | None:
     """Real roots of G, sorted, with a mark on those that stay merged at this precision; None if undecided.
 
     G'' is bounded on each interval through its Taylor expansion to the fourth derivative, so that the work stays small
-    beside a quadruple root (similar triangles, section 5.3).
+    beside a quadruple root (similar triangles, theory/platform-direct 3).
     """
     fourth = 2 * (abs(g[1]) + 16 * abs(g[2]) + 81 * abs(g[3]))
     eta = (abs(g[0]) + fourth) * mp.mpf(10) ** (5 - _DIGITS)
@@ -164,7 +164,10 @@ def _congruent(A: list[Any], b: list[Any], l2: list[Any]) -> str:
 
 
 def _geometric(mp: Any, A: list[Any], b: list[Any], l2: list[Any], z: Any) -> tuple[str, list[Any]]:
-    """Poses at an orientation where Delta vanishes (section 5.3): a line met with the circle ``|Q| = l2_1``."""
+    """Poses at an orientation where Delta vanishes: a line met with the circle ``|Q| = l2_1``.
+
+    See theory/platform-direct 3.
+    """
     e = [z * (b[k] - b[0]) - (A[k] - A[0]) for k in (1, 2)]
     w = [l2[k] ** 2 - l2[0] ** 2 - abs(e[k - 1]) ** 2 for k in (1, 2)]
     tiny = mp.mpf(10) ** -14

@@ -104,7 +104,7 @@ def _two_product(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _sum3(terms: list[Array]) -> Array:
-    """Sum as if computed in three-fold working precision (Ogita, Rump, Oishi 2005, algorithm SumK with K = 3)."""
+    """Sum as if computed in three-fold working precision ([Ogita et al. 2005], algorithm SumK with K = 3)."""
     for _ in range(2):
         for index in range(1, len(terms)):
             terms[index], terms[index - 1] = _two_sum(terms[index], terms[index - 1])
@@ -135,10 +135,11 @@ def _discriminants(u: Array, v: Array, l1: Array, l2: Array) -> tuple[Array, Arr
 def solve_leg(u: ArrayLike, v: ArrayLike, l1: ArrayLike, l2: ArrayLike) -> LegSolution:
     """Reach and angles of a leg with arm ``l1`` and link ``l2`` that ends at (u, v) from its pivot.
 
-    Absolute error of the angle at most about 4e-16 rad for the given double-precision numbers (section 3.3); the status
-    is decided by the sign of compensated sums, not by a tolerance.  Lengths are zero or more; nothing is checked here.
+    Absolute error of the angle at most about 4e-16 rad for the given double-precision numbers
+    (theory/platform-inverse 7); the status is decided by the sign of compensated sums, not by a tolerance.  Lengths are
+    zero or more; nothing is checked here.
 
-    Source: specification parallel_platform, sections 3.1 to 3.3.
+    Source: theory/platform-inverse 5 to 7.
 
     Examples
     --------

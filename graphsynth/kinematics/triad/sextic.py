@@ -18,7 +18,7 @@ Complex = NDArray[np.complex128]
 
 
 class Sextic(NamedTuple):
-    """Coefficients of G, of ``N(z)`` and of ``Delta(z)`` (section 5.1); arrays of one shape.
+    """Coefficients of G, of ``N(z)`` and of ``Delta(z)`` (theory/platform-direct 1); arrays of one shape.
 
     ``n = (n2, n1, n0, nm)``, ``d = (d0, de)``, ``g = (g0, g1, g2, g3)``.
     """

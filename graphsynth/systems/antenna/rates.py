@@ -1,4 +1,4 @@
-"""Velocities and accelerations (specification instruments_and_dynamics, section 2.6, for both gimbal orders)."""
+"""Velocities and accelerations (theory/antenna 6, for both gimbal orders)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sweep of both cranks that carries its assembly mode and stops at a fold (section 2.7)."""
+"""A sweep of both cranks that carries its assembly mode and stops at a fold (theory/antenna 7)."""
 
 from __future__ import annotations
 

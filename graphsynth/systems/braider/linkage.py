@@ -66,7 +66,7 @@ class FourBar:
 
     Notes
     -----
-    Specification instruments_and_dynamics, sections 4.2 and 4.8.
+    See theory/braider 2, 8.
 
     Examples
     --------

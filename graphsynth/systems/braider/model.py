@@ -46,7 +46,7 @@ class Thread:
 
     Notes
     -----
-    Specification instruments_and_dynamics, section 4.3: the in-plane part of the tension acts on the switch.
+    See theory/braider 3: the in-plane part of the tension acts on the switch.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def _train() -> Train:
 
 @dataclass(frozen=True, eq=False)
 class Braider:
-    """Braiding mechanism; the default numbers are those of the specification.
+    """Braiding mechanism; the default numbers are those of theory/braider 1.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Braider:
 
     Notes
     -----
-    Specification instruments_and_dynamics, section 4.
+    See theory/braider.
 
     Examples
     --------
@@ -274,7 +274,7 @@ class Braider:
 
     @checked
     def inductance_study(self, times: ArrayLike, inductances: tuple[float, ...]) -> ReductionStudy:
-        """Distance to the limit L -> 0 for several inductances (section 4.6), from rest.
+        """Distance to the limit L -> 0 for several inductances (theory/braider 6), from rest.
 
         Raises
         ------

@@ -1,7 +1,7 @@
 """The braider in nine absolute coordinates with Lagrange multipliers: the independent second formulation.
 
 Nothing is taken from the closed form of the linkage or from Newton and Euler for its links: bodies, constraints, their
-Jacobian and the quadratic velocity terms alone.  Specification instruments_and_dynamics, sections 4.5 and 5.
+Jacobian and the quadratic velocity terms alone.  See theory/braider 5 and theory/planar-dynamics.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ def reactions(braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration
 
     Notes
     -----
-    Specification instruments_and_dynamics, section 4.5.  The dyad is solved first: the moments of the coupler about A
+    See theory/braider 5.  The dyad is solved first: the moments of the coupler about A
     and of the rocker about O2 give F23; the rest follows from sums of forces.
 
     Examples

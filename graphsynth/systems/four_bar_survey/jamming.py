@@ -41,7 +41,7 @@ def close_form(table: SurveyTable, lengths: NDArray[np.int64]) -> Jamming:
     """Judge the bearing for sets of lengths (frame, crank, coupler, rocker); only crank over coupler matters.
 
     As `jam_arcs`, `largest_misalignment` and `smallest_clearance` of :mod:`graphsynth.jamming`, set by set
-    (specification lambda_and_jamming, sections 4.7, 7.1, 7.4).
+    (theory/bearing-contact 7 and theory/jam-arcs 1, 4).
     """
     from graphsynth.jamming.bearing.bearing import Bearing
     from graphsynth.mechanism.four_bar import TiltedFourBar

@@ -1,7 +1,7 @@
 """Loops that move in spaces of different mobility: W = sum of i p_i - sum of Pi_j, checked by the rank at a pose.
 
 Source: E. V. Didenko, *Development and analysis of planar multi-loop mechanisms on the basis of graph theory* (2019),
-chapter 2; the meaning of Pi_j is that of the specification, ``structure.md`` section 2.
+chapter 2; the meaning of Pi_j is that of theory/structural-system 2.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def aspects(
 
     Notes
     -----
-    Specification parallel_platform, section 6.1.  Nodes are connected along the axes of the grid.
+    See theory/platform-workspace 1.  Nodes are connected along the axes of the grid.
 
     Examples
     --------

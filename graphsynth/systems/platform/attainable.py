@@ -91,7 +91,7 @@ def attainable(mechanism: SingleMotorPlatform, direction: ArrayLike) -> Attainab
 
     Notes
     -----
-    Specification parallel_platform, section 10.4: ``1 - mu`` with mu the largest eigenvalue of the pencil
+    See theory/inverse-design 4: ``1 - mu`` with mu the largest eigenvalue of the pencil
     ``(Re(g g^H), Re(G^H G))``, ``g = G^H t``.
 
     Examples

@@ -173,7 +173,7 @@ def certify_assembly_modes(
 
     Notes
     -----
-    Specification parallel_platform, section 5.5.
+    See theory/platform-direct 5.
 
     Examples
     --------

@@ -56,7 +56,7 @@ def parallel_positions(A: list[Gaussian], b: list[Gaussian], lengths: list[Fract
     """Positions p of the platform at an orientation z where Delta vanishes, as balls; None if it does not vanish.
 
     The two linear equations ``dot(e_k, Q) = w_k / 2`` then describe one line, which meets the circle ``|Q| = l2_1`` at
-    most twice, or contradict each other; both are decided exactly (specification parallel_platform, section 5.3).
+    most twice, or contradict each other; both are decided exactly (theory/platform-direct 3).
     """
     e = [z * (b[k] - b[0]) - (A[k] - A[0]) for k in (1, 2)]
     if (e[0].conj * e[1]).imag != 0:

@@ -1,6 +1,6 @@
 """`certify_full_turn`: proof that the single-motor platform makes a full turn on one branch.
 
-Drives by the exact condition of specification parallel_platform, section 7.4; the platform by moving boxes that cover
+Drives by the exact condition of theory/platform-drive 5; the platform by moving boxes that cover
 the turn, linked, and closed at exactly 2 pi; the working mode by enclosures of the reach of every leg over these boxes.
 """
 
@@ -135,7 +135,7 @@ def certify_full_turn(
 
     Notes
     -----
-    Specification parallel_platform, section 7.4.
+    See theory/platform-drive 5.
 
     Examples
     --------

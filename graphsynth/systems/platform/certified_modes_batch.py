@@ -112,7 +112,7 @@ def certify_assembly_modes_batch(
 
     Notes
     -----
-    Specification parallel_platform, section 5.5.
+    See theory/platform-direct 5.
 
     Examples
     --------
@@ -215,7 +215,7 @@ def _one_by_one(
 
 
 def _coefficients(A: Balls, b: Balls, l2: Balls) -> _Coefficients:
-    """Section 5.1, for every problem."""
+    """theory/platform-direct 1, for every problem."""
     a2, a3, b2, b3 = A[:, 1] - A[:, 0], A[:, 2] - A[:, 0], b[:, 1] - b[:, 0], b[:, 2] - b[:, 0]
     squares = l2 * l2
     L = squares[:, 0]

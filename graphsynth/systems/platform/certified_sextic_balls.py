@@ -1,7 +1,6 @@
 """Real roots of the sextic of the direct problem in balls of any precision: isolation on the circle, refinement.
 
-``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` with ``z = exp(i alpha)``; specification parallel_platform, sections
-5.1, 5.2 and 5.5.
+``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` with ``z = exp(i alpha)``; theory/platform-direct 1, 2, 5.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def singular_conic(anchors: ArrayLike, vertices: ArrayLike, alpha: float) -> Sin
     -----
     With ``q = p - g_1``, ``g_k = A_k - z b_k``, ``u_k = g_1 - g_k`` and ``t_k`` the third entries, the rows minus the
     first give ``det JX / 8 = t_1 cross(u_2, u_3) - t_2 cross(q, u_3) + t_3 cross(q, u_2)``: products of functions
-    linear in p (specification parallel_platform, section 6.2).
+    linear in p (theory/platform-workspace 2).
 
     Examples
     --------

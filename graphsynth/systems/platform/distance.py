@@ -32,7 +32,7 @@ class NearestSingularity(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SingularityDistance:
-    """Distances in the norm ``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2)`` (specification parallel_platform, section 6.3).
+    """Distances in the norm ``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2)`` (theory/platform-workspace 3).
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def singularity_distance(
     Notes
     -----
     The nearest pose beyond the reach of *some* leg is also the nearest end of the workspace, so type I needs one
-    leg at a time.  Compare Kapilavai and Nawratil (2023) for 3-RPR platforms.
+    leg at a time.  Compare [Kapilavai & Nawratil 2023] for 3-RPR platforms.
 
     Examples
     --------

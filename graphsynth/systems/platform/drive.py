@@ -75,7 +75,7 @@ class FourBarDrive:
 
     Notes
     -----
-    Specification parallel_platform, sections 7.2 to 7.4.
+    See theory/platform-drive 3 to 5.
 
     Examples
     --------
@@ -139,7 +139,7 @@ class FourBarDrive:
         return float(moved.phi), float(moved.phi1)
 
     def turn(self) -> DriveTurn:
-        """Whether the crank turns fully, decided in exact arithmetic on the given numbers (section 7.4)."""
+        """Whether the crank turns fully, decided in exact arithmetic on the given numbers (theory/platform-drive 5)."""
         state = self._rotation()
         if state.kind not in ("limited", "immovable"):
             return DriveTurn(state.kind, () if state.kind == "never assembled" else None)

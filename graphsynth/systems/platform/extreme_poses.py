@@ -84,7 +84,7 @@ def two_pose_design(
 
     Notes
     -----
-    Specification parallel_platform, section 10.3: with the distances d+ and d- of the rocker ends from the wheel axis,
+    See theory/inverse-design 3: with the distances d+ and d- of the rocker ends from the wheel axis,
     ``l_B = |d+ - d-| / 2`` and ``l_BC = (d+ + d-) / 2``.
 
     Examples

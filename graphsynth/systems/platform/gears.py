@@ -15,7 +15,7 @@ __all__ = ["GearTrain"]
 class GearTrain:
     """Pinion with ``z1`` teeth on the motor shaft, three wheels with ``z2`` teeth around it.
 
-    Source: specification parallel_platform, section 7.1.
+    Source: theory/platform-drive 2.
 
     Raises
     ------

@@ -81,7 +81,10 @@ def translation_along(amplitude: float, angle: float) -> Complex:
 
 
 def rotation_about(amplitude: float, centre: complex = 0j) -> Complex:
-    """Phasor of a rotation: amplitude (radians) about a point measured from the home position (section 10.1)."""
+    """Phasor of a rotation: amplitude (radians) about a point measured from the home position.
+
+    See theory/inverse-design 1.
+    """
     c, amplitude = plane_point("centre", centre), finite("amplitude", amplitude)
     return amplitude * np.array([c.imag, -c.real, 1.0], dtype=np.complex128)
 
@@ -128,7 +131,7 @@ def linear_design(mechanism: SingleMotorPlatform, wanted: ArrayLike, *, samples:
 
     Notes
     -----
-    Specification parallel_platform, section 10.1: ``kappa = J^-1 Xi``; every ellipse in pose space has one design.
+    See theory/inverse-design 1: ``kappa = J^-1 Xi``; every ellipse in pose space has one design.
 
     Examples
     --------
@@ -173,7 +176,7 @@ def refine_design(
 
     Notes
     -----
-    Specification parallel_platform, section 10.2; analytic derivatives.
+    See theory/inverse-design 2; analytic derivatives.
 
     Examples
     --------

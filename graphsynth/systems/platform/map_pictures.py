@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["harmonics_picture", "loci_picture", "map_picture", "workspace_picture"]
 
-#: One colour for each leg, readable in grey and by colour-blind readers (Okabe and Ito 2008).
+#: One colour for each leg, readable in grey and by colour-blind readers [Okabe & Ito 2008].
 _LEGS = ("#0072B2", "#D55E00", "#009E73")
 _SINGULAR = LIGHT["bad"]
 _TINTS = ("#F6DCC8", "#D3E4F2")  # det JX < 0, > 0

@@ -116,7 +116,7 @@ def quality(platform: ParallelPlatform, poses: ArrayLike, sigma: Sequence[int], 
 
     Notes
     -----
-    Specification parallel_platform, sections 4.3 and 6.3.
+    See theory/platform-jacobians 3 and theory/platform-workspace 3.
 
     Examples
     --------

@@ -30,7 +30,10 @@ class Event(NamedTuple):
 
 
 class BranchLabel(NamedTuple):
-    """Branch identity (section 7.5): drive branches, working mode, sign of det JX, rank of alpha, continuation id."""
+    """Branch identity: drive branches, working mode, sign of det JX, rank of alpha, continuation id.
+
+    See theory/platform-drive 6.
+    """
 
     tau: tuple[int, int, int]
     sigma: tuple[int, int, int]

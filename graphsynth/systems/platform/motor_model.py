@@ -60,7 +60,7 @@ class MotorDrivenPlatform:
 
     Notes
     -----
-    Specification parallel_platform, section 11; the source is ``MotorDrivenPlatform.source``.
+    See theory/motor-drive; the source is ``MotorDrivenPlatform.source``.
 
     Examples
     --------

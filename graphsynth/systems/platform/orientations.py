@@ -101,7 +101,7 @@ def reachable_workspace(platform: ParallelPlatform, resolution: float = 2e-3) ->
 
     Notes
     -----
-    Specification parallel_platform, section 6.1 (union over alpha).
+    See theory/platform-workspace 1 (union over alpha).
     """
 
     def test(p: Complex, extra: float) -> NDArray[np.bool_]:

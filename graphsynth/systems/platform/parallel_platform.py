@@ -121,8 +121,8 @@ class ParallelPlatform:
 
     Notes
     -----
-    Specification parallel_platform, sections 2 to 5.  All batch methods take poses of shape (..., 3) and angles of
-    shape (..., 3) and broadcast.
+    See theory/platform-inverse, theory/platform-jacobians and theory/platform-direct.  All batch methods take poses of
+    shape (..., 3) and angles of shape (..., 3) and broadcast.
 
     Examples
     --------
@@ -149,14 +149,17 @@ class ParallelPlatform:
 
     @classmethod
     def g1(cls) -> ParallelPlatform:
-        """Return the generic asymmetric reference platform G1 (section 2.5; no unit)."""
+        """Return the generic asymmetric reference platform G1 (theory/platform-inverse 3; no unit)."""
         return cls(
             (0, 2.5 + 0.2j, 1.1 + 2.3j), (-0.4 - 0.25j, 0.45 - 0.3j, 0.05 + 0.5j), (0.9, 1.0, 0.8), (1.1, 0.95, 1.05)
         )
 
     @classmethod
     def mock(cls) -> ParallelPlatform:
-        """Return the symmetric mock-up MOCK-RECT (sections 2.5 and 8.2; millimetres)."""
+        """Return the symmetric mock-up MOCK-RECT (millimetres).
+
+        See theory/platform-inverse 3 and theory/platform-drive 8.
+        """
         turn = directions((-5 * math.pi / 6, -math.pi / 6, math.pi / 2))
         return cls(tuple((105 + 45j) * turn), tuple(45 * turn), (45.0,) * 3, (60.0,) * 3)
 
@@ -171,7 +174,7 @@ class ParallelPlatform:
         return np.asarray(np.array(self.D) + np.array(self.l1) * np.exp(1j * theta))
 
     def inverse(self, pose: ArrayLike, sigma: ArrayLike | None = None) -> InverseSolution:
-        """Rocker angles for poses (..., 3): all eight working modes, or the mode ``sigma`` (section 3).
+        """Rocker angles for poses (..., 3): all eight working modes, or the mode ``sigma`` (theory/platform-inverse 4).
 
         Angles are accurate to a few 1e-16 rad for the vertices as computed, also for extreme length ratios and beside
         the boundary of the reach.  A leg out of reach gives NaN and a status, never a clipped angle.
@@ -203,7 +206,7 @@ class ParallelPlatform:
         return np.asarray((gap - l2) * (gap + l2))
 
     def jacobians(self, pose: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
-        """Exact partial derivatives of the closure (section 4.1).
+        """Exact partial derivatives of the closure (theory/platform-jacobians 1).
 
         Returns
         -------
@@ -240,14 +243,19 @@ class ParallelPlatform:
         return _solve(JX, -JT[..., None, :] * np.eye(3), "velocity matrix")
 
     def scaled_velocity_matrix(self, pose: ArrayLike, theta: ArrayLike, Lc: float) -> Array:
-        """``diag(1/Lc, 1/Lc, 1) J`` with the characteristic length ``Lc`` (section 4.3), dimensionless."""
+        """``diag(1/Lc, 1/Lc, 1) J`` with the characteristic length ``Lc``, dimensionless.
+
+        See theory/platform-jacobians 3.
+        """
         Lc = positive("Lc", Lc)
         return np.asarray(self.velocity_matrix(pose, theta) / np.array([Lc, Lc, 1.0])[:, None])
 
     def accelerations(
         self, pose: ArrayLike, theta: ArrayLike, rate: ArrayLike, rate2: ArrayLike
     ) -> tuple[Array, Array]:
-        """X' and X'' for given theta' and theta'' with respect to any parameter (section 4.2), shapes (..., 3).
+        """X' and X'' for given theta' and theta'' with respect to any parameter, shapes (..., 3).
+
+        See theory/platform-jacobians 2.
 
         Raises
         ------
@@ -267,7 +275,9 @@ class ParallelPlatform:
         return first, _solve(JX, right[..., None], "accelerations")[..., 0]
 
     def rocker_torques(self, pose: ArrayLike, theta: ArrayLike, wrench: ArrayLike) -> Array:
-        """Torques ``J^T W`` at the rockers that balance the wrench W exerted by the platform (section 4.4).
+        """Torques ``J^T W`` at the rockers that balance the wrench W exerted by the platform.
+
+        See theory/platform-jacobians 4.
 
         Raises
         ------
@@ -278,7 +288,7 @@ class ParallelPlatform:
         return np.asarray(np.einsum("...ij,...i->...j", self.velocity_matrix(X, angle), W))
 
     def direct(self, theta: ArrayLike) -> AssemblyModes:
-        """All assembly modes for rocker angles ``theta``, shape (3,) (section 5).
+        """All assembly modes for rocker angles ``theta``, shape (3,) (theory/platform-direct).
 
         An empty list is a valid answer.  Near a type-II singularity the computation continues at 50 digits and says so.
         """
@@ -310,7 +320,7 @@ class ParallelPlatform:
     def condition_number(self, pose: ArrayLike, theta: ArrayLike, Lc: float) -> Array:
         """Condition number of JX with its third column divided by the characteristic length ``Lc``, shape (...).
 
-        Infinite at a type-II singularity (section 4.3).
+        Infinite at a type-II singularity (theory/platform-jacobians 3).
         """
         JX, _ = self.jacobians(pose, theta)
         scaled = JX / np.array([1.0, 1.0, positive("Lc", Lc)])

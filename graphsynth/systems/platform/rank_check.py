@@ -194,7 +194,7 @@ def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, toleran
     Notes
     -----
     Loops are the fundamental cycles of a breadth-first spanning tree from the frame.  A gear pair has two freedoms:
-    rolling about the pitch point and sliding along the line of centres (specification parallel_platform, section 7.6).
+    rolling about the pitch point and sliding along the line of centres (theory/platform-drive 7).
     """
     from graphsynth.mechanism.rank import characteristic_length
 

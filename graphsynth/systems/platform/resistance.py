@@ -55,7 +55,7 @@ def ripple_gain(ratio: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
     Notes
     -----
     With ``nu = Om/w_n``: ``(4 zeta^2 + nu^2) / ((1 - nu^2)^2 + 4 zeta^2 nu^2)`` and ``1`` over the same denominator.
-    The derivative of the first by zeta^2 has the sign of ``1 - 2 nu^2``: specification parallel_platform, 11.5.
+    The derivative of the first by zeta^2 has the sign of ``1 - 2 nu^2``: theory/motor-drive 5.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def resistance_effect(
 
     Notes
     -----
-    Specification parallel_platform, section 11.5, with the train included and the largest harmonic of J.
+    See theory/motor-drive 5, with the train included and the largest harmonic of J.
 
     Examples
     --------

@@ -93,7 +93,7 @@ class SingleMotorPlatform:
 
     Notes
     -----
-    Specification parallel_platform, sections 7 and 8.
+    See theory/platform-drive.
 
     Examples
     --------
@@ -170,7 +170,7 @@ class SingleMotorPlatform:
         return DriveState(phi + offset, phi1, phi2, h_phi, np.stack([m.status for m in moved], axis=-1))
 
     def drive_turns(self) -> tuple[DriveTurn, DriveTurn, DriveTurn]:
-        """Exact full-turn statement of each drive (section 7.4)."""
+        """Exact full-turn statement of each drive (theory/platform-drive 5)."""
         first, second, third = (drive.turn() for drive in self.drives)
         return (first, second, third)
 

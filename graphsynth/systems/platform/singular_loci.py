@@ -146,7 +146,7 @@ def type_two_curves(
 
     Notes
     -----
-    Specification parallel_platform, section 6.2; pseudo-arclength continuation: Allgower and Georg (1990).
+    See theory/platform-workspace 2; pseudo-arclength continuation: [Allgower & Georg 1990].
     """
     mode = working_mode(sigma)
     alpha = finite("alpha", alpha)

@@ -120,7 +120,7 @@ def singularity(
 
     Notes
     -----
-    Gosselin and Angeles (1990); specification parallel_platform, section 4.3.
+    [Gosselin & Angeles 1990]; theory/platform-jacobians 3.
 
     Examples
     --------

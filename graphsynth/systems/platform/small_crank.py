@@ -122,7 +122,7 @@ def small_crank(mechanism: SingleMotorPlatform) -> SmallCrank:
 
     Notes
     -----
-    Specification parallel_platform, section 9.
+    See theory/small-crank.
 
     Examples
     --------

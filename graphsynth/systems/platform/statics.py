@@ -108,7 +108,7 @@ def statics(
 
     Notes
     -----
-    Specification parallel_platform, section 4.4: ``JX^T lambda = W``, ``tau_k = -JT_kk lambda_k``, axial force
+    See theory/platform-jacobians 4: ``JX^T lambda = W``, ``tau_k = -JT_kk lambda_k``, axial force
     ``2 l2_k lambda_k``.
 
     Examples
@@ -162,8 +162,8 @@ def crank_statics(
 
     Notes
     -----
-    Specification parallel_platform, sections 4.4 and 7.2.  At a dead point of a rocker its share of the crank torque is
-    zero whatever the load.
+    See theory/platform-jacobians 4 and theory/platform-drive 3.  At a dead point of a rocker its share of the crank
+    torque is zero whatever the load.
 
     Examples
     --------

@@ -175,7 +175,7 @@ def constant_orientation_workspace(
 
     Notes
     -----
-    Specification parallel_platform, section 6.1; a rocker at its limit adds the circle of radius l2 about its end.
+    See theory/platform-workspace 1; a rocker at its limit adds the circle of radius l2 about its end.
 
     Examples
     --------

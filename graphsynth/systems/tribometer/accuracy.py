@@ -91,7 +91,7 @@ class AccuracyStudy:
 
 
 def _times(duration: float) -> Array:
-    """Return the times of the specification, 0.05, 0.10, ... below the duration."""
+    """Return the times of theory/tribometer 10: 0.05, 0.10, ... below the duration."""
     found: Array = 0.05 * np.arange(1, max(2, round(duration / 0.05)), dtype=np.float64)
     return found
 
@@ -215,7 +215,7 @@ def regularisation_study(
     most_calls: int = 600_000,
     rounds: int = 1,
 ) -> AccuracyStudy:
-    """Error of the regularised form against the smoothing velocity (section 3.10), failures included.
+    """Error of the regularised form against the smoothing velocity (theory/tribometer 10), failures included.
 
     Parameters
     ----------

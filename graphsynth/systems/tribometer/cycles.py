@@ -36,7 +36,7 @@ def belt_cycle(model: Tribometer) -> BeltCycle:
     """Stick-slip cycle on a belt without damping, two-coefficient law: closed form, exact.
 
     ``T_stick = 2 (mu_s - mu_k) N / (k v0)``, ``T_slip = (2/w0) (pi - atan(A))`` with
-    ``A = (mu_s - mu_k) N w0 / (k v0)`` (section 3.7).
+    ``A = (mu_s - mu_k) N w0 / (k v0)`` (theory/tribometer 7).
 
     Raises
     ------

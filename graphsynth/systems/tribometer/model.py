@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Tribometer:
-    """A tribometer; the defaults are the chosen values of the specification (Stribeck law, crank drive).
+    """A tribometer; the defaults are the chosen values of theory/tribometer 1 (Stribeck law, crank drive).
 
     ``m x2'' = -k x2 - c x2' + F``; ``F = sgn(u) N mu(|u|)`` while slipping with ``u = x1' - x2'``, and whatever keeps
     ``u = 0``, at most ``mu_s N``, while sticking.
@@ -59,7 +59,7 @@ class Tribometer:
 
     Notes
     -----
-    Perechesova, Kalapyshina, Nuzhdin (2014); specification of the instruments, section 3.
+    [Perechesova et al. 2014]; theory/tribometer.
 
     Examples
     --------
@@ -138,7 +138,7 @@ class Tribometer:
     def limit_force(self, times: ArrayLike) -> Array:
         """Spring force over the normal force in the limit of a stiff, damped spring, ``sgn(v1) mu(|v1|)``.
 
-        The averaged limit to which ``k x2 / N`` tends (section 3.11).
+        The averaged limit to which ``k x2 / N`` tends (theory/tribometer 11).
         """
         v = self.drive.motion(times).v
         found: Array = np.sign(v) * self.law.coefficient(np.abs(v))

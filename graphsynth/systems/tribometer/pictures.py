@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-#: Readable in grey and by colour-blind readers (Okabe and Ito 2008).
+#: Readable in grey and by colour-blind readers [Okabe & Ito 2008].
 _LOWER, _UPPER, _THIRD, _FOURTH = "#0072B2", "#D55E00", "#009E73", "#AA4499"
 _STICK, _FAIL, _SOFT = LIGHT["pale"], LIGHT["bad"], LIGHT["soft"]
 _COLOURS = (_LOWER, _UPPER, _THIRD, _FOURTH, "#56B4E9", "#E69F00", "#555555")
@@ -69,7 +69,7 @@ def _sticking(motion: StickSlipMotion) -> list[tuple[float, float]]:
 def platforms_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (9.0, 6.0)) -> Figure:
     """Displacements of both platforms over time, and below the friction force between its limits.
 
-    The upper part is Figure 7b of the source (Perechesova, Kalapyshina, Nuzhdin 2014).  Sticking is shaded.
+    The upper part is Figure 7b of the source [Perechesova et al. 2014].  Sticking is shaded.
 
     Parameters
     ----------

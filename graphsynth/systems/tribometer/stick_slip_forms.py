@@ -143,7 +143,7 @@ def _residual(model: Tribometer, path: Array, energies: Array) -> float:
 def model_error(speed: float) -> float:
     """Error of the position that regularised friction makes in reference C, ``0.15 s eps ln((1 m/s)/eps)``, m.
 
-    Measured for ``eps`` from 1e-8 to 1e-2 m/s (section 3.10); for another tribometer an order of magnitude.
+    Measured for ``eps`` from 1e-8 to 1e-2 m/s (theory/tribometer 10); for another tribometer an order of magnitude.
 
     Examples
     --------
@@ -280,7 +280,7 @@ def _solve(
     rhs(0.0, start)
     jac(0.0, start)
     options: dict[str, Any] = {"jac": jac} if jacobian and solver in _IMPLICIT else {}
-    scale = 0.01 * rtol  # 1e-10 for the tolerance 1e-8 of the specification
+    scale = 0.01 * rtol  # 1e-10 for the tolerance 1e-8 of theory/tribometer 10
     blank = np.full((2, times.size), math.nan)
     begin = time.perf_counter()
     try:

@@ -30,7 +30,7 @@ def section(t):
 WORST = "0.0133312592085829611560698794957554253"
 F = Fraction
 EPS = ("1e-9", "1e-8", "1e-7", "1e-6", "1e-5", "1e-4")
-# specification 6.6: spectral radius on the exact hull, and how many of the six tolerances are certified
+# theory/interval-tests 3: spectral radius on the exact hull, and how many of the six tolerances are certified
 TABLE = [
     (surrogate(WORST), (6.7e-5, 6.7e-4, 6.7e-3, 0.067, 0.67, 6.7), 4),
     (surrogate("0.0075"), (3.2e-4, 3.2e-3, 0.032, 0.32, 3.2, 32), 3),

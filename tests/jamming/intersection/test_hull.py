@@ -282,7 +282,7 @@ def test_eps_beside_e1_is_refused():
 
 
 def test_poses_of_the_bearing_without_a_crossing():
-    """No tilt, and a tilt of 4e-9: circle inside the ellipse, no division by a^2 - b^2 (specification 12)."""
+    """No tilt, and a tilt of 4e-9: circle inside the ellipse, no division by a^2 - b^2 (theory/extreme-cases 1)."""
     for sine in ("0", "4e-9"):
         found = exact_hull(surrogate_problem(Bearing(), sine, eps="1e-9"))
         assert found.status is Status.EMPTY

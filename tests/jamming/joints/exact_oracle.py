@@ -1,10 +1,12 @@
 """Independent judge of one position: linear programs with cuts find tilts and wrenches, rational numbers prove them.
 
-Nothing of graphsynth is used.  The unknowns are the tilts and lifts of the bodies (specification, section 9.2); circles
-are cut by tangents until they are respected (Kelley).  From the floats of the linear program follow, in fractions,
+Nothing of graphsynth is used.  The unknowns are the tilts and lifts of the bodies (theory/joints-that-share-a-tilt 2);
+circles are cut by tangents until they are respected (Kelley).  From the floats of the linear program follow, in
+fractions,
 
 * tilts that close exactly: joints without play are closed by an exact solve, the largest tilt over its limit is U;
-* wrenches in exact equilibrium: chords of a spanning tree keep theirs, the tree carries the sum (section 9.4); L.
+* wrenches in exact equilibrium: chords of a spanning tree keep theirs, the tree carries the sum; L
+  (theory/joints-that-share-a-tilt 4).
 
 ``L <= T <= U`` then holds without any rounding, for the floats of the position as they are.
 """

@@ -98,7 +98,10 @@ def test_roll_and_pitch_of_slanted_guides():
 
 
 def exact_lower(given, poses, y, units):
-    """Lower bound of section 9.4 in rational arithmetic for wrenches y, without the square roots: squared sizes."""
+    """Lower bound in rational arithmetic for wrenches y, without the square roots: squared sizes.
+
+    See theory/joints-that-share-a-tilt 4.
+    """
     layout = given.layout
     r, _, base = joint_places(given.mechanism, layout.joints, poses[None])
     d = shifts(layout, base)[0]
@@ -191,7 +194,10 @@ def test_a_box_around_the_float_alone_is_not_that_of_the_motion():
 
 
 def test_whole_turn_of_the_lambda_linkage():
-    """Free up to 2 t_A (section 9.6), jammed above, undecided at it; within alpha squared of it by small tilts only."""
+    """Free up to 2 t_A, jammed above, undecided at it; within alpha squared of it by small tilts only.
+
+    See theory/joints-that-share-a-tilt 6.
+    """
     motion = simulate(four_bar(), TURN)
     for alpha, expected in [
         (2 * T_A * (1 - 1e-6), "CERTIFIED_FREE"), (2 * T_A * (1 + 1e-9), "CERTIFIED_JAMMED"),
@@ -273,7 +279,10 @@ def test_tolerances_within_which_all_are_free_or_all_jam():
     ids=["alpha", "sign", "fit", "lengths"],
 )
 def test_some_members_jam(fit, alpha, alpha_range, tolerance):
-    """The witness is a member of the boxes, and jams by the search over points of section 9.4 in many digits."""
+    """The witness is a member of the boxes, and jams by the search over points in many digits.
+
+    See theory/joints-that-share-a-tilt 4.
+    """
     tilt = Misalignment(0, 1, alpha, alpha_range=alpha_range)
     motion = simulate(four_bar(), TURN)
     fit = fit() if callable(fit) else fit

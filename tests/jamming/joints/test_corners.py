@@ -104,7 +104,7 @@ def test_any_direction(turn):
     """A tilt up to alpha in a direction nobody knows: proved free up to one percent below the worst direction."""
     motion = simulate(four_bar(), turn)
     unknown = Misalignment(0, 1, 0.0085, alpha_range=(0.0, 0.0085), direction_range=(0.0, 2.0 * math.pi))
-    # specification 9.6: the worst factor of the grid is 0.699 t_A / alpha, which allows 0.00868
+    # theory/joints-that-share-a-tilt 6: the worst factor of the grid is 0.699 t_A / alpha, which allows 0.00868
     assert certify_coupled(motion, Bearing(), unknown).verdict.name == "CERTIFIED_FREE"
     more = replace(unknown, alpha=0.0088, alpha_range=(0.0, 0.0088))
     found = certify_coupled(motion, Bearing(), more, resolution=2e-2)

@@ -93,7 +93,7 @@ def test_against_a_general_optimiser():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_single_loop_to_many_digits(seed):
-    """Section 9.4: the search over the point p, in 25 digits, with axial play."""
+    """theory/joints-that-share-a-tilt 4: the search over the point p, in 25 digits, with axial play."""
     rng = np.random.default_rng(seed)
     mechanism = four_bar()
     limits = {(1, 2): rng.uniform(0.3, 3), (2, 3): rng.uniform(0.3, 3), (0, 3): rng.uniform(0.3, 3)}
@@ -375,7 +375,7 @@ def test_bearing_ranges():
 
 
 def extent(R, half, hole, tilt):
-    """Largest half width of a tilted pin inside the slab of its hole (specification, section 4.4)."""
+    """Largest half width of a tilted pin inside the slab of its hole (theory/bearing-contact 4)."""
     s, c = mpmath.sin(tilt), mpmath.cos(tilt)
     if R * s >= half * c:
         return mpmath.sqrt(R * R + half * half)

@@ -1,4 +1,4 @@
-"""The numbers of the specification, sections 9.6, 14.6 and 14.7."""
+"""The numbers of theory/joints-that-share-a-tilt 6 and theory/values-of-bearings 6, 7."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Independent formulas in many digits, written straight from the specification (sections 2.2 to 2.5)."""
+"""Independent formulas in many digits, written straight from theory/antenna 2 to 5."""
 
 from __future__ import annotations
 

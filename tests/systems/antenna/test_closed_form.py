@@ -15,7 +15,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna import PointingMechanism, PoseStatus
 from graphsynth.systems.antenna.precise import precise_angles
 
-# section 2.9, equal cranks, degrees: phi, a YX, b YX, a XY, b XY
+# theory/values-of-the-antenna 1, equal cranks, degrees: phi, a YX, b YX, a XY, b XY
 EQUAL = [
     (5, "2.961353737663430764484", "2.957573938893077389169", "2.957541511617530966725", "2.961658028258117829033"),
     (10, "5.929522028403067771639", "5.900676029236157904114", "5.900151492499074575631", "5.934385402755182936507"),
@@ -77,7 +77,7 @@ def test_parallelogram_legs():
 
 
 def test_small_angles(exact):
-    """Series of section 2.5 with its coefficient c4; the response is not odd."""
+    """Series of theory/antenna 5 with its coefficient c4; the response is not odd."""
     ratio, c4 = 0.592, 0.0592**2 * 0.408**2 / (8 * 0.1 * 0.15)
     for phi in (0.02, 0.04):
         with mp.workdps(50):

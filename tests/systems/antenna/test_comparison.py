@@ -18,7 +18,7 @@ PHI = np.radians(DEGREES)
 XY = PointingMechanism(order="XY")
 REVERSED_BOTH = Reading(sense_y=-1, sense_x=-1)
 
-# section 2.8: minutes of arc against order YX.  Reversed cranks turn the reflector the other way: the means are
+# theory/antenna 8: minutes of arc against order YX.  Reversed cranks turn the reflector the other way: the means are
 # compared after reversing the outputs too, which for both legs is the same as mounting them on the negative side.
 TABLE = [
     ("order XY", XY, Reading(), [0.008, 0.130, 0.656, 2.060, 10.201, 30.990], 5.1e-4),

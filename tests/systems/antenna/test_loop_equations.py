@@ -16,7 +16,7 @@ from graphsynth.systems.antenna.loop_equations import loop_equations
 
 ART = PointingMechanism()
 ORDERS = ("YX", "XY")
-# section 2.9, degrees, at 40/40, order YX
+# theory/values-of-the-antenna 1, degrees, at 40/40, order YX
 UNKNOWNS = [
     25.867632282271907632, 16.557298688788906387, -41.891959625006658758, -3.3179772343770728488,
     4.9217113440515791783, 23.712080016484991565, 21.73389545342156182, 22.195371224626922341,
@@ -112,7 +112,7 @@ def test_verdicts_on_coordinates():
 
 
 def test_singular_coordinates_are_noticed_before_the_first_iteration():
-    """Section 9, case 1: rank 11 of 12, and the regular coordinates are used instead."""
+    """theory/extreme-cases 3, case 1: rank 11 of 12, and the regular coordinates are used instead."""
     solved = ART.solve_loops(0.5, 0.5, chart="printed")
     assert (solved.chart, int(solved.start_rank)) == ("corrected", 11)
     assert "coordinates singular, mechanism regular" in solved.message
@@ -134,7 +134,7 @@ def test_the_mechanism_itself_is_singular_at_a_fold():
 
 @pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.slow)])
 def test_printed_and_corrected_equations_from_zero(every):
-    """Section 2.4: the printed form is not reliably solved from the rest pose, the corrected one always is."""
+    """theory/antenna 4: the printed form is not reliably solved from the rest pose, the corrected one always is."""
     from scipy.optimize import root
 
     solved = {"printed": 0, "corrected": 0}

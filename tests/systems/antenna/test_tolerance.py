@@ -19,7 +19,7 @@ ART = PointingMechanism()
 PARALLELOGRAM = PointingMechanism(l3=0.1, l5=0.1)
 PHI = math.radians(15.0)
 SECOND = math.pi / 648000.0
-# section 2.10, every length +-0.05 mm, 15/15 degrees
+# theory/antenna 9, every length +-0.05 mm, 15/15 degrees
 RANGE_A = ("8.89519986289888041209", "8.919867117063479901837")
 RANGE_B = ("8.803040986781996547718", "8.826927759715010619827")
 
@@ -145,7 +145,7 @@ def test_what_is_printed_as_certified_is_a_bound():
 
 
 def test_a_box_that_touches_a_fold_is_undecided():
-    """Section 9, case 7: near the fold of the parallelogram legs."""
+    """theory/extreme-cases 3, case 7: near the fold of the parallelogram legs."""
     safe = PARALLELOGRAM.tolerance(math.radians(60), math.radians(60))
     assert safe.status is ToleranceStatus.CERTIFIED
     near = PARALLELOGRAM.tolerance(math.radians(69.3), math.radians(69.3))

@@ -1,4 +1,4 @@
-"""The braider against section 4 of the specification, multipliers, and laws that need no numbers."""
+"""The braider against theory/braider, multipliers, and laws that need no numbers."""
 
 from __future__ import annotations
 
@@ -277,7 +277,7 @@ def test_effective_inertia_is_the_kinetic_energy():
     theta = np.linspace(0.0, math.tau, 3001)
     J, slope = braider.effective_inertia(theta)
     linkage = J - braider.reflected_inertia
-    assert 7.6e-6 < linkage.min() < 7.8e-6 and 3.5e-5 < linkage.max() < 3.7e-5  # section 4.4
+    assert 7.6e-6 < linkage.min() < 7.8e-6 and 3.5e-5 < linkage.max() < 3.7e-5  # theory/braider 4
     assert braider.reflected_inertia == pytest.approx(0.02766, abs=5e-6)
     for k in (180, 1200, 2460):
         bodies = solve_with_multipliers(braider, theta[k], 1e-9, acceleration=1.0).acceleration
@@ -317,7 +317,7 @@ def test_ideal_speed_needs_the_torque_of_the_inverse_dynamics():
 
 def test_gravity_of_the_thread_does_the_work_of_its_weight():
     """The thread is conservative: its work is the weight times the shortening between guide and tip."""
-    braider = Braider(thread=Thread(guide=0.03 + 0.07j))  # that of the specification lies over O2: no moment
+    braider = Braider(thread=Thread(guide=0.03 + 0.07j))  # that of theory/braider 3 lies over O2: no moment
     assert np.abs(Braider().load_moment(np.linspace(0.0, 6.0, 50))).max() < 1e-18
     theta = np.linspace(0.3, 1.9, 20001)
     power = braider.load_moment(theta) * braider.linkage.motion(theta).k3

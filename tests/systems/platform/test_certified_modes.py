@@ -249,7 +249,10 @@ def closed(proof: AssemblyCertificate, anchors: list[Any], vertices: list[Any], 
 
 
 def test_two_modes_of_equal_orientation_are_kept_apart() -> None:
-    """Delta = 0 at alpha = 0, where e = (-6, -3) and Q = (3, +4) or (3, -4): legs 5, 5, 4 (section 5.3)."""
+    """Delta = 0 at alpha = 0, where e = (-6, -3) and Q = (3, +4) or (3, -4): legs 5, 5, 4.
+
+    See theory/platform-direct 3.
+    """
     anchors, vertices, lengths = [(0, 0), (12, 0), (6, 0)], [(0, 0), (6, 0), (3, 0)], [5, 5, 4]
     proof = certify_assembly_modes(anchors, vertices, lengths)
     assert proof.certified and proof.method == "exact polynomial" and closed(proof, anchors, vertices, lengths)
@@ -412,7 +415,7 @@ def test_batch_agrees_with_single_problems_and_has_balanced_signs(platform: Para
 
 
 def test_spec_distribution_of_counts_is_proved() -> None:
-    """The first part of the regression sample of section 5.4, every problem with proof."""
+    """The first part of the regression sample of theory/platform-direct 4, every problem with proof."""
     theta = np.random.default_rng(9).uniform(-math.pi, math.pi, (200000, 3))[:4000]
     g1, mock = certify_direct_batch(ParallelPlatform.g1(), theta), certify_direct_batch(ParallelPlatform.mock(), theta)
     for batch, platform in ((g1, ParallelPlatform.g1()), (mock, ParallelPlatform.mock())):

@@ -23,7 +23,7 @@ from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatfor
 
 LEG = (-5 * math.pi / 6, -math.pi / 6, math.pi / 2)
 
-#: psi / pi -> pose on the home branch for l_B = (10, 5, 0), psi0 = (0, 0.5, 1): specification, section 14.5
+#: psi / pi -> pose on the home branch for l_B = (10, 5, 0), psi0 = (0, 0.5, 1): theory/values-of-the-platform 5
 TABLE = {
     0.0: (0.6726309905203590, -5.007798833182030, 0.05338478141100772),
     0.25: (2.003085941471040, -3.391552232148333, 0.06987910600284579),
@@ -63,7 +63,10 @@ def test_reference_turn_is_certified_and_holds_the_reference_poses() -> None:
     ],
 )
 def test_limits_of_the_mock_up(crank: float, phase: tuple[float, float, float], verdict: TurnVerdict) -> None:
-    """Section 8.3: pure rotation up to 45 (1 - sqrt(5/29)) = 26.31476...; otherwise 30, exclusive, exactly."""
+    """Pure rotation up to 45 (1 - sqrt(5/29)) = 26.31476...; otherwise 30, exclusive, exactly.
+
+    See theory/platform-drive 9.
+    """
     proof = certify_full_turn(SingleMotorPlatform(crank=(crank,) * 3, phase=phase))
     assert proof.verdict is verdict, proof.statement
     assert proof.certified == (not proof.reason)

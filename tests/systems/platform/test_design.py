@@ -36,7 +36,7 @@ def equal(length: float, phases: tuple[float, ...] = (0.0, 0.0, 0.0)) -> SingleM
     return SingleMotorPlatform(crank=(length,) * 3, phase=phases)  # type: ignore[arg-type]
 
 
-# --- spec 14.6
+# --- theory/values-of-the-platform 6
 
 
 def test_linear_design_reference() -> None:
@@ -190,7 +190,7 @@ def test_design_of_nothing() -> None:
         linear_design(MOCK, [1.0, math.nan, 0.0])
 
 
-# --- claim: any direction by crank lengths (spec 10.4, E5)
+# --- claim: any direction by crank lengths (theory/inverse-design 4, E5)
 
 
 @settings(max_examples=30, deadline=None)
@@ -238,7 +238,7 @@ def test_lengths_only_in_the_leg_frames_reach_what_is_asked() -> None:
     assert worse.error > 0.95 * math.sqrt(attainable(MOCK, [math.cos(0.6), math.sin(0.6), 0.0]).off_direction)
 
 
-# --- claim: displacements tend to a sinusoid (spec 9, E6)
+# --- claim: displacements tend to a sinusoid (theory/small-crank)
 
 
 @pytest.mark.parametrize(("length", "ratio"), [(1.0, 0.00555566), (5.0, 0.00555832), (10.0, 0.00556778)])
@@ -270,7 +270,7 @@ def test_rocker_theory_is_of_third_order(coupler: tuple[float, float, float]) ->
 
 
 def test_table_of_harmonics() -> None:
-    """Spec 9.3, rows of the global and the leg-frame setting."""
+    """theory/small-crank 3, rows of the global and the leg-frame setting."""
     for length, first, second, mean, third in (
         (1.0, 0.7500407, 0.0065106, 0.000150739, 1.570e-6),
         (5.0, 3.7551412, 0.162894, 0.00378954, 0.00019734),

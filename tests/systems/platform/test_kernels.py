@@ -1,4 +1,7 @@
-"""Compiled parts of the parallel platform: against 60 digits, companion eigenvalues, brute force, and section 12."""
+"""Compiled parts of the parallel platform: against 60 digits, companion eigenvalues, brute force.
+
+See theory/extreme-cases 2.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ from graphsynth.systems.platform.tracking import BranchEnd
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
 REFERENCE = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
 LEG_PHASES = SingleMotorPlatform().frame_angle
-SINGULAR_CRANK = 45 * (1 - math.sqrt(5 / 29))  # section 8.3
+SINGULAR_CRANK = 45 * (1 - math.sqrt(5 / 29))  # theory/platform-drive 9
 
 
 def circle(a, b):
@@ -435,7 +438,7 @@ def test_limit_of_pure_rotation(offset):
     assert not motion.complete
     event = motion.events[-1]
     assert event.kind == "platform singular"
-    # at the singular pose the rockers have turned by -2 atan(9/37) from home (section 8.3)
+    # at the singular pose the rockers have turned by -2 atan(9/37) from home (theory/platform-drive 9)
     home = float(FourBarDrive(45, 105 + 45j, 0.0, 45.0, 60.0).motion(0.0).phi)
     turned = float(above.drives[0].motion(event.psi).phi) - home
     assert turned == pytest.approx(-2 * math.atan(9 / 37), abs=1e-9)
@@ -462,7 +465,8 @@ def test_limit_of_the_drives(cranks):
         assert circle(event.psi, away) < 0.02
 
 
-# --- extreme cases of section 12 --------------------------------------------------------------------------------------
+# --- extreme cases of theory/extreme-cases 2
+# --------------------------------------------------------------------------------------
 
 
 def similar(zeta, size=1.0):
@@ -526,7 +530,7 @@ def case_no_mode():
 
 
 def case_exact_type_two():
-    vertices = np.array([1, 1j, -1])  # similar triangles: the modes are |z - 2| = leg length (section 5.3)
+    vertices = np.array([1, 1j, -1])  # similar triangles: the modes are |z - 2| = leg length (theory/platform-direct 3)
     merged = assembly_modes(2 * vertices, vertices, [1.0, 1.0, 1.0])
     assert (merged.near_double_root, merged.escalated, merged.double.tolist()) == (True, True, [True])
     assert np.abs(merged.poses).max() < 1e-20

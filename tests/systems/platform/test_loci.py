@@ -29,7 +29,7 @@ from graphsynth.systems.platform.singular_loci import (
 from graphsynth.systems.platform.workspace import constant_orientation_workspace
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
-ALPHA_G1 = -0.491174039432700716436386522579764691645742  # spec 14.4
+ALPHA_G1 = -0.491174039432700716436386522579764691645742  # theory/values-of-the-platform 4
 ALPHA_MOCK = 2.0 * math.atan(3.0 / 7.0)
 
 

@@ -374,7 +374,7 @@ def test_self_motion_and_degenerate_modes():
 
 
 def test_delta_vanishing_at_a_real_mode():
-    """e_2 parallel to e_3 at alpha = 0 with N = 0: two modes share the orientation (section 5.3)."""
+    """e_2 parallel to e_3 at alpha = 0 with N = 0: two modes share the orientation (theory/platform-direct 3)."""
     A = np.array([0, 2, 5], dtype=complex)
     b = np.array([0, 1, 2], dtype=complex)  # e_2 = -1, e_3 = -3 at alpha = 0
     Q = 0.3 + 1.1j

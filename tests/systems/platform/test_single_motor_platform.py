@@ -19,7 +19,7 @@ from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatfor
 REFERENCE = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
 LEG_PHASES = SingleMotorPlatform().frame_angle
 
-# spec 14.5: x, y, alpha, det JX at psi = 0, pi/4, ...
+# theory/values-of-the-platform 5: x, y, alpha, det JX at psi = 0, pi/4, ...
 TURN = [
     (0.6726309905203590802261211284909424, -5.007798833182029853049940135266481, 0.053384781411007717626804032933934, -188253854.0504867671045701),
     (2.003085941471040017307306726396674, -3.391552232148333278478002649010856, 0.06987910600284579180954095572691073, -187287228.0329033806575134),
@@ -96,7 +96,7 @@ def test_pure_rotation_between_dead_points():
 
 
 def test_circular_translation_harmonics():
-    """Section 9.3: mean of alpha and first harmonic for equal global phases, by trapezoidal sums."""
+    """theory/small-crank 3: mean of alpha and first harmonic for equal global phases, by trapezoidal sums."""
     motion = SingleMotorPlatform(crank=(5,) * 3).full_turn(samples=np.arange(65) * math.tau / 64)
     pose = motion.pose[:64]
     assert pose[:, 2].mean() == pytest.approx(0.00378954, abs=5e-9)

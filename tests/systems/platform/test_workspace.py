@@ -16,7 +16,7 @@ from graphsynth.systems.platform.workspace import Workspace, _between, constant_
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
 
-# spec 14.7: platform, alpha, area, perimeter
+# theory/values-of-the-platform 7: platform, alpha, area, perimeter
 REFERENCE = [
     (G1, 0.0, 3.2672113311537243673640656155137, 9.6623065049276481828824613970019),
     (G1, 0.15, 3.2991533339741900256747885888938, 9.7197375118854875760409107545392),

@@ -1,6 +1,6 @@
-"""Printed reference values of the tribometer: specification of the instruments, sections 3.7 to 3.11."""
+"""Printed reference values of the tribometer: theory/tribometer 7 to 11."""
 
-#: Section 3.8: time, new state, x2 (40 digits computed, printed to 30).
+#: theory/tribometer 8: time, new state, x2 (40 digits computed, printed to 30).
 HARMONIC_EVENTS = [
     ("0.406627900017483953909428936456", -1, "-0.00938590054526578496156891075498"),
     ("0.651254753691441470891341648015", 0, "-0.00476391984119285610449584785445"),
@@ -41,16 +41,16 @@ HARMONIC_EVENTS = [
     ("9.92487102052821569292639000797", -1, "-0.00939548483598766311687963192023"),
 ]
 HARMONIC_X2, HARMONIC_V2 = "-0.0088337024489276769888214220566", "0.0595451435333351571993796554312"
-#: Section 3.7.
+#: theory/tribometer 7.
 BELT_STICK, BELT_SLIP, BELT_PERIOD = "0.367875", "0.183621439575209089144194976858", "0.551496439575209089144194976858"
-#: Section 3.9: accurate to about 1e-14.
+#: theory/tribometer 9: accurate to about 1e-14.
 CRANK_EVENTS = [
     (0.365311879706055, -1, -0.00933904293982135),
     (0.608830310579125, 0, -0.00262488891175237),
     (0.720893078952936, -1, -0.00953879049414652),
     (0.954741972884760, 0, -0.00177238132861263),
 ]
-#: Section 3.11: factor on the stiffness -> k x2 / N at the times, number of events in 3 s.
+#: theory/tribometer 11: factor on the stiffness -> k x2 / N at the times, number of events in 3 s.
 STIFF = {
     1e2: ({2.4: 0.282874735726, 2.9: 0.258330591415, 3.0: 0.301829249850, 0.3: -0.69125239, 0.8: -0.25682324,
            1.2: -0.2598963, 1.9: 0.8239214}, 25),
@@ -66,7 +66,7 @@ STIFF_EVENTS = {
 }  # fmt: skip
 #: Damping left at 2 N s/m: factor -> events in the first second, k x2(1) / N.
 CHATTER = {1.0: (4, -0.1650259907), 1e2: (61, -0.9659947263), 1e4: (576, -6.6689532298)}
-#: Section 3.10: smoothing velocity -> largest error of x2, m.
+#: theory/tribometer 10: smoothing velocity -> largest error of x2, m.
 REGULARISED = {1e-2: 7.1e-3, 1e-3: 1.14e-3, 1e-4: 1.27e-4, 1e-5: 1.62e-5, 1e-6: 2.0e-6, 1e-7: 2.4e-7, 1e-8: 2.8e-8}
 #: Time stepping: step -> error of x2(10), m.
 STEPPED = {1e-3: 2.34e-5, 1e-4: 2.45e-6, 1e-5: 2.46e-7}

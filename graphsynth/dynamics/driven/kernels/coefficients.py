@@ -1,7 +1,7 @@
 """Coefficients of the five-stage Radau IIA method (order 9); made with 40 digits from their defining equations.
 
-Nodes: zeros of ``P_5 - P_4`` on [0, 1]; ``A`` integrates the Lagrange polynomials of the nodes (Hairer and Wanner
-1996, section IV.5); ``SHIFT`` is the real eigenvalue of ``A`` and ``ERROR`` the embedded formula of section IV.8.
+Nodes: zeros of ``P_5 - P_4`` on [0, 1]; ``A`` integrates the Lagrange polynomials of the nodes ([Hairer & Wanner 1996],
+section IV.5); ``SHIFT`` is the real eigenvalue of ``A`` and ``ERROR`` the embedded formula of section IV.8.
 """
 
 import numpy as np

@@ -96,7 +96,7 @@ def attempt(setup, P, V, y, h, f0, jac, unit, kappa, Z, F, tmp):
 
 @kernel
 def estimate(setup, P, V, y, h, f0, jac, unit, Z, tmp):
-    """Scaled error of the embedded formula (Hairer and Wanner 1996, IV.8, equations 8.19 and 8.20)."""
+    """Scaled error of the embedded formula ([Hairer & Wanner 1996], IV.8, equations 8.19 and 8.20)."""
     n = y.size
     M, order = np.empty((n, n)), np.empty(n, np.int64)
     for a in range(n):

@@ -51,7 +51,7 @@ def series(q, V, P, out):
 def four_bar(theta, P, out):
     """Effective inertia, half its derivative and the generalised thread load of the braider into out[0:3].
 
-    Well-conditioned products of section 4.2, with the excesses ``b + c - a - g`` and
+    Well-conditioned products of theory/braider 2, with the excesses ``b + c - a - g`` and
     ``(g - a)^2 - (b - c)^2`` given; out[3:11] get k2, k3, phi2'', phi3'', AB and O2B.
     """
     L = P[LINKAGE:]
@@ -159,7 +159,10 @@ def field(setup, P, V, y, dy, tmp):
 
 @kernel
 def jacobian(setup, P, V, y, f, scale, jac, work, tmp):
-    """Difference quotients with steps of the natural scale of each variable (section 6.4, trap 4, cannot occur)."""
+    """Difference quotients with steps of the natural scale of each variable (trap 4, cannot occur).
+
+    See theory/solvers 3.
+    """
     n = y.size
     for j in range(n):
         kept = y[j]

@@ -50,7 +50,7 @@ def upper_half(a):
 def cross(ax, ay, bx, by):
     """Return ax by - ay bx, right to its last digits also where the vectors are nearly parallel.
 
-    Both products are exact sums of two numbers (Dekker 1971), so that only the difference is rounded.
+    Both products are exact sums of two numbers [Dekker 1971], so that only the difference is rounded.
     """
     p, q = ax * by, ay * bx
     a, b, c, d = upper_half(ax), upper_half(by), upper_half(ay), upper_half(bx)

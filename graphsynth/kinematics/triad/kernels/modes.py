@@ -1,6 +1,6 @@
 """All assembly modes of a 3-RPR platform: sampled real roots of the sextic with a guarantee, poses, polish, checks.
 
-Specification parallel_platform, sections 5.1 to 5.4.  ``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` is sampled at
+See theory/platform-direct 1 to 4.  ``G(alpha) = g0 + 2 Re(g1 z + g2 z^2 + g3 z^3)`` is sampled at
 the ends and middles of 32 intervals; on each, ``|G''| <= |G''(middle)| + (half width) max|G'''|`` decides between no
 root, exactly one, and bisection.
 """

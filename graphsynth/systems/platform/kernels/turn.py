@@ -1,8 +1,8 @@
 """The single-motor platform in bulk: drives block by block, then the platform by prediction and Newton's method.
 
-Specification parallel_platform, sections 4.2, 7.2 and 7.5.  A step is accepted only if the corrector moves little and
-converges fast, and if ``det JX`` keeps its sign and half its size; otherwise it is cut.  A step that becomes too small
-ends the branch: there is no jump.
+See theory/platform-jacobians 2 and theory/platform-drive 3, 6.  A step is accepted only if the corrector moves little
+and converges fast, and if ``det JX`` keeps its sign and half its size; otherwise it is cut.  A step that becomes too
+small ends the branch: there is no jump.
 
 A machine is one array (3, 21), a row per leg: axis minus pivot of the drive (x, y), crank, phase, rocker, tau, six
 constants of `length_constants`, the fixed turn of the bell-crank (cos, sin, angle), pivot (x, y), arm l1, platform
@@ -210,7 +210,7 @@ def leg_row(x, y, cz, sz, dx, dy, l1, bx, by, l2, c, t):
 
 @kernel
 def push(lx, ly, rx, ry, zx, zy, vx, vy, va, r1, r2):
-    """Half the right-hand side of the accelerations for one leg (section 4.2)."""
+    """Half the right-hand side of the accelerations for one leg (theory/platform-jacobians 2)."""
     sx, sy = vx - zy * va + ry * r1, vy + zx * va - rx * r1
     ax, ay = -ry * r2 - rx * r1 * r1 + zx * va * va, rx * r2 - ry * r1 * r1 + zy * va * va
     return lx * ax + ly * ay - (sx * sx + sy * sy)

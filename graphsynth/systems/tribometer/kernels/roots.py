@@ -39,7 +39,7 @@ def value(kind, p, s, t, x, v, span, work):
 def root(kind, p, s, t, x, v, low, high, work):
     """Root between ``low`` and ``high``, where the guard has different signs, down to rounding.
 
-    The method of Chandrupatla (1997); returns the end of the last bracket where the guard is smaller.
+    The method of [Chandrupatla 1997]; returns the end of the last bracket where the guard is smaller.
     """
     a, b = low, high
     fa, fb = value(kind, p, s, t, x, v, a, work), value(kind, p, s, t, x, v, b, work)

@@ -21,7 +21,7 @@ LINEAR = SingleMotorPlatform(
     crank=(2.10617329135206268, 5.29647666822047662, 3.19030337686841394),
     phase=tuple(np.radians((-166.260204708311957406, 133.739795291688042594, 73.7397952916880425937))),
 )
-# section 11.2: J_eff/m in mm^2 with a radius of gyration of 20 mm
+# theory/motor-drive 2: J_eff/m in mm^2 with a radius of gyration of 20 mm
 RANGES = {
     "circular translation": (SingleMotorPlatform(), (38.955, 78.368, 58.602), 0),
     "pure rotation": (SingleMotorPlatform(phase=LEGS), (0.0, 12.604, 6.217), 2),
@@ -71,7 +71,7 @@ def test_value_and_derivative_against_the_sweep():
 
 
 def test_reference_point_of_the_specification():
-    """Section 14.5: J_eff/m and half its derivative at psi = pi/2."""
+    """theory/values-of-the-platform 5: J_eff/m and half its derivative at psi = pi/2."""
     machine = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
     inertia = EffectiveInertia.of_platform(machine, 1.0, 0.020)
     assert 1e6 * float(inertia.value(math.pi / 2)) == pytest.approx(25.677994605313476, rel=1e-13)

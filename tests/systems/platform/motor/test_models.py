@@ -22,7 +22,7 @@ def motor(resistance=1.0, inductance=0.2, **more):
     return DCMotor(resistance, inductance, 0.1, 0.1, 20.0, 20.0, **more)
 
 
-# specification parallel_platform, section 14.8
+# theory/values-of-the-platform 8
 TABLE = [
     (0.1, 2.4033800571171583, 11.711831447227500, -46.798323567474699),
     (0.5, 9.8953258428489656, 17.565682938423782, -2.6052707386754443),
@@ -79,7 +79,7 @@ def test_model_j_with_small_inertia(base):
     assert found.energy_error < 1e-13
 
 
-# section 14.9: time, fictitious time, u, M at the dead centres; states
+# theory/values-of-the-platform 9: time, fictitious time, u, M at the dead centres; states
 DEAD = [
     (0.5, 0.10162899343909495, 0.12837435064682285, 1.1803822394017044, -0.055390988862672136),
     (1.5, 0.24299954470626854, 0.33389052895675168, 0.77086394522185665, -0.44089115912755996),
@@ -125,7 +125,7 @@ def test_model_s_states(model_s):
 
 
 def test_model_s_is_the_limit_of_model_j(model_s):
-    """The angle at 0.2 s approaches that of model S from above as J_0 falls; section 11.3."""
+    """The angle at 0.2 s approaches that of model S from above as J_0 falls; theory/motor-drive 3."""
     gaps = [abs(SMALL[base][1][1] - model_s.angle[2]) for base in (1e-4, 1e-6, 1e-8)]
     assert gaps[0] > 10 * gaps[1] > 100 * gaps[2] > 0.0
 
@@ -151,7 +151,7 @@ def test_stiff_limits_cost_the_same_and_are_of_first_order():
     assert study.steps.max() < 250
     np.testing.assert_allclose(study.order[2:8], 1.0, atol=2e-3)
     at_end = abs(study.runs[3].angle[-1] - study.limit.angle[-1]) / 1e-6
-    assert at_end == pytest.approx(0.46, abs=0.005)  # section 11.4: about 0.46 rad per henry
+    assert at_end == pytest.approx(0.46, abs=0.005)  # theory/motor-drive 4: about 0.46 rad per henry
 
 
 def test_automatic_reduction_keeps_its_promise():
@@ -171,7 +171,7 @@ def test_automatic_reduction_keeps_its_promise():
 
 
 def test_reversal_is_an_event():
-    """Little inductance without inertia: the kinetic energy reaches zero near a dead centre (section 11.3)."""
+    """Little inductance without inertia: the kinetic energy reaches zero near a dead centre (theory/motor-drive 3)."""
     found = SOURCE(motor(1.0, 0.1), base_inertia=0.0).simulate(np.linspace(0.0, 1.0, 101), speed=1.0)
     stalls = [event for event in found.events if event.kind == "stall"]
     assert found.complete and stalls

@@ -1,4 +1,4 @@
-"""The claim about the armature resistance: table of section 11.5, the criterion, counter-examples."""
+"""The claim about the armature resistance: table of theory/motor-drive 5, the criterion, counter-examples."""
 
 from __future__ import annotations
 
