@@ -9,7 +9,7 @@ import numpy as np
 
 
 def rod_error(mechanism: Any, a: float, b: float, phi_x: float, phi_y: float) -> float:
-    """Largest error of the rod lengths, from rotation matrices and points alone (section 2.5, order YX)."""
+    """Largest error of the rod lengths, from rotation matrices and points alone (theory/antenna 5, order YX)."""
     l1, l2, l3, l4, l5 = mechanism.lengths
     ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
     R = np.array([[cb, sb * sa, sb * ca], [0.0, ca, -sa], [-sb, cb * sa, cb * ca]])
@@ -51,7 +51,7 @@ def sine_of_crank_and_rod(mechanism: Any, leg: str, p: Any) -> float:
 def folds_of_leg_x() -> list[Any]:
     """Crank angles at which the rod of leg X lies on a line through the centre, with ``l5 = 0.12``.
 
-    There ``|S_X| = l1 + l4`` or ``l4 - l1``, so ``A cos + B sin = C`` of section 2.7.
+    There ``|S_X| = l1 + l4`` or ``l4 - l1``, so ``A cos + B sin = C`` of theory/antenna 7.
     """
     import mpmath as mp
 

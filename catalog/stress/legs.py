@@ -8,7 +8,7 @@ import numpy as np
 
 
 def exact_angle(l1: float, l2: float, u: float, v: float, sigma: int) -> Any:
-    """Rocker angle to 60 digits for the given doubles, by the law of cosines and not by the formulas of section 3."""
+    """Rocker angle to 60 digits for the given doubles, by the law of cosines alone (not theory/platform-inverse 4)."""
     import mpmath as mp
 
     with mp.workdps(60):

@@ -72,7 +72,7 @@ def bar(mass: float, length: float) -> Any:
 
 
 def crank_rocker(**changes: Any) -> Any:
-    """Crank-rocker G1 of section 5.9."""
+    """Crank-rocker G1 of theory/planar-dynamics 9."""
     from graphsynth.dynamics import DynamicModel
 
     bodies = {1: bar(0.2, 0.2), 2: bar(0.6, 0.6), 3: bar(0.4, 0.4)}
@@ -80,7 +80,7 @@ def crank_rocker(**changes: Any) -> Any:
 
 
 def slider_crank(shift: float | None = None) -> Any:
-    """G3 of section 5.9, with a second guide shifted sideways if asked for."""
+    """G3 of theory/planar-dynamics 9, with a second guide shifted sideways if asked for."""
     from graphsynth.dynamics import Body, DynamicModel, Spring
     from graphsynth.mechanism.joints import Prismatic, Revolute
     from graphsynth.structure.graph import MechanismGraph

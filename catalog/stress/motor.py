@@ -6,7 +6,7 @@ from typing import Any
 
 
 def linear_motor(resistance: float, times: list[float]) -> tuple[list[Any], list[Any]]:
-    """Speeds and currents of the motor without a platform, by the formulas of section 14.10."""
+    """Speeds and currents of the motor without a platform, by the formulas of theory/motor-drive 6."""
     import mpmath as mp
 
     with mp.workdps(60):

@@ -5,7 +5,7 @@ Rump's form of Krawczyk's test: with Y near the inverse of mid A and x near the 
     D' = Y (b - A x) + (I - Y A) D   lies in the interior of D,
 
 then every matrix in A (and Y) is nonsingular and every solution lies in ``x + D'`` ([Rump 1980]; [Neumaier 1990],
-section 4.4).  D is found by epsilon-inflation.
+theory/bearing-contact 4).  D is found by epsilon-inflation.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ of `KINDS`, described in ``docs/explanation/stress.md``.  ``is`` holds what must
 ``math``, ``np``, ``mp`` (mpmath), ``Fraction``, and over the functions of Python files beside the data (``scripts``).
 So a file of cases is a program: only the shipped ones are read, or one that the user names.
 
-The id of a case is the page of the specification and the number of the row in its section of extreme cases:
-``lambda-12.6`` is row 6 of section 12 of the lambda linkage.  Other numbers give the section from which a case is taken
-(the structural page has no section of extreme cases); ``beyond`` holds what no page asks for.
+The id of a case is the list of theory/extreme-cases and the number of the row there: ``lambda-12.6`` is row 6 of the
+list of the lambda linkage, ``platform-12.6`` and ``instruments-9.6`` are row 6 of the others.  Other numbers stand for cases
+of other pages; ``beyond`` holds what no page asks for.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PAGES = {
     "platform": "Parallel platform",
     "instruments": "Instruments and dynamics",
     "structure": "Structural synthesis",
-    "beyond": "Beyond the specification",
+    "beyond": "Beyond the lists",
 }
 
 _NUMBER = ("given", "is", "right", "relative", "absolute", "source")

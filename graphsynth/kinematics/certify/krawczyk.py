@@ -7,8 +7,8 @@ For a system ``f(x, u) = 0`` with as many equations as unknowns, an interval U o
 
 with any matrix Y satisfies: if K(u) lies in the interior of ``c(u) + B`` for every u in U, then for every u in U there
 is exactly one solution in ``c(u) + B``, it lies in K(u), and the Jacobian is regular everywhere in the box ([Krawczyk
-1969]; [Neumaier 1990], section 5.1).  ``f`` along the moving centre is bounded by its value at mid U and its derivative
-by u over U, so the bound is of second order in the width of U.
+1969]; [Neumaier 1990], theory/circle-and-ellipse 1).  ``f`` along the moving centre is bounded by its value at mid U
+and its derivative by u over U, so the bound is of second order in the width of U.
 """
 
 from __future__ import annotations

@@ -116,7 +116,7 @@ def certify(
 
     Notes
     -----
-    [Krawczyk 1969]; [Neumaier 1990], section 5.1; theory/platform-drive 5.
+    [Krawczyk 1969]; [Neumaier 1990], theory/circle-and-ellipse 1; theory/platform-drive 5.
     See ``docs/explanation/certificates.md``.
 
     Examples

@@ -1,6 +1,6 @@
 """Closed forms: poses on one assembly mode and on all, crank angles for a wanted pose, two models compared.
 
-Specification instruments_and_dynamics, sections 2.5 and 2.8.
+See theory/antenna 5, 8.
 """
 
 from __future__ import annotations

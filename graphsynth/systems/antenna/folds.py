@@ -1,4 +1,4 @@
-"""Folds (output singularities) and dead-centre positions (input singularities) of each leg (section 2.7).
+"""Folds (output singularities) and dead-centre positions (input singularities) of each leg (theory/antenna 7).
 
 Where a discriminant vanishes, two assembly modes or two crank settings meet.  For the leg that is solved first it is a
 product of two sinusoids of the crank angle, for the other leg a trigonometric polynomial of degree two: all of its

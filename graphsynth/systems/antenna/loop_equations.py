@@ -1,8 +1,7 @@
 """The twelve loop equations: passive joint angles, analytic Jacobian, rank of the coordinates, Newton's method.
 
 Each leg is a product of one-step matrices: rotations by an unknown or given angle, shifts, one mounting rotation.
-Position rows are divided by ``l1``, so that lengths and angles weigh alike (specification instruments_and_dynamics,
-sections 2.3 to 2.5).
+Position rows are divided by ``l1``, so that lengths and angles weigh alike (theory/antenna 3 to 5).
 
 Newton's method is independent of the closed form.  A root counts only if the orientation reached through each leg
 agrees with the gimbal: the scalar equations are also satisfied when it is off by half a turn about a coordinate axis.
@@ -31,8 +30,8 @@ class PassiveAngles:
     Attributes
     ----------
     x : ndarray, shape (..., 12)
-        ``x1 ... x12`` of section 2.3, radians: cardan and ball joint of leg Y, elevation, cardan and ball joint of leg
-        X, azimuth.  NaN where the mechanism cannot be assembled.
+        ``x1 ... x12`` of theory/antenna 3, radians: cardan and ball joint of leg Y, elevation, cardan and ball joint of
+        leg X, azimuth.  NaN where the mechanism cannot be assembled.
     margin : ndarray, shape (...)
         Smallest cosine of ``x2, x4, x8, x10``: 0 means that a cardan or the angles of a ball joint are locked.
     """

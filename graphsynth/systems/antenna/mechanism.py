@@ -31,7 +31,7 @@ class PointingMechanism(PointingDimensions):
 
     Leg Y (rod ``l2``, crank ``l3``, crank angle ``phi_x``) tilts the reflector about X: elevation ``a``.  Leg X (rod
     ``l4``, crank ``l5``, crank angle ``phi_y``) turns it about Y: azimuth ``b``.  Both are attached at the distance
-    ``l1`` from the centre.  At rest all angles are zero.  The defaults are the geometry ART of the specification.
+    ``l1`` from the centre.  At rest all angles are zero.  The defaults are the geometry ART of theory/antenna 2.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class PointingMechanism(PointingDimensions):
 
     Notes
     -----
-    Perechesova, Kalapyshina, Nuzhdin (2014), corrected; specification instruments_and_dynamics, section 2.
+    [Perechesova et al. 2014], corrected; theory/antenna.
 
     Examples
     --------
@@ -59,7 +59,7 @@ class PointingMechanism(PointingDimensions):
     """
 
     def poses(self, phi_x: ArrayLike, phi_y: ArrayLike, s_y: int = 1, s_x: int = -1) -> Poses:
-        """Reflector angles for crank angles, on one assembly mode (closed form, section 2.5).
+        """Reflector angles for crank angles, on one assembly mode (closed form, theory/antenna 5).
 
         Parameters
         ----------
@@ -122,7 +122,7 @@ class PointingMechanism(PointingDimensions):
         return cranks(self, a, b, elbow_y, elbow_x)
 
     def passive_angles(self, poses: Poses) -> PassiveAngles:
-        """Angles of all passive joints at known poses: the twelve unknowns of the loop equations (section 2.5)."""
+        """Angles of all passive joints at known poses: the twelve unknowns of the loop equations (theory/antenna 5)."""
         from graphsynth.systems.antenna.loop_equations import passive_angles
 
         return passive_angles(self, poses)
@@ -130,7 +130,7 @@ class PointingMechanism(PointingDimensions):
     def solve_loops(
         self, phi_x: ArrayLike, phi_y: ArrayLike, *, start: ArrayLike | None = None, chart: str = "corrected"
     ) -> LoopSolution:
-        """Solve the twelve loop equations by Newton's method, without the closed form (section 2.3).
+        """Solve the twelve loop equations by Newton's method, without the closed form (theory/antenna 3).
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class PointingMechanism(PointingDimensions):
     def check_chart(
         self, phi_x: float, phi_y: float, chart: str = "corrected", *, s_y: int = 1, s_x: int = -1, scaled: bool = True
     ) -> ChartReport:
-        """Judge the coordinates of the loop equations at a pose: rank, condition, verdict (section 2.4).
+        """Judge the coordinates of the loop equations at a pose: rank, condition, verdict (theory/antenna 4).
 
         Examples
         --------
@@ -186,7 +186,7 @@ class PointingMechanism(PointingDimensions):
         s_y: int = 1,
         s_x: int = -1,
     ) -> Rates:
-        """Velocity Jacobian, velocities and accelerations (section 2.6); crank rates in rad/s, rad/s^2.
+        """Velocity Jacobian, velocities and accelerations (theory/antenna 6); crank rates in rad/s, rad/s^2.
 
         Examples
         --------
@@ -205,7 +205,9 @@ class PointingMechanism(PointingDimensions):
         return passive_rates(self, poses, dphi_x, dphi_y)
 
     def folds(self, leg: str, phi_other: float = 0.0, *, s_other: int | None = None) -> tuple[Fold, ...]:
-        """All folds of one leg over a full turn of its crank, with place, output, order and coefficient (section 2.7).
+        """All folds of one leg over a full turn of its crank, with place, output, order and coefficient.
+
+        See theory/antenna 7.
 
         Parameters
         ----------
@@ -237,7 +239,7 @@ class PointingMechanism(PointingDimensions):
         return folds(self, leg, phi_other, s_other)
 
     def dead_points(self, leg: str, phi_other: float = 0.0, *, s_other: int | None = None) -> tuple[DeadPoint, ...]:
-        """All dead points of one crank: crank and rod in a plane with the crank axis (section 2.7).
+        """All dead points of one crank: crank and rod in a plane with the crank axis (theory/antenna 7).
 
         Parameters are those of `folds`.
         """
@@ -305,7 +307,7 @@ class PointingMechanism(PointingDimensions):
         reading: Reading | None = None,
         other_reading: Reading | None = None,
     ) -> ModelComparison:
-        """Difference of two models over a sweep: gimbal order, lengths, senses, mounting, reading (section 2.8).
+        """Difference of two models over a sweep: gimbal order, lengths, senses, mounting, reading (theory/antenna 8).
 
         Parameters
         ----------
@@ -348,8 +350,8 @@ class PointingMechanism(PointingDimensions):
         s_y, s_x : {+1, -1}
             Assembly mode.
         method : {"mixed", "mean_value"}
-            "mixed" puts every length with a proved sign of the derivative to the ends of its interval (section 2.10,
-            step 3); "mean_value" is faster and some per cent wider.
+            "mixed" puts every length with a proved sign of the derivative to the ends of its interval
+            (theory/antenna 9, step 3); "mean_value" is faster and some per cent wider.
         converted : bool
             The doubles given stand for decimals or degrees: the bounds then hold for the numbers before they were
             converted to metres and radians and rounded (up to three roundings each).

@@ -1,7 +1,7 @@
 """What the mechanism is: dimensions, structural graph, its two legs, and the poses that everything else computes.
 
 With ``u`` the angle of the fixed gimbal axis and ``v`` that of the carried one, both gimbal orders lead to the same
-triangular pair of equations (specification instruments_and_dynamics, section 2.5)::
+triangular pair of equations (theory/antenna 5)::
 
     P1 cos u + Q1 sin u = K1
     P2 cos v + Q2 cos u sin v = K2

@@ -4,7 +4,7 @@ Lengths are read as the decimal numbers that they print as: 0.1 means one tenth.
 
 A fold turns an error ``d`` of the input into ``C sqrt(d)`` of the output: half of the digits are lost.  Given the
 distance itself, and not only the rounded input, the closed form loses nothing: it is evaluated on exact differences
-from the fold (specification, section 9, case 5).
+from the fold (theory/extreme-cases 3, case 5).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Guaranteed bounds of the pointing direction over length tolerances (specification, section 2.10).
+"""Guaranteed bounds of the pointing direction over length tolerances (theory/antenna 9).
 
 Both outputs are enclosed over a box of lengths by interval Newton, then by the mean-value form.  The four operations
 with outward rounding are those of mpmath.  No inverse function is enclosed; sines and cosines, which mpmath computes
