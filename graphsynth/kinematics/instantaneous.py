@@ -160,7 +160,7 @@ def inflection_circle(motion: Motion, link: int, base: int | None = None) -> Cir
 
     References
     ----------
-    Bottema & Roth (1979), chapter 8, section 2; Hunt (1978), section 5.4.
+    [Bottema & Roth 1979], chapter 8, section 2; [Hunt 1978], section 5.4.
     """
     pole, a, turn = _acceleration_at_pole(motion, link, base)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -39,7 +39,7 @@ def test_the_coupler_turns_about_the_crossing_of_crank_and_rocker(rocker):
 
 
 def test_the_polodes_of_a_trammel_are_cardan_circles():
-    """Elliptic trammel of length L: a circle of diameter L rolls in one of radius L (Hunt 1978, section 5.3)."""
+    """Elliptic trammel of length L: a circle of diameter L rolls in one of radius L ([Hunt 1978], section 5.3)."""
     L = 2.0
     places = {
         "A": (L * math.cos(0.4), 0),

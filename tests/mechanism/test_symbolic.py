@@ -45,7 +45,7 @@ def test_the_sextic_is_roberts_form():
 def test_the_slider_crank_draws_a_quartic():
     linkage = gs.Mechanism.slider_crank(1, 3, 0.25, rod_point=(1.5, 0.5))
     curve = linkage.coupler_curve("P")
-    assert (curve.degree, curve.circularity) == (4, 1)  # Hunt 1978, section 7.3
+    assert (curve.degree, curve.circularity) == (4, 1)  # [Hunt 1978], theory/jam-arcs 3
     assert value_on(curve, linkage.simulate().point("P").position).max() < 1e-13
 
 
