@@ -8,8 +8,8 @@ of `KINDS`, described in ``docs/explanation/stress.md``.  ``is`` holds what must
 So a file of cases is a program: only the shipped ones are read, or one that the user names.
 
 The id of a case is the list of theory/extreme-cases and the number of the row there: ``lambda-12.6`` is row 6 of the
-list of the lambda linkage, ``platform-12.6`` and ``instruments-9.6`` are row 6 of the others.  Other numbers stand for cases
-of other pages; ``beyond`` holds what no page asks for.
+list of the lambda linkage, ``platform-12.6`` and ``instruments-9.6`` are row 6 of the others.  Other numbers
+stand for cases of other pages; ``beyond`` holds what no page asks for.
 """
 
 from __future__ import annotations
