@@ -7,7 +7,10 @@ mostly neighbouring doubles, at worst three apart.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import wraps
+from inspect import signature
+from typing import Any, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,277 +54,200 @@ def _mark_clipped(x: Interval, where: NDArray[np.bool_]) -> Interval:
     return _make(x.lo, x.hi, _clipped(x.flags, where))
 
 
-def sqr(x: Any) -> Any:
-    """Square.
+class _Unary(Protocol):
+    """Function of one argument: a `Dual` gives a `Dual`, anything else an `Interval`."""
+
+    @overload
+    def __call__(self, x: Dual) -> Dual: ...
+    @overload
+    def __call__(self, x: Any) -> Interval: ...
+
+
+class _Binary(Protocol):
+    """Function of two arguments: a `Dual` among them gives a `Dual`, anything else an `Interval`."""
+
+    @overload
+    def __call__(self, x: Dual, y: Any, /) -> Dual: ...
+    @overload
+    def __call__(self, x: Any, y: Dual, /) -> Dual: ...
+    @overload
+    def __call__(self, x: Any, y: Any, /) -> Interval: ...
+
+
+_DOCUMENTED = """
 
     Parameters
     ----------
-    x : Interval, Dual or anything an Interval takes
+    {names} : Interval, Dual or anything an Interval takes{more}
 
     Returns
     -------
     Interval or Dual
         Encloses every value over the argument (certified); of the same kind and shape.
+    """
+
+
+def _document(function: Callable[..., Any], names: str, more: str = "") -> None:
+    """Put parameters and result behind the first paragraph of a docstring."""
+    first, _, rest = (function.__doc__ or "").partition("\n\n")
+    sections = _DOCUMENTED.format(names=names, more=more)
+    function.__doc__ = first + sections + ("\n    " + rest.lstrip() if rest else "")
+
+
+def _unary(slope: Callable[[Interval, Interval], Interval]) -> Callable[[Callable[[Interval], Interval]], _Unary]:
+    """Make a function of intervals one of duals too; ``slope(x, value)`` is its derivative."""
+
+    def decorated(function: Callable[[Interval], Interval]) -> _Unary:
+        @wraps(function)
+        def apply(x: Any) -> Any:
+            if isinstance(x, Dual):
+                value = function(x.value)
+                return x.chain(value, slope(x.value, value))
+            return function(interval(x))
+
+        _document(apply, "x")
+        return apply
+
+    return decorated
+
+
+def _binary(slopes: Callable[[Dual, Dual, Interval], Dual]) -> Callable[[Callable[..., Interval]], _Binary]:
+    """Make a function of two intervals one of duals too; ``slopes(x, y, value)`` is the result for duals."""
+
+    def decorated(function: Callable[[Interval, Interval], Interval]) -> _Binary:
+        @wraps(function)
+        def apply(x: Any, y: Any, /) -> Any:
+            if isinstance(x, Dual) or isinstance(y, Dual):
+                x, y = _dual(x, y), _dual(y, x)
+                return slopes(x, y, function(x.value, y.value))
+            return function(*_both(x, y))
+
+        names = ", ".join(signature(function).parameters)
+        _document(apply, names, "\n        Shapes that broadcast.")
+        return apply
+
+    return decorated
+
+
+@_unary(lambda x, value: x * 2)
+def sqr(x: Interval) -> Interval:
+    """Square.
 
     Examples
     --------
     >>> sqr(Interval(-1, 2))
     Interval([0, 4])
     """
-    return x.sqr() if isinstance(x, Dual) else interval(x).sqr()
+    return x.sqr()
 
 
-def sqrt(x: Any) -> Any:
-    """Square root; a negative part is clipped and recorded (`Decoration.CLIPPED`).
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    return x.sqrt() if isinstance(x, Dual) else interval(x).sqrt()
+@_unary(lambda x, value: 1 / (value * 2))
+def sqrt(x: Interval) -> Interval:
+    """Square root; a negative part is clipped and recorded (`Decoration.CLIPPED`)."""
+    return x.sqrt()
 
 
-def sin(x: Any) -> Any:
+@_unary(lambda x, value: _apply("cos", x))
+def sin(x: Interval) -> Interval:
     """Sine.
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
 
     Examples
     --------
     >>> sin(Interval(0, 4)).hi.item()
     1.0
     """
-    if isinstance(x, Dual):
-        return x.chain(sin(x.value), cos(x.value))
-    return _apply("sin", interval(x))
+    return _apply("sin", x)
 
 
-def cos(x: Any) -> Any:
-    """Cosine.
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual):
-        return x.chain(cos(x.value), -sin(x.value))
-    return _apply("cos", interval(x))
+@_unary(lambda x, value: -_apply("sin", x))
+def cos(x: Interval) -> Interval:
+    """Cosine."""
+    return _apply("cos", x)
 
 
-def tan(x: Any) -> Any:
-    """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`).
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual):
-        value = tan(x.value)
-        return x.chain(value, value.sqr() + 1)
-    result = _apply("tan", interval(x))
+@_unary(lambda x, value: value.sqr() + 1)
+def tan(x: Interval) -> Interval:
+    """Tangent; the whole line across a pole, recorded (`Decoration.DISCONTINUOUS`)."""
+    result = _apply("tan", x)
     return _mark(result, ~result.is_bounded & ~result.is_empty)
 
 
-def atan(x: Any) -> Any:
-    """Inverse tangent.
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual):
-        return x.chain(atan(x.value), 1 / (x.value.sqr() + 1))
-    return _apply("atan", interval(x))
+@_unary(lambda x, value: 1 / (x.sqr() + 1))
+def atan(x: Interval) -> Interval:
+    """Inverse tangent."""
+    return _apply("atan", x)
 
 
-def asin(x: Any) -> Any:
-    """Inverse sine; a part outside [-1, 1] is clipped and recorded.
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual):
-        return x.chain(asin(x.value), 1 / sqrt((1 - x.value) * (1 + x.value)))
-    x = interval(x)
+@_unary(lambda x, value: 1 / sqrt((1 - x) * (1 + x)))
+def asin(x: Interval) -> Interval:
+    """Inverse sine; a part outside [-1, 1] is clipped and recorded."""
     return _mark_clipped(_apply("asin", x), (x.lo < -1.0) | (x.hi > 1.0))
 
 
-def acos(x: Any) -> Any:
-    """Inverse cosine; a part outside [-1, 1] is clipped and recorded.
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual):
-        return x.chain(acos(x.value), -1 / sqrt((1 - x.value) * (1 + x.value)))
-    x = interval(x)
+@_unary(lambda x, value: -1 / sqrt((1 - x) * (1 + x)))
+def acos(x: Interval) -> Interval:
+    """Inverse cosine; a part outside [-1, 1] is clipped and recorded."""
     return _mark_clipped(_apply("acos", x), (x.lo < -1.0) | (x.hi > 1.0))
 
 
-def exp(x: Any) -> Any:
-    """Exponential.
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual):
-        value = exp(x.value)
-        return x.chain(value, value)
-    return _apply("exp", interval(x))
+@_unary(lambda x, value: value)
+def exp(x: Interval) -> Interval:
+    """Exponential."""
+    return _apply("exp", x)
 
 
-def log(x: Any) -> Any:
-    """Natural logarithm; a part at or below 0 is clipped and recorded.
-
-    Parameters
-    ----------
-    x : Interval, Dual or anything an Interval takes
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual):
-        return x.chain(log(x.value), 1 / x.value)
-    x = interval(x)
+@_unary(lambda x, value: 1 / x)
+def log(x: Interval) -> Interval:
+    """Natural logarithm; a part at or below 0 is clipped and recorded."""
     return _mark_clipped(_apply("log", x), x.lo <= 0.0)
 
 
-def atan2(y: Any, x: Any) -> Any:
+def _atan2_slopes(y: Dual, x: Dual, value: Interval) -> Dual:
+    square = x.value.sqr() + y.value.sqr()
+    return Dual(value, (x.value / square) * y.grad - (y.value / square) * x.grad)
+
+
+@_binary(_atan2_slopes)
+def atan2(y: Interval, x: Interval) -> Interval:
     """Angle of the points (x, y) in (-pi, pi]; ``[-pi, pi]`` across the cut, recorded; clipped at the origin.
-
-    Parameters
-    ----------
-    y, x : Interval, Dual or anything an Interval takes
-        Shapes that broadcast.
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
 
     Examples
     --------
     >>> atan2(Interval(1), Interval(1)).contains(0.7853981633974483)
     True
     """
-    if isinstance(x, Dual) or isinstance(y, Dual):
-        x, y = _dual(x, y), _dual(y, x)
-        square = x.value.sqr() + y.value.sqr()
-        return Dual(atan2(y.value, x.value), (x.value / square) * y.grad - (y.value / square) * x.grad)
-    y, x = interval(y), interval(x)
     result = _mark(_apply("atan2", y, x), (y.lo < 0.0) & (y.hi >= 0.0) & (x.lo < 0.0))
     return _mark_clipped(result, (y.lo <= 0.0) & (y.hi >= 0.0) & (x.lo <= 0.0) & (x.hi >= 0.0))
 
 
-def hypot(x: Any, y: Any) -> Any:
-    """Distance from the origin, without overflow on the way.
+@_binary(lambda x, y, value: Dual(value, (x.value / value) * x.grad + (y.value / value) * y.grad))
+def hypot(x: Interval, y: Interval) -> Interval:
+    """Distance from the origin, without overflow on the way."""
+    return _apply("hypot", x, y)
 
-    Parameters
-    ----------
-    x, y : Interval, Dual or anything an Interval takes
-        Shapes that broadcast.
 
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual) or isinstance(y, Dual):
-        x, y = _dual(x, y), _dual(y, x)
-        value = hypot(x.value, y.value)
-        return Dual(value, (x.value / value) * x.grad + (y.value / value) * y.grad)
-    return _apply("hypot", interval(x), interval(y))
+def _smaller_slopes(x: Dual, y: Dual, value: Interval) -> Dual:
+    return _selected(value, x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo)
+
+
+@_binary(_smaller_slopes)
+def minimum(x: Interval, y: Interval) -> Interval:
+    """Smaller of two; the derivative holds both where either may be the smaller."""
+    return _combined(x, y, np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi))
+
+
+def _larger_slopes(x: Dual, y: Dual, value: Interval) -> Dual:
+    return _selected(value, x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi)
+
+
+@_binary(_larger_slopes)
+def maximum(x: Interval, y: Interval) -> Interval:
+    """Larger of two; the derivative holds both where either may be the larger."""
+    return _combined(x, y, np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi))
 
 
 def _dual(x: Any, like: Any) -> Dual:
     return x if isinstance(x, Dual) else Dual(interval(x), like.grad * 0)
-
-
-def minimum(x: Any, y: Any) -> Any:
-    """Smaller of two; the derivative holds both where either may be the smaller.
-
-    Parameters
-    ----------
-    x, y : Interval, Dual or anything an Interval takes
-        Shapes that broadcast.
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual) or isinstance(y, Dual):
-        x, y = _dual(x, y), _dual(y, x)
-        return _selected(minimum(x.value, y.value), x, y, x.value.hi < y.value.lo, y.value.hi < x.value.lo)
-    x, y = _both(x, y)
-    return _combined(x, y, np.minimum(x.lo, y.lo), np.minimum(x.hi, y.hi))
-
-
-def maximum(x: Any, y: Any) -> Any:
-    """Larger of two; the derivative holds both where either may be the larger.
-
-    Parameters
-    ----------
-    x, y : Interval, Dual or anything an Interval takes
-        Shapes that broadcast.
-
-    Returns
-    -------
-    Interval or Dual
-        Encloses every value over the argument (certified); of the same kind and shape.
-    """
-    if isinstance(x, Dual) or isinstance(y, Dual):
-        x, y = _dual(x, y), _dual(y, x)
-        return _selected(maximum(x.value, y.value), x, y, x.value.lo > y.value.hi, y.value.lo > x.value.hi)
-    x, y = _both(x, y)
-    return _combined(x, y, np.maximum(x.lo, y.lo), np.maximum(x.hi, y.hi))
 
 
 def _both(x: Any, y: Any) -> tuple[Interval, Interval]:

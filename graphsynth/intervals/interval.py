@@ -239,6 +239,15 @@ class Interval(Measures):
         product: Interval = self * other
         return product.sum(-1)
 
+    def times(self, other: Interval) -> Interval:
+        """Products of matrices (N, n, n) with matrices or vectors (N, n), added in order."""
+        if other.ndim < self.ndim:
+            return (self * other.reshape(*other.shape[:-1], 1, other.shape[-1])).sum(-1)
+        total = self[..., :, 0:1] * other[..., 0:1, :]
+        for k in range(1, self.shape[-1]):
+            total = total + self[..., :, k : k + 1] * other[..., k : k + 1, :]
+        return total
+
     def _beside(self, other: Any) -> Interval:
         """Read the other operand; its shape must fit."""
         read: Interval = interval(other)

@@ -20,8 +20,8 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals._checks import checked
 from graphsynth.intervals.functions import divide_extended
 from graphsynth.intervals.guard import check_rounding
-from graphsynth.intervals.interval import Interval, _make, interval
-from graphsynth.intervals.proving import _inverse, matmul, matvec, spectral_radius
+from graphsynth.intervals.interval import Interval, interval
+from graphsynth.intervals.proving import inverses, points, spectral_radius
 from graphsynth.intervals.status import Status
 
 __all__ = ["LinearResult", "gauss_seidel", "solve_linear"]
@@ -87,20 +87,18 @@ def solve_linear(matrix: Any, right: Any) -> LinearResult:
     """
     A, b = _read(matrix, right)
     n = b.size
-    Y, singular = _inverse(A.mid[None])
+    Y, singular = inverses(A.mid[None])
     if singular[0]:
         return LinearResult(Status.UNDECIDED, Interval.entire(n), float("inf"))
     with np.errstate(all="ignore"):
-        exact = _make(Y, Y)
-        centre = Y[0] @ b.mid
-        x = _make(centre, centre)
-        residual = matvec(exact, (b - matvec(A[None], x[None])[0])[None])[0]
-        rest = (_make(np.eye(n), np.eye(n)) - matmul(exact, A[None]))[0]
+        exact, x = points(Y), points(Y[0] @ b.mid)
+        residual = exact.times((b - A[None].times(x[None])[0])[None])[0]
+        rest = (points(np.eye(n)) - exact.times(A[None]))[0]
         radius = spectral_radius(np.asarray(rest.mag))
         D = residual
         for _ in range(_ROUNDS):
             trial = D.hull(0).inflate(0.1, 1e-300)
-            D = residual + matvec(rest[None], trial[None])[0]
+            D = residual + rest[None].times(trial[None])[0]
             if not D.is_bounded.all():
                 break
             if D.interior(trial).all():
@@ -112,7 +110,7 @@ def _tighten(residual: Interval, rest: Interval, D: Interval) -> Interval:
     """Repeat the contraction, one component after the other with the newest values, until it gains little."""
     for _ in range(_ROUNDS):
         before = D.width
-        D = D.intersect(residual + matvec(rest[None], D[None])[0])
+        D = D.intersect(residual + rest[None].times(D[None])[0])
         if not (D.width < 0.99 * before).any():
             break
     return D

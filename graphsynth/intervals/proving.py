@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,11 +108,10 @@ class KrawczykResult:
     exact_input: bool
 
 
-def _inverse(matrices: Array) -> tuple[Array, Mask]:
-    """Return inverses (identity where there is none) and where there is none."""
-    n = matrices.shape[-1]
+def inverses(matrices: Array) -> tuple[Array, Mask]:
+    """Return inverses (zero where there is none) and where there is none."""
     fine: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    guarded = np.where(fine[:, None, None], matrices, np.eye(n))
+    guarded = np.where(fine[:, None, None], matrices, np.eye(matrices.shape[-1]))
     try:
         inverse = np.linalg.inv(guarded)
     except np.linalg.LinAlgError:
@@ -121,7 +120,39 @@ def _inverse(matrices: Array) -> tuple[Array, Mask]:
             with suppress(np.linalg.LinAlgError):
                 inverse[k] = np.linalg.inv(matrix)
     fine = np.asarray(fine & np.isfinite(inverse).all(axis=(1, 2)))
-    return np.where(fine[:, None, None], inverse, np.eye(n)), ~fine
+    return np.where(fine[:, None, None], inverse, 0.0), ~fine
+
+
+class Enclosures(Protocol):
+    """What `krawczyk_image` needs of an arithmetic: arrays of intervals or of balls."""
+
+    def __add__(self, other: Self) -> Self:
+        """Sum."""
+
+    def __sub__(self, other: Self) -> Self:
+        """Difference."""
+
+    def times(self, other: Self) -> Self:
+        """Products of matrices (N, n, n) with matrices or vectors (N, n)."""
+
+
+E = TypeVar("E", bound=Enclosures)
+
+
+def krawczyk_image(point: Callable[[Array], E], Y: Array, z: E, at: E, slopes: E, box: E) -> tuple[E, E]:
+    """Krawczyk's operator ``K(X) = z - Y F(z) + (I - Y L) (X - z)`` in any arithmetic of enclosures, and ``I - Y L``.
+
+    ``point`` encloses real numbers.  Any ``Y`` is allowed: if K(X) lies in the interior of X, then X holds exactly one
+    solution, it lies in K(X), and the Jacobian is regular everywhere in X.
+    """
+    real = point(Y)
+    rest = point(np.eye(Y.shape[-1])) - real.times(slopes)
+    return z - real.times(at) + rest.times(box - z), rest
+
+
+def points(values: Array) -> Interval:
+    """Real numbers as intervals."""
+    return _make(values, values)
 
 
 def _square(f: System, x: Sequence[Any], parameters: Interval | None, shape: tuple[int, ...]) -> Sequence[Any]:
@@ -132,19 +163,6 @@ def _square(f: System, x: Sequence[Any], parameters: Interval | None, shape: tup
             f"the system returns {len(results)} equations for {len(x)} unknowns; Krawczyk's test needs as many"
         )
     return results
-
-
-def matvec(matrix: Interval, vector: Interval) -> Interval:
-    """Product of matrices (N, n, n) and vectors (N, n)."""
-    return (matrix * vector.reshape(*vector.shape[:-1], 1, vector.shape[-1])).sum(-1)
-
-
-def matmul(a: Interval, b: Interval) -> Interval:
-    """Product of matrices (N, n, n)."""
-    total = a[..., :, 0:1] * b[..., 0:1, :]
-    for k in range(1, a.shape[-1]):
-        total = total + a[..., :, k : k + 1] * b[..., k : k + 1, :]
-    return total
 
 
 def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Image:
@@ -184,12 +202,10 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
         over, slopes = values_of(duals, shape), jacobian_of(duals, n, shape)
         z = boxes.mid
         z = np.where(np.isfinite(z), z, 0.0)
-        centre = _make(z, z)
+        centre = points(z)
         at = values_of(_square(f, [centre[:, i] for i in range(n)], parameters, shape), shape)
-        Y, singular = _inverse(slopes.mid)
-        real = _make(Y, Y)
-        rest = _make(np.eye(n), np.eye(n)) - matmul(real, slopes)
-        K = centre - matvec(real, at) + matvec(rest, boxes - centre)
+        Y, singular = inverses(slopes.mid)
+        K, rest = krawczyk_image(points, Y, centre, at, slopes, boxes)
     void: Mask = np.asarray(boxes.is_empty.any(axis=1))
     smooth = _all_guaranteed(over, 1) & _all_guaranteed(slopes, 2) & _all_guaranteed(at, 1)
     smooth = np.asarray(smooth & boxes.is_bounded.all(axis=1) & ~singular)
@@ -210,10 +226,8 @@ def image(f: System, boxes: Interval, parameters: Interval | None = None) -> Ima
 
 def _regular(Y: Array, slopes: Interval) -> Mask:
     """Whether ``|I - Y mid L| < 1`` in the maximum norm is proved, so that Y is nonsingular."""
-    n = Y.shape[-1]
-    mid = slopes.mid
     with np.errstate(all="ignore"):
-        rest = _make(np.eye(n), np.eye(n)) - matmul(_make(Y, Y), _make(mid, mid))
+        rest = points(np.eye(Y.shape[-1])) - points(Y).times(points(slopes.mid))
         norm = _make(np.zeros_like(rest.mag), rest.mag).sum(-1).hi.max(axis=-1)
     return np.asarray(norm < 1.0)
 

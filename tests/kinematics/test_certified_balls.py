@@ -10,8 +10,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from graphsynth.kinematics.certify.balls import Balls, check_rounding, exact, tau_times, unit
-from graphsynth.kinematics.certify.cover import Budget, cover, prove_nodes
+from graphsynth.intervals.balls import Balls, exact, tau_times, unit
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.moving import Budget, cover, prove_nodes
 
 NUMBER = st.floats(-1e100, 1e100, allow_subnormal=True)
 OPERATIONS = [lambda a, b: a + b, lambda a, b: a - b, lambda a, b: a * b, lambda a, b: a / b]

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.intervals.balls import Balls, exact
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.certify import certify, certify_four_bar
-from graphsynth.kinematics.certify.balls import Balls, exact
 from graphsynth.kinematics.certify.equations import MechanismSystem
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.constraints import jacobian, residual

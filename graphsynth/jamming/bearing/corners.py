@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import choice
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, asin, atan2, cos, hypot, pi, sin
+from graphsynth.intervals.reading import enclose
 from graphsynth.jamming.bearing.bearing import CONDITIONS, Condition
-from graphsynth.jamming.bearing.parameters import Range, ToleranceBox, bounds_of
+from graphsynth.jamming.bearing.parameters import Range, ToleranceBox
 
 
 def ends(box: ToleranceBox, name: str, falling: bool = False) -> Interval:
@@ -67,7 +68,7 @@ def _inclination(box: ToleranceBox) -> Interval:
     """Pair of ``1 - n3^2`` for the normalised axis: grows with n1^2 + n2^2, falls with n3^2; rational, so exact."""
     squares = [_squares(box[f"n{i}"]) for i in (1, 2, 3)]
     flat = [squares[0][k] + squares[1][k] for k in (0, 1)]
-    pairs = [bounds_of(flat[k] / (flat[k] + squares[2][1 - k])) for k in (0, 1)]
+    pairs = [enclose(flat[k] / (flat[k] + squares[2][1 - k])) for k in (0, 1)]
     return Interval.from_bounds([low for low, _ in pairs], [high for _, high in pairs])
 
 
@@ -108,7 +109,7 @@ def phase(box: ToleranceBox) -> Interval:
         return Interval.from_bounds(-2.0, 2.0)
     if float(n1.hi) <= 0.0:  # keep away from the cut of atan2; a half turn does not matter
         n1, n2 = -n1, -n2
-    result: Interval = atan2(n2, n1) + box.outer("azimuth")
+    result = atan2(n2, n1) + box.outer("azimuth")
     if not (box["n3"].is_point and box["n3"].lower == 0):
         half = box.outer("alpha") / 2 * (1 if box.convention == "spec" else -1)
         length = (n1.sqr() + n2.sqr() + n3.sqr()).sqrt()
@@ -290,8 +291,7 @@ def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, flo
 
 def arcsine(value: float) -> Interval:
     """Enclose ``asin`` of a double in [0, 1]."""
-    found: Interval = asin(Interval.from_bounds(value, value))
-    return found
+    return asin(Interval.from_bounds(value, value))
 
 
 def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:

@@ -16,29 +16,12 @@ import numpy as np
 
 from graphsynth.core.checks import checked, choice, sign
 from graphsynth.core.errors import GeometryError
-from graphsynth.intervals.reading import fraction, text_ends
+from graphsynth.intervals.reading import enclose, fraction, text_ends
 from graphsynth.jamming.bearing.bearing import Bearing
 from graphsynth.mechanism.four_bar import TiltedFourBar
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
-
-
-def bounds_of(value: Fraction) -> tuple[float, float]:
-    """Return the largest double not above and the smallest not below a rational number.
-
-    Examples
-    --------
-    >>> bounds_of(Fraction(1, 2)), bounds_of(Fraction(3, 100))[0] < bounds_of(Fraction(3, 100))[1]
-    ((0.5, 0.5), True)
-    """
-    nearest = float(value)
-    exact = Fraction(nearest)
-    if exact == value:
-        return nearest, nearest
-    if exact < value:
-        return nearest, math.nextafter(nearest, math.inf)
-    return math.nextafter(nearest, -math.inf), nearest
 
 
 @checked
@@ -122,7 +105,7 @@ class Range:
     @cached_property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Tightest double bounds of the lower and of the upper end."""
-        return bounds_of(self.lower), bounds_of(self.upper)
+        return enclose(self.lower), enclose(self.upper)
 
     @cached_property
     def outer(self) -> Interval:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.certify.balls import Balls, exact, stack, tau_times, unit
+from graphsynth.intervals.balls import Balls, exact, stack, tau_times, unit
 from graphsynth.kinematics.certify.laws import law_rate, law_value
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver, Mechanism

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import flint
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.certify.numbers import ball, rational
-from graphsynth.kinematics.certify.precision import precision
+from graphsynth.intervals.exact import ball, precision, rational
 from graphsynth.mechanism.rotatability import KINDS, four_bar_rotation, rotation_kind, type_of
 
 __all__ = [

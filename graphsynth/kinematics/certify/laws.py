@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.kinematics.certify.balls import Balls, exact, unit
+from graphsynth.intervals.balls import Balls, exact, unit
 from graphsynth.mechanism.laws import Harmonic, Law, Linear, Polynomial
 
 __all__ = ["enclosed", "law_rate", "law_value", "whole_periods"]

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import positive, whole
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.certify.balls import Balls, check_rounding, exact, tau_times
-from graphsynth.kinematics.certify.cover import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
+from graphsynth.intervals.balls import Balls, exact, tau_times
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.moving import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
 from graphsynth.kinematics.certify.equations import MechanismSystem
 from graphsynth.kinematics.certify.laws import enclosed, whole_periods
 from graphsynth.kinematics.engine.result import Motion

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import three
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.certify.numbers import Gaussian, ball, complex_ball, gaussian, rational
-from graphsynth.kinematics.certify.precision import precision
+from graphsynth.intervals.exact import Gaussian, ball, complex_ball, gaussian, precision, rational
 from graphsynth.systems.platform.certified_exact_modes import exact_roots, parallel_positions, self_motion
 from graphsynth.systems.platform.certified_sextic_balls import SexticBalls, isolate, mirror_count, refine, sextic_balls
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.kinematics.certify.balls import UP, Balls, exact, stack, unit
+from graphsynth.intervals.balls import UP, Balls, exact, stack, unit
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 __all__ = ["LegBounds", "PlatformSystem"]

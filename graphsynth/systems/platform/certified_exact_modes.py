@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import flint
 
-from graphsynth.kinematics.certify.numbers import Gaussian, ball, complex_ball
+from graphsynth.intervals.exact import Gaussian, ball, complex_ball
 from graphsynth.systems.platform.certified_sextic_balls import sextic_balls
 
 __all__ = ["ExactRoot", "exact_roots", "parallel_positions", "self_motion"]

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.certify.balls import TINY, UP, Balls, check_rounding, exact, tau_times
-from graphsynth.kinematics.certify.cover import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
-from graphsynth.kinematics.certify.krawczyk import Boxes
+from graphsynth.intervals.balls import TINY, UP, Balls, exact, tau_times
+from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.moving import Boxes, Budget, Cover, Nodes, cover, prove_nodes, whole_turns
 from graphsynth.systems.platform.certified_equations import PlatformSystem
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 

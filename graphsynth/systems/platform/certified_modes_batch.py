@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import triples
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.certify.balls import TINY, UP, Balls, check_rounding, exact, tau_times, unit
+from graphsynth.intervals.balls import TINY, UP, Balls, exact, join, tau_times, unit
+from graphsynth.intervals.guard import check_rounding
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
 __all__ = ["AssemblyCertificateBatch", "certify_assembly_modes_batch", "certify_direct_batch"]
@@ -326,16 +327,12 @@ def _isolate(s: _Coefficients, decided: Mask) -> tuple[Index, NDArray[np.int64],
             at[left],
             arcs.at_high[left],
         )
-        arcs = _Arcs(np.concatenate([p, p]), np.concatenate([low, mid]), _join(a, m), _join(m, c))
+        arcs = _Arcs(np.concatenate([p, p]), np.concatenate([low, mid]), join(a, m), join(m, c))
         step //= 2
     else:
         decided[arcs.problem] = False
     problem, first, width = (np.concatenate(column) for column in zip(*found))
     return problem, first, width
-
-
-def _join(a: Balls, b: Balls) -> Balls:
-    return Balls(np.concatenate([a.mid, b.mid]), np.concatenate([a.rad, b.rad]))
 
 
 def _refine(s: _Coefficients, low: NDArray[np.int64], width: Array) -> Balls:

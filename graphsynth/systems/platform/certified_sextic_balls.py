@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import flint
 
-from graphsynth.kinematics.certify.numbers import Gaussian
+from graphsynth.intervals.exact import Gaussian
 
 __all__ = ["Isolation", "SexticBalls", "isolate", "mirror_count", "refine", "sextic_balls"]
 

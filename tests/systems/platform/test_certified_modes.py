@@ -17,8 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.certify.numbers import ball, complex_ball, gaussian, rational
-from graphsynth.kinematics.certify.precision import precision
+from graphsynth.intervals.exact import ball, complex_ball, gaussian, precision, rational
 from graphsynth.systems.platform import (
     AssemblyCertificate,
     AssemblyVerdict,

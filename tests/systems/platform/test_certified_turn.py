@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.intervals.balls import Balls, exact
 from graphsynth.kinematics.certify import certify_four_bar, certify_inverted_slider_crank, certify_slider_crank
-from graphsynth.kinematics.certify.balls import Balls, exact
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.rotatability import type_of
 from graphsynth.systems.platform import TurnVerdict, certify_full_turn

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GraphsynthError
-from graphsynth.kinematics.certify.precision import precision
+from graphsynth.intervals.exact import precision
 
-__all__ = ["UP", "Balls", "check_rounding", "exact", "stack", "tau_times", "unit"]
+__all__ = ["TINY", "UP", "Balls", "exact", "join", "stack", "tau_times", "unit"]
 
 Array = NDArray[np.float64]
 
@@ -34,22 +34,6 @@ SMALLEST = 2.0**-1074
 _STEPS = 1024
 #: Checked bound of the error of a cosine or sine in the table.
 _TABLE = 2.0**-52
-
-
-def check_rounding() -> None:
-    """Refuse to certify anything in a process whose rounding is not to nearest, or that flushes small numbers.
-
-    Raises
-    ------
-    GraphsynthError
-        If a library has changed the rounding mode of this process.
-    """
-    one, half, small = np.array([1.0, 2.0**-53, 5e-324])
-    if one + half != 1.0 or -one - half != -1.0 or one - half / 2.0 != 1.0 or not small * one > 0.0:
-        raise GraphsynthError(
-            "floating point does not round to nearest in this process, so nothing can be certified; "
-            "find the library that changed the rounding mode, and certify in a process without it"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +78,18 @@ class Balls:
 
     def __getitem__(self, key: Any) -> Balls:
         return Balls(self.mid[key], self.rad[key])
+
+    def times(self, other: Balls) -> Balls:
+        """Products of real matrices (N, n, n) with matrices or vectors (N, n)."""
+        if other.mid.ndim < self.mid.ndim:
+            product = self.times(other[..., None])
+            return product[..., 0]
+        gamma = 4.0 * (self.mid.shape[-1] + 2) * U  # more than the error of a sum of n products, relative to its terms
+        a, b = np.abs(self.mid), np.abs(other.mid)
+        rad = np.matmul(a, gamma * b + other.rad)
+        if self.rad.any():
+            rad = rad + np.matmul(self.rad, b + other.rad)
+        return Balls(np.matmul(self.mid, other.mid), rad * ((1.0 + gamma) * UP) + TINY)
 
     @property
     def real(self) -> Balls:
@@ -141,6 +137,11 @@ def exact(values: ArrayLike) -> Balls:
 def stack(parts: list[Balls]) -> Balls:
     """Balls of one shape, stacked on a new last axis."""
     return Balls(np.stack([p.mid for p in parts], axis=-1), np.stack([p.rad for p in parts], axis=-1))
+
+
+def join(a: Balls, b: Balls) -> Balls:
+    """Balls of both arrays along the first axis."""
+    return Balls(np.concatenate([a.mid, b.mid]), np.concatenate([a.rad, b.rad]))
 
 
 def tau_times(turns: ArrayLike) -> Balls:

@@ -1,7 +1,9 @@
-"""Exact input: integers, fractions, decimals and floats as rational numbers; rational numbers as balls."""
+"""Exact numbers: what is given as a rational number, and rational numbers as balls of python-flint."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -10,9 +12,21 @@ from typing import Any
 import flint
 import numpy as np
 
-from graphsynth.core.errors import GeometryError
+from graphsynth.core.errors import FormatError, GeometryError
+from graphsynth.intervals.reading import fraction
 
-__all__ = ["Gaussian", "ball", "complex_ball", "gaussian", "rational"]
+__all__ = ["Gaussian", "ball", "complex_ball", "gaussian", "precision", "rational"]
+
+
+@contextmanager
+def precision(bits: int) -> Iterator[None]:
+    """Work with python-flint's balls of ``bits`` binary digits inside the block, whatever the caller has set."""
+    before = flint.ctx.prec
+    flint.ctx.prec = bits
+    try:
+        yield
+    finally:
+        flint.ctx.prec = before
 
 
 @dataclass(frozen=True)
@@ -59,11 +73,13 @@ def rational(name: str, value: Any) -> Fraction:
     (Fraction(1, 10), Fraction(1, 2))
     """
     try:
-        if isinstance(value, float | int | str | Fraction | Decimal):
+        if isinstance(value, str):
+            return fraction(value)
+        if isinstance(value, float | int | Fraction | Decimal):
             return Fraction(value)
         if isinstance(value, np.floating | np.integer):
             return Fraction(value.item())
-    except (ValueError, OverflowError, ZeroDivisionError):
+    except (FormatError, ValueError, OverflowError):
         pass
     raise GeometryError(f"{name} = {value!r} is not a finite number; give an int, float, Fraction or decimal text")
 
