@@ -21,8 +21,7 @@ def exact_elbows(theta: tuple[str, ...]) -> list[Any]:
     """Anchors of G1 at decimal angles, as balls."""
     import flint
 
-    from graphsynth.kinematics.certify.numbers import ball, complex_ball, gaussian, rational
-    from graphsynth.kinematics.certify.precision import precision
+    from graphsynth.intervals.exact import ball, complex_ball, gaussian, precision, rational
 
     with precision(1000):
         found = []

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.intervals.exact import precision
 
-__all__ = ["TINY", "UP", "Balls", "exact", "join", "stack", "tau_times", "unit"]
+__all__ = ["TINY", "UP", "Balls", "argument", "exact", "join", "root", "stack", "tau_times", "unit"]
 
 Array = NDArray[np.float64]
 
@@ -48,22 +48,34 @@ class Balls:
 
     mid: NDArray[Any]
     rad: Array
+    __array_ufunc__ = None  # numpy leaves mixed operations to this class
 
-    def __add__(self, other: Balls) -> Balls:
+    def __add__(self, other: Balls | float) -> Balls:
+        other = _ball(other)
         mid = self.mid + other.mid
         return Balls(mid, (self.rad + other.rad + U * np.abs(mid)) * UP + TINY)
 
-    def __sub__(self, other: Balls) -> Balls:
+    __radd__ = __add__
+
+    def __sub__(self, other: Balls | float) -> Balls:
+        other = _ball(other)
         mid = self.mid - other.mid
         return Balls(mid, (self.rad + other.rad + U * np.abs(mid)) * UP + TINY)
 
-    def __mul__(self, other: Balls) -> Balls:
+    def __rsub__(self, other: float) -> Balls:
+        return _ball(other) - self
+
+    def __mul__(self, other: Balls | float) -> Balls:
+        other = _ball(other)
         a, b = np.abs(self.mid), np.abs(other.mid)
         # 4 U covers the error sqrt(5) U of a complex product, with or without fused operations
         return Balls(self.mid * other.mid, (a * other.rad + self.rad * (b + other.rad) + 4.0 * U * (a * b)) * UP + TINY)
 
-    def __truediv__(self, other: Balls) -> Balls:
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Balls | float) -> Balls:
         """Quotient; of infinite radius where the divisor may be zero.  Real balls only."""
+        other = _ball(other)
         # products below the normal range lose up to SMALLEST each, which a small divisor would blow up
         least = np.abs(other.mid) * (1.0 - 4.0 * U) - SMALLEST - other.rad
         with np.errstate(all="ignore"):
@@ -72,6 +84,9 @@ class Balls:
             rad = ((self.rad + size * other.rad + SMALLEST) / least + 4.0 * U * size) * UP + TINY
         good = (least > 0.0) & np.isfinite(mid) & np.isfinite(rad)
         return Balls(np.where(good, mid, 0.0), np.where(good, rad, np.inf))
+
+    def __rtruediv__(self, other: float) -> Balls:
+        return _ball(other) / self
 
     def __neg__(self) -> Balls:
         return Balls(-self.mid, self.rad)
@@ -124,6 +139,10 @@ class Balls:
     def wider(self, more: ArrayLike) -> Balls:
         """Radius increased by ``more``."""
         return Balls(self.mid, (self.rad + np.asarray(more)) * UP)
+
+
+def _ball(value: Balls | float) -> Balls:
+    return value if isinstance(value, Balls) else exact(value)
 
 
 def exact(values: ArrayLike) -> Balls:
@@ -186,3 +205,29 @@ def unit(angle: Balls) -> Balls:
     turned = _table()[index.astype(np.int64) % _STEPS] * total
     rad = np.where(sound & np.isfinite(angle.rad), (turned.rad + angle.rad) * UP, np.inf)
     return Balls(turned.mid, rad)
+
+
+def root(x: Balls) -> Balls:
+    """Square root of real balls; of infinite radius where zero is not excluded."""
+    with np.errstate(all="ignore"):
+        mid = np.sqrt(x.mid)
+        rad = (x.rad / mid + 2.0 * U * mid) * UP + TINY  # |sqrt(a) - sqrt(m)| <= |a - m| / sqrt(m)
+    good = (x.mid - x.rad > 0.0) & np.isfinite(rad)
+    return Balls(np.where(good, mid, 0.0), np.where(good, rad, np.inf))
+
+
+def argument(d: Balls) -> Balls:
+    """Argument of every member, continuous over the ball; infinite radius if zero may be inside.
+
+    The library's value at the midpoint is checked by turning back: ``d exp(-i phi)`` must lie on the positive axis.
+    """
+    phi = np.angle(d.mid)
+    back = exact(d.mid) * unit(exact(-phi))
+    least = back.real.mid - back.rad
+    with np.errstate(all="ignore"):
+        error = back.imag.size / least  # tangent of the error of phi
+        sine = d.rad / (np.abs(d.mid) * (1.0 - 1e-15))
+        spread = sine / np.sqrt(np.maximum(1.0 - sine * sine, 0.0))  # at least the arc sine
+        rad = (error + spread * (1.0 + 1e-14)) * (1.0 + 1e-14) + 1e-300
+    good = (least > 0.0) & (sine < 0.99) & np.isfinite(rad)
+    return Balls(phi, np.where(good, rad, np.inf))

@@ -12,8 +12,9 @@ from typing import Any, ClassVar
 
 from graphsynth.core.checks import Point, checked, finite, link_number, point, positive
 from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.equations import Gradient, Seen
 
-__all__ = ["COLUMNS", "Cam", "Gear", "JointGeometry", "PinSlot", "Prismatic", "Revolute"]
+__all__ = ["COLUMNS", "Cam", "Gear", "JointGeometry", "PinSlot", "PlanarJoint", "Prismatic", "Revolute"]
 
 #: Numbers of a joint in one row: point on a, direction on a, point on b, direction on b, radii, sign, offset.
 COLUMNS = ("ax", "ay", "a_angle", "bx", "by", "b_angle", "radius_a", "radius_b", "sign", "offset")
@@ -23,7 +24,7 @@ _HARMONICS_MAX = 1024
 
 
 @dataclass(frozen=True)
-class _Pair:
+class PlanarJoint:
     """Two links joined; the order a, b is the user's and need not ascend."""
 
     a: int
@@ -42,6 +43,18 @@ class _Pair:
         for name in angles:
             object.__setattr__(self, name, finite(f"{name} of joint {self.a}-{self.b}", getattr(self, name)))
 
+    def values(self, at: Seen) -> list[Any]:
+        """Left sides of the equations, in the arithmetic of ``at``."""
+        raise NotImplementedError
+
+    def gradients(self, at: Seen) -> list[Gradient]:
+        """Return the derivatives of the equations."""
+        raise NotImplementedError
+
+    def turns(self) -> list[tuple[float, ...]]:
+        """Return what a whole turn of the angle in each equation adds to it, in turns; empty where there is none."""
+        return [()] * (3 - self.mobility)
+
     @property
     def pair(self) -> tuple[int, int]:
         """The two links, ascending."""
@@ -49,7 +62,7 @@ class _Pair:
 
 
 @dataclass(frozen=True)
-class Revolute(_Pair):
+class Revolute(PlanarJoint):
     """Turning pair: the point ``at_a`` of link a and the point ``at_b`` of link b coincide (two equations)."""
 
     at_a: Point = (0.0, 0.0)
@@ -60,13 +73,27 @@ class Revolute(_Pair):
     def __post_init__(self) -> None:
         self._check(("at_a", "at_b"), ())
 
+    def values(self, at: Seen) -> list[Any]:
+        """``d = 0``."""
+        return list(at.plane.parts(at.d))
+
+    def gradients(self, at: Seen) -> list[Gradient]:
+        """Of both components of d."""
+        return [Gradient(at.plane.vector(1.0, 0.0)), Gradient(at.plane.vector(0.0, 1.0))]
+
+    coordinate_turns: ClassVar[bool] = True
+
+    def coordinate(self, at: Seen) -> tuple[Any, Gradient]:
+        """Angle of link b against link a, up to whole turns."""
+        return at.angle_b - at.angle_a, Gradient(None, -1.0, 1.0)
+
     def row(self) -> tuple[float, ...]:
         """Numbers in the order of `COLUMNS`."""
         return (*self.at_a, 0.0, *self.at_b, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Prismatic(_Pair):
+class Prismatic(PlanarJoint):
     """Sliding pair: ``at_b`` stays on the line of link a, and the two directions stay parallel (two equations).
 
     The line passes through ``at_a`` in the direction ``angle_a``; ``theta_a + angle_a = theta_b + angle_b``.  The
@@ -83,13 +110,33 @@ class Prismatic(_Pair):
     def __post_init__(self) -> None:
         self._check(("at_a", "at_b"), ("angle_a", "angle_b"))
 
+    def values(self, at: Seen) -> list[Any]:
+        """``t x d = 0`` and ``theta_b + angle_b - theta_a - angle_a = 0``."""
+        along = at.plane.cross(at.line(self.angle_a), at.d)
+        return [along, (at.angle_b + self.angle_b) - (at.angle_a + self.angle_a)]
+
+    def gradients(self, at: Seen) -> list[Gradient]:
+        """Return the derivatives; the line turns with link a."""
+        return [_across(at, self.angle_a), Gradient(None, -1.0, 1.0)]
+
+    def turns(self) -> list[tuple[float, ...]]:
+        """Return 1 for the equation of angles."""
+        return [(), (1.0,)]
+
+    coordinate_turns: ClassVar[bool] = False
+
+    def coordinate(self, at: Seen) -> tuple[Any, Gradient]:
+        """Displacement of ``at_b`` along the line."""
+        t = at.line(self.angle_a)
+        return at.plane.dot(t, at.d), Gradient(t, at.plane.cross(t, at.d))
+
     def row(self) -> tuple[float, ...]:
         """Numbers in the order of `COLUMNS`."""
         return (*self.at_a, self.angle_a, *self.at_b, self.angle_b, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class PinSlot(_Pair):
+class PinSlot(PlanarJoint):
     """Pin in a straight slot: the point ``at_b`` of link b stays on the line of link a (one equation)."""
 
     at_a: Point = (0.0, 0.0)
@@ -102,13 +149,21 @@ class PinSlot(_Pair):
     def __post_init__(self) -> None:
         self._check(("at_a", "at_b"), ("angle_a",))
 
+    def values(self, at: Seen) -> list[Any]:
+        """``t x d = 0``."""
+        return [at.plane.cross(at.line(self.angle_a), at.d)]
+
+    def gradients(self, at: Seen) -> list[Gradient]:
+        """Return the derivatives; the line turns with link a."""
+        return [_across(at, self.angle_a)]
+
     def row(self) -> tuple[float, ...]:
         """Numbers in the order of `COLUMNS`."""
         return (*self.at_a, self.angle_a, *self.at_b, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Gear(_Pair):
+class Gear(PlanarJoint):
     """Gear pair with pitch radii, external or internal (one equation).
 
     With phi the direction from the centre ``at_a`` to the centre ``at_b``, followed continuously,
@@ -141,14 +196,37 @@ class Gear(_Pair):
                 "give different radii"
             )
 
+    @property
+    def sign(self) -> float:
+        """+1 for an external, -1 for an internal pair."""
+        return -1.0 if self.internal else 1.0
+
+    def values(self, at: Seen) -> list[Any]:
+        """``radius_a (theta_a - phi) + s radius_b (theta_b - phi - offset) = 0``."""
+        return [self.mesh(at, at.plane.argument(at.d))]
+
+    def mesh(self, at: Seen, phi: Any) -> Any:
+        """Return the left side for a given direction of the line of centres."""
+        second = (at.angle_b - phi - self.offset) * (self.sign * self.radius_b)
+        return (at.angle_a - phi) * self.radius_a + second
+
+    def gradients(self, at: Seen) -> list[Gradient]:
+        """Return the derivatives; the line of centres turns with d."""
+        weight = (self.radius_a + self.sign * self.radius_b) * -1.0
+        by_d = at.plane.left(at.d) * (weight / at.plane.dot(at.d, at.d))
+        return [Gradient(by_d, self.radius_a, self.sign * self.radius_b)]
+
+    def turns(self) -> list[tuple[float, ...]]:
+        """Return what a turn of the line of centres adds."""
+        return [(self.radius_a, self.sign * self.radius_b)]
+
     def row(self) -> tuple[float, ...]:
         """Numbers in the order of `COLUMNS`."""
-        sign = -1.0 if self.internal else 1.0
-        return (*self.at_a, 0.0, *self.at_b, 0.0, self.radius_a, self.radius_b, sign, self.offset)
+        return (*self.at_a, 0.0, *self.at_b, 0.0, self.radius_a, self.radius_b, self.sign, self.offset)
 
 
 @dataclass(frozen=True)
-class Cam(_Pair):
+class Cam(PlanarJoint):
     """Disk cam on link a with a roller (or knife edge) on link b (one equation).
 
     The centre ``at_b`` of the roller stays on the pitch curve round ``at_a``, given in polar form by
@@ -192,6 +270,26 @@ class Cam(_Pair):
         waves[1 : len(self.harmonics) + 1] = [complex(c / unit, -s / unit) / 2.0 for c, s in self.harmonics]
         return float(np.fft.irfft(waves, norm="forward").min()) * unit
 
+    def values(self, at: Seen) -> list[Any]:
+        """``|d| = rho(psi)``, psi the direction of d seen from link a."""
+        return [at.plane.length(at.d) - self._wave(at)[0]]
+
+    def gradients(self, at: Seen) -> list[Gradient]:
+        """Return the derivatives; the pitch curve turns with link a."""
+        length, first = at.plane.length(at.d), self._wave(at)[1]
+        radial = at.d * (1.0 / length)
+        return [Gradient(radial - at.plane.left(radial) * (first / length), first)]
+
+    def _wave(self, at: Seen) -> tuple[Any, Any]:
+        """Radius of the pitch curve in the direction of d and its derivative, in any arithmetic."""
+        psi = at.plane.argument(at.d) - at.angle_a - self.angle_a
+        value, first = psi * 0.0 + self.radius, psi * 0.0
+        for k, (c, s) in enumerate(self.harmonics, 1):
+            cosine, sine = at.plane.cos(psi * k), at.plane.sin(psi * k)
+            value = value + cosine * c + sine * s
+            first = first + (cosine * s - sine * c) * k
+        return value, first
+
     @checked
     def pitch_radius(self, psi: float) -> tuple[float, float, float]:
         """Radius of the pitch curve at ``psi`` (radians from ``angle_a``) and its first two derivatives."""
@@ -215,6 +313,12 @@ def _harmonics(given: Any, name: str) -> tuple[Point, ...]:
         return tuple(point(f"harmonic {k} {name}", pair) for k, pair in enumerate(given, 1))
     except TypeError as error:
         raise GeometryError(f"harmonics {name} = {given!r} are no list of pairs (c_k, s_k)") from error
+
+
+def _across(at: Seen, angle: float) -> Gradient:
+    """Return the derivatives of ``t x d`` for the direction t of a line on link a."""
+    t = at.line(angle)
+    return Gradient(at.plane.left(t), at.plane.dot(t, at.d) * -1.0)
 
 
 JointGeometry = Revolute | Prismatic | PinSlot | Gear | Cam

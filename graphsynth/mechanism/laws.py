@@ -21,6 +21,8 @@ __all__ = ["LAWS", "Driver", "Harmonic", "Law", "Linear", "Polynomial", "Table"]
 
 Array = NDArray[np.float64]
 Law = Callable[[Array], tuple[Array, Array, Array]]
+#: Sine or cosine of an arithmetic.
+Function = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,10 @@ class Linear:
         u = _inputs(u)
         return self.offset + self.rate * u, np.full_like(u, self.rate), np.zeros_like(u)
 
+    def at(self, u: Any, sin: Function, cos: Function) -> tuple[Any, Any]:
+        """Coordinate and rate in any arithmetic with its sine and cosine."""
+        return u * self.rate + self.offset, u * 0.0 + self.rate
+
 
 @dataclass(frozen=True)
 class Harmonic:
@@ -67,6 +73,11 @@ class Harmonic:
         wave = self.amplitude * np.sin(angle)
         return self.mean + wave, self.order * self.amplitude * np.cos(angle), -(self.order**2) * wave
 
+    def at(self, u: Any, sin: Function, cos: Function) -> tuple[Any, Any]:
+        """Coordinate and rate in any arithmetic with its sine and cosine."""
+        angle = u * self.order + self.phase
+        return sin(angle) * self.amplitude + self.mean, cos(angle) * self.amplitude * self.order
+
 
 @dataclass(frozen=True)
 class Polynomial:
@@ -84,6 +95,13 @@ class Polynomial:
         u, p = _inputs(u), np.polynomial.Polynomial(self.coefficients)
         first, second = p.deriv(1), p.deriv(2)
         return np.asarray(p(u)), np.asarray(first(u)) + 0.0 * u, np.asarray(second(u)) + 0.0 * u
+
+    def at(self, u: Any, sin: Function, cos: Function) -> tuple[Any, Any]:
+        """Coordinate and rate in any arithmetic, by Horner's scheme."""
+        value, rate = u * 0.0, u * 0.0
+        for c in reversed(self.coefficients):
+            value, rate = value * u + c, rate * u + value
+        return value, rate
 
 
 @dataclass(frozen=True)

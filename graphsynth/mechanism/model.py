@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import Point, finite, link_number, point
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.constructors import Constructors
-from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.joints import COLUMNS, JointGeometry, PlanarJoint, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.methods import Methods
 from graphsynth.structure.graph import MechanismGraph
@@ -215,7 +215,7 @@ def _ordered(graph: MechanismGraph, joints: tuple[JointGeometry, ...]) -> tuple[
         raise GeometryError(f"space = {graph.space}: only planar mechanisms (space 3) have joint geometry here")
     by_pair: dict[tuple[int, int], JointGeometry] = {}
     for joint in joints:
-        if not isinstance(joint, Revolute | Prismatic | PinSlot | Gear | Cam):
+        if not isinstance(joint, PlanarJoint):
             raise GeometryError(f"{joint!r} is not a joint; use Revolute, Prismatic, PinSlot, Gear or Cam")
         if joint.pair in by_pair:
             raise GeometryError(f"joint {joint.pair[0]}-{joint.pair[1]} has two geometries; remove one")

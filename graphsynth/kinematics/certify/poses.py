@@ -16,8 +16,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.balls import Balls, exact, tau_times
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.moving import Budget, Cover, Nodes, cover, prove_nodes, whole_turns
-from graphsynth.kinematics.certify.equations import MechanismSystem
-from graphsynth.kinematics.certify.laws import enclosed, whole_periods
+from graphsynth.kinematics.certify.equations import MechanismSystem, enclosed, whole_periods
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.joints import Gear, Prismatic
 
@@ -229,11 +228,8 @@ def _meshes_again(joint: Gear, nodes: Nodes, gear: int, angle: dict[int, int]) -
     line = round(float(last.mid - first.mid) / math.tau)
     if not bool((last - first - tau_times(float(line))).size < 3.0):
         return False
-    sign = -1 if joint.internal else 1
-    shift = Fraction(joint.radius_a) * (angle[joint.a] - line) + sign * Fraction(joint.radius_b) * (
-        angle[joint.b] - line
-    )
-    return shift == 0
+    first_wheel, second_wheel = map(Fraction, joint.turns()[0])
+    return first_wheel * (angle[joint.a] - line) + second_wheel * (angle[joint.b] - line) == 0
 
 
 def _certificate(

@@ -8,6 +8,7 @@ triad of class III one core link and three equations, and the kernels solve 3 x 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,6 +34,24 @@ Number = float | Array
 _WIDE = 1e-14
 #: Columns of a dimension set that are lengths.
 _LENGTHS = [k for k, name in enumerate(COLUMNS) if name in ("ax", "ay", "bx", "by", "radius_a", "radius_b")]
+
+
+#: Equations of the kernels: codes, with the parameters that they have beside the two points.
+KernelRows = list[tuple[int, dict[int, Number]]]
+
+
+def _line(size: Array) -> dict[int, Number]:
+    return {codes.TX: np.cos(size[2]), codes.TY: np.sin(size[2])}
+
+
+#: Equations of every kind of joint, from its numbers in the order of `COLUMNS` (columns are arrays over the sets).
+ROWS: dict[str, Callable[[Array], KernelRows]] = {
+    "R": lambda size: [(codes.RX, {}), (codes.RY, {})],
+    "P": lambda size: [(codes.LINE, _line(size)), (codes.ANGLE, _line(size) | {codes.H: size[2] - size[5]})],
+    "pin-slot": lambda size: [(codes.LINE, _line(size))],
+    "gear": lambda size: [(codes.GEAR, {codes.RA: size[6], codes.RB: size[7], codes.SIGN: size[8], codes.H: size[9]})],
+    "cam": lambda size: [(codes.CAM, {codes.RA: size[2], codes.H: size[6]})],
+}
 
 
 class Row(NamedTuple):
@@ -245,23 +264,15 @@ class _Compiler:
         size = self.sizes[joint.pair].T
         base: list[Number] = [size[0], size[1], size[3], size[4], 1.0, 0.0, *[0.0] * 6]
         found = []
-        if isinstance(joint, Gear):
-            base[codes.RA], base[codes.RB], base[codes.SIGN], base[codes.H] = size[6:10]
-            return [Row(codes.GEAR, a, b, base)]
-        if isinstance(joint, Cam):
-            base[codes.RA], base[codes.H] = size[2], size[6]
-            return [Row(codes.CAM, a, b, [*base, *(part for pair in joint.harmonics for part in pair)])]
-        if isinstance(joint, Revolute):
-            found = [Row(codes.RX, a, b, list(base)), Row(codes.RY, a, b, list(base))]
-        else:
-            base[codes.TX], base[codes.TY] = np.cos(size[2]), np.sin(size[2])
-            found = [Row(codes.LINE, a, b, list(base))]
-            if isinstance(joint, Prismatic):
-                turned = list(base)
-                turned[codes.H] = size[2] - size[5]
-                found.append(Row(codes.ANGLE, a, b, turned))
+        for code, own in ROWS[joint.kind](size):
+            parameters = list(base)
+            for column, value in own.items():
+                parameters[column] = value
+            harmonics = joint.harmonics if isinstance(joint, Cam) else ()
+            found.append(Row(code, a, b, [*parameters, *(part for pair in harmonics for part in pair)]))
         if joint.pair in self.driven:
             index, driver = self.driven[joint.pair]
+            base[codes.TX], base[codes.TY] = np.cos(size[2]), np.sin(size[2])
             base[codes.SIGN], base[codes.SLOT] = (1.0 if driver.base == a else -1.0), float(index)
             found.append(Row(codes.DRIVE_ANGLE if isinstance(joint, Revolute) else codes.DRIVE_SLIDE, a, b, base))
         return found

@@ -1,0 +1,232 @@
+"""Joint equations in any arithmetic: floats, balls, intervals, duals, numbers of many digits, formulas.
+
+Every kind of joint states its equations once (`graphsynth.mechanism.joints`), over a `Plane` of numbers and vectors:
+`Floats` (numpy arrays) here, balls in `graphsynth.kinematics.certify`, and `Pairs` for any type of number with
+arithmetic and functions of its own: intervals, duals, mpmath, sympy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+__all__ = ["Floats", "Gradient", "Pair", "Pairs", "Plane", "Seen", "derivatives", "seen"]
+
+#: A number, and a vector of the plane, of the arithmetic in use.
+Number = Any
+Vector = Any
+
+
+class Plane(Protocol):
+    """Arithmetic of numbers and vectors; sums of vectors, and products with numbers, are written with operators."""
+
+    def vector(self, x: Number, y: Number) -> Vector:
+        """Vector of two numbers, plain floats among them."""
+
+    def parts(self, v: Vector) -> tuple[Number, Number]:
+        """Both components."""
+
+    def unit(self, angle: Number) -> Vector:
+        """Direction of an angle."""
+
+    def turned(self, v: Vector, by: Vector) -> Vector:
+        """``v`` turned by the direction of a unit vector."""
+
+    def left(self, v: Vector) -> Vector:
+        """``v`` turned to the left by a right angle."""
+
+    def dot(self, a: Vector, b: Vector) -> Number:
+        """Scalar product."""
+
+    def cross(self, a: Vector, b: Vector) -> Number:
+        """Component of ``a x b`` across the plane."""
+
+    def length(self, v: Vector) -> Number:
+        """Length of a vector."""
+
+    def argument(self, v: Vector) -> Number:
+        """Angle of a vector, up to whole turns."""
+
+    def cos(self, angle: Number) -> Number:
+        """Cosine."""
+
+    def sin(self, angle: Number) -> Number:
+        """Sine."""
+
+
+class Floats:
+    """Arrays of floats; vectors are complex numbers."""
+
+    def vector(self, x: Number, y: Number) -> Vector:
+        """Vector of two numbers."""
+        return x + 1j * y
+
+    def parts(self, v: Vector) -> tuple[Number, Number]:
+        """Both components."""
+        return v.real, v.imag
+
+    def unit(self, angle: Number) -> Vector:
+        """Direction of an angle."""
+        return np.exp(1j * angle)
+
+    def turned(self, v: Vector, by: Vector) -> Vector:
+        """Product of complex numbers."""
+        return by * v
+
+    def left(self, v: Vector) -> Vector:
+        """``v`` turned to the left by a right angle."""
+        return 1j * v
+
+    def dot(self, a: Vector, b: Vector) -> Number:
+        """Scalar product."""
+        return (np.conj(a) * b).real
+
+    def cross(self, a: Vector, b: Vector) -> Number:
+        """Component of ``a x b`` across the plane."""
+        return (np.conj(a) * b).imag
+
+    def length(self, v: Vector) -> Number:
+        """Length of a vector."""
+        return np.abs(v)
+
+    def argument(self, v: Vector) -> Number:
+        """Angle of a vector in (-pi, pi]."""
+        return np.angle(v)
+
+    def cos(self, angle: Number) -> Number:
+        """Cosine."""
+        return np.cos(angle)
+
+    def sin(self, angle: Number) -> Number:
+        """Sine."""
+        return np.sin(angle)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A vector of two numbers of any type."""
+
+    x: Number
+    y: Number
+
+    def __add__(self, other: Pair) -> Pair:
+        return Pair(self.x + other.x, self.y + other.y)
+
+    def __sub__(self, other: Pair) -> Pair:
+        return Pair(self.x - other.x, self.y - other.y)
+
+    def __mul__(self, other: Number) -> Pair:
+        return Pair(self.x * other, self.y * other)
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Any type of number, with its sine, cosine, square root and angle ``atan2(y, x)``."""
+
+    sin: Callable[[Number], Number]
+    cos: Callable[[Number], Number]
+    sqrt: Callable[[Number], Number]
+    atan2: Callable[[Number, Number], Number]
+
+    def vector(self, x: Number, y: Number) -> Pair:
+        """Vector of two numbers."""
+        return Pair(x, y)
+
+    def parts(self, v: Pair) -> tuple[Number, Number]:
+        """Both components."""
+        return v.x, v.y
+
+    def unit(self, angle: Number) -> Pair:
+        """Direction of an angle."""
+        return Pair(self.cos(angle), self.sin(angle))
+
+    def turned(self, v: Pair, by: Pair) -> Pair:
+        """``v`` turned by the direction of a unit vector."""
+        return Pair(by.x * v.x - by.y * v.y, by.y * v.x + by.x * v.y)
+
+    def left(self, v: Pair) -> Pair:
+        """``v`` turned to the left by a right angle."""
+        return Pair(-v.y, v.x)
+
+    def dot(self, a: Pair, b: Pair) -> Number:
+        """Scalar product."""
+        return a.x * b.x + a.y * b.y
+
+    def cross(self, a: Pair, b: Pair) -> Number:
+        """Component of ``a x b`` across the plane."""
+        return a.x * b.y - a.y * b.x
+
+    def length(self, v: Pair) -> Number:
+        """Length of a vector."""
+        return self.sqrt(v.x**2 + v.y**2)
+
+    def argument(self, v: Pair) -> Number:
+        """Angle of a vector."""
+        return self.atan2(v.y, v.x)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The two links of a joint in some arithmetic: what its equations are written in.
+
+    Attributes
+    ----------
+    plane : Plane
+    angle_a, angle_b : number
+        Angles of the links.
+    axis_a : vector
+        Direction of the x axis of link a.
+    arm_a, arm_b : vector
+        From the origin of each link to the joint's point of it.
+    d : vector
+        From the joint's point of a to that of b.
+    """
+
+    plane: Plane
+    angle_a: Number
+    angle_b: Number
+    axis_a: Vector
+    arm_a: Vector
+    arm_b: Vector
+    d: Vector
+
+    def line(self, angle: float) -> Vector:
+        """Direction of a line fixed on link a."""
+        return self.plane.turned(self.plane.unit(angle), self.axis_a)
+
+
+class Gradient(NamedTuple):
+    """Derivatives of one equation by the vector d and by the angles of links a and b; None for zero."""
+
+    by_d: Vector | None
+    by_a: Number | None = None
+    by_b: Number | None = None
+
+
+def seen(plane: Plane, joint: Any, a: tuple[Number, Number, Number], b: tuple[Number, Number, Number]) -> Seen:
+    """Place the two links of a joint at poses ``(x, y, theta)``."""
+    axes = [plane.unit(pose[2]) for pose in (a, b)]
+    arms = [plane.turned(plane.vector(*at), axis) for axis, at in zip(axes, (joint.at_a, joint.at_b))]
+    d = plane.vector(b[0], b[1]) + arms[1] - (plane.vector(a[0], a[1]) + arms[0])
+    return Seen(plane, a[2], b[2], axes[0], arms[0], arms[1], d)
+
+
+def derivatives(at: Seen, rows: Sequence[Gradient]) -> list[tuple[list[Number | None], list[Number | None]]]:
+    """Return the derivatives of equations by ``x, y, theta`` of link a and of link b; None for zero."""
+    found = []
+    for by_d, by_a, by_b in rows:
+        if by_d is None:
+            found.append(([None, None, by_a], [None, None, by_b]))
+            continue
+        x, y = at.plane.parts(by_d)
+        turn_a, turn_b = (at.plane.dot(by_d, at.plane.left(arm)) for arm in (at.arm_a, at.arm_b))
+        found.append(
+            (
+                [-x, -y, -turn_a if by_a is None else by_a - turn_a],
+                [x, y, turn_b if by_b is None else by_b + turn_b],
+            )
+        )
+    return found
