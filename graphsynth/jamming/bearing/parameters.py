@@ -375,8 +375,6 @@ class ToleranceBox:
 
     def nominal(self) -> tuple[TiltedFourBar, Bearing]:
         """Return the linkage and the bearing in the middle of the box, in doubles (estimated: for tables and plots)."""
-        import math
-
         m = {name: value.middle for name, value in self._ranges.items()}
         turn = m["azimuth"]
         n1 = m["n1"] * math.cos(turn) - m["n2"] * math.sin(turn)
