@@ -6,9 +6,9 @@ For a system ``f(x, u) = 0`` with as many equations as unknowns, an interval U o
     K(u) - c(u) = -Y f(c(u), u) + (1 - Y J(c(U) + B, U)) [-B, B]
 
 with any matrix Y satisfies: if it lies in the interior of [-B, B] for every u in U, then for every u in U there is
-exactly one solution in ``c(u) + B``, and the Jacobian is regular everywhere in the box (Krawczyk 1969; Neumaier 1990,
-section 5.1).  ``f`` along the moving centre is bounded by its value at mid U and its derivative by u over U, so the
-bound is of second order in the width of U.
+exactly one solution in ``c(u) + B``, and the Jacobian is regular everywhere in the box ([Krawczyk 1969]; [Neumaier
+1990], theory/circle-and-ellipse 1).  ``f`` along the moving centre is bounded by its value at mid U and its derivative
+by u over U, so the bound is of second order in the width of U.
 
 Nodes are inputs with a small box around the pose there; an interval between two nodes has a moving box.  If both are
 proved, and each node's solution lies in the moving box at that node's input, then by uniqueness the branch through the
