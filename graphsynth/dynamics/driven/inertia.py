@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,13 +12,9 @@ from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.motors import number, numbers
 
-if TYPE_CHECKING:
-    from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-
 __all__ = ["EffectiveInertia"]
 
 Array = NDArray[np.float64]
-_LARGEST = 4096  # samples of a turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,55 +90,6 @@ class EffectiveInertia:
             )
         return cls(rows, _common_zeros(rows), tail)
 
-    @classmethod
-    def of_platform(
-        cls,
-        machine: SingleMotorPlatform,
-        mass: float,
-        gyration: float,
-        mass_centre: complex = 0.0,
-        *,
-        rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0),
-        length: float = 1e-3,
-        tolerance: float = 1e-12,
-    ) -> EffectiveInertia:
-        """Effective inertia of the platform, and of the rockers, of a single-motor mechanism over a closed turn.
-
-        Parameters
-        ----------
-        machine : SingleMotorPlatform
-        mass : float
-            Of the platform, kg.
-        gyration : float
-            Radius of gyration about the mass centre, m.
-        mass_centre : complex
-            In the frame of the platform, m.
-        rocker_inertia : sequence of 3 floats
-            About the pivots D_k, kg m^2.
-        length : float
-            Metres per length unit of the machine (1e-3 for the millimetres of the mock-up).
-        tolerance : float
-            Largest relative truncation of the series.
-
-        Raises
-        ------
-        SpecError
-            Negative masses, or a motion that 4096 samples do not resolve.
-        GeometryError
-            If the home branch does not make a whole turn.
-        """
-        m = number("mass", mass, least=0.0)
-        radius = number("gyration", gyration, least=0.0)
-        wheels = [number(f"rocker_inertia {k}", v, least=0.0) for k, v in enumerate(rocker_inertia, 1)]
-        count = 128
-        while True:
-            rows, tail = _series(_velocities(machine, m, radius, complex(mass_centre), wheels, length, count))
-            if tail <= tolerance:
-                return cls(rows, _common_zeros(rows), tail)
-            if count == _LARGEST:
-                raise SpecError(f"{count} samples of a turn leave a relative error of {tail:.1e}; relax tolerance")
-            count *= 2
-
     def components(self, q: ArrayLike) -> tuple[Array, Array]:
         """Return the ``v_i`` and their derivatives at angles q (...), each of shape (k, ...)."""
         angle = finite_array("q", q, nan=True)
@@ -202,32 +147,6 @@ def _series(values: Array) -> tuple[Array, float]:
     rows[:, 1::2] = 2.0 * spectrum[:, 1 : top + 1].real
     rows[:, 2::2] = -2.0 * spectrum[:, 1 : top + 1].imag
     return rows, tail
-
-
-def _velocities(
-    machine: SingleMotorPlatform,
-    m: float,
-    radius: float,
-    centre: complex,
-    rockers: list[float],
-    length: float,
-    count: int,
-) -> Array:
-    from graphsynth.core.errors import GeometryError
-
-    psi = np.linspace(0.0, math.tau, count + 1)
-    sweep = machine.sweep(psi)
-    if not sweep.complete:
-        raise GeometryError(f"the branch ends at psi = {sweep.end[0]:.6g} rad: {sweep.reason}; use shorter cranks")
-    pose, velocity = sweep.pose[:-1], sweep.velocity[:-1]
-    if np.abs(sweep.pose[-1] - sweep.pose[0]).max() > 1e-9 * machine.Lc:
-        raise GeometryError(
-            "the branch does not close after one turn, so J has no period of 2 pi; choose another start"
-        )
-    point = length * (velocity[:, 0] + 1j * velocity[:, 1]) + 1j * np.exp(1j * pose[:, 2]) * centre * velocity[:, 2]
-    rows = [math.sqrt(m) * point.real, math.sqrt(m) * point.imag, math.sqrt(m) * radius * velocity[:, 2]]
-    rows += [math.sqrt(value) * sweep.theta_velocity[:-1, k] for k, value in enumerate(rockers) if value > 0.0]
-    return np.asarray(rows)
 
 
 def _common_zeros(rows: Array) -> tuple[float, ...]:

@@ -25,7 +25,7 @@ from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["EffectiveInertia", "OneCoordinateForm", "effective_inertia", "one_coordinate_obstacle"]
+__all__ = ["InertiaCurve", "OneCoordinateForm", "effective_inertia", "one_coordinate_obstacle"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -83,7 +83,7 @@ class EngineState(NamedTuple):
     centres: Array
 
 
-class EffectiveInertia(NamedTuple):
+class InertiaCurve(NamedTuple):
     """Effective inertia at the input, its derivative, and the mechanism's transmission to every link.
 
     ``inertia`` J and ``slope`` dJ/dtheta, shape (n,), kg m^2 (kg for a sliding input); NaN where the pose is out of
@@ -374,7 +374,7 @@ def engine_buffers(trace: Trace, n: int) -> EngineState:
 
 
 @checked
-def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object) -> EffectiveInertia:
+def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object) -> InertiaCurve:
     """Effective inertia ``J(theta) = sum m |r'|^2 + I psi'^2 (+ rotors)`` over the input, and its derivative.
 
     Parameters
@@ -388,7 +388,7 @@ def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object)
 
     Returns
     -------
-    EffectiveInertia
+    InertiaCurve
         Arrays of shape (n,): ``inertia``, ``slope``, and the ``inputs`` (estimated: floating point).
 
     Raises
@@ -425,4 +425,4 @@ def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object)
     second[..., 1] += extra.imag
     weighted = first @ compiled.tables.mass
     inertia = (weighted * first).sum(axis=1)
-    return EffectiveInertia(motion.inputs, inertia, 2.0 * (weighted * second.reshape(first.shape)).sum(axis=1))
+    return InertiaCurve(motion.inputs, inertia, 2.0 * (weighted * second.reshape(first.shape)).sum(axis=1))

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from graphsynth.core.compilation import kernel
+from graphsynth.dynamics.kernels.linear import factorise, substitute
 from graphsynth.dynamics.kernels.systems import pull, twist
 
 #: Columns of the table of friction; the sense is +1 or -1 (sliding), 0 (sticking, no force here), `BY_SPEED`.
@@ -116,7 +117,8 @@ def slide_loads(T, lam, parts):
     circles, plain substitution takes every second round.
     """
     count = T.friction.shape[0]
-    now, x, G = np.empty(lam.shape[0]), np.empty(count), np.empty((count, count + 1))
+    now, x, short = np.empty(lam.shape[0]), np.empty(count), np.empty(count)
+    G, order = np.empty((count, count)), np.empty(count, np.int64)
     for f in range(count):
         x[f] = friction_load(T, f, lam)
     factor = return_factor(T, parts)
@@ -128,7 +130,7 @@ def slide_loads(T, lam, parts):
         worst, size = 0.0, 0.0
         for f in range(count):
             load = friction_load(T, f, now)
-            G[f, count] = load - x[f]
+            short[f] = load - x[f]
             worst, size = max(worst, abs(load - x[f])), max(size, load, friction_load(T, f, lam))
             for g in range(count):
                 G[f, g] = (1.0 if f == g else 0.0) - load_slope(T, f, now, parts[g])
@@ -140,27 +142,9 @@ def slide_loads(T, lam, parts):
         if not worst < math.inf:
             break
         if step < 8 or step % 2 == 0:
-            eliminate(G)
+            if not factorise(G, order):
+                break
+            substitute(G, order, short)
         for f in range(count):
-            x[f] += G[f, count]
+            x[f] += short[f]
     return x, factor, -1.0
-
-
-@kernel
-def eliminate(G):
-    """Solve a square system with its right side as last column, in place of it."""
-    n = G.shape[0]
-    for s in range(n):
-        best = s
-        for i in range(s + 1, n):
-            if abs(G[i, s]) > abs(G[best, s]):
-                best = i
-        for j in range(n + 1):
-            G[s, j], G[best, j] = G[best, j], G[s, j]
-        for i in range(n):
-            if i != s:
-                ratio = G[i, s] / G[s, s]
-                for j in range(s, n + 1):
-                    G[i, j] -= ratio * G[s, j]
-    for s in range(n):
-        G[s, n] /= G[s, s]

@@ -102,15 +102,7 @@ def places(bar: FourBar, bodies: Mapping[int, Body], t: Any) -> list[Any]:
 
 def bodies_of(braider: Braider) -> dict[int, Body]:
     """Bars of a braider, the switch rigid with the rocker."""
-    from graphsynth.dynamics.model import Body
-
-    bar, (m1, m2, m3, m4) = braider.linkage, braider.masses
-    tip = braider.switch * complex(np.cos(braider.switch_angle), np.sin(braider.switch_angle))
-    rocker = Body.bar(m3, (0.0, 0.0), (bar.rocker, 0.0)), Body.bar(m4, (0.0, 0.0), (tip.real, tip.imag))
-    return {
-        1: Body.bar(m1, (0.0, 0.0), (bar.crank, 0.0)), 2: Body.bar(m2, (0.0, 0.0), (bar.coupler, 0.0)),
-        3: Body.combined(*rocker),
-    }  # fmt: skip
+    return braider.bodies
 
 
 def shape_of_braider(braider: Braider) -> Shape:

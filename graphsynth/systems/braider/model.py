@@ -15,8 +15,21 @@ from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.prescribed import prescribed_run
 from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, inductance_study
 from graphsynth.dynamics.driven.run import DriveRun, Plant, RunStatus, run
-from graphsynth.dynamics.motors import IdealSpeed, Motor, SynchronousMotor, check_motor, number, whole
+from graphsynth.dynamics.elements import Element, Force, MotorDrive
+from graphsynth.dynamics.model import Body, DynamicModel
+from graphsynth.dynamics.motors import (
+    IdealSpeed,
+    LinearCharacteristic,
+    Motor,
+    SynchronousMotor,
+    check_motor,
+    number,
+    whole,
+)
 from graphsynth.dynamics.trains import Train
+from graphsynth.mechanism.joints import Revolute
+from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.braider.linkage import FourBar
 
 __all__ = ["Braider", "LinkMotion", "Peak", "Settling", "Thread"]
@@ -194,6 +207,64 @@ class Braider:
             thread.guide.real, thread.guide.imag, thread.height, far, near,
         ])  # fmt: skip
         return Plant(np.zeros((1, 1)), base=self.inertia, linkage=linkage)
+
+    @property
+    def bodies(self) -> dict[int, Body]:
+        """Crank, coupler, and rocker with switch, as links 1 to 3 along their bars."""
+        bar, (m1, m2, m3, m4) = self.linkage, self.masses
+        rocker, switch = Body.bar(m3, (0.0, 0.0), (bar.rocker, 0.0)), Body.bar(m4, (0.0, 0.0), self._tip)
+        return {
+            1: Body.bar(m1, (0.0, 0.0), (bar.crank, 0.0)), 2: Body.bar(m2, (0.0, 0.0), (bar.coupler, 0.0)),
+            3: Body.combined(rocker, switch) if m3 + m4 > 0.0 else Body(0.0, 0.0),
+        }  # fmt: skip
+
+    @property
+    def _tip(self) -> tuple[float, float]:
+        return self.switch * math.cos(self.switch_angle), self.switch * math.sin(self.switch_angle)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The linkage as a planar mechanism: frame 0, crank 1 (driver), coupler 2, rocker 3 with the tip C."""
+        bar = self.linkage
+        return Mechanism(
+            MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0),
+            (
+                Revolute(0, 1),
+                Revolute(1, 2, (bar.crank, 0.0)),
+                Revolute(2, 3, (bar.coupler, 0.0), (bar.rocker, 0.0)),
+                Revolute(0, 3, (bar.frame, 0.0)),
+            ),
+            drivers=(Driver(0, 1),),
+            points={"C": TracePoint(3, self._tip)},
+        )
+
+    def model(self, *, motor: bool = True) -> DynamicModel:
+        """Return the braider as a dynamic model, thread and motor among its elements, for every form and integrator.
+
+        ``modes={0: linkage.branch}`` names its assembly mode.  An ideal speed is the driver's: only its inertia is
+        an element.
+
+        Examples
+        --------
+        >>> from graphsynth.dynamics import simulate_dynamics
+        >>> motion = simulate_dynamics(Braider().model(), [0.0, 0.01], keep={(0, 1): 0.0}, modes={0: 1})
+        >>> round(float(motion.velocities[-1, 1, 2]), 9)
+        0.537673535
+        """
+
+        def thread(t: float, place: tuple[float, float], velocity: tuple[float, float]) -> tuple[float, float]:
+            force = complex(self.thread.force(complex(*place)))
+            return force.real, force.imag
+
+        elements: list[Element] = [Force(3, thread, self._tip)] if self.thread.weight else []
+        if motor:
+            train = replace(self.train, inertia=self.train.inertia + self.inertia)
+            if isinstance(self.motor, IdealSpeed):
+                idle = LinearCharacteristic(0.0, 0.0, self.motor.rotor_inertia, self.motor.friction)
+                elements.append(MotorDrive(0, 1, idle, train))
+            else:
+                elements.append(MotorDrive(0, 1, self.motor, train))
+        return DynamicModel(self.mechanism, self.bodies, elements, gravity=(0.0, 0.0))
 
     def tip(self, theta: ArrayLike) -> NDArray[np.complex128]:
         """Position of the switch tip C, complex, m."""

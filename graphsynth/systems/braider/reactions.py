@@ -1,8 +1,8 @@
-"""Joint reactions of the braider: Newton and Euler for each link, checked by power and by multipliers."""
+"""Joint reactions of the braider: Newton and Euler for each link, checked by power and by the general formulation."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.driven.run import DriveRun
     from graphsynth.systems.braider.model import Braider
 
-__all__ = ["Reactions", "reactions", "run_reactions"]
+__all__ = ["Reactions", "general_reactions", "reactions", "run_reactions"]
 
 Array = NDArray[np.float64]
 
@@ -128,6 +128,36 @@ def run_reactions(braider: Braider, found: DriveRun) -> Reactions:
     """Reactions along a run, with the accelerations of the equation of motion."""
     alpha = braider.acceleration(found.angle, found.speed, found.motor_torque)
     return reactions(braider, found.angle, found.speed, alpha)
+
+
+def general_reactions(
+    braider: Braider, theta: ArrayLike, speed: ArrayLike, acceleration: ArrayLike
+) -> tuple[Array, Array]:
+    """Reactions a second way: multipliers of the planar model in nine absolute coordinates, by `inverse_dynamics`.
+
+    Returns
+    -------
+    forces, torque : ndarray of shape (n, 4, 2) and (n,)
+        As in `Reactions`; NaN where the linkage cannot be assembled.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.braider.model import Braider
+    >>> round(float(general_reactions(Braider(), [0.0], 1.803, 0.0)[1][0]), 15)
+    -7.9020145597e-05
+    """
+    from graphsynth.dynamics.inverse import inverse_dynamics
+    from graphsynth.kinematics.simulation import simulate
+    from graphsynth.mechanism.laws import Linear
+    from graphsynth.mechanism.model import Driver
+
+    theta, w, alpha = _together(theta, speed, acceleration)
+    model = braider.model(motor=False)
+    turning = replace(model.mechanism, drivers=(Driver(0, 1, Linear()),))
+    motion = simulate(turning, theta, modes={0: braider.linkage.branch}, events=False)
+    found = inverse_dynamics(model, motion, w, alpha, times=0.0)
+    pairs = ((0, 1), (1, 2), (2, 3), (0, 3))
+    return np.stack([found.reactions.between(*pair).on(pair[1])[0] for pair in pairs], axis=1), found.efforts[:, 0]
 
 
 def _turning(arm: NDArray[np.complex128], w: Array, alpha: Array) -> NDArray[np.complex128]:

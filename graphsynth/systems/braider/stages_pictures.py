@@ -97,27 +97,13 @@ def animations(context: Context) -> tuple[Picture, ...]:
     import numpy as np
 
     from graphsynth.drawing.animation import animated_svg
-    from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
-    from graphsynth.structure.graph import MechanismGraph
 
     table, braider = table_of(context), braider_of(context)
     bar = braider.linkage
     arcs = bar.reach()
     if not arcs:
         return ()
-    tip = braider.switch * complex(math.cos(braider.switch_angle), math.sin(braider.switch_angle))
-    linkage = Mechanism(
-        MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0),
-        (
-            Revolute(0, 1),
-            Revolute(1, 2, (bar.crank, 0.0)),
-            Revolute(2, 3, (bar.coupler, 0.0), (bar.rocker, 0.0)),
-            Revolute(0, 3, (bar.frame, 0.0)),
-        ),
-        drivers=(Driver(0, 1),),
-        points={"C": TracePoint(3, (tip.real, tip.imag))},
-    )
+    linkage = braider.mechanism
     low, high = (0.0, math.tau) if bar.turns_fully else arcs[-1]
     theta = np.linspace(low, high, 181)
     theta = theta[np.isfinite(bar.motion(theta).k3)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -27,9 +28,10 @@ from graphsynth.dynamics.trains import Train
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["MotorDrivenPlatform"]
+__all__ = ["MotorDrivenPlatform", "platform_inertia"]
 
 Array = NDArray[np.float64]
+_SAMPLES = (128, 256, 512, 1024, 2048, 4096)  # of a turn
 _SPIKES = "no rotor inertia: model S; the crank speed is unbounded at dead centres, an artefact of the missing inertia"
 
 
@@ -105,9 +107,7 @@ class MotorDrivenPlatform:
         length: float = 1e-3,
     ) -> MotorDrivenPlatform:  # fmt: skip
         """Real geometry: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of the gears."""
-        series = EffectiveInertia.of_platform(
-            machine, mass, gyration, mass_centre, rocker_inertia=rocker_inertia, length=length
-        )
+        series = platform_inertia(machine, mass, gyration, mass_centre, rocker_inertia=rocker_inertia, length=length)
         ratio = machine.gears.z2 / machine.gears.z1
         own = ratio**2 * number("pinion_inertia", pinion_inertia, least=0.0)
         own += 3.0 * number("wheel_inertia", wheel_inertia, least=0.0)
@@ -210,3 +210,71 @@ class MotorDrivenPlatform:
             load += EffectiveInertia(np.atleast_2d(self.load_series)).components(angle)[0][0]
         friction = self.friction + self.train.ratio**2 * self.motor.friction
         return np.asarray(0.5 * self.inertia.derivative(angle) * w * w + friction * w + load)
+
+
+def platform_inertia(
+    machine: SingleMotorPlatform, mass: float, gyration: float, mass_centre: complex = 0.0, *,
+    rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0), length: float = 1e-3, tolerance: float = 1e-12,
+) -> EffectiveInertia:  # fmt: skip
+    """Effective inertia of the platform, and of the rockers, of a single-motor mechanism over a closed turn.
+
+    Parameters
+    ----------
+    machine : SingleMotorPlatform
+    mass : float
+        Of the platform, kg.
+    gyration : float
+        Radius of gyration about the mass centre, m.
+    mass_centre : complex
+        In the frame of the platform, m.
+    rocker_inertia : sequence of 3 floats
+        About the pivots D_k, kg m^2.
+    length : float
+        Metres per length unit of the machine (1e-3 for the millimetres of the mock-up).
+    tolerance : float
+        Largest relative truncation of the series.
+
+    Raises
+    ------
+    SpecError
+        Negative masses, or a motion that 4096 samples do not resolve.
+    GeometryError
+        If the home branch does not make a whole turn.
+    """
+    m = number("mass", mass, least=0.0)
+    radius = number("gyration", gyration, least=0.0)
+    wheels = [number(f"rocker_inertia {k}", v, least=0.0) for k, v in enumerate(rocker_inertia, 1)]
+    for count in _SAMPLES:
+        velocities = _velocities(machine, m, radius, complex(mass_centre), wheels, length, count)
+        try:
+            return EffectiveInertia.of_samples(velocities, tolerance=tolerance)
+        except SpecError:
+            if count == _SAMPLES[-1]:
+                raise
+    raise AssertionError
+
+
+def _velocities(
+    machine: SingleMotorPlatform,
+    m: float,
+    radius: float,
+    centre: complex,
+    rockers: list[float],
+    length: float,
+    count: int,
+) -> Array:
+    from graphsynth.core.errors import GeometryError
+
+    psi = np.linspace(0.0, math.tau, count + 1)
+    sweep = machine.sweep(psi)
+    if not sweep.complete:
+        raise GeometryError(f"the branch ends at psi = {sweep.end[0]:.6g} rad: {sweep.reason}; use shorter cranks")
+    pose, velocity = sweep.pose[:-1], sweep.velocity[:-1]
+    if np.abs(sweep.pose[-1] - sweep.pose[0]).max() > 1e-9 * machine.Lc:
+        raise GeometryError(
+            "the branch does not close after one turn, so J has no period of 2 pi; choose another start"
+        )
+    point = length * (velocity[:, 0] + 1j * velocity[:, 1]) + 1j * np.exp(1j * pose[:, 2]) * centre * velocity[:, 2]
+    rows = [math.sqrt(m) * point.real, math.sqrt(m) * point.imag, math.sqrt(m) * radius * velocity[:, 2]]
+    rows += [math.sqrt(value) * sweep.theta_velocity[:-1, k] for k, value in enumerate(rockers) if value > 0.0]
+    return np.asarray(rows)

@@ -1,4 +1,4 @@
-"""The braider against theory/braider, multipliers, and laws that need no numbers."""
+"""The braider against theory/braider, its general model, and laws that need no numbers."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError, SpecError
+from graphsynth.dynamics import effective_inertia, simulate_dynamics
 from graphsynth.dynamics.driven.run import RunStatus
 from graphsynth.dynamics.motors import IdealSpeed
 from graphsynth.systems.braider.linkage import FourBar
 from graphsynth.systems.braider.model import Braider, Thread
-from graphsynth.systems.braider.multipliers import solve_with_multipliers
-from graphsynth.systems.braider.reactions import reactions, run_reactions
+from graphsynth.systems.braider.reactions import general_reactions, reactions, run_reactions
 
 KINEMATICS = """
 0 41.409622109270859338 82.819244218541718677 -0.5 -0.5 0.0944911182523068068 0.850420064270761261
@@ -104,15 +104,14 @@ def test_inverse_dynamics_of_the_specification(text, speed):
 @pytest.mark.parametrize("guide", [0.06, 0.03 + 0.07j])
 def test_multipliers_agree_with_newton_and_euler(speed, branch, guide):
     braider = Braider(linkage=FourBar(branch=branch), thread=Thread(guide=guide))
-    theta = np.random.default_rng(5).uniform(-math.pi, math.pi, 20)
+    theta = np.sort(np.random.default_rng(5).uniform(-math.pi, math.pi, 20))
     alpha = np.random.default_rng(6).normal(0.0, 50.0, 20)
     found = reactions(braider, theta, speed, alpha)
+    forces, torque = general_reactions(braider, theta, speed, alpha)
     for k in range(20):
-        second = solve_with_multipliers(braider, theta[k], speed, acceleration=alpha[k])
-        size = np.abs(second.forces).max()
-        np.testing.assert_allclose(found.forces()[k], second.forces, rtol=1e-12, atol=1e-13 * size)
-        assert found.torque[k] == pytest.approx(second.torque, rel=1e-12, abs=1e-13 * size * 0.02)
-        assert second.closure < 1e-16
+        size = np.abs(forces[k]).max()
+        np.testing.assert_allclose(found.forces()[k], forces[k], rtol=1e-12, atol=1e-13 * size)
+        assert found.torque[k] == pytest.approx(torque[k], rel=1e-12, abs=1e-13 * size * 0.02)
 
 
 def test_start_up_of_the_specification(start_up):
@@ -130,37 +129,47 @@ def test_reactions_along_the_start_up(start_up):
     # the late accelerations are differences of torques three hundred times larger
     np.testing.assert_allclose(rows[:, 0], expected[:, 1], rtol=1e-12, atol=2e-13)
     np.testing.assert_allclose(rows[:, 1:], expected[:, 2:], rtol=1e-11, atol=1e-16)
-    braider, motor = Braider(), Braider().motor
     for k in range(1, len(start_up.time)):
-        G = braider.train.ratio
-        applied = G * start_up.motor_torque[k] - G * G * motor.friction * start_up.speed[k]
-        second = solve_with_multipliers(braider, start_up.angle[k], start_up.speed[k], torque=applied)
-        assert second.acceleration[0, 2] == pytest.approx(found.acceleration[k], rel=1e-12, abs=2e-14)
-        np.testing.assert_allclose(found.forces()[k], second.forces, rtol=1e-12, atol=1e-16)
+        accelerations, forces = general_state(Braider(), start_up, k)
+        assert accelerations[1] == pytest.approx(found.acceleration[k], rel=1e-12, abs=2e-14)
+        np.testing.assert_allclose(found.forces()[k], forces, rtol=1e-12, atol=1e-16)
+
+
+def general_state(braider, run, k):
+    """Accelerations of the angles and the joint forces of the general model at a state of a run."""
+    model = braider.model()
+    drive = replace(model.elements[-1], currents=tuple(run.currents[k]))
+    model = replace(model, elements=(*model.elements[:-1], drive))
+    state = {"keep": {(0, 1): run.angle[k]}, "keep_rates": {(0, 1): run.speed[k]}, "modes": {0: 1}}
+    motion = simulate_dynamics(model, [0.0], form="augmented", **state)
+    joints = (motion.reactions.between(*pair).on(pair[1])[0][0] for pair in ((0, 1), (1, 2), (2, 3), (0, 3)))
+    return motion.accelerations[0, :, 2], np.array(list(joints))
+
+
+def test_start_up_of_the_general_model(start_up):
+    """The specification's start-up a second time: the planar model with its motor, integrated in every form."""
+    expected = read(TRANSIENT)
+    for form in ("one-coordinate", "partitioned", "augmented"):
+        motion = simulate_dynamics(
+            Braider().model(), start_up.time, keep={(0, 1): 0.0}, modes={0: 1}, form=form, rtol=1e-12
+        )
+        (motor,) = motion.motors
+        found = np.column_stack([motion.coordinate(0, 1)[0], motor.speed / Braider().train.ratio, motor.currents])[1:]
+        size = np.abs(expected[:, 1:]).max(axis=0)
+        np.testing.assert_allclose(found, expected[:, 1:], rtol=2e-12, atol=2e-12 * size.max())
+        assert motion.checks.energy < 1e-12 and motion.checks.electric < 1e-12 and motion.warnings == ()
 
 
 def test_start_up_under_load_of_the_thread():
-    """With a guide away from O2 the thread drives and brakes: against scipy on the multipliers' accelerations."""
-    from scipy.integrate import solve_ivp
-
+    """With a guide away from O2 the thread drives and brakes: against the general model in absolute coordinates."""
     braider = Braider(thread=Thread(weight=0.5, guide=0.02 + 0.08j))
-    motor, G = braider.motor, braider.train.ratio
-
-    def rhs(_t, y):
-        theta, w, d, q = y
-        torque = G * 1.5 * 4 * motor.flux * q - G * G * motor.friction * w
-        alpha = solve_with_multipliers(braider, theta, w, torque=torque).acceleration[0, 2]
-        shaft = 4 * G * w
-        return [
-            w, alpha, (motor.ud - 2.0 * d + shaft * 1e-3 * q) / 1e-3,
-            (motor.uq - 2.0 * q - shaft * (1e-3 * d + 5e-3)) / 1e-3,
-        ]  # fmt: skip
-
     found = braider.simulate([0.0, 0.02, 0.05], angle=1.0, speed=1.0, rtol=1e-12)
-    second = solve_ivp(rhs, (0.0, 0.05), [1.0, 1.0, 0.0, 0.0], "DOP853", found.time, rtol=1e-9, atol=1e-11)
+    start = {"keep": {(0, 1): 1.0}, "keep_rates": {(0, 1): 1.0}, "modes": {0: 1}}
+    second = simulate_dynamics(braider.model(), found.time, form="augmented", rtol=1e-12, **start)
+    expected = np.column_stack([*second.coordinate(0, 1), second.motors[0].currents])
     without = replace(braider, thread=Thread(weight=0.0)).simulate([0.0, 0.05], angle=1.0, speed=1.0)
     assert abs(without.speed[-1] - found.speed[-1]) > 1e-3
-    np.testing.assert_allclose(np.column_stack([found.angle, found.speed, found.currents]), second.y.T, atol=2e-8)
+    np.testing.assert_allclose(np.column_stack([found.angle, found.speed, found.currents]), expected, atol=1e-10)
 
 
 def test_settling_and_steady_speed():
@@ -279,14 +288,10 @@ def test_effective_inertia_is_the_kinetic_energy():
     linkage = J - braider.reflected_inertia
     assert 7.6e-6 < linkage.min() < 7.8e-6 and 3.5e-5 < linkage.max() < 3.7e-5  # theory/braider 4
     assert braider.reflected_inertia == pytest.approx(0.02766, abs=5e-6)
+    general = effective_inertia(braider.model(motor=False), theta, modes={0: 1})
+    np.testing.assert_allclose(general.inertia, linkage, rtol=1e-12)
+    np.testing.assert_allclose(general.slope, slope, rtol=1e-11, atol=1e-12 * np.abs(slope).max())
     for k in (180, 1200, 2460):
-        bodies = solve_with_multipliers(braider, theta[k], 1e-9, acceleration=1.0).acceleration
-        mass = np.array([0.015, 0.045, 0.050])
-        arm = abs(0.03 * 0.02 + 0.02 * 0.0175 * np.exp(1j * braider.switch_angle)) / 0.05
-        spin = np.array([0.015 * 0.02**2 / 12, 0.045 * 0.06**2 / 12, (0.03 * 0.04**2 + 0.02 * 0.035**2) / 3])
-        spin[2] -= 0.05 * arm**2
-        energy = (mass * (bodies[:, 0] ** 2 + bodies[:, 1] ** 2) + spin * bodies[:, 2] ** 2).sum()
-        assert linkage[k] == pytest.approx(energy, rel=1e-12)
         h = 1e-5
         ends = braider.effective_inertia(theta[k] + np.array([-h, h]))[0]
         assert slope[k] == pytest.approx((ends[1] - ends[0]) / (2 * h), abs=1e-9)
@@ -297,10 +302,7 @@ def test_link_motion_and_energy(start_up):
     motion = braider.link_motion(start_up)
     s = braider.linkage.motion(start_up.angle)
     np.testing.assert_allclose(motion.speed[:, 2], s.k3 * start_up.speed)
-    second = solve_with_multipliers(
-        braider, start_up.angle[5], start_up.speed[5], acceleration=motion.acceleration[5, 0]
-    )
-    np.testing.assert_allclose(motion.acceleration[5], second.acceleration[:, 2], rtol=1e-11)
+    np.testing.assert_allclose(motion.acceleration[5], general_state(braider, start_up, 5)[0][1:], rtol=1e-11)
 
 
 def test_ideal_speed_needs_the_torque_of_the_inverse_dynamics():
@@ -347,10 +349,6 @@ REFUSED = {
     "theta = 'x' are not": lambda: reactions(Braider(), "x", 1.0, 0.0),
     "do not fit": lambda: reactions(Braider(), [0.0, 1.0], [1.0, 2.0, 3.0], 0.0),
     "no inductance to take to zero": lambda: Braider(motor=IdealSpeed(1.0)).inductance_study([0, 1], (1e-3,)),
-    "only one of them": lambda: solve_with_multipliers(Braider(), 0.0, 1.0),
-    "cannot be assembled at theta": lambda: solve_with_multipliers(
-        Braider(linkage=FourBar(0.03, 0.03, 0.04, 0.06)), 3.0, 1.0, acceleration=0.0
-    ),
 }
 
 

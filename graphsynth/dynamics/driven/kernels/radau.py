@@ -15,7 +15,6 @@ import numpy as np
 
 from graphsynth.core.compilation import kernel
 from graphsynth.dynamics.driven.kernels.coefficients import ERROR, SHIFT, STAGES, A, C
-from graphsynth.dynamics.driven.kernels.linear import clear, copy, factorise, norm, substitute
 from graphsynth.dynamics.driven.kernels.systems import (
     DIRECT,
     DRIVING,
@@ -33,6 +32,7 @@ from graphsynth.dynamics.driven.kernels.systems import (
     jacobian,
     kinetic_energy,
 )
+from graphsynth.dynamics.kernels.linear import clear, copy, factorise, norm, substitute
 
 DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, TOO_MANY_EVENTS = 0, 1, 2, 3, 4
 NONE, OUTPUT, DEAD_CENTRE, STALL, LIMIT, FLOW = 0, 1, 2, 3, 4, 5

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from graphsynth.core.errors import GeometryError, SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.motors import DCMotor
-from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+from graphsynth.systems.platform.motor_model import MotorDrivenPlatform, platform_inertia
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 LEGS = (-5 * math.pi / 6, -math.pi / 6, math.pi / 2)
@@ -32,7 +32,7 @@ RANGES = {
 @pytest.mark.parametrize("name", RANGES)
 def test_ranges_of_the_real_geometry(name):
     machine, expected, dead = RANGES[name]
-    inertia = EffectiveInertia.of_platform(machine, 1.0, 0.020)
+    inertia = platform_inertia(machine, 1.0, 0.020)
     low, high, mean = (1e6 * x for x in inertia.range())
     assert low == pytest.approx(expected[0], abs=1.01e-3)
     assert (high, mean) == pytest.approx(expected[1:], abs=1.01e-3)
@@ -40,7 +40,7 @@ def test_ranges_of_the_real_geometry(name):
 
 
 def test_linear_design_almost_has_dead_points():
-    inertia = EffectiveInertia.of_platform(LINEAR, 1.0, 0.020)
+    inertia = platform_inertia(LINEAR, 1.0, 0.020)
     low, high, mean = (1e6 * x for x in inertia.range())
     assert (high, mean) == pytest.approx((16.102, 8.020), abs=1.01e-3)
     assert not inertia.dead_centres
@@ -58,7 +58,7 @@ def test_linear_design_almost_has_dead_points():
 def test_value_and_derivative_against_the_sweep():
     machine = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
     centre, rockers = 0.003 - 0.002j, (1e-4, 2e-4, 3e-4)
-    inertia = EffectiveInertia.of_platform(machine, 1.7, 0.02, centre, rocker_inertia=rockers)
+    inertia = platform_inertia(machine, 1.7, 0.02, centre, rocker_inertia=rockers)
     q = np.sort(np.random.default_rng(3).uniform(0.0, math.tau, 40))
     sweep = machine.sweep(q)
     point = 1e-3 * (sweep.velocity[:, 0] + 1j * sweep.velocity[:, 1])
@@ -73,7 +73,7 @@ def test_value_and_derivative_against_the_sweep():
 def test_reference_point_of_the_specification():
     """theory/values-of-the-platform 5: J_eff/m and half its derivative at psi = pi/2."""
     machine = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
-    inertia = EffectiveInertia.of_platform(machine, 1.0, 0.020)
+    inertia = platform_inertia(machine, 1.0, 0.020)
     assert 1e6 * float(inertia.value(math.pi / 2)) == pytest.approx(25.677994605313476, rel=1e-13)
     assert 0.5e6 * float(inertia.derivative(math.pi / 2)) == pytest.approx(6.2006475694504331, rel=1e-12)
 
@@ -119,6 +119,6 @@ def test_samples_that_do_not_resolve_are_refused():
     good = EffectiveInertia.of_samples(2.0 * np.sin(q))
     assert good.dead_centres == pytest.approx((0.0, math.pi)) or good.dead_centres == pytest.approx((-math.pi, 0.0))
     with pytest.raises(GeometryError, match=r"branch ends|home branch"):
-        EffectiveInertia.of_platform(SingleMotorPlatform(crank=(31, 31, 31)), 1.0, 0.02)
+        platform_inertia(SingleMotorPlatform(crank=(31, 31, 31)), 1.0, 0.02)
     with pytest.raises(SpecError, match="mass = -1"):
-        EffectiveInertia.of_platform(SingleMotorPlatform(), -1.0, 0.02)
+        platform_inertia(SingleMotorPlatform(), -1.0, 0.02)
