@@ -56,11 +56,26 @@ def _plain_links(text: str, page: str) -> str:
 
 
 def _read(app: object, page: str, source: list[str]) -> None:
-    source[0] = pages.with_links_to_references(_plain_links(source[0], page), page)
+    text = _plain_links(pages.with_benches(source[0]), page)
+    source[0] = pages.with_links_to_references(pages.with_scene_keys(text), page)
     if page == "index":
         source[0] = _toctrees(source[0])
     elif page == "reference/api":
         source[0] = source[0].replace("<!-- docstrings -->", public_api.reference())
+
+
+def _note_objects(app: Any, doctree: nodes.document) -> None:
+    """Enter every public name in the inventory of the site (``objects.inv``), so that other sites can link to it."""
+    if app.env.current_document.docname != "reference/api":
+        return
+    anchors = {}
+    for room in doctree.findall(nodes.section):
+        for entry in room.children:
+            if isinstance(entry, nodes.section):
+                anchors[room[0].astext(), entry[0].astext()] = entry["ids"][0]
+    for room_name, name, dotted, kind in public_api.places():
+        for full in dotted:
+            app.env.domains.python_domain.note_object(full, kind, anchors[room_name, name])
 
 
 def _mathml(writer: Any, node: Any) -> None:
@@ -77,5 +92,6 @@ def _mathml(writer: Any, node: Any) -> None:
 def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
     app.connect("source-read", _read)
+    app.connect("doctree-read", _note_objects)
     app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

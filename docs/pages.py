@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"])
@@ -33,7 +36,9 @@ def theory() -> dict[str, set[int]]:
 
 def _last_names(author: str) -> list[str]:
     names = [name.strip() for name in author.split(" and ")]
-    return [name.strip("{}").removeprefix("The ").split(" ")[0] if "{" in name else name.split(",")[0] for name in names]
+    return [
+        name.strip("{}").removeprefix("The ").split(" ")[0] if "{" in name else name.split(",")[0] for name in names
+    ]
 
 
 def bibliography() -> dict[str, dict[str, str]]:
@@ -55,7 +60,9 @@ def references() -> str:
         for name in entry["author"].split(" and "):
             last, _, first = name.strip("{} ").partition(", ")
             people.append(f"{first} {last}".strip())
-        where = [entry.get(field, "") for field in ("edition", "journal", "booktitle", "number", "publisher", "address")]
+        where = [
+            entry.get(field, "") for field in ("edition", "journal", "booktitle", "number", "publisher", "address")
+        ]
         where[0] += " edition" if where[0] else ""
         if "volume" in entry:
             where.append(f"volume {entry['volume']}")
@@ -73,3 +80,81 @@ def with_links_to_references(text: str, page: str) -> str:
     for label, entry in bibliography().items():
         text = text.replace(f"[{label}]", f"[{label}](#{entry['key'].lower()})")
     return text if page != "reference/bibliography" else text.replace("<!-- references -->", references())
+
+
+def _kind(schema: dict[str, Any]) -> str:
+    """Type of a key in words: "number, mm", "text", "list of 3 numbers"."""
+    if "enum" in schema:
+        return ", ".join(f"`{json.dumps(value)}`" for value in schema["enum"])
+    if "anyOf" in schema:
+        kinds = list(dict.fromkeys(_kind(option) for option in schema["anyOf"]))
+        return " or ".join(kind for kind in kinds if kind != "quantity" or len(kinds) == 1)
+    if schema.get("type") == "array":
+        items = schema.get("prefixItems") or [schema.get("items") or {}]
+        many = f"{len(items)} of " if "prefixItems" in schema else "list of "
+        return many + " and ".join(dict.fromkeys(_kind(item) for item in items if isinstance(item, dict)))
+    if schema.get("type") == "string" and "pattern" in schema:
+        return "quantity"
+    return {"string": "text", "object": "table", "boolean": "true or false"}.get(
+        schema.get("type", ""), schema.get("type", "any")
+    )
+
+
+def _rows(schema: dict[str, Any], above: str) -> Iterator[str]:
+    for key, value in schema.get("properties", {}).items():
+        told = value.get("description", "")
+        if told.startswith("with its unit"):  # the same key without the unit in its name
+            continue
+        if _kind(value).endswith("quantity") and any(f"{key}_" in other for other in schema["properties"]):
+            continue
+        inner = json.dumps([value.get("items"), value.get("prefixItems")])
+        unit = re.match(r"in (.*), or text with a unit$", told) or re.search(
+            r'"in ([^"]*), or text with a unit"', inner
+        )
+        default = "" if "default" not in value else f"`{json.dumps(value['default'])}`"
+        needed = "needed" if key in schema.get("required", ()) else default
+        meaning = "" if told.startswith("in ") else " ".join(told.split()).replace("|", r"\|")
+        yield f"| `{above}{key}` | {_kind(value)} | {unit[1] if unit else ''} | {needed} | {meaning} |"
+        yield from _rows(value, f"{above}{key}.")
+        if isinstance(value.get("items"), dict):
+            yield from _rows(value["items"], f"{above}{key}[].")
+
+
+def scene_keys(module: str) -> str:
+    """Table of the keys of one system's ``[mechanism]``, from the schema of scene files."""
+    schema = json.loads((ROOT / "docs" / "reference" / "scene.schema.json").read_text("utf-8"))
+    for case in schema["allOf"]:
+        if case["if"]["properties"]["mechanism"]["properties"]["module"].get("const") == module:
+            rows = _rows(case["then"]["properties"]["mechanism"], "")
+            head = "| key | type | unit | default | meaning |\n|---|---|---|---|---|\n"
+            return head + "\n".join(row for row in rows if not row.startswith("| `module`"))
+    raise ValueError(f"no system is called {module!r}")
+
+
+def with_scene_keys(text: str) -> str:
+    """Put the tables of keys into a page."""
+    return re.sub(r"<!-- keys: (\w+) -->", lambda match: scene_keys(match[1]), text)
+
+
+def benches() -> str:
+    """Table of the benchmarks: what each module of ``tests/bench`` measures, in the first sentence of its docstring."""
+    rows = []
+    for path in sorted((ROOT / "tests" / "bench").glob("test_*_speed.py")):
+        told = ast.get_docstring(ast.parse(path.read_text("utf-8"))) or ""
+        first = " ".join(re.split(r"[;:.]", told.partition("\n\n")[0])[0].split())
+        rows.append(f"| `{path.name}` | {first} |")
+    return "| module | what it measures |\n|---|---|\n" + "\n".join(rows)
+
+
+def readme_table() -> str:
+    """Return the comparison with other tools as it stands in the README."""
+    section = (ROOT / "README.md").read_text("utf-8").partition("## Beside other tools\n")[2].partition("\n## ")[0]
+    return re.sub(r"\]\(docs/", "](../", section.strip())
+
+
+def with_benches(text: str) -> str:
+    """Put the tables of benchmarks into a page."""
+    for mark, table in (("<!-- benches -->", benches), ("<!-- table of the README -->", readme_table)):
+        if mark in text:
+            text = text.replace(mark, table())
+    return text

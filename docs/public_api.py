@@ -25,7 +25,7 @@ def rooms() -> list[str]:
     found = list(MODULES)
     for init in PACKAGE.rglob("__init__.py"):
         name = ".".join(init.parent.relative_to(PACKAGE.parent).parts)
-        public = re.search(r"^__all__\b", init.read_text("utf-8"), re.MULTILINE)
+        public = re.search(r"^(?:\w+, )*__all__\b", init.read_text("utf-8"), re.MULTILINE)
         if public and not {"kernels", "cli"} & set(name.split(".")):
             found.append(name)
     return sorted(found, key=lambda name: (-name.count("."), name))
@@ -101,3 +101,24 @@ def reference() -> str:
         if entries:
             sections[room] = f"## `{room}`\n\n" + "\n".join(entries)
     return "\n".join(text for _, text in sorted(sections.items()))
+
+
+def kind_of(thing: object) -> str:
+    """Kind of a name, as the Python domain of Sphinx calls it."""
+    if inspect.isclass(thing):
+        return "exception" if issubclass(thing, BaseException) else "class"
+    if inspect.ismodule(thing):
+        return "module"
+    return "function" if callable(thing) else "data"
+
+
+def places() -> list[tuple[str, str, list[str], str]]:
+    """Room and name of every entry of `reference`, every dotted name that leads to it, and its kind."""
+    entries: dict[int, tuple[str, str, list[str], str]] = {}
+    for room in rooms():
+        module = import_module(room)
+        for name in sorted(public_names(room)):
+            thing = getattr(module, name)
+            entry_of = entries.setdefault(id(thing), (room, name, [], kind_of(thing)))
+            entry_of[2].append(f"{room}.{name}")
+    return list(entries.values())

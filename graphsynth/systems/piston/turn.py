@@ -119,6 +119,11 @@ def piston_turn(machine: PistonMachine, length: float | None = None) -> PistonTu
     length : float, optional
         Of piston and shoe, for the forces at their ends, m; the stroke by default.
 
+    Returns
+    -------
+    PistonTurn
+        Work of gas, friction and crank over one turn, and the peaks of the forces.
+
     Raises
     ------
     GeometryError

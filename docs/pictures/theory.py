@@ -1,0 +1,549 @@
+"""The drawings of the theory: what a lecturer would put on the board, drawn from the formulas of the page.
+
+``python docs/pictures/theory.py [FOLDER]`` draws them anew.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from graphsynth.drawing.svg import number, painted, picture, words
+from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+
+Points = Iterable[complex]
+
+
+class Board:
+    """A board with its origin and scale: points are complex numbers, y upwards."""
+
+    def __init__(self, width: float, height: float, origin: complex, scale: float) -> None:
+        self.width, self.height, self.origin, self.scale = width, height, origin, scale
+        self.parts: list[str] = []
+
+    def xy(self, point: complex) -> tuple[str, str]:
+        """Place of a point on the page."""
+        page = self.origin + self.scale * point.conjugate()
+        return number(page.real), number(page.imag)
+
+    def line(self, *points: complex, colour: str = "ink", width: float = 1.6, dash: str = "", fill: str = "") -> None:
+        """Draw a polyline; a fill closes it."""
+        path = "M" + " L".join(" ".join(self.xy(point)) for point in points) + ("Z" if fill else "")
+        look = painted(fill, colour if width else "", width, opacity=0.25)
+        more = f' stroke-dasharray="{dash}"' if dash else ""
+        self.parts.append(f'<path d="{path}" {look}{more} stroke-linejoin="round" stroke-linecap="round"/>')
+
+    def curve(self, points: Points, **look: object) -> None:
+        """Draw a smooth curve through many points."""
+        self.line(*points, **look)  # type: ignore[arg-type]
+
+    def circle(self, centre: complex, radius: float, colour: str = "ink", width: float = 1.6, dash: str = "") -> None:
+        """Draw a circle of a radius in the units of the drawing."""
+        turn = [centre + radius * cmath.exp(2j * math.pi * k / 96) for k in range(97)]
+        self.line(*turn, colour=colour, width=width, dash=dash)
+
+    def arc(self, centre: complex, radius: float, start: float, stop: float, colour: str = "note") -> None:
+        """Draw an arc with an arrow head at its end (angles in radians)."""
+        turn = [centre + radius * cmath.exp(1j * (start + (stop - start) * k / 24)) for k in range(25)]
+        self.line(*turn, colour=colour, width=1.2)
+        self.head(turn[-1], turn[-1] - turn[-3], colour)
+
+    def head(self, tip: complex, along: complex, colour: str = "ink") -> None:
+        """Draw the head of an arrow."""
+        back = 9.0 / self.scale * along / abs(along)
+        path = " L".join(" ".join(self.xy(p)) for p in (tip, tip - back * (1 + 0.35j), tip - back * (1 - 0.35j)))
+        self.parts.append(f'<path d="M{path}Z" {painted(colour)}/>')
+
+    def arrow(self, start: complex, end: complex, colour: str = "ink", width: float = 1.6) -> None:
+        """Draw an arrow."""
+        self.line(start, end, colour=colour, width=width)
+        self.head(end, end - start, colour)
+
+    def span(self, start: complex, end: complex, text: str, aside: complex = 0j) -> None:
+        """Draw a dimension line with an arrow at both ends and its text beside the middle."""
+        self.line(start, end, colour="note", width=1.0)
+        self.head(end, end - start, "note")
+        self.head(start, start - end, "note")
+        self.text((start + end) / 2 + aside, text, colour="note")
+
+    def joint(self, *points: complex) -> None:
+        """Draw revolute joints."""
+        for point in points:
+            x, y = self.xy(point)
+            self.parts.append(f'<circle cx="{x}" cy="{y}" r="4" {painted("paper", "ink", 1.6)}/>')
+
+    def ground(self, *points: complex) -> None:
+        """Draw fixed pivots: a joint on a hatched foot."""
+        for point in points:
+            foot = [point + (a + 1j * b) / self.scale for a, b in ((0, 0), (-10, -16), (10, -16))]
+            self.line(*foot, fill="note", colour="ink", width=1.2)
+            self.joint(point)
+
+    def text(self, at: complex, text: str, *, colour: str = "ink", size: float = 14.0, anchor: str = "middle") -> None:
+        """Write text, its middle at a point."""
+        page = self.origin + self.scale * at.conjugate()
+        self.parts.append(
+            words(text, page.real, page.imag + 0.36 * size, size=size, colour=colour, anchor=anchor, halo=3)
+        )
+
+    def svg(self, title: str) -> str:
+        """Return the finished picture."""
+        return picture(self.parts, self.width, self.height, title) + "\n"
+
+
+def _ring(a: float, b: float, centre: complex = 0j, turn: complex = 1.0) -> list[complex]:
+    """Points of an ellipse."""
+    return [
+        centre + turn * complex(a * math.cos(t), b * math.sin(t)) for t in (2 * math.pi * k / 120 for k in range(121))
+    ]
+
+
+def tilted_bearing() -> str:
+    """Draw a tilted bearing in a long hole (A), and a long shaft through a short hole (B)."""
+    board = Board(680, 330, 170 + 165j, 4.0)
+    tilt = cmath.exp(-1j * math.radians(12))
+    radius, half, clearance = 17.5, 9.0, 2.0
+    for shift, short in ((0j, True), (82 + 0j, False)):
+        hole, tall = radius + clearance, 26.0 if short else 9.0
+        for side in (-1, 1):
+            wall = [
+                shift + side * x + 1j * y for x, y in ((hole, -tall), (hole + 9, -tall), (hole + 9, tall), (hole, tall))
+            ]
+            board.line(*wall, fill="note", colour="note", width=0)
+            board.line(shift + side * hole - 1j * tall, shift + side * hole + 1j * tall, width=2)
+        length = half if short else 27.0
+        body = [
+            shift + tilt * complex(x, y)
+            for x, y in ((-radius, -length), (radius, -length), (radius, length), (-radius, length))
+        ]
+        board.line(*body, fill="a", colour="a", width=2)
+        board.line(shift - 33j, shift + 33j, colour="note", width=1, dash="8 3 2 3")
+        board.line(shift - 33j * tilt, shift + 33j * tilt, colour="a", width=1, dash="8 3 2 3")
+        board.arc(shift, 30, math.pi / 2, math.pi / 2 - math.radians(12))
+        board.text(shift + 3.5 + 34.5j, "t")
+        touch = [tilt * complex(radius, half), -tilt * complex(radius, half)]
+        if not short:
+            touch = [complex(hole, 9.0), complex(-hole, -9.0)]
+        for point in touch:
+            x, y = board.xy(shift + point)
+            board.parts.append(f'<circle cx="{x}" cy="{y}" r="6" {painted(stroke="b", width=2.5)}/>')
+    board.span(-radius - clearance - 29j, radius + clearance - 29j, "2 Rh = 2 (R + c)", -4j)
+    board.span(tilt * (-radius - 9j) - 2, tilt * (-radius + 9j) - 2, "", 0j)
+    board.text(-12 - 0.5j, "Hb = 2 h")
+    board.text(-37j, "A: short bearing, long hole", size=15)
+    board.text(82 - 37j, "B: long shaft, short hole", size=15)
+    board.span(82 + 25 - 9j, 82 + 25 + 9j, "Hb", 4.5)
+    return board.svg("A bearing whose axis is tilted by t touches its hole at two opposite points")
+
+
+def lambda_linkage() -> str:
+    """Draw the lambda linkage with its symbols and the path of its tracing point."""
+    linkage = TiltedFourBar()
+    board = Board(620, 420, 190 + 345j, 62.0)
+    table = linkage.positions([math.radians(f) for f in range(0, 361, 3)])
+    places = table.B
+    path = [complex(*(2 * b - a)[:2]) for a, b in zip(table.A, places, strict=True)]
+    board.curve(path, colour="b", width=2)
+    board.circle(0j, 1.0, colour="note", width=1, dash="4 4")
+    crank, k = table.A[20], 20
+    a, b = complex(*crank[:2]), complex(*places[k][:2])
+    m = 2 * b - a
+    board.line(0j, a, width=3)
+    board.line(a, m, width=3, colour="a")
+    board.line(2 + 0j, b, width=3)
+    board.line(0j, 2 + 0j, colour="note", width=1.2, dash="6 4")
+    board.ground(0j, 2 + 0j)
+    board.joint(a, b)
+    board.arc(0j, 0.45, 0, cmath.phase(a))
+    for at, text in (
+        (-0.25 + 0.12j, "O"),
+        (2.3 + 0j, "C"),
+        (a - 0.24 + 0.1j, "A"),
+        (b + 0.3 - 0.1j, "B"),
+        (m + 0.3, "M"),
+    ):
+        board.text(at, text)
+    for at, text in (
+        (0.62 + 0.22j, "f"),
+        (1 - 0.22j, "l1"),
+        (a / 2 - 0.2 + 0.1j, "l2"),
+        ((a + b) / 2 - 0.22, "l3"),
+        ((2 + b) / 2 + 0.26, "l4"),
+    ):
+        board.text(at, text, colour="note")
+    return board.svg("Chebyshev's lambda linkage and the path of its tracing point M")
+
+
+def circle_and_ellipse() -> str:
+    """Draw the shaft's circle and the two lids of the tilted hole (exaggerated)."""
+    board = Board(560, 380, 280 + 180j, 8.0)
+    radius, hole, tilt, half = 17.5, 18.2, 0.32, 5.0
+    for sign in (-1, 1):
+        board.curve(
+            _ring(hole * math.cos(tilt), hole, sign * half * math.sin(tilt)), colour="a" if sign > 0 else "c", width=1.8
+        )
+    board.circle(0j, radius, colour="b", width=2.2)
+    board.arrow(-22 + 0j, 24 + 0j, colour="note", width=1)
+    board.text(25.5 + 0j, "u", colour="note")
+    board.line(-half * math.sin(tilt) + 0j, half * math.sin(tilt) + 0j, width=4)
+    board.text(3.4 - 1.8j, "h sin t")
+    board.text(-27 + 13j, "shaft, radius R", colour="b", anchor="start")
+    board.text(14 + 18j, "top lid", colour="a", anchor="start")
+    board.text(-20 - 18j, "bottom lid", colour="c", anchor="end")
+    board.text(-20.5j, "semi-axes Rh cos t along u, Rh across", colour="note", size=13)
+    return board.svg("The two lids of a tilted hole, seen along the shaft, and the circle of the shaft")
+
+
+def jam_arcs() -> str:
+    """Draw the sine of the tilt over a turn against the critical one."""
+    board = Board(690, 300, 60 + 150j, 1.5)
+    kappa, high = 0.45, 62.0
+    turn = [complex(f, high * math.sin(math.radians(f))) for f in range(361)]
+    board.arrow(0j, 378 + 0j, colour="note", width=1)
+    board.arrow(-80j, 85j, colour="note", width=1)
+    board.curve(turn, colour="a", width=2.2)
+    edge = math.degrees(math.asin(kappa))
+    for sign, start in ((1, edge), (-1, 180 + edge)):
+        stop = start + 180 - 2 * edge
+        board.line(sign * 1j * kappa * high, 360 + sign * 1j * kappa * high, colour="note", width=1, dash="5 4")
+        inside = [point for point in turn if start <= point.real <= stop]
+        board.line(
+            complex(start, sign * kappa * high),
+            *inside,
+            complex(stop, sign * kappa * high),
+            fill="b",
+            colour="b",
+            width=1,
+        )
+        board.line(complex(start, -86), complex(stop, -86), colour="b", width=5)
+    board.text(-16 + 1j * kappa * high, "κ")
+    board.text(-18 - 1j * kappa * high, "−κ")
+    board.text(384 + 12j, "f − ψ1", size=13)
+    board.text(60 + 92j, "sin(f − ψ1)", colour="a", size=13)
+    for f in (180, 360):
+        board.text(complex(f + 12, -10), f"{f}°", size=12, colour="note")
+    board.text(180 - 74j, "jam arcs", colour="b", size=13)
+    return board.svg("Two jam arcs per turn, where the sine of the tilt exceeds the critical one")
+
+
+def whitney() -> str:
+    """Draw a peg in a hole with two contacts, and the diagram of its loads."""
+    board = Board(660, 330, 150 + 150j, 3.0)
+    lean = cmath.exp(-1j * math.radians(7))
+    for side in (-1, 1):
+        wall = [complex(side * x, y) for x, y in ((21, 12), (38, 12), (38, -45), (21, -45))]
+        board.line(*wall, fill="note", colour="note", width=0)
+        board.line(complex(side * 38, 12), complex(side * 21, 12), complex(side * 21, -45), width=2)
+    board.line(
+        *(lean * complex(x, y) for x, y in ((-18, -28), (18, -28), (18, 40), (-18, 40))), fill="a", colour="a", width=2
+    )
+    tip = lean * -28j
+    board.arrow(tip, tip - 18j, colour="b", width=2)
+    board.arrow(tip, tip + 17, colour="b", width=2)
+    board.text(tip - 22j - 5, "Fz", colour="b")
+    board.text(tip + 11 + 6j, "Fx", colour="b")
+    board.span(-45 + 12j, complex(-45, tip.imag), "l", -4)
+    slope, reach = 0.55, 1.6
+    centre = 118 - 5j
+    corners = [
+        complex(x * 26, y * 15)
+        for x, y in (
+            (1.25, reach - slope * 1.25 * 1.4),
+            (1.25, -reach - slope * 1.25 * 1.4),
+            (-1.25, -reach + slope * 1.25 * 1.4),
+            (-1.25, reach + slope * 1.25 * 1.4),
+        )
+    ]
+    board.arrow(centre - 44, centre + 46, colour="note", width=1)
+    board.arrow(centre - 50j, centre + 49j, colour="note", width=1)
+    board.line(*(centre + corner for corner in corners), fill="c", colour="c", width=2)
+    board.text(centre + 40 - 6j, "Fx / Fz", size=13)
+    board.text(centre + 18 + 46j, "M / (r Fz)", size=13)
+    board.text(centre + 12j - 12, "no jamming", size=13)
+    board.text(centre + 38 + 5j, "1/μ", size=12, colour="note")
+    board.text(centre + 5 + 27j, "λ", size=12, colour="note")
+    return board.svg("A peg with two contacts, and Whitney's parallelogram of loads without jamming")
+
+
+def shared_tilt() -> str:
+    """Draw the tilts of the joints close the loop: levers about a point p."""
+    table = TiltedFourBar().positions([math.radians(60)])
+    a, b = complex(*table.A[0][:2]), complex(*table.B[0][:2])
+    board = Board(560, 330, 130 + 265j, 75.0)
+    point = 3.6 + 2.2j
+    for joint in (a, b, 2 + 0j):
+        board.line(point, joint, colour="c", width=1.4, dash="5 4")
+    board.line(0j, a, width=3)
+    board.line(a, b, width=3, colour="a")
+    board.line(2 + 0j, b, width=3)
+    board.arrow(-0.9 + 0j, 4.6 + 0j, colour="b", width=2)
+    board.text(4.75 + 0j, "a", colour="b")
+    board.ground(0j, 2 + 0j)
+    board.joint(a, b)
+    board.span(complex(point.real, 0.06), point - 0.06j, "|a × (p − O)|", 0.66)
+    for at, text in (
+        (-0.22 + 0.2j, "O"),
+        (a - 0.22 + 0.12j, "A"),
+        (b + 0.02 + 0.25j, "B"),
+        (2.25 - 0.2j, "C"),
+        (point + 0.22 + 0.05j, "p"),
+    ):
+        board.text(at, text)
+    board.text(3.2 + 0.95j, "t |p − r|", colour="c", size=13)
+    return board.svg(
+        "The tilted motor lifts a point p; every joint can give back its critical tilt times its distance from p"
+    )
+
+
+def _platform(
+    board: Board, platform: ParallelPlatform, pose: complex, alpha: float, sigma: tuple[int, int, int], colour: str
+) -> None:
+    """Draw a platform on its legs."""
+    angles = platform.inverse([[pose.real, pose.imag, alpha]], sigma).theta[0]
+    corners = [pose + cmath.exp(1j * alpha) * vertex for vertex in platform.b]
+    board.line(*corners, fill=colour, colour=colour, width=2)
+    for pivot, arm, angle, corner in zip(platform.D, platform.l1, angles, corners, strict=True):
+        elbow = pivot + arm * cmath.exp(1j * float(angle))
+        board.line(pivot, elbow, width=3)
+        board.line(elbow, corner, width=2)
+        board.joint(elbow, corner)
+        board.ground(pivot)
+
+
+def platform() -> str:
+    """Draw the reference platform G1 with its symbols."""
+    g1 = ParallelPlatform.g1()
+    board = Board(560, 400, 110 + 330j, 118.0)
+    _platform(board, g1, 1.2 + 0.9j, 0.15, (1, 1, 1), "a")
+    first = g1.D[0]
+    angle = float(g1.inverse([[1.2, 0.9, 0.15]], (1, 1, 1)).theta[0][0])
+    elbow = first + g1.l1[0] * cmath.exp(1j * angle)
+    vertex = 1.2 + 0.9j + cmath.exp(0.15j) * g1.b[0]
+    board.arc(first, 0.3, 0, angle)
+    board.line(first, first + 0.5, colour="note", width=1)
+    for at, text in (
+        (first - 0.2 + 0.02j, "D1"),
+        (elbow - 0.17 + 0.05j, "A1"),
+        (vertex - 0.03 - 0.16j, "F1"),
+        (1.2 + 0.9j, "p, α"),
+        (first + 0.37 + 0.2j, "θ1"),
+    ):
+        board.text(at, text)
+    board.text((first + elbow) / 2 - 0.16, "l1", colour="note")
+    board.text((elbow + vertex) / 2 + 0.02 + 0.14j, "l2", colour="note")
+    return board.svg("A platform on three legs: pivots D, rockers l1, intermediate links l2, vertices F")
+
+
+def modes() -> str:
+    """Draw both assembly modes of the reference platform at the same rocker angles."""
+    g1 = ParallelPlatform.g1()
+    board = Board(560, 420, 90 + 350j, 112.0)
+    first = (1.2 + 0.9j, 0.15)
+    second = (1.170779876116247 + 1.013261618710664j, -1.200689464379391)
+    angles = g1.inverse([[1.2, 0.9, 0.15]], (1, 1, 1)).theta[0]
+    elbows = [D + arm * cmath.exp(1j * float(angle)) for D, arm, angle in zip(g1.D, g1.l1, angles, strict=True)]
+    for (place, alpha), colour in ((first, "a"), (second, "b")):
+        corners = [place + cmath.exp(1j * alpha) * vertex for vertex in g1.b]
+        board.line(*corners, fill=colour, colour=colour, width=2)
+        for elbow, corner in zip(elbows, corners, strict=True):
+            board.line(elbow, corner, colour=colour, width=1.6, dash="" if colour == "a" else "6 4")
+            board.joint(corner)
+    for pivot, elbow, name in zip(g1.D, elbows, ("A1", "A2", "A3"), strict=True):
+        board.line(pivot, elbow, width=3)
+        board.ground(pivot)
+        board.joint(elbow)
+        board.text(elbow + 0.16 + 0.08j, name)
+    return board.svg("The two assembly modes of a platform: the same rocker angles, two poses")
+
+
+def singular() -> str:
+    """Draw the lines of the intermediate links of the mock-up that meet in one point."""
+    mock = ParallelPlatform.mock()
+    board = Board(460, 420, 225 + 220j, 1.55)
+    alpha = 2 * math.atan(3 / 7)
+    _platform(board, mock, 0j, alpha, (-1, -1, -1), "a")
+    angles = mock.inverse([[0.0, 0.0, alpha]], (-1, -1, -1)).theta[0]
+    for D, arm, angle in zip(mock.D, mock.l1, angles, strict=True):
+        elbow = D + arm * cmath.exp(1j * float(angle))
+        board.line(elbow, -0.3 * elbow, colour="b", width=1.2, dash="6 4")
+    board.text(16 - 9j, "det J = 0", colour="b", size=13)
+    return board.svg("A type-II singularity: the lines of the three intermediate links pass through one point")
+
+
+def levels() -> str:
+    """Draw the mechanism graph of the source's Figure 3 by adjacency levels."""
+    board = Board(680, 330, 40 + 60j, 1.0)
+    rows = ((0,), (1, 2, 3, 4, 8, 9, 10), (5, 6, 7, 11, 12, 13), (14,))
+    at = {}
+    for k, row in enumerate(rows):
+        for m, link in enumerate(row):
+            at[link] = complex(320 + (m - (len(row) - 1) / 2) * 82, -75 * k)
+        board.text(complex(0, -75 * k), f"L{k}", colour="note")
+    single = "0-1 0-2 0-3 0-4 2-5 3-6 4-7 5-8 6-9 7-10 0-8 0-9 0-10 8-11 9-12 10-13 11-14 12-14 13-14"
+    for pair in single.split():
+        one, other = map(int, pair.split("-"))
+        board.line(at[one], at[other], colour="note")
+    for k, other in enumerate((2, 3, 4)):
+        bend = (at[1] + at[other]) / 2 + 1j * (10 + 10 * k)
+        board.curve([at[1], bend, at[other]], colour="b", width=2)
+    for link, place in at.items():
+        x, y = board.xy(place)
+        board.parts.append(f'<circle cx="{x}" cy="{y}" r="14" {painted("paper", "a", 2)}/>')
+        board.text(place, str(link), size=13)
+    return board.svg("A mechanism graph by adjacency levels; gear pairs in the second colour")
+
+
+def cuts() -> str:
+    """Draw a four-bar as a spanning tree and the joint that is cut."""
+    board = Board(620, 220, 40 + 175j, 70.0)
+    for shift, cut in ((0j, False), (4.4 + 0j, True)):
+        A, C = shift + 0.55 + 0.85j, shift + 3 + 0j
+        B = shift + 2.3 + 1.7j
+        near = B + (0.12j + 0.18 if cut else 0)
+        board.line(shift, A, width=3)
+        board.line(A, B, width=3, colour="a")
+        board.line(C, near, width=3)
+        board.ground(shift, C)
+        board.joint(A, B)
+        if cut:
+            board.joint(near)
+            board.line(B - 0.2 + 0.3j, near + 0.25 - 0.32j, colour="b", width=1.6, dash="4 3")
+            board.text(B + 0.5 + 0.25j, "cut", colour="b")
+    board.arrow(3.35 + 0.8j, 3.95 + 0.8j, colour="note")
+    return board.svg("A closed loop becomes a tree of two branches and one cut joint")
+
+
+def workspace() -> str:
+    """Draw three annuli and their intersection."""
+    g1 = ParallelPlatform.g1()
+    board = Board(560, 480, 190 + 320j, 66.0)
+    centres = [pivot - vertex for pivot, vertex in zip(g1.D, g1.b, strict=True)]
+    step = 0.03
+    for row in range(110):
+        line = [complex(-0.6 + step * column, -0.9 + step * row) for column in range(130)]
+        free = [
+            p
+            for p in line
+            if all(abs(a - b) <= abs(p - c) <= a + b for a, b, c in zip(g1.l1, g1.l2, centres, strict=True))
+        ]
+        runs = [p for p in free if not any(abs(p - step - q) < 1e-9 for q in free)]
+        for start in runs:
+            end = start
+            while any(abs(end + step - q) < 1e-9 for q in free):
+                end += step
+            board.line(start, end, colour="a", width=1.2)
+    for centre, arm, link, colour in zip(centres, g1.l1, g1.l2, ("b", "c", "note"), strict=True):
+        board.circle(centre, arm + link, colour=colour)
+        board.circle(centre, abs(arm - link), colour=colour, dash="4 3")
+        board.text(centre, "+", colour=colour)
+    board.text(1.25 + 0.9j, "workspace")
+    return board.svg("For a fixed orientation every leg reaches an annulus; the workspace is their intersection")
+
+
+def drive() -> str:
+    """Draw pinion, wheel, four-bar and leg of the mock-up."""
+    board = Board(640, 410, 150 + 290j, 3.0)
+    axis, pivot, wheel, pinion = 45 + 0j, 105 + 45j, 30.0, 15.0
+    psi, crank, coupler, rocker = math.radians(115), 14.0, 45.0, 60.0
+    pin = axis + crank * cmath.exp(1j * psi)
+    arm = pin - pivot
+    reach = abs(arm)
+    phi = cmath.phase(arm) + math.atan2(
+        math.sqrt(4 * rocker**2 * reach**2 - (reach**2 + rocker**2 - coupler**2) ** 2),
+        reach**2 + rocker**2 - coupler**2,
+    )
+    end = pivot + rocker * cmath.exp(1j * phi)
+    elbow = pivot + 45 * cmath.exp(1j * (phi - math.pi / 2))
+    vertex = 45 + 30j
+    board.circle(axis, wheel, colour="note", dash="3 3")
+    board.circle(0j, pinion, colour="note", dash="3 3")
+    for line, colour in (((axis, pin), "b"), ((pin, end), "a"), ((end, pivot), "ink"), ((pivot, elbow), "ink")):
+        board.line(*line, colour=colour, width=3)
+    reach_link = elbow + 60 * (vertex - elbow) / abs(vertex - elbow)
+    board.line(elbow, reach_link, colour="c", width=3)
+    board.line(reach_link, reach_link + 26j - 20, reach_link - 26 - 4j, fill="c", colour="c", width=1.5)
+    board.ground(axis, pivot)
+    board.joint(pin, end, elbow, reach_link)
+    for at, text in (
+        (axis + 9 - 9j, "O"),
+        (pin - 7 + 4j, "B"),
+        (end + 4 - 9j, "C"),
+        (pivot + 9 + 2j, "D"),
+        (elbow + 8 + 4j, "A"),
+        (reach_link + 2 + 8j, "F"),
+    ):
+        board.text(at, text)
+    board.text(-1 - 20j, "pinion z1", colour="note", size=12)
+    board.text(45 - 36j, "wheel z2", colour="note", size=12)
+    return board.svg("One leg of the drive: wheel with crank OB, coupler BC, bell crank CDA, intermediate link AF")
+
+
+def krawczyk() -> str:
+    """Draw three boxes and their images."""
+    board = Board(660, 240, 110 + 110j, 1.0)
+    for k, (image, text) in enumerate(
+        (
+            ((-38, -28, 30, 34), "inside: exactly one root"),
+            ((20, -30, 110, 30), "overlap: nothing proved"),
+            ((95, -35, 150, 25), "apart: no root"),
+        )
+    ):
+        shift = complex(k * 205 - 15, 0)
+        box = [shift + complex(x, y) for x, y in ((-70, -60), (70, -60), (70, 60), (-70, 60))]
+        board.line(*box, box[0], width=1.8)
+        x0, y0, x1, y1 = image
+        corners = [shift + complex(x, y) * 0.9 for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
+        board.line(*corners, fill="a", colour="a", width=1.8)
+        board.text(shift - 58 + 48j, "X", size=13)
+        board.text(sum(corners) / 4, "K(X)", colour="a", size=13)
+        board.text(shift - 82j, text, size=13)
+    return board.svg("What follows from Krawczyk's image K(X) of a box X")
+
+
+def body() -> str:
+    """Draw the free body of a link: coordinates, offset of a joint, forces."""
+    board = Board(560, 280, 110 + 200j, 2.0)
+    turn, centre = cmath.exp(0.35j), 70 + 45j
+    shape = [centre + turn * point for point in (-55 - 12j, 55 - 18j, 60 + 14j, -50 + 16j)]
+    board.line(*shape, fill="a", colour="a", width=2)
+    ends = [centre + turn * point for point in (-48 + 2j, 50 - 2j)]
+    board.arrow(-35 + 0j, 30 + 0j, colour="note", width=1)
+    board.arrow(-30 - 5j, -30 + 55j, colour="note", width=1)
+    board.arrow(-30 + 0j, centre, colour="note", width=1.2)
+    board.arrow(centre, ends[1], colour="c", width=2)
+    board.arrow(ends[1], ends[1] + 38 + 16j, colour="b", width=2.2)
+    board.arrow(ends[0], ends[0] - 22 + 26j, colour="b", width=2.2)
+    board.arrow(centre, centre - 40j, colour="b", width=2.2)
+    board.joint(*ends, centre)
+    for at, text, colour in (
+        (centre - 4 + 10j, "(x, y, ψ)", "ink"),
+        ((centre + ends[1]) / 2 - 3 + 9j, "A(ψ) s", "c"),
+        (ends[1] + 42 + 22j, "−λ", "b"),
+        (centre + 14 - 36j, "m g", "b"),
+        (28 + 7j, "r", "note"),
+    ):
+        board.text(at, text, colour=colour)
+    return board.svg("A body with its centre of mass, a joint at s from it, and the forces on it")
+
+
+DRAWINGS = {
+    "theory-bearing": tilted_bearing, "theory-linkage": lambda_linkage, "theory-ellipse": circle_and_ellipse,
+    "theory-arcs": jam_arcs, "theory-whitney": whitney, "theory-shared-tilt": shared_tilt, "theory-platform": platform,
+    "theory-workspace": workspace, "theory-drive": drive, "theory-krawczyk": krawczyk,
+    "theory-modes": modes, "theory-singular": singular,
+    "theory-levels": levels, "theory-cuts": cuts, "theory-body": body,
+}  # fmt: skip
+
+
+def make(folder: Path) -> None:
+    """Write all drawings."""
+    for name, draw in DRAWINGS.items():
+        (folder / f"{name}.svg").write_text(draw(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    make(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
