@@ -81,7 +81,7 @@ def dynamics_work_precision(
     >>> rows = dynamics_work_precision(model, consistent_start(model, keep={(0, 1): 0.0}), [0.0, 1.0],
     ...     forms=["augmented"], methods=["DOP853"], tolerances=[1e-6, 1e-10])
     >>> [row.method for row in rows], rows[0].error > rows[1].error
-    (['constrained, DOP853', 'constrained, DOP853'], True)
+    (['augmented, DOP853', 'augmented, DOP853'], True)
     """
     for name, given in (("forms", forms), ("methods", methods), ("tolerances", tolerances)):
         if not isinstance(given, Sequence) or isinstance(given, str):

@@ -156,8 +156,8 @@ def estimated_size(
     made = [sum(lines for _, lines in text_of_piece(unit)) for unit in chosen]
     some = [next(graphs([unit], None)) for unit, lines in zip(chosen, made) if lines]
     size = sum(map(len, map(_json_line if _form(path) == "jsonl" else _text_line, some))) / max(len(some), 1)
-    graphs = weight * sum(made) / sum(unit.weight for unit in chosen)
-    return graphs, graphs * size
+    number = weight * sum(made) / sum(unit.weight for unit in chosen)
+    return number, number * size
 
 
 def _text_line(graph: MechanismGraph) -> str:

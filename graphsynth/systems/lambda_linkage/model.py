@@ -17,5 +17,5 @@ class LambdaLinkage(TiltedFourBar):
     --------
     >>> stroke = LambdaLinkage().straightness()
     >>> round(stroke.chord, 12), round(stroke.deviation, 6)
-    (4.0, 0.011407)
+    (4.0, 0.009754)
     """
