@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from graphsynth import evidence, intervals, jamming
+from graphsynth import intervals, jamming
 from graphsynth.core.arguments import checker
 from graphsynth.core.errors import GeometryError, GraphsynthError, IntervalError
 from graphsynth.intervals import Dual, Interval, Search
@@ -99,17 +99,6 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "part of a turn": lambda: (jamming.certify_jamming(box()).over, {"start": 0.1, "stop": 0.2}),
     "another box": lambda: (box().replace, {"l1": 2, "axis": (1, 0, 0), "clearance": 0.03}),
     "parameter of a box": lambda: (box().outer, {"name": "l1"}),
-    "arc errors": lambda: (evidence.arc_errors, {
-        "box": box(), "condition": "A", "resolutions": (0.1,), "samples": (20,), "repeats": 1,
-    }),
-    "area errors": lambda: (evidence.area_errors, {
-        "bearing": BEARING, "sine": "0.0133", "counts": (16,), "repeats": 1,
-    }),
-    "crossing errors": lambda: (evidence.crossing_errors, {
-        "problem": None, "boxes": (30,), "general": False, "repeats": 1,
-    }),
-    "error table": lambda: (evidence.error_table, {"groups": {}}),
-    "rows of an error table": lambda: (lambda rows: evidence.error_table({"a": rows}), {"rows": []}),
     "fits": lambda: (jamming.tightest_free_fit, {"box": box(), "fits": ("H7/g6",), "diameter": 35}),
     "assessment": lambda: (jamming.assess_jamming, {
         "subject": DECK, "bearing": BEARING, "condition": "A", "samples": 8, "certify": False,

@@ -178,6 +178,9 @@ def test_tables_of_scenes_and_questions_are_read(body, tmp_path, capsys):
         groups = set(tables["project"]["entry-points"])
         code = "".join(path.read_text("utf-8") for path in (ROOT / "graphsynth" / "pipeline").rglob("*.py"))
         assert groups and all(f'"{group}"' in code for group in groups)
+    elif "case" in tables:  # stress cases of one's own
+        (tmp_path / "mine.toml").write_text(body, "utf-8")
+        assert main(["stress", "--cases", str(tmp_path / "mine.toml")]) == 0
     elif "W" in tables:  # a structural question
         (tmp_path / "question.toml").write_text(body, "utf-8")
         assert main(["solve", "--spec", str(tmp_path / "question.toml"), "--json"]) == 0

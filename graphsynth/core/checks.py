@@ -46,7 +46,6 @@ _CLASSES = [
     "DynamicModel",
     "DynamicMotion",
     "EngineSettings",
-    "ErrorRow",
     "ExudynSettings",
     "Fraction",
     "Interval",

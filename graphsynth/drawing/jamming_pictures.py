@@ -19,18 +19,15 @@ from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from matplotlib.figure import Figure
 
     from graphsynth.drawing.plots import Chart
-    from graphsynth.evidence.bearing import ErrorRow
     from graphsynth.jamming.assess import JammingReport
     from graphsynth.jamming.bearing.area_curve import AreaCurve
     from graphsynth.jamming.bearing.bearing import Bearing
 
 __all__ = [
-    "area_chart", "area_picture", "crossing_picture", "error_time_picture", "region_picture", "report_picture",
+    "area_chart", "area_picture", "crossing_picture", "region_picture", "report_picture",
     "section_picture", "space_picture",
 ]  # fmt: skip
 
@@ -292,58 +289,3 @@ def _bands(panels: tuple[Any, ...], report: JammingReport, shown: tuple[float, f
         for axes in panels:
             for k, (a, b) in enumerate(seen):
                 axes.axvspan(a, b, color=colour, alpha=0.22, lw=0 if b - a > 0.2 else 1.0, label="" if k else label)
-
-
-# -- error against run time --------------------------------------------------------------------------------------------
-
-
-def error_time_picture(groups: Mapping[str, Sequence[ErrorRow]]) -> Figure:
-    """Draw error against run time, log-log: one panel for each question, one colour and marker for each method.
-
-    Parameters
-    ----------
-    groups : mapping of str to rows
-        Question with its unit, to the rows of `graphsynth.evidence.crossing_errors`, `area_errors` or `arc_errors`.
-        Subdivisions of one method are joined by a line; the first and the last are labelled with their setting.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        If there is no row.
-
-    Examples
-    --------
-    >>> from graphsynth.evidence import ErrorRow
-    >>> rows = [ErrorRow("sweep", "0.1 rad", 1e-1, 0.002), ErrorRow("sweep", "0.01 rad", 1e-2, 0.004)]
-    >>> len(error_time_picture({"arc ends, rad": rows}).axes)
-    1
-    """
-    if not any(len(rows) for rows in groups.values()):
-        raise GeometryError("groups holds no rows; give those of crossing_errors, area_errors or arc_errors")
-    figure = new_figure((5.4 * len(groups), 4.8))
-    for axes, (question, rows) in zip(np.atleast_1d(figure.subplots(1, len(groups))), groups.items()):
-        for k, method in enumerate(dict.fromkeys(row.method for row in rows)):
-            _method_line(axes, [row for row in rows if row.method == method], k)
-        dress(axes, question, "run time, s", "error")
-        axes.grid(True, color=LIGHT["soft"], alpha=0.3, lw=0.6)
-        axes.margins(0.14, 0.1)
-        axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, frameon=False)
-    return figure
-
-
-def _method_line(axes: Any, rows: Sequence[ErrorRow], k: int) -> None:
-    """Draw the runs of one method; an error of 0 is drawn at the smallest double step of 1."""
-    colour, marker = LIGHT[("a", "b", "c", "d", "ink")[k % 5]], "osD^vPX"[k % 7]
-    place = [(row.seconds, max(row.error, 2.0**-52)) for row in rows]
-    axes.loglog(*zip(*place), color=colour, marker=marker, ms=6, lw=1.2, label=rows[0].method)
-    for at in sorted({0, len(rows) - 1}):
-        if rows[at].setting:
-            last = at > 0 and place[at][0] > 3.0 * place[0][0]
-            axes.annotate(
-                rows[at].setting, place[at], textcoords="offset points", xytext=(-6 if last else 6, 6), fontsize=7,
-                color=colour, ha="right" if last else "left",
-            )  # fmt: skip

@@ -64,7 +64,7 @@ def front(rows: Iterable[Row], floor: float = FLOOR) -> tuple[Row, ...]:
 
 @dataclass(frozen=True)
 class Knee:
-    """The setting of a method beyond which accuracy becomes dear, and where the library's default stands to it.
+    """The setting of a method beyond which more accuracy costs much time, and how the library's default compares.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Knee:
     knee : Row
         The finest setting up to which each further decade of accuracy costs at most twice the time.
     default : Row or None
-    verdict : {"at the knee", "finer", "coarser", "dearer, and no better,", "failed", "no default"}
+    verdict : {"at the knee", "finer", "coarser", "slower, no gain", "failed", "no default"}
         The others only if the default differs from the knee by more than a factor of two in time or a decade in error.
     """
 
@@ -85,16 +85,18 @@ class Knee:
     def sentence(self) -> str:
         """The verdict in words."""
         k = self.knee
-        at = f"the knee is {k.setting} ({k.error:.1e} in {seconds_text(k.seconds)})"
+        at = f"{k.setting} ({k.error:.1e} in {seconds_text(k.seconds)})"
         if self.default is None:
-            return f"{self.method}: {at}"
+            return f"{self.method}: the knee is {at}"
         d = self.default
         if self.verdict == "failed":
-            return f"{self.method}: the default {d.setting} {d.status.value} here; {at}"
+            return f"{self.method}: the default {d.setting} {d.status.value} here; the knee is {at}"
         own = f"the default {d.setting} ({d.error:.1e} in {seconds_text(d.seconds)})"
         if self.verdict == "at the knee":
             return f"{self.method}: {own} lies at the knee"
-        return f"{self.method}: {own} is {self.verdict} than the knee; {at}"
+        if self.verdict == "slower, no gain":
+            return f"{self.method}: {own} is slower than the knee and gains nothing; the knee is {at}"
+        return f"{self.method}: {own} is {self.verdict} than the knee; the knee is {at}"
 
 
 def knee(rows: Sequence[Row], floor: float = FLOOR) -> Row | None:
@@ -165,7 +167,7 @@ def _verdict(at: Row, default: Row | None) -> str:
     if near:
         return "at the knee"
     if default.seconds > at.seconds:
-        return "dearer, and no better," if _size(default) > _size(at) else "finer"
+        return "slower, no gain" if _size(default) > _size(at) else "finer"
     return "coarser"
 
 
@@ -188,7 +190,7 @@ def _two(value: float) -> str:
 
 
 def advice(problem: Problem) -> dict[str, str]:
-    """Return one sentence for each method: for which accuracy to choose it, or what to take instead.
+    """Return one sentence for each method: for which accuracy it is the fastest, or which other method is better.
 
     Parameters
     ----------
@@ -205,7 +207,7 @@ def advice(problem: Problem) -> dict[str, str]:
     >>> rows = [Row("a", "coarse", 1e-2, 1e-3, 3, "", ""), Row("a", "fine", 1e-4, 1e-1, 3, "", ""),
     ...         Row("a", "finest", 1e-5, 1.0, 3, "", ""), Row("b", "", 1e-12, 1e-2, 3, "", "")]
     >>> advice(Problem("p", "q", "mm", tuple(rows)))["a"]
-    'a: choose it for errors down to 0.01 mm (coarse, 1 ms); finer errors are cheaper with b.'
+    'a: fastest for errors down to 0.01 mm (coarse, 1 ms); for smaller errors b is faster.'
     """
     if problem.sentences:
         return dict(problem.sentences)
@@ -220,20 +222,20 @@ def _sentence(problem: Problem, method: str, best: tuple[Row, ...], proved: tupl
     good = [row for row in rows if row.good]
     if not good:
         why = next((row.reason for row in rows if row.reason), "no result")
-        return f"{method}: do not choose it here; every setting failed ({why}){_settings(rows)}."
+        return f"{method}: not usable here, every setting failed ({why}){_settings(rows)}."
     mine = [row for row in best if row.method == method]
     if mine:
-        text = f"choose it {_range(mine, best, problem.unit)}"
+        text = f"fastest {_range(mine, best, problem.unit)}"
     elif any(row.method == method for row in proved):
         own = [row for row in proved if row.method == method]
-        text = f"choose it where a proof is wanted, {_range(own, proved, problem.unit)}"
+        text = f"fastest with a proof, {_range(own, proved, problem.unit)}"
     else:
         text = _beaten(good, best, problem.unit, floor)
     lost = [row for row in rows if row.status is not RowStatus.OK]
     tail = _settings(rows)
     if lost:
         which = ", ".join(row.setting or "its only setting" for row in lost[:3]) + (" ..." if len(lost) > 3 else "")
-        tail += f"; {len(lost)} of {len(rows)} settings {'is' if len(lost) == 1 else 'are'} no use here ({which})"
+        tail += f"; {len(lost)} of {len(rows)} settings failed or gave a wrong result ({which})"
     return f"{method}: {text}{tail}."
 
 
@@ -257,9 +259,9 @@ def _range(mine: list[Row], best: tuple[Row, ...], unit: str) -> str:
     if between:
         text += f", with {' and '.join(between)} in between"
     if last + 1 < len(best):
-        text += f"; finer errors are cheaper with {best[last + 1].method}"
+        text += f"; for smaller errors {best[last + 1].method} is faster"
     elif len(best) > 1:
-        text += ", the finest of all"
+        text += ", the smallest error of all"
     return text
 
 
@@ -269,9 +271,9 @@ def _beaten(good: list[Row], best: tuple[Row, ...], unit: str, floor: float) -> 
     times = own.seconds / other.seconds
     than = f"{_error(other.error, unit)} in {seconds_text(other.seconds)}"
     if times < _NOISE:
-        return f"as good as {other.label}, which has {than}"
+        return f"as good as {other.label}, {than}"
     return (
-        f"take {other.label} instead: {than}, {_two(times)} times faster than {_error(own.error, unit)} in "
+        f"{other.label} is better: {than}, {_two(times)} times faster than {_error(own.error, unit)} in "
         f"{seconds_text(own.seconds)} here"
     )
 

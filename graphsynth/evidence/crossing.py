@@ -84,9 +84,11 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
         found, seconds, rounds = best_of(lambda n=boxes: krawczyk_boxes(given, max_boxes=n), effort)  # type: ignore[misc]
         # a search that ends by itself is what the default limit gives
         ended = bool(found.finished) or boxes == limit
-        rows.append(_enclosed(
-            "Krawczyk boxes", f"{found.tested} boxes", found.outer, hull, truth, (seconds, rounds), default=ended,
-        ))  # fmt: skip
+        rows.append(
+            _enclosed(
+                "Krawczyk boxes", f"{found.tested} boxes", found.outer, hull, truth, (seconds, rounds), default=ended
+            )
+        )
         if found.finished:
             break
     for boxes in () if effort.quick else (100, 300, 3000):
@@ -107,9 +109,17 @@ def _hull_row(problem: CircleEllipse, truth: tuple[Any, Any], effort: Effort) ->
     held = _holds(found.hull, truth)
     status, why = (RowStatus.OK, "") if held else (RowStatus.FAILED, "the hull does not hold the crossing")
     return found.hull, Row(
-        "exact hull", "", float(found.hull.width.max()), seconds, rounds, "width of the enclosure",
-        f"closed form with {_DIGITS} digits", status, why, proved=True,
-    )  # fmt: skip
+        "exact hull",
+        "",
+        float(found.hull.width.max()),
+        seconds,
+        rounds,
+        "width of the enclosure",
+        f"closed form with {_DIGITS} digits",
+        status,
+        why,
+        proved=True,
+    )
 
 
 def _holds(found: Interval, truth: tuple[Any, Any]) -> bool:
@@ -119,9 +129,15 @@ def _holds(found: Interval, truth: tuple[Any, Any]) -> bool:
 
 
 def _enclosed(
-    method: str, setting: str, found: Interval, hull: Interval, truth: tuple[Any, Any], timed: tuple[float, int], *,
+    method: str,
+    setting: str,
+    found: Interval,
+    hull: Interval,
+    truth: tuple[Any, Any],
+    timed: tuple[float, int],
+    *,
     default: bool = False,
-) -> Row:  # fmt: skip
+) -> Row:
     """Row of an enclosure of the crossing: how much wider than the exact hull, and whether it holds the crossing."""
     # two roundings outward for each coordinate: more than the hull can be too wide
     rounding = float((np.spacing(np.abs(hull.lo)) + np.spacing(np.abs(hull.hi))).max(initial=0.0))
@@ -132,10 +148,17 @@ def _enclosed(
     why = why if _holds(found, truth) else "the enclosure does not hold the crossing"
     status = RowStatus.FAILED if why else RowStatus.OK
     return Row(
-        method, setting, excess, *timed, "width of the enclosure beyond the exact hull",
-        f"exact hull, rational arithmetic; checked to hold the crossing with {_DIGITS} digits", status, why, default,
+        method,
+        setting,
+        excess,
+        *timed,
+        "width of the enclosure beyond the exact hull",
+        f"exact hull, rational arithmetic; checked to hold the crossing with {_DIGITS} digits",
+        status,
+        why,
+        default,
         True,
-    )  # fmt: skip
+    )
 
 
 def _paved(problem: CircleEllipse, boxes: int) -> Interval:
@@ -146,8 +169,9 @@ def _paved(problem: CircleEllipse, boxes: int) -> Interval:
     alpha, beta, side = 1 / a.sqr(), 1 / b.sqr(), float(Q.sqrt().hi)
     found = pave(
         lambda z: [z[0] ** 2 + z[1] ** 2 - Q, z[0] ** 2 * alpha + z[1] ** 2 * beta - 1],
-        Interval.from_bounds([0.0, 0.0], [side, side]), max_boxes=boxes,
-    )  # fmt: skip
+        Interval.from_bounds([0.0, 0.0], [side, side]),
+        max_boxes=boxes,
+    )
     return Interval.from_bounds(found.boxes.lo.min(axis=0), found.boxes.hi.max(axis=0))
 
 
@@ -165,8 +189,8 @@ def precise_area(bearing: Bearing, sine: str) -> Any:
     Examples
     --------
     >>> from graphsynth.jamming import Bearing
-    >>> from graphsynth.evidence.bearing import WORST_SINE
-    >>> round(float(precise_area(Bearing(), WORST_SINE)), 16)  # docs/explanation/errata.md
+    >>> worst = "0.01333086433470144655443037446460955080344"  # 0.4 sin(1/30)
+    >>> round(float(precise_area(Bearing(), worst)), 16)  # docs/explanation/errata.md
     0.9749683652811658
     """
     import mpmath
@@ -249,9 +273,7 @@ def _doubles_row(method: str, setting: str, run: Callable[[], Any], many: int, t
     return Row(method, setting, max(error, math.ulp(float(truth)) / 2), seconds / many, rounds, kind, _AREA_REFERENCE)
 
 
-def _area_row(
-    method: str, setting: str, found: Interval, many: int, truth: Any, seconds: float, rounds: int
-) -> Row:  # fmt: skip
+def _area_row(method: str, setting: str, found: Interval, many: int, truth: Any, seconds: float, rounds: int) -> Row:
     """Row of an enclosure of the area: it must hold the reference, and say more than that there is an area."""
     width = float(np.max(found.width))
     low, high = np.atleast_1d(found.lo), np.atleast_1d(found.hi)
@@ -260,9 +282,17 @@ def _area_row(
         why = "the enclosure does not hold the area"
     status = RowStatus.FAILED if why else RowStatus.OK
     return Row(
-        method, setting, width, seconds / many, rounds, "width of the enclosure",
-        f"none needed; checked to hold the {_AREA_REFERENCE}", status, why, proved=True,
-    )  # fmt: skip
+        method,
+        setting,
+        width,
+        seconds / many,
+        rounds,
+        "width of the enclosure",
+        f"none needed; checked to hold the {_AREA_REFERENCE}",
+        status,
+        why,
+        proved=True,
+    )
 
 
 def _enclosed_area(bearing: Bearing, sine: str, many: int, truth: Any, effort: Effort) -> Row:

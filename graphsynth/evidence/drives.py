@@ -3,25 +3,223 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from inspect import signature
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
+from graphsynth.dynamics.driven.run import Plant, run
+from graphsynth.dynamics.driven.setup import output_times, prepare
+from graphsynth.dynamics.motors import IdealSpeed, Motor, whole
+from graphsynth.dynamics.trains import Train
 from graphsynth.evidence.choice import seconds_text
 from graphsynth.evidence.precise_drive import NAME, Shape, precise_drive, shape_of_series
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 
-__all__ = ["drive_problem", "reduction_problem", "work_rows"]
+__all__ = ["drive_problem", "drive_work_precision", "reduction_problem", "rows_as_text", "work_precision"]
 
+Array = NDArray[np.float64]
 _L = "inductance [H]"
 _PRECISE = f"{NAME} on the equations of theory/motor-drive"
 _KIND = "largest error of speed and currents over their largest values"
 #: A scipy solver that needs more calls of the right-hand side is a failure here.
 _MOST_CALLS = 30_000
+_OWN = "graphsynth"
+_WORK = "steps or calls"
+#: Above this many electrical time constants the explicit reference would take too long.
+_STIFF = 5e4
+
+
+class _Drive(NamedTuple):
+    """What is integrated, for a motion without events."""
+
+    plant: Plant
+    motor: Motor
+    train: Train
+    times: Array
+
+    def run(self, rtol: float) -> Any:
+        return run(self.plant, self.motor, self.train, self.times, rtol=rtol, estimate=False)
+
+    def equations(self) -> tuple[Callable[[float, Array], Array], Array]:
+        """Right-hand side of the form with inertia for scipy, and the start."""
+        from graphsynth.dynamics.driven.kernels import systems as s
+
+        ready = prepare(self.plant, self.motor, self.train, self.times, 0.0, 0.0, None, regular=False)
+        scratch = np.zeros(16)
+
+        def rhs(_t: float, y: Array) -> Array:
+            rates = np.empty(y.size)
+            s.field(ready.setup, ready.values, ready.rows, y, rates, scratch)
+            return rates
+
+        return rhs, ready.start
+
+
+class _Truth(NamedTuple):
+    """States (angle, speed, currents) at the times, and where they are from."""
+
+    states: Array
+    name: str
+
+    def error(self, states: Array) -> float:
+        """Largest error of speed and currents over their largest reference values."""
+        scale = np.abs(self.states).max(axis=0)[1:]
+        gaps = np.abs(states - self.states)[:, 1:].max(axis=0)
+        return float((gaps / np.where(scale > 0.0, scale, 1.0)).max())
+
+
+def work_precision(
+    plant: Plant,
+    motor: Motor | IdealSpeed,
+    train: Train,
+    times: ArrayLike,
+    *,
+    tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12),
+    solvers: Sequence[str] = ("LSODA", "BDF", "Radau", "DOP853"),
+    rounds: int = 3,
+    most_calls: int = 200_000,
+) -> Problem:
+    """Error against run time over tolerances, failures included.
+
+    Parameters
+    ----------
+    plant, motor, train, times
+        From rest, as for `graphsynth.dynamics.driven.run.run`; without events (voltage limit, efficiency) on the way.
+    tolerances : sequence of float
+    solvers : sequence of str
+        Of `scipy.integrate.solve_ivp`, on the same compiled right-hand side.
+    rounds : int
+        Runs for the wall time.
+    most_calls : int
+        A solver that needs more calls of the right-hand side is shown as failed.
+
+    Returns
+    -------
+    Problem
+        The reference is DOP853 at 3e-14, another method on the same equations; for a stiff motor, which no explicit
+        method can follow, a run at 1e-13, and ``reference`` of the rows says so.
+
+    Raises
+    ------
+    SpecError
+        An ideal speed, a voltage limit or an efficiency below one.
+    """
+    out = output_times(times)
+    whole("rounds", rounds, "the best of them is taken")
+    if isinstance(motor, IdealSpeed) or train.efficiency < 1.0 or getattr(motor, "voltage_limit", math.inf) < math.inf:
+        raise SpecError("the comparison is for motions without events: no ideal speed, voltage limit or efficiency")
+    drive, effort = _Drive(plant, motor, train, out), Effort(rounds)
+    truth = _reference(drive)
+    rows = [_own_row(drive, rtol, truth, effort) for rtol in tolerances]
+    rows += [_scipy_row(name, drive, rtol, truth, effort, most_calls) for name in solvers for rtol in tolerances]
+    question = f"Speed and currents of the drive up to {out[-1]:g} s, at {out.size} times"
+    return Problem(
+        "drive", question, "relative", tuple(rows), note=f"Error of speed and currents against {truth.name}."
+    )
+
+
+def drive_work_precision(machine: Any, times: ArrayLike, **options: Any) -> Problem:
+    """Error against run time of a machine with ``plant()``, ``motor`` and ``train``; options as `work_precision`."""
+    return work_precision(machine.plant(), machine.motor, machine.train, times, **options)
+
+
+def _reference(drive: _Drive) -> _Truth:
+    from scipy.integrate import solve_ivp
+
+    own, out = drive.run(1e-13), drive.times
+    states = np.column_stack([own.angle, own.speed, own.currents])
+    constants = float(out[-1] - out[0]) / getattr(drive.motor, "electrical_time", math.inf)
+    if constants < _STIFF:
+        rhs, start = drive.equations()
+        found = solve_ivp(rhs, (out[0], out[-1]), start, "DOP853", out, rtol=3e-14, atol=1e-15)
+        if found.success:
+            truth = _Truth(np.asarray(found.y.T), "")
+            gap = truth.error(states)
+            name = f"scipy DOP853 with tolerance 3e-14 on the same equations, itself good to about {gap:.0e}"
+            return truth._replace(name=name)
+    if not own.complete:
+        raise SpecError(f"there is no reference to compare with: {own.reason}")
+    name = "graphsynth itself with tolerance 1e-13, because the motor is too stiff for an explicit method"
+    return _Truth(states, name)
+
+
+def _own_row(drive: _Drive, rtol: float, truth: _Truth, effort: Effort) -> Row:
+    found, seconds, rounds = best_of(lambda: drive.run(rtol), effort)
+    error = truth.error(np.column_stack([found.angle, found.speed, found.currents])) if found.complete else math.nan
+    row = Row(_OWN, f"rtol {rtol:.0e}", error, seconds, rounds, _KIND, truth.name, value=rtol)
+    status = RowStatus.UNRELIABLE if found.complete else RowStatus.FAILED
+    more = {_WORK: float(found.steps + found.rejected)}
+    return replace(row, status=status if found.reason else RowStatus.OK, reason=found.reason, more=more)
+
+
+class _TooManyCallsError(Exception):
+    pass
+
+
+def _scipy_row(name: str, drive: _Drive, rtol: float, truth: _Truth, effort: Effort, most_calls: int) -> Row:
+    from scipy.integrate import solve_ivp
+
+    (rhs, start), out, calls = drive.equations(), drive.times, 0
+    unit = np.concatenate([[1.0], np.maximum(np.abs(truth.states).max(axis=0)[1:], 1e-300)])
+
+    def counted(t: float, y: Array) -> Array:
+        nonlocal calls
+        calls += 1
+        if calls > most_calls:
+            raise _TooManyCallsError
+        return rhs(t, y)
+
+    def solve() -> Any:
+        nonlocal calls
+        calls = 0
+        with warnings.catch_warnings(), np.errstate(all="ignore"):  # a solver that overflows is a row, not a stop
+            warnings.simplefilter("ignore")
+            try:
+                return solve_ivp(counted, (out[0], out[-1]), start, name, out, rtol=max(rtol, 3e-14), atol=rtol * unit)
+            except _TooManyCallsError:
+                calls = most_calls
+                return None
+
+    found, seconds, rounds = best_of(solve, effort, warm=False)
+    why = f"more than {most_calls} calls" if found is None else "" if found.success else str(found.message)
+    same = " (the same method)" if name in truth.name else ""
+    return Row(
+        f"scipy {name}",
+        f"rtol {rtol:.0e}",
+        math.nan if why else truth.error(found.y.T),
+        seconds,
+        rounds,
+        _KIND,
+        truth.name + same,
+        RowStatus.FAILED if why else RowStatus.OK,
+        why,
+        more={_WORK: float(calls)},
+        value=rtol,
+    )
+
+
+def rows_as_text(found: Problem) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...], str]:
+    """Columns, rows and note of `work_precision`, ready to print."""
+    columns = ("method", "tolerance", "error", "time [ms]", _WORK, "status")
+    rows = tuple(
+        (
+            row.method,
+            f"{row.value:.0e}",
+            "" if math.isnan(row.error) else f"{row.error:.1e}",
+            f"{1e3 * row.seconds:.2f}",
+            f"{row.more[_WORK]:.0f}",
+            row.reason or "done",
+        )
+        for row in found.rows
+    )
+    return columns, rows, found.note
 
 
 def drive_problem(
@@ -32,7 +230,7 @@ def drive_problem(
     Parameters
     ----------
     plant, motor, train
-        As for `graphsynth.evidence.driven.work_precision`; without events on the way.
+        As for `work_precision`; without events on the way.
     end : float
         Final time, s.
     effort : Effort, optional
@@ -43,28 +241,35 @@ def drive_problem(
     ------
     SpecError
         A motor with events (ideal speed, voltage limit) or a train that loses power.
-    """
-    from graphsynth.dynamics.driven.run import run
-    from graphsynth.evidence.driven import work_precision
 
+    Examples
+    --------
+    >>> from graphsynth.dynamics.driven.run import Plant
+    >>> from graphsynth.dynamics.motors import DCMotor
+    >>> from graphsynth.dynamics.trains import Train
+    >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
+    >>> found = drive_problem(Plant(np.zeros((1, 1)), 1.0), motor, Train(), 0.2, Effort(rounds=1, quick=True))
+    >>> found.methods, found.rows[0].status.value
+    (('graphsynth', 'scipy LSODA'), 'ok')
+    """
     effort = effort or Effort()
     default = signature(run).parameters["rtol"].default
     times = np.linspace(0.0, end, 11)
-    tolerances = (
-        (1e-4, 1e-8, default)
-        if effort.quick
-        else tuple(sorted({1e-4, 1e-6, 1e-8, 1e-10, 1e-12, default}, reverse=True))
-    )
-    options = {"rounds": effort.rounds, "most_calls": _MOST_CALLS}
-    found = work_precision(plant, motor, train, times, tolerances=tolerances, solvers=("LSODA",), **options)
-    rows, reference = list(found.rows), found.reference
     slow = (1e-4, 1e-6, 1e-8)
+    tolerances = tuple(sorted({*slow, 1e-10, 1e-12, default} if not effort.quick else {1e-4, 1e-8, default}))[::-1]
+
+    def measured(solvers: Sequence[str], asked: Sequence[float], rounds: int) -> tuple[Row, ...]:
+        found = work_precision(
+            plant, motor, train, times, tolerances=asked, solvers=solvers, rounds=rounds, most_calls=_MOST_CALLS
+        )
+        return found.rows
+
+    rows = list(measured(("LSODA",), tolerances, effort.rounds))
     for solver in () if effort.quick else ("DOP853", "BDF", "Radau"):
-        rows += work_precision(
-            plant, motor, train, times, tolerances=slow if solver != "DOP853" else tolerances, solvers=(solver,),
-            **{**options, "rounds": 1},
-        ).rows[-len(slow if solver != "DOP853" else tolerances) :]  # fmt: skip
-    shaped = work_rows(rows, reference, effort, default)
+        asked = tolerances if solver == "DOP853" else slow
+        rows += measured((solver,), asked, 1)[len(asked) :]
+    reference = rows[0].reference
+    rows = [replace(row, default=row.method == _OWN and row.value == default) for row in rows]
     truth = _precise(plant, motor, train, times, shape)
     note = (
         f"graphsynth is compared with {_PRECISE}, which shares no code with it; scipy's solvers with {reference}, "
@@ -73,9 +278,10 @@ def drive_problem(
     if truth is None:
         note = f"No reference of its own for this motor. All are compared with {reference}: the same right-hand side."
     else:
-        shaped = tuple(_against(row, truth, (plant, motor, train, times)) for row in shaped)
+        drive = _Drive(plant, motor, train, times)
+        rows = [_against(row, _Truth(truth, _PRECISE), drive) for row in rows]
     question = f"Speed and currents of the drive from rest to {end:g} s, at eleven times"
-    return Problem("drive", question, "relative", shaped, "run", note)
+    return Problem("drive", question, "relative", tuple(rows), "run", note)
 
 
 def _precise(plant: Any, motor: Any, train: Any, times: Any, shape: Shape | None) -> Any:
@@ -89,38 +295,13 @@ def _precise(plant: Any, motor: Any, train: Any, times: Any, shape: Shape | None
         return None
 
 
-def _against(row: Row, truth: Any, drive: Any) -> Row:
+def _against(row: Row, truth: _Truth, drive: _Drive) -> Row:
     """Row of the own integrator with its error against the precise motion; others as they are."""
-    from graphsynth.dynamics.driven.run import run
-
-    if row.method != "graphsynth" or not row.good:
+    if row.method != _OWN or not row.good:
         return row
-    plant, motor, train, times = drive
-    found = run(plant, motor, train, times, rtol=float(row.setting.split()[1]), estimate=False)
-    states = np.column_stack([found.speed, found.currents])
-    scale = np.abs(truth).max(axis=0)[1:]
-    error = float((np.abs(states - truth[:, 1:]).max(axis=0) / np.where(scale > 0, scale, 1)).max())
-    return replace(row, error=error, reference=_PRECISE, more={**row.more, "distance from scipy DOP853": row.error})
-
-
-def work_rows(rows: Sequence[Any], reference: str, effort: Effort, default: float) -> tuple[Row, ...]:
-    """Turn rows of the room of dynamics into ours; what is not done is a failure, with its error if it has one."""
-    found = []
-    for r in rows:
-        done = r.status == "done" and math.isfinite(r.error)
-        missed = not done and math.isfinite(r.error)
-        status = RowStatus.OK if done else RowStatus.UNRELIABLE if missed else RowStatus.FAILED
-        own = r.method == "graphsynth"
-        same = "DOP853" in r.method and "DOP853" in reference
-        found.append(
-            Row(
-                r.method, f"rtol {r.setting:.0e}", r.error, r.seconds,
-                effort.rounds if own or "LSODA" in r.method else 1, _KIND,
-                reference + (" (the same method)" if same else ""), status, "" if done else r.status,
-                own and r.setting == default, more={"steps or calls": float(r.steps)},
-            )
-        )  # fmt: skip
-    return tuple(found)
+    found = drive.run(row.value)
+    error = truth.error(np.column_stack([found.angle, found.speed, found.currents]))
+    return replace(row, error=error, reference=truth.name, more={**row.more, "distance from scipy DOP853": row.error})
 
 
 def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], effort: Effort | None = None) -> Problem:
@@ -146,28 +327,41 @@ def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], ef
         wrong = float(found.speed[k])
         rows.append(
             Row(
-                "model without inductance", f"L = {L:g} H", wrong, limit.seconds, rounds,
-                "largest error of the speed behind the electrical transient", "run with the inductance",
-                more={"steps": float(limit.steps)},
+                "model without inductance",
+                f"L = {L:g} H",
+                wrong,
+                limit.seconds,
+                rounds,
+                "largest error of the speed behind the electrical transient",
+                "run with the inductance",
+                more={"steps": float(limit.steps), _L: L},
+                value=L,
             )
-        )  # fmt: skip
+        )
     for L in found.inductance.tolist():
-        kept = replace(machine, motor=replace(machine.motor, inductance=L))
-        run, _, rounds = best_of(lambda k=kept: k.simulate(times, reduce=False), effort)  # type: ignore[misc]
+        full = replace(machine, motor=replace(machine.motor, inductance=L))
+        kept, _, rounds = best_of(partial(full.simulate, times, reduce=False), effort)
         rows.append(
             Row(
-                "model with inductance", f"L = {L:g} H", float(run.error[1]) if run.complete else math.nan, run.seconds,
-                rounds, "estimated error of the speed", "the same integrator at a tighter tolerance",
-                RowStatus.OK if run.complete else RowStatus.FAILED, run.reason, more={"steps": float(run.steps)},
+                "model with inductance",
+                f"L = {L:g} H",
+                float(kept.error[1]) if kept.complete else math.nan,
+                kept.seconds,
+                rounds,
+                "estimated error of the speed",
+                "the same integrator at a tighter tolerance",
+                RowStatus.OK if kept.complete else RowStatus.FAILED,
+                kept.reason,
+                more={"steps": float(kept.steps), _L: L},
+                value=L,
             )
-        )  # fmt: skip
+        )
     question = "The motor without its inductance: error of the speed after the electrical transient"
     note = (
         "The settings are inductances, not accuracies. Errors with the inductance are the integrator's own estimate: "
         "no other method follows so stiff a motor."
     )
-    found_rows = tuple(replace(row, more={**row.more, _L: float(row.setting.split()[2])}) for row in rows)
-    problem = Problem("small-inductance", question, "rad/s", found_rows, "run", note, over=_L)
+    problem = Problem("small-inductance", question, "rad/s", tuple(rows), "run", note, over=_L)
     return replace(problem, sentences=_limit_sentences(problem))
 
 
@@ -181,11 +375,11 @@ def _limit_sentences(problem: Problem) -> dict[str, str]:
     return {
         bare[0].method: (
             f"{bare[0].method}: errors from {large.error:.1g} rad/s ({large.setting}) down to {small.error:.1g} rad/s "
-            f"({small.setting}), {share:.2g} rad/s per henry in the limit, in {seconds_text(small.seconds)}; choose it "
-            "where that error is small enough."
+            f"({small.setting}), {share:.2g} rad/s per henry in the limit, in {seconds_text(small.seconds)}: "
+            "enough where that error is."
         ),
         full[0].method: (
             f"{full[0].method}: errors up to {worst:.1g} rad/s whatever the inductance, in up to {times:.2g} times the "
-            "time; choose it otherwise."
+            "time."
         ),
     }

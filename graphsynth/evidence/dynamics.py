@@ -1,27 +1,33 @@
-"""Integrators on a mechanism: error, drift of the joints and of the energy against run time."""
+"""Integrators on a mechanism: every form and integrator beside an independent reference; error, drift, run time."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from inspect import signature
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.errors import GraphsynthError
-from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus
+from graphsynth.core.checks import finite, whole
+from graphsynth.core.errors import GeometryError, GraphsynthError
+from graphsynth.dynamics.integrate import simulate_dynamics
+from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.model import DynamicModel
     from graphsynth.dynamics.result import DynamicMotion
     from graphsynth.dynamics.start import StartReport
-    from graphsynth.systems.braider.model import Braider
 
-__all__ = ["Truth", "braider_model", "dynamics_problem", "precise_swing"]
+__all__ = ["Truth", "dynamics_problem", "dynamics_work_precision"]
 
 Array = NDArray[np.float64]
+#: Beyond this many tolerances the error is not what was asked for.
+_MISSED = 1e3
+_KIND = "largest error of all coordinates"
+_DEFAULT = signature(simulate_dynamics).parameters["rtol"].default
 
 
 class Truth(NamedTuple):
@@ -31,39 +37,123 @@ class Truth(NamedTuple):
     name: str
 
 
-def braider_model(braider: Braider, speed: float) -> tuple[DynamicModel, StartReport]:
-    """Return the linkage of a braider without motor and thread, and a start at crank angle zero (speed in rad/s)."""
-    from graphsynth.dynamics.model import DynamicModel
-    from graphsynth.dynamics.start import consistent_start
-    from graphsynth.evidence.position import four_bar
-    from graphsynth.mechanism.four_bar import TiltedFourBar
-    from graphsynth.systems.braider.evidence_four_bar import bodies_of
+def dynamics_work_precision(
+    model: DynamicModel,
+    start: StartReport,
+    times: ArrayLike,
+    *,
+    forms: Sequence[str] = ("one-coordinate", "augmented", "partitioned"),
+    methods: Sequence[str] = ("DOP853", "RK45", "LSODA"),
+    tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10),
+    rounds: int = 3,
+    max_steps: int = 200_000,
+) -> tuple[Row, ...]:
+    """Measure error and wall time of every form, method and tolerance; failures stay in the table.
 
-    bar = braider.linkage
-    mechanism, _ = four_bar(TiltedFourBar(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch))
-    model = DynamicModel(mechanism, bodies_of(braider))
-    return model, consistent_start(model, pose=mechanism.pose, keep={(0, 1): 0.0}, keep_rates={(0, 1): speed})
+    Parameters
+    ----------
+    model : DynamicModel
+    start : StartReport
+        A consistent start.
+    times : array_like, shape (n,)
+        Output times, equal for all, s.
+    forms, methods : sequence of str
+        Those of :func:`graphsynth.dynamics.simulate_dynamics`.
+    tolerances : sequence of float
+        At least 1e-12, so that the reference is tighter.
+    rounds : int
+        Runs of each; the best time counts.
+    max_steps : int
 
+    Returns
+    -------
+    tuple of Row
+        ``method`` is "form, method"; the error is the largest of all coordinates at all times, lengths over the
+        characteristic length (estimated).  The reference of the augmented form is the partitioned one at 2.3e-14 and
+        the other way round: another formulation, so no method is compared with itself.
 
-def precise_swing(braider: Braider, speed: float, times: Array, gravity: tuple[float, float]) -> Array:
-    """Free motion of the linkage of `braider_model`, in long doubles: centres of mass and angles, shape (n, 9).
+    Raises
+    ------
+    GeometryError
+        Tolerances below 1e-12, no reference, times that do not increase.
 
-    One equation for the crank, from the closed loop and the bodies, integrated by extrapolation; see
-    `graphsynth.evidence.precise_drive`.
+    Examples
+    --------
+    >>> from graphsynth.dynamics.model import Body, DynamicModel
+    >>> from graphsynth.dynamics.start import consistent_start
+    >>> from graphsynth.mechanism.joints import Revolute
+    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
+    >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
+    >>> rows = dynamics_work_precision(model, consistent_start(model, keep={(0, 1): 0.0}), [0.0, 1.0],
+    ...     forms=["augmented"], methods=["DOP853"], tolerances=[1e-6, 1e-10])
+    >>> [row.method for row in rows], rows[0].error > rows[1].error
+    (['augmented, DOP853', 'augmented, DOP853'], True)
     """
-    from graphsynth.evidence.precise_drive import precise_drive
-    from graphsynth.systems.braider.evidence_four_bar import bodies_of, places, shape_of_four_bar
+    for name, given in (("forms", forms), ("methods", methods), ("tolerances", tolerances)):
+        if not isinstance(given, Sequence) or isinstance(given, str):
+            raise GeometryError(f"{name} = {given!r} is not a list; give one")
+    if not tolerances or min(finite("tolerance", given) for given in tolerances) < 1e-12:
+        raise GeometryError(f"tolerances = {tuple(tolerances)} must be 1e-12 or more; the reference must be tighter")
+    whole("rounds", rounds, 1, 1000)
+    references = {form: _reference(model, start, times, form) for form in ("partitioned", "augmented")}
+    rows = []
+    for form in forms:
+        other = "augmented" if form == "partitioned" else "partitioned"
+        for method in methods:
+            for rtol in tolerances:
+                options: dict[str, Any] = {"form": form, "method": method, "rtol": rtol, "max_steps": max_steps}
+                row = _row(model, start, times, options, references[other], Effort(rounds))
+                rows.append(replace(row, reference=f"{other} form, DOP853 at 2.3e-14"))
+    return tuple(rows)
 
-    bodies = bodies_of(braider)
-    shape = shape_of_four_bar(braider.linkage, bodies, gravity)
-    found = precise_drive(shape, None, 1.0, 0.0, 0.0, times.tolist(), speed=speed)
-    return np.array([places(braider.linkage, bodies, angle) for angle in found[:, 0]], dtype=np.float64)
+
+def _reference(model: DynamicModel, start: StartReport, times: ArrayLike, form: str) -> DynamicMotion:
+    found = simulate_dynamics(model, times, start=start, form=form, rtol=2.3e-14, outputs="exact")  # type: ignore[arg-type]
+    if not found.completed:
+        raise GeometryError(f"there is no reference: {found.message}; give a shorter time")
+    return found
+
+
+def _row(
+    model: DynamicModel,
+    start: StartReport,
+    times: ArrayLike,
+    options: dict[str, Any],
+    truth: DynamicMotion,
+    effort: Effort,
+) -> Row:
+    rtol, name = options["rtol"], f"{options['form']}, {options['method']}"
+    row = Row(name, f"rtol {rtol:.0e}", math.nan, math.nan, 1, _KIND, value=rtol)
+
+    def run() -> DynamicMotion:
+        return simulate_dynamics(model, times, start=start, outputs="exact", **options)
+
+    try:
+        found, seconds, rounds = best_of(run, effort, warm=False)
+    except GeometryError as refusal:
+        return replace(row, status=RowStatus.FAILED, reason=str(refusal), more={"steps": 0.0})
+    row = replace(row, seconds=seconds, rounds=rounds, more={"steps": float(found.steps)})
+    if not found.completed:
+        return replace(row, status=RowStatus.FAILED, reason=found.message)
+    unit = np.tile([found.compiled.tables.size, found.compiled.tables.size, 1.0], found.compiled.n // 3)
+    error = float(np.abs((found.q - truth.q) / unit).max())
+    if error > _MISSED * rtol:
+        return replace(
+            row, error=error, status=RowStatus.UNRELIABLE, reason=f"more than {_MISSED:g} times the tolerance"
+        )
+    return replace(row, error=error)
 
 
 def dynamics_problem(
-    model: DynamicModel, start: StartReport, end: float, name: str, effort: Effort | None = None, *,
+    model: DynamicModel,
+    start: StartReport,
+    end: float,
+    name: str,
+    effort: Effort | None = None,
+    *,
     truth: Truth | None = None,
-) -> Problem:  # fmt: skip
+) -> Problem:
     """Integrate a mechanism in every form with several integrators and tolerances.
 
     Parameters
@@ -83,60 +173,55 @@ def dynamics_problem(
         Error: largest of all coordinates at eight times, lengths over the characteristic length; further columns:
         drift of positions and velocities, error of the energy.
     """
-    from graphsynth.dynamics.integrate import simulate_dynamics
-    from graphsynth.evidence.mechanism_accuracy import dynamics_work_precision
-
     effort = effort or Effort()
-    default = signature(simulate_dynamics).parameters["rtol"].default
     times = np.linspace(0.0, end, 8)
-    tolerances = (1e-4, 1e-8, default) if effort.quick else (1e-4, 1e-6, 1e-8, 1e-10, default)
+    tolerances = (1e-4, 1e-8, _DEFAULT) if effort.quick else (1e-4, 1e-6, 1e-8, 1e-10, _DEFAULT)
     every: tuple[str, ...] = ("one-coordinate", "augmented", "partitioned")
     right = truth.coordinates(times) if truth else None
     rows = []
     for method in ("DOP853",) if effort.quick else ("DOP853", "RK45", "LSODA"):
-        # the forms are told apart by the default integrator, the integrators by the form that is cheapest
+        # the forms are told apart by the default integrator, the integrators by the form that takes least time
         forms, asked = (every, tolerances) if method == "DOP853" else (("one-coordinate",), (1e-4, 1e-6, 1e-8))
         found = dynamics_work_precision(
-            model, start, times, forms=forms, methods=(method,), tolerances=asked,
-            rounds=min(2, effort.rounds), max_steps=5_000,
-        )  # fmt: skip
-        rows += [_row(model, start, times, r, default, min(2, effort.rounds), right, truth) for r in found]
+            model,
+            start,
+            times,
+            forms=forms,
+            methods=(method,),
+            tolerances=asked,
+            rounds=min(2, effort.rounds),
+            max_steps=5_000,
+        )
+        rows += [_with_drift(model, start, times, row, right, truth) for row in found]
     note = "Drift and energy are those of a further run; positions are projected onto the joints (the default)."
     if truth is None:
         note += " The reference is another formulation of the same model, by the same integrator: no code of its own."
     return Problem("linkage-dynamics", f"Motion of {name}, over {end:g} s", "relative", tuple(rows), "run", note)
 
 
-def _row(
-    model: DynamicModel, start: StartReport, times: Array, r: Any, default: float, rounds: int, right: Array | None,
-    truth: Truth | None,
-) -> Row:  # fmt: skip
-    from graphsynth.dynamics.integrate import simulate_dynamics
-
-    form, method = r.method.split(", ")
-    done = r.status == "done" and math.isfinite(r.error)
-    status = RowStatus.OK if done else RowStatus.UNRELIABLE if math.isfinite(r.error) else RowStatus.FAILED
-    more, error = {"steps": float(r.steps)}, float(r.error)
-    other = "augmented" if form == "partitioned" else "partitioned"
-    reference = f"{other} form, DOP853 at 2.3e-14"
-    if math.isfinite(r.error):
-        try:
-            options: dict[str, Any] = {"form": form, "method": method, "rtol": r.setting, "outputs": "exact"}
-            found = simulate_dynamics(model, times, start=start, **options)
-            more |= {
-                "position drift": found.checks.position_drift, "velocity drift": found.checks.velocity_drift,
-                "energy error": found.checks.energy,
-            }  # fmt: skip
-            if right is not None and truth is not None:
-                more["distance from " + reference] = error
-                error, reference = _away(found, right), truth.name
-        except GraphsynthError:
-            pass
-    return Row(
-        r.method, f"rtol {r.setting:.0e}", error, r.seconds, rounds, "largest error of all coordinates",
-        reference, status, "" if done else r.status,
-        r.setting == default and method == "DOP853", more=more,
-    )  # fmt: skip
+def _with_drift(
+    model: DynamicModel, start: StartReport, times: Array, row: Row, right: Array | None, truth: Truth | None
+) -> Row:
+    """Row with drift and energy of a further run, and with its error against the reference if there is one."""
+    form, method = row.method.split(", ")
+    row = replace(row, default=row.value == _DEFAULT and method == "DOP853")
+    if not math.isfinite(row.error):
+        return row
+    options: dict[str, Any] = {"form": form, "method": method, "rtol": row.value, "outputs": "exact"}
+    try:
+        found = simulate_dynamics(model, times, start=start, **options)
+    except GraphsynthError:
+        return row
+    more = {
+        **row.more,
+        "position drift": found.checks.position_drift,
+        "velocity drift": found.checks.velocity_drift,
+        "energy error": found.checks.energy,
+    }
+    if right is None or truth is None:
+        return replace(row, more=more)
+    more["distance from " + row.reference] = row.error
+    return replace(row, error=_away(found, right), reference=truth.name, more=more)
 
 
 def _away(found: DynamicMotion, right: Array) -> float:

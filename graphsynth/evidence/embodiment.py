@@ -49,7 +49,7 @@ def precise_strip() -> float:
 
 def _rows(
     goals: Goals, settings: tuple[tuple[float, int], ...], seeds: int, error: Any, kind: str, reference: str
-) -> tuple[Row, ...]:  # fmt: skip
+) -> tuple[Row, ...]:
     """One row for each effort and number of tries; a seed without an acceptable result is infinitely wrong."""
     from graphsynth.kinematics.dimensional.api import embody
     from graphsynth.structure.graph import MechanismGraph
@@ -71,12 +71,19 @@ def _rows(
         missed = not math.isfinite(middle)
         rows.append(
             Row(
-                "search", f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}",
-                math.nan if missed else middle, median(times), seeds, kind, reference,
-                RowStatus.FAILED if missed else RowStatus.OK, lost if missed else "",
-                default=(effort, tries) == default, more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
+                "search",
+                f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}",
+                math.nan if missed else middle,
+                median(times),
+                seeds,
+                kind,
+                reference,
+                RowStatus.FAILED if missed else RowStatus.OK,
+                lost if missed else "",
+                default=(effort, tries) == default,
+                more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
             )
-        )  # fmt: skip
+        )
     return tuple(rows)
 
 
@@ -125,9 +132,12 @@ def path_problem(effort: Effort | None = None) -> Problem:
     efforts, seeds = ((0.02, 0.05, 0.1), 1) if effort.quick else ((0.02, 0.1, 0.3, own["effort"].default), 3)
     settings = tuple((share, own["tries"].default) for share in efforts)  # a target that is met ends the tries
     rows = _rows(
-        goals, settings, seeds, lambda found: found.figures.goal_error,
+        goals,
+        settings,
+        seeds,
+        lambda found: found.figures.goal_error,
         f"largest distance from a point over the size of the set, median of {seeds} seeds",
         "exact: the points are those of a linkage",
-    )  # fmt: skip
+    )
     question = "Dimensions of a four-bar linkage that passes eight points of another one at given inputs"
     return Problem("path-dimensions", question, "relative", rows, "search", _NOTE)

@@ -16,9 +16,7 @@ from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 __all__ = ["PUBLISHED", "Growth", "enumeration_problem", "growth", "of_scene"]
 
 #: Planar kinematic chains of mobility 1 by links: The On-Line Encyclopedia of Integer Sequences, A233288.
-PUBLISHED: Mapping[int, int] = {
-    4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318_162, 16: 19_819_281, 18: 1_535_380_884,
-}  # fmt: skip
+PUBLISHED: Mapping[int, int] = {4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318_162, 16: 19_819_281, 18: 1_535_380_884}
 _GRAPHS = "graphs"
 _NOTE = (
     "Kinematic chains of mobility 1, whose numbers are published, whatever the scene asks. Extrapolated: one process, "
@@ -96,9 +94,15 @@ def enumeration_problem(effort: Effort | None = None) -> Problem:
         rows += own
         laws[method] = _law(method, own)
     return Problem(
-        "enumeration", "Kinematic chains of mobility 1: time against their number", "graphs", tuple(rows),
-        "enumeration", _NOTE, _GRAPHS, sentences=laws,
-    )  # fmt: skip
+        "enumeration",
+        "Kinematic chains of mobility 1: time against their number",
+        "graphs",
+        tuple(rows),
+        "enumeration",
+        _NOTE,
+        _GRAPHS,
+        sentences=laws,
+    )
 
 
 def _row(method: str, run: Callable[[int], int], links: int, effort: Effort) -> Row:
@@ -107,9 +111,17 @@ def _row(method: str, run: Callable[[int], int], links: int, effort: Effort) -> 
     status, why = (RowStatus.OK, "") if not wrong else (RowStatus.FAILED, f"{found} instead of {PUBLISHED[links]}")
     more: dict[str, Any] = {_GRAPHS: float(found), "graphs per second": found / seconds}
     return Row(
-        method, f"{links} links", wrong, seconds, rounds, "difference from the published number", "OEIS A233288",
-        status, why, more=more,
-    )  # fmt: skip
+        method,
+        f"{links} links",
+        wrong,
+        seconds,
+        rounds,
+        "difference from the published number",
+        "OEIS A233288",
+        status,
+        why,
+        more=more,
+    )
 
 
 def _law(method: str, rows: Sequence[Row]) -> str:
@@ -123,8 +135,9 @@ def _law(method: str, rows: Sequence[Row]) -> str:
     return (
         f"{method}: {top.more[_GRAPHS]:.3g} graphs ({top.setting}) in {seconds_text(top.seconds)}; time ~ "
         f"graphs^{law.exponent:.2f}, within a factor {law.spread:.2g} of {law.rows} runs"
-        + (f"; extrapolated: {said}" if said else "") + "."
-    )  # fmt: skip
+        + (f"; extrapolated: {said}" if said else "")
+        + "."
+    )
 
 
 def of_scene(context: Any, effort: Effort) -> Problem:

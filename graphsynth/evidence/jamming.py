@@ -1,36 +1,44 @@
-"""Jam arcs: rows of the room of jamming, against the contact condition of theory/bearing-contact in 50 digits."""
+"""Bearings that jam: ends of the jam arcs, and the largest misalignment that several bearings share.
+
+The references are the contact condition in 50 digits, a closed form, or proved bounds.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from graphsynth.core.errors import GeometryError
-from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus
+from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 
 if TYPE_CHECKING:
     from graphsynth.jamming.bearing.bearing import Bearing, Condition
     from graphsynth.jamming.bearing.parameters import ToleranceBox
+    from graphsynth.jamming.joints.assess import CoupledReport
+    from graphsynth.jamming.joints.limits import Misalignment
+    from graphsynth.jamming.joints.scale import ScaleCertificate
+    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.mechanism.four_bar import TiltedFourBar
+    from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["arc_problem", "precise_arc_ends", "precise_critical_tilt"]
+__all__ = [
+    "arc_problem",
+    "coupled_problem",
+    "exact_largest",
+    "lambda_problem",
+    "precise_arc_ends",
+    "precise_critical_tilt",
+]
 
 _DIGITS = 50
-_PROVED = {"closed form, enclosed", "interval sweep"}
-
-
-def _rows(found: Sequence[Any], effort: Effort, kinds: dict[str, str], references: dict[str, str]) -> list[Row]:
-    """Turn rows (method, setting, error, seconds) of other rooms into ours."""
-    return [
-        Row(
-            r.method, r.setting, float(r.error), r.seconds, effort.rounds,
-            kinds.get(r.method, kinds[""]), references.get(r.method, references[""]),
-            proved=r.method in _PROVED,
-        )
-        for r in found
-    ]  # fmt: skip
+#: Gap of the proved bounds that are the reference where no closed form is known.
+_FINE_GAP = 1e-6
 
 
 def precise_arc_ends(box: ToleranceBox, condition: Condition = "A") -> tuple[float, ...]:
@@ -67,9 +75,7 @@ def precise_arc_ends(box: ToleranceBox, condition: Condition = "A") -> tuple[flo
             return ()
         length = mpmath.sqrt(v["n1"] ** 2 + v["n2"] ** 2 + v["n3"] ** 2)
         c, s = mpmath.cos(v["azimuth"]), mpmath.sin(v["azimuth"])
-        n1, n2, n3 = (
-            (v["n1"] * c - v["n2"] * s) / length, (v["n1"] * s + v["n2"] * c) / length, v["n3"] / length
-        )  # fmt: skip
+        n1, n2, n3 = ((v["n1"] * c - v["n2"] * s) / length, (v["n1"] * s + v["n2"] * c) / length, v["n3"] / length)
         angle = v["alpha"] if box.convention == "spec" else -v["alpha"]
         sine, versine = mpmath.sin(angle), 1 - mpmath.cos(angle)
         r31, r32 = n1 * n3 * versine - n2 * sine, n2 * n3 * versine + n1 * sine
@@ -134,7 +140,6 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
     GeometryError
         A box with tolerances, which have no arc ends; or a bearing that never jams.
     """
-    from graphsynth.evidence.bearing import arc_errors
     from graphsynth.jamming.bearing.certify import certify_jamming
     from graphsynth.jamming.bearing.sweep import sweep_linkage
 
@@ -142,49 +147,217 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
     ends = precise_arc_ends(box, condition)
     if not ends:
         raise GeometryError("the bearing jams nowhere during the turn, so there are no arc ends to compare")
+    found, seconds, rounds = best_of(lambda: certify_jamming(box, condition), effort)
+    rows = [_proved_row("closed form, enclosed", "", found.arcs.undecided, ends, (seconds, rounds))]
     default = signature(sweep_linkage).parameters["resolution"].default
-    resolutions = sorted({*effort.some((1e-1, 1e-2, 1e-4, 1e-6, 1e-9, 1e-12)), default}, reverse=True)
-    samples = effort.some((100, 1000, 10_000, 100_000)) if not effort.quick else (100, 300, 1000)
-    found = arc_errors(box, condition, resolutions, samples, repeats=effort.rounds)
-    width = "length of the angles left undecided"
-    kinds = {"": width, "samples, doubles": "length of the steps in which the sign changes"}
-    proof = f"none needed; checked to hold the ends with {_DIGITS} digits"
-    rows = _rows(
-        found, effort, kinds, {"": proof, "samples, doubles": f"ends with {_DIGITS} digits lie in these steps"}
-    )
-    rows = [replace(row, default=row.setting == f"{default:g} rad") for row in rows]
-    spans = {"closed form, enclosed": [certify_jamming(box, condition).arcs.undecided]}
-    spans["interval sweep"] = [sweep_linkage(box, condition, resolution=r).undecided for r in resolutions]
-    rows = _checked(rows, spans, ends)
-    counts = {row.setting: int(row.setting.split()[0]) for row in rows if row.method == "samples, doubles"}
-    rows = [
-        row if row.setting not in counts or _steps_found(row, counts[row.setting], ends)
-        else replace(row, status=RowStatus.UNRELIABLE, reason="an arc lies between two samples and is not seen")
-        for row in rows
-    ]  # fmt: skip
+    for resolution in sorted({*effort.some((1e-1, 1e-2, 1e-4, 1e-6, 1e-9, 1e-12)), default}, reverse=True):
+        swept, seconds, rounds = best_of(partial(sweep_linkage, box, condition, resolution=resolution), effort)
+        row = _proved_row("interval sweep", f"{resolution:g} rad", swept.undecided, ends, (seconds, rounds))
+        rows.append(replace(row, error=math.tau * swept.undecided_part, default=resolution == default))
+    for count in (100, 300, 1000) if effort.quick else (100, 1000, 10_000, 100_000):
+        changes, seconds, rounds = best_of(partial(_sign_changes, box, condition, count), effort)
+        # ends that share a step hide each other
+        seen = changes == len({math.floor(end * count / math.tau) for end in ends}) == len(ends)
+        rows.append(
+            Row(
+                "samples, doubles",
+                f"{count} angles",
+                changes * math.tau / count,
+                seconds,
+                rounds,
+                "length of the steps in which the sign changes",
+                f"ends with {_DIGITS} digits lie in these steps",
+                RowStatus.OK if seen else RowStatus.UNRELIABLE,
+                "" if seen else "an arc lies between two samples and is not seen",
+            )
+        )
     question = f"At which crank angles the bearing begins and ceases to jam (condition {condition}, {len(ends)} ends)"
     return Problem("arc-ends", question, "rad", tuple(rows))
 
 
-def _steps_found(row: Row, count: int, ends: tuple[float, ...]) -> bool:
-    """Whether samples saw a change of sign in the step of every end (ends that share a step hide each other)."""
-    steps = {math.floor(end * count / math.tau) for end in ends}
-    return round(row.error * count / math.tau) == len(steps) == len(ends)
+def _proved_row(method: str, setting: str, left: Any, ends: Sequence[float], timed: tuple[float, int]) -> Row:
+    """Row of a proof: the length of the angles left undecided, which must hold the ends."""
+    from graphsynth.jamming.bearing.arcs import total_length
+
+    held = all(_held(left, end) for end in ends)
+    return Row(
+        method,
+        setting,
+        total_length(left),
+        *timed,
+        "length of the angles left undecided",
+        f"none needed; checked to hold the ends with {_DIGITS} digits",
+        RowStatus.OK if held else RowStatus.FAILED,
+        "" if held else "an end lies outside the angles left undecided",
+        proved=True,
+    )
 
 
-def _checked(rows: list[Row], spans: dict[str, list[Any]], ends: tuple[float, ...]) -> list[Row]:
-    """Mark a proof whose undecided angles do not hold the ends as failed."""
-    left = {method: list(found) for method, found in spans.items()}
-    checked = []
-    for row in rows:
-        if row.method in left:
-            open_ = left[row.method].pop(0)
-            if not all(_held(open_, end) for end in ends):
-                row = replace(row, status=RowStatus.FAILED, reason="an end lies outside the angles left undecided")
-        checked.append(row)
-    return checked
+def _sign_changes(box: ToleranceBox, condition: Condition, count: int) -> int:
+    linkage, bearing = box.nominal()
+    path = linkage.positions(np.linspace(0.0, math.tau, count + 1))
+    jams = bearing.gap(path.sin_theta, path.cos_theta, condition) > 0.0
+    return int((jams[1:] != jams[:-1]).sum())
 
 
 def _held(spans: Sequence[Any], end: float) -> bool:
     slack = 4.0 * math.ulp(end)  # the reference is rounded once
     return any(low - slack <= end + turn <= high + slack for low, high in spans for turn in (-math.tau, 0.0, math.tau))
+
+
+def exact_largest(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Any:
+    """Largest misalignment about the frame line of the source's linkage with three equal bearings, with 50 digits.
+
+    Twice the critical tilt of one bearing (theory/joints-that-share-a-tilt 6: the worst pose is 90 degrees).  None for
+    other proportions than (2, 1, 5/2, 5/2), for which no closed form is known.
+
+    Examples
+    --------
+    >>> from graphsynth.jamming import Bearing
+    >>> from graphsynth.mechanism.four_bar import TiltedFourBar
+    >>> print(f"{float(exact_largest(TiltedFourBar(), Bearing())):.16f}")
+    0.0121287931183128
+    """
+    import mpmath
+
+    crank = linkage.l2
+    if (linkage.l1, linkage.l3, linkage.l4) != (2.0 * crank, 2.5 * crank, 2.5 * crank):
+        return None
+    critical = precise_critical_tilt(bearing, condition)
+    with mpmath.workdps(_DIGITS):
+        return None if critical is None else 2 * critical
+
+
+def lambda_problem(
+    linkage: TiltedFourBar,
+    bearing: Bearing,
+    direction: float = 0.0,
+    condition: Condition = "A",
+    effort: Effort | None = None,
+) -> Problem:
+    """Find the largest misalignment of the driven axis of a four-bar linkage with equal bearings in its moving joints.
+
+    Parameters
+    ----------
+    linkage : TiltedFourBar
+        Planar, and its crank turns fully.
+    bearing : Bearing
+    direction : float
+        Of the axis about which the motor axis is tilted, radians from the frame line.
+    condition : {"A", "B"}
+    effort : Effort, optional
+    """
+    from graphsynth.evidence.position import four_bar
+    from graphsynth.jamming.joints.limits import Misalignment
+
+    mechanism, _ = four_bar(linkage)
+    exact = exact_largest(linkage, bearing, condition) if direction == 0.0 else None
+    size = ", ".join(f"{value:g}" for value in (linkage.l1, linkage.l2, linkage.l3, linkage.l4))
+    tilt = Misalignment(0, 1, 0.01, direction)
+    return coupled_problem(
+        mechanism, bearing, tilt, f"the linkage ({size})", condition=condition, exact=exact, effort=effort
+    )
+
+
+def coupled_problem(
+    mechanism: Mechanism,
+    bearings: Any,
+    tilt: Misalignment,
+    name: str,
+    *,
+    condition: Condition = "A",
+    exact: Any = None,
+    inputs: tuple[float, float] = (0.0, math.tau),
+    effort: Effort | None = None,
+) -> Problem:
+    """Find the largest misalignment of a mechanism whose bearings share it, by samples and by proof.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    bearings
+        As for `graphsynth.jamming.joints.assess_coupled`.
+    tilt : Misalignment
+    name : str
+        Of the mechanism, for the picture.
+    condition : {"A", "B"}
+    exact : mpmath number, optional
+        The largest misalignment, radians, if it is known; else the reference are proved bounds, 1e-6 apart.
+    inputs : (float, float), optional
+        Range of the input, radians.
+    effort : Effort, optional
+
+    Raises
+    ------
+    GeometryError
+        If the mechanism does not move through the range, or no bounds can be proved.
+    """
+    from graphsynth.jamming.joints.assess import assess_coupled
+    from graphsynth.jamming.joints.scale import largest_scale
+    from graphsynth.kinematics.simulation import simulate
+
+    effort = effort or Effort()
+    rounds = Effort(1 if effort.quick else min(2, effort.rounds), effort.patience, effort.quick)
+
+    def turn(count: int) -> Motion:
+        return simulate(mechanism, np.linspace(*inputs, count), events=False)
+
+    def assessed(count: int) -> CoupledReport:
+        return assess_coupled(turn(count), bearings, tilt, condition=condition)
+
+    motion = turn(37)
+    if not motion.completed:
+        raise GeometryError(f"the motion ends: {motion.reason}")
+    prove = partial(largest_scale, motion, bearings, tilt, condition=condition)
+    low, high, reference = _reference(prove, tilt, exact)
+    middle = (low + high) / 2
+    rows = []
+    for count in (8, 14, 26) if effort.quick else (8, 26, 74, 362):
+        report, seconds, done = best_of(partial(assessed, count), rounds)
+        error = float(abs(report.smallest_scale / middle - 1))
+        kind = "distance from the reference"
+        rows.append(Row("samples", f"{count} positions", error, seconds, done, kind, reference))
+    default = signature(largest_scale).parameters["relative_gap"].default
+    gaps = sorted({1e-1, 1e-2, default} if effort.quick else {1e-1, 1e-2, 1e-3, default}, reverse=True)
+    for gap in gaps:
+        found, seconds, done = best_of(partial(prove, relative_gap=gap), rounds, warm=gap == gaps[0])
+        rows.append(_gap_row(found, gap, (low, high, reference), (seconds, done), default=gap == default))
+    question = f"Largest misalignment of {name} whose bearings share it"
+    note = "Samples err on the wrong side: they never find the worst input itself."
+    return Problem("coupled-joints", question, "relative", tuple(rows), note=note)
+
+
+def _gap_row(
+    found: ScaleCertificate, gap: float, truth: tuple[Any, Any, str], timed: tuple[float, int], *, default: bool
+) -> Row:
+    """Row of a certificate: its gap, and whether it holds the reference and is as narrow as was asked."""
+    low, high, reference = truth
+    why = "" if found.low <= high and low <= found.high else "the reference lies outside of what is proved"
+    why = why or (found.reason if found.relative_gap > gap else "")
+    return Row(
+        "certified gap",
+        f"gap {gap:g}, {found.evaluated} pieces",
+        found.relative_gap,
+        *timed,
+        "gap between the proved bounds",
+        f"none needed; checked to hold the {reference}",
+        RowStatus.FAILED if why else RowStatus.OK,
+        why,
+        default,
+        True,
+        value=gap,
+    )
+
+
+def _reference(prove: Any, tilt: Misalignment, exact: Any) -> tuple[Any, Any, str]:
+    """Bounds of the largest factor on the misalignment, and where they are from."""
+    import mpmath
+
+    if exact is not None:
+        with mpmath.workdps(_DIGITS):
+            scale = exact / mpmath.mpf(tilt.alpha)
+        return scale, scale, "closed form with 50 digits: twice the critical tilt of one bearing"
+    found = prove(relative_gap=_FINE_GAP, max_pieces=200_000)
+    if not 0.0 < found.low <= found.high < math.inf:
+        raise GeometryError(f"no bounds of the misalignment can be proved: {found.reason}")
+    return found.low, found.high, f"proved bounds of the certificate itself, {found.relative_gap:.0e} apart"

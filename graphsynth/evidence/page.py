@@ -71,8 +71,16 @@ def _problem(report: AccuracyReport, problem: Problem, svg: str) -> str:
 
 def _rows(problem: Problem) -> str:
     extra = list(dict.fromkeys(name for row in problem.rows for name in row.more))
-    head = ["method", "setting", f"error, {problem.unit}", f"time of one {problem.per}", "status", *extra, "error is",
-            "against"]  # fmt: skip
+    head = [
+        "method",
+        "setting",
+        f"error, {problem.unit}",
+        f"time of one {problem.per}",
+        "status",
+        *extra,
+        "error is",
+        "against",
+    ]
     cells = "".join(_row(row, extra) for row in problem.rows)
     names = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
     return (

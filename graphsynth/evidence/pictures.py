@@ -93,9 +93,14 @@ def _law(axes: Any, rows: tuple[Row, ...], count: str, colour: str) -> None:
     ends = [min(row.more[count] for row in good if row.more[count] >= 100.0), 100.0 * largest]
     axes.plot(ends, [law.seconds(n) for n in ends], "--", color=colour, lw=0.9, alpha=0.7)
     axes.annotate(
-        f"time ~ {count}^{law.exponent:.2f}", (ends[1], law.seconds(ends[1])), textcoords="offset points",
-        xytext=(-4, 4), ha="right", fontsize=7, color=colour,
-    )  # fmt: skip
+        f"time ~ {count}^{law.exponent:.2f}",
+        (ends[1], law.seconds(ends[1])),
+        textcoords="offset points",
+        xytext=(-4, 4),
+        ha="right",
+        fontsize=7,
+        color=colour,
+    )
 
 
 def _top(problem: Problem) -> float:
@@ -123,13 +128,22 @@ def _method(
     if places:
         filled = all(row.proved for row in good)
         axes.plot(
-            *zip(*places), **style, ms=6, lw=1.3, mfc=colour if filled else "white", mew=1.4,
+            *zip(*places),
+            **style,
+            ms=6,
+            lw=1.3,
+            mfc=colour if filled else "white",
+            mew=1.4,
             label=rows[0].method + (" (proved)" if filled else ""),
-        )  # fmt: skip
+        )
         axes.plot(
             *(zip(*[p for p, row in zip(places, good) if row.default]) if any(r.default for r in good) else ((), ())),
-            "o", ms=12, mfc="none", mec=colour, mew=1.0,
-        )  # fmt: skip
+            "o",
+            ms=12,
+            mfc="none",
+            mec=colour,
+            mew=1.0,
+        )
     else:
         axes.plot([], [], **style, ms=6, lw=1.3, mfc="white", label=rows[0].method)
     times = [row.seconds for row in problem.rows if math.isfinite(row.seconds)]
@@ -149,17 +163,30 @@ def _name_ends(
             continue
         below = k > 0 or len(rows) == 1
         text = axes.annotate(
-            good[k].setting, places[k], textcoords="offset points", xytext=(5, -10 if below else 6), fontsize=7,
-            color=colour, ha="left",
-        )  # fmt: skip
+            good[k].setting,
+            places[k],
+            textcoords="offset points",
+            xytext=(5, -10 if below else 6),
+            fontsize=7,
+            color=colour,
+            ha="left",
+        )
         taken.append(text)
 
 
 #: Where the name of a setting may stand beside its marker, in points: offset and alignment, the best first.
 _SPOTS = (
-    ((6, 6), "left"), ((6, -11), "left"), ((-6, 6), "right"), ((-6, -11), "right"), ((6, 15), "left"),
-    ((6, -20), "left"), ((-6, 15), "right"), ((-6, -20), "right"), ((6, 24), "left"), ((6, -29), "left"),
-)  # fmt: skip
+    ((6, 6), "left"),
+    ((6, -11), "left"),
+    ((-6, 6), "right"),
+    ((-6, -11), "right"),
+    ((6, 15), "left"),
+    ((6, -20), "left"),
+    ((-6, 15), "right"),
+    ((-6, -20), "right"),
+    ((6, 24), "left"),
+    ((6, -29), "left"),
+)
 
 
 def _part(figure: Any, axes: Any, names: list[Any]) -> None:

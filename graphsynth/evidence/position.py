@@ -7,7 +7,8 @@ formula with the closed forms or the engine, which tell it the branch only.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,18 +16,27 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.mechanism.joints import Revolute
+from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["NODES", "Closed", "four_bar", "position_problem", "precise_points", "precise_poses"]
+__all__ = ["NODES", "Closed", "batch_problem", "four_bar", "position_problem", "precise_points", "precise_poses"]
 
 Array = NDArray[np.float64]
 #: Name of a closed form, and what it gives at inputs (n,): the position (n,) of the watched point, complex.
 Closed = tuple[str, Callable[[Array], NDArray[np.complex128]]]
 _DIGITS = 50
 NODES = 12  # the reference is computed at these intervals of the range
+_REFERENCE = f"Newton's method with {_DIGITS} digits on the joint equations"
+_KIND = "distance from the reference"
+Complex = NDArray[np.complex128]
+_Made = tuple[Mechanism, Closed]
+_POSITIONS = 6 * NODES + 1
+_SETS_KIND = "largest distance from the reference over the longest link"
 
 
 def four_bar(linkage: TiltedFourBar) -> tuple[Mechanism, Closed]:
@@ -50,8 +60,11 @@ def four_bar(linkage: TiltedFourBar) -> tuple[Mechanism, Closed]:
     l1, l2, l3, l4 = linkage.l1, linkage.l2, linkage.l3, linkage.l4
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     joints = (
-        Revolute(0, 1), Revolute(1, 2, (l2, 0.0)), Revolute(2, 3, (l3, 0.0), (l4, 0.0)), Revolute(0, 3, (l1, 0.0)),
-    )  # fmt: skip
+        Revolute(0, 1),
+        Revolute(1, 2, (l2, 0.0)),
+        Revolute(2, 3, (l3, 0.0), (l4, 0.0)),
+        Revolute(0, 3, (l1, 0.0)),
+    )
     first = linkage.positions([0.0])
     A, B = complex(first.A[0, 0], first.A[0, 1]), complex(first.B[0, 0], first.B[0, 1])
     coupler, rocker = (A.real, A.imag, float(np.angle(B - A))), (l1, 0.0, float(np.angle(B - l1)))
@@ -172,9 +185,13 @@ def _driven(mechanism: Mechanism, u: Any, pose: list[list[Any]]) -> tuple[Any, d
 
 
 def position_problem(
-    mechanism: Mechanism, name: str, closed: Closed | None = None, *, inputs: tuple[float, float] = (0.0, math.tau),
+    mechanism: Mechanism,
+    name: str,
+    closed: Closed | None = None,
+    *,
+    inputs: tuple[float, float] = (0.0, math.tau),
     effort: Effort | None = None,
-) -> Problem:  # fmt: skip
+) -> Problem:
     """Compare every way to the positions over a range of the input.
 
     Parameters
@@ -244,10 +261,6 @@ def _precise_point(pose: list[list[Any]], watched: tuple[int, tuple[float, float
         return complex(mpmath.mpc(x, y) + mpmath.expj(theta) * mpmath.mpc(*at))
 
 
-_REFERENCE = f"Newton's method with {_DIGITS} digits on the joint equations"
-_KIND = "distance from the reference"
-
-
 def _gap(found: NDArray[np.complex128], truth: NDArray[np.complex128], Lc: float) -> float:
     """Largest distance at the nodes, which every grid contains."""
     step = (len(found) - 1) // NODES
@@ -269,15 +282,28 @@ def _engine_row(
     error = _gap(_point(found.poses, watched), truth, Lc)
     status = RowStatus.OK if found.completed else RowStatus.FAILED
     return Row(
-        "engine, with events and derivatives", f"{len(grid)} at once", error, seconds / len(grid), rounds, _KIND,
-        _REFERENCE, status, found.reason, more={"residual": found.residual},
-    )  # fmt: skip
+        "engine, with events and derivatives",
+        f"{len(grid)} at once",
+        error,
+        seconds / len(grid),
+        rounds,
+        _KIND,
+        _REFERENCE,
+        status,
+        found.reason,
+        more={"residual": found.residual},
+    )
 
 
 def _root_row(
-    mechanism: Mechanism, nodes: Array, truth: NDArray[np.complex128], watched: Any, motion: Any, tol: float,
+    mechanism: Mechanism,
+    nodes: Array,
+    truth: NDArray[np.complex128],
+    watched: Any,
+    motion: Any,
+    tol: float,
     effort: Effort,
-) -> Row:  # fmt: skip
+) -> Row:
     """Scipy's ``root`` on the same equations, from node to node with steps of five degrees between."""
     from scipy.optimize import root
 
@@ -302,9 +328,10 @@ def _root_row(
         found: list[Array] = []
         for u in fine:
             answer = root(
-                lambda y, u=u: np.append(residual(mechanism.joints, full(y)) / motion.Lc, driven(full(y), u)), x,
+                lambda y, u=u: np.append(residual(mechanism.joints, full(y)) / motion.Lc, driven(full(y), u)),
+                x,
                 tol=tol,
-            )  # fmt: skip
+            )
             if not answer.success:
                 return found, " ".join(answer.message.split())
             x = answer.x
@@ -343,7 +370,7 @@ def _proof_row(
     if not proof.certified:
         return Row(
             name, setting, math.nan, seconds / len(grid), rounds, kind, "", RowStatus.FAILED, proof.reason, more=more
-        )  # fmt: skip
+        )
     radius = float(np.max(proof.position_radius))
     # the watched point moves with the angle of its link too
     reach = radius + float(np.max(proof.angle_radius)) * math.hypot(*watched[1])
@@ -351,7 +378,115 @@ def _proof_row(
     held = away <= reach + 4.0 * math.ulp(float(np.abs(truth).max()))
     why = "" if held else f"the reference is {away:.1e} away, beyond the proved radius"
     return Row(
-        name, setting, reach / Lc, seconds / len(grid), rounds, kind,
-        f"none needed; checked to hold the pose with {_DIGITS} digits", RowStatus.OK if held else RowStatus.FAILED, why,
-        proved=True, more=more,
-    )  # fmt: skip
+        name,
+        setting,
+        reach / Lc,
+        seconds / len(grid),
+        rounds,
+        kind,
+        f"none needed; checked to hold the pose with {_DIGITS} digits",
+        RowStatus.OK if held else RowStatus.FAILED,
+        why,
+        proved=True,
+        more=more,
+    )
+
+
+def batch_problem(crank: float, largest: float, effort: Effort | None = None) -> Problem:
+    """Move crank-rockers with one crank and other lengths up to ``largest``, at 73 crank angles each.
+
+    Parameters
+    ----------
+    crank, largest : float
+        In one unit; ``largest`` is at least four cranks.
+    effort : Effort, optional
+
+    Examples
+    --------
+    >>> problem = batch_problem(1.0, 5.0, Effort(rounds=1, quick=True))
+    >>> max(row.error for row in problem.rows) < 1e-13
+    True
+    """
+    effort = effort or Effort()
+    linkages = _crank_rockers(crank, largest, 4 if effort.quick else 12)
+    f = np.linspace(0.0, math.tau, _POSITIONS)
+    made = [four_bar(linkage) for linkage in linkages]
+    nodes = f[:: (_POSITIONS - 1) // NODES]
+    truth = np.array([precise_points(mechanism, nodes) for mechanism, _ in made])
+    size = np.array([max(linkage.l1, linkage.l3, linkage.l4) for linkage in linkages])
+    rows = []
+    for sets in (len(made), 40, 400) if effort.quick else (1, len(made), 240, 2400, 24_000):
+        for rates in (False, True):
+            name = "batch engine" + (" with derivatives" if rates else "")
+            run = partial(_batch, [m for m, _ in made], f, sets, rates)
+            found, seconds, rounds = best_of(run, effort)
+            rows.append(_sets_row(name, f"{sets} sets", found, truth, size, seconds / (sets * len(f)), rounds))
+    for name, each in (("engine, set by set", _engine), ("closed form, set by set", _closed)):
+        for count in (1, len(made) // 2, len(made)):
+            found, seconds, rounds = best_of(partial(each, made[:count], f), effort)
+            rows.append(_sets_row(name, f"{count} sets", found, truth, size, seconds / (count * len(f)), rounds))
+    question = f"Positions of crank-rockers of many dimensions, {len(f)} crank angles each"
+    return Problem("many-sets", question, "relative", tuple(rows), "position")
+
+
+def _crank_rockers(crank: float, largest: float, count: int) -> list[TiltedFourBar]:
+    """Draw crank-rockers well away from change points, always the same ones."""
+    random = np.random.default_rng(0)
+    found: list[TiltedFourBar] = []
+    while len(found) < count:
+        l1, l3, l4 = random.uniform(1.2 * crank, largest, 3)
+        sides = sorted((l1, l3, l4))
+        if crank + sides[2] < sides[0] + sides[1] - 0.05 * crank:
+            found.append(TiltedFourBar(float(l1), crank, float(l3), float(l4)))
+    return found
+
+
+def _batch(mechanisms: list[Mechanism], f: Array, sets: int, rates: bool) -> Complex:
+    from graphsynth.kinematics.simulation import simulate_batch
+
+    dimensions = np.stack([mechanisms[k % len(mechanisms)].dimensions for k in range(sets)])
+    found = simulate_batch(mechanisms[0], f, dimensions, rates=rates, keep=(3,))
+    # joint B is the end of the rocker, link 3
+    x, y, cosine, sine = np.moveaxis(found.frames[: len(mechanisms), :, 0], -1, 0)
+    ends = np.array([_end(mechanism) for mechanism in mechanisms])[: len(x), None]
+    return np.asarray(x + 1j * y + ends * (cosine + 1j * sine))
+
+
+def _end(mechanism: Mechanism) -> float:
+    """Length of the rocker, link 3."""
+    joint = next(joint for joint in mechanism.joints if joint.pair == (2, 3))
+    assert isinstance(joint, Revolute)
+    return joint.at_b[0]
+
+
+def _engine(made: Sequence[_Made], f: Array) -> Complex:
+    from graphsynth.kinematics.simulation import simulate
+
+    found = []
+    for mechanism, _ in made:
+        pose = simulate(mechanism, f).poses[:, 3]
+        found.append(pose[:, 0] + 1j * pose[:, 1] + _end(mechanism) * np.exp(1j * pose[:, 2]))
+    return np.array(found)
+
+
+def _closed(made: Sequence[_Made], f: Array) -> Complex:
+    return np.array([closed(f) for _, (_, closed) in made])
+
+
+def _sets_row(
+    method: str, setting: str, found: Complex, truth: Complex, size: Array, seconds: float, rounds: int
+) -> Row:
+    nodes = found[:, :: (_POSITIONS - 1) // NODES]
+    error = float((np.abs(nodes - truth[: len(found)]) / size[: len(found), None]).max())
+    lost = not math.isfinite(error)
+    return Row(
+        method,
+        setting,
+        error,
+        seconds,
+        rounds,
+        _SETS_KIND,
+        "Newton's method with 50 digits on the joint equations",
+        RowStatus.FAILED if lost else RowStatus.OK,
+        "a set stopped" if lost else "",
+    )

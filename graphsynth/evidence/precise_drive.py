@@ -53,9 +53,16 @@ def shape_of_series(rows: NDArray[np.float64], base: float = 0.0, load: float = 
 
 
 def precise_drive(
-    shape: Shape, motor: DCMotor | SynchronousMotor | None, ratio: float, inertia: float, friction: float,
-    times: Sequence[float], *, angle: float = 0.0, speed: float = 0.0,
-) -> Vector:  # fmt: skip
+    shape: Shape,
+    motor: DCMotor | SynchronousMotor | None,
+    ratio: float,
+    inertia: float,
+    friction: float,
+    times: Sequence[float],
+    *,
+    angle: float = 0.0,
+    speed: float = 0.0,
+) -> Vector:
     """Angle, speed and currents at times.
 
     Parameters
@@ -160,9 +167,7 @@ def _electric(motor: DCMotor | SynchronousMotor) -> Callable[[Any, Vector], tupl
     if isinstance(motor, DCMotor):
         if math.isfinite(motor.voltage_limit):
             raise SpecError(f"voltage_limit = {motor.voltage_limit:g} V: the precise reference knows no events")
-        gain, wanted, constant, back = map(
-            Long, (motor.gain, motor.speed, motor.torque_constant, motor.emf_constant)
-        )  # fmt: skip
+        gain, wanted, constant, back = map(Long, (motor.gain, motor.speed, motor.torque_constant, motor.emf_constant))
 
         def direct(w: Any, y: Vector) -> tuple[Any, list[Any]]:
             return constant * y[2], [(gain * (wanted - w) - R * y[2] - back * w) / L]

@@ -77,20 +77,28 @@ class AccuracyReport:
             rows = table([problem]).to_dict("records")
             problems.append(
                 {
-                    "name": problem.name, "question": problem.question, "unit": problem.unit, "per": problem.per,
-                    "note": problem.note, "rows": [{key: _plain(v) for key, v in row.items()} for row in rows],
+                    "name": problem.name,
+                    "question": problem.question,
+                    "unit": problem.unit,
+                    "per": problem.per,
+                    "note": problem.note,
+                    "rows": [{key: _plain(v) for key, v in row.items()} for row in rows],
                     "advice": self.advice[problem.name],
                     "knees": [
                         {"method": k.method, "knee": k.knee.setting, "verdict": k.verdict, "sentence": k.sentence}
                         for k in self.knees[problem.name]
                     ],
                 }
-            )  # fmt: skip
+            )
         return {
-            "scene": self.scene, "machine": self.machine, "seconds": round(self.seconds, 3),
-            "measured in": {name: round(value, 3) for name, value in self.times.items()}, "problems": problems,
-            "left_out": [list(pair) for pair in self.left_out], "interrupted": self.interrupted,
-        }  # fmt: skip
+            "scene": self.scene,
+            "machine": self.machine,
+            "seconds": round(self.seconds, 3),
+            "measured in": {name: round(value, 3) for name, value in self.times.items()},
+            "problems": problems,
+            "left_out": [list(pair) for pair in self.left_out],
+            "interrupted": self.interrupted,
+        }
 
 
 def _plain(value: Any) -> Any:
@@ -150,7 +158,7 @@ def measure(
         progress("done", len(plans), len(plans))
     return AccuracyReport(
         context.scene.name, tuple(found), tuple(left_out), perf_counter() - begin, _machine(), times, interrupted
-    )  # fmt: skip
+    )
 
 
 def _by_hand(error: BaseException | None) -> bool:
@@ -161,7 +169,7 @@ def _by_hand(error: BaseException | None) -> bool:
 
 
 def _why(error: BaseException) -> str:
-    """Reason in one line; what nobody foresaw is named as the failure it is."""
+    """Reason in one line; anything but an error of the library is named as a failure."""
     text = " ".join(str(error).split())
     return text if isinstance(error, GraphsynthError) else f"failed: {type(error).__name__}: {text}"
 

@@ -57,20 +57,23 @@ class Row:
         Whether the method proves its result.
     more : mapping of str to float
         Further columns: events, drift, energy, calls, ...
+    value : float
+        The setting as a number: a tolerance, a step; NaN if it is none.
     """
 
     method: str
     setting: str
     error: float
     seconds: float
-    rounds: int
-    kind: str
-    reference: str
+    rounds: int = 1
+    kind: str = "distance from the reference"
+    reference: str = ""
     status: RowStatus = RowStatus.OK
     reason: str = ""
     default: bool = False
     proved: bool = False
     more: Mapping[str, float] = field(default_factory=dict)
+    value: float = math.nan
 
     @property
     def good(self) -> bool:
@@ -130,6 +133,17 @@ class Problem:
     def of(self, method: str) -> tuple[Row, ...]:
         """Rows of one method."""
         return tuple(row for row in self.rows if row.method == method)
+
+    def order(self, method: str) -> float:
+        """Observed order of a method: slope of the error over the setting between first and last good row."""
+        good = [row for row in self.of(method) if row.good]
+        if len(good) < 2:
+            return math.nan
+        return math.log(good[0].error / good[-1].error) / math.log(good[0].value / good[-1].value)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the rows as a table."""
+        return table([self])
 
 
 @dataclass(frozen=True)
@@ -222,6 +236,7 @@ def table(problems: Iterable[Problem]) -> pd.DataFrame:
         for row in problem.rows:
             record = asdict(row)
             more = record.pop("more")
+            del record["value"]
             record["status"] = row.status.value
             records.append({"problem": problem.name, **record, "unit": problem.unit, "per": problem.per, **more})
     first = ["problem", "method", "setting", "error", "unit", "kind", "reference", "seconds", "per", "rounds", "status"]

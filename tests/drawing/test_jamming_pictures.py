@@ -11,13 +11,11 @@ from graphsynth.drawing.jamming_pictures import (
     area_chart,
     area_picture,
     crossing_picture,
-    error_time_picture,
     region_picture,
     report_picture,
     section_picture,
     space_picture,
 )
-from graphsynth.evidence import ErrorRow
 from graphsynth.jamming import Bearing, ToleranceBox, assess_jamming
 from graphsynth.jamming.bearing.area_curve import area_curve
 from graphsynth.jamming.intersection import circle_ellipse, exact_hull, krawczyk_boxes
@@ -164,15 +162,3 @@ def test_report_shows_what_is_proved():
     assert bands(drawn(report_picture(assess_jamming(box=ToleranceBox(), certify=False, samples=31))).axes[0]) == []
     stops = report_picture(assess_jamming(box=ToleranceBox(2, 1, 1, 1, "0.05"), samples=31))
     assert any("where it can be assembled" in text.get_text() for text in stops.legends[0].get_texts())
-
-
-def test_error_against_run_time_is_drawn_for_each_method():
-    rows = [ErrorRow("sweep", f"{e:g} rad", e, 1e-3 / e) for e in (0.1, 0.01, 0.001)] + [ErrorRow("exact", "", 0, 1e-4)]
-    figure = drawn(error_time_picture({"arc ends, rad": rows, "areas, mm²": rows[:1]}))
-    left = figure.axes[0]
-    assert left.get_xscale() == left.get_yscale() == "log"
-    assert [line.get_label() for line in left.lines] == ["sweep", "exact"]
-    np.testing.assert_allclose(left.lines[0].get_ydata(), [0.1, 0.01, 0.001])
-    assert [text.get_text() for text in left.texts] == ["0.1 rad", "0.001 rad"]
-    with pytest.raises(GeometryError, match="no rows"):
-        error_time_picture({"arcs": []})

@@ -7,7 +7,7 @@ from dynamic_models import g1
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import consistent_start
-from graphsynth.evidence import dynamics_work_precision
+from graphsynth.evidence import RowStatus, dynamics_work_precision
 
 
 def test_rows_of_the_crank_rocker():
@@ -20,7 +20,7 @@ def test_rows_of_the_crank_rocker():
     for rough, fine in zip(explicit[::2], explicit[1::2]):
         assert fine.error < 1e-6 and fine.error < 0.1 * rough.error
     failed = [row for row in rows if math.isnan(row.error)]
-    assert failed and all("more than 150 steps" in row.status for row in failed)
+    assert failed and all("more than 150 steps" in row.reason for row in failed)
 
 
 def test_bad_requests():
@@ -30,3 +30,13 @@ def test_bad_requests():
         dynamics_work_precision(model, start, [0.0, 0.1], tolerances=[1e-13])
     with pytest.raises(GeometryError, match="rounds = 0"):
         dynamics_work_precision(model, start, [0.0, 0.1], rounds=0)
+
+
+def test_what_misses_its_tolerance_is_unreliable(monkeypatch):
+    monkeypatch.setattr("graphsynth.evidence.dynamics._MISSED", 1e-6)
+    model = g1()
+    start = consistent_start(model, keep={(0, 1): 0.0}, keep_rates={(0, 1): 10.0}, modes={0: 1})
+    (row,) = dynamics_work_precision(
+        model, start, [0.0, 0.1], forms=["augmented"], methods=["DOP853"], tolerances=[1e-5], rounds=1
+    )
+    assert row.status is RowStatus.UNRELIABLE and row.error > 0.0 and "times the tolerance" in row.reason

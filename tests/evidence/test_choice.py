@@ -64,26 +64,24 @@ def test_sentences_of_a_small_table():
     )  # fmt: skip
     said = advice(Problem("p", "q", "mm", table))
     assert said["polygon"] == (
-        "polygon: choose it for errors down to 0.01 mm (16 corners, 10 µs); finer errors are cheaper with closed form; "
+        "polygon: fastest for errors down to 0.01 mm (16 corners, 10 µs); for smaller errors closed form is faster; "
         "measured at 2 settings only."
     )
-    assert said["closed form"].startswith("closed form: choose it for errors from 0.01 mm down to 1e-15 mm (100 µs)")
+    assert said["closed form"].startswith("closed form: fastest for errors from 0.01 mm down to 1e-15 mm (100 µs)")
     assert said["closed form"].endswith("; it has no setting.")
-    assert said["sweep"].startswith(
-        "sweep: choose it where a proof is wanted, for errors down to 1e-06 mm (fine, 100 ms)"
-    )
-    assert said["sweep"].endswith("; 1 of 3 settings is no use here (finest).")
+    assert said["sweep"].startswith("sweep: fastest with a proof, for errors down to 1e-06 mm (fine, 100 ms)")
+    assert said["sweep"].endswith("; 1 of 3 settings failed or gave a wrong result (finest).")
     assert said["guess"] == (
-        "guess: do not choose it here; every setting failed (it never converges); measured at 1 setting only."
+        "guess: not usable here, every setting failed (it never converges); measured at 1 setting only."
     )
-    assert "take closed form instead: 1e-15 mm in 100 µs, 10000 times faster" in said["slow"]
+    assert "closed form is better: 1e-15 mm in 100 µs, 10000 times faster" in said["slow"]
 
 
 def test_an_unreliable_result_is_never_recommended():
     table = (row("a", 1e-12, 1e-6, "wrong", status=RowStatus.UNRELIABLE, reason="no"), row("b", 1e-3, 1e-1, "slow"))
     said = advice(Problem("p", "q", "mm", table))
-    assert said["a"].startswith("a: do not choose it here")
-    assert said["b"].startswith("b: choose it for errors down to 0.001 mm")
+    assert said["a"].startswith("a: not usable here")
+    assert said["b"].startswith("b: fastest for errors down to 0.001 mm")
 
 
 def test_the_knee_of_a_method_of_first_order_is_its_first_setting():
@@ -97,11 +95,11 @@ def test_the_knee_of_a_method_of_high_order_is_where_rounding_begins():
 
 def test_one_slow_run_does_not_end_the_search_for_the_knee():
     times = (1.0, 9.0, 9.5, 10.0, 40.0)
-    given = [row("a", 10.0 ** (-3 * k), t, str(k)) for k, t in enumerate(times[:4])] + [row("a", 1e-10, 40.0, "dear")]
+    given = [row("a", 10.0 ** (-3 * k), t, str(k)) for k, t in enumerate(times[:4])] + [row("a", 1e-10, 40.0, "slow")]
     assert knee(given).setting == "3"
 
 
-def test_defaults_are_judged():
+def test_defaults_are_compared_with_the_knee():
     def verdict(name):
         errors, times = (1e-2, 1e-4, 1e-6, 1e-7), (1.0, 1.5, 2.0, 40.0)
         given = tuple(row("a", e, t, n, default=n == name) for e, t, n in zip(errors, times, "wxyz"))
@@ -110,6 +108,20 @@ def test_defaults_are_judged():
     assert [verdict(name).verdict for name in "wxyz-"] == ["coarser", "coarser", "at the knee", "finer", "no default"]
     assert verdict("z").sentence == (
         "a: the default z (1.0e-07 in 40 s) is finer than the knee; the knee is y (1.0e-06 in 2 s)"
+    )
+
+
+def test_a_default_that_costs_time_and_gains_nothing():
+    given = (
+        row("a", 1e-2, 1.0, "x"),
+        row("a", 1e-4, 1.5, "y"),
+        row("a", 1e-6, 2.0, "z"),
+        row("a", 1e-3, 9.0, "w", default=True),
+    )
+    found = knees(Problem("p", "q", "mm", given))[0]
+    assert found.verdict == "slower, no gain"
+    assert found.sentence == (
+        "a: the default w (1.0e-03 in 9 s) is slower than the knee and gains nothing; the knee is z (1.0e-06 in 2 s)"
     )
 
 

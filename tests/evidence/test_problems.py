@@ -7,16 +7,17 @@ import pytest
 
 from graphsynth import LambdaLinkage, ParallelPlatform
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics.motors import DCMotor
 from graphsynth.evidence import Effort, RowStatus, knees
-from graphsynth.evidence.coupled import exact_largest, lambda_problem
 from graphsynth.evidence.crossing import area_problem, crossing_problem
-from graphsynth.evidence.drives import work_rows
+from graphsynth.evidence.drives import drive_work_precision
 from graphsynth.evidence.enumeration import enumeration_problem
-from graphsynth.evidence.jamming import arc_problem
+from graphsynth.evidence.jamming import arc_problem, exact_largest, lambda_problem
 from graphsynth.evidence.position import NODES, _closed_row, four_bar, position_problem, precise_points
 from graphsynth.jamming import Bearing, ToleranceBox
+from graphsynth.systems.platform.evidence import double_root_problem
 from graphsynth.systems.platform.evidence_direct import mode_problem
-from graphsynth.systems.platform.evidence_double_root import double_root_problem
+from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
 QUICK = Effort(rounds=1, quick=True)
 SINE = "0.0133308643347"
@@ -94,7 +95,7 @@ def test_coupled_joints_of_another_linkage_have_proved_bounds():
 
 
 def test_a_certificate_beside_the_reference_or_too_wide_is_a_failure():
-    from graphsynth.evidence.coupled import _gap_row
+    from graphsynth.evidence.jamming import _gap_row
     from graphsynth.jamming.joints.scale import ScaleCertificate
 
     def row(low, high, gap=0.1, reason=""):
@@ -240,13 +241,8 @@ def test_a_wrong_count_is_a_failure(monkeypatch):
 
 
 def test_what_an_integrator_does_not_finish_is_a_failure():
-    from graphsynth.evidence.driven import WorkRow
-
-    given = [
-        WorkRow("graphsynth", 1e-8, 1e-9, 0.1, 10, "done"),
-        WorkRow("scipy Radau", 1e-8, math.nan, 3.0, 30_000, "more than 30000 calls"),
-        WorkRow("scipy DOP853", 1e-8, 1e-3, 0.2, 10, "more than 1000 times the tolerance"),
-    ]
-    rows = work_rows(given, "scipy DOP853", Effort(), 1e-8)
-    assert [row.status for row in rows] == [RowStatus.OK, RowStatus.FAILED, RowStatus.UNRELIABLE]
-    assert rows[0].default and rows[2].reference.endswith("(the same method)")
+    machine = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, 0.1, 0.1, 20.0, 20.0))
+    options = {"tolerances": (1e-8,), "solvers": ("DOP853",), "rounds": 1, "most_calls": 50}
+    own, scipy = drive_work_precision(machine, [0.0, 0.1, 0.2], **options).rows
+    assert own.status is RowStatus.OK and scipy.status is RowStatus.FAILED and math.isnan(scipy.error)
+    assert scipy.reason == "more than 50 calls" and scipy.reference.endswith("(the same method)")

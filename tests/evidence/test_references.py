@@ -14,9 +14,8 @@ from graphsynth.evidence.jamming import precise_arc_ends, precise_critical_tilt
 from graphsynth.evidence.position import four_bar, precise_points, precise_poses
 from graphsynth.jamming import Bearing, ToleranceBox
 from graphsynth.jamming.intersection import surrogate_problem
-from graphsynth.systems.platform.evidence_continuation import precise_branch
-from graphsynth.systems.platform.evidence_direct_reference import precise_anchors, precise_modes
-from graphsynth.systems.platform.evidence_eigenvalues import eigenvalue_modes
+from graphsynth.systems.platform.evidence import precise_branch
+from graphsynth.systems.platform.evidence_direct import eigenvalue_modes, precise_anchors, precise_modes
 
 
 def test_modes_of_g1_of_the_specification():
@@ -152,17 +151,15 @@ def test_branch_is_one_of_all_poses_of_the_platform():
 
 
 def test_area_of_the_specification():
-    from graphsynth.evidence.bearing import WORST_SINE
+    worst = "0.01333086433470144655443037446460955080344"  # 0.4 sin(1/30): the largest tilt of the linkage
 
     # docs/explanation/errata.md: the free gap at the worst pose, 25 digits
     with mpmath.workdps(30):
-        assert abs(precise_area(Bearing(), WORST_SINE) - mpmath.mpf("0.9749683652811658362854900")) < mpmath.mpf(
-            "1e-24"
-        )
+        assert abs(precise_area(Bearing(), worst) - mpmath.mpf("0.9749683652811658362854900")) < mpmath.mpf("1e-24")
 
 
 def test_the_closed_form_of_coupled_joints_keeps_its_digits():
-    from graphsynth.evidence.coupled import exact_largest
+    from graphsynth.evidence.jamming import exact_largest
 
     found = exact_largest(LambdaLinkage(), Bearing())  # theory/joints-that-share-a-tilt 6
     with mpmath.workdps(45):
@@ -178,7 +175,7 @@ def test_critical_tilt_of_the_specification():
 @pytest.mark.parametrize("order", ["YX", "XY"])
 def test_rods_and_closed_form_agree_in_fifty_digits(order):
     from graphsynth.systems.antenna import PointingMechanism
-    from graphsynth.systems.antenna.evidence_poses import rod_angles
+    from graphsynth.systems.antenna.evidence import rod_angles
     from graphsynth.systems.antenna.precise import precise_angles
 
     mechanism = PointingMechanism(order=order)

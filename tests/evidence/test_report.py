@@ -283,7 +283,7 @@ def test_ctrl_c_at_the_terminal(small, monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("graphsynth.pipeline.system.plans_of", lambda name, structure: stopped)
     assert main(["accuracy", "lambda", "--out", str(tmp_path)]) == 130
     out, error = capsys.readouterr()
-    assert "a: choose it" in out and "kept in" in error and error.endswith("interrupted\n")
+    assert "a: fastest for errors" in out and "kept in" in error and error.endswith("interrupted\n")
     assert len(pd.read_csv(tmp_path / "accuracy.csv")) == len(PROBLEM.rows)
 
 

@@ -4,56 +4,70 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from graphsynth.core.errors import GeometryError
-from graphsynth.evidence import arc_errors, area_errors, crossing_errors, error_table
-from graphsynth.jamming import ToleranceBox, spread
-from graphsynth.jamming.intersection import circle_ellipse
+from graphsynth.core.errors import GeometryError, SpecError
+from graphsynth.evidence import Effort, arc_problem, area_problem, crossing_problem
+from graphsynth.evidence.jamming import lambda_problem
+from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, spread, sweep_linkage
+from graphsynth.jamming.bearing.arcs import total_length
+from graphsynth.jamming.intersection import circle_ellipse, exact_hull, krawczyk_boxes
+from graphsynth.mechanism.four_bar import TiltedFourBar
 
-
-def by_method(rows):
-    return {name: [row for row in rows if row.method == name] for name in dict.fromkeys(row.method for row in rows)}
+ONCE = Effort(rounds=1)
+WORST = "0.01333086433470144655443037446460955080344"  # 0.4 sin(1/30): the largest tilt of the linkage
 
 
 def test_crossings():
-    rows = by_method(crossing_errors(boxes=(100, 400, 5000), repeats=1))
-    assert list(rows) == ["exact hull", "Krawczyk boxes", "general solver"]
-    errors = [row.error for row in rows["Krawczyk boxes"]]
+    problem = crossing_problem(Bearing(), WORST, ONCE)
+    assert problem.methods == ("exact hull", "Krawczyk boxes", "general solver")
+    errors = [row.error for row in problem.of("Krawczyk boxes")]
     assert errors == sorted(errors, reverse=True) and errors[0] > 1.0 > 1e-10 > errors[-1]
-    assert rows["exact hull"][0].error < 1e-14 and rows["general solver"][0].error < 1e-9
-    thick = crossing_errors(circle_ellipse(5, 6, 4, 1, "0.1"), boxes=(50, 500), repeats=1)
-    assert [row.method for row in thick] == ["exact hull", "Krawczyk boxes", "Krawczyk boxes"]
-    assert 0.0 < thick[2].error < thick[1].error
+    assert problem.of("exact hull")[0].error < 1e-14 and problem.of("general solver")[-1].error < 1e-9
+    thick = circle_ellipse(5, 6, 4, 1, "0.1")
+    exact = exact_hull(thick).hull.width
+    coarse, fine = (float(np.max(krawczyk_boxes(thick, max_boxes=n).outer.width - exact)) for n in (50, 500))
+    assert 0.0 < fine < coarse
 
 
 def test_areas():
-    rows = by_method(area_errors(counts=(100, 200), repeats=1))
-    assert rows["closed form, enclosed"][0].error < 1e-13
-    assert rows["closed form, doubles"][0].error < 1e-14
-    coarse, fine = (row.error for row in rows["polygon, doubles"])
-    assert coarse / fine == pytest.approx(4.0, rel=0.05)  # chords: second order
-    assert all(row.error > 800.0 for row in rows["interval shoelace sum"])  # finer boxes do not help
+    problem = area_problem(Bearing(), WORST, ONCE)
+    assert problem.of("closed form, enclosed")[0].error < 1e-13
+    assert problem.of("closed form, doubles")[0].error < 1e-14
+    errors = [row.error for row in problem.of("polygon, doubles")]
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.05)  # chords: second order
+    assert all(row.error > 800.0 for row in problem.of("interval shoelace sum"))  # finer boxes do not help
     with pytest.raises(GeometryError, match="do not cross"):
-        area_errors(sine="0.001")
+        area_problem(Bearing(), "0.001", ONCE)
 
 
 def test_arcs():
-    rows = by_method(arc_errors(resolutions=(1e-2, 1e-4), samples=(100, 1000), repeats=1))
-    assert rows["closed form, enclosed"][0].error < 1e-13
-    coarse, fine = (row.error for row in rows["interval sweep"])
-    assert coarse < 4.1e-2 and fine < 4.1e-4 and fine < coarse
-    assert [row.error for row in rows["samples, doubles"]] == pytest.approx([4 * math.tau / 100, 4 * math.tau / 1000])
+    problem = arc_problem(ToleranceBox(alpha="1/30"), effort=ONCE)
+    assert problem.of("closed form, enclosed")[0].error < 1e-13
+    widths = {row.setting: row.error for row in problem.of("interval sweep")}
+    assert 0.0 < widths["0.01 rad"] < 4.1e-2 and widths["0.0001 rad"] < min(4.1e-4, widths["0.01 rad"])
+    samples = [row.error for row in problem.of("samples, doubles")]
+    assert samples == pytest.approx([4 * math.tau / n for n in (100, 1000, 10_000, 100_000)])
     box = ToleranceBox(alpha=spread("1/30", relative="1e-2"))
-    loose = by_method(arc_errors(box, resolutions=(1e-3,), repeats=1))
-    assert list(loose) == ["closed form, enclosed", "interval sweep"]  # samples prove nothing about tolerances
-    assert loose["interval sweep"][0].error >= loose["closed form, enclosed"][0].error > 1e-3
-    with pytest.raises(GeometryError, match="repeats = 0"):
-        arc_errors(repeats=0)
+    swept = math.tau * sweep_linkage(box, resolution=1e-3).undecided_part
+    assert swept >= total_length(certify_jamming(box).arcs.undecided) > 1e-3
+    with pytest.raises(GeometryError, match="single dimensions"):  # samples prove nothing about tolerances
+        arc_problem(box, effort=ONCE)
+    with pytest.raises(SpecError, match="rounds = 0"):
+        Effort(rounds=0)
+
+
+def test_a_shared_misalignment():
+    problem = lambda_problem(TiltedFourBar(), Bearing(), effort=Effort(rounds=1, quick=True))
+    coarse, _, fine = (row.error for row in problem.of("samples"))
+    assert coarse == pytest.approx(0.0044, abs=5e-5) and coarse > 10.0 * fine > 0.0
+    gaps = problem.of("certified gap")
+    assert all(0.0 < row.error <= row.value for row in gaps) and min(row.value for row in gaps) <= 1e-2
+    assert all(row.seconds > 0.0 for row in problem.rows)
 
 
 def test_table():
-    rows = area_errors(counts=(100,), repeats=1)
-    table = error_table({"area": rows, "arcs": arc_errors(resolutions=(), samples=(), repeats=1)})
-    assert table["question"].tolist() == ["area"] * len(rows) + ["arcs"]
+    table = area_problem(Bearing(), WORST, Effort(rounds=1, quick=True)).to_pandas()
+    assert set(table["problem"]) == {"areas"}
     assert (table["seconds"] > 0).all() and table["error"].notna().all()

@@ -122,14 +122,15 @@ def test_pictures_of_the_shipped_scene(tables: dict[str, Any]) -> None:
 
 
 def test_solvers_side_by_side(tables: dict[str, Any]) -> None:
-    from graphsynth.evidence.driven import braider_work_precision
+    from graphsynth.evidence.drives import drive_work_precision
     from graphsynth.systems.braider.model import Braider
 
-    study = braider_work_precision(Braider(), 0.1, tolerances=[1e-6, 1e-10], solvers=["LSODA"], rounds=1)
-    assert [row.status for row in study.rows] == ["done"] * 4
+    times = np.linspace(0.0, 0.1, 11)
+    study = drive_work_precision(Braider(), times, tolerances=[1e-6, 1e-10], solvers=["LSODA"], rounds=1)
+    assert [row.status for row in study.rows] == ["ok"] * 4
     for ours, theirs in zip(study.rows[:2], study.rows[2:]):
-        assert ours.error < 100 * ours.setting and theirs.error < 1e3 * theirs.setting
-    failed = braider_work_precision(
-        Braider(), 0.1, tolerances=[1e-8], solvers=["DOP853"], rounds=1, most_calls=100
+        assert ours.error < 100 * ours.value and theirs.error < 1e3 * theirs.value
+    failed = drive_work_precision(
+        Braider(), np.linspace(0.0, 0.1, 11), tolerances=[1e-8], solvers=["DOP853"], rounds=1, most_calls=100
     ).rows[1]
-    assert failed.status == "more than 100 calls" and math.isnan(failed.error)
+    assert failed.reason == "more than 100 calls" and math.isnan(failed.error)

@@ -32,7 +32,7 @@ def positions(context: Any, effort: Effort) -> Problem:
 
 def coupled_joints(context: Any, effort: Effort) -> Problem:
     """Measure the bearings of the scene, in all moving joints of a mechanism of the scene."""
-    from graphsynth.evidence.coupled import coupled_problem
+    from graphsynth.evidence.jamming import coupled_problem
     from graphsynth.jamming.bearing.bearing import Bearing
     from graphsynth.jamming.joints import bearing_limits
     from graphsynth.jamming.joints.limits import Misalignment

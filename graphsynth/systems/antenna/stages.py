@@ -191,7 +191,7 @@ def tolerances(context: Context) -> tuple[tuple[float, Tolerance], ...]:
 
 def solvers(context: Context) -> tuple[Table, ...]:
     """Error against run time of the closed form and of the twelve equations; not part of the shipped outputs."""
-    from graphsynth.systems.antenna.accuracy import pointing_errors
+    from graphsynth.systems.antenna.evidence import pointing_errors
 
     found = pointing_errors(antenna_of(context), table_of(context).sweep.largest)
     rows = ((row.method, row.setting, row.error, row.seconds) for row in found)

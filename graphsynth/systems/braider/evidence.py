@@ -27,11 +27,12 @@ def start_up(context: Any, effort: Effort) -> Problem:
 
 def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     """Measure the linkage without motor and thread, free to move from the speed of the scene."""
-    from graphsynth.evidence.dynamics import Truth, braider_model, dynamics_problem, precise_swing
+    from graphsynth.evidence.dynamics import Truth, dynamics_problem
     from graphsynth.evidence.precise_drive import NAME
+    from graphsynth.systems.braider.evidence_four_bar import free_linkage, precise_swing
 
     braider, speed = _braider(context), context.scene.mechanism.speed_rad_s
-    model, start = braider_model(braider, speed)
+    model, start = free_linkage(braider, speed)
     end, name = 1.0 if effort.quick else 2.0, "the braider's linkage, free"
     truth = Truth(lambda times: precise_swing(braider, speed, times, model.gravity), f"closed loop, {NAME}")
     return dynamics_problem(model, start, end, name, effort, truth=truth)

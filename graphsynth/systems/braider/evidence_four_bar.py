@@ -1,7 +1,7 @@
 """A four-bar linkage with masses in long doubles: inertia, load and places of its bodies, from the closed loop alone.
 
 The loop ``a e^(i t) + b e^(i f2) = g + c e^(i f3)`` is closed by two circles and differentiated twice; velocities and
-accelerations of the centres of mass follow.  It shares no code with the rooms of kinematics and dynamics.
+accelerations of the centres of mass follow.  It shares no code with `graphsynth.kinematics` and `graphsynth.dynamics`.
 """
 
 from __future__ import annotations
@@ -10,15 +10,19 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from graphsynth.evidence.precise_drive import Long, Shape
+from graphsynth.evidence.precise_drive import Long, Shape, precise_drive
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.model import Body
+    from graphsynth.dynamics.model import Body, DynamicModel
+    from graphsynth.dynamics.start import StartReport
     from graphsynth.systems.braider.linkage import FourBar
     from graphsynth.systems.braider.model import Braider
 
-__all__ = ["bodies_of", "places", "shape_of_braider", "shape_of_four_bar"]
+__all__ = ["free_linkage", "places", "precise_swing", "shape_of_braider", "shape_of_four_bar"]
+
+Array = NDArray[np.float64]
 
 
 class _Link(NamedTuple):
@@ -51,9 +55,10 @@ def _links(bar: FourBar, t: Any) -> tuple[_Link, _Link, _Link]:
     rest = A + u * k2 * k2 - v * k3 * k3  # i rest + f2 u = f3 v
     f2, f3 = (rest * v.conjugate()).real / sine, (rest * u.conjugate()).real / sine
     return (
-        _Link(nothing, turn, Long(1), nothing, nothing, nothing), _Link(A, u / b, k2, f2, 1j * A, -A),
+        _Link(nothing, turn, Long(1), nothing, nothing, nothing),
+        _Link(A, u / b, k2, f2, 1j * A, -A),
         _Link(g, v / c, k3, f3, nothing, nothing),
-    )  # fmt: skip
+    )
 
 
 def shape_of_four_bar(bar: FourBar, bodies: Mapping[int, Body], gravity: tuple[float, float] = (0.0, 0.0)) -> Shape:
@@ -70,7 +75,7 @@ def shape_of_four_bar(bar: FourBar, bodies: Mapping[int, Body], gravity: tuple[f
     --------
     >>> from graphsynth.systems.braider.model import Braider
     >>> braider = Braider()
-    >>> J, half, load = shape_of_four_bar(braider.linkage, bodies_of(braider))(0.3)
+    >>> J, half, load = shape_of_four_bar(braider.linkage, braider.bodies)(0.3)
     >>> abs(float(J) + braider.reflected_inertia - float(braider.effective_inertia(0.3)[0])) < 1e-17, float(load)
     (True, 0.0)
     """
@@ -100,14 +105,9 @@ def places(bar: FourBar, bodies: Mapping[int, Body], t: Any) -> list[Any]:
     return found
 
 
-def bodies_of(braider: Braider) -> dict[int, Body]:
-    """Bars of a braider, the switch rigid with the rocker."""
-    return braider.bodies
-
-
 def shape_of_braider(braider: Braider) -> Shape:
     """Shape of the braider as its motor feels it: the linkage, and the thread at the tip of the switch."""
-    linkage, thread = shape_of_four_bar(braider.linkage, bodies_of(braider)), braider.thread
+    linkage, thread = shape_of_four_bar(braider.linkage, braider.bodies), braider.thread
     arm0 = Long(braider.switch) * np.exp(1j * Long(braider.switch_angle))
     pull, height = Long(thread.weight) * Long(thread.gravity), Long(thread.height)
     guide = np.clongdouble(thread.guide)
@@ -121,3 +121,28 @@ def shape_of_braider(braider: Braider) -> Shape:
         return inertia + Long(braider.inertia), half, load + _cross(arm, force) * rocker.first
 
     return shape
+
+
+def free_linkage(braider: Braider, speed: float) -> tuple[DynamicModel, StartReport]:
+    """Return the linkage of a braider without motor and thread, and a start at crank angle zero (speed in rad/s)."""
+    from graphsynth.dynamics.model import DynamicModel
+    from graphsynth.dynamics.start import consistent_start
+    from graphsynth.evidence.position import four_bar
+    from graphsynth.mechanism.four_bar import TiltedFourBar
+
+    bar = braider.linkage
+    mechanism, _ = four_bar(TiltedFourBar(bar.frame, bar.crank, bar.coupler, bar.rocker, sgn=bar.branch))
+    model = DynamicModel(mechanism, braider.bodies)
+    return model, consistent_start(model, pose=mechanism.pose, keep={(0, 1): 0.0}, keep_rates={(0, 1): speed})
+
+
+def precise_swing(braider: Braider, speed: float, times: Array, gravity: tuple[float, float]) -> Array:
+    """Free motion of `free_linkage`, in long doubles: centres of mass and angles, shape (n, 9).
+
+    One equation for the crank, from the closed loop and the bodies, integrated by extrapolation; see
+    `graphsynth.evidence.precise_drive`.
+    """
+    bodies = braider.bodies
+    shape = shape_of_four_bar(braider.linkage, bodies, gravity)
+    found = precise_drive(shape, None, 1.0, 0.0, 0.0, times.tolist(), speed=speed)
+    return np.array([places(braider.linkage, bodies, angle) for angle in found[:, 0]], dtype=np.float64)

@@ -11,7 +11,7 @@ __all__ = ["arc_ends", "crossing", "dimensions", "many_sets"]
 
 def many_sets(context: Any, effort: Effort) -> Problem:
     """Measure the positions of many sets at once."""
-    from graphsynth.evidence.batch import batch_problem
+    from graphsynth.evidence.position import batch_problem
 
     lengths = context.scene.mechanism.lengths
     largest = max(lengths.frame.last, lengths.coupler.last, lengths.rocker.last)
@@ -28,9 +28,16 @@ def _box(context: Any) -> Any:
     crank = Fraction(repr(table.lengths.crank))
     bearing = table.bearing
     return ToleranceBox(
-        2 * crank, crank, crank * 5 / 2, crank * 5 / 2, repr(table.tilt.alpha), table.tilt.axis,
-        Rb=repr(bearing.radius_mm), Hb=repr(bearing.height_mm), clearance=repr(bearing.clearance_mm),
-    )  # fmt: skip
+        2 * crank,
+        crank,
+        crank * 5 / 2,
+        crank * 5 / 2,
+        repr(table.tilt.alpha),
+        table.tilt.axis,
+        Rb=repr(bearing.radius_mm),
+        Hb=repr(bearing.height_mm),
+        clearance=repr(bearing.clearance_mm),
+    )
 
 
 def arc_ends(context: Any, effort: Effort) -> Problem:

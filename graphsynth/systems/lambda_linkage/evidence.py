@@ -47,7 +47,7 @@ def arc_ends(context: Any, effort: Effort) -> Problem:
 
 def coupled_joints(context: Any, effort: Effort) -> Problem:
     """Measure the linkage and the bearing of the scene, the bearing in all three moving joints."""
-    from graphsynth.evidence.coupled import lambda_problem
+    from graphsynth.evidence.jamming import lambda_problem
 
     table = context.scene.mechanism
     linkage, bearing = _box(context).nominal()

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from graphsynth.evidence.rows import Effort, Problem
+import numpy as np
 
-__all__ = ["loads", "positions", "work"]
+from graphsynth.core.errors import GeometryError
+from graphsynth.evidence.rows import Effort, Problem, Row, best_of
+
+if TYPE_CHECKING:
+    from graphsynth.systems.piston.gas import CompressorCycle
+    from graphsynth.systems.piston.machine import PistonMachine
+
+__all__ = ["load_problem", "loads", "positions", "precise_work", "work", "work_problem"]
 
 
 def _first(context: Any) -> Any:
@@ -26,15 +35,126 @@ def positions(context: Any, effort: Effort) -> Problem:
 
 def loads(context: Any, effort: Effort) -> Problem:
     """Measure the loads of the first machine of the scene."""
-    from graphsynth.systems.piston.evidence_loads import load_problem
-
     name, machine = _first(context)
     return load_problem(machine, f"the floating piston on a {name}", effort)
 
 
 def work(context: Any, effort: Effort) -> Problem:
     """Measure the work of the gas in the first machine of the scene."""
-    from graphsynth.systems.piston.evidence_loads import work_problem
-
     name, machine = _first(context)
     return work_problem(machine, f"the floating piston on a {name}", effort)
+
+
+def load_problem(machine: PistonMachine, name: str, effort: Effort | None = None) -> Problem:
+    """Compare the loads of a piston machine by closed form with those by multipliers, and the energy balance.
+
+    Parameters
+    ----------
+    machine : PistonMachine
+    name : str
+    effort : Effort, optional
+    """
+    from graphsynth.systems.piston.dynamic_model import check_by_multipliers
+
+    effort = effort or Effort()
+    rows = []
+    counts = (6, 12, 24) if effort.quick else (12, 24, 96)
+    for count in counts:
+        angles = (np.arange(count) + 0.5) * math.tau / count
+        loads, seconds, rounds = best_of(lambda a=angles: machine.loads(a), effort)  # type: ignore[misc]
+        check, slow, slow_rounds = best_of(lambda a=angles: check_by_multipliers(machine, a), effort)  # type: ignore[misc]
+        kind, unit = "largest difference of a force over the largest force", f"{count} positions"
+        more = {"power error": float(loads.power_error)}
+        rows.append(
+            Row(
+                "closed form",
+                unit,
+                float(check.difference),
+                seconds / count,
+                rounds,
+                kind,
+                "multipliers of all bodies at once",
+                more=more,
+            )
+        )
+        rows.append(Row("multipliers", unit, float(check.difference), slow / count, slow_rounds, kind, "closed form"))
+    rows.sort(key=lambda row: row.method)
+    note = "Each of the two ways is the other's reference: an error of the forces that both share is not seen."
+    return Problem("loads", f"Side loads of {name} over a turn", "relative", tuple(rows), "position", note)
+
+
+def work_problem(machine: PistonMachine, name: str, effort: Effort | None = None) -> Problem:
+    """Integrate the gas work over a turn: even steps, and the pieces between the kinks of the load.
+
+    Raises
+    ------
+    GeometryError
+        A gas law without work.
+    """
+    from graphsynth.systems.piston.turn import piston_turn
+
+    effort = effort or Effort()
+    exact, reference = _exact_work(machine)
+    if not math.isfinite(exact) or exact == 0.0:
+        raise GeometryError("the gas does no work over a turn, so there is nothing to compare")
+    _work = partial(_work_row, exact=exact, reference=reference)
+    rows = []
+    for count in (90, 360, 1440) if effort.quick else (90, 360, 1440, 5760, 23_040):
+        value, seconds, rounds = best_of(_trapezium(machine, count), effort)
+        rows.append(_work("even steps", f"{count} positions", value, seconds, rounds))
+    found, seconds, rounds = best_of(lambda: piston_turn(machine), effort)
+    rows.append(_work("pieces between kinks, all works", "", float(found.gas), seconds, rounds))
+    return Problem("work", f"Work of the gas of {name} over a turn", "relative", tuple(rows), "turn")
+
+
+def _trapezium(machine: PistonMachine, count: int) -> Any:
+    angles = np.arange(count) * math.tau / count
+
+    def run() -> float:
+        force = machine.gas_force(angles)
+        speed = machine.mechanism.motion(angles).piston.first
+        return float(np.sum(force * speed) * math.tau / count)
+
+    return run
+
+
+def _work_row(
+    method: str, setting: str, value: float, seconds: float, rounds: int, *, exact: float, reference: str
+) -> Row:
+    error = min(abs(value - exact), abs(value + exact)) / abs(exact)
+    return Row(method, setting, error, seconds, rounds, "distance from the reference", reference)
+
+
+def _exact_work(machine: PistonMachine) -> tuple[float, str]:
+    """Work of the gas over a turn, and where it is from."""
+    from graphsynth.systems.piston.gas import CompressorCycle
+
+    stroke = machine.mechanism.stroke
+    if isinstance(machine.gas, CompressorCycle):
+        return float(precise_work(machine.gas, stroke)), "area of the p-V diagram, quadrature with 50 digits"
+    return machine.gas.work(stroke), "area of the p-V diagram, closed form of the gas law"
+
+
+def precise_work(gas: CompressorCycle, stroke: float) -> Any:
+    """Return the indicated work of a compressor over a turn, J: area of its diagram by quadrature with 50 digits.
+
+    Compression and re-expansion are polytropic, the valves open at the pressures outside; no formula for the work is
+    used.
+
+    Examples
+    --------
+    >>> from graphsynth.systems.piston.gas import CompressorCycle
+    >>> gas = CompressorCycle(0.1, suction=1e5, discharge=6e5)
+    >>> abs(float(precise_work(gas, 0.1)) / gas.work(0.1) - 1.0) < 1e-15
+    True
+    """
+    import mpmath
+
+    with mpmath.workdps(50):
+        low, high, c, n = (mpmath.mpf(float(v)) for v in (gas.suction, gas.discharge, gas.clearance, gas.exponent))
+        area = mpmath.pi * mpmath.mpf(gas.bore) ** 2 / 4
+        top = min(high, low * ((1 + c) / c) ** n)  # the valve may never open
+        opens = min(mpmath.mpf(1), (1 + c) * (low / top) ** (1 / n) - c), c * ((top / low) ** (1 / n) - 1)
+        closing = mpmath.quad(lambda x: low * ((1 + c) / (x + c)) ** n, [opens[0], 1]) + opens[0] * top
+        opening = mpmath.quad(lambda x: top * (c / (x + c)) ** n, [0, opens[1]]) + (1 - opens[1]) * low
+        return area * mpmath.mpf(stroke) * (closing - opening)

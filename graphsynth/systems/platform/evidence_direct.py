@@ -1,6 +1,7 @@
 """Direct kinematics of the platform: every assembly mode, by sextic, eigenvalues, continuation and proof.
 
-The reference is `graphsynth.systems.platform.evidence_direct_reference`.
+The reference with 50 digits: the closure condition itself is sampled, interpolated, and its roots are found in the
+complex plane; no coefficient formula, no isolation and no iteration of the library is used.
 """
 
 from __future__ import annotations
@@ -17,18 +18,28 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
-from graphsynth.systems.platform.evidence_direct_reference import DIGITS, precise_anchors, precise_modes
-from graphsynth.systems.platform.evidence_eigenvalues import eigenvalue_modes
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["Proved", "judged", "mode_problem", "proof_row"]
+__all__ = [
+    "DIGITS",
+    "Proved",
+    "assessed",
+    "eigenvalue_modes",
+    "mode_problem",
+    "precise_anchors",
+    "precise_modes",
+    "proof_row",
+]
 
+DIGITS = 50
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 _REFERENCE = f"interpolated closure condition, roots with {DIGITS} digits"
 _KIND = "largest distance of a mode from the reference"
+#: Modes and their proved radii (scaled), None for a problem that is not decided.
+Proved = list[tuple[Array, float] | None]
 
 
 def _away(found: Array, truth: Array, size: float) -> float:
@@ -43,19 +54,33 @@ def _away(found: Array, truth: Array, size: float) -> float:
     return float(max(distance.min(axis=0).max(), distance.min(axis=1).max()))
 
 
-def judged(
-    method: str, setting: str, found: Sequence[Array], truth: Sequence[Array], size: float, seconds: float, rounds: int,
+def assessed(
+    method: str,
+    setting: str,
+    found: Sequence[Array],
+    truth: Sequence[Array],
+    size: float,
+    seconds: float,
+    rounds: int,
     **more: Any,
-) -> Row:  # fmt: skip
+) -> Row:
     """Row of a method that gives all modes: a wrong number of modes anywhere is a failure."""
     gaps = [_away(np.asarray(one), right, size) for one, right in zip(found, truth)]
     wrong = sum(not math.isfinite(gap) for gap in gaps)
     error = max((gap for gap in gaps if math.isfinite(gap)), default=math.nan)
     if wrong:
         return Row(
-            method, setting, math.nan, seconds, rounds, _KIND, _REFERENCE, RowStatus.FAILED,
-            f"another number of modes than the reference in {wrong} of {len(gaps)} problems", **more,
-        )  # fmt: skip
+            method,
+            setting,
+            math.nan,
+            seconds,
+            rounds,
+            _KIND,
+            _REFERENCE,
+            RowStatus.FAILED,
+            f"another number of modes than the reference in {wrong} of {len(gaps)} problems",
+            **more,
+        )
     return Row(method, setting, error, seconds, rounds, _KIND, _REFERENCE, **more)
 
 
@@ -94,14 +119,12 @@ def mode_problem(
         batch, seconds, rounds = best_of(partial(platform.direct_batch, tiled), effort)
         part = min(many, n)
         found = _split(batch.problem, batch.poses, part)
-        rows.append(judged(
-            "sextic and Newton", f"{many} at once", found, truth[:part], size, seconds / many, rounds,
-        ))  # fmt: skip
+        rows.append(assessed("sextic and Newton", f"{many} at once", found, truth[:part], size, seconds / many, rounds))
     anchors = platform.elbows(theta)
     for polish in (0, 1, 2):
         modes, seconds, rounds = best_of(partial(eigenvalue_modes, anchors, b, l2, polish=polish), effort)
         setting = f"{polish} Newton steps"
-        rows.append(judged("companion eigenvalues", setting, modes, truth, size, seconds / n, rounds))
+        rows.append(assessed("companion eigenvalues", setting, modes, truth, size, seconds / n, rounds))
     rows += _one_mode(platform, theta, truth, size, effort)
     rows += _proved_rows(platform, theta, truth, size, effort)
     note = "scipy's fsolve finds one mode from a guess near it; all others find all modes."
@@ -120,10 +143,19 @@ def _one_mode(
         found, seconds, rounds = best_of(run, effort)
         worst = max(_away(X[None], truth[k][:1], size) for X, k in zip(found, which))
         lost = worst > 1e-3
-        rows.append(Row(
-            "scipy fsolve, one mode", f"tol {tol:.0e}", worst, seconds / len(which), rounds, _KIND, _REFERENCE,
-            RowStatus.UNRELIABLE if lost else RowStatus.OK, "it ends at another mode or at none" if lost else "",
-        ))  # fmt: skip
+        rows.append(
+            Row(
+                "scipy fsolve, one mode",
+                f"tol {tol:.0e}",
+                worst,
+                seconds / len(which),
+                rounds,
+                _KIND,
+                _REFERENCE,
+                RowStatus.UNRELIABLE if lost else RowStatus.OK,
+                "it ends at another mode or at none" if lost else "",
+            )
+        )
     return rows
 
 
@@ -150,23 +182,32 @@ def _proved_rows(
     rows = []
     for many in (n, 4 * n) if effort.quick else (1, n, 10 * n):
         tiled = np.resize(theta, (many, 3))
-        rows.append(proof_row(
-            "certified, balls of doubles", f"{many} at once", partial(_batch, platform, tiled, size),
-            truth[: min(many, n)], size, many, effort,
-        ))  # fmt: skip
+        rows.append(
+            proof_row(
+                "certified, balls of doubles",
+                f"{many} at once",
+                partial(_batch, platform, tiled, size),
+                truth[: min(many, n)],
+                size,
+                many,
+                effort,
+            )
+        )
     few = min(n, 2 if effort.quick else 6)
     rows += [
         proof_row(
-            "certified, one by one", f"up to {bits} bits", partial(_singly, platform, theta[:few], bits, size),
-            truth[:few], size, few, effort, default=bits == signature(certify_direct).parameters["max_bits"].default,
+            "certified, one by one",
+            f"up to {bits} bits",
+            partial(_singly, platform, theta[:few], bits, size),
+            truth[:few],
+            size,
+            few,
+            effort,
+            default=bits == signature(certify_direct).parameters["max_bits"].default,
         )
         for bits in (64, 128, 512)
-    ]  # fmt: skip
+    ]
     return rows
-
-
-#: Modes and their proved radii (scaled), None for a problem that is not decided.
-Proved = list[tuple[Array, float] | None]
 
 
 def _batch(platform: ParallelPlatform, theta: Array, size: float) -> Proved:
@@ -197,9 +238,16 @@ def _singly(platform: ParallelPlatform, theta: Array, bits: int, size: float) ->
 
 
 def proof_row(
-    method: str, setting: str, run: Callable[[], Proved], truth: Sequence[Array], size: float, many: int,
-    effort: Effort, *, default: bool = False,
-) -> Row:  # fmt: skip
+    method: str,
+    setting: str,
+    run: Callable[[], Proved],
+    truth: Sequence[Array],
+    size: float,
+    many: int,
+    effort: Effort,
+    *,
+    default: bool = False,
+) -> Row:
     """Row of a method that proves: its radius, and whether the reference lies within."""
     kind = "largest proved radius"
     try:
@@ -227,3 +275,131 @@ def proof_row(
         default,
         True,
     )
+
+
+def precise_modes(anchors: Sequence[Any], vertices: Sequence[complex], lengths: Sequence[float]) -> Array:
+    """Return all assembly modes (x, y, alpha) of one problem (3-RPR), found with 50 digits; shape (m, 3), by alpha.
+
+    For a rotation ``z = exp(i alpha)`` two differences of the closure equations are linear in the position; put into
+    the third they give a trigonometric polynomial of degree three, sampled at eight angles and interpolated.  Its roots
+    on the unit circle are the modes.
+
+    Parameters
+    ----------
+    anchors : sequence of 3 complex or mpmath numbers
+    vertices : sequence of 3 complex
+    lengths : sequence of 3 floats
+
+    Examples
+    --------
+    >>> corner = [complex(np.exp(2j * np.pi * k / 3)) for k in range(3)]
+    >>> precise_modes([2 * c for c in corner], corner, [1.5] * 3)[:, 2].round(6).tolist()
+    [-0.812756, 0.812756]
+    """
+    import mpmath
+
+    with mpmath.workdps(DIGITS + 20):
+        A, b = [mpmath.mpc(v) for v in anchors], [mpmath.mpc(v) for v in vertices]
+        l2 = [mpmath.mpf(v) for v in lengths]
+
+        def parts(z: Any) -> tuple[Any, Any, Any, list[Any]]:
+            w = [z * b[k] - A[k] for k in range(3)]  # p + w_k is the leg
+            r = [l2[k] ** 2 - abs(w[k]) ** 2 for k in range(3)]
+            u, v = w[1] - w[0], w[2] - w[0]  # 2 Re(p conj u) = r1 - r0
+            det = (mpmath.conj(u) * v).imag
+            top = (v * (r[1] - r[0]) - u * (r[2] - r[0])) / (2j)  # det * p
+            return det, top, r[0], w
+
+        def condition(alpha: Any) -> Any:
+            det, top, r0, w = parts(mpmath.expj(alpha))
+            return abs(top) ** 2 + 2 * det * (top * mpmath.conj(w[0])).real - det * det * r0
+
+        nodes = [2 * mpmath.pi * k / 8 for k in range(8)]
+        values = [condition(alpha) for alpha in nodes]
+        coefficients = [
+            sum(g * mpmath.expj(-m * alpha) for g, alpha in zip(values, nodes)) / 8 for m in range(3, -4, -1)
+        ]
+        scale = max(abs(c) for c in coefficients)
+        while abs(coefficients[0]) < scale * mpmath.mpf(10) ** (-DIGITS):  # the degree drops
+            coefficients = coefficients[1:-1]
+        roots = mpmath.polyroots(coefficients, maxsteps=500, extraprec=400)
+        found = []
+        for z in roots:
+            if abs(abs(z) - 1) < mpmath.mpf(10) ** (-DIGITS // 2):
+                alpha = mpmath.arg(z)
+                det, top, _, _ = parts(mpmath.expj(alpha))
+                p = top / det
+                found.append((float(alpha), float(p.real), float(p.imag)))
+        return np.array([(x, y, alpha) for alpha, x, y in sorted(found)]).reshape(-1, 3)
+
+
+def precise_anchors(platform: ParallelPlatform, theta: Array) -> list[Any]:
+    """Elbows with 50 digits from the doubles given."""
+    import mpmath
+
+    with mpmath.workdps(DIGITS + 20):
+        return [
+            mpmath.mpc(D) + mpmath.mpf(arm) * mpmath.expj(mpmath.mpf(float(t)))
+            for D, arm, t in zip(platform.D, platform.l1, theta)
+        ]
+
+
+def eigenvalue_modes(
+    anchors: Complex, vertices: Complex, lengths: Array, *, polish: int = 0, band: float = 1e-6
+) -> list[Array]:
+    """Modes by eigenvalues of companion matrices, the textbook way; for comparison.
+
+    Parameters
+    ----------
+    anchors : ndarray of complex, shape (n, 3)
+    vertices, lengths : ndarray, shape (3,)
+    polish : int
+        Steps of Newton's method on the closure equations afterwards.
+    band : float
+        Roots whose modulus differs from one by less count as real modes.
+
+    Returns
+    -------
+    list of ndarray, shape (m, 3)
+        ``(x, y, alpha)`` by alpha, for each problem; estimated, and a mode may be missing or too many.
+    """
+    from graphsynth.kinematics.triad.sextic import sextic
+
+    scale = float(np.abs(lengths).max())
+    s = sextic(anchors / scale, vertices / scale, lengths / scale)
+    g0, g1, g2, g3 = s.g
+    matrix = np.zeros((len(anchors), 6, 6), dtype=complex)
+    matrix[:, 0] = -np.stack([g2, g1, g0 + 0j, np.conj(g1), np.conj(g2), np.conj(g3)], axis=-1) / g3[:, None]
+    matrix[:, range(1, 6), range(5)] = 1.0
+    every = np.linalg.eigvals(matrix)
+    found = []
+    for k, roots in enumerate(every):
+        z = roots[np.abs(np.abs(roots) - 1.0) < band]
+        z = z / np.abs(z)
+        p = _place(z, anchors[k], vertices, lengths)
+        X = np.stack([p.real, p.imag, np.angle(z)], axis=-1)
+        for _ in range(polish):
+            X = _newton(X, anchors[k], vertices, lengths)
+        found.append(X[np.argsort(X[:, 2])])
+    return found
+
+
+def _place(z: Complex, A: Complex, b: Complex, l2: Array) -> Complex:
+    """Position for a rotation from two differences of the closure equations."""
+    w = z[:, None] * b - A
+    r = l2**2 - np.abs(w) ** 2
+    u, v = w[:, 1] - w[:, 0], w[:, 2] - w[:, 0]
+    det = (np.conj(u) * v).imag
+    return np.asarray((v * (r[:, 1] - r[:, 0]) - u * (r[:, 2] - r[:, 0])) / (2j * det))
+
+
+def _newton(X: Array, A: Complex, b: Complex, l2: Array) -> Array:
+    arm = np.exp(1j * X[:, 2:3]) * b
+    d = X[:, 0:1] + 1j * X[:, 1:2] + arm - A
+    J = 2.0 * np.stack([d.real, d.imag, (np.conj(arm) * d).imag], axis=-1)
+    size = np.abs(d)
+    with np.errstate(all="ignore"):
+        try:
+            return np.asarray(X - np.linalg.solve(J, ((size - l2) * (size + l2))[..., None])[..., 0])
+        except np.linalg.LinAlgError:
+            return X

@@ -186,7 +186,7 @@ def solvers(context: Context) -> tuple[Table, ...]:
     """Error against run time beside scipy; not part of the shipped outputs."""
     import numpy as np
 
-    from graphsynth.evidence.driven import drive_work_precision, rows_as_text
+    from graphsynth.evidence.drives import drive_work_precision, rows_as_text
 
     table = table_of(context)
     model = drive_of(context, table.resistances[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import plans
+from graphsynth.evidence.registry import Plan, plans
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import In, require
@@ -164,5 +164,8 @@ SYSTEM = System(
         Stage("plot", f"{_STEPS}_pictures:plots", ("runs", "without_inertia", "claim", "limit"), ("plots",)),
         Stage("compare solvers", f"{_STEPS}:solvers", (), ("solvers",)),
     ),
-    evidence=plans("graphsynth.systems.platform.evidence_motor", "drive", "small-inductance"),
+    evidence=(
+        Plan("drive", "graphsynth.systems.platform.evidence:motor_drive"),
+        *plans("graphsynth.systems.platform.evidence", "small-inductance"),
+    ),
 )

@@ -3,91 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
+from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 from graphsynth.systems.tribometer.events import RunStatus
 from graphsynth.systems.tribometer.model import Tribometer
 from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 from graphsynth.systems.tribometer.stick_slip_forms import model_error
 from graphsynth.systems.tribometer.stick_slip_precise import PreciseMotion
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-__all__ = [
-    "AccuracyRow",
-    "AccuracyStudy",
-    "method_study",
-    "regularisation_study",
-    "step_study",
-    "tolerance_study",
-]
+__all__ = ["method_study", "regularisation_study", "step_study", "tolerance_study"]
 
 Array = NDArray[np.float64]
+_SETTINGS = {"event-driven": "rtol {:.0e}", "time stepping": "step {:g} s"}
+_KIND = "largest error of the position"
+_STATUS = {RunStatus.COMPLETE: RowStatus.OK, RunStatus.UNRELIABLE: RowStatus.UNRELIABLE}
 
 
-@dataclass(frozen=True)
-class AccuracyRow:
-    """One run of one method.
+class _Truth(NamedTuple):
+    """Positions at the times of a study, times of the events, and where they are from."""
 
-    Attributes
-    ----------
-    method : str
-        "event-driven", "time stepping" or the name of the solver of the regularised form.
-    parameter : float
-        Relative tolerance, step (s) or smoothing velocity (m/s).
-    error : float
-        Largest error of x2 at the times of the study, m; NaN if the run failed.
-    event_error : float
-        Largest error of an event time, s; NaN where the events do not match or the method has none.
-    events : int
-        Events found.
-    evaluations : int
-        Steps, or calls of the right-hand side.
-    seconds : float
-        Wall time, the best of the rounds.
-    status : RunStatus
-        A failure stays in the table as a failure.
-    statement : str
-        One sentence.
-    """
-
-    method: str
-    parameter: float
-    error: float
-    event_error: float
-    events: int
-    evaluations: int
-    seconds: float
-    status: RunStatus
-    statement: str
-
-
-@dataclass(frozen=True)
-class AccuracyStudy:
-    """Rows of a study, and against what the errors were measured."""
-
-    rows: tuple[AccuracyRow, ...]
-    reference: str
-
-    def to_pandas(self) -> pd.DataFrame:
-        """Return the rows as a table."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(row) | {"status": row.status.value} for row in self.rows])
-
-    def order(self, method: str) -> float:
-        """Observed order of a method: slope of the error over the parameter between first and last good row."""
-        good = [row for row in self.rows if row.method == method and row.status is RunStatus.COMPLETE]
-        if len(good) < 2:
-            return math.nan
-        return math.log(good[0].error / good[-1].error) / math.log(good[0].parameter / good[-1].parameter)
+    times: Array
+    positions: Array
+    events: Array
+    name: str
 
 
 def _times(duration: float) -> Array:
@@ -96,20 +42,33 @@ def _times(duration: float) -> Array:
     return found
 
 
-def _row(method: str, parameter: float, runs: list[StickSlipMotion], truth: Array, events: Array) -> AccuracyRow:
-    motion = runs[0]
-    bad = motion.status not in (RunStatus.COMPLETE, RunStatus.UNRELIABLE)
-    gap = math.nan if bad else float(np.abs(motion.x2 - truth).max())
+def _row(method: str, value: float, run: Callable[[], StickSlipMotion], truth: _Truth, effort: Effort) -> Row:
+    row = Row(method, _setting(method, value), math.nan, math.nan, 0, _KIND, truth.name, value=value)
+    motion, seconds, rounds = best_of(run, effort, warm=False)
+    status = _STATUS.get(motion.status, RowStatus.FAILED)
+    failed = status is RowStatus.FAILED
     found = np.array([event.time for event in motion.events])
-    late = float(np.abs(found - events).max()) if found.size == events.size and found.size else math.nan
-    return AccuracyRow(
-        method, parameter, gap, late, found.size, motion.evaluations, min(run.seconds for run in runs), motion.status,
-        motion.statement,
-    )  # fmt: skip
+    more = {"events": float(found.size), "steps or calls": float(motion.evaluations)}
+    if found.size == truth.events.size and found.size:
+        more["event error [s]"] = float(np.abs(found - truth.events).max())
+    return replace(
+        row,
+        error=math.nan if failed else float(np.abs(motion.x2 - truth.positions).max()),
+        seconds=seconds,
+        rounds=rounds,
+        status=status,
+        reason="" if status is RowStatus.OK else motion.statement,
+        more=more,
+    )
 
 
-def _failed(method: str, parameter: float, sentence: str) -> AccuracyRow:
-    return AccuracyRow(method, parameter, math.nan, math.nan, 0, 0, math.nan, RunStatus.FAILED, sentence)
+def _setting(method: str, value: float) -> str:
+    return _SETTINGS.get(method, "speed {:.0e} m/s").format(value)
+
+
+def _study(rows: Sequence[Row], duration: float, truth: _Truth) -> Problem:
+    question = f"Stick-slip over {duration:g} s: position of the upper platform every 50 ms"
+    return Problem("stick-slip", question, "m", tuple(rows), note=f"Error against {truth.name}.")
 
 
 def method_study(
@@ -122,7 +81,7 @@ def method_study(
     solvers: Sequence[str] = ("LSODA",),
     rounds: int = 3,
     most_calls: int = 600_000,
-) -> AccuracyStudy:
+) -> Problem:
     """Error and run time of all three methods on one tribometer, failures and refusals included.
 
     The reference is the automaton with the tolerance 1e-14: for its own rows it is itself, for the others a different
@@ -153,56 +112,55 @@ def method_study(
     >>> [row.method for row in study.rows]
     ['event-driven', 'time stepping', 'LSODA']
     """
-    times = _times(duration)
-    truth, events, text = _reference(model, duration, times)
-    rows = []
-    for rtol in () if model.closed_form else tolerances:
-        runs = [model.event_driven(duration, times=times, rtol=rtol, estimate=False) for _ in range(rounds)]
-        rows.append(_row("event-driven", rtol, runs, truth, events))
-    for step in steps:
-        runs = [model.time_stepping(duration, step=step, times=times, estimate=False) for _ in range(rounds)]
-        rows.append(_row("time stepping", step, runs, truth, events))
-    smooth = [
-        _regularised_row(model, duration, times, speed, solver, rounds, most_calls, truth, events)
-        for solver in solvers
-        for speed in speeds
+    truth, effort = _reference(model, duration), Effort(rounds)
+    options: dict[str, Any] = {"times": truth.times, "estimate": False}
+    rows = [
+        _row("event-driven", rtol, partial(model.event_driven, duration, rtol=rtol, **options), truth, effort)
+        for rtol in (() if model.closed_form else tolerances)
     ]
-    return AccuracyStudy((*rows, *(_doubted(row, smooth) for row in smooth)), text)
+    rows += _step_rows(model, duration, steps, truth, effort)
+    smooth = []
+    smoothed: dict[str, Any] = {"times": truth.times, "check": False, "most_calls": most_calls}
+    for solver in solvers:
+        for speed in speeds:
+            run = partial(model.regularised, duration, speed=speed, solver=solver, **smoothed)
+            try:
+                smooth.append(_row(solver, speed, run, truth, effort if solver == "LSODA" else Effort(1)))
+            except SpecError as refusal:
+                refused = Row(solver, _setting(solver, speed), math.nan, math.nan, 0, _KIND, truth.name, value=speed)
+                none = {"events": 0.0, "steps or calls": 0.0}
+                smooth.append(replace(refused, status=RowStatus.FAILED, reason=str(refusal), more=none))
+    return _study([*rows, *(_doubted(row, smooth) for row in smooth)], duration, truth)
 
 
-def _regularised_row(
-    model: Tribometer, duration: float, times: Array, speed: float, solver: str, rounds: int, most_calls: int,
-    truth: Array, events: Array,
-) -> AccuracyRow:  # fmt: skip
-    try:
-        runs = [
-            model.regularised(duration, speed=speed, solver=solver, times=times, check=False, most_calls=most_calls)
-            for _ in range(rounds if solver == "LSODA" else 1)
-        ]
-    except SpecError as refusal:
-        return _failed(solver, speed, str(refusal))
-    return _row(solver, speed, runs, truth, events)
+def _step_rows(model: Tribometer, duration: float, steps: Sequence[float], truth: _Truth, effort: Effort) -> list[Row]:
+    options: dict[str, Any] = {"times": truth.times, "estimate": False}
+    return [
+        _row("time stepping", step, partial(model.time_stepping, duration, step=step, **options), truth, effort)
+        for step in steps
+    ]
 
 
-def _doubted(row: AccuracyRow, all_rows: list[AccuracyRow]) -> AccuracyRow:
+def _doubted(row: Row, all_rows: list[Row]) -> Row:
     """Mark a success whose error is far above that of the form itself."""
-    if row.status is not RunStatus.COMPLETE:
+    if row.status is not RowStatus.OK:
         return row
-    others = [other.error for other in all_rows if other.parameter == row.parameter and other.method != row.method]
+    others = [other.error for other in all_rows if other.value == row.value and other.method != row.method]
     others = [error for error in others if not math.isnan(error)]
-    bound = 3.0 * min(others) if others else 10.0 * model_error(row.parameter)
+    bound = 3.0 * min(others) if others else 10.0 * model_error(row.value)
     if row.error <= bound:
         return row
     text = f"{row.method} reports success with an error of {row.error:.1e} m, above that of the form itself."
-    return replace(row, status=RunStatus.UNRELIABLE, statement=text)
+    return replace(row, status=RowStatus.UNRELIABLE, reason=text)
 
 
-def _reference(model: Tribometer, duration: float, times: Array) -> tuple[Array, Array, str]:
+def _reference(model: Tribometer, duration: float) -> _Truth:
+    times = _times(duration)
     motion = model.event_driven(duration, times=times)
     if not motion.complete:
         raise SpecError(f"There is no reference to compare with: {motion.statement}")
-    text = f"event-driven run with relative tolerance 1e-14, error estimated {motion.error:.1e} m"
-    return motion.x2, np.array([event.time for event in motion.events]), text
+    name = f"event-driven run with relative tolerance 1e-14, error estimated {motion.error:.1e} m"
+    return _Truth(times, motion.x2, np.array([event.time for event in motion.events]), name)
 
 
 def regularisation_study(
@@ -214,7 +172,7 @@ def regularisation_study(
     rtol: float = 1e-8,
     most_calls: int = 600_000,
     rounds: int = 1,
-) -> AccuracyStudy:
+) -> Problem:
     """Error of the regularised form against the smoothing velocity (theory/tribometer 10), failures included.
 
     Parameters
@@ -235,29 +193,31 @@ def regularisation_study(
     --------
     >>> study = regularisation_study(Tribometer(), 0.5, speeds=[1e-3], solvers=["BDF"])
     >>> study.rows[0].status.value
-    'complete'
+    'ok'
     """
-    times = _times(duration)
-    truth, events, text = _reference(model, duration, times)
-    rows = []
+    truth, rows = _reference(model, duration), []
     for solver in solvers:
         for speed in speeds:
-            runs = [
-                model.regularised(duration, speed=speed, solver=solver, times=times, rtol=rtol, most_calls=most_calls)
-            ]
-            runs += [
-                model.regularised(
-                    duration, speed=speed, solver=solver, times=times, rtol=rtol, most_calls=most_calls, check=False
-                )
-                for _ in range(rounds - 1)
-            ]
-            rows.append(_row(solver, speed, runs, truth, events))
-    return AccuracyStudy(tuple(rows), text)
+            run = partial(
+                model.regularised,
+                duration,
+                speed=speed,
+                solver=solver,
+                times=truth.times,
+                rtol=rtol,
+                most_calls=most_calls,
+            )
+            row = _row(solver, speed, run, truth, Effort(1))
+            if rounds > 1 and row.rounds:
+                _, seconds, more = best_of(partial(run, check=False), Effort(rounds - 1), warm=False)
+                row = replace(row, seconds=min(row.seconds, seconds), rounds=1 + more)
+            rows.append(row)
+    return _study(rows, duration, truth)
 
 
 def step_study(
     model: Tribometer, duration: float = 10.0, *, steps: Sequence[float] = (1e-3, 1e-4, 1e-5), rounds: int = 1
-) -> AccuracyStudy:
+) -> Problem:
     """Error of time stepping against the step; errors of the final position too are in ``StickSlipMotion``.
 
     Examples
@@ -265,13 +225,8 @@ def step_study(
     >>> 0.8 < step_study(Tribometer(), 2.0).order("time stepping") < 1.2
     True
     """
-    times = _times(duration)
-    truth, events, text = _reference(model, duration, times)
-    rows = []
-    for step in steps:
-        runs = [model.time_stepping(duration, step=step, times=times, estimate=False) for _ in range(rounds)]
-        rows.append(_row("time stepping", step, runs, truth, events))
-    return AccuracyStudy(tuple(rows), text)
+    truth = _reference(model, duration)
+    return _study(_step_rows(model, duration, steps, truth, Effort(rounds)), duration, truth)
 
 
 def tolerance_study(
@@ -281,7 +236,7 @@ def tolerance_study(
     *,
     tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14),
     rounds: int = 3,
-) -> AccuracyStudy:
+) -> Problem:
     """Error of the automaton against a motion in multiple precision: final position and event times.
 
     Parameters
@@ -294,13 +249,17 @@ def tolerance_study(
     tolerances : sequence of float
     rounds : int
     """
-    truth = np.array([float(reference.x2)])
+    name = f"Taylor series with {reference.digits} digits"
     events = np.array([float(event.time) for event in reference.events])
+    truth = _Truth(np.array([duration]), np.array([float(reference.x2)]), events, name)
     rows = []
     for rtol in tolerances:
-        runs = [model.event_driven(duration, times=[duration], rtol=rtol, estimate=False) for _ in range(rounds)]
-        row = _row("event-driven", rtol, runs, truth, events)
-        if row.events != events.size:
-            row = replace(row, status=RunStatus.UNRELIABLE, statement=f"{row.events} events for {events.size}.")
+        run = partial(model.event_driven, duration, times=[duration], rtol=rtol, estimate=False)
+        row = replace(_row("event-driven", rtol, run, truth, Effort(rounds)), kind="error of the final position")
+        if row.more["events"] != events.size:
+            row = replace(
+                row, status=RowStatus.UNRELIABLE, reason=f"{row.more['events']:.0f} events for {events.size}."
+            )
         rows.append(row)
-    return AccuracyStudy(tuple(rows), f"Taylor series with {reference.digits} digits")
+    question = f"Event-driven run over {duration:g} s: final position of the upper platform, {events.size} events"
+    return Problem("events", question, "m", tuple(rows))

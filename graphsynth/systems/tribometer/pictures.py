@@ -20,7 +20,7 @@ from graphsynth.drawing.palette import LIGHT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.systems.tribometer.accuracy import AccuracyStudy
+    from graphsynth.evidence.rows import Problem
     from graphsynth.systems.tribometer.model import Tribometer
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 
@@ -182,9 +182,7 @@ def friction_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (6.
     return figure
 
 
-def error_picture(
-    studies: Sequence[AccuracyStudy], *, over: str = "time", size: tuple[float, float] = (7.0, 5.0)
-) -> Figure:
+def error_picture(studies: Sequence[Problem], *, over: str = "time", size: tuple[float, float] = (7.0, 5.0)) -> Figure:
     """Errors of the methods, log-log: over run time, or over the parameter (smoothing velocity, step).
 
     An error of exactly zero has no place on a logarithmic axis and is left out.
@@ -193,7 +191,7 @@ def error_picture(
 
     Parameters
     ----------
-    studies : sequence of AccuracyStudy
+    studies : sequence of Problem
     over : str
         "time" or "parameter".
     size : tuple of float
@@ -207,7 +205,7 @@ def error_picture(
     if over not in ("time", "parameter"):
         raise SpecError(f"The abscissa {over!r} is not known; give 'time' or 'parameter'.")
     rows = [row for study in studies for row in study.rows]
-    good = [row for row in rows if row.status.value == "complete" and row.error > 0.0]
+    good = [row for row in rows if row.good and row.error > 0.0]
     if not good:
         raise SpecError("No run of the studies succeeded with an error above zero, so there is nothing to draw.")
     figure = new_figure(size)
@@ -215,7 +213,7 @@ def error_picture(
     _plain(axes)
 
     def place(row: Any) -> float:
-        return float(row.seconds if over == "time" else row.parameter)
+        return float(row.seconds if over == "time" else row.value)
 
     top = 10.0 * max(row.error for row in good)
     for index, method in enumerate(dict.fromkeys(row.method for row in rows)):
@@ -224,7 +222,7 @@ def error_picture(
         axes.loglog([place(row) for row in own], [row.error for row in own], color=colour, marker=_MARKERS[index % 7],
                     ms=5, lw=1.2, label=method)  # fmt: skip
         for row in rows:
-            if row.method == method and row.status.value != "complete":
+            if row.method == method and not row.good:
                 height = top if math.isnan(row.error) else row.error
                 axes.loglog(place(row), height, "x", color=colour, ms=9, mew=2.5)
     if len(good) < len(rows):

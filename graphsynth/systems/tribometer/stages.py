@@ -10,7 +10,7 @@ from graphsynth.pipeline.stages import Context
 from graphsynth.systems.tribometer.system import TribometerTable
 
 if TYPE_CHECKING:
-    from graphsynth.systems.tribometer.accuracy import AccuracyStudy
+    from graphsynth.evidence.rows import Problem
     from graphsynth.systems.tribometer.cycles import LimitCycle
     from graphsynth.systems.tribometer.drives import Drive
     from graphsynth.systems.tribometer.model import Tribometer
@@ -78,12 +78,12 @@ def cycle(context: Context) -> LimitCycle:
     return limit_cycle(tribometer_of(context), most_turns=table_of(context).run.most_turns)
 
 
-def methods(context: Context, motion: StickSlipMotion) -> AccuracyStudy | None:
+def methods(context: Context, motion: StickSlipMotion) -> Problem | None:
     """Compare the methods with the event-driven run; None if that one did not finish."""
     return _study(context, motion, table_of(context).methods.solvers)
 
 
-def _study(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...]) -> AccuracyStudy | None:
+def _study(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...]) -> Problem | None:
     from graphsynth.systems.tribometer.accuracy import method_study
 
     table, model = table_of(context), tribometer_of(context)
@@ -99,7 +99,7 @@ def _study(context: Context, motion: StickSlipMotion, solvers: tuple[str, ...]) 
         raise (context.scene.place / "mechanism" / "methods").error(f"cannot be used: {error}") from error
 
 
-def method_rows(study: AccuracyStudy) -> tuple[tuple[str, ...], ...]:
+def method_rows(study: Problem) -> tuple[tuple[str, ...], ...]:
     """Rows of a study, ready to print."""
     import math
 
@@ -108,10 +108,10 @@ def method_rows(study: AccuracyStudy) -> tuple[tuple[str, ...], ...]:
 
     return tuple(
         (
-            row.method, f"{row.parameter:.0e}", shown(row.error, f"{row.error:.2e}"),
-            shown(row.event_error, f"{row.event_error:.1e}"), str(row.evaluations),
-            shown(row.seconds, f"{1e3 * row.seconds:.2f}"), row.status.value,
-            "" if row.status.value == "complete" else row.statement,
+            row.method, f"{row.value:.0e}", shown(row.error, f"{row.error:.2e}"),
+            f"{row.more['event error [s]']:.1e}" if "event error [s]" in row.more else "",
+            f"{row.more['steps or calls']:.0f}", shown(row.seconds, f"{1e3 * row.seconds:.2f}"), row.status.value,
+            row.reason,
         )
         for row in study.rows
     )  # fmt: skip
@@ -128,4 +128,4 @@ def solvers(context: Context, motion: StickSlipMotion) -> tuple[Table, ...]:
     study = _study(context, motion, ("LSODA", "BDF", "Radau"))
     if study is None:
         return ()
-    return (Table("Error against run time", METHOD_COLUMNS, method_rows(study), study.reference),)
+    return (Table("Error against run time", METHOD_COLUMNS, method_rows(study), study.note),)

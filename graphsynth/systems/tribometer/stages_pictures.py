@@ -9,7 +9,7 @@ from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
 
 if TYPE_CHECKING:
-    from graphsynth.systems.tribometer.accuracy import AccuracyStudy
+    from graphsynth.evidence.rows import Problem
     from graphsynth.systems.tribometer.cycles import LimitCycle
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 
@@ -58,9 +58,7 @@ def animations(context: Context, motion: StickSlipMotion) -> tuple[Picture, ...]
     return (Picture("In motion", tribometer_animation(motion, seconds=seconds), caption, "wide"),)
 
 
-def plots(
-    context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: AccuracyStudy | None
-) -> tuple[Picture, ...]:
+def plots(context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: Problem | None) -> tuple[Picture, ...]:
     """Draw Figure 7b, friction, phase portraits, energies and errors."""
     from graphsynth.systems.tribometer.pictures import error_picture, friction_picture, phase_picture, platforms_picture
 
@@ -86,7 +84,7 @@ def plots(
         ),
         *_curves(motion),
     ]  # fmt: skip
-    if study is not None and any(row.status.value == "complete" and row.error > 0.0 for row in study.rows):
+    if study is not None and any(row.good and row.error > 0.0 for row in study.rows):
         for over, name in (("time", "run time"), ("parameter", "tolerance, step and smoothing velocity")):
             svg = _svg(error_picture([study], over=over, size=(5.2, 4.4)))
             pictures.append(Picture(f"Error against {name}", svg, "Crosses: failed or unreliable."))

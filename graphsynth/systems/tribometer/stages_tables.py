@@ -11,7 +11,7 @@ from graphsynth.pipeline.stages import Context
 from graphsynth.systems.tribometer.stages import METHOD_COLUMNS, method_rows, tribometer_of
 
 if TYPE_CHECKING:
-    from graphsynth.systems.tribometer.accuracy import AccuracyStudy
+    from graphsynth.evidence.rows import Problem
     from graphsynth.systems.tribometer.cycles import BeltCycle, LimitCycle
     from graphsynth.systems.tribometer.model import Tribometer
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
@@ -24,7 +24,7 @@ _MOST_EVENTS = 400
 
 
 def judge(
-    context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: AccuracyStudy | None
+    context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: Problem | None
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give the verdict and the tables."""
     model = tribometer_of(context)
@@ -180,9 +180,9 @@ def _energy_table(motion: StickSlipMotion) -> Table:
     return Table("Energy balance", ("", ""), rows, note)
 
 
-def _methods_table(study: AccuracyStudy) -> Table:
+def _methods_table(study: Problem) -> Table:
     note = (
-        f"Error of the position at 0.05, 0.10, ... s, against: {study.reference} (rows 'event-driven': the same method "
-        "with a larger tolerance). Solvers of scipy run the smoothed law."
+        f"Error of the position at 0.05, 0.10, ... s, against: {study.rows[0].reference} (rows 'event-driven': the "
+        "same method with a larger tolerance). Solvers of scipy run the smoothed law."
     )
     return Table("The other methods", METHOD_COLUMNS, method_rows(study), note)

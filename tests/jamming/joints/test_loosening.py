@@ -10,7 +10,6 @@ from coupled_oracles import driven_pair, embodied, four_bar
 from graphsynth import simulate
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.coupled_pictures import clearance_picture, loosening_picture
-from graphsynth.evidence.joints_misaligned import error_against_time
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import (
     RIGID,
@@ -138,10 +137,3 @@ def test_offsets_that_make_no_sense(offset, text):
         bearing_limits(Bearing(), radial_offset=offset)
     with pytest.raises(GeometryError, match="pushed"):
         bearing_limits(Bearing(), radial_offset=0.02, clearance_tolerance=0.02)
-
-
-def test_error_falls_with_the_work():
-    rows = error_against_time(samples=(8, 74), gaps=(1e-1, 1e-4), repeats=1)
-    assert [row.method for row in rows] == ["samples", "samples", "certified gap", "certified gap"]
-    assert rows[0].error > 10.0 * rows[1].error > 0.0 and rows[2].error <= 1e-1 and 0.0 < rows[3].error <= 1e-4
-    assert all(row.seconds > 0.0 for row in rows)

@@ -6,7 +6,7 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna import PointingMechanism
-from graphsynth.systems.antenna.accuracy import pointing_errors
+from graphsynth.systems.antenna.evidence import pointing_errors
 
 
 def test_rows_are_ordered_by_what_they_promise():

@@ -9,7 +9,8 @@ import pytest
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.closed_form import linear_response
 from graphsynth.dynamics.motors import DCMotor, IdealSpeed
-from graphsynth.evidence.driven import drive_work_precision, rows_as_text
+from graphsynth.evidence.drives import drive_work_precision, rows_as_text
+from graphsynth.evidence.rows import RowStatus
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
 SOURCE = MotorDrivenPlatform.source
@@ -25,9 +26,12 @@ def test_errors_fall_with_the_tolerance():
     )
     ours, theirs = study.rows[:3], study.rows[3:]
     for rows in (ours, theirs):
-        assert [row.status for row in rows] == ["done"] * 3
-        assert rows[0].error > 10 * rows[1].error and all(row.seconds > 0.0 and row.steps > 0 for row in rows)
-    assert ours[2].error < 1e-11 and "DOP853 with tolerance 3e-14" in study.reference
+        assert [row.status for row in rows] == [RowStatus.OK] * 3
+        assert rows[0].error > 10 * rows[1].error and all(
+            row.seconds > 0.0 and row.more["steps or calls"] > 0 for row in rows
+        )
+    assert ours[2].error < 1e-11 and "DOP853 with tolerance 3e-14" in ours[0].reference
+    assert theirs[0].reference.endswith("(the same method)") and "the same method" not in ours[0].reference
 
 
 def test_error_is_that_of_the_closed_form():
@@ -45,8 +49,9 @@ def test_stiff_motor_and_a_solver_that_gives_up():
     study = drive_work_precision(
         SOURCE(motor(1e-9)), [0.0, 0.05], tolerances=[1e-6], solvers=["LSODA", "DOP853"], rounds=1, most_calls=2000
     )
-    assert "too stiff" in study.reference
-    assert [row.status for row in study.rows] == ["done", "done", "more than 2000 calls"]
+    assert all("too stiff" in row.reference for row in study.rows)
+    assert [row.reason for row in study.rows] == ["", "", "more than 2000 calls"]
+    assert [row.status.value for row in study.rows] == ["ok", "ok", "failed"]
     assert math.isnan(study.rows[2].error) and rows_as_text(study)[1][2][2] == ""
 
 
