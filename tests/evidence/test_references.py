@@ -212,7 +212,7 @@ def test_a_motor_without_load_follows_its_exponentials():
 
 
 def test_four_bar_in_long_doubles_is_the_braider():
-    from graphsynth.systems.braider.evidence_four_bar import bodies_of, places, shape_of_braider
+    from graphsynth.systems.braider.evidence_four_bar import places, shape_of_braider
     from graphsynth.systems.braider.model import Braider
 
     braider = Braider()
@@ -225,7 +225,7 @@ def test_four_bar_in_long_doubles_is_the_braider():
         right = float(braider.load_moment(theta) * braider.linkage.motion(theta).k3)
         assert abs(load - right) < 1e-16
         # the joints stay closed: the end of the coupler is that of the rocker
-        at, bar = places(braider.linkage, bodies_of(braider), theta), braider.linkage
+        at, bar = places(braider.linkage, braider.bodies, theta), braider.linkage
         middle, turn = complex(at[3], at[4]), np.exp(1j * float(at[5]))
         end = bar.frame + bar.rocker * np.exp(1j * float(at[8]))
         assert abs(middle + bar.coupler / 2 * turn - end) < 1e-17
