@@ -16,10 +16,9 @@ import numpy as np
 
 from graphsynth.core.arguments import Budget, Positive
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving
 from graphsynth.intervals.compiled import pave_compiled
-from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.paving import pave
 from graphsynth.intervals.proving import System

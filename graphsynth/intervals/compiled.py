@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Budget, Positive
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving
-from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.proving import read_parameters
 from graphsynth.intervals.status import Status

@@ -11,9 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.arguments import checker
+from graphsynth.core.errors import GraphsynthError, IntervalError
 
-__all__ = ["check_quickly", "check_rounding", "rounding_faults"]
+__all__ = ["check_quickly", "check_rounding", "checked", "rounding_faults"]
+
+#: Lets a function keep what its annotations say; an `IntervalError` names the argument that is something else.
+checked = checker(IntervalError, ("Interval",), {"System": "Callable"})
+
 
 _U = 2.0**-53
 # run-time values in arrays: neither the byte-code compiler nor a C compiler can fold the sums below

@@ -17,9 +17,8 @@ import numpy as np
 
 from graphsynth.core.arguments import Count
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals._checks import checked
 from graphsynth.intervals.functions import divide_extended
-from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, interval
 from graphsynth.intervals.proving import inverses, points, spectral_radius
 from graphsynth.intervals.status import Status

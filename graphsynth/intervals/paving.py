@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Budget, Count, Positive
 from graphsynth.core.errors import FormatError, IntervalError
-from graphsynth.intervals._checks import checked
 from graphsynth.intervals.boxes import Paving, Progress
-from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.proving import System, image, read_parameters
 from graphsynth.intervals.status import Status

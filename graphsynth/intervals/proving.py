@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Count
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals._checks import checked
 from graphsynth.intervals.dual import evaluate, jacobian_of, values_of, variables
-from graphsynth.intervals.guard import check_rounding
+from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.status import Status
 

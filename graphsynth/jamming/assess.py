@@ -20,7 +20,7 @@ from graphsynth.jamming.bearing.limits import Limit, largest_misalignment, small
 from graphsynth.jamming.bearing.parameters import ToleranceBox
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
 from graphsynth.mechanism.four_bar import TiltedFourBar
-from graphsynth.mechanism.four_bar_turn import FullTurn
+from graphsynth.mechanism.rotatability import FullTurn
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,10 +16,10 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.assembly import whole_range
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
+from graphsynth.kinematics.engine.escapes import pivot_passes, refined
 from graphsynth.kinematics.engine.events import ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.inputs import coordinates, fine_grid, full_turn, monotonic, warn_of_degrees
-from graphsynth.kinematics.engine.pivots import pivot_passes, refined
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
 from graphsynth.kinematics.engine.reversals import dead_centres

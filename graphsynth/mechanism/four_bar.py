@@ -26,7 +26,7 @@ from graphsynth.core.checks import (
     sign,
     unit_vector,
 )
-from graphsynth.mechanism.four_bar_turn import FullTurn, full_turn
+from graphsynth.mechanism.rotatability import FullTurn, full_turn
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -354,7 +354,7 @@ class TiltedFourBar:
         GeometryError
             If the linkage cannot be assembled somewhere on the stroke.
         """
-        from graphsynth.mechanism.four_bar_turn import straightness
+        from graphsynth.mechanism.rotatability import straightness
 
         return straightness(self, start, stop, samples)
 

@@ -14,7 +14,7 @@ import pytest
 from scipy.optimize import fsolve
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute
-from graphsynth.kinematics.engine.dyads import solve_rrr
+from graphsynth.kinematics.engine.batch import solve_rrr
 from graphsynth.kinematics.simulation import simulate, simulate_batch
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 361)

@@ -13,7 +13,7 @@ from graphsynth.core.errors import GraphsynthError
 from graphsynth.kinematics import simulate, simulate_batch
 from graphsynth.kinematics.certify import certify
 from graphsynth.kinematics.dimensional import PathGoal, PosesGoal, embody
-from graphsynth.kinematics.engine.dyads import solve_rrr
+from graphsynth.kinematics.engine.batch import solve_rrr
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Driver, Mechanism

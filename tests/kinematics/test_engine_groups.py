@@ -10,7 +10,7 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate, simulate_batch
-from graphsynth.kinematics.engine.dyads import solve_rrr
+from graphsynth.kinematics.engine.batch import solve_rrr
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.mechanism.constraints import jacobian
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from graphsynth.mechanism.four_bar import TiltedFourBar
-from graphsynth.mechanism.four_bar_turn import _margins
+from graphsynth.mechanism.rotatability import _margins
 
 CHANGE, STRETCHED = (2.0, 1.0, 2.0, 3.0), (4.0, 1.0, 1.0, 2.0)
 

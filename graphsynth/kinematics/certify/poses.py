@@ -147,13 +147,12 @@ def _certify(motion: Motion, between: bool, budget: Budget) -> MotionCertificate
     u, end = _inputs(motion.inputs[asked], turns)
     nodes = prove_nodes(system, u, samples)
     position, angle, room = _radii(system, nodes, samples)
-    proved = np.isfinite(room)
     found = Cover(np.zeros(max(len(asked) - 1, 0), dtype=bool))
     if between and len(asked) > 1 and all(enclosed(driver.law) for driver in motion.mechanism.drivers):
         found = cover(system, nodes, budget, begin)
     closed = turns is not None and end
     closed = closed and bool(found.covered.all()) and _closes(system, nodes, turns)
-    return _certificate(motion, between, asked, (position, angle, room), proved, found, closed, turns, begin)
+    return _certificate(motion, between, asked, (position, angle, room), found, closed, turns, begin)
 
 
 def _full_turn(motion: Motion) -> Fraction | None:
@@ -233,7 +232,7 @@ def _meshes_again(joint: Gear, nodes: Nodes, gear: int, angle: dict[int, int]) -
 
 
 def _certificate(
-    motion: Motion, between: bool, asked: NDArray[np.intp], radii: tuple[Array, Array, Array], proved: Mask,
+    motion: Motion, between: bool, asked: NDArray[np.intp], radii: tuple[Array, Array, Array],
     found: Cover, closed: bool, turns: Fraction | None, begin: float,
 ) -> MotionCertificate:  # fmt: skip
     n = len(motion.inputs)
@@ -241,6 +240,7 @@ def _certificate(
     poses, intervals = np.zeros(n, dtype=bool), np.zeros(max(n - 1, 0), dtype=bool)
     for target, part in zip((position, angle, room), radii):
         target[asked] = part
+    proved = np.isfinite(radii[2])
     poses[asked] = proved
     intervals[: len(found.covered)] = found.covered & proved[:-1] & proved[1:]
     reason = _reason(motion, between, poses, intervals, found)

@@ -16,8 +16,16 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import three
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.exact import Gaussian, ball, complex_ball, gaussian, precision, rational
-from graphsynth.systems.platform.certified_exact_modes import exact_roots, parallel_positions, self_motion
-from graphsynth.systems.platform.certified_sextic_balls import SexticBalls, isolate, mirror_count, refine, sextic_balls
+from graphsynth.systems.platform.certified_exact_modes import (
+    SexticBalls,
+    exact_roots,
+    isolate,
+    mirror_count,
+    parallel_positions,
+    refine,
+    self_motion,
+    sextic_balls,
+)
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
 __all__ = ["AssemblyCertificate", "AssemblyVerdict", "ModeEnclosure", "certify_assembly_modes", "certify_direct"]

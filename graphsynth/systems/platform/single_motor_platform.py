@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite, finite_array, positive, sign, three, three_points, triple
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.drive import DriveTurn, FourBarDrive, first_barrier
-from graphsynth.systems.platform.gears import GearTrain
+from graphsynth.systems.platform.drive import DriveTurn, FourBarDrive, GearTrain, first_barrier
 from graphsynth.systems.platform.motion import BranchLabel, Monodromy, Motion, Sweep, TurnBatch
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.plane import directions
@@ -27,12 +26,13 @@ from graphsynth.systems.platform.tracking import (
     Tracked,
     compare,
     distance,
+    events,
     machine_rows,
     monodromy,
     track,
     turn_batch,
+    wheel_angles,
 )
-from graphsynth.systems.platform.turn_events import events, wheel_angles
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph

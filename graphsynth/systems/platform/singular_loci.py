@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import checked, finite, whole
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.circles import BoundaryCircle, leg_circles
+from graphsynth.systems.platform.conic import BoundaryCircle, leg_circles
 from graphsynth.systems.platform.field import characteristic_length, determinant, pose_grid, working_mode
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.systems.platform.tracing import CurveEquations, Traced, trace

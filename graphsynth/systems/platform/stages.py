@@ -81,7 +81,7 @@ def platform_of(context: Context) -> SingleMotorPlatform:
 
 def _mechanism(table: PlatformTable) -> SingleMotorPlatform:
     """Embody the scene's dimensions; one leg is repeated three times."""
-    from graphsynth.systems.platform.gears import GearTrain
+    from graphsynth.systems.platform.drive import GearTrain
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
     def thrice(value: float) -> tuple[float, float, float]:

@@ -27,8 +27,7 @@ from graphsynth.systems.platform import (
     certify_direct,
     certify_direct_batch,
 )
-from graphsynth.systems.platform.certified_exact_modes import exact_roots
-from graphsynth.systems.platform.certified_sextic_balls import sextic_balls
+from graphsynth.systems.platform.certified_exact_modes import exact_roots, sextic_balls
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
 D = [("0", "0"), ("2.5", "0.2"), ("1.1", "2.3")]

@@ -17,7 +17,7 @@ from graphsynth.kinematics.certify import certify_four_bar, certify_inverted_sli
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.rotatability import type_of
 from graphsynth.systems.platform import TurnVerdict, certify_full_turn
-from graphsynth.systems.platform.certified_equations import PlatformSystem
+from graphsynth.systems.platform.certified_full_turn import PlatformSystem
 from graphsynth.systems.platform.drive import FourBarDrive
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 

@@ -15,7 +15,7 @@ from graphsynth.mechanism.constraints import residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.systems.platform.gears import GearTrain
+from graphsynth.systems.platform.drive import GearTrain
 from graphsynth.systems.platform.rank_check import (
     as_mechanism,
     link_poses,

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.drive import FourBarDrive
-from graphsynth.systems.platform.gears import GearTrain
+from graphsynth.systems.platform.drive import FourBarDrive, GearTrain
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 REFERENCE = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
