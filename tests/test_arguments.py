@@ -22,7 +22,7 @@ from graphsynth.intervals import Dual, Interval, Search
 from graphsynth.jamming import Bearing, Fit, ToleranceBox
 from graphsynth.jamming.bearing import areas as circle_areas
 from graphsynth.jamming.bearing.parameters import Range
-from graphsynth.jamming.bearing.sweep import PieceGap
+from graphsynth.jamming.bearing.sweep import PieceInterference
 from graphsynth.jamming.intersection import (
     Reading,
     circle_ellipse,
@@ -62,8 +62,8 @@ def square(x: Any, p: Any) -> list[Any]:
     return [x[0] ** 2 - p[0]]
 
 
-def always(f: Interval) -> PieceGap:
-    return PieceGap(intervals.sin(f) - 0.5, np.ones(len(f), bool), np.zeros(len(f), bool))
+def always(f: Interval) -> PieceInterference:
+    return PieceInterference(intervals.sin(f) - 0.5, np.ones(len(f), bool), np.zeros(len(f), bool))
 
 
 PAVED = {"f": square, "box": LINE, "parameters": [2], "tolerance": 1e-3, "max_boxes": 100, "max_seconds": 1.0}
@@ -89,9 +89,9 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "gauss_seidel": lambda: (intervals.gauss_seidel, {
         "matrix": [[2, 1], [1, 3]], "right": [3, 4], "box": ["[-9, 9]"] * 2, "rounds": 3,
     }),
-    "arc": lambda: (jamming.Arc, {"start": 0.0, "length": 1.0}),
-    "inside an arc": lambda: (jamming.Arc(0.0, 1.0).contains, {"f": 0.1}),
-    "gap": lambda: (BEARING.gap, {"sine": 0.1, "cosine": 0.99, "condition": "A"}),
+    "arc": lambda: (jamming.JamArc, {"start": 0.0, "length": 1.0}),
+    "inside an arc": lambda: (jamming.JamArc(0.0, 1.0).contains, {"f": 0.1}),
+    "gap": lambda: (BEARING.interference, {"sine": 0.1, "cosine": 0.99, "condition": "A"}),
     "fit": lambda: (Fit, {"name": "H7/g6", "nominal": Fraction(35), "hole": UNIT, "shaft": UNIT}),
     "pair": lambda: (FIT.pair, {"loosest": True}),
     "range": lambda: (Range, {"lower": Fraction(1), "upper": Fraction(2), "exact": True}),
@@ -103,17 +103,20 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "assessment": lambda: (jamming.assess_jamming, {
         "subject": DECK, "bearing": BEARING, "condition": "A", "samples": 8, "certify": False,
     }),
-    "largest gap": lambda: (jamming.largest_gap, {"box": box(), "tolerance": 1e-3, "decide_sign": True, **BUDGETS}),
+    "largest interference": lambda: (jamming.largest_interference, {
+        "box": box(), "tolerance": 1e-3, "decide_sign": True, **BUDGETS,
+    }),
     "maximise": lambda: (jamming.maximise, {
         "function": lambda x: x[0] * x[1], "box": Interval(["[0, 1]"] * 2), "tolerance": 0.1, "tried": None, **BUDGETS,
     }),
     "sweep": lambda: (jamming.sweep_turn, {
-        "gap": always, "resolution": 0.1, "first": 16, "max_pieces": 300, "max_seconds": 1.0,
+        "interference": always, "resolution": 0.1, "first": 16, "max_pieces": 300, "max_seconds": 1.0,
     }),
-    "samples": lambda: (jamming.sample_gaps, {"box": box(), "condition": "A", "count": 50, "seed": 0}),
+    "samples": lambda: (jamming.sample_interference, {"box": box(), "condition": "A", "count": 50, "seed": 0}),
     "limit": lambda: (jamming.largest_height, {"linkage": DECK, "bearing": BEARING, "condition": "A"}),
     "limits of a bearing": lambda: (bearing_limits, {
-        "bearing": BEARING, "play": 0.0, "radius_tolerance": 0.0, "clearance_tolerance": 0.0, "radial_offset": 0.0,
+        "bearing": BEARING, "axial_clearance": 0.0, "radius_tolerance": 0.0, "clearance_tolerance": 0.0,
+        "radial_offset": 0.0,
     }),
     "boxes of a crossing": lambda: (krawczyk_boxes, {"problem": circle_ellipse(5, 6, 4), "tolerance": 0.01, **BUDGETS}),
     "ellipse": lambda: (reading_ellipse, {
@@ -170,7 +173,7 @@ def test_protocols_of_python_stay() -> None:
     with pytest.raises(TypeError):
         jamming.certify_jamming()
     with pytest.raises(TypeError):
-        jamming.largest_gap(box(), colour=1)
+        jamming.largest_interference(box(), colour=1)
     assert len(list(THREE)) == 3
 
 

@@ -40,7 +40,7 @@ def check_panels(tilts: tuple[float, ...], exaggeration: float) -> None:
 
 def panel_title(bearing: Bearing, tilt: float, title: str) -> str:
     """Return the heading of a panel: its title, the tilt, and by how much the bearing jams or is free."""
-    gap = float(bearing.gap(abs(math.sin(tilt)), math.cos(tilt), "A"))
+    gap = float(bearing.interference(abs(math.sin(tilt)), math.cos(tilt), "A"))
     verdict = f"jams: {gap:.4f} mm too much" if gap > 0 else f"free: {-gap:.4f} mm left"
     return f"{title}\ntilt {tilt:.6f} rad, {verdict}".strip()
 

@@ -16,9 +16,9 @@ from graphsynth.drawing.palette import LIGHT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.jamming.joints import CoupledReport, LooseningTable
+    from graphsynth.jamming.joints import CoupledReport, SensitivityTable
 
-__all__ = ["clearance_picture", "loosening_picture"]
+__all__ = ["clearance_picture", "sensitivity_picture"]
 
 #: Shown at most: how many times the allowed scale at the worst input.
 _HIGH = 4.0
@@ -91,13 +91,13 @@ def _name(name: tuple[tuple[int, int], str]) -> str:
     return f"{a}-{b}" if what == "tilt" else f"{a}-{b} {what}"
 
 
-def loosening_picture(table: LooseningTable) -> Figure:
+def sensitivity_picture(table: SensitivityTable) -> Figure:
     """Draw what loosening each limit alone gains, and what could be had at most.
 
     Parameters
     ----------
-    table : LooseningTable
-        Of `graphsynth.jamming.joints.compare_loosening`.
+    table : SensitivityTable
+        Of `graphsynth.jamming.joints.compare_sensitivities`.
 
     Returns
     -------

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.intervals.interval import Interval
-    from graphsynth.jamming.intersection import CircleEllipse, CrossingBoxes
+    from graphsynth.jamming.intersection import CircleEllipse, IntersectionBoxes
 
 __all__ = ["crossing_picture", "dress", "region_picture"]
 
@@ -46,13 +46,13 @@ def _curves(problem: CircleEllipse, count: int = 1441) -> tuple[Array, Array]:
 # -- crossings ---------------------------------------------------------------------------------------------------------
 
 
-def crossing_picture(problem: CircleEllipse, boxes: CrossingBoxes | None = None) -> Figure:
+def crossing_picture(problem: CircleEllipse, boxes: IntersectionBoxes | None = None) -> Figure:
     """Draw the four crossings of a circle and an ellipse with tolerances; one of them enlarged, and unrolled.
 
     Parameters
     ----------
     problem : CircleEllipse
-    boxes : CrossingBoxes, optional
+    boxes : IntersectionBoxes, optional
         Result of Krawczyk's method to be drawn into the detail.
 
     Returns
@@ -170,7 +170,7 @@ def _clipped(problem: CircleEllipse) -> Array:
     return np.array(corners).reshape(-1, 2)
 
 
-def _paving(axes: Any, boxes: CrossingBoxes) -> None:
+def _paving(axes: Any, boxes: IntersectionBoxes) -> None:
     from matplotlib.collections import PolyCollection
 
     nothing = (0.0, 0.0, 0.0, 0.0)

@@ -245,7 +245,7 @@ def report_picture(report: JammingReport) -> Figure:
     Examples
     --------
     >>> from graphsynth.jamming import ToleranceBox, assess_jamming
-    >>> len(report_picture(assess_jamming(box=ToleranceBox(alpha="1/30"))).axes)
+    >>> len(report_picture(assess_jamming(ToleranceBox(alpha="1/30"))).axes)
     2
     """
     figure = new_figure((9.0, 5.6))
@@ -257,7 +257,7 @@ def report_picture(report: JammingReport) -> Figure:
             tilts.axhline(sign * 1e3 * report.critical_tilt, color=LIGHT["soft"], lw=1.0, ls=(0, (4, 2)))
         tilts.annotate("critical tilt", (f[0], 1e3 * report.critical_tilt), xytext=(4, 3), fontsize=8,
                        textcoords="offset points", color=LIGHT["note"])  # fmt: skip
-    gaps.plot(f, report.table.gap, color=LIGHT["ink"], lw=1.5)
+    gaps.plot(f, report.table.interference, color=LIGHT["ink"], lw=1.5)
     gaps.axhline(0.0, color=LIGHT["soft"], lw=1.0)
     if report.certificate is not None:
         _bands((tilts, gaps), report, (float(f.min()), float(f.max())))

@@ -196,7 +196,7 @@ def _proved_row(method: str, setting: str, left: Any, ends: Sequence[float], tim
 def _sign_changes(box: ToleranceBox, condition: Condition, count: int) -> int:
     linkage, bearing = box.nominal()
     path = linkage.positions(np.linspace(0.0, math.tau, count + 1))
-    jams = bearing.gap(path.sin_theta, path.cos_theta, condition) > 0.0
+    jams = bearing.interference(path.sin_theta, path.cos_theta, condition) > 0.0
     return int((jams[1:] != jams[:-1]).sum())
 
 

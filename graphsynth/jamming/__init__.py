@@ -1,4 +1,4 @@
-"""Bearing contact under tilt: gaps, critical tilt, jam arcs over a turn, areas, verdicts with and without proof.
+"""Binding of misaligned bearings: interference, critical tilt, arcs, areas, verdicts with and without proof.
 
 Names are resolved on first use.
 """

@@ -6,9 +6,6 @@ from .assess import (
     assess_jamming as assess_jamming,
 )
 from .bearing.arcs import (
-    Arc as Arc,
-)
-from .bearing.arcs import (
     ArcEnclosure as ArcEnclosure,
 )
 from .bearing.arcs import (
@@ -16,6 +13,9 @@ from .bearing.arcs import (
 )
 from .bearing.arcs import (
     Enclosure as Enclosure,
+)
+from .bearing.arcs import (
+    JamArc as JamArc,
 )
 from .bearing.arcs import (
     JamArcs as JamArcs,
@@ -37,13 +37,13 @@ from .bearing.branch_and_bound import (
     Supremum as Supremum,
 )
 from .bearing.branch_and_bound import (
-    largest_gap as largest_gap,
+    largest_interference as largest_interference,
 )
 from .bearing.branch_and_bound import (
     maximise as maximise,
 )
 from .bearing.branch_and_bound import (
-    sample_gaps as sample_gaps,
+    sample_interference as sample_interference,
 )
 from .bearing.certify import (
     JamCertificate as JamCertificate,

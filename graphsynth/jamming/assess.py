@@ -39,17 +39,17 @@ Array = NDArray[np.float64]
 class JammingTable:
     """Values over the crank angles ``f``; every array has the shape of ``f``.
 
-    Angles in radians, gaps in mm, areas in mm^2.  ``status`` is an `AssemblyStatus`; the other columns are NaN where
-    the linkage cannot be assembled, and the two areas of the surrogate E4 also where its ellipse is not defined.
+    Angles in radians, interferences in mm, areas in mm^2.  ``status`` is an `AssemblyStatus`; the other columns are NaN
+    where the linkage cannot be assembled, and the two areas of the surrogate E4 also where its ellipse is not defined.
     ``rim_by_quadrature`` marks the angles at which the area of the rim is not a closed form.
     """
 
     f: Array
     status: NDArray[np.int8]
     theta: Array
-    gap_a: Array
-    gap_b: Array
-    gap: Array
+    interference_a: Array
+    interference_b: Array
+    interference: Array
     surrogate_gap_area: Array
     surrogate_interference_area: Array
     lid_area: Array
@@ -79,9 +79,9 @@ def table_over(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, f
         f=f,
         status=path.status,
         theta=path.theta,
-        gap_a=bearing.gap(S, C, "A") + hide,
-        gap_b=bearing.gap(S, C, "B") + hide,
-        gap=bearing.gap(S, C, condition) + hide,
+        interference_a=bearing.interference(S, C, "A") + hide,
+        interference_b=bearing.interference(S, C, "B") + hide,
+        interference=bearing.interference(S, C, condition) + hide,
         surrogate_gap_area=crescent[0] + hide,
         surrogate_interference_area=crescent[1] + hide,
         lid_area=lid + hide,
@@ -93,7 +93,7 @@ def table_over(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, f
 _MOST_SAMPLES = 10_000_000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class JammingReport:
     """Result of `assess_jamming`.
 
@@ -107,8 +107,8 @@ class JammingReport:
         Contact condition used.
     arcs : JamArcs
         Closed-form jam arcs of the nominal dimensions, radians (estimated; proved bounds are in the certificate).
-    worst_gap, worst_angle : float
-        Largest gap function over the crank angles that can be assembled (mm; negative is the clearance left) and one at
+    worst_interference, worst_angle : float
+        Largest interference over the crank angles that can be assembled (mm; negative is the clearance left) and one at
         which it is reached; NaN if there are none.
     largest_tilt, critical_tilt : float or None
         Radians; None if there is no critical tilt, with the sentence in ``arcs.reason``.
@@ -123,7 +123,7 @@ class JammingReport:
     seconds : float
         Run time.
     certificate : JamCertificate or None
-        What is proved, with evidence: bounds of the gap, inner and outer arcs, witness.
+        What is proved, with evidence: bounds of the interference, inner and outer arcs, witness.
     """
 
     linkage: TiltedFourBar
@@ -132,7 +132,7 @@ class JammingReport:
     method: str
     condition: str
     arcs: JamArcs
-    worst_gap: float
+    worst_interference: float
     worst_angle: float
     largest_tilt: float
     critical_tilt: float | None
@@ -143,6 +143,27 @@ class JammingReport:
     notes: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
     certificate: JamCertificate | None = None
+
+    def __repr__(self) -> str:
+        limits = [
+            f"{text}: {limit.value:.6g} {unit}"
+            for text, limit, unit in (
+                ("smallest clearance", self.smallest_clearance, "mm"),
+                ("largest misalignment", self.largest_misalignment, "rad"),
+            )
+            if limit is not None and limit.value is not None
+        ]
+        critical = "none" if self.critical_tilt is None else f"{self.critical_tilt:.6g} rad"
+        arcs = ", ".join(f"{math.degrees(a.start):.2f} to {math.degrees(a.stop):.2f} deg" for a in self.arcs.arcs)
+        lines = [
+            self.statement,
+            f"  interference at worst: {self.worst_interference:.6g} mm at {math.degrees(self.worst_angle):.2f} deg",
+            f"  largest tilt: {self.largest_tilt:.6g} rad; critical tilt: {critical}",
+            f"  binds at crank angles: {arcs or 'none'} (nominal dimensions)",
+            *(f"  {text}" for text in limits),
+            "  more: .table, .arcs, .certificate, .summary(), .to_pandas()",
+        ]
+        return "\n".join(lines)
 
     @property
     def statement(self) -> str:
@@ -177,7 +198,7 @@ class JammingReport:
             "arcs": [[arc.start, arc.stop] for arc in self.arcs.arcs],
             "touching": list(self.arcs.touching),
             "kappa": self.arcs.kappa,
-            "worst_gap_mm": self.worst_gap,
+            "worst_gap_mm": self.worst_interference,
             "worst_angle": self.worst_angle,
             "largest_tilt": self.largest_tilt,
             "critical_tilt": self.critical_tilt,
@@ -190,15 +211,14 @@ class JammingReport:
         }
 
 
-# one tilted bearing of a lambda linkage (model L0)
+# one tilted bearing of a four-bar (model L0)
 @overload
 def assess_jamming(
-    subject: TiltedFourBar | None = None,
+    subject: TiltedFourBar | ToleranceBox,
     bearing: Bearing | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike = 361,
     *,
-    box: ToleranceBox | None = None,
     certify: bool = True,
 ) -> JammingReport: ...
 
@@ -219,35 +239,31 @@ def assess_jamming(
 
 @checked
 def assess_jamming(
-    subject: TiltedFourBar | Motion | None = None,
+    subject: TiltedFourBar | ToleranceBox | Motion | None = None,
     bearing: Bearings | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike | None = None,
     *,
-    box: ToleranceBox | None = None,
     tilts: Misalignment | Iterable[Misalignment] | None = None,
     certify: bool = True,
     length_tolerance: float = 0.0,
     seconds: float = 20.0,
 ) -> JammingReport | CoupledReport:
-    """Assess whether bearings jam: those of any mechanism over its motion, or the one at B of a lambda linkage.
+    """Assess whether bearings bind: all of a mechanism over its motion, or the one at B of a four-bar.
 
     Parameters
     ----------
-    subject : Motion or TiltedFourBar
+    subject : Motion, TiltedFourBar or ToleranceBox
         A `Motion` of `graphsynth.simulate` is assessed with all its joints (model L1, needs ``tilts``); a
-        `TiltedFourBar` with its tilted motor axis by the model of the source (L0), and may be left out if ``box`` is
-        given.
+        `TiltedFourBar` with its tilted motor axis by the model of the source (L0).  With a `ToleranceBox` the verdict
+        of L0 holds for the whole box; table and closed-form arcs are those of its middle.
     bearing : Bearing, optional
-        L0: the bearing at B, by default that of the source (17.5 mm, 10 mm, 0.03 mm).  L1: limits for all joints, or a
-        mapping of pairs of links to limits, see `graphsynth.jamming.joints.assess_coupled`.
+        L0: the bearing at B, by default that of the box, else of the source (17.5 mm, 10 mm, 0.03 mm).  L1: limits for
+        all joints, or a mapping of pairs of links to limits, see `graphsynth.jamming.joints.assess_coupled`.
     condition : {"A", "B", "general"}
         Contact condition; "A" (short bearing in a long hole) is what the source means.
     samples : int or array_like, optional
         L0: number of crank angles of the table over [0, 2 pi] (361), or the angles themselves (radians).
-    box : ToleranceBox, optional
-        L0: exact dimensions with tolerances; the verdict then holds for the whole box, table and closed-form arcs for
-        its middle unless ``subject`` and ``bearing`` say otherwise.
     tilts : Misalignment or several, optional
         L1: the axes that are tilted.
     certify : bool
@@ -269,8 +285,8 @@ def assess_jamming(
 
     Examples
     --------
-    >>> report = assess_jamming(box=ToleranceBox(alpha="1/30", clearance="0.03 +- 0.003"))
-    >>> report.verdict.name, round(report.worst_gap, 12)
+    >>> report = assess_jamming(ToleranceBox(alpha="1/30", clearance="0.03 +- 0.003"))
+    >>> report.verdict.name, round(report.worst_interference, 12)
     ('CERTIFIED_JAMMED', 0.035099273074)
 
     The same dimensions with three bearings of that kind, at A, B and C, over half a turn:
@@ -286,67 +302,60 @@ def assess_jamming(
     >>> assess_jamming(motion, Bearing(), tilts=Misalignment(0, 1, 0.011)).verdict.name
     'CERTIFIED_FREE'
     """
-    if subject is not None and not isinstance(subject, TiltedFourBar):
-        _refuse("a motion", {"samples": samples is not None, "box": box is not None})
-        return _any_mechanism(subject, bearing, condition, tilts, certify, length_tolerance, seconds)
-    given = {"tilts": tilts is not None, "length_tolerance": length_tolerance != 0.0}
-    _refuse("a TiltedFourBar or a box", given)
-    if box is not None and not isinstance(box, ToleranceBox):
-        raise GeometryError(f"box = {box!r} is no ToleranceBox; give ToleranceBox(alpha=..., clearance=..., ...)")
-    if bearing is not None and not isinstance(bearing, Bearing):
-        raise GeometryError(f"bearing = {bearing!r} does not fit a TiltedFourBar; give one Bearing(...)")
-    return _one_bearing(subject, bearing, condition, 361 if samples is None else samples, box, certify)
-
-
-def _refuse(subject: str, given: dict[str, bool]) -> None:
-    """Refuse arguments of the other model."""
-    wrong = [name for name, there in given.items() if there]
-    if wrong:
-        other = "the motion of a mechanism (simulate)" if "tilts" in wrong or "length_tolerance" in wrong else "L0"
-        other = "a TiltedFourBar or a ToleranceBox" if other == "L0" else other
-        raise GeometryError(f"{wrong[0]} does not go with {subject}; it belongs to {other}")
-
-
-def _any_mechanism(
-    subject: Motion,
-    bearings: Bearings | None,
-    condition: Condition,
-    tilts: Misalignment | Iterable[Misalignment] | None,
-    certify: bool,
-    length_tolerance: float,
-    seconds: float,
-) -> CoupledReport:
+    if isinstance(subject, TiltedFourBar | ToleranceBox):
+        _refuse("a TiltedFourBar or a ToleranceBox", "the motion of a mechanism (simulate)",
+                tilts=tilts is not None, length_tolerance=length_tolerance != 0.0)  # fmt: skip
+        if bearing is not None and not isinstance(bearing, Bearing):
+            raise GeometryError(f"bearing = {bearing!r} does not fit a TiltedFourBar; give one Bearing(...)")
+        samples = 361 if samples is None else samples
+        if isinstance(subject, ToleranceBox):
+            linkage, own = subject.nominal()
+            return assess_bearing(linkage, bearing or own, condition, samples, subject, certify)
+        return assess_bearing(subject, bearing or Bearing(), condition, samples, None, certify)
+    _refuse("a motion", "a TiltedFourBar or a ToleranceBox", samples=samples is not None)
     from graphsynth.jamming.joints.assess import assess_coupled
     from graphsynth.kinematics.simulation import Motion
 
     if not isinstance(subject, Motion):
-        raise GeometryError(f"subject = {subject!r} is neither a Motion (simulate) nor a TiltedFourBar; give one")
+        raise GeometryError(
+            f"subject = {subject!r} is neither a Motion (simulate) nor a TiltedFourBar or ToleranceBox; give one"
+        )
     if tilts is None:
         raise GeometryError("no axis is misaligned; give tilts=Misalignment(base, link, alpha)")
-    if bearings is None:
+    if bearing is None:
         raise GeometryError("the joints have no bearings; give a Bearing or JointLimits, or {(link, link): ...}")
     return assess_coupled(
-        subject, bearings, tilts, condition=condition, certify=certify, length_tolerance=length_tolerance,
+        subject, bearing, tilts, condition=condition, certify=certify, length_tolerance=length_tolerance,
         seconds=seconds,
     )  # fmt: skip
 
 
-def _one_bearing(
-    linkage: TiltedFourBar | None,
-    bearing: Bearing | None,
+def _refuse(subject: str, other: str, **given: bool) -> None:
+    """Refuse arguments of the other model."""
+    for name, there in given.items():
+        if there:
+            raise GeometryError(f"{name} does not go with {subject}; it belongs to {other}")
+
+
+def assess_bearing(
+    linkage: TiltedFourBar,
+    bearing: Bearing,
     condition: Condition,
     samples: int | ArrayLike,
     box: ToleranceBox | None,
     certify: bool,
 ) -> JammingReport:
+    """Assess one tilted bearing: the verdict for ``box`` (without one for the doubles given), the table for them."""
     begin = perf_counter()
-    linkage, bearing, box = _given(linkage, bearing, box)
-    f = _angles(samples)
-    table = table_over(linkage, bearing, condition, f)
+    table = table_over(linkage, bearing, condition, _angles(samples))
     arcs = jam_arcs(linkage, bearing, condition)
     turn = linkage.full_turn()
     worst = _worst(linkage, bearing, condition, turn)
-    certificate = _certificate(box, condition) if certify else None
+    certificate = None
+    if certify:
+        from graphsynth.jamming.bearing.certify import certify_jamming
+
+        certificate = certify_jamming(ToleranceBox.of(linkage, bearing) if box is None else box, condition)
     inverse = condition != "general" and linkage.rod == "rigid" and linkage.pin_height <= linkage.l3
     return JammingReport(
         linkage=linkage,
@@ -355,7 +364,7 @@ def _one_bearing(
         method=METHOD_CERTIFIED if certificate else METHOD_CLOSED_FORM,
         condition=condition,
         arcs=arcs,
-        worst_gap=worst[0],
+        worst_interference=worst[0],
         worst_angle=worst[1],
         largest_tilt=linkage.largest_tilt[0],
         critical_tilt=bearing.critical_tilt(condition).angle,
@@ -367,27 +376,6 @@ def _one_bearing(
         seconds=perf_counter() - begin,
         certificate=certificate,
     )
-
-
-def _given(
-    linkage: TiltedFourBar | None, bearing: Bearing | None, box: ToleranceBox | None
-) -> tuple[TiltedFourBar, Bearing, ToleranceBox]:
-    """Complete what was given: the box of the models, or the models in the middle of the box."""
-    if box is None:
-        if linkage is None:
-            raise GeometryError(
-                "neither a linkage nor a box is given; give TiltedFourBar(...) or box=ToleranceBox(...)"
-            )
-        bearing = Bearing() if bearing is None else bearing
-        return linkage, bearing, ToleranceBox.of(linkage, bearing)
-    middle = box.nominal()
-    return linkage or middle[0], bearing or middle[1], box
-
-
-def _certificate(box: ToleranceBox, condition: Condition) -> JamCertificate:
-    from graphsynth.jamming.bearing.certify import certify_jamming
-
-    return certify_jamming(box, condition)
 
 
 def _notes(arcs: JamArcs, turn: FullTurn, table: JammingTable, certificate: JamCertificate | None) -> tuple[str, ...]:
@@ -413,7 +401,7 @@ def _angles(samples: int | ArrayLike) -> Array:
 
 
 def _worst(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, turn: FullTurn) -> tuple[float, float]:
-    """Largest gap over the assembled part of the turn, and a crank angle of it.
+    """Largest interference over the assembled part of the turn, and a crank angle of it.
 
     That is a quarter turn before or after the phase, or a dead point if neither can be reached.
     """
@@ -425,12 +413,12 @@ def _worst(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, turn:
     reached = linkage.positions(both).assembled
     if turn.possible or reached.any() or not turn.limit_angles:
         at = int(reached[1] and not reached[0])
-        return float(bearing.gap(sine, math.cos(tilt), condition)), float(both[at])
+        return float(bearing.interference(sine, math.cos(tilt), condition)), float(both[at])
     rise = linkage.pin_height / linkage.l3 * np.abs(np.sin(np.array(turn.limit_angles) - linkage.pin_phase))
     S = rise if linkage.rod == "rigid" else rise / np.hypot(1.0, rise)
-    gap = bearing.gap(S, np.sqrt((1.0 - S) * (1.0 + S)), condition)
-    best = int(np.argmax(gap))
-    return float(gap[best]), turn.limit_angles[best]
+    interference = bearing.interference(S, np.sqrt((1.0 - S) * (1.0 + S)), condition)
+    best = int(np.argmax(interference))
+    return float(interference[best]), turn.limit_angles[best]
 
 
 def _verdict(bearing: Bearing, arcs: JamArcs, turn: FullTurn) -> Verdict:

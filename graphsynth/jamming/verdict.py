@@ -1,4 +1,9 @@
-"""Verdicts on jamming: what is claimed, and how it was had."""
+"""Verdicts: whether bearings bind, and by which method this is known.
+
+Binding is geometric: rigid parts would have to overlap.  The package calls the question "jamming"; the theory of peg
+insertion (Whitney, Simunovic) keeps that word for forces that cannot push the peg, and "wedging" for two contacts that
+hold each other by friction, see `graphsynth.jamming.bearing.friction`.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +21,9 @@ class Verdict(Enum):
     ============================= ============================== ==================================================
     member                        what is proved (theory/jam-arcs 5)
     ============================= ============================== ==================================================
-    ``CERTIFIED_FREE``            ``NO_JAM_CERTIFIED``           g < 0 for every angle and every parameter vector
-    ``CERTIFIED_JAMMED``          ``JAM_FOR_ALL``                every parameter vector jams at some angle or input
-    ``CERTIFIED_JAMMED_FOR_SOME`` ``JAM_FOR_SOME``               some parameter vector jams at some angle or input
+    ``CERTIFIED_FREE``            ``NO_JAM_CERTIFIED``           interference < 0 for all angles and parameters
+    ``CERTIFIED_JAMMED``          ``JAM_FOR_ALL``                every parameter vector binds at some angle or input
+    ``CERTIFIED_JAMMED_FOR_SOME`` ``JAM_FOR_SOME``               some parameter vector binds at some angle or input
     ``UNDECIDED``                 ``TOUCHING``, ``UNDECIDED``    nothing; the reason says what stands in the way
     ``CANNOT_ASSEMBLE``           (theory/extreme-cases 1)                   interference fit, or no position of the
     linkage ============================= ==============================
@@ -28,13 +33,13 @@ class Verdict(Enum):
     included, so none of them is a certificate.
     """
 
-    CERTIFIED_FREE = "free over the whole turn or range (certified)"
-    CERTIFIED_JAMMED = "jams on part of the turn or range, for all parameters given (certified)"
-    CERTIFIED_JAMMED_FOR_SOME = "jams on part of the turn or range, for some of the parameters given (certified)"
+    CERTIFIED_FREE = "never binds, for all parameters given (certified)"
+    CERTIFIED_JAMMED = "binds over part of the range, for all parameters given (certified)"
+    CERTIFIED_JAMMED_FOR_SOME = "binds over part of the range, for some of the parameters given (certified)"
     UNDECIDED = "undecided"
-    FREE_ESTIMATED = "free over the whole turn or range (estimated)"
-    JAMMED_ESTIMATED = "jams on part of the turn or range (estimated)"
-    TOUCHING_ESTIMATED = "touches without clearance left, within the rounding level (estimated)"
+    FREE_ESTIMATED = "never binds (estimated)"
+    JAMMED_ESTIMATED = "binds over part of the range (estimated)"
+    TOUCHING_ESTIMATED = "touches with no clearance left, within rounding (estimated)"
     CANNOT_ASSEMBLE = "the parts cannot be assembled"
 
     @property
@@ -44,7 +49,7 @@ class Verdict(Enum):
 
     @property
     def is_jammed(self) -> bool:
-        """True for a verdict that says that something jams."""
+        """True for a verdict that says that something binds."""
         return self in (Verdict.JAMMED_ESTIMATED, Verdict.CERTIFIED_JAMMED, Verdict.CERTIFIED_JAMMED_FOR_SOME)
 
     @property

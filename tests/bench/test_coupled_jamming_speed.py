@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains, simulate
 from graphsynth.jamming import Bearing
-from graphsynth.jamming.joints import JointLimits, Misalignment, certify_coupled, compare_loosening, largest_scale
+from graphsynth.jamming.joints import JointLimits, Misalignment, certify_coupled, compare_sensitivities, largest_scale
 from graphsynth.jamming.joints.closure import force_rows, joint_places, moment_rows, shifts, work_row
 from graphsynth.jamming.joints.program import problem
 from graphsynth.kinematics.dimensional import embody
@@ -107,7 +107,7 @@ def test_loosening_every_limit_of_eight_links(benchmark, eight):
     """Every limit by itself, over 360 poses."""
     mechanism, tilt = eight
     motion = simulate(mechanism, np.linspace(0.0, 6.28, 360 if benchmark.enabled else 6))
-    table = timed(benchmark, lambda: compare_loosening(motion, JointLimits(0.006, 0.002), tilt), 1)
+    table = timed(benchmark, lambda: compare_sensitivities(motion, JointLimits(0.006, 0.002), tilt), 1)
     assert len(table.rows) == 2 * (len(mechanism.joints) - 1) and table.rows[0].gain > 0.05
 
 

@@ -6,7 +6,15 @@ from time import perf_counter
 
 import pytest
 
-from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, jam_arcs, largest_gap, spread, sweep_linkage
+from graphsynth.jamming import (
+    Bearing,
+    ToleranceBox,
+    certify_jamming,
+    jam_arcs,
+    largest_interference,
+    spread,
+    sweep_linkage,
+)
 from graphsynth.jamming.assess import assess_jamming
 from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes
 from graphsynth.mechanism.four_bar import TiltedFourBar
@@ -33,10 +41,10 @@ def test_times_beside_plain_floats(capsys: pytest.CaptureFixture[str]) -> None:
     linkage, bearing = TiltedFourBar(alpha=1 / 30), Bearing()
     plain = best(lambda: jam_arcs(linkage, bearing))
     proved, box = best(lambda: certify_jamming(DECK)), best(lambda: certify_jamming(BOX))
-    report = best(lambda: assess_jamming(box=DECK))
+    report = best(lambda: assess_jamming(DECK))
     crossing = circle_ellipse("17.5", "17.53", "17.4617879639289313590283215334")
     boxes = best(lambda: krawczyk_boxes(crossing), 200)
-    search = largest_gap(
+    search = largest_interference(
         BOX.replace(hole_length=8, Rb="[5, 40]", alpha="[0, 1]"), "general", tolerance=1e-7, max_boxes=50_000
     )
     sweep = sweep_linkage(DECK, resolution=1e-9)

@@ -148,7 +148,7 @@ def bands(axes):
 
 
 def test_report_shows_what_is_proved():
-    report = assess_jamming(box=ToleranceBox(alpha="1/30", azimuth="0 +- 0.05"), samples=91)
+    report = assess_jamming(ToleranceBox(alpha="1/30", azimuth="0 +- 0.05"), samples=91)
     figure = drawn(report_picture(report))
     tilts, gaps = figure.axes
     assert report.statement == tilts.get_title()
@@ -159,6 +159,6 @@ def test_report_shows_what_is_proved():
     inner = report.certificate.arcs.inner[0]
     middle = math.degrees(0.5 * (inner.start + inner.stop))
     assert any(a < middle < b and b - a == pytest.approx(math.degrees(inner.length)) for a, b, _ in bands(tilts))
-    assert bands(drawn(report_picture(assess_jamming(box=ToleranceBox(), certify=False, samples=31))).axes[0]) == []
-    stops = report_picture(assess_jamming(box=ToleranceBox(2, 1, 1, 1, "0.05"), samples=31))
+    assert bands(drawn(report_picture(assess_jamming(ToleranceBox(), certify=False, samples=31))).axes[0]) == []
+    stops = report_picture(assess_jamming(ToleranceBox(2, 1, 1, 1, "0.05"), samples=31))
     assert any("where it can be assembled" in text.get_text() for text in stops.legends[0].get_texts())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.antenna import PointingMechanism, Reading
+from graphsynth.systems.antenna import Convention, PointingMechanism
 from graphsynth.systems.antenna.map_pictures import fold_map_picture, tolerance_map_picture
 from graphsynth.systems.antenna.pictures import comparison_picture, pointing_picture
 
@@ -52,7 +52,7 @@ def test_comparison_shows_the_published_curves():
 
 
 def test_comparison_of_other_conventions():
-    figure = comparison_picture(ART, ART, other_reading=Reading(side_y=-1), samples=21)
+    figure = comparison_picture(ART, ART, other_reading=Convention(side_y=-1), samples=21)
     assert figure.axes[3].lines[0].get_ydata()[-1] == pytest.approx(37.19, abs=0.006)
 
 

@@ -72,7 +72,7 @@ def test_arc_ends_are_where_the_gap_changes_sign(condition):
     linkage, bearing = box.nominal()
     f = np.linspace(0.0, math.tau, 200_001)
     path = linkage.positions(f)
-    sign = bearing.gap(path.sin_theta, path.cos_theta, condition) > 0
+    sign = bearing.interference(path.sin_theta, path.cos_theta, condition) > 0
     changes = f[np.flatnonzero(sign[1:] != sign[:-1])]
     ends = np.array(precise_arc_ends(box, condition))
     assert len(changes) == len(ends) == 4

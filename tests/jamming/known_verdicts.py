@@ -189,14 +189,14 @@ def count_undecided(count, seed, kind="moderate", margins=(-9.0, -0.5)):
             assert found.reason
         elif found.verdict is Verdict.CERTIFIED_JAMMED:
             assert case.jams, (case, found)
-            if found.witness.gap.lo > 1e-12 * float(case.box["Rb"].upper):
+            if found.witness.interference.lo > 1e-12 * float(case.box["Rb"].upper):
                 check_witness(found)
         else:
             assert found.verdict is Verdict.CERTIFIED_FREE and not case.jams, (case, found)
     return undecided
 
 
-def worst_gap(point, condition):
+def worst_interference(point, condition):
     """Largest gap over a turn, wherever the linkage can be assembled or not, and the sine of its tilt."""
     p = {name: real(value) for name, value in point.items()}
     n = [p["n1"], p["n2"], p["n3"]]
@@ -254,8 +254,8 @@ def check_box(rng, box, condition, count=6, angles=5):
     with mpmath.workdps(DIGITS):
         for values in members(rng, box, count):
             point = point_of(box, values)
-            gap, S = worst_gap(point, condition)
-            assert found.largest_gap.hi >= gap >= found.smallest_worst_gap.lo, (box, condition)
+            gap, S = worst_interference(point, condition)
+            assert found.largest_interference.hi >= gap >= found.smallest_worst_interference.lo, (box, condition)
             assert found.largest_tilt.lo <= mpmath.asin(S) <= found.largest_tilt.hi, (box, condition)
             assert found.verdict is not Verdict.CERTIFIED_FREE or gap < 0, (box, condition)
             assert found.verdict is not Verdict.CERTIFIED_JAMMED or gap > 0, (box, condition)
@@ -303,5 +303,5 @@ def check_limits(rng, box, condition, count=6):
             continue
         with mpmath.workdps(DIGITS):
             for values in members(rng, box, count):
-                gap, _ = worst_gap(point_of(box, {**values, name: F(limit.works)}), condition)
+                gap, _ = worst_interference(point_of(box, {**values, name: F(limit.works)}), condition)
                 assert gap < 0, (box, condition, name, limit)

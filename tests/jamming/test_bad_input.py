@@ -20,8 +20,8 @@ from graphsynth.jamming import (
     certified_largest_misalignment,
     certified_smallest_clearance,
     certify_jamming,
-    largest_gap,
-    sample_gaps,
+    largest_interference,
+    sample_interference,
     smallest_clearance,
     sweep_linkage,
     wedging,
@@ -66,11 +66,11 @@ def box(**changes):
         (lambda: area_curve(OUT_OF_REACH, f=[1.5]), "rises above l3 at 85.9437 degrees"),
         (lambda: smallest_clearance(OUT_OF_REACH, Bearing()), "rises to 2.79612, above l3 = 1.0|rises to 2.796"),
         (lambda: sweep_linkage(box(), resolution=math.nan), "resolution = nan must be at least"),
-        (lambda: largest_gap(box(), "C"), "condition = 'C' is unknown"),
+        (lambda: largest_interference(box(), "C"), "condition = 'C' is unknown"),
         (lambda: assess_jamming(DECK, Bearing(), samples=[math.nan]), "samples holds nan"),
         (lambda: assess_fits(box(), diameter=-3), "diameter -3 mm is outside"),
         (lambda: wedging(box(), "-0.1"), "friction = -0.1 is negative"),
-        *[(lambda n=n: sample_gaps(box(), count=n), "must be a positive integer") for n in (0, -3, 2.5, True)],
+        *[(lambda n=n: sample_interference(box(), count=n), "must be a positive integer") for n in (0, -3, 2.5, True)],
     ],
 )  # fmt: skip
 def test_one_clear_sentence(call, words):
@@ -92,7 +92,7 @@ def test_zero_clearance():
 def test_clearance_larger_than_the_bearing():
     for condition in ("A", "B"):
         report = assess_jamming(DECK, Bearing(clearance=100), condition)
-        assert report.verdict is Verdict.CERTIFIED_FREE and report.worst_gap < -90.0
+        assert report.verdict is Verdict.CERTIFIED_FREE and report.worst_interference < -90.0
     assert report.critical_tilt > report.largest_tilt and assess_jamming(DECK, Bearing(clearance=100)).arcs.reason
     limit = certified_largest_misalignment(box(clearance=100))
     assert limit.fails is None and "no limit" in limit.reason
@@ -110,11 +110,15 @@ def test_bearing_without_height():
 def test_tilt_beyond_the_reach_of_the_linkage():
     report = assess_jamming(OUT_OF_REACH, Bearing())
     assert report.verdict is Verdict.CANNOT_ASSEMBLE and any("cannot be assembled" in note for note in report.notes)
-    assert np.isnan(report.table.gap).all() and math.isnan(report.worst_gap)
+    assert np.isnan(report.table.interference).all() and math.isnan(report.worst_interference)
     limit = certified_smallest_clearance(ToleranceBox(2, 3, 1, "2.5", "1.2"))
     assert limit.works is None and limit.fails is None and "assembled" in limit.reason
     partly = assess_jamming(TiltedFourBar(3, 2, 1.5, 2.5, alpha=1.2), Bearing())
-    assert not partly.full_turn.possible and np.isnan(partly.table.gap).any() and not np.isnan(partly.table.gap).all()
+    assert (
+        not partly.full_turn.possible
+        and np.isnan(partly.table.interference).any()
+        and not np.isnan(partly.table.interference).all()
+    )
     assert partly.verdict in (Verdict.CERTIFIED_JAMMED, Verdict.UNDECIDED)
 
 
@@ -125,7 +129,7 @@ def test_what_is_not_a_number_gives_no_area():
 
 
 def test_a_box_without_tolerances_can_be_sampled():
-    seen = sample_gaps(ToleranceBox(alpha="1/30"), count=500)
+    seen = sample_interference(ToleranceBox(alpha="1/30"), count=500)
     assert seen.outside == 0 and seen.corners == 1 and 0 <= seen.overestimation < 1e-15
 
 
@@ -143,9 +147,10 @@ NOTHINGS = [None, "text", math.nan, np.zeros(3), object()]
     [
         lambda v: Fit.read(v, 35), lambda v: Fit.read("H7/g6", v), lambda v: assess_fits(v),
         lambda v: certify_jamming(v),
-        lambda v: assess_fits(box(), "A", v), lambda v: certified_largest_misalignment(v), lambda v: sample_gaps(v),
+        lambda v: assess_fits(box(), "A", v), lambda v: certified_largest_misalignment(v),
+        lambda v: sample_interference(v),
         lambda v: certified_smallest_clearance(v), lambda v: certified_smallest_clearance(box(), v),
-        lambda v: largest_gap(v), lambda v: largest_gap(box(), v), lambda v: wedging(v, "0.1"),
+        lambda v: largest_interference(v), lambda v: largest_interference(box(), v), lambda v: wedging(v, "0.1"),
         lambda v: wedging(box(), v),
         lambda v: smallest_clearance(v, Bearing()), lambda v: smallest_clearance(DECK, v), lambda v: sweep_linkage(v),
         lambda v: sweep_linkage(box(), resolution=v), lambda v: krawczyk_boxes(v),
@@ -154,8 +159,8 @@ NOTHINGS = [None, "text", math.nan, np.zeros(3), object()]
         lambda v: ToleranceBox.of(DECK, 0 if v is None else v),
         lambda v: coupled.bearing_limits(v), lambda v: coupled.JointLimits(v), lambda v: coupled.SlideLimits(v, v),
         lambda v: coupled.certify_coupled(v, Bearing(), coupled.Misalignment(0, 1, 0.01)),
-        lambda v: coupled.Misalignment(0, 1, v), lambda v: sample_gaps(box(), seed=v),
-        lambda v: sample_gaps(box(), v),
+        lambda v: coupled.Misalignment(0, 1, v), lambda v: sample_interference(box(), seed=v),
+        lambda v: sample_interference(box(), v),
     ],
 )  # fmt: skip
 def test_nothing_of_use_gets_a_sentence(call, value):
@@ -173,4 +178,4 @@ def test_one_default_condition():
             if inspect.isfunction(member) and "condition" in inspect.signature(member).parameters:
                 found[name] = inspect.signature(member).parameters["condition"].default
     assert len(found) >= 15 and set(found.values()) == {"A"}, found
-    assert largest_gap(box()).upper >= largest_gap(box(), "A").lower
+    assert largest_interference(box()).upper >= largest_interference(box(), "A").lower

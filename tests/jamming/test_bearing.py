@@ -15,9 +15,9 @@ from graphsynth.jamming.bearing.areas import (
     ellipse_circle,
     ellipse_circle_stable,
     lid_area,
-    lid_crossing,
+    lid_intersection,
     rim_area,
-    rim_crossing,
+    rim_intersection,
     surrogate_areas,
 )
 from graphsynth.jamming.bearing.bearing import Bearing
@@ -35,7 +35,7 @@ def test_critical_tilts():
     for condition in ("A", "B"):
         found = DECK.critical_tilt(condition)
         close(found.sine, math.sin(found.angle), 4e-16)
-        assert abs(float(DECK.gap(found.sine, math.cos(found.angle), condition))) < 1e-17
+        assert abs(float(DECK.interference(found.sine, math.cos(found.angle), condition))) < 1e-17
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_critical_tilts():
 )
 def test_general_pin(R, hp, hh, t, D):
     bearing = Bearing(R, 2 * hp, 0.05, hole_length=2 * hh)
-    close(bearing.gap(math.sin(t), math.cos(t), "general") + bearing.Rh, D, 1e-15)
+    close(bearing.interference(math.sin(t), math.cos(t), "general") + bearing.Rh, D, 1e-15)
 
 
 @settings(max_examples=30, deadline=None)
@@ -70,7 +70,7 @@ def test_general_pin_against_brute_force(R, hp, hh, t):
     candidates = [np.where(np.abs(height) <= hh, np.hypot(x, y), 0).max()]
     candidates += [np.where(ok, r, 0).max() for ok, r in zip(inside, reach)]
     bearing = Bearing(R, 2 * hp, 0.0, hole_length=2 * hh)
-    assert float(bearing.gap(S, C, "general")) + R == pytest.approx(max(candidates), rel=2e-4)
+    assert float(bearing.interference(S, C, "general")) + R == pytest.approx(max(candidates), rel=2e-4)
 
 
 @settings(max_examples=100, deadline=None)
@@ -85,9 +85,9 @@ def test_gaps_against_fifty_digits(R, ratio, relative, t):
         gB = r - ((r + c) * k - h * s)
         size = float(h * s + c + r * s * s)
     assume(abs(R * S - R * ratio / 2 * C) > 1e-9)  # the branch itself
-    assert float(bearing.gap(S, C, "A")) == pytest.approx(float(gA), rel=1e-14, abs=1e-15 * size)
+    assert float(bearing.interference(S, C, "A")) == pytest.approx(float(gA), rel=1e-14, abs=1e-15 * size)
     # C is rounded; only S^2 / (1 + C) sees it
-    assert float(bearing.gap(S, C, "B")) == pytest.approx(float(gB), rel=1e-14, abs=1e-15 * size)
+    assert float(bearing.interference(S, C, "B")) == pytest.approx(float(gB), rel=1e-14, abs=1e-15 * size)
 
 
 @settings(max_examples=100, deadline=None)
@@ -118,7 +118,7 @@ def test_no_critical_tilt():
     touch = Bearing(4.0, 6.0, 1.0).critical_tilt("A")  # h^2 = 9 = c (2R + c)
     assert "never overlap" in touch.reason
     close(touch.angle, 2 * math.atan(1 / 3), 1e-15)
-    assert float(Bearing(4.0, 6.0, 1.0).gap(1.0, 0.0, "A")) == 0.0
+    assert float(Bearing(4.0, 6.0, 1.0).interference(1.0, 0.0, "A")) == 0.0
     assert "interference" in Bearing(17.5, 10, -0.01).critical_tilt("A").reason
     assert Bearing(17.5, 10, 0.0).critical_tilt("A").angle == 0.0
 
@@ -126,7 +126,7 @@ def test_no_critical_tilt():
 def test_general_critical_tilt_is_where_the_gap_vanishes():
     for bearing in (Bearing(1, 4, 0.1, hole_length=2), Bearing(1, 1, 0.05, hole_length=6), Bearing(1, 2.2, 0.3, 2.0)):
         found = bearing.critical_tilt("general")
-        assert abs(float(bearing.gap(found.sine, math.cos(found.angle), "general"))) < 1e-15
+        assert abs(float(bearing.interference(found.sine, math.cos(found.angle), "general"))) < 1e-15
 
 
 @pytest.mark.parametrize(
@@ -139,15 +139,15 @@ def test_bad_dimensions(arguments):
 
 def test_bad_condition():
     with pytest.raises(GeometryError, match="condition"):
-        DECK.gap(0.1, 0.9, "C")
+        DECK.interference(0.1, 0.9, "C")
     with pytest.raises(GeometryError, match="hole_length"):
-        DECK.gap(0.1, 0.9, "general")
+        DECK.interference(0.1, 0.9, "general")
 
 
 def test_monotone_gap():
     t = np.linspace(0, math.pi / 2, 4001)
     for condition in ("A", "B"):
-        assert np.all(np.diff(DECK.gap(np.sin(t), np.cos(t), condition)) >= -1e-14)
+        assert np.all(np.diff(DECK.interference(np.sin(t), np.cos(t), condition)) >= -1e-14)
 
 
 # areas ----------------------------------------------------------------------------------------------------------------
@@ -244,7 +244,7 @@ def test_lid_area_against_the_direct_form(R, ratio, relative, beyond):
             mp.mpf(bearing.Rb), mp.mpf(bearing.Rb) + mp.mpf(bearing.clearance), mp.mpf(bearing.h), mp.asin(s)
         )
     # the area grows like gap^(3/2); the gap has the absolute error of its largest term
-    gap, size = float(bearing.gap(S, C, "B")), bearing.h * S + bearing.clearance
+    gap, size = float(bearing.interference(S, C, "B")), bearing.h * S + bearing.clearance
     close(lid_area(bearing, S, C), float(exact), 2e-14 + 1e-15 * size / gap)
 
 
@@ -257,7 +257,7 @@ def test_rim_area_against_the_direct_form(R, ratio, relative, beyond):
     t = critical.angle * (1 + beyond)
     S, C = math.sin(t), math.cos(t)
     assume(bearing.Rb * S <= bearing.h * C and bearing.h * S - bearing.Rb * C < bearing.Rh)
-    gap, size = float(bearing.gap(S, C, "A")), bearing.h * S + bearing.clearance
+    gap, size = float(bearing.interference(S, C, "A")), bearing.h * S + bearing.clearance
     assume(gap > 1e-6 * size)
     with mp.workdps(60):
         s = mp.mpf(S)
@@ -310,10 +310,14 @@ def test_zero_clearance():
     S = 0.4 * math.sin(1 / 30) * np.array([0.0, math.sin(math.radians(1)), 1.0])
     C = np.sqrt(1 - S * S)
     np.testing.assert_allclose(
-        bearing.gap(S, C, "A"), [0, 0.001162804686889637822783608439, 0.06509927307354575852847158852], rtol=1e-14
+        bearing.interference(S, C, "A"),
+        [0, 0.001162804686889637822783608439, 0.06509927307354575852847158852],
+        rtol=1e-14,
     )
     np.testing.assert_allclose(
-        bearing.gap(S, C, "B"), [0, 0.001163751938405329369742144091, 0.06820937027346870701583215753], rtol=1e-14
+        bearing.interference(S, C, "B"),
+        [0, 0.001163751938405329369742144091, 0.06820937027346870701583215753],
+        rtol=1e-14,
     )
     np.testing.assert_allclose(
         surrogate_areas(bearing, S, C).circle_only,
@@ -326,10 +330,10 @@ def test_crossing_points_at_the_worst_pose():
     """theory/values-of-bearings 2, below the table: f = 90 degrees of the deck's motion."""
     sine = 0.4 * math.sin(1.0 / 30.0)
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
-    u, v = lid_crossing(DECK, sine, cosine)
+    u, v = lid_intersection(DECK, sine, cosine)
     assert float(u) == pytest.approx(-7.768039976301275745374382, rel=1e-14)
     assert float(v) == pytest.approx(15.68143982313439467532102, rel=1e-14)
-    u, v = rim_crossing(DECK, sine, cosine)
+    u, v = rim_intersection(DECK, sine, cosine)
     assert float(u) == pytest.approx(8.000463409123589289808929, rel=1e-14)
     assert float(v) == pytest.approx(15.59786797095277876096664, rel=1e-14)
 
@@ -338,8 +342,8 @@ def test_crossing_points_lie_on_both_outlines_or_are_nan():
     t = np.linspace(0.0, 0.25, 41)
     S, C = np.sin(t), np.cos(t)
     for found, ellipse, disc in (
-        (lid_crossing(DECK, S, C), (DECK.h * S, DECK.Rh * C, DECK.Rh), DECK.Rb),
-        (rim_crossing(DECK, S, C), (DECK.h * S, DECK.Rb * C, DECK.Rb), DECK.Rh),
+        (lid_intersection(DECK, S, C), (DECK.h * S, DECK.Rh * C, DECK.Rh), DECK.Rb),
+        (rim_intersection(DECK, S, C), (DECK.h * S, DECK.Rb * C, DECK.Rb), DECK.Rh),
     ):
         u, v = found
         there = np.isfinite(u)

@@ -25,9 +25,9 @@ from graphsynth.jamming import (
     certified_smallest_clearance,
     certify_jamming,
     insertion_diagram,
-    largest_gap,
+    largest_interference,
     maximise,
-    sample_gaps,
+    sample_interference,
     spread,
     sweep_linkage,
     sweep_turn,
@@ -36,7 +36,7 @@ from graphsynth.jamming import (
 )
 from graphsynth.jamming.bearing import branch_and_bound, fits
 from graphsynth.jamming.bearing.arcs import Span, complement, contains, merge_outer, strictly_inside, subtract
-from graphsynth.jamming.bearing.sweep import PieceGap
+from graphsynth.jamming.bearing.sweep import PieceInterference
 
 
 def between(text, *ends):
@@ -254,8 +254,8 @@ def test_branch_and_bound_agrees_with_the_corners(condition, axis):
     tol = "0.01"
     box = ToleranceBox(l2=spread(1, 0, tol), l3=spread("2.5", 0, tol), alpha=spread("1/30", 0, tol), axis=axis,
                        Rb="17.5 +- 0.05", Hb="10 +- 0.1", clearance="0.03 +- 0.003")  # fmt: skip
-    corner = certify_jamming(box, condition).largest_gap
-    found = largest_gap(box, condition, tolerance=1e-12)
+    corner = certify_jamming(box, condition).largest_interference
+    found = largest_interference(box, condition, tolerance=1e-12)
     assert found.finished and found.upper - found.lower <= 1e-12
     assert found.lower <= corner.hi and corner.lo <= found.upper
     assert found.boxes <= 20
@@ -264,7 +264,7 @@ def test_branch_and_bound_agrees_with_the_corners(condition, axis):
 def test_the_lower_bound_of_the_search_belongs_to_the_exact_box():
     """Its points are doubles, but 0.03 and 1/3 are none: the values beside them belong to other bearings."""
     for clearance in ("0.03", "1/3", "[0.1, 0.3]"):
-        found = largest_gap(ToleranceBox(clearance=clearance), "A", max_boxes=100)  # no tilt: the gap is -c
+        found = largest_interference(ToleranceBox(clearance=clearance), "A", max_boxes=100)  # no tilt: the gap is -c
         exact = -ToleranceBox(clearance=clearance)["clearance"].lower
         assert F(found.lower) <= exact <= F(found.upper)
         assert found.upper - found.lower < 1e-16
@@ -273,8 +273,8 @@ def test_the_lower_bound_of_the_search_belongs_to_the_exact_box():
 def test_general_pin_with_a_range_of_radii():
     # wide radii: neither end is the worst, gA falls and gB / C rises with the radius
     box = ToleranceBox(l2=1, l3=2, alpha="0.5", Rb="[5, 40]", Hb=20, hole_length=6, clearance="0.5 +- 0.1")
-    certificate = certify_jamming(box, "general").largest_gap
-    found = largest_gap(box, "general", tolerance=1e-9, max_boxes=50_000)
+    certificate = certify_jamming(box, "general").largest_interference
+    found = largest_interference(box, "general", tolerance=1e-9, max_boxes=50_000)
     assert found.finished
     assert found.lower <= certificate.hi and certificate.lo <= found.upper
     assert certificate.width < 1e-9
@@ -337,7 +337,7 @@ def test_sweep_of_linkages_without_full_turn():
 
 def test_sweep_budget_and_input():
     def rough(f):
-        return PieceGap(sin(f * 1000), np.ones(len(f), bool), np.zeros(len(f), bool))
+        return PieceInterference(sin(f * 1000), np.ones(len(f), bool), np.zeros(len(f), bool))
 
     short = sweep_turn(rough, max_pieces=1000)
     assert not short.finished and short.undecided_part > 0.5
@@ -350,11 +350,11 @@ def test_samples_stay_below_the_bound():
         l2=spread(1, 0, "1e-4"), l3=spread("2.5", 0, "1e-4"), alpha=spread("1/30", 0, "1e-4"), azimuth="0 +- 0.05",
         Rb="17.5 +- 0.005", Hb="10 +- 0.05", clearance="0.03 +- 0.003",
     )  # fmt: skip
-    seen = sample_gaps(jammed, seed=3)
+    seen = sample_interference(jammed, seed=3)
     assert seen.outside == 0 and seen.count == 200_000
     assert seen.jamming_positions == pytest.approx(0.70, abs=0.005)  # 10.3
     assert seen.jamming_mechanisms == 1.0 and seen.jamming_mechanisms_range[0] > 0.9999
-    assert seen.largest_gap == pytest.approx(0.0384, abs=1e-4)
+    assert seen.largest_interference == pytest.approx(0.0384, abs=1e-4)
     assert 0 <= seen.overestimation < 1e-15 and seen.corners == 2**7
 
 
@@ -364,7 +364,7 @@ def test_the_share_of_mechanisms_is_not_that_of_positions():
     S = 1 / 2.5 * math.sin(0.0145)
     needed = 5 * S - 17.5 * S * S / (1 + math.sqrt(1 - S * S))  # clearance with which the gap closes at 90 degrees
     exact = (needed - 0.027) / 0.006
-    seen = sample_gaps(box, count=50_000, seed=2)
+    seen = sample_interference(box, count=50_000, seed=2)
     low, high = seen.jamming_mechanisms_range
     assert low < exact < high and high - low < 0.01
     assert seen.jamming_mechanisms == pytest.approx(exact, abs=0.008)
@@ -381,7 +381,7 @@ def test_a_million_samples():
             Rb="[10, 20]", Hb="[2, 12]", clearance="[0.01, 0.2]", hole_length="[1, 9]",
         )  # fmt: skip
         for condition in ("A", "B", "general"):
-            assert sample_gaps(box, condition, 34_000, k).outside == 0
+            assert sample_interference(box, condition, 34_000, k).outside == 0
 
 
 # -- sets of angles ----------------------------------------------------------------------------------------------------

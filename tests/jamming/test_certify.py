@@ -75,14 +75,14 @@ def test_published_tilts_gaps_and_the_statement():
         for text, enclosure in [
             ("0.0133312592085829611560698794957554253", found.largest_tilt),
             ("0.006064396559156420060266102798724801172486", found.critical_tilt),
-            ("0.03509927307354575852847158852", found.largest_gap),
-            ("0.03509927307354575852847158852", found.smallest_worst_gap),
+            ("0.03509927307354575852847158852", found.largest_interference),
+            ("0.03509927307354575852847158852", found.smallest_worst_interference),
         ]:
             assert enclosure.lo <= mpmath.mpf(text) <= enclosure.hi
             assert enclosure.width < 1e-15
-    assert found.statement.startswith("proved: the bearing jams") and "0.0350992 mm" in found.statement  # down
+    assert found.statement.startswith("proved: the bearing binds") and "0.0350992 mm" in found.statement  # down
     assert found.summary()["verdict"] == "CERTIFIED_JAMMED"
-    assert found.witness is not None and found.witness.gap.lo > 0
+    assert found.witness is not None and found.witness.interference.lo > 0
 
 
 def table_10_3(alpha, tol):
@@ -98,9 +98,9 @@ def test_both_rows_of_the_published_tolerance_table():
     assert free.verdict is Verdict.CERTIFIED_FREE
     with mpmath.workdps(40):
         for text, enclosure in [
-            ("0.03845215250404404041426319", jammed.largest_gap),
-            ("0.03174659891642157774855620", jammed.smallest_worst_gap),
-            ("-0.0003274375372990500519939424", free.largest_gap),
+            ("0.03845215250404404041426319", jammed.largest_interference),
+            ("0.03174659891642157774855620", jammed.smallest_worst_interference),
+            ("-0.0003274375372990500519939424", free.largest_interference),
         ]:
             assert enclosure.lo <= mpmath.mpf(text) <= enclosure.hi
             assert enclosure.width < 3e-16
@@ -128,8 +128,8 @@ def test_verdicts_and_enclosures_against_sixty_digits(alpha, axis, l2, l3, R, H,
     gap, S, phase = reference(alpha, axis, (l2, l3), R, H, c, condition, hole)
     box = ToleranceBox(6, l2, l3, 6, alpha, axis, 0, R, H, c, hole)
     found = certify_jamming(box, condition)
-    assert found.largest_gap.lo <= gap <= found.largest_gap.hi
-    assert found.largest_gap.width <= 1e-14 * float(R + H)
+    assert found.largest_interference.lo <= gap <= found.largest_interference.hi
+    assert found.largest_interference.width <= 1e-14 * float(R + H)
     if abs(gap) > 1e-13:
         assert found.verdict is (Verdict.CERTIFIED_JAMMED if gap > 0 else Verdict.CERTIFIED_FREE)
     off = mpmath.fmod(phase - mpmath.mpf(found.arcs.phase.mid), mpmath.pi)
@@ -207,14 +207,18 @@ def test_zero_tilt_and_vertical_axis_are_free():
     for box in (deck(alpha=0), deck(axis=(0, 0, 1)), deck(axis=(0, 0, 1), alpha=3)):
         found = certify_jamming(box)
         assert found.verdict is Verdict.CERTIFIED_FREE and "no tilt" in found.arcs.reason
-        assert found.largest_gap.hi == pytest.approx(-0.03, rel=1e-15)
+        assert found.largest_interference.hi == pytest.approx(-0.03, rel=1e-15)
         assert found.arcs.free[0].length == math.tau
 
 
 def test_tiny_tilt_keeps_its_digits():
     found = certify_jamming(deck(alpha="1e-8"))
     with mpmath.workdps(40):  # 14.4
-        assert found.largest_gap.lo <= mpmath.mpf("-0.02999998000000014000000033333") <= found.largest_gap.hi
+        assert (
+            found.largest_interference.lo
+            <= mpmath.mpf("-0.02999998000000014000000033333")
+            <= found.largest_interference.hi
+        )
 
 
 def test_upright_tilt():
@@ -249,7 +253,7 @@ def test_a_jam_for_some_names_exact_parameters():
     floats = certify_jamming(deck(clearance=(0.03, 0.1), l2=(0.9, 1.07)))
     assert F(floats.witness.parameters["clearance"]) == F(0.03) and F(floats.witness.parameters["l2"]) == F(1.07)
     _check_witness(floats)
-    assert found.largest_gap.lo > 0 > found.smallest_worst_gap.hi
+    assert found.largest_interference.lo > 0 > found.smallest_worst_interference.hi
 
 
 def _check_witness(found):
@@ -262,7 +266,7 @@ def _check_witness(found):
         S, R, h, c = abs(S * mpmath.sin(f - phase)), *(mpmath.mpf(v.numerator) / v.denominator for v in (
             p["Rb"], p["Hb"] / 2, p["clearance"]))  # fmt: skip
         assert h * mpmath.sqrt(1 - S * S) > R * S
-        assert h * S - c - R * (1 - mpmath.sqrt(1 - S * S)) >= found.witness.gap.lo - 1e-15
+        assert h * S - c - R * (1 - mpmath.sqrt(1 - S * S)) >= found.witness.interference.lo - 1e-15
 
 
 def test_results_are_refused_after_a_library_has_changed_the_rounding():
@@ -356,7 +360,7 @@ def test_arcs_hold_every_member_of_a_box(data):
     linkage, bearing = point.nominal()
     f = np.linspace(0.0, math.tau, 721)
     path = linkage.positions(f)
-    gap = bearing.gap(path.sin_theta, path.cos_theta, condition)
+    gap = bearing.interference(path.sin_theta, path.cos_theta, condition)
     from graphsynth.jamming.bearing.arcs import contains
 
     for angle, g in zip(f, gap):
@@ -364,7 +368,7 @@ def test_arcs_hold_every_member_of_a_box(data):
             assert contains(found.arcs.outer, angle + 0.0) or _near(found.arcs.outer, angle)
         if g < -1e-12:
             assert not any(_inside(span, angle) for span in found.arcs.inner)
-    assert found.largest_gap.hi >= gap.max() - 1e-14
+    assert found.largest_interference.hi >= gap.max() - 1e-14
     assert (found.verdict is not Verdict.CERTIFIED_FREE) or gap.max() < 1e-14
     assert (found.verdict is not Verdict.CERTIFIED_JAMMED) or gap.max() > -1e-5
 
@@ -419,8 +423,9 @@ def test_numbers_in_sentences_are_bounds_too(alpha, condition):
         found = certify_jamming(box, condition)
         said = re.search(r"at least ([-+.e\d]+) mm", found.statement)
         proved = {
-            Verdict.CERTIFIED_FREE: -found.largest_gap.hi, Verdict.CERTIFIED_JAMMED: found.smallest_worst_gap.lo,
-            Verdict.CERTIFIED_JAMMED_FOR_SOME: found.largest_gap.lo,
+            Verdict.CERTIFIED_FREE: -found.largest_interference.hi,
+            Verdict.CERTIFIED_JAMMED: found.smallest_worst_interference.lo,
+            Verdict.CERTIFIED_JAMMED_FOR_SOME: found.largest_interference.lo,
         }[found.verdict]  # fmt: skip
         assert 0 < F(said[1]) <= F(proved) and F(said[1]) > F(proved) * (1 - F(1, 10**5))
 
@@ -429,8 +434,11 @@ def test_gap_of_a_range_that_begins_with_interference():
     """The largest gap counts the members with interference: at no tilt it is minus the smallest clearance."""
     found = certify_jamming(ToleranceBox(clearance="[-0.01, 0.01]"))
     assert found.verdict is Verdict.UNDECIDED and "interference" in found.reason
-    assert F(1, 100) in (F(found.largest_gap.lo), F(found.largest_gap.hi)) or 0.01 in found.largest_gap
-    assert -0.01 in found.smallest_worst_gap and not found.arcs.free
+    assert (
+        F(1, 100) in (F(found.largest_interference.lo), F(found.largest_interference.hi))
+        or 0.01 in found.largest_interference
+    )
+    assert -0.01 in found.smallest_worst_interference and not found.arcs.free
 
 
 def test_what_is_no_tolerance_box_or_no_number_is_refused():
@@ -447,7 +455,10 @@ def test_what_is_no_tolerance_box_or_no_number_is_refused():
 
 def test_numbers_at_the_ends_of_the_range_of_doubles():
     tiny = certify_jamming(deck(axis=(1e-320, 0, 0)))
-    assert tiny.verdict is certify_jamming(deck()).verdict and tiny.largest_gap == certify_jamming(deck()).largest_gap
+    assert (
+        tiny.verdict is certify_jamming(deck()).verdict
+        and tiny.largest_interference == certify_jamming(deck()).largest_interference
+    )
     wide = certify_jamming(ToleranceBox(alpha="1/30", rod="deck", Hb=0, clearance="1e20"), "B")
     assert wide.verdict is Verdict.CERTIFIED_FREE
 

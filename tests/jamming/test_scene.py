@@ -61,11 +61,11 @@ def test_the_report_says_what_is_proved():
     (attempt,) = report["assessments"]
     certificate = attempt.value["A"].certificate
     assert certificate.verdict is Verdict.CERTIFIED_JAMMED
-    assert certificate.largest_gap.lo > 0.0384521525 and certificate.smallest_worst_gap.lo > 0.0317465
+    assert certificate.largest_interference.lo > 0.0384521525 and certificate.smallest_worst_interference.lo > 0.0317465
     tables = {t.title: t for t in report["tables"]}
     proof = {row[0]: row[1:] for row in tables["What is proved about the bearing"].rows}
-    assert proof["statement"][0].startswith("proved: every bearing of the tolerance box jams")
-    assert proof["without tolerances"][0].startswith("proved: the bearing jams")
+    assert proof["statement"][0].startswith("proved: every bearing of the tolerance box binds")
+    assert proof["without tolerances"][0].startswith("proved: the bearing binds")
     assert "clearance [0.027, 0.033]" in tables["What is proved about the bearing"].note
     fits = {row[0]: row[2] for row in tables["Standard fits (ISO 286)"].rows}
-    assert (fits["H7/g6"], fits["H11/b11"]) == ("every pair jams", "every pair is free")
+    assert (fits["H7/g6"], fits["H11/b11"]) == ("every pair binds", "every pair is free")

@@ -129,7 +129,7 @@ def test_lambda_run_writes_a_whole_folder(tmp_path: Path) -> None:
     assert content["versions"]["python"] and len(content["sha256"]) == 64
     assert [s["stage"] for s in content["stages"]][:3] == ["solve", "generate", "recognise"]
     page = (report.folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 12 and "jams on part of the turn" in page
+    assert page.count("<svg") == 12 and "binds over part of the range" in page
 
 
 # theory/values-of-the-platform 5: psi/pi, x, y [mm], alpha [rad], det JX [mm^4].

@@ -271,8 +271,8 @@ def _about(kappa: Enclosure) -> str:
     """Say what is special about a range of kappa."""
     if kappa.lo == 0.0:
         if kappa.hi == 0.0:
-            return "no clearance: jams at every angle with a tilt, touches at the two angles without"
-        return "no clearance is left at the lower end of its range: every angle with a tilt may jam"
+            return "no clearance: binds at every angle with a tilt, touches at the two angles without"
+        return "no clearance is left at the lower end of its range: every angle with a tilt may bind"
     if kappa.hi >= 1.0:
         return "kappa contains 1: whether there is an arc at all depends on the parameters, or on rounding"
     return ""
@@ -300,7 +300,7 @@ _ROUNDING = 16 * 2.0**-52
 
 @checked
 @dataclass(frozen=True)
-class Arc:
+class JamArc:
     """An open arc of crank angles (radians): from ``start`` in [0, 2 pi) counter-clockwise over ``length``."""
 
     start: float
@@ -323,7 +323,7 @@ class JamArcs:
 
     Attributes
     ----------
-    arcs : tuple of Arc
+    arcs : tuple of JamArc
         The two arcs, half a turn apart, one per lid; empty if there is none.
     touching : tuple of float
         Crank angles (radians) of contact without overlap: the two of ``kappa = 1``, or of zero clearance.
@@ -335,7 +335,7 @@ class JamArcs:
         Contact condition used, how the arcs were had, and why there are none or what is special.
     """
 
-    arcs: tuple[Arc, ...]
+    arcs: tuple[JamArc, ...]
     touching: tuple[float, ...]
     kappa: float
     phase: float
@@ -374,7 +374,7 @@ def jam_arcs(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A
     phase = linkage.pin_phase
     if critical.sine is None:
         if bearing.clearance < 0.0:
-            return JamArcs((Arc(0.0, math.tau),), (), 0.0, phase, condition, reason=critical.reason)
+            return JamArcs((JamArc(0.0, math.tau),), (), 0.0, phase, condition, reason=critical.reason)
         return JamArcs((), (), math.inf, phase, condition, reason=critical.reason)
     if not linkage.tilted:
         if bearing.clearance == 0.0:
@@ -390,9 +390,11 @@ def jam_arcs(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A
         return JamArcs((), (), kappa, phase, condition, reason="the largest tilt is below the critical tilt")
     if critical.reason:  # h^2 = c (2R + c): contact, never overlap
         return JamArcs((), _ends(phase, kappa), kappa, phase, condition, reason=critical.reason)
-    arcs = tuple(Arc((phase + math.asin(kappa) + turn) % math.tau, 2.0 * math.acos(kappa)) for turn in (0.0, math.pi))
+    arcs = tuple(
+        JamArc((phase + math.asin(kappa) + turn) % math.tau, 2.0 * math.acos(kappa)) for turn in (0.0, math.pi)
+    )
     touching = (phase % math.tau, (phase + math.pi) % math.tau) if kappa == 0.0 else ()
-    reason = "no clearance: jams at every angle with a tilt" if kappa == 0.0 else ""
+    reason = "no clearance: binds at every angle with a tilt" if kappa == 0.0 else ""
     return JamArcs(tuple(sorted(arcs, key=lambda arc: arc.start)), touching, kappa, phase, condition, reason=reason)
 
 

@@ -66,7 +66,7 @@ class AreaCurve:
 
     @property
     def source_ordinate(self) -> Array:
-        """What the source plots, as far as it can be told: the free gap of E4, 0 where there is no crossing, mm^2."""
+        """What the source plots, as far as it can be told: the free gap of E4, 0 without an intersection, mm^2."""
         return np.where(self.crossing, self.surrogate_gap.mid, 0.0)
 
     def to_pandas(self) -> pd.DataFrame:

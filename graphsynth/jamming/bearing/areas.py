@@ -153,26 +153,26 @@ def surrogate_areas(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Cre
         For an interference fit.
     """
     S, C = _tilts(bearing, sine, cosine)
-    gap = bearing.gap(S, C, "B")
-    defined = gap < bearing.Rb
-    areas = ellipse_circle_stable(bearing.Rb, bearing.clearance, np.where(defined, gap, 0.0))
+    depth = bearing.interference(S, C, "B")
+    defined = depth < bearing.Rb
+    areas = ellipse_circle_stable(bearing.Rb, bearing.clearance, np.where(defined, depth, 0.0))
     return CrescentAreas(*(np.where(defined, area, np.nan) for area in areas))
 
 
-def _lid_crossing(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, h: float) -> tuple[Array, Array]:
-    """Distances of the crossing points of disc and lid ellipse from the centre, against the tilt and across it.
+def _lid_point(R: float, Rh: float, ring: float, S: Array, C: Array, depth: Array, h: float) -> tuple[Array, Array]:
+    """Distances of the intersections of disc and lid ellipse from the centre, against the tilt and across it.
 
     The discriminant of theory/circle-and-ellipse 4 simplifies: ``H^2 - k G = (S wB / (C q^2))^2`` with ``wB`` of
-    theory/bearing-contact 7, so that the crossing point needs neither a division by C nor a subtraction.
+    theory/bearing-contact 7, so that the intersection needs neither a division by C nor a subtraction.
     """
-    m = gap * (R + h * S + Rh * C) / (S * (R * S + h + C * math.sqrt(h * h + ring)))
+    m = depth * (R + h * S + Rh * C) / (S * (R * S + h + C * math.sqrt(h * h + ring)))
     return R - m, np.sqrt(np.maximum(m * (2.0 * R - m), 0.0))
 
 
-def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, gap: Array, h: float) -> Array:
-    """Crescent of the disc of radius R outside the lid ellipse, on the side with ``gap > 0``; h < 0 is the far side."""
+def _lid_side(R: float, Rh: float, ring: float, S: Array, C: Array, depth: Array, h: float) -> Array:
+    """Crescent of the disc of radius R outside the lid ellipse, on the side of ``depth > 0``; h < 0 is the far side."""
     p, q, d = Rh * C, Rh, h * S
-    X, y = _lid_crossing(R, Rh, ring, S, C, gap, h)
+    X, y = _lid_point(R, Rh, ring, S, C, depth, h)
     s1, s2 = np.arctan2(y, X), np.arctan2(y / q, (d + X) / p)
     thin = q * S * S / (1.0 + C)  # q - p
     dl = np.arctan2((y / R) * (d / p + X * thin / (p * q)), X * (d + X) / (p * R) + y * y / (q * R))
@@ -194,10 +194,10 @@ def lid_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> Array:
     S, C = _tilts(bearing, sine, cosine)
     R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
     disc, ring = math.pi * R * R, float(bearing._slack)
-    gap, p, d = bearing.gap(S, C, "B"), Rh * C, h * S
+    depth, p, d = bearing.interference(S, C, "B"), Rh * C, h * S
     missed = (d - p >= R) | (p <= 0.0)
     area = np.zeros(S.shape)
-    for near, side in ((gap, h), (np.asarray(R - d - p), -h)):
+    for near, side in ((depth, h), (np.asarray(R - d - p), -h)):
         use = (near > 0.0) & ~missed
         area[use] += _lid_side(R, Rh, ring, S[use], C[use], near[use], side)
     return np.asarray(np.where(missed, disc, np.minimum(area, disc)) + 0.0 * (S + C))
@@ -222,16 +222,16 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
     """
     S, C = _tilts(bearing, sine, cosine)
     R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
-    gap, ring = bearing.gap(S, C, "A"), float(bearing._slack)
+    depth, ring = bearing.interference(S, C, "A"), float(bearing._slack)
     steep = h * C < R * S
     area = np.zeros(S.shape)
     p, d = R * C, h * S
     missed = (d - p >= Rh) & ~steep
     area[missed] = math.pi * R * p[missed]
-    use = (gap > 0.0) & ~steep & ~missed
+    use = (depth > 0.0) & ~steep & ~missed
     if use.any():
-        area[use] = _rim_side(R, Rh, h, ring, S[use], C[use], gap[use])
-    quadrature = steep & (gap > 0.0)
+        area[use] = _rim_side(R, Rh, h, ring, S[use], C[use], depth[use])
+    quadrature = steep & (depth > 0.0)
     for index in np.ndindex(S.shape):
         if quadrature[index]:
             area[index] = _rim_quadrature(R, Rh, float(p[index]), float(d[index]))
@@ -239,15 +239,13 @@ def rim_area(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Arra
 
 
 @checked
-def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
-    """Crossing point of the disc of radius R and the near side of one lid (condition B), mm.
-
-    See theory/circle-and-ellipse 4.
+def lid_intersection(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
+    """Intersection of the disc of radius R and the near side of one lid (condition B, theory/circle-and-ellipse 4), mm.
 
     Returns
     -------
     u, v : ndarray
-        Along the tilt and across it; the other one is ``(u, -v)``.  NaN without a crossing.
+        Along the tilt and across it; the other one is ``(u, -v)``.  NaN without an intersection.
 
     Raises
     ------
@@ -256,27 +254,28 @@ def lid_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[
 
     Examples
     --------
-    >>> u, v = lid_crossing(Bearing(), 0.01333086429801, 0.99991114008)
+    >>> u, v = lid_intersection(Bearing(), 0.01333086429801, 0.99991114008)
     >>> round(float(u), 6), round(float(v), 6)
     (-7.76804, 15.68144)
     """
     S, C = _tilts(bearing, sine, cosine)
     R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
-    gap = bearing.gap(S, C, "B")
-    there = (gap > 0.0) & (h * S - Rh * C < R) & (C > 0.0)
+    depth = bearing.interference(S, C, "B")
+    there = (depth > 0.0) & (h * S - Rh * C < R) & (C > 0.0)
     with np.errstate(all="ignore"):
-        X, y = _lid_crossing(R, Rh, float(bearing._slack), S, C, gap, h)
+        X, y = _lid_point(R, Rh, float(bearing._slack), S, C, depth, h)
     return np.where(there, -X, np.nan), np.where(there, y, np.nan)
 
 
 @checked
-def rim_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
-    """Crossing point of the rim of the tilted bearing and the hole (condition A, theory/circle-and-ellipse 4), mm.
+def rim_intersection(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
+    """Intersection of the rim of the tilted bearing and the hole (condition A, theory/circle-and-ellipse 4), mm.
 
     Returns
     -------
     u, v : ndarray
-        Along the tilt and across it; the other one is ``(u, -v)``.  NaN without a crossing, and where ``R S > h C``.
+        Along the tilt and across it; the other one is ``(u, -v)``.  NaN without an intersection, and where ``R S > h
+        C``.
 
     Raises
     ------
@@ -285,23 +284,23 @@ def rim_crossing(bearing: Bearing, sine: ArrayLike, cosine: ArrayLike) -> tuple[
     """
     S, C = _tilts(bearing, sine, cosine)
     R, Rh, h = bearing.Rb, bearing.Rh, bearing.h
-    gap = bearing.gap(S, C, "A")
-    there = (gap > 0.0) & (h * C >= R * S) & (h * S - R * C < Rh)
+    depth = bearing.interference(S, C, "A")
+    there = (depth > 0.0) & (h * C >= R * S) & (h * S - R * C < Rh)
     with np.errstate(all="ignore"):
-        x, y = _rim_crossing(R, Rh, h, float(bearing._slack), S, C, gap)
+        x, y = _rim_point(R, Rh, h, float(bearing._slack), S, C, depth)
     return np.where(there, x, np.nan), np.where(there, y, np.nan)
 
 
-def _rim_crossing(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, gap: Array) -> tuple[Array, Array]:
-    """Crossing point of rim and hole; the discriminant of theory/circle-and-ellipse 4 is ``(S wA / C)^2``."""
-    m = gap * (R * C + Rh - h * S) / (S * (h - Rh * S + C * math.sqrt(max(h * h - ring, 0.0))))
+def _rim_point(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, depth: Array) -> tuple[Array, Array]:
+    """Intersection of rim and hole; the discriminant of theory/circle-and-ellipse 4 is ``(S wA / C)^2``."""
+    m = depth * (R * C + Rh - h * S) / (S * (h - Rh * S + C * math.sqrt(max(h * h - ring, 0.0))))
     return Rh - m, np.sqrt(np.maximum(m * (2.0 * Rh - m), 0.0))
 
 
-def _rim_side(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, gap: Array) -> Array:
+def _rim_side(R: float, Rh: float, h: float, ring: float, S: Array, C: Array, depth: Array) -> Array:
     """Crescent of the rim outside the hole."""
     p, d = R * C, h * S
-    x, y = _rim_crossing(R, Rh, h, ring, S, C, gap)
+    x, y = _rim_point(R, Rh, h, ring, S, C, depth)
     s1, s2 = np.arctan2(y, x), np.arctan2(y / R, (x - d) / p)
     bend = S * S / (1.0 + C)
     dl = np.arctan2(y * (d - x * bend) / (p * Rh), (x - d) * x / (p * Rh) + y * y / (R * Rh))

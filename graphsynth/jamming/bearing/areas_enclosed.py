@@ -233,8 +233,8 @@ def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> Enclos
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
     pairs = ((c.lo, c.hi), (h.hi, h.lo), (S.hi, S.lo))  # the tight corner, the free corner
-    areas, gap = _surrogate_at(_twice(R), *(_point(np.stack(pair)) for pair in pairs))
-    never, maybe = gap.lo[1] >= R.hi, gap.hi[0] >= R.lo
+    areas, depth = _surrogate_at(_twice(R), *(_point(np.stack(pair)) for pair in pairs))
+    never, maybe = depth.lo[1] >= R.hi, depth.hi[0] >= R.lo
     any_area = _bounds(0.0, np.inf)
     both = []
     for area, low, high in ((areas.ellipse_only, 0, 1), (areas.circle_only, 1, 0)):
@@ -245,9 +245,9 @@ def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> Enclos
 
 def _surrogate_at(R: Interval, c: Interval, h: Interval, S: Interval) -> tuple[EnclosedCrescents, Interval]:
     tilt = _tilt(S)
-    gap = h * S - c + (R + c) * tilt.bend
-    defined = _choose(gap.hi < R.lo, gap, Interval(0))
-    return _crescents_at(R, c, defined), gap
+    depth = h * S - c + (R + c) * tilt.bend
+    defined = _choose(depth.hi < R.lo, depth, Interval(0))
+    return _crescents_at(R, c, defined), depth
 
 
 def enclose_lid_area(R: Any, clearance: Any, h: Any, sine: Any) -> Interval:
@@ -290,21 +290,21 @@ def _lid_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     return _limited(_choose(p.lo > 0.0, area, _choose(near.lo > 0.0, disc, disc.hull(Interval(0)))), disc)
 
 
-def _lid_side(R: Interval, c: Interval, h: Interval, tilt: _Tilt, gap: Interval) -> Interval:
-    """One crescent; zero where ``gap <= 0``."""
+def _lid_side(R: Interval, c: Interval, h: Interval, tilt: _Tilt, depth: Interval) -> Interval:
+    """One crescent; zero where ``depth <= 0``."""
     one = Interval(1)
     S, C, bend = (_choose((tilt.S.lo > 0.0) & (tilt.C.lo > 0.0), part, one) for part in tilt)
     q = R + c
     p, d, thin, ring = q * C, h * S, q * bend, c * (2 * R + c)
-    m = _nonnegative(gap) * (R + d + p) / (S * (R * S + h + C * (h.sqr() + ring).sqrt()))
+    m = _nonnegative(depth) * (R + d + p) / (S * (R * S + h + C * (h.sqr() + ring).sqrt()))
     m = _choose(m.is_empty, _bounds(0.0, np.inf), m)
     m = _limited(m, 2 * R)
     X, y = R - m, _nonnegative(m * (2 * R - m)).sqrt()
     s1, s2 = _angle(y, X), _angle(y / q, (d + X) / p)
     dl = _angle((y / R) * (d / p + X * thin / (p * q)), X * (d + X) / (p * R) + y.sqr() / (q * R))
     area = (q * thin - ring) * _segment(s1) + p * q * _segment_difference(dl, s1 + s2)
-    area = _bounds(np.where(gap.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
-    return _choose(gap.hi > 0.0, area, Interval.zeros(area.shape))
+    area = _bounds(np.where(depth.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
+    return _choose(depth.hi > 0.0, area, Interval.zeros(area.shape))
 
 
 def enclose_rim_area(R: Any, clearance: Any, h: Any, sine: Any) -> tuple[Interval, Mask]:
@@ -357,11 +357,11 @@ def _rim_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     """theory/circle-and-ellipse 4, condition A, with its branches."""
     one, full = Interval(1), _tilt(S)
     usable = (full.S.lo > 0.0) & (full.C.lo > 0.0)
-    gap = h * S - c - R * full.bend
+    depth = h * S - c - R * full.bend
     S, C, bend = (_choose(usable, part, one) for part in full)
     Rh, ring = R + c, c * (2 * R + c)
     p, d = R * C, h * S
-    m = _nonnegative(gap) * (p + Rh - d) / (S * (h - Rh * S + C * _nonnegative(h.sqr() - ring).sqrt()))
+    m = _nonnegative(depth) * (p + Rh - d) / (S * (h - Rh * S + C * _nonnegative(h.sqr() - ring).sqrt()))
     m = _limited(_choose(m.is_empty, _bounds(0.0, np.inf), m), 2 * Rh)
     x, y = Rh - m, _nonnegative(m * (2 * Rh - m)).sqrt()
     s1, s2 = _angle(y, x), _angle(y / R, (x - d) / p)
@@ -370,7 +370,7 @@ def _rim_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     whole = _pi() * p * R
     beyond = d - p - Rh
     area = _choose(beyond.lo >= 0.0, whole, _choose(beyond.hi >= 0.0, area.hull(whole), area))
-    area = _bounds(np.where(gap.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
-    area = _choose(gap.hi > 0.0, area, Interval.zeros(area.shape))
+    area = _bounds(np.where(depth.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
+    area = _choose(depth.hi > 0.0, area, Interval.zeros(area.shape))
     possible = _choose(usable, area, (_pi() * R.sqr()).hull(Interval(0)))
-    return _choose(gap.hi > 0.0, possible, Interval.zeros(area.shape))
+    return _choose(depth.hi > 0.0, possible, Interval.zeros(area.shape))

@@ -1,6 +1,6 @@
-"""A bearing in a hole: contact conditions, gap functions in stable form, critical tilt.
+"""A bearing in a hole: contact conditions, interference in stable form, critical tilt.
 
-A gap function is negative when the parts are free, zero when they touch and positive when rigid parts would have to
+The interference is negative when the parts are free, zero when they touch and positive when rigid parts would have to
 overlap.  All dimensions are in millimetres, as on a drawing; only their ratios decide a verdict.
 """
 
@@ -114,11 +114,11 @@ class Bearing:
             )
         return 0.5 * self.hole_length
 
-    def gap(self, sine: ArrayLike, cosine: ArrayLike, condition: Condition = "A") -> Array:
-        """Gap function g (millimetres) for the sine and cosine of the tilt: free < 0, touching = 0, jam > 0.
+    def interference(self, sine: ArrayLike, cosine: ArrayLike, condition: Condition = "A") -> Array:
+        """Interference g (millimetres) for the sine and cosine of the tilt: free < 0, touching = 0, jam > 0.
 
         Stable forms of theory/bearing-contact 6; relative error of a few units in the last place of the largest term,
-        so that gaps of a micrometre keep ten digits.  Only ``|sine|`` and a non-negative cosine matter.
+        so that interferences of a micrometre keep ten digits.  Only ``|sine|`` and a non-negative cosine matter.
 
         Parameters
         ----------
@@ -130,18 +130,18 @@ class Bearing:
         half = self._hole_half(condition)
         S, C = np.abs(finite_array("sine", sine, nan=True)), finite_array("cosine", cosine, nan=True)
         if condition == "B":
-            return self._gap_b(S, C, self.h)
-        gap = np.where(self.Rb * S <= self.h * C, self._gap_a(S, C), self._saturated())
+            return self._interference_b(S, C, self.h)
+        interference = np.where(self.Rb * S <= self.h * C, self._interference_a(S, C), self._saturated())
         if condition == "general":
             slanted = np.logical_and(self.h * C - self.Rb * S > half, C > 0.0)
             with np.errstate(divide="ignore", invalid="ignore"):
-                gap = np.where(slanted, self._gap_b(S, C, min(half, self.h)) / C, gap)
-        return gap
+                interference = np.where(slanted, self._interference_b(S, C, min(half, self.h)) / C, interference)
+        return interference
 
-    def _gap_a(self, S: Array, C: Array) -> Array:
+    def _interference_a(self, S: Array, C: Array) -> Array:
         return np.asarray(self.h * S - self.clearance - self.Rb * S * S / (1.0 + C))
 
-    def _gap_b(self, S: Array, C: Array, half: float) -> Array:
+    def _interference_b(self, S: Array, C: Array, half: float) -> Array:
         return np.asarray(half * S - self.clearance + self.Rh * S * S / (1.0 + C))
 
     def _saturated(self) -> float:

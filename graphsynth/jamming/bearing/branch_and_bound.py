@@ -237,12 +237,14 @@ class _Search:
         self.bound = np.concatenate([self.bound, bound, bound])
 
 
-#: Parameters of the gap over a full turn, in the order of the variables of `gap_function`.
-GAP_VARIABLES = ("l2", "l3", "alpha", "Rb", "Hb", "clearance", "hole_length")
+#: Parameters of the interference over a full turn, in the order of the variables of `interference_function`.
+INTERFERENCE_VARIABLES = ("l2", "l3", "alpha", "Rb", "Hb", "clearance", "hole_length")
 
 
-def gap_function(condition: Condition, axis: tuple[Any, Any, Any] = (1, 0, 0)) -> Callable[[Sequence[Dual]], Dual]:
-    """Return the gap at the worst angle of a turn as a function of l2, l3, alpha, Rb, Hb, clearance[, hole_length].
+def interference_function(
+    condition: Condition, axis: tuple[Any, Any, Any] = (1, 0, 0)
+) -> Callable[[Sequence[Dual]], Dual]:
+    """Return the interference at the worst angle as a function of l2, l3, alpha, Rb, Hb, clearance[, hole_length].
 
     For `maximise`; the axis is fixed, the rod rigid.  It uses none of the monotonicity of `certify_jamming`.
     """
@@ -252,7 +254,7 @@ def gap_function(condition: Condition, axis: tuple[Any, Any, Any] = (1, 0, 0)) -
     flat, steep = n[0].sqr() + n[1].sqr(), n[2].sqr()
     inclination = flat / (flat + steep)
 
-    def gap(v: Sequence[Dual]) -> Dual:
+    def interference(v: Sequence[Dual]) -> Dual:
         l2, l3, alpha, R, height, c = v[:6]
         half = sin(alpha / 2)  # sqrt(d (2 - d)) with d = 2 half^2 (1 - n3^2), written with a bounded derivative at 0
         S: Dual = l2 / l3 * (abs(half) * (inclination.sqrt() * 2) * sqrt(1 - half.sqr() * inclination))
@@ -268,7 +270,7 @@ def gap_function(condition: Condition, axis: tuple[Any, Any, Any] = (1, 0, 0)) -
         slanted: Dual = minimum(a, (v[6] / 2 * S - c + (R + c) * bend) / C)
         return slanted
 
-    return gap
+    return interference
 
 
 def _either(switch: Dual, low: Dual, high: Dual) -> Dual:
@@ -286,8 +288,8 @@ def _either(switch: Dual, low: Dual, high: Dual) -> Dual:
 
 
 @checked
-def largest_gap(box: ToleranceBox, condition: Condition = "A", **options: Any) -> Supremum:
-    """Enclose the largest gap (mm) over a turn and a tolerance box by branch and bound.
+def largest_interference(box: ToleranceBox, condition: Condition = "A", **options: Any) -> Supremum:
+    """Enclose the largest interference (mm) over a turn and a tolerance box by branch and bound.
 
     Slower than the two corners of `certify_jamming`, and independent of the monotonicity that they rest on.
 
@@ -303,7 +305,7 @@ def largest_gap(box: ToleranceBox, condition: Condition = "A", **options: Any) -
     Returns
     -------
     Supremum
-        Lower and upper bound of the largest gap, mm (certified), and where it is.
+        Lower and upper bound of the largest interference, mm (certified), and where it is.
 
     Raises
     ------
@@ -313,7 +315,7 @@ def largest_gap(box: ToleranceBox, condition: Condition = "A", **options: Any) -
     Examples
     --------
     >>> box = ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003")
-    >>> found = largest_gap(box, decide_sign=True)
+    >>> found = largest_interference(box, decide_sign=True)
     >>> found.upper < 0, found.boxes < 100
     (True, True)
     """
@@ -324,9 +326,9 @@ def largest_gap(box: ToleranceBox, condition: Condition = "A", **options: Any) -
     axis = [box[f"n{i}"] for i in (1, 2, 3)]
     if box.rod != "rigid" or not all(part.is_point for part in axis):
         raise GeometryError("branch and bound needs a fixed axis and a rigid rod; use certify_jamming for this box")
-    names = GAP_VARIABLES[: 7 if condition == "general" else 6]
+    names = INTERFERENCE_VARIABLES[: 7 if condition == "general" else 6]
     start = Interval.stack([box.outer(name) for name in names])
-    function = gap_function(condition, (axis[0].lower, axis[1].lower, axis[2].lower))
+    function = interference_function(condition, (axis[0].lower, axis[1].lower, axis[2].lower))
     return maximise(function, start, tried=Interval.stack([box[name].doubles for name in names]), **options)
 
 
@@ -341,21 +343,21 @@ class Samples:
     ----------
     count : int
         Parameter vectors with a crank angle, uniform in the box and over the turn.
-    largest_gap : float
-        Largest gap seen, mm (estimated).
+    largest_interference : float
+        Largest interference seen, mm (estimated).
     jamming_positions : float
-        Part of the samples with a positive gap: the share of crank positions, over all parameter vectors.
+        Part of the samples with a positive interference: the share of crank positions, over all parameter vectors.
     jamming_mechanisms : float
-        Part of the parameter vectors that have a positive gap somewhere in the turn: the probability that a mechanism
-        drawn from the box jams (estimated), whether that position can be assembled or not.
+        Part of the parameter vectors that have a positive interference somewhere in the turn: the probability that a
+        mechanism drawn from the box jams (estimated), whether that position can be assembled or not.
     jamming_mechanisms_range : (float, float)
         Confidence interval of that probability, 95 %, exact for the binomial distribution [Clopper & Pearson 1934].
-    corner_gap : float
-        Largest gap over all corners of the box at the worst angle, mm (estimated).
+    corner_interference : float
+        Largest interference over all corners of the box at the worst angle, mm (estimated).
     corners : int
         Corners tried.
     bound : float
-        Certified upper bound of the gap, mm.
+        Certified upper bound of the interference, mm.
     outside : int
         Samples above the bound; anything but 0 is a bug.
     seconds : float
@@ -363,11 +365,11 @@ class Samples:
     """
 
     count: int
-    largest_gap: float
+    largest_interference: float
     jamming_positions: float
     jamming_mechanisms: float
     jamming_mechanisms_range: tuple[float, float]
-    corner_gap: float
+    corner_interference: float
     corners: int
     bound: float
     outside: int
@@ -375,12 +377,14 @@ class Samples:
 
     @property
     def overestimation(self) -> float:
-        """Certified bound minus the largest gap seen, at the corners or in the samples, mm."""
-        return self.bound - max(self.largest_gap, self.corner_gap)
+        """Certified bound minus the largest interference seen, at the corners or in the samples, mm."""
+        return self.bound - max(self.largest_interference, self.corner_interference)
 
 
 @checked
-def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: Count = 200_000, seed: int = 0) -> Samples:
+def sample_interference(
+    box: ToleranceBox, condition: Condition = "A", count: Count = 200_000, seed: int = 0
+) -> Samples:
     """Draw parameter vectors and crank angles, search the corners, and compare with the certified bound.
 
     Parameters
@@ -397,7 +401,8 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: Count = 20
     Returns
     -------
     Samples
-        Largest gap met, mm, whether it respects the certified bound, and how often positions and mechanisms jam.
+        Largest interference met, mm, whether it respects the certified bound, and how often positions and mechanisms
+        jam.
 
     Raises
     ------
@@ -407,7 +412,7 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: Count = 20
     Examples
     --------
     >>> box = ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003")
-    >>> seen = sample_gaps(box, count=2000)
+    >>> seen = sample_interference(box, count=2000)
     >>> seen.outside, seen.jamming_positions, seen.jamming_mechanisms, 0 <= seen.overestimation < 1e-15
     (0, 0.0, 0.0, True)
     >>> seen.jamming_mechanisms_range[1] < 0.002
@@ -416,17 +421,17 @@ def sample_gaps(box: ToleranceBox, condition: Condition = "A", count: Count = 20
     if seed < 0:
         raise GeometryError(f"seed = {seed!r} must be a whole number of zero or more")
     begin = perf_counter()
-    bound = certify_jamming(box, condition).largest_gap.hi
+    bound = certify_jamming(box, condition).largest_interference.hi
     generator = np.random.default_rng(seed)
     best, jams, ever, outside = -math.inf, 0, 0, 0
     for start in range(0, count, _BATCH):
         size = min(_BATCH, count - start)
         values = {name: _uniform(generator, box, name, size) for name in box.ranges}
-        gap = _gaps(box, condition, values, np.sin(generator.uniform(0.0, math.tau, size)))
-        best = max(best, float(gap.max()))
-        jams += int((gap > 0.0).sum())
-        ever += int((_gaps(box, condition, values, np.ones(size)) > 0.0).sum())  # the tilt is largest there
-        outside += int((gap > bound).sum())
+        interference = _interferences(box, condition, values, np.sin(generator.uniform(0.0, math.tau, size)))
+        best = max(best, float(interference.max()))
+        jams += int((interference > 0.0).sum())
+        ever += int((_interferences(box, condition, values, np.ones(size)) > 0.0).sum())  # the tilt is largest there
+        outside += int((interference > bound).sum())
     corner, tried = _corners(box, condition)
     return Samples(
         count, best, jams / count, ever / count, _binomial_range(ever, count), corner, tried, bound, outside,
@@ -447,8 +452,8 @@ def _uniform(generator: np.random.Generator, box: ToleranceBox, name: str, size:
     return np.full(size, low) if low >= high else generator.uniform(low, high, size)
 
 
-def _gaps(box: ToleranceBox, condition: str, v: dict[str, Array], wave: Array) -> Array:
-    """Gap function in doubles for parameter vectors and ``sin(f - psi1)``, stable form."""
+def _interferences(box: ToleranceBox, condition: str, v: dict[str, Array], wave: Array) -> Array:
+    """Interference in doubles for parameter vectors and ``sin(f - psi1)``, stable form."""
     flat = v["n1"] ** 2 + v["n2"] ** 2
     deficit = 2.0 * np.sin(0.5 * v["alpha"]) ** 2 * flat / (flat + v["n3"] ** 2)
     ratio = v["l2"] / v["l3"] * np.sqrt(deficit * (2.0 - deficit)) * np.abs(wave)
@@ -466,11 +471,11 @@ def _gaps(box: ToleranceBox, condition: str, v: dict[str, Array], wave: Array) -
 
 
 def _corners(box: ToleranceBox, condition: str) -> tuple[float, int]:
-    """Largest gap over the corners of the ranges that have a width, at the worst angle."""
+    """Largest interference over the corners of the ranges that have a width, at the worst angle."""
     wide = [name for name in box.ranges if not box[name].is_point]
     signs = np.array(list(product((0, 1), repeat=len(wide)))).reshape(2 ** len(wide), len(wide))
     values = {name: np.full(len(signs), box[name].middle) for name in box.ranges}
     for column, name in enumerate(wide):
         ends = np.array([float(box[name].lower), float(box[name].upper)])
         values[name] = ends[signs[:, column]]
-    return float(_gaps(box, condition, values, np.ones(len(signs))).max()), len(signs)
+    return float(_interferences(box, condition, values, np.ones(len(signs))).max()), len(signs)

@@ -27,15 +27,16 @@ MODEL = "L0 with exact tilts: the bearing at B takes the whole misalignment, the
 
 @dataclass(frozen=True)
 class Witness:
-    """A jam that is proved: exact parameters, a crank angle, and a positive lower bound of the gap function there.
+    """A jam that is proved: exact parameters, a crank angle, and a positive lower bound of the interference there.
 
     ``parameters`` are exact numbers as text; ranges ``[a, b]`` where every parameter vector jams.  ``f`` (radians)
-    encloses the crank angle (one for each vector, after its own phase), ``gap`` (mm) holds a positive lower bound.
+    encloses the crank angle (one for each vector, after its own phase), ``interference`` (mm) holds a positive lower
+    bound.
     """
 
     parameters: dict[str, str]
     f: Enclosure
-    gap: Enclosure
+    interference: Enclosure
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +53,12 @@ class JamCertificate:
         Contact condition used.
     box : ToleranceBox
         The parameters.
-    largest_gap : Enclosure
-        Of the largest gap function over the turn and the box, mm, whether the linkage can be assembled there or not;
+    largest_interference : Enclosure
+        Of the largest interference over the turn and the box, mm, whether the linkage can be assembled there or not;
         a negative upper end proves that all is free.
-    smallest_worst_gap : Enclosure
-        Of the smallest value over the box of the largest gap over the turn, mm; a positive lower end proves that every
-        parameter vector jams if ``assembles`` is "always" (else ``witness`` does).
+    smallest_worst_interference : Enclosure
+        Of the smallest value over the box of the largest interference over the turn, mm; a positive lower end proves
+        that every parameter vector jams if ``assembles`` is "always" (else ``witness`` does).
     largest_tilt, critical_tilt : Enclosure
         Range over the box of the largest tilt of a turn and of the critical tilt, radians; infinite: none.
     arcs : CertifiedArcs
@@ -78,8 +79,8 @@ class JamCertificate:
     reason: str
     condition: str
     box: ToleranceBox
-    largest_gap: Enclosure
-    smallest_worst_gap: Enclosure
+    largest_interference: Enclosure
+    smallest_worst_interference: Enclosure
     largest_tilt: Enclosure
     critical_tilt: Enclosure
     arcs: CertifiedArcs
@@ -94,7 +95,7 @@ class JamCertificate:
     @property
     def clearance_left(self) -> Enclosure:
         """Range that holds the clearance left at the worst angle of the worst parameters, mm; negative is missing."""
-        return Enclosure(-self.largest_gap.hi, -self.largest_gap.lo)
+        return Enclosure(-self.largest_interference.hi, -self.largest_interference.lo)
 
     @property
     def tilt_margin(self) -> Enclosure:
@@ -151,8 +152,8 @@ class JamCertificate:
             "condition": self.condition,
             "parameters": self.box.describe(),
             "exact_input": self.exact_input,
-            "largest_gap_mm": list(self.largest_gap),
-            "smallest_worst_gap_mm": list(self.smallest_worst_gap),
+            "largest_gap_mm": list(self.largest_interference),
+            "smallest_worst_gap_mm": list(self.smallest_worst_interference),
             "largest_tilt": list(self.largest_tilt),
             "critical_tilt": list(self.critical_tilt),
             "kappa": list(arcs.kappa),
@@ -177,22 +178,22 @@ def statement(found: JamCertificate) -> str:
     """Say what is proved, or why nothing is; lengths rounded so that the sentence stays true."""
     who = "the bearing" if found.box.is_point else "every bearing of the tolerance box"
     given = "" if found.exact_input else " (for the doubles given: floats came in, decimals are not guaranteed)"
-    gap = found.largest_gap
-    left = shortened(-gap.hi, -1)
-    # of a position that can be assembled: the largest gap of all may lie beyond a dead centre
-    missing = shortened(found.witness.gap.lo, -1) if found.witness else "0"
+    interference = found.largest_interference
+    left = shortened(-interference.hi, -1)
+    # of a position that can be assembled: the largest interference of all may lie beyond a dead centre
+    missing = shortened(found.witness.interference.lo, -1) if found.witness else "0"
     match found.verdict:
         case Verdict.CERTIFIED_FREE:
-            text = f"proved: {who} is free at every crank angle; at least {left} mm of clearance are left"
+            text = f"proved: {who} stays free at every crank angle, with at least {left} mm of clearance left"
         case Verdict.CERTIFIED_JAMMED:
-            text = f"proved: {who} jams during the turn; at least {missing} mm are missing"
+            text = f"proved: {who} binds during the rotation, with at least {missing} mm of interference"
         case Verdict.CERTIFIED_JAMMED_FOR_SOME:
-            text = f"proved: a bearing of the tolerance box jams; at least {missing} mm are missing there"
+            text = f"proved: one bearing of the tolerance box binds, with at least {missing} mm of interference"
         case Verdict.CANNOT_ASSEMBLE:
             text = f"the parts cannot be assembled: {found.reason}"
         case _:
             text = f"undecided: {found.reason}"
-    return f"{text} (condition {found.condition}; exact tilt, all of it taken by this bearing){given}"
+    return f"{text} (contact condition {found.condition}, exact tilt, taken by this bearing alone){given}"
 
 
 _ANGLES = 64  # angles of the turn tried as positions of a jam
@@ -208,7 +209,7 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     box : ToleranceBox
         The linkage and the bearing; give text or fractions, not floats, if the numbers are decimals.
     condition : {"A", "B", "general"}
-        Contact condition, see `Bearing.gap`.
+        Contact condition, see `Bearing.interference`.
 
     Returns
     -------
@@ -224,13 +225,13 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
 
     Notes
     -----
-    The gap is monotone in every parameter, so that its extremes over the box are values at two exact corners
+    The interference is monotone in every parameter, so that its extremes over the box are values at two exact corners
     (theory/jam-arcs 6); a jam also needs a position that can be assembled, which interval kinematics proves.
 
     Examples
     --------
     >>> found = certify_jamming(ToleranceBox(alpha="0.0130 +- 0.00013", clearance="0.03 +- 0.003"))
-    >>> found.verdict.name, found.largest_gap.hi < 0
+    >>> found.verdict.name, found.largest_interference.hi < 0
     ('CERTIFIED_FREE', True)
     """
     import graphsynth.intervals.kernels.loops  # noqa: F401  # few intervals, many operations: the compiled path pays
@@ -256,7 +257,7 @@ class _Proof:
 
         self.box, self.condition, self.begin = box, condition, begin
         self.tilt = corners.sines(box)
-        self.gaps = corners.gap_corners(box, self.tilt.sine, condition)
+        self.depths = corners.interference_corners(box, self.tilt.sine, condition)
         self.critical = corners.critical_sines(box, condition)
         self.phase = corners.phase(box)
         self.kappa = Enclosure(*corners.onset(box, self.critical, self.tilt))
@@ -265,7 +266,7 @@ class _Proof:
 
     def result(self) -> JamCertificate:
 
-        low, high = _pair(self.gaps, 0), _pair(self.gaps, 1)
+        low, high = _pair(self.depths, 0), _pair(self.depths, 1)
         verdict, reason, witness = Verdict.UNDECIDED, "", None
         if self.assembles == "never":
             verdict, reason = Verdict.CANNOT_ASSEMBLE, "no crank angle can be assembled, for any parameters"
@@ -284,7 +285,7 @@ class _Proof:
 
     def _why(self, high: Enclosure) -> str:
         if high.lo > 0.0:
-            return "the gap closes, but no position with a jam is proved to be assembled"
+            return "the clearance is used up, but no position that binds is proved to be assembled"
         c = self.box["clearance"]
         if c.lower == 0:
             if self.kappa.lo > 0.0 or float(self.tilt.sine.hi[1]) == 0.0:
@@ -295,7 +296,8 @@ class _Proof:
         from graphsynth.intervals.reading import shortened
 
         width = f"[{shortened(high.lo, -1, 3)}, {shortened(high.hi, 1, 3)}] mm"
-        return f"the largest gap lies in {width}, which contains 0: touching at this resolution; change a tolerance"
+        touching = "which contains 0: touching at this resolution; change a tolerance"
+        return f"the largest interference lies in {width}, {touching}"
 
     def _assembly(self, box: ToleranceBox) -> str:
         """Say at how much of the turn the linkage is proved to be assembled, for every parameter vector."""
@@ -311,10 +313,10 @@ class _Proof:
             return "never"
         return "at some angles" if found.assembled.any() else "not decided"
 
-    def _jam_of_all(self, gap: Enclosure) -> Witness | None:
-        """Find a position in which every parameter vector jams, if ``gap`` is the least one at the worst angle."""
+    def _jam_of_all(self, interference: Enclosure) -> Witness | None:
+        """Find a position in which every parameter vector binds; ``interference`` is the least at the worst angle."""
         if self.assembles == "always":
-            return _at_worst_angle(self.box, gap)
+            return _at_worst_angle(self.box, interference)
         return self._jam_on_grid(self.box)
 
     def _jam_of_worst(self) -> Witness | None:
@@ -325,8 +327,8 @@ class _Proof:
         if self.assembles != "always":
             return self._jam_on_grid(worst)
         self.boxes += 1
-        gap = _pair(corners.gap_corners(worst, corners.sines(worst).sine, self.condition), 0)
-        return _at_worst_angle(worst, gap) if gap.lo > 0.0 else None
+        interference = _pair(corners.interference_corners(worst, corners.sines(worst).sine, self.condition), 0)
+        return _at_worst_angle(worst, interference) if interference.lo > 0.0 else None
 
     def _jam_on_grid(self, box: ToleranceBox) -> Witness | None:
         """Look for an angle at which every parameter vector of ``box`` is proved assembled and jammed."""
@@ -339,21 +341,21 @@ class _Proof:
         tilt = corners.sines(box) if box is not self.box else self.tilt
         amplitude = Interval.from_bounds(tilt.amplitude.lo[0], tilt.amplitude.hi[0])
         sine = corners.sine_of(amplitude * abs(sin(turn)), box.rod)
-        gap = corners.corner_gap(box, sine, self.condition, 0)
+        interference = corners.corner_interference(box, sine, self.condition, 0)
         f = corners.phase(box) + turn
         found = corners.pose(box, f)
         self.boxes += _ANGLES
-        proved = np.flatnonzero((gap.lo > 0.0) & found.assembled)
+        proved = np.flatnonzero((interference.lo > 0.0) & found.assembled)
         if proved.size == 0:
             return None
-        best = int(proved[np.argmax(gap.lo[proved])])
+        best = int(proved[np.argmax(interference.lo[proved])])
         angle = Enclosure(float(f.lo[best]), float(f.hi[best]))
-        return _witness(box, angle, Enclosure(float(gap.lo[best]), float(gap.hi[best])))
+        return _witness(box, angle, Enclosure(float(interference.lo[best]), float(interference.hi[best])))
 
     def _finish(self, verdict: Verdict, reason: str, witness: Witness | None) -> JamCertificate:
         shown = Enclosure(float(self.phase.lo), float(self.phase.hi))
         if verdict is Verdict.CERTIFIED_FREE:
-            why = "the gap stays open"
+            why = "the parts stay clear of each other"
             if self.kappa.lo == math.inf:
                 still = float(self.tilt.amplitude.hi[1]) == 0.0
                 why = "the crank pin stays in the plane: no tilt" if still else "there is no critical tilt"
@@ -367,8 +369,8 @@ class _Proof:
             reason=reason,
             condition=self.condition,
             box=self.box,
-            largest_gap=_pair(self.gaps, 1),
-            smallest_worst_gap=_pair(self.gaps, 0),
+            largest_interference=_pair(self.depths, 1),
+            smallest_worst_interference=_pair(self.depths, 0),
             largest_tilt=_angles(self.tilt.sine),
             critical_tilt=_angles(self.critical),
             arcs=arcs,
@@ -380,17 +382,17 @@ class _Proof:
         )
 
 
-def _at_worst_angle(box: ToleranceBox, gap: Enclosure) -> Witness:
+def _at_worst_angle(box: ToleranceBox, interference: Enclosure) -> Witness:
     """Return the position a quarter turn after the phase, where the tilt of every parameter vector is largest."""
     from graphsynth.intervals import pi
     from graphsynth.jamming.bearing.corners import phase
 
     f = phase(box) + pi() / 2
-    return _witness(box, Enclosure(float(f.lo), float(f.hi)), gap)
+    return _witness(box, Enclosure(float(f.lo), float(f.hi)), interference)
 
 
-def _witness(box: ToleranceBox, angle: Enclosure, gap: Enclosure) -> Witness:
-    return Witness({name: _text(value) for name, value in box.ranges.items()}, angle, gap)
+def _witness(box: ToleranceBox, angle: Enclosure, interference: Enclosure) -> Witness:
+    return Witness({name: _text(value) for name, value in box.ranges.items()}, angle, interference)
 
 
 def _text(value: Range) -> str:
@@ -423,13 +425,13 @@ def _interference(box: ToleranceBox, condition: Condition, begin: float) -> JamC
     from graphsynth.jamming.bearing import corners
 
     tilt = corners.sines(box)
-    gaps = corners.gap_corners(box, tilt.sine, condition)
+    depths = corners.interference_corners(box, tilt.sine, condition)
     nothing = Enclosure(0.0, 0.0)
     reason = "interference fit: the clearance is negative, the parts overlap at every tilt"
     arcs = whole_turn(nothing, Enclosure(-math.pi, math.pi), reason, True)
     return JamCertificate(
-        Verdict.CANNOT_ASSEMBLE, reason, condition, box, _pair(gaps, 1), _pair(gaps, 0), _angles(tilt.sine), nothing,
-        arcs, "never", None, box.exact_input, 2, perf_counter() - begin,
+        Verdict.CANNOT_ASSEMBLE, reason, condition, box, _pair(depths, 1), _pair(depths, 0),
+        _angles(tilt.sine), nothing, arcs, "never", None, box.exact_input, 2, perf_counter() - begin,
     )  # fmt: skip
 
 
@@ -448,8 +450,9 @@ def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) 
         verdict, reason = Verdict.CERTIFIED_JAMMED_FOR_SOME, text
     elif found.verdict is not Verdict.CERTIFIED_JAMMED_FOR_SOME:
         verdict, reason = Verdict.UNDECIDED, text
-    gaps = corners.gap_corners(box, corners.sines(box).sine, condition)  # of all, the interference included
+    # of all clearances, the negative ones included
+    depths = corners.interference_corners(box, corners.sines(box).sine, condition)
     return replace(
-        found, verdict=verdict, reason=reason, box=box, largest_gap=_pair(gaps, 1), smallest_worst_gap=_pair(gaps, 0),
-        seconds=perf_counter() - begin,
+        found, verdict=verdict, reason=reason, box=box, largest_interference=_pair(depths, 1),
+        smallest_worst_interference=_pair(depths, 0), seconds=perf_counter() - begin,
     )  # fmt: skip

@@ -122,11 +122,8 @@ def cosine(sine: Interval) -> Interval:
     return ((1 - sine) * (1 + sine)).sqrt()
 
 
-def _gap_a(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
-    """Condition A with both branches, in stable form; nondecreasing in S, h, nonincreasing in R, c.
-
-    See theory/bearing-contact 2.
-    """
+def _interference_a(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
+    """Condition A, both branches in stable form (theory/bearing-contact 2); grows with S and h, falls with R and c."""
     rising = h * S - c - R * S.sqr() / (1 + C)
     across, along = R * S, h * C
     if (across.hi <= along.lo).all():
@@ -139,42 +136,44 @@ def _gap_a(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> I
     return Interval.from_bounds(lo, hi)
 
 
-def _gap_b(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
+def _interference_b(S: Interval, C: Interval, R: Interval, h: Interval, c: Interval) -> Interval:
     return h * S - c + (R + c) * S.sqr() / (1 + C)
 
 
-def gap_values(S: Interval, R: Interval, h: Interval, c: Interval, hole: Interval | None, condition: str) -> Interval:
-    """Enclose the gap g (mm) elementwise for given intervals of sine, radius, half height, clearance, half hole.
+def interference_values(
+    S: Interval, R: Interval, h: Interval, c: Interval, hole: Interval | None, condition: str
+) -> Interval:
+    """Enclose the interference (mm) elementwise for intervals of sine, radius, half height, clearance, half hole.
 
     Condition "general" is ``min(gA, gB / C)``: the pin jams where it would both as a short bearing in a long hole and
     as a long shaft in a hole of this length (theory/bearing-contact 4).
     """
     C = cosine(S)
     if condition == "A":
-        return _gap_a(S, C, R, h, c)
+        return _interference_a(S, C, R, h, c)
     if condition == "B":
-        return _gap_b(S, C, R, h, c)
+        return _interference_b(S, C, R, h, c)
     assert hole is not None
-    a, b = _gap_a(S, C, R, h, c), slanted(S, R, hole, c)
+    a, b = _interference_a(S, C, R, h, c), slanted(S, R, hole, c)
     return Interval.from_bounds(np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi))
 
 
 def slanted(S: Interval, R: Interval, hole: Interval, c: Interval) -> Interval:
-    """Gap ``gB / C`` of the slanted shaft at the rim of a hole of half length ``hole``; unbounded at 90 degrees."""
+    """Interference ``gB / C`` of the slanted shaft at the rim of a hole of half length ``hole``."""
     C = cosine(S)
-    value = _gap_b(S, C, R, hole, c) / C
+    value = _interference_b(S, C, R, hole, c) / C
     upright = value.is_empty  # C = 0: the shaft lies across
     return Interval.from_bounds(np.where(upright, 0.0, value.lo), np.where(upright, np.inf, value.hi))
 
 
-def gap_corners(box: ToleranceBox, sine: Interval, condition: Condition) -> Interval:
-    """Pair of the smallest and the largest gap (mm) over the box, for a pair of sines of tilt (theory/jam-arcs 6)."""
+def interference_corners(box: ToleranceBox, sine: Interval, condition: Condition) -> Interval:
+    """Pair of the smallest and the largest interference (mm) over the box, for a pair of sines (theory/jam-arcs 6)."""
     check_condition(box, condition)
     h, c = ends(box, "Hb") / 2, ends(box, "clearance", falling=True)
     if condition != "general":
-        return gap_values(sine, ends(box, "Rb", falling=condition == "A"), h, c, None, condition)
+        return interference_values(sine, ends(box, "Rb", falling=condition == "A"), h, c, None, condition)
     hole = ends(box, "hole_length") / 2
-    a = gap_values(sine, ends(box, "Rb", falling=True), h, c, None, "A")
+    a = interference_values(sine, ends(box, "Rb", falling=True), h, c, None, "A")
     b = slanted(sine, ends(box, "Rb"), hole, c)
     low = (min(float(a.lo[0]), float(b.lo[0])), min(float(a.hi[0]), float(b.hi[0])))
     if box["Rb"].is_point:
@@ -191,7 +190,7 @@ def _largest_over_radius(
     (start, first), (last, stop) = box["Rb"].ends
 
     def both(points: Interval) -> tuple[Interval, Interval]:
-        return gap_values(S, points, h, c, None, "A"), slanted(S, points, hole, c)
+        return interference_values(S, points, h, c, None, "A"), slanted(S, points, hole, c)
 
     a, b = both(Interval.from_bounds(start, stop))
     best, above = float(min(a.lo, b.lo)), float(min(a.hi, b.hi))
@@ -295,7 +294,7 @@ def arcsine(value: float) -> Interval:
 
 
 def worst_corner(box: ToleranceBox, condition: Condition) -> ToleranceBox:
-    """Return the parameter vector of the box at which the gap is largest; the middle where it does not matter.
+    """Return the parameter vector of the box at which the interference is largest; the middle where it does not matter.
 
     For condition "general" with a range of radii the radius is a candidate only: the value there is evaluated anew.
     """
@@ -448,21 +447,21 @@ def _direction(box: ToleranceBox) -> tuple[Interval, Interval, Interval, Interva
     return unit[0], unit[1], unit[2], alpha
 
 
-def pose_gap(box: ToleranceBox, f: Interval, condition: Condition) -> tuple[Interval, Pose]:
-    """Enclose the gap g (mm) over pieces of the turn for all parameters of the box, with the poses.
+def pose_interference(box: ToleranceBox, f: Interval, condition: Condition) -> tuple[Interval, Pose]:
+    """Enclose the interference g (mm) over pieces of the turn for all parameters of the box, with the poses.
 
     The lower bound holds for every parameter vector and angle of a piece, and so does the upper bound.
     """
     check_condition(box, condition)
     found = pose(box, f)
     low, high = found.sine.lo, found.sine.hi
-    lower = corner_gap(box, Interval.from_bounds(low, low), condition, 0).lo
-    upper = corner_gap(box, Interval.from_bounds(high, high), condition, 1).hi
+    lower = corner_interference(box, Interval.from_bounds(low, low), condition, 0).lo
+    upper = corner_interference(box, Interval.from_bounds(high, high), condition, 1).hi
     return Interval.from_bounds(lower, upper), found
 
 
-def corner_gap(box: ToleranceBox, sine: Interval, condition: Condition, corner: int) -> Interval:
-    """Gap at the sine given and at the corner of the bearing that makes it smallest (0) or largest (1)."""
+def corner_interference(box: ToleranceBox, sine: Interval, condition: Condition, corner: int) -> Interval:
+    """Interference at the sine given and at the corner of the bearing that makes it smallest (0) or largest (1)."""
 
     def end(name: str, rising: bool) -> Interval:
         low, high = box[name].ends[corner if rising else 1 - corner]
@@ -470,8 +469,8 @@ def corner_gap(box: ToleranceBox, sine: Interval, condition: Condition, corner: 
 
     h, c = end("Hb", True) / 2, end("clearance", False)
     if condition != "general":
-        return gap_values(sine, end("Rb", condition == "B"), h, c, None, condition)
-    a = gap_values(sine, end("Rb", False), h, c, None, "A")
+        return interference_values(sine, end("Rb", condition == "B"), h, c, None, condition)
+    a = interference_values(sine, end("Rb", False), h, c, None, "A")
     # gA falls and gB / C rises with the radius: each at its own end bounds the smaller of both from either side
     b = slanted(sine, end("Rb", True), end("hole_length", True) / 2, c)
     return Interval.from_bounds(np.minimum(a.lo, b.lo), np.minimum(a.hi, b.hi))

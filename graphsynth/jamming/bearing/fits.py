@@ -155,8 +155,8 @@ class FitVerdict:
         """The verdict in words about pairs of parts."""
         return {
             Verdict.CERTIFIED_FREE: "every pair is free",
-            Verdict.CERTIFIED_JAMMED: "every pair jams",
-            Verdict.CERTIFIED_JAMMED_FOR_SOME: "the tightest pair jams",
+            Verdict.CERTIFIED_JAMMED: "every pair binds",
+            Verdict.CERTIFIED_JAMMED_FOR_SOME: "the tightest pair binds",
         }.get(self.verdict, "undecided")
 
     def row(self) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def assess_fits(
 def _assess(box: ToleranceBox, condition: Condition, fit: Fit) -> FitVerdict:
     """Radius and clearance taken as independent: more pairs than there are, so freedom holds a fortiori."""
     every = certify_jamming(box.replace(Rb=fit.radius, clearance=fit.clearance), condition)
-    left = -every.largest_gap.hi
+    left = -every.largest_interference.hi
     if every.verdict in (Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED):
         return FitVerdict(fit, every.verdict, left)
     radius, clearance = fit.pair(loosest=False)  # parts that exist: the largest shaft in the smallest hole

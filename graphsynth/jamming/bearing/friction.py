@@ -1,6 +1,8 @@
-"""Friction of a tilted bearing: wedging, torque amplification, Whitney's diagram.
+"""Friction of a tilted bearing: wedging, torque amplification, Whitney's diagram (theory/friction-of-a-tilted-bearing).
 
-See theory/friction-of-a-tilted-bearing.
+The words are those of insertion theory (Simunovic, Whitney [Whitney 1982]): a peg *wedges* when two contacts hold each
+other by friction alone, whatever the load; it *jams* when the load lies outside the region in which it slides in.  What
+the rest of the package decides is geometric *binding*: rigid parts that would have to overlap.
 """
 
 from __future__ import annotations

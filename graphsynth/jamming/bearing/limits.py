@@ -158,7 +158,7 @@ def largest_height(linkage: TiltedFourBar, bearing: Bearing, condition: Conditio
     if condition == "B":
         half = (c - bearing.Rh * S * S / (1.0 + C)) / S
         if half < 0.0:
-            return Limit(None, "no height works: even a thin plate jams at this tilt")
+            return Limit(None, "no height works: even a thin plate binds at this tilt")
         return Limit(2.0 * half)
     if condition != "A":
         raise GeometryError(f'condition = {condition!r} has no closed form here; use "A" or "B"')
@@ -426,7 +426,7 @@ class _Search:
         works = mild if self.free(mild) else None
         fails = mild if works is None and self.jams(mild) else None
         if fails is not None:
-            reason = f"no value works: even {mild!r} {unit} is certified to jam"
+            reason = f"no value works: even {mild!r} {unit} is certified to bind"
         else:
             reason = self.why or "neither side is proved"
         return CertifiedLimit(works, fails, unit, reason, covers, self.trials, perf_counter() - begin)

@@ -1,8 +1,8 @@
 """The turn cut into pieces: free, jammed or undecided with proof, for motions without a closed form.
 
-The gap is enclosed on every piece of the turn; undecided pieces are halved until a resolution or a budget ends the
-search (theory/jam-arcs 3).  For the lambda linkage `sweep_linkage` uses interval kinematics, which shares no
-formula with the closed form of the arcs.
+The interference is enclosed on every piece of the turn; undecided pieces are halved until a resolution or a budget ends
+the search (theory/jam-arcs 3).  For the lambda linkage `sweep_linkage` uses interval kinematics, which shares
+no formula with the closed form of the arcs.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _FREE, _JAMS, _OPEN, _OUT = 0, 1, 2, 3
 _ENOUGH = 64
 
 
-class PieceGap(NamedTuple):
-    """Enclosure of the gap on pieces of the turn, over all parameters; and what is proved about assembly there.
+class PieceInterference(NamedTuple):
+    """Enclosure of the interference on pieces of the turn, over all parameters; and what is proved about assembly.
 
     ``assembled``: at every angle of the piece for every parameter vector; ``missing``: at none of them.
     """
 
-    gap: Interval
+    interference: Interval
     assembled: Mask
     missing: Mask
 
@@ -81,19 +81,19 @@ class TurnPartition:
 
 @checked
 def sweep_turn(
-    gap: Callable[[Interval], PieceGap],
+    interference: Callable[[Interval], PieceInterference],
     *,
     resolution: Real = 1e-6,
     first: Count = 256,
     max_pieces: Count = 200_000,
     max_seconds: Budget = math.inf,
 ) -> TurnPartition:
-    """Partition the turn by the sign of a gap function given in intervals.
+    """Partition the turn by the sign of an interference given in intervals.
 
     Parameters
     ----------
-    gap : callable
-        Takes pieces of the turn, an `Interval` of shape (m,), and returns a `PieceGap`.
+    interference : callable
+        Takes pieces of the turn, an `Interval` of shape (m,), and returns a `PieceInterference`.
     resolution : float
         Undecided pieces no longer than this (radians) are left; at least 1e-15.
     first : int
@@ -116,7 +116,7 @@ def sweep_turn(
     >>> import numpy as np
     >>> from graphsynth.intervals import sin
     >>> def always(f):
-    ...     return PieceGap(sin(f) - 0.5, np.ones(len(f), bool), np.zeros(len(f), bool))
+    ...     return PieceInterference(sin(f) - 0.5, np.ones(len(f), bool), np.zeros(len(f), bool))
     >>> found = sweep_turn(always)
     >>> [round(end, 5) for end in found.inner[0]], found.undecided_part < 1e-6
     ([0.5236, 2.61799], True)
@@ -136,7 +136,7 @@ def sweep_turn(
             finished = False
             done.append((lo, hi, np.full(lo.size, _OPEN, dtype=np.int8)))
             break
-        kind = _classify(gap(Interval.from_bounds(lo, hi)), lo.size)
+        kind = _classify(interference(Interval.from_bounds(lo, hi)), lo.size)
         pieces += lo.size
         split = (kind == _OPEN) & (hi - lo > resolution)
         done.append((lo[~split], hi[~split], kind[~split]))
@@ -157,9 +157,9 @@ def _split(lo: NDArray[np.float64], hi: NDArray[np.float64]) -> tuple[NDArray[np
     return starts[filled], stops[filled]
 
 
-def _classify(found: PieceGap, size: int) -> NDArray[np.int8]:
-    lo, hi = np.broadcast_to(found.gap.lo, (size,)), np.broadcast_to(found.gap.hi, (size,))
-    sound = np.broadcast_to(found.gap.guaranteed & ~found.gap.is_empty, (size,))
+def _classify(found: PieceInterference, size: int) -> NDArray[np.int8]:
+    lo, hi = np.broadcast_to(found.interference.lo, (size,)), np.broadcast_to(found.interference.hi, (size,))
+    sound = np.broadcast_to(found.interference.guaranteed & ~found.interference.is_empty, (size,))
     kind = np.full(size, _OPEN, dtype=np.int8)
     kind[sound & (hi < 0.0)] = _FREE
     kind[sound & (lo > 0.0) & found.assembled] = _JAMS
@@ -217,10 +217,10 @@ def sweep_linkage(
     >>> len(found.inner), len(found.missing), found.undecided_part < 1e-3
     (2, 0, True)
     """
-    from graphsynth.jamming.bearing.corners import pose_gap
+    from graphsynth.jamming.bearing.corners import pose_interference
 
-    def gap(f: Interval) -> PieceGap:
-        value, found = pose_gap(box, f, condition)
-        return PieceGap(value, found.assembled, found.missing)
+    def interference(f: Interval) -> PieceInterference:
+        value, found = pose_interference(box, f, condition)
+        return PieceInterference(value, found.assembled, found.missing)
 
-    return sweep_turn(gap, resolution=resolution, max_pieces=max_pieces, max_seconds=max_seconds)
+    return sweep_turn(interference, resolution=resolution, max_pieces=max_pieces, max_seconds=max_seconds)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from graphsynth.jamming.intersection.boxes import CrossCheck, CrossingBoxes, cross_check, krawczyk_boxes
-from graphsynth.jamming.intersection.hull import CrossingHull, exact_hull, mirrored
+from graphsynth.jamming.intersection.boxes import CrossCheck, IntersectionBoxes, cross_check, krawczyk_boxes
+from graphsynth.jamming.intersection.hull import IntersectionHull, exact_hull, mirrored
 from graphsynth.jamming.intersection.problem import CircleEllipse, Reason, circle_ellipse, surrogate_problem
 from graphsynth.jamming.intersection.readings import (
     Reading,
@@ -16,8 +16,8 @@ from graphsynth.jamming.intersection.readings import (
 __all__ = [
     "CircleEllipse",
     "CrossCheck",
-    "CrossingBoxes",
-    "CrossingHull",
+    "IntersectionBoxes",
+    "IntersectionHull",
     "Reading",
     "Reason",
     "TiltedEllipse",

@@ -21,7 +21,7 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.status import Status
-from graphsynth.jamming.intersection.hull import CrossingHull, exact_hull, mirrored, spectral_radius
+from graphsynth.jamming.intersection.hull import IntersectionHull, exact_hull, mirrored, spectral_radius
 from graphsynth.jamming.intersection.problem import CircleEllipse, Reason
 
 Array = NDArray[np.float64]
@@ -33,17 +33,18 @@ _MOST_POWER = 900
 
 
 @dataclass(frozen=True, eq=False)
-class CrossingBoxes:
+class IntersectionBoxes:
     """Outcome of `krawczyk_boxes`, for the first quadrant.
 
     Attributes
     ----------
     status : Status
-        ``EMPTY``: no crossing; ``UNIQUE``: exactly one in the quadrant, for every choice of the parameters; ``EXISTS``:
-        at least one for every choice, but boxes are left that may hold more; ``UNDECIDED``: see ``reasons``.
+        ``EMPTY``: no intersection; ``UNIQUE``: exactly one in the quadrant, for every choice of the parameters;
+        ``EXISTS``: at least one for every choice, but boxes are left that may hold more; ``UNDECIDED``: see
+        ``reasons``.
     reasons : tuple of Reason
     proved : Interval, shape (P, 2)
-        Enclosures of crossings that exist and are unique in the matching row of ``domains``.
+        Enclosures of intersections that exist and are unique in the matching row of ``domains``.
     domains : Interval, shape (P, 2)
     inner : Interval, shape (M, 2)
         Boxes of which every point is a solution for some choice of the parameters.
@@ -67,12 +68,12 @@ class CrossingBoxes:
 
     @cached_property
     def proved(self) -> Interval:
-        """Enclosures of the crossings that are proved, shape (P, 2)."""
+        """Enclosures of the intersections that are proved, shape (P, 2)."""
         return _intervals(self.rows[0])
 
     @cached_property
     def domains(self) -> Interval:
-        """Boxes in which each of them is the only crossing, shape (P, 2)."""
+        """Boxes in which each of them is the only intersection, shape (P, 2)."""
         return _intervals(self.rows[1])
 
     @cached_property
@@ -107,7 +108,7 @@ class CrossingBoxes:
 
     @property
     def four(self) -> Interval:
-        """Hulls of the crossings in all quadrants, copies on an axis merged; see `mirrored`."""
+        """Hulls of the intersections in all quadrants, copies on an axis merged; see `mirrored`."""
         return mirrored(self.outer)
 
 
@@ -164,7 +165,7 @@ def _bounds(top: int, bottom: int) -> tuple[float, float]:
 @checked
 def krawczyk_boxes(
     problem: CircleEllipse, *, tolerance: Real = 1e-6, max_boxes: Real = 20_000, max_seconds: Real = 60.0
-) -> CrossingBoxes:
+) -> IntersectionBoxes:
     """Solve the problem by bisection and Krawczyk's test in (x, y).
 
     Parameters
@@ -179,7 +180,7 @@ def krawczyk_boxes(
 
     Returns
     -------
-    CrossingBoxes
+    IntersectionBoxes
         Certified, whatever the limit.
 
     Raises
@@ -254,8 +255,8 @@ def _intervals(rows: Array) -> Interval:
 
 def _outcome(
     problem: CircleEllipse, parts: list[Array], finished: bool, tested: int, seconds: float, full: bool
-) -> CrossingBoxes:
-    """Drop boxes that a proved crossing stands for, and say what is known."""
+) -> IntersectionBoxes:
+    """Drop boxes that a proved intersection stands for, and say what is known."""
     enclosures, domains, inner, rest = parts
     for domain in domains if len(rest) else ():
         for_it = (rest[:, ::2] >= domain[::2]).all(axis=1) & (rest[:, 1::2] <= domain[1::2]).all(axis=1)
@@ -265,14 +266,14 @@ def _outcome(
         status = Status.EXISTS if left or len(domains) > 1 else Status.UNIQUE
     else:
         status = Status.UNDECIDED if left else Status.EMPTY
-    reasons = [Reason.CROSSING] if status is Status.UNIQUE else []
+    reasons = [Reason.INTERSECTION] if status is Status.UNIQUE else []
     if status is Status.EMPTY:
         outside = problem.circle_bounds.lo > problem.a.lo**2
         reasons.append(Reason.CIRCLE_OUTSIDE if outside else Reason.CIRCLE_INSIDE)
     elif left:
         reasons.append(Reason.RESOLUTION if finished else Reason.BOXES if full else Reason.SECONDS)
     rows = (enclosures, domains, inner, rest)
-    return CrossingBoxes(problem, status, tuple(reasons), rows, finished, tested, seconds)
+    return IntersectionBoxes(problem, status, tuple(reasons), rows, finished, tested, seconds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,8 +282,8 @@ class CrossCheck:
 
     Attributes
     ----------
-    hull : CrossingHull
-    boxes : CrossingBoxes
+    hull : IntersectionHull
+    boxes : IntersectionBoxes
     hull_in_boxes : bool
         The exact hull lies in the hull of all boxes; implied if both are right and the hull is tight.
     inner_in_hull : bool
@@ -291,8 +292,8 @@ class CrossCheck:
         Neither has proved what the other has disproved.
     """
 
-    hull: CrossingHull
-    boxes: CrossingBoxes
+    hull: IntersectionHull
+    boxes: IntersectionBoxes
     hull_in_boxes: bool
     inner_in_hull: bool
     statuses_agree: bool
@@ -332,9 +333,9 @@ def cross_check(problem: CircleEllipse, **limits: Any) -> CrossCheck:
     return CrossCheck(hull, boxes, covered, bool(boxes.inside.subset(hull.hull).all()), _agree(hull, boxes))
 
 
-def _agree(hull: CrossingHull, boxes: CrossingBoxes) -> bool:
+def _agree(hull: IntersectionHull, boxes: IntersectionBoxes) -> bool:
     if boxes.status is Status.EMPTY or hull.status is Status.EMPTY:
         found = len(boxes.proved) + len(boxes.inner) > 0
         return not found and (boxes.status is not Status.EMPTY or hull.status is Status.EMPTY)
-    # a crossing proved for every choice of the parameters cannot vanish or be double for some
+    # a intersection proved for every choice of the parameters cannot vanish or be double for some
     return len(boxes.proved) == 0 or hull.status is Status.UNIQUE or not hull.tight

@@ -17,7 +17,7 @@ from graphsynth.core.checks import checked
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
 from graphsynth.intervals.status import Status
-from graphsynth.jamming.intersection.problem import CircleEllipse, Range, Reason, outward, root_bounds
+from graphsynth.jamming.intersection.problem import CircleEllipse, Exact, Reason, outward, root_bounds
 
 if TYPE_CHECKING:
     from graphsynth.jamming.intersection.problem import CircleEllipse
@@ -58,13 +58,13 @@ def spectral_radius(problem: CircleEllipse, box: Interval) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class CrossingHull:
+class IntersectionHull:
     """Outcome of `exact_hull`, for the first quadrant.
 
     Attributes
     ----------
     status : Status
-        ``UNIQUE``: one crossing inside the quadrant for every choice of the parameters; ``EMPTY``: none for any;
+        ``UNIQUE``: one intersection inside the quadrant for every choice of the parameters; ``EMPTY``: none for any;
         ``UNDECIDED``: neither holds, or it depends on the parameters: see ``reasons``.
     reasons : tuple of Reason
         Why, one or two.
@@ -98,12 +98,12 @@ class CrossingHull:
 
     @property
     def four(self) -> Interval:
-        """All crossings, see `mirrored`."""
+        """All intersections, see `mirrored`."""
         return mirrored(self.hull)
 
 
 @checked
-def exact_hull(problem: CircleEllipse) -> CrossingHull:
+def exact_hull(problem: CircleEllipse) -> IntersectionHull:
     """Solve the problem exactly.
 
     Parameters
@@ -112,7 +112,7 @@ def exact_hull(problem: CircleEllipse) -> CrossingHull:
 
     Returns
     -------
-    CrossingHull
+    IntersectionHull
         Certified; the hull is exact up to one rounding of each bound.
 
     Raises
@@ -134,7 +134,7 @@ def exact_hull(problem: CircleEllipse) -> CrossingHull:
     """
     check_rounding()
     circle, level = problem.circle_bounds, problem.level_bounds
-    long, short = (Range(r.lo**2 * level.lo, r.hi**2 * level.hi) for r in (problem.a, problem.b))
+    long, short = (Exact(r.lo**2 * level.lo, r.hi**2 * level.hi) for r in (problem.a, problem.b))
     if circle.lo > long.hi:
         return _empty(problem, Reason.CIRCLE_OUTSIDE)
     if circle.hi < short.lo:
@@ -147,7 +147,7 @@ def exact_hull(problem: CircleEllipse) -> CrossingHull:
     u_min, v_max = least if least[0] >= 0 else (Fraction(0), min(circle.hi, short.hi))
     reasons = _touches(problem, least[0], most[1])
     status = Status.UNDECIDED if reasons else Status.UNIQUE
-    return _result(problem, status, reasons or (Reason.CROSSING,), Range(u_min, u_max), Range(v_min, v_max))
+    return _result(problem, status, reasons or (Reason.INTERSECTION,), Exact(u_min, u_max), Exact(v_min, v_max))
 
 
 def _corner(a: Fraction, b: Fraction, Q: Fraction, E: Fraction) -> tuple[Fraction, Fraction]:
@@ -157,7 +157,7 @@ def _corner(a: Fraction, b: Fraction, Q: Fraction, E: Fraction) -> tuple[Fractio
 
 
 def _touches(problem: CircleEllipse, u: Fraction, v: Fraction) -> tuple[Reason, ...]:
-    """Reasons why not every choice of the parameters has a crossing inside the quadrant."""
+    """Reasons why not every choice of the parameters has a intersection inside the quadrant."""
     sharp = problem.R1.is_point and problem.e1.hi == 0 == problem.e2.hi
     reasons = []
     if u <= 0:
@@ -167,7 +167,7 @@ def _touches(problem: CircleEllipse, u: Fraction, v: Fraction) -> tuple[Reason, 
     return tuple(reasons)
 
 
-def _near_circular(problem: CircleEllipse, circle: Range, long: Range, short: Range) -> CrossingHull:
+def _near_circular(problem: CircleEllipse, circle: Exact, long: Exact, short: Exact) -> IntersectionHull:
     """Treat an ellipse that is, or may be, a circle."""
     ring = problem.a == problem.b and problem.a.is_point
     top = min(circle.hi, long.hi)
@@ -175,23 +175,23 @@ def _near_circular(problem: CircleEllipse, circle: Range, long: Range, short: Ra
         if max(circle.lo, long.lo) > top:
             return _empty(problem, Reason.CIRCLE_OUTSIDE if circle.lo > long.hi else Reason.CIRCLE_INSIDE)
         reason = Reason.COINCIDENT if problem.is_exact_data else Reason.RING
-        return _result(problem, Status.UNDECIDED, (reason,), Range(Fraction(0), top), Range(Fraction(0), top))
+        return _result(problem, Status.UNDECIDED, (reason,), Exact(Fraction(0), top), Exact(Fraction(0), top))
     v_max = min(top, short.hi)
-    u = Range(max(Fraction(0), circle.lo - v_max), top)
-    return _result(problem, Status.UNDECIDED, (Reason.NOT_SEPARATED,), u, Range(Fraction(0), v_max), tight=False)
+    u = Exact(max(Fraction(0), circle.lo - v_max), top)
+    return _result(problem, Status.UNDECIDED, (Reason.NOT_SEPARATED,), u, Exact(Fraction(0), v_max), tight=False)
 
 
-def _empty(problem: CircleEllipse, reason: Reason) -> CrossingHull:
+def _empty(problem: CircleEllipse, reason: Reason) -> IntersectionHull:
     nothing = Interval.empty(2)
-    return CrossingHull(problem, Status.EMPTY, (reason,), nothing, nothing, True)
+    return IntersectionHull(problem, Status.EMPTY, (reason,), nothing, nothing, True)
 
 
 def _result(
-    problem: CircleEllipse, status: Status, reasons: tuple[Reason, ...], u: Range, v: Range, tight: bool = True
-) -> CrossingHull:
+    problem: CircleEllipse, status: Status, reasons: tuple[Reason, ...], u: Exact, v: Exact, tight: bool = True
+) -> IntersectionHull:
     squares = Interval.stack([u.outward(), v.outward()])
     hull = Interval.stack([outward(root_bounds(r.lo).lo, root_bounds(r.hi).hi) for r in (u, v)])
-    return CrossingHull(problem, status, reasons, hull, squares, tight)
+    return IntersectionHull(problem, status, reasons, hull, squares, tight)
 
 
 @checked

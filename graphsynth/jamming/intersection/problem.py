@@ -22,7 +22,7 @@ from graphsynth.jamming.bearing import parameters
 from graphsynth.jamming.bearing.bearing import Bearing
 
 
-class Range(NamedTuple):
+class Exact(NamedTuple):
     """A closed range of numbers with rational ends; a point if they are equal."""
 
     lo: Fraction
@@ -43,7 +43,7 @@ def outward(lo: Fraction, hi: Fraction) -> Interval:
     return Interval.from_bounds(lower_bound(lo) + 0.0, upper_bound(hi) + 0.0)  # no negative zero
 
 
-def exact_range(name: str, value: Any) -> Range:
+def exact_range(name: str, value: Any) -> Exact:
     """Read a number or a range without rounding.
 
     Parameters
@@ -63,15 +63,15 @@ def exact_range(name: str, value: Any) -> Range:
     >>> exact_range("c", "0.03").lo
     Fraction(3, 100)
     """
-    if isinstance(value, Range):
+    if isinstance(value, Exact):
         return value
     if isinstance(value, Fraction):  # also beyond the range of doubles: units far from 1
-        return Range(value, value)
+        return Exact(value, value)
     found = parameters.Range.read(name, value)
-    return Range(found.lower, found.upper)
+    return Exact(found.lower, found.upper)
 
 
-def root_bounds(value: Fraction, bits: int = 64) -> Range:
+def root_bounds(value: Fraction, bits: int = 64) -> Exact:
     """Enclose the square root of ``value >= 0`` in rational numbers, to ``bits`` significant bits; exact if rational.
 
     Examples
@@ -80,7 +80,7 @@ def root_bounds(value: Fraction, bits: int = 64) -> Range:
     (True, 1.4142135623730951)
     """
     if value == 0:
-        return Range(Fraction(0), Fraction(0))
+        return Exact(Fraction(0), Fraction(0))
     size = value.numerator.bit_length() - value.denominator.bit_length()
     shift = bits - size // 2  # value 4^shift has about 2 bits digits
     up, down = max(2 * shift, 0), max(-2 * shift, 0)
@@ -89,11 +89,11 @@ def root_bounds(value: Fraction, bits: int = 64) -> Range:
     exact = rest == 0 and root * root == whole
     unit = Fraction(1, 1 << shift) if shift >= 0 else Fraction(1 << -shift)
     if exact:
-        return Range(root * unit, root * unit)
+        return Exact(root * unit, root * unit)
     perfect = math.isqrt(value.numerator), math.isqrt(value.denominator)
     if perfect[0] ** 2 == value.numerator and perfect[1] ** 2 == value.denominator:
-        return Range(Fraction(*perfect), Fraction(*perfect))
-    return Range(root * unit, (root + 1) * unit)
+        return Exact(Fraction(*perfect), Fraction(*perfect))
+    return Exact(root * unit, (root + 1) * unit)
 
 
 class Reason(Enum):
@@ -102,18 +102,18 @@ class Reason(Enum):
     Examples
     --------
     >>> Reason.TOUCHES_X.value
-    'touches axis x = 0: for some parameters the crossing lies on it, or there is none'
+    'touches axis x = 0: for some parameters the intersection lies on it, or there is none'
     """
 
-    CROSSING = "one crossing in each quadrant for every choice of the parameters"
-    CIRCLE_OUTSIDE = "the circle encloses the ellipse: no crossing"
-    CIRCLE_INSIDE = "the ellipse encloses the circle: no crossing"
-    TOUCHES_X = "touches axis x = 0: for some parameters the crossing lies on it, or there is none"
-    TOUCHES_Y = "touches axis y = 0: for some parameters the crossing lies on it, or there is none"
+    INTERSECTION = "one intersection in each quadrant for every choice of the parameters"
+    CIRCLE_OUTSIDE = "the circle encloses the ellipse: no intersection"
+    CIRCLE_INSIDE = "the ellipse encloses the circle: no intersection"
+    TOUCHES_X = "touches axis x = 0: for some parameters the intersection lies on it, or there is none"
+    TOUCHES_Y = "touches axis y = 0: for some parameters the intersection lies on it, or there is none"
     TANGENT_LONG = "tangent at the ends of the long axis: a double point on y = 0"
     TANGENT_SHORT = "tangent at the ends of the short axis: a double point on x = 0"
     COINCIDENT = "coincident: circle and ellipse are the same curve, every point of it is a solution"
-    RING = "a = b: the solutions form a ring, not separate crossings"
+    RING = "a = b: the solutions form a ring, not separate intersections"
     NOT_SEPARATED = "the ranges of a and b overlap: the ellipse may be a circle"
     BOXES = "the limit in boxes was reached"
     SECONDS = "the limit in seconds was reached"
@@ -129,29 +129,29 @@ class CircleEllipse:
 
     Attributes
     ----------
-    R1, a, b : Range
+    R1, a, b : Exact
         Radius of the circle, semi-axes along x and y; of one length unit.
-    e1 : Range
+    e1 : Exact
         Tolerance of ``x^2 + y^2``, in the square of that unit.
-    e2 : Range
+    e2 : Exact
         Tolerance of ``x^2/a^2 + y^2/b^2``, a number.
     """
 
-    R1: Range
-    a: Range
-    b: Range
-    e1: Range
-    e2: Range
+    R1: Exact
+    a: Exact
+    b: Exact
+    e1: Exact
+    e2: Exact
 
     @property
-    def circle_bounds(self) -> Range:
+    def circle_bounds(self) -> Exact:
         """Smallest and largest ``x^2 + y^2``."""
-        return Range(self.R1.lo**2 - self.e1.hi, self.R1.hi**2 + self.e1.hi)
+        return Exact(self.R1.lo**2 - self.e1.hi, self.R1.hi**2 + self.e1.hi)
 
     @property
-    def level_bounds(self) -> Range:
+    def level_bounds(self) -> Exact:
         """Smallest and largest ``x^2/a^2 + y^2/b^2``."""
-        return Range(1 - self.e2.hi, 1 + self.e2.hi)
+        return Exact(1 - self.e2.hi, 1 + self.e2.hi)
 
     @property
     def is_exact_data(self) -> bool:
@@ -254,7 +254,7 @@ def surrogate_problem(
     if high > 1:
         raise GeometryError(f"sine = {float(high)} of the tilt exceeds 1; give a value in [-1, 1]")
     _, Rh, h = bearing_radii(bearing)
-    short = Range(
+    short = Exact(
         Rh * root_bounds(1 - high * high, bits).lo - h * high, Rh * root_bounds(1 - low * low, bits).hi - h * low
     )
     if short.lo <= 0:

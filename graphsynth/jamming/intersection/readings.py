@@ -15,7 +15,7 @@ from graphsynth.jamming.bearing.areas import CrescentAreas, ellipse_circle_stabl
 from graphsynth.jamming.bearing.bearing import Bearing
 from graphsynth.jamming.intersection.problem import (
     CircleEllipse,
-    Range,
+    Exact,
     bearing_radii,
     circle_ellipse,
     exact_range,
@@ -162,7 +162,7 @@ def _masked(areas: CrescentAreas, defined: NDArray[np.bool_]) -> CrescentAreas:
 def reading_problem(
     bearing: Bearing, sine: Any, reading: Reading, e1: Any = 0, e2: Any = 0, *, eps: Any = None
 ) -> CircleEllipse:
-    """Pose the crossing problem for a centred reading: E1, E2 or E4, with x along the long axis.
+    """Pose the intersection problem for a centred reading: E1, E2 or E4, with x along the long axis.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def reading_problem(
     least = Fraction(0) if low <= 0 <= high else min(abs(low), abs(high))
     if most >= 1:
         raise GeometryError(f"sine = {float(most)}: the ellipse of {reading.value} exists for |sine| < 1 only")
-    cosine = Range(root_bounds(1 - most * most, 128).lo, root_bounds(1 - least * least, 128).hi)
+    cosine = Exact(root_bounds(1 - most * most, 128).lo, root_bounds(1 - least * least, 128).hi)
     R, Rh, _ = bearing_radii(bearing)
     if reading is Reading.IMAGE:
         return circle_ellipse(R, Rh, (Rh * cosine.lo, Rh * cosine.hi), e1, e2, eps=eps)

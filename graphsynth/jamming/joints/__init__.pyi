@@ -39,13 +39,13 @@ from .scale import (
 from .scale import (
     largest_scale as largest_scale,
 )
-from .search import Witness as Witness
+from .search import MemberWitness as MemberWitness
 from .sensitivity import (
-    Loosened as Loosened,
+    LimitSensitivity as LimitSensitivity,
 )
 from .sensitivity import (
-    LooseningTable as LooseningTable,
+    SensitivityTable as SensitivityTable,
 )
 from .sensitivity import (
-    compare_loosening as compare_loosening,
+    compare_sensitivities as compare_sensitivities,
 )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import checked
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.limits import Misalignment
-from graphsynth.jamming.joints.program import Bearings, PoseSolution, Problem, check_motion, problem
+from graphsynth.jamming.joints.program import Bearings, JointProblem, PoseSolution, check_motion, problem
 from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
 
 if TYPE_CHECKING:
@@ -27,12 +27,12 @@ Array = NDArray[np.float64]
 METHOD_SAMPLES = "convex program at the samples, double precision, not certified"
 
 
-class Loosen(NamedTuple):
-    """What loosening one joint gains at the worst input.
+class Sensitivity(NamedTuple):
+    """How sensitive the allowed misalignment at the worst input is to one limit.
 
     ``gain`` is the relative growth of the allowed misalignment per relative growth of the joint's limit ``what``
     ("tilt", "roll", "pitch" or "play"): 0.5 means that one percent more limit allows at most half a percent more
-    misalignment there.  `graphsynth.jamming.joints.compare_loosening` solves for what it allows over the motion.
+    misalignment there.  `graphsynth.jamming.joints.compare_sensitivities` solves for what it allows over the motion.
     """
 
     joint: tuple[int, int]
@@ -40,7 +40,7 @@ class Loosen(NamedTuple):
     gain: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CoupledReport:
     """Result of `assess_coupled`; arrays over the n inputs, NaN where the mechanism is not assembled.
 
@@ -51,30 +51,30 @@ class CoupledReport:
         One sentence.
     inputs : ndarray, shape (n,)
     factor : ndarray, shape (n,)
-        T*: the least factor on all tilt limits with which the pose can be assembled, plays as they are; above 1 it
-        jams, infinite if no factor helps.
-    gap : ndarray, shape (n,)
+        T*: the least factor on all tilt limits with which the pose can be assembled, axial clearances as they are;
+        above 1 it jams, infinite if no factor helps.
+    duality_gap : ndarray, shape (n,)
         Primal minus dual value of T*, relative: the factor is known to this (estimated: rounding only).
     allowed_scale : ndarray, shape (n,)
         Factor by which all misalignments may grow before the pose jams; below 1 where it jams, infinite if never.
     consumption : ndarray, shape (n, blocks)
         ``|tau| / (T* t)`` of every limit on tilt: 1 where it is used up.  One optimal sharing; joints that are not
         binding may have others.
-    play_used : ndarray, shape (n, joints)
-        ``|zeta| / s`` of every joint with finite play.
-    price : ndarray, shape (n, blocks)
-        Dual price: relative fall of T* per relative growth of the limit; positive where the limit is binding; the
-        sum is 1.
-    play_price : ndarray, shape (n, joints)
-        Fall of T* per relative growth of the axial play.
+    axial_clearance_used : ndarray, shape (n, joints)
+        ``|zeta| / s`` of every joint with finite axial clearance.
+    shadow_price : ndarray, shape (n, blocks)
+        Shadow price (dual multiplier): relative fall of T* per relative growth of the limit; positive where the limit
+        is binding; the sum is 1.
+    axial_shadow_price : ndarray, shape (n, joints)
+        Fall of T* per relative growth of the axial clearance.
     names, joints : tuple
         ``((a, b), "tilt" | "roll" | "pitch")`` of the blocks; pairs ``(a, b)`` of the joints.
     worst_input, worst_factor : float
         Where T* is largest among the samples, and its value there.
     smallest_scale : float
         Smallest of ``allowed_scale``, and ``smallest_scale_input`` where.
-    loosen : tuple of Loosen
-        Limits in the order of what loosening them gains at ``smallest_scale_input``.
+    sensitivities : tuple of Sensitivity
+        Limits in the order of their shadow prices at ``smallest_scale_input``.
     limits, misalignments : tuple
         As used.
     certificate : TurnCertificate or None
@@ -87,19 +87,19 @@ class CoupledReport:
     reason: str
     inputs: Array
     factor: Array
-    gap: Array
+    duality_gap: Array
     allowed_scale: Array
     consumption: Array
-    play_used: Array
-    price: Array
-    play_price: Array
+    axial_clearance_used: Array
+    shadow_price: Array
+    axial_shadow_price: Array
     names: tuple[tuple[tuple[int, int], str], ...]
     joints: tuple[tuple[int, int], ...]
     worst_input: float
     worst_factor: float
     smallest_scale: float
     smallest_scale_input: float
-    loosen: tuple[Loosen, ...]
+    sensitivities: tuple[Sensitivity, ...]
     limits: tuple[Limits, ...]
     misalignments: tuple[Misalignment, ...]
     condition: str = "A"
@@ -107,6 +107,17 @@ class CoupledReport:
     notes: tuple[str, ...] = ()
     seconds: float = field(default=0.0, compare=False)
     small_tilts: str = "L1 with small tilts (first order): neglects terms of relative order alpha squared"
+
+    def __repr__(self) -> str:
+        rows = [(*one.joint, one.what, one.gain) for one in self.sensitivities[:3]]
+        lines = [
+            self.statement,
+            f"  factor on the limits, at most: {self.worst_factor:.6g} at input {self.worst_input:.6g} (binds above 1)",
+            f"  misalignments may grow by: {self.smallest_scale:.6g} at input {self.smallest_scale_input:.6g}",
+            *(f"  joint {a}-{b}, {what}: sensitivity {value:.3f}" for a, b, what, value in rows),
+            "  more: .sensitivities, .certificate, .summary(), .to_pandas()",
+        ]
+        return "\n".join(lines)
 
     @property
     def model(self) -> str:
@@ -125,8 +136,8 @@ class CoupledReport:
 
     @property
     def binding(self) -> NDArray[np.bool_]:
-        """Limits that are binding (price above 1e-9), shape (n, blocks)."""
-        return np.asarray(self.price > 1e-9)
+        """Limits that are binding (shadow price above 1e-9), shape (n, blocks)."""
+        return np.asarray(self.shadow_price > 1e-9)
 
     def summary(self) -> dict[str, Any]:
         """Plain values (numbers, strings, lists) for a report or a JSON file."""
@@ -140,23 +151,23 @@ class CoupledReport:
             "worst_factor": self.worst_factor,
             "smallest_scale": self.smallest_scale,
             "smallest_scale_input": self.smallest_scale_input,
-            "largest_gap": float(np.nanmax(self.gap, initial=0.0)),
-            "loosen": [{"joint": list(one.joint), "what": one.what, "gain": one.gain} for one in self.loosen],
+            "largest_gap": float(np.nanmax(self.duality_gap, initial=0.0)),
+            "loosen": [{"joint": list(one.joint), "what": one.what, "gain": one.gain} for one in self.sensitivities],
             "certificate": None if self.certificate is None else self.certificate.summary(),
             "notes": list(self.notes),
             "seconds": self.seconds,
         }
 
     def to_pandas(self) -> Any:
-        """Return a table over the inputs: factor, gap, allowed scale, and consumption and price of every limit."""
+        """Return a table over the inputs: factor, gap, allowed scale, consumption and shadow price of every limit."""
         import pandas as pd
 
         columns: dict[str, Array] = {
-            "input": self.inputs, "factor": self.factor, "gap": self.gap, "allowed_scale": self.allowed_scale,
+            "input": self.inputs, "factor": self.factor, "gap": self.duality_gap, "allowed_scale": self.allowed_scale,
         }  # fmt: skip
         for k, ((a, b), what) in enumerate(self.names):
             columns[f"consumption_{a}_{b}_{what}"] = self.consumption[:, k]
-            columns[f"price_{a}_{b}_{what}"] = self.price[:, k]
+            columns[f"price_{a}_{b}_{what}"] = self.shadow_price[:, k]
         return pd.DataFrame(columns)
 
 
@@ -254,7 +265,7 @@ def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:
     return full
 
 
-def _report(given: Problem, motion: Motion, begin: float) -> CoupledReport:
+def _report(given: JointProblem, motion: Motion, begin: float) -> CoupledReport:
     keep = np.flatnonzero(motion.assembled)
     tilt, scale = given.solve(motion.poses[keep]), given.solve(motion.poses[keep], "scale")
     layout, count = given.layout, len(motion.inputs)
@@ -263,7 +274,11 @@ def _report(given: Problem, motion: Motion, begin: float) -> CoupledReport:
         allowed = np.where(scale.lower > 0.0, 1.0 / scale.lower, math.inf)
         lean = np.hypot(tilt.tau[..., 0], tilt.tau[..., 1])
         used = np.where(layout.limit > 0.0, lean / (tilt.lower[:, None] * layout.limit), 0.0)
-        slip = np.where(np.isfinite(layout.play) & (layout.play > 0.0), np.abs(tilt.zeta) / layout.play, 0.0)
+        slip = np.where(
+            np.isfinite(layout.end_float) & (layout.end_float > 0.0),
+            np.abs(tilt.zeta) / layout.end_float,
+            0.0,
+        )
     used = np.where(tilt.lower[:, None] > 0.0, used, 0.0)
     verdict, reason = _verdict(scale.lower, motion, keep)
     worst = int(np.argmax(tilt.lower)) if keep.size else -1
@@ -274,19 +289,19 @@ def _report(given: Problem, motion: Motion, begin: float) -> CoupledReport:
         reason=reason,
         inputs=motion.inputs,
         factor=_spread(tilt.lower, keep, count),
-        gap=_spread(gap, keep, count),
+        duality_gap=_spread(gap, keep, count),
         allowed_scale=_spread(allowed, keep, count),
         consumption=_spread(used, keep, count),
-        play_used=_spread(slip, keep, count),
-        price=_spread(tilt.moment, keep, count),
-        play_price=_spread(tilt.force, keep, count),
+        axial_clearance_used=_spread(slip, keep, count),
+        shadow_price=_spread(tilt.moment, keep, count),
+        axial_shadow_price=_spread(tilt.force, keep, count),
         names=given.names,
         joints=given.pairs,
         worst_input=float(inputs[worst]) if keep.size else math.nan,
         worst_factor=float(tilt.lower[worst]) if keep.size else math.nan,
         smallest_scale=float(allowed[tight]) if keep.size else math.nan,
         smallest_scale_input=float(inputs[tight]) if keep.size else math.nan,
-        loosen=_loosen(given, scale, tight) if keep.size else (),
+        sensitivities=_sensitivities(given, scale, tight) if keep.size else (),
         limits=given.limits,
         misalignments=given.misalignments,
         notes=_notes(given, motion, keep),
@@ -299,7 +314,7 @@ def _verdict(value: Array, motion: Motion, keep: NDArray[np.intp]) -> tuple[Verd
         return Verdict.CANNOT_ASSEMBLE, f"no sample is assembled: {motion.reason}"
     jammed = value > 1.0 + _TOUCH
     if jammed.any():
-        return Verdict.JAMMED_ESTIMATED, f"jams at {int(jammed.sum())} of {keep.size} samples (estimated)"
+        return Verdict.JAMMED_ESTIMATED, f"binds at {int(jammed.sum())} of {keep.size} samples (estimated)"
     if (value >= 1.0 - _TOUCH).any():
         return Verdict.TOUCHING_ESTIMATED, "no clearance is left at one sample or more (estimated)"
     if not motion.completed:
@@ -307,16 +322,16 @@ def _verdict(value: Array, motion: Motion, keep: NDArray[np.intp]) -> tuple[Verd
     return Verdict.FREE_ESTIMATED, f"free at all {keep.size} samples (estimated)"
 
 
-def _loosen(given: Problem, scale: PoseSolution, at: int) -> tuple[Loosen, ...]:
-    rows = [Loosen(pair, what, float(scale.moment[at, k])) for k, (pair, what) in enumerate(given.names)]
-    rows += [Loosen(pair, "play", float(scale.force[at, k])) for k, pair in enumerate(given.pairs)]
+def _sensitivities(given: JointProblem, scale: PoseSolution, at: int) -> tuple[Sensitivity, ...]:
+    rows = [Sensitivity(pair, what, float(scale.moment[at, k])) for k, (pair, what) in enumerate(given.names)]
+    rows += [Sensitivity(pair, "play", float(scale.force[at, k])) for k, pair in enumerate(given.pairs)]
     return tuple(sorted((row for row in rows if row.gain > 1e-9), key=lambda row: -row.gain))
 
 
-def _notes(given: Problem, motion: Motion, keep: NDArray[np.intp]) -> tuple[str, ...]:
+def _notes(given: JointProblem, motion: Motion, keep: NDArray[np.intp]) -> tuple[str, ...]:
     notes = []
     if given.layout.loops == 0:
-        notes.append("no closed loop of guided joints: nothing can jam")
+        notes.append("no closed loop of guided joints: nothing can bind")
     if keep.size < len(motion.inputs):
         notes.append(f"{len(motion.inputs) - keep.size} samples are not assembled: {motion.reason}")
     return tuple(notes)

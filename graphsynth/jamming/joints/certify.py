@@ -22,7 +22,7 @@ from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.pieces import Found, Work, check_range
 from graphsynth.jamming.joints.positions import Unsupported
 from graphsynth.jamming.joints.program import Bearings, problem
-from graphsynth.jamming.joints.search import Budget, Witness, jamming_member, search
+from graphsynth.jamming.joints.search import Budget, MemberWitness, jamming_member, search
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ def states(pieces: Found) -> States:
     return np.where(pieces.lower > 1.0, -1, np.where(pieces.upper < 1.0, 1, 0)).astype(np.int8)
 
 
-def judge(
-    work: Work, pieces: Found, state: States, stopped: str, branch: bool, witness: Witness | None
+def verdict_of(
+    work: Work, pieces: Found, state: States, stopped: str, branch: bool, witness: MemberWitness | None
 ) -> tuple[Verdict, str]:
     """Return the strongest verdict that the pieces in these states prove, and one sentence on it."""
     width = pieces.hi - pieces.lo
@@ -52,10 +52,11 @@ def judge(
     open_text = _why_open(pieces, state, stopped)
     if share[0] == 0.0 and (state == -1).any():
         u = float(pieces.lo[state == -1][0])
-        return Verdict.CERTIFIED_JAMMED, f"jams at the input {u!r}, proved; around it undecided: {open_text}"
+        return Verdict.CERTIFIED_JAMMED, f"binds at the input {u!r}, proved; around it undecided: {open_text}"
     if share[0] > 0.0:
         rest = f"; undecided over {share[1]:.3g}: {open_text}" if share[1] > 0.0 else ""
-        return Verdict.CERTIFIED_JAMMED, f"jams over {shortened(share[0], -1)} of the range, proved{rest}"
+        part = "the whole range" if (state == -1).all() else f"{shortened(100.0 * share[0], -1, 3)} % of the range"
+        return Verdict.CERTIFIED_JAMMED, f"binds over {part}, proved{rest}"
     if witness is not None:
         return Verdict.CERTIFIED_JAMMED_FOR_SOME, witness.sentence
     if share[1] > 0.0:
@@ -82,7 +83,7 @@ def _why_open(pieces: Found, state: States, stopped: str) -> str:
         return f"the positions are not proved near the input {u:.9g} (a singularity, or two modes that nearly meet)"
     if near.any():
         at = int(np.flatnonzero(near)[np.argmin(np.maximum(pieces.lower[near] - 1.0, 1.0 - pieces.upper[near]))])
-        side = "jams" if pieces.lower[at] > 1.0 else "is free"
+        side = "binds" if pieces.lower[at] > 1.0 else "is free"
         text = (
             f"near the input {pieces.lo[at]:.9g} it {side} with small tilts (first order), but the terms of second "
             "order that they neglect may change that"
@@ -96,7 +97,7 @@ def _widest(pieces: Found, left: Mask) -> str:
     below, above = shortened(float(pieces.lower[worst]), -1, 9), shortened(float(pieces.upper[worst]), 1, 9)
     return (
         f"the factor lies between {below} and {above} near the input "
-        f"{pieces.lo[worst]:.9g}: a crossing, a touch, or tolerances of which some jam and some do not"
+        f"{pieces.lo[worst]:.9g}: it passes 1, touches 1, or some members of the tolerance boxes bind and some do not"
     )
 
 
@@ -126,7 +127,7 @@ class TurnCertificate:
         What is proved in the small-tilt model alone, which neglects terms of second order in the tilts.
     one_branch : bool
         All pieces are proved to belong to one continuous branch.
-    witness : Witness or None
+    witness : MemberWitness or None
         The member that jams, for CERTIFIED_JAMMED_FOR_SOME.
     evaluated : int
         Pieces evaluated.
@@ -141,7 +142,7 @@ class TurnCertificate:
     lower: Array
     upper: Array
     one_branch: bool
-    witness: Witness | None
+    witness: MemberWitness | None
     evaluated: int
     seconds: float
     small_tilts: Verdict = Verdict.UNDECIDED
@@ -254,7 +255,7 @@ def certify_coupled(
 
 
 def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCertificate:
-    """Keep what is proved to be on the branch of the motion; judge."""
+    """Keep what is proved to be on the branch of the motion; give the verdict."""
     links = work.links(pieces)
     own = work.on_branch(pieces, links)
     branch = bool(own.all() and links.all())
@@ -271,8 +272,8 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
     state = pieces.sure
     witness = None if (state == -1).any() or (state == 1).all() else jamming_member(work, pieces, own)
     proved = witness if witness is not None and witness.exact else None
-    verdict, reason = judge(work, pieces, state, stopped, branch, proved)
-    small, first_order = judge(work, pieces, states(pieces), stopped, branch, witness)
+    verdict, reason = verdict_of(work, pieces, state, stopped, branch, proved)
+    small, first_order = verdict_of(work, pieces, states(pieces), stopped, branch, witness)
     if small.is_certified and small is not verdict:
         reason = f"{reason}; with small tilts (first order): {first_order}"
     return TurnCertificate(

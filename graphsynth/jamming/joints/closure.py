@@ -46,9 +46,9 @@ class Layout:
         +1 where the loop passes the joint from a to b, -1 from b to a, else 0.
     block_joint, block_axis : ndarray, shape (blocks,)
         Every limit on tilt: its joint (position in ``joints``) and whether it is round, on roll, or on pitch.
-    limit, play : ndarray, shape (blocks,) and (joints,)
+    limit, end_float : ndarray, shape (blocks,) and (joints,)
         Nominal limits; 0 is rigid, infinite is none.
-    limit_range, play_range : ndarray, shape (2, blocks) and (2, joints)
+    limit_range, end_float_range : ndarray, shape (2, blocks) and (2, joints)
         Tolerance boxes.
     misalignments : tuple of (int, Misalignment)
         Position in ``joints`` and the misalignment, turned so that it is of b against a.
@@ -61,9 +61,9 @@ class Layout:
     block_joint: Ints
     block_axis: Ints
     limit: Array
-    play: Array
+    end_float: Array
     limit_range: Array
-    play_range: Array
+    end_float_range: Array
     misalignments: tuple[tuple[int, float, Misalignment], ...]
     frame: int
     bodies: int
@@ -97,8 +97,8 @@ def lay_out(mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misal
     return Layout(
         joints=tuple(kept), pairs=pairs, incidence=_loops(pairs, mechanism.graph.links, mechanism.frame),
         block_joint=table[:, 0].astype(np.intp), block_axis=table[:, 1].astype(np.intp), limit=table[:, 2],
-        play=np.array([limits[k].play for k in kept]), limit_range=table[:, 3:].T.copy(),
-        play_range=np.array([_of(limits[k].play_range) for k in kept]).reshape(-1, 2).T.copy(),
+        end_float=np.array([limits[k].axial_clearance for k in kept]), limit_range=table[:, 3:].T.copy(),
+        end_float_range=np.array([_of(limits[k].axial_clearance_range) for k in kept]).reshape(-1, 2).T.copy(),
         misalignments=tuple(turned), frame=mechanism.frame, bodies=mechanism.graph.links,
     )  # fmt: skip
 
@@ -110,7 +110,9 @@ def _of(bounds: tuple[float, float] | None) -> tuple[float, float]:
 
 def _holds(own: Limits) -> bool:
     tilts = (own.tilt,) if isinstance(own, JointLimits) else (own.roll, own.pitch)
-    return min(*tilts, own.play) < math.inf if len(tilts) > 1 else min(tilts[0], own.play) < math.inf
+    return (
+        min(*tilts, own.axial_clearance) < math.inf if len(tilts) > 1 else min(tilts[0], own.axial_clearance) < math.inf
+    )
 
 
 def _loops(pairs: Ints, bodies: int, frame: int) -> Array:

@@ -77,7 +77,7 @@ def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Arra
     Parameters
     ----------
     layout : Layout
-        Its ``limit_range`` and ``play_range`` are part of the box.
+        Its ``limit_range`` and ``end_float_range`` are part of the box.
     at : Pieces
     found : PoseSolution
         Of `solve_poses` with mode "scale" near the middle of the boxes; any numbers give valid bounds.
@@ -134,8 +134,8 @@ def _lower(
             continue
         size = _size(layout.block_axis[block], (m[0][:, place], m[1][:, place]), at.e[:, place])
         cost = cost + size * Interval.from_bounds(np.zeros(len(y)), limit)
-    for place, play in enumerate(layout.play_range[1].tolist()):
-        if play > 0.0 and np.isfinite(layout.play[place]):
+    for place, play in enumerate(layout.end_float_range[1].tolist()):
+        if play > 0.0 and np.isfinite(layout.end_float[place]):
             cost = cost + abs(wrench[:, place, 2]) * Interval.from_bounds(0.0, play) / length
     if exact is not None:
         rest = Interval.from_bounds(np.zeros_like(exact.lift), exact.lift)
@@ -212,7 +212,7 @@ def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
         for row in wanted:
             add([[value * s for value in row] for s in signs])
     columns = {tuple((c * (c[np.flatnonzero(c)[0]] if c.any() else 1.0)).tolist())
-               for c in layout.incidence.T[np.isinf(layout.play)]}  # fmt: skip
+               for c in layout.incidence.T[np.isinf(layout.end_float)]}  # fmt: skip
     for column in sorted(columns):
         if any(column):
             add([[zero, zero, Interval(int(s))] for s in column])
@@ -225,7 +225,7 @@ def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
 def start_tilts(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
     """Tilts (N, blocks, 2) and slips (N, joints) from which a closed system is sought, in floats."""
     tau, zeta = np.nan_to_num(found.tau), np.nan_to_num(found.zeta)
-    tau[:, layout.limit == 0.0], zeta[:, layout.play == 0.0] = 0.0, 0.0
+    tau[:, layout.limit == 0.0], zeta[:, layout.end_float == 0.0] = 0.0, 0.0
     tau[:, layout.block_axis != ROUND, 1] = 0.0
     length = found.units.length
     return _fill_free(layout, (at.r.mid - found.units.centre) / length, at, (tau, zeta), length)
@@ -255,7 +255,9 @@ def _upper(
     worst = np.zeros(len(step))
     count = len(step)
     limits = np.broadcast_to(layout.limit_range[0], (count, len(layout.limit))) if exact is None else exact.narrow
-    plays = np.broadcast_to(layout.play_range[0], (count, len(layout.joints))) if exact is None else exact.play
+    plays = (
+        np.broadcast_to(layout.end_float_range[0], (count, len(layout.joints))) if exact is None else exact.end_float
+    )
     for block in range(len(layout.limit)):
         if layout.limit[block] == 0.0 or np.isinf(limits[:, block]).any():
             continue
@@ -265,7 +267,7 @@ def _upper(
             size = abs(tau_all[:, block, 0])
         worst = np.maximum(worst, _ratio(size.hi, limits[:, block]))
     for place in range(len(layout.joints)):
-        if layout.play[place] > 0.0 and np.isfinite(layout.play_range[0, place]):
+        if layout.end_float[place] > 0.0 and np.isfinite(layout.end_float_range[0, place]):
             worst = np.maximum(worst, _ratio(zeta_all[:, place].mag, plays[:, place]))
     return np.where(fine & ~np.isnan(worst), worst, np.inf)
 
@@ -311,7 +313,11 @@ def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length:
     finite = layout.limit[np.isfinite(layout.limit)].max(initial=0.0) or 1.0
     weight = np.where(np.isinf(layout.limit), 100.0, (layout.limit / finite) ** 2)
     tilts = rows * weight[:, None, None]
-    play = np.where(np.isinf(layout.play), 10.0 * finite * length, np.minimum(layout.play, 10.0 * finite * length))
+    play = np.where(
+        np.isinf(layout.end_float),
+        10.0 * finite * length,
+        np.minimum(layout.end_float, 10.0 * finite * length),
+    )
     share = (play / (length * finite)) ** 2
     slips = np.zeros((len(r), len(layout.joints), 3 * loops))
     slips[:, :, 2::3] = layout.incidence.T * (share * length)[:, None]
@@ -325,7 +331,7 @@ def _directions(layout: Layout, r: Array, e: Array, found: PoseSolution, length:
 def _fill_free(layout: Layout, r: Array, at: Pieces, start: tuple[Array, Array], length: float) -> tuple[Array, Array]:
     """Give joints without limit the tilts and slips that close the loops, in floats."""
     tau, zeta = start
-    blocks, joints = np.isinf(layout.limit), np.isinf(layout.play)
+    blocks, joints = np.isinf(layout.limit), np.isinf(layout.end_float)
     if not (blocks.any() or joints.any()):
         return tau, zeta
     count = len(r)

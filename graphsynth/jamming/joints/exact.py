@@ -2,9 +2,9 @@
 
 The exact model.  Link i has the orientation ``T(n_i) Rz(phi_i)``: n_i its normal, T the least rotation from the z axis
 to it, ``phi_i`` its twist.  At a joint the angle between the axes of both sides (the seat turned by its misalignment)
-is at most the limit (a guide: components of the relative rotation), and the centres lie at most the play apart along an
-axis of the joint.  Drivers, guides and gears prescribe twists.  With ``h`` the horizontal part of a normal and v the
-plane vector between two joints of a link, exactly
+is at most the limit (a guide: components of the relative rotation), and the centres lie at most the axial clearance
+apart along an axis of the joint.  Drivers, guides and gears prescribe twists.  With ``h`` the horizontal part of a
+normal and v the plane vector between two joints of a link, exactly
 
     horizontal step = v - h (h . v) / (1 + cos),      vertical step = - h . v
 
@@ -49,8 +49,8 @@ class Neglected(NamedTuple):
 
     ``r``, ``e``, ``d`` (N, joints): movement of a joint, turn of a guide, change of a misalignment.  ``lift`` (N,
     loops): rest of the vertical closure.  ``wide`` and ``narrow`` (N, blocks): limits on linear tilts that every exact
-    tilt within its limit obeys, and that leave every exact tilt within its limit; ``play`` (N, joints) the latter for
-    slips.  ``sound`` (N,): whether all of it is proved.
+    tilt within its limit obeys, and that leave every exact tilt within its limit; ``end_float`` (N, joints) the
+    latter for slips.  ``sound`` (N,): whether all of it is proved.
     """
 
     r: Array
@@ -59,7 +59,7 @@ class Neglected(NamedTuple):
     lift: Array
     wide: Array
     narrow: Array
-    play: Array
+    end_float: Array
     sound: Mask
 
 
@@ -110,7 +110,7 @@ def neglected(
     shift = _shifts(layout, angles, turned)
     wide, narrow = _limits(system, layout, angles, blocks)
     lean = np.sin(_axis(system, angles))[:, kept]
-    play = layout.play_range[0] * (1.0 - 0.5 * lean**2) / _ROUNDING
+    play = layout.end_float_range[0] * (1.0 - 0.5 * lean**2) / _ROUNDING
     lift = _rest(system, layout, angles, lengths, slips)
     moved_r, along, shift, lift, wide = (value * _ROUNDING for value in (moved_r, along, shift, lift, wide))
     return Neglected(moved_r, along, shift, lift, wide, narrow, play, np.asarray(sound & small))
@@ -170,10 +170,10 @@ def _axis(system: Positions, angles: _Angles) -> Array:
 
 
 def _slips(system: Positions, layout: Layout, angles: _Angles, lengths: Array) -> tuple[Array, Mask]:
-    """Largest slip of every joint: its play, or what the heights of both links leave where there is none."""
+    """Largest slip of every joint: its axial clearance, or what the heights of both links leave where there is none."""
     mechanism = system.mechanism
     play = np.full(len(mechanism.joints), np.inf)
-    play[list(layout.joints)] = layout.play_range[1]
+    play[list(layout.joints)] = layout.end_float_range[1]
     rise = lengths * np.sin(angles.link)
     height = np.full_like(angles.link, np.inf)
     height[:, mechanism.frame] = 0.0

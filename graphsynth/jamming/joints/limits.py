@@ -60,24 +60,25 @@ class JointLimits:
     ----------
     tilt : float
         Largest relative tilt, radians; 0 for a rigid guide, ``math.inf`` for none (a spherical joint).
-    play : float
-        Largest axial slip to either side, in the length unit of the mechanism; ``math.inf`` for a joint that floats.
-    tilt_range, play_range : (float, float), optional
+    axial_clearance : float
+        Axial clearance (end float): largest slip to either side, in the length unit of the mechanism; ``math.inf`` for
+        a joint that floats.
+    tilt_range, axial_clearance_range : (float, float), optional
         Tolerance boxes; the value itself by default.
 
     Examples
     --------
-    >>> JointLimits(0.006).play
+    >>> JointLimits(0.006).axial_clearance
     0.0
     """
 
     tilt: float
-    play: float = 0.0
+    axial_clearance: float = 0.0
     tilt_range: Range | None = None
-    play_range: Range | None = None
+    axial_clearance_range: Range | None = None
 
     def __post_init__(self) -> None:
-        for name in ("tilt", "play"):
+        for name in ("tilt", "axial_clearance"):
             value = _limit(name, getattr(self, name))
             object.__setattr__(self, name, value)
             object.__setattr__(self, f"{name}_range", _range(name, value, getattr(self, f"{name}_range")))
@@ -91,21 +92,21 @@ class SlideLimits:
     ----------
     roll, pitch : float
         Largest tilt about the direction of the guide and about the perpendicular in the plane, radians.
-    play : float
-        Largest slip out of the plane to either side, in the length unit of the mechanism.
-    roll_range, pitch_range, play_range : (float, float), optional
+    axial_clearance : float
+        Axial clearance: largest slip out of the plane to either side, in the length unit of the mechanism.
+    roll_range, pitch_range, axial_clearance_range : (float, float), optional
         Tolerance boxes.
     """
 
     roll: float
     pitch: float
-    play: float = 0.0
+    axial_clearance: float = 0.0
     roll_range: Range | None = None
     pitch_range: Range | None = None
-    play_range: Range | None = None
+    axial_clearance_range: Range | None = None
 
     def __post_init__(self) -> None:
-        for name in ("roll", "pitch", "play"):
+        for name in ("roll", "pitch", "axial_clearance"):
             value = _limit(name, getattr(self, name))
             object.__setattr__(self, name, value)
             object.__setattr__(self, f"{name}_range", _range(name, value, getattr(self, f"{name}_range")))
@@ -180,7 +181,7 @@ def bearing_limits(
     bearing: Bearing,
     condition: Condition = "A",
     *,
-    play: Real = 0.0,
+    axial_clearance: Real = 0.0,
     radius_tolerance: float = 0.0,
     height_tolerance: float = 0.0,
     clearance_tolerance: float = 0.0,
@@ -194,8 +195,8 @@ def bearing_limits(
     bearing : Bearing
     condition : {"A", "B", "general"}
         Contact condition; "general" needs ``bearing.hole_length``.
-    play : float
-        Axial play, in the length unit of the mechanism.
+    axial_clearance : float
+        Axial clearance (end float) to either side, in the length unit of the mechanism.
     radius_tolerance, height_tolerance, clearance_tolerance, hole_tolerance : float
         Half widths in millimetres of ``Rb``, ``Hb``, ``clearance`` and ``hole_length``.
     radial_offset : float
@@ -231,7 +232,7 @@ def bearing_limits(
         raise GeometryError(f"clearance = {bearing.clearance} mm is an interference fit; the joint cannot be assembled")
     critical = bearing.critical_tilt(condition)
     tilt = math.inf if critical.angle is None or critical.reason else critical.angle
-    return JointLimits(tilt, play, critical_range(bearing, condition, boxes, tilt))
+    return JointLimits(tilt, axial_clearance, critical_range(bearing, condition, boxes, tilt))
 
 
 def complete(

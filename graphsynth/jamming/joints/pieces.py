@@ -32,7 +32,7 @@ from graphsynth.jamming.joints.enclosure import (
 from graphsynth.jamming.joints.exact import neglected
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.positions import Positions
-from graphsynth.jamming.joints.program import PoseSolution, Problem, check_motion
+from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion
 from graphsynth.jamming.joints.tubes import Tubes, linked, points, prove_tubes, slopes
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ class Found(NamedTuple):
 class Work:
     """Evaluation of pieces of one problem along one motion; without ``exact`` by small tilts alone."""
 
-    def __init__(self, given: Problem, motion: Motion, tolerance: float, exact: bool = True) -> None:
+    def __init__(self, given: JointProblem, motion: Motion, tolerance: float, exact: bool = True) -> None:
         self.given, self.motion, self.tolerance, self.exact = given, motion, tolerance, exact
         self.system = Positions(motion.mechanism, tolerance)
         self.corners = corner_layouts(given.layout)

@@ -132,7 +132,7 @@ class _Rows:
         self.M = moment_rows(layout, r, e)
         self.F = force_rows(layout)
         self.W = work_row(layout, r, d)
-        limit, play = layout.limit, layout.play
+        limit, play = layout.limit, layout.end_float
         finite = limit[np.isfinite(limit)]
         self.unit = float(finite.max(initial=0.0)) or 1.0
         self.t = limit / self.unit
@@ -324,7 +324,7 @@ Bearings: TypeAlias = Bearing | Limits | Mapping[tuple[int, int], Bearing | Limi
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class JointProblem:
     """A mechanism with limits and misalignments; what the solvers and the certificates start from."""
 
     mechanism: Mechanism
@@ -359,7 +359,7 @@ def check_motion(motion: Any) -> None:
 
 def problem(
     mechanism: Mechanism, bearings: Bearings, tilts: Misalignment | Iterable[Misalignment], condition: Condition = "A"
-) -> Problem:
+) -> JointProblem:
     """Put a mechanism, limits and misalignments together; see `assess_coupled` for the arguments.
 
     Raises
@@ -381,4 +381,4 @@ def problem(
             raise GeometryError(f"joint {pair[0]}-{pair[1]} has two misalignments; give their sum")
         by_pair[pair] = tilt
     limits = complete(mechanism.joints, bearings, by_pair, condition)
-    return Problem(mechanism, limits, chosen, lay_out(mechanism, limits, chosen))
+    return JointProblem(mechanism, limits, chosen, lay_out(mechanism, limits, chosen))

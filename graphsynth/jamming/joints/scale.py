@@ -41,7 +41,7 @@ class ScaleCertificate:
     larger one the input ``at`` is proved to jam, again for all of them; tolerances keep the two apart.
     ``relative_gap`` is ``high / low - 1``; ``reason`` says why it is not smaller, or is empty.  Free and jammed are
     those of the small-tilt model, whose error, of relative order alpha squared, is not in the bounds; `certify_coupled`
-    judges a given misalignment with exact tilts.
+    assesses a given misalignment with exact tilts.
     """
 
     low: float

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from graphsynth.intervals.reading import shortened
 from graphsynth.jamming.joints.limits import JointLimits, Limits, Misalignment, SlideLimits
 from graphsynth.jamming.joints.pieces import Found, Work, cut
-from graphsynth.jamming.joints.program import Problem, problem
+from graphsynth.jamming.joints.program import JointProblem, problem
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
@@ -150,7 +150,7 @@ _INSIDE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Witness:
+class MemberWitness:
     """A member of the tolerance boxes that is proved to jam (certified).
 
     Attributes
@@ -192,18 +192,18 @@ class Witness:
         """What is proved."""
         tilts = ", ".join(f"alpha = {m.alpha:.9g} at {m.direction:.9g} rad" for m in self.misalignments)
         return (
-            f"a member of the tolerance boxes ({tilts}) jams at the input {self.input!r}, proved"
+            f"a member of the tolerance boxes ({tilts}) binds at the input {self.input!r}, proved"
             f"{'' if self.exact else ' with small tilts (first order) only'}: its limits would "
             f"have to be {shortened(self.factor, -1, 9)} times as large or more with small tilts"
         )
 
 
 def _values(own: Limits) -> dict[str, float]:
-    names = ("tilt", "play") if isinstance(own, JointLimits) else ("roll", "pitch", "play")
-    return {name: getattr(own, name) for name in names}
+    names = {"tilt": "tilt"} if isinstance(own, JointLimits) else {"roll": "roll", "pitch": "pitch"}
+    return {key: getattr(own, name) for key, name in {**names, "play": "axial_clearance"}.items()}
 
 
-def jamming_member(work: Work, pieces: Found, own: Mask) -> Witness | None:
+def jamming_member(work: Work, pieces: Found, own: Mask) -> MemberWitness | None:
     """Return a member proved to jam in one of the pieces ``own`` (proved to be on the branch), or None."""
     left = np.flatnonzero(own & (pieces.upper > 1.0))
     if left.size == 0 or not _has_tolerance(work):
@@ -225,22 +225,22 @@ def jamming_member(work: Work, pieces: Found, own: Mask) -> Witness | None:
     if factor[top] <= 1.0:
         return None
     given = member.given
-    return Witness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism, exact)
+    return MemberWitness(float(at[top]), float(factor[top]), given.misalignments, given.limits, given.mechanism, exact)
 
 
 def _has_tolerance(work: Work) -> bool:
     boxes = [m.alpha_range for m in work.given.misalignments] + [m.direction_range for m in work.given.misalignments]
     for limit in work.given.limits:
-        boxes += [getattr(limit, f"{name}_range") for name in _values(limit)]
+        boxes += [value for name, value in vars(limit).items() if name.endswith("_range")]
     return work.tolerance > 0.0 or any(box is not None and box[0] < box[1] for box in boxes)
 
 
 def _tightest(limit: Limits) -> Limits:
     if isinstance(limit, JointLimits):
-        assert limit.tilt_range is not None and limit.play_range is not None  # filled when made
-        return JointLimits(limit.tilt_range[0], limit.play_range[0])
-    assert limit.roll_range is not None and limit.pitch_range is not None and limit.play_range is not None
-    return SlideLimits(limit.roll_range[0], limit.pitch_range[0], limit.play_range[0])
+        assert limit.tilt_range is not None and limit.axial_clearance_range is not None  # filled when made
+        return JointLimits(limit.tilt_range[0], limit.axial_clearance_range[0])
+    assert limit.roll_range is not None and limit.pitch_range is not None and limit.axial_clearance_range is not None
+    return SlideLimits(limit.roll_range[0], limit.pitch_range[0], limit.axial_clearance_range[0])
 
 
 def _sharp(tilt: Misalignment, alpha: float | None = None, direction: float | None = None) -> Misalignment:
@@ -254,7 +254,7 @@ def _member(work: Work, mechanism: Mechanism, limits: tuple[Limits, ...], tilts:
     """Work of one member, from the start of the motion."""
     rigid = {(min(t.base, t.link), max(t.base, t.link)) for t in tilts if t.rigid}
     table = {joint.pair: own for joint, own in zip(mechanism.joints, limits) if joint.pair not in rigid}
-    given: Problem = problem(mechanism, table, tilts)
+    given: JointProblem = problem(mechanism, table, tilts)
     return Work(given, replace(work.motion, mechanism=mechanism), 0.0)
 
 

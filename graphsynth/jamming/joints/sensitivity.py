@@ -20,7 +20,7 @@ from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.limits import Misalignment
-from graphsynth.jamming.joints.program import Bearings, Problem, check_motion, problem
+from graphsynth.jamming.joints.program import Bearings, JointProblem, check_motion, problem
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.simulation import Motion
@@ -31,13 +31,13 @@ Array = NDArray[np.float64]
 _NOTHING = 1e-9
 
 
-class Loosened(NamedTuple):
+class LimitSensitivity(NamedTuple):
     """One limit loosened by itself.
 
     ``scale`` is the smallest allowed scale over the range then, and ``binds_at`` the input where it is reached;
     ``gain`` its relative growth per relative growth of the limit (0.4: ten percent more limit, four percent more
-    misalignment); ``promised`` the same from the price at the worst input, never less; ``without`` the smallest scale
-    if the joint had no such limit at all: no more can be had from this joint alone.
+    misalignment); ``promised`` the same from the shadow price at the worst input, never less; ``without`` the smallest
+    scale if the joint had no such limit at all: no more can be had from this joint alone.
     """
 
     joint: tuple[int, int]
@@ -50,8 +50,8 @@ class Loosened(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LooseningTable:
-    """Result of `compare_loosening`: rows from the most useful limit to the least.
+class SensitivityTable:
+    """Result of `compare_sensitivities`: rows from the most useful limit to the least.
 
     Attributes
     ----------
@@ -59,13 +59,13 @@ class LooseningTable:
         Relative growth of each limit.
     scale, worst_input : float
         Smallest allowed scale as the mechanism is, and where.
-    rows : tuple of Loosened
+    rows : tuple of LimitSensitivity
     """
 
     by: float
     scale: float
     worst_input: float
-    rows: tuple[Loosened, ...]
+    rows: tuple[LimitSensitivity, ...]
 
     def __str__(self) -> str:
         """Return a table in plain text; limits that gain nothing are counted."""
@@ -84,20 +84,20 @@ class LooseningTable:
         """Return the rows as a table."""
         import pandas as pd
 
-        frame = pd.DataFrame(self.rows, columns=Loosened._fields)
+        frame = pd.DataFrame(self.rows, columns=LimitSensitivity._fields)
         frame["joint"] = [f"{a}-{b}" for a, b in frame["joint"]]
         return frame
 
 
-def compare_loosening(
+def compare_sensitivities(
     motion: Motion,
     bearings: Bearings,
     tilts: Misalignment | Iterable[Misalignment],
     *,
     condition: Condition = "A",
     by: float = 0.1,
-) -> LooseningTable:
-    """Loosen every limit by itself and tell how much more misalignment the whole motion then takes.
+) -> SensitivityTable:
+    """Sensitivity every limit by itself and tell how much more misalignment the whole motion then takes.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def compare_loosening(
 
     Returns
     -------
-    LooseningTable
+    SensitivityTable
         Estimated, at the samples of the motion; limits that are zero (rigid) or infinite have no row.
 
     Raises
@@ -127,7 +127,7 @@ def compare_loosening(
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     >>> joints = Revolute(0, 1), Revolute(1, 2, (1, 0)), Revolute(2, 3, (2.5, 0), (2.5, 0)), Revolute(0, 3, (2, 0))
     >>> motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), np.radians([90.0]))
-    >>> table = compare_loosening(motion, Bearing(), Misalignment(0, 1, 0.01))
+    >>> table = compare_sensitivities(motion, Bearing(), Misalignment(0, 1, 0.01))
     >>> [(row.joint, row.what, round(row.promised, 6)) for row in table.rows]
     [((0, 3), 'tilt', 0.5), ((1, 2), 'tilt', 0.5), ((2, 3), 'tilt', 0.0)]
     """
@@ -146,9 +146,9 @@ def compare_loosening(
     rows = []
     for name, one in _each(given):
         promised = float((found.force if name[1] == "play" else found.moment)[worst, one.place])
-        rows.append(_loosened(name, one, here, promised if math.isfinite(promised) else 0.0))
+        rows.append(_sensitivity(name, one, here, promised if math.isfinite(promised) else 0.0))
     rows.sort(key=lambda row: (-round(row.gain, 9), -row.promised, row.joint, row.what))
-    return LooseningTable(by, float(allowed[worst]), float(inputs[worst]), tuple(rows))
+    return SensitivityTable(by, float(allowed[worst]), float(inputs[worst]), tuple(rows))
 
 
 class _Here(NamedTuple):
@@ -161,10 +161,10 @@ class _Here(NamedTuple):
     by: float
 
 
-def _loosened(name: tuple[tuple[int, int], str], one: _One, here: _Here, promised: float) -> Loosened:
+def _sensitivity(name: tuple[tuple[int, int], str], one: _One, here: _Here, promised: float) -> LimitSensitivity:
     scale, at = float(here.allowed[here.worst]), float(here.inputs[here.worst])
     if promised <= _NOTHING or scale == 0.0:  # concave and without slope: it will not grow later either
-        return Loosened(*name, scale, 0.0, promised, at, scale)
+        return LimitSensitivity(*name, scale, 0.0, promised, at, scale)
     # no pose gains more than the factor itself: only those near the smallest can be the smallest then
     near = np.flatnonzero(here.allowed <= scale * (1.0 + here.by))
     now = _allowed(one.by(1.0 + here.by).solve(here.poses[near], "scale").lower)
@@ -172,7 +172,7 @@ def _loosened(name: tuple[tuple[int, int], str], one: _One, here: _Here, promise
     gain = (float(now[least]) / scale - 1.0) / here.by
     without = float(_allowed(one.by(math.inf).solve(here.poses, "scale").lower).min())
     gain = gain if gain > _NOTHING else 0.0
-    return Loosened(*name, float(now[least]), gain, promised, float(here.inputs[near[least]]), without)
+    return LimitSensitivity(*name, float(now[least]), gain, promised, float(here.inputs[near[least]]), without)
 
 
 def _allowed(lower: Array) -> Array:
@@ -183,19 +183,19 @@ def _allowed(lower: Array) -> Array:
 class _One(NamedTuple):
     """One limit of a problem."""
 
-    given: Problem
+    given: JointProblem
     field: str
     place: int
 
-    def by(self, factor: float) -> Problem:
+    def by(self, factor: float) -> JointProblem:
         """Return the problem with this limit so many times as large."""
         values = getattr(self.given.layout, self.field).copy()
         values[self.place] *= factor
         return replace(self.given, layout=replace(self.given.layout, **{self.field: values}))
 
 
-def _each(given: Problem) -> list[tuple[tuple[tuple[int, int], str], _One]]:
+def _each(given: JointProblem) -> list[tuple[tuple[tuple[int, int], str], _One]]:
     """Limits that can be loosened, with their names."""
     tilts = [(name, _One(given, "limit", k)) for k, name in enumerate(given.names)]
-    plays = [((pair, "play"), _One(given, "play", k)) for k, pair in enumerate(given.pairs)]
+    plays = [((pair, "play"), _One(given, "end_float", k)) for k, pair in enumerate(given.pairs)]
     return [(name, one) for name, one in tilts + plays if 0.0 < getattr(given.layout, one.field)[one.place] < math.inf]

@@ -1,11 +1,11 @@
-from .closed_form import AssemblyModes as AssemblyModes
+from .closed_form import (
+    Convention as Convention,
+)
 from .closed_form import CrankAngles as CrankAngles
 from .closed_form import (
     ModelComparison as ModelComparison,
 )
-from .closed_form import (
-    Reading as Reading,
-)
+from .closed_form import PointingModes as PointingModes
 from .folds import (
     DeadPoint as DeadPoint,
 )

@@ -83,7 +83,7 @@ SIGNS = ((1, -1), (1, 1), (-1, -1), (-1, 1))
 
 
 @dataclass(frozen=True, eq=False)
-class AssemblyModes:
+class PointingModes:
     """All assembly modes; the last axis runs over `SIGNS`.
 
     Attributes
@@ -113,7 +113,7 @@ class AssemblyModes:
         return np.asarray(self.distinct.sum(axis=-1))
 
 
-def solve(mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike) -> AssemblyModes:
+def solve(mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike) -> PointingModes:
     """All assembly modes; see `PointingMechanism.solve`."""
     found = [poses(mechanism, phi_x, phi_y, *signs) for signs in SIGNS]
     a, b, status, deficit = (
@@ -124,7 +124,7 @@ def solve(mechanism: PointingDimensions, phi_x: ArrayLike, phi_y: ArrayLike) -> 
         for earlier in range(later):
             same = (a[..., later] == a[..., earlier]) & (b[..., later] == b[..., earlier])
             distinct[..., later] &= ~same
-    return AssemblyModes(a, b, status, deficit, distinct)
+    return PointingModes(a, b, status, deficit, distinct)
 
 
 class CrankStatus(IntEnum):
@@ -247,7 +247,7 @@ def _gimbal_axes(a: Array, b: Array, order: str) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class Reading:
+class Convention:
     """How a model reads its inputs and outputs.
 
     Parameters
@@ -320,7 +320,7 @@ class ModelComparison:
 
 
 def read_angles(
-    mechanism: PointingDimensions, reading: Reading, phi_x: Array, phi_y: Array
+    mechanism: PointingDimensions, reading: Convention, phi_x: Array, phi_y: Array
 ) -> tuple[Array, Array, NDArray[np.int8]]:
     """Elevation, azimuth and status as a model with the given conventions reads them.
 
@@ -340,8 +340,8 @@ def compare(
     other: PointingDimensions,
     phi_x: ArrayLike,
     phi_y: ArrayLike | None,
-    reading: Reading,
-    other_reading: Reading,
+    reading: Convention,
+    other_reading: Convention,
 ) -> ModelComparison:
     """Compare two models; see `PointingMechanism.compare`."""
     x, y = crank_arrays(phi_x, phi_x if phi_y is None else phi_y)

@@ -18,7 +18,7 @@ from graphsynth.drawing.palette import LIGHT, WHITE
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.systems.antenna.closed_form import ModelComparison, Reading
+    from graphsynth.systems.antenna.closed_form import Convention, ModelComparison
     from graphsynth.systems.antenna.mechanism import PointingMechanism
 
 __all__ = ["difference_map_picture", "fold_map_picture", "tolerance_map_picture"]
@@ -30,8 +30,8 @@ def difference_map_picture(
     mechanism: PointingMechanism,
     other: PointingMechanism | None = None,
     *,
-    reading: Reading | None = None,
-    other_reading: Reading | None = None,
+    reading: Convention | None = None,
+    other_reading: Convention | None = None,
     span: float = math.radians(40.0),
     nodes: int = 81,
     size: tuple[float, float] = (10.0, 4.4),

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from graphsynth.systems.antenna.closed_form import AssemblyModes, CrankAngles, ModelComparison, Reading
+    from graphsynth.systems.antenna.closed_form import Convention, CrankAngles, ModelComparison, PointingModes
     from graphsynth.systems.antenna.folds import DeadPoint, Fold
     from graphsynth.systems.antenna.loop_equations import ChartReport, LoopSolution, PassiveAngles, RootSurvey
     from graphsynth.systems.antenna.model import Poses
@@ -83,7 +83,7 @@ class PointingMechanism(PointingDimensions):
 
         return poses(self, phi_x, phi_y, s_y, s_x)
 
-    def solve(self, phi_x: ArrayLike, phi_y: ArrayLike) -> AssemblyModes:
+    def solve(self, phi_x: ArrayLike, phi_y: ArrayLike) -> PointingModes:
         """All assembly modes at the given crank angles: up to four, none twice.
 
         Examples
@@ -304,8 +304,8 @@ class PointingMechanism(PointingDimensions):
         phi_x: ArrayLike,
         phi_y: ArrayLike | None = None,
         *,
-        reading: Reading | None = None,
-        other_reading: Reading | None = None,
+        reading: Convention | None = None,
+        other_reading: Convention | None = None,
     ) -> ModelComparison:
         """Difference of two models over a sweep: gimbal order, lengths, senses, mounting, reading (theory/antenna 8).
 
@@ -314,7 +314,7 @@ class PointingMechanism(PointingDimensions):
         other : PointingMechanism
         phi_x, phi_y : array_like
             Crank angles, radians; ``phi_y = phi_x`` unless given.
-        reading, other_reading : Reading, optional
+        reading, other_reading : Convention, optional
             Conventions of each model.
 
         Examples
@@ -324,9 +324,9 @@ class PointingMechanism(PointingDimensions):
         >>> found.arcminutes.round(6).tolist()
         [0.656059, 30.989576]
         """
-        from graphsynth.systems.antenna.closed_form import Reading, compare
+        from graphsynth.systems.antenna.closed_form import Convention, compare
 
-        return compare(self, other, phi_x, phi_y, reading or Reading(), other_reading or Reading())
+        return compare(self, other, phi_x, phi_y, reading or Convention(), other_reading or Convention())
 
     def tolerance(
         self,

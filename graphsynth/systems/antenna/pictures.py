@@ -18,7 +18,7 @@ from graphsynth.drawing.palette import LIGHT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from graphsynth.systems.antenna.closed_form import ModelComparison, Reading
+    from graphsynth.systems.antenna.closed_form import Convention, ModelComparison
     from graphsynth.systems.antenna.mechanism import PointingMechanism
     from graphsynth.systems.antenna.model import Poses
 
@@ -160,8 +160,8 @@ def comparison_picture(
     mechanism: PointingMechanism,
     other: PointingMechanism | None = None,
     *,
-    reading: Reading | None = None,
-    other_reading: Reading | None = None,
+    reading: Convention | None = None,
+    other_reading: Convention | None = None,
     largest: float = math.radians(40.0),
     samples: int = 161,
     working: float = math.radians(15.0),
@@ -177,7 +177,7 @@ def comparison_picture(
         Model of panel b (analytical).
     other : PointingMechanism, optional
         Model of panel a (block diagram); by default the same lengths with the other gimbal order.
-    reading, other_reading : Reading, optional
+    reading, other_reading : Convention, optional
         Conventions of each model.
     largest : float
         Crank angle at the end of the sweep, radians.

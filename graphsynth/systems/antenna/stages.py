@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from graphsynth.systems.antenna import (
         ChartReport,
+        Convention,
         DeadPoint,
         Fold,
         ModelComparison,
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
         PointingMechanism,
         PointingSweep,
         Rates,
-        Reading,
         RootSurvey,
         Tolerance,
     )
@@ -102,16 +102,16 @@ def widths_of(context: Context) -> list[float]:
     return [getattr(table, name) for name in LENGTH_NAMES]
 
 
-def other_model(context: Context) -> tuple[PointingMechanism, Reading]:
+def other_model(context: Context) -> tuple[PointingMechanism, Convention]:
     """Return the second model and its conventions."""
     from dataclasses import replace
 
-    from graphsynth.systems.antenna import Reading
+    from graphsynth.systems.antenna import Convention
 
     c = table_of(context).comparison
     return (
         replace(antenna_of(context), order=c.order),
-        Reading(c.sense_y, c.sense_x, c.side_y, c.side_x, c.output),
+        Convention(c.sense_y, c.sense_x, c.side_y, c.side_x, c.output),
     )
 
 
@@ -336,21 +336,21 @@ def _conventions_table(context: Context) -> Table:
 
     import numpy as np
 
-    from graphsynth.systems.antenna import Reading
+    from graphsynth.systems.antenna import Convention
 
     antenna, largest = antenna_of(context), table_of(context).sweep.largest
     phi = largest * np.array([0.125, 0.25, 0.375, 0.5, 0.75, 1.0])
     swapped = replace(antenna, order="XY" if antenna.order == "YX" else "YX")
-    cases: list[tuple[str, PointingMechanism, Reading]] = [
-        (f"gimbal order {swapped.order}", swapped, Reading()),
-        ("both cranks reversed", antenna, Reading(-1, -1)),
-        ("crank of leg Y reversed", antenna, Reading(sense_y=-1)),
-        ("crank of leg X reversed", antenna, Reading(sense_x=-1)),
-        ("leg Y on the other side", antenna, Reading(side_y=-1)),
-        ("tilt of the normal as output", antenna, Reading(output="normal")),
-        ("rod of leg Y longer by 1 mm", replace(antenna, l2=antenna.l2 + 1e-3), Reading()),
-        ("cardans farther by 0.5 mm", replace(antenna, l1=antenna.l1 + 5e-4), Reading()),
-        ("crank of leg Y longer by 0.5 mm", replace(antenna, l3=antenna.l3 + 5e-4), Reading()),
+    cases: list[tuple[str, PointingMechanism, Convention]] = [
+        (f"gimbal order {swapped.order}", swapped, Convention()),
+        ("both cranks reversed", antenna, Convention(-1, -1)),
+        ("crank of leg Y reversed", antenna, Convention(sense_y=-1)),
+        ("crank of leg X reversed", antenna, Convention(sense_x=-1)),
+        ("leg Y on the other side", antenna, Convention(side_y=-1)),
+        ("tilt of the normal as output", antenna, Convention(output="normal")),
+        ("rod of leg Y longer by 1 mm", replace(antenna, l2=antenna.l2 + 1e-3), Convention()),
+        ("cardans farther by 0.5 mm", replace(antenna, l1=antenna.l1 + 5e-4), Convention()),
+        ("crank of leg Y longer by 0.5 mm", replace(antenna, l3=antenna.l3 + 5e-4), Convention()),
     ]
     rows = []
     for name, other, reading in cases:
@@ -366,7 +366,7 @@ def _conventions_table(context: Context) -> Table:
     return table("What makes two models disagree", columns, rows, note)
 
 
-def _sizes(antenna: PointingMechanism, phi: NDArray[np.float64], reading: Reading) -> NDArray[np.float64]:
+def _sizes(antenna: PointingMechanism, phi: NDArray[np.float64], reading: Convention) -> NDArray[np.float64]:
     """Difference of means, minutes of arc, if reversed cranks are counted positive in the direction they turn."""
     import numpy as np
 

@@ -32,7 +32,7 @@ INFLATIONS, SHRINKS = 40, 8
 PLACES = {"Y": (0, 2, 1), "X": (0, 4, 3)}
 
 
-class Enclosure(NamedTuple):
+class OutputEnclosure(NamedTuple):
     """Intervals of both outputs and of their derivatives by the five lengths, for every length in the box."""
 
     u: Any
@@ -193,7 +193,7 @@ class LengthBoxProblem:
                 break
         return output, gradient
 
-    def enclose(self, box: tuple[Any, ...]) -> Enclosure:
+    def enclose(self, box: tuple[Any, ...]) -> OutputEnclosure:
         """Enclose both outputs and their gradients over a box of lengths.
 
         Raises
@@ -212,7 +212,7 @@ class LengthBoxProblem:
         v_mid = self._prove(second, middle, middle, starts[1], u_mid, u_mid, None)
         v = self._prove(second, box, middle, starts[1], u, u_mid, du)
         v, dv = self._shrink(second, box, middle, v, v_mid, u, du)
-        return Enclosure(u, v, du, dv)
+        return OutputEnclosure(u, v, du, dv)
 
 
 NAMES = ("l1", "l2", "l3", "l4", "l5")
@@ -343,7 +343,9 @@ def _ceil(x: Any) -> float:
     return value if x.b <= value else math.nextafter(value, math.inf)
 
 
-def _face_bound(problem: LengthBoxProblem, box: tuple[Any, ...], found: Enclosure, which: int, upward: bool) -> Any:
+def _face_bound(
+    problem: LengthBoxProblem, box: tuple[Any, ...], found: OutputEnclosure, which: int, upward: bool
+) -> Any:
     """Bound of one output with every proved monotone length at its end, the others in mean-value form (step 3)."""
     iv = problem.iv
     gradient = found.dv if which else found.du

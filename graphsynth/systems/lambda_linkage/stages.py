@@ -91,14 +91,14 @@ def _move(table: LambdaTable) -> LambdaMotion:
 
 def jamming(context: Context, motions: tuple[Attempt, ...]) -> tuple[Attempt, ...]:
     """Prove what the bearing of every moved candidate does, under condition A and condition B, for all tolerances."""
-    from graphsynth.jamming.assess import assess_jamming
+    from graphsynth.jamming.assess import assess_bearing
     from graphsynth.jamming.bearing.bearing import Bearing
 
     table, box = _table(context), tolerance_box(context)
     bearing = Bearing(table.bearing.radius_mm, table.bearing.height_mm, table.bearing.clearance_mm)
 
     def assess(motion: LambdaMotion) -> dict[_C, JammingReport]:
-        return {c: assess_jamming(motion.linkage, bearing, c, motion.tilted.f, box=box) for c in _CONDITIONS}
+        return {c: assess_bearing(motion.linkage, bearing, c, motion.tilted.f, box, True) for c in _CONDITIONS}
 
     return each(motions, assess)
 
@@ -175,7 +175,7 @@ def _margins(
     """Margins of the nominal dimensions, each with the proved bound of its error where there is one."""
     part = sum(arc.length for arc in report.arcs.arcs) / math.tau
     values: list[tuple[str, float | None, str, tuple[float | None, float | None]]] = [
-        ("least clearance over the turn", -report.worst_gap, "mm", proved.clearance_left),
+        ("least clearance over the turn", -report.worst_interference, "mm", proved.clearance_left),
         ("largest tilt", report.largest_tilt, "rad", proved.largest_tilt),
         ("critical tilt", report.critical_tilt, "rad", proved.critical_tilt),
         ("jammed part of the turn", part, "", (None, None)),
@@ -207,7 +207,7 @@ def _proof_table(
     if not tolerance_box(context).is_point:
         rows.append(("without tolerances", *(_nominal(context, c).statement for c in found)))
     rows += [
-        ("largest gap, mm", *(_bounds(f.largest_gap.lo, f.largest_gap.hi) for f in found.values())),
+        ("largest gap, mm", *(_bounds(f.largest_interference.lo, f.largest_interference.hi) for f in found.values())),
         ("jams for certain", *(_spans(f.arcs.inner) for f in found.values())),
         ("free for certain", *(_spans(f.arcs.free) for f in found.values())),
         ("neither is proved", *(_total(f.arcs.undecided) for f in found.values())),

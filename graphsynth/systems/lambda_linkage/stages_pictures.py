@@ -14,7 +14,7 @@ from graphsynth.systems.lambda_linkage.system import LambdaTable
 if TYPE_CHECKING:
     from graphsynth.drawing.plots import Band
     from graphsynth.jamming.assess import JammingReport
-    from graphsynth.jamming.bearing.arcs import Arc
+    from graphsynth.jamming.bearing.arcs import JamArc
     from graphsynth.systems.lambda_linkage.stages import LambdaMotion
 
 __all__ = ["animations", "plots", "sketches"]
@@ -78,11 +78,11 @@ def _condition(context: Context) -> str:
     return table.bearing.condition
 
 
-def _jams(arcs: tuple[Arc, ...], angle: float) -> bool:
+def _jams(arcs: tuple[JamArc, ...], angle: float) -> bool:
     return any(arc.contains(angle) for arc in arcs)
 
 
-def _sketch(motion: LambdaMotion, i: int, width: float, arcs: tuple[Arc, ...], labels: bool) -> str:
+def _sketch(motion: LambdaMotion, i: int, width: float, arcs: tuple[JamArc, ...], labels: bool) -> str:
     """Draw one position in the plane; a bearing that jams has a coloured ring."""
     angle = float(motion.tilted.f[i])
     return lambda_sketch(motion.linkage, angle, width=width, labels=labels, ring=_jams(arcs, angle)).svg()
@@ -124,7 +124,7 @@ def _plot_gap(report: JammingReport) -> str:
     from graphsynth.drawing.plots import Line, line_plot
 
     table, f = report.table, np.degrees(report.table.f)
-    gaps = [Line(f, table.gap_a, "condition A", "a"), Line(f, table.gap_b, "condition B", "c", "--")]
+    gaps = [Line(f, table.interference_a, "condition A", "a"), Line(f, table.interference_b, "condition B", "c", "--")]
     zero = Line((), 0.0, "", "soft")
     return line_plot(
         gaps, "crank angle [°]", "interference [mm]", bands=_jam_bands(report), xticks=_TICKS, levels=[zero]

@@ -96,7 +96,7 @@ def test_deck_problem_is_solved_sharply():
     boxes = krawczyk_boxes(circle_ellipse(*surrogate(WORST)))
     hull = exact_hull(boxes.problem)
     assert boxes.status is Status.UNIQUE
-    assert boxes.reasons == (Reason.CROSSING,)
+    assert boxes.reasons == (Reason.INTERSECTION,)
     assert boxes.proved.width.max() < 1e-11
     assert (boxes.domains.width > 1e3 * hull.hull.width).all()
     assert boxes.spectral_radius < 1e-9

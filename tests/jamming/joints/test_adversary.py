@@ -80,7 +80,7 @@ def attack(make, links, rng, count):
     lower, upper = factor_bounds(layout, at, solve_poses(layout, r, e, moved, "scale"))
     outcome = Counter(positions=count)
     tilt = tuple(own.tilt if isinstance(own, JointLimits) else (own.roll, own.pitch) for own in limits)
-    pairs, play = tuple(map(tuple, layout.pairs.tolist())), tuple(own.play for own in limits)
+    pairs, play = tuple(map(tuple, layout.pairs.tolist())), tuple(own.axial_clearance for own in limits)
     for n in range(count):
         (x, moments, forces), _, _ = judge(Position(mechanism.graph.links, pairs, r[n], d[n], tilt, play))
         here = Position(mechanism.graph.links, pairs, r[n], moved[n], tilt, play)
@@ -168,7 +168,9 @@ def test_random_tilts_and_wrenches_stay_outside(links):
     lower, upper = factor_bounds(layout, at, found)
     assert upper[0] - lower[0] <= 1e-11 * upper[0]
     pairs = tuple(map(tuple, layout.pairs.tolist()))
-    here = Position(links, pairs, r[0], d[0], tuple(own.tilt for own in limits), tuple(own.play for own in limits))
+    here = Position(
+        links, pairs, r[0], d[0], tuple(own.tilt for own in limits), tuple(own.axial_clearance for own in limits)
+    )
     (x, *_), _, _ = judge(here)
     size = 10.0 ** rng.uniform(-8, 0, (20000, 1))
     fields = x[None, :-1] + size * rng.normal(size=(20000, len(x) - 1))
@@ -177,7 +179,7 @@ def test_random_tilts_and_wrenches_stay_outside(links):
     for k, own in enumerate(limits):
         tau = fields @ np.array([tilt_row(here, k, n)[:-1] for n in ((1.0, 0.0), (0.0, 1.0))]).T - d[0, k]
         worst = np.maximum(worst, np.hypot(*tau.T) / own.tilt)
-        worst = np.maximum(worst, np.abs(fields @ slip_row(here, k)[:-1]) / own.play)
+        worst = np.maximum(worst, np.abs(fields @ slip_row(here, k)[:-1]) / own.axial_clearance)
     assert worst.min() >= lower[0] * (1 - 1e-12) and worst.min() < 1.01 * lower[0]
     loops = layout.incidence
     chosen = found.y[0] + size * rng.normal(size=(20000, found.y.shape[1])) * np.abs(found.y).max()
@@ -186,6 +188,6 @@ def test_random_tilts_and_wrenches_stay_outside(links):
     place = (r[0] - centre) / length
     m = wrench[..., :2] + wrench[..., 2:] * np.stack([-place[:, 1], place[:, 0]], axis=-1)
     cost = np.hypot(m[..., 0], m[..., 1]) @ [own.tilt for own in limits]
-    cost += np.abs(wrench[..., 2]) @ [own.play / length for own in limits]
+    cost += np.abs(wrench[..., 2]) @ [own.axial_clearance / length for own in limits]
     bound = np.abs((m * d[0]).sum(axis=(1, 2))) / cost
     assert bound.max() <= upper[0] * (1 + 1e-12) and bound.max() > 0.99 * upper[0]

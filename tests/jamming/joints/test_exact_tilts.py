@@ -221,7 +221,7 @@ def disturbed_bounds(given, poses, **changes):
     values = {
         "r": none, "e": none, "d": none, "lift": np.zeros((count, layout.loops)),
         "wide": np.tile(layout.limit, (count, 1)), "narrow": np.tile(layout.limit, (count, 1)),
-        "play": np.tile(layout.play, (count, 1)), "sound": np.ones(count, dtype=bool), **changes,
+        "end_float": np.tile(layout.end_float, (count, 1)), "sound": np.ones(count, dtype=bool), **changes,
     }  # fmt: skip
     found = given.solve(poses, "scale")
     exact = Neglected(**values)
@@ -276,7 +276,7 @@ def test_limits_rest_and_soundness_of_disturbed_bounds():
     assert doubled[0] == pytest.approx(0.5 * plain[0], rel=1e-9)
     halved = disturbed_bounds(rigid, poses, narrow=0.5 * np.tile(layout.limit, (2, 1)))
     assert halved[1] == pytest.approx(2.0 * plain[1], rel=1e-9)
-    less = disturbed_bounds(given, poses, play=0.5 * np.tile(layout.play, (2, 1)))
+    less = disturbed_bounds(given, poses, end_float=0.5 * np.tile(layout.end_float, (2, 1)))
     assert (less[1] >= upper).all() and (less[1] > upper * 1.0001).any()
     rest = disturbed_bounds(rigid, poses, lift=np.full((2, layout.loops), 0.01))
     assert (rest[0] < 0.999 * plain[0]).all() and (rest[1] > 1.001 * plain[1]).all()
@@ -306,7 +306,7 @@ def test_what_is_neglected_of_a_four_bar():
         assert exact.wide[0, block] == pytest.approx(t + off, rel=1e-9)
         assert exact.narrow[0, block] == pytest.approx(t * (1.0 - t**2 / 5.0) - off, rel=1e-9)
         lean = math.sin(max(angle[a], angle[b]))
-        assert exact.play[0, place] == pytest.approx(slips[a, b] * (1.0 - lean**2 / 2.0), rel=1e-9, abs=1e-15)
+        assert exact.end_float[0, place] == pytest.approx(slips[a, b] * (1.0 - lean**2 / 2.0), rel=1e-9, abs=1e-15)
         assert exact.d[0, place] == 0.0
         rest += slips[a, b] * lean**2
         slip = max(slip, slips[a, b] * lean)

@@ -9,7 +9,7 @@ from coupled_oracles import driven_pair, embodied, four_bar
 
 from graphsynth import simulate
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.coupled_pictures import clearance_picture, loosening_picture
+from graphsynth.drawing.coupled_pictures import clearance_picture, sensitivity_picture
 from graphsynth.jamming import Bearing
 from graphsynth.jamming.joints import (
     RIGID,
@@ -18,7 +18,7 @@ from graphsynth.jamming.joints import (
     Misalignment,
     assess_coupled,
     bearing_limits,
-    compare_loosening,
+    compare_sensitivities,
 )
 
 
@@ -35,7 +35,7 @@ def eight():
 def test_every_row_solved_again(eight):
     """Each limit of an eight-link mechanism: the whole motion assessed anew with that limit larger, and without it."""
     motion, limits, tilt = eight
-    table = compare_loosening(motion, limits, tilt, by=0.1)
+    table = compare_sensitivities(motion, limits, tilt, by=0.1)
     plain = assess_coupled(motion, limits, tilt)
     assert table.scale == plain.smallest_scale and table.worst_input == plain.smallest_scale_input
     driven = (min(tilt.base, tilt.link), max(tilt.base, tilt.link))
@@ -46,7 +46,9 @@ def test_every_row_solved_again(eight):
     def anew(row, factor):
         old = limits[row.joint]
         new = (
-            JointLimits(old.tilt * factor, old.play) if row.what == "tilt" else JointLimits(old.tilt, old.play * factor)
+            JointLimits(old.tilt * factor, old.axial_clearance)
+            if row.what == "tilt"
+            else JointLimits(old.tilt, old.axial_clearance * factor)
         )
         return assess_coupled(motion, {**limits, row.joint: new}, tilt).smallest_scale
 
@@ -56,7 +58,7 @@ def test_every_row_solved_again(eight):
         assert row.gain <= row.promised + 1e-9 and row.scale <= row.without * (1 + 1e-12)
     gains = [round(row.gain, 9) for row in table.rows]
     assert gains == sorted(gains, reverse=True) and gains[0] > 0.05 and gains[-1] == 0.0
-    assert {(one.joint, one.what): one.gain for one in plain.loosen} == pytest.approx(
+    assert {(one.joint, one.what): one.gain for one in plain.sensitivities} == pytest.approx(
         {(row.joint, row.what): row.promised for row in table.rows if row.promised > 1e-9}
     )
 
@@ -64,7 +66,7 @@ def test_every_row_solved_again(eight):
 def test_another_input_binds_next():
     """Lambda linkage over the turn: loosening B gains nothing at 90 degrees, where p is B."""
     motion = simulate(four_bar(), np.radians(np.arange(0.0, 361.0, 10.0)))
-    table = compare_loosening(motion, Bearing(), Misalignment(0, 1, 0.01), by=0.2)
+    table = compare_sensitivities(motion, Bearing(), Misalignment(0, 1, 0.01), by=0.2)
     rows = {row.joint: row for row in table.rows}
     assert rows[(2, 3)].gain == 0.0 and rows[(2, 3)].without == table.scale
     for pair in ((1, 2), (0, 3)):
@@ -80,7 +82,7 @@ def test_another_input_binds_next():
 )
 def test_bad_growth(by, inputs, text):
     with pytest.raises(GeometryError, match=text):
-        compare_loosening(simulate(four_bar(), inputs), Bearing(), Misalignment(0, 1, 0.01), by=by)
+        compare_sensitivities(simulate(four_bar(), inputs), Bearing(), Misalignment(0, 1, 0.01), by=by)
 
 
 def test_pictures(eight, tmp_path):
@@ -92,7 +94,7 @@ def test_pictures(eight, tmp_path):
     used = uses.collections[0].get_array()
     assert np.nanmax(used) == pytest.approx(report.factor.max())  # the binding joint uses all there is
     assert len(uses.get_yticklabels()) == used.shape[0] == 9  # the motor's joint has no clearance to use
-    picture = loosening_picture(compare_loosening(motion, limits, tilt))
+    picture = sensitivity_picture(compare_sensitivities(motion, limits, tilt))
     assert "other limits gain nothing" in picture.axes[0].get_xlabel()
     figure.savefig(tmp_path / "clearance.png")
     proof = assess_coupled(simulate(four_bar(), [0.0, 0.5, 1.0]), Bearing(), Misalignment(0, 1, 0.01), certify=True)
@@ -107,7 +109,7 @@ def test_pictures_of_nothing():
     with pytest.raises(GeometryError, match="clearance"):
         clearance_picture(assess_coupled(motion, SPHERICAL, Misalignment(0, 1, 0.01)))
     with pytest.raises(GeometryError, match="gains nothing"):
-        loosening_picture(compare_loosening(motion, SPHERICAL, Misalignment(0, 1, 0.01)))
+        sensitivity_picture(compare_sensitivities(motion, SPHERICAL, Misalignment(0, 1, 0.01)))
 
 
 @pytest.mark.parametrize("condition", ["A", "B", "general"])

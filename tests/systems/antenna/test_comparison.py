@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.antenna import PointingMechanism, Reading
+from graphsynth.systems.antenna import Convention, PointingMechanism
 from graphsynth.systems.antenna.closed_form import read_angles
 from graphsynth.systems.antenna.model import orientation
 
@@ -16,19 +16,19 @@ ART = PointingMechanism()
 DEGREES = np.array([5.0, 10.0, 15.0, 20.0, 30.0, 40.0])
 PHI = np.radians(DEGREES)
 XY = PointingMechanism(order="XY")
-REVERSED_BOTH = Reading(sense_y=-1, sense_x=-1)
+REVERSED_BOTH = Convention(sense_y=-1, sense_x=-1)
 
 # theory/antenna 8: minutes of arc against order YX.  Reversed cranks turn the reflector the other way: the means are
 # compared after reversing the outputs too, which for both legs is the same as mounting them on the negative side.
 TABLE = [
-    ("order XY", XY, Reading(), [0.008, 0.130, 0.656, 2.060, 10.201, 30.990], 5.1e-4),
-    ("both reversed", ART, Reading(side_y=-1, side_x=-1), [0.008, 0.130, 0.656, 2.060, 10.201, 30.990], 5.1e-4),
-    ("Y reversed", ART, Reading(side_y=-1), [0.01, 0.15, 0.74, 2.34, 11.81, 37.19], 5.1e-3),
-    ("X reversed", ART, Reading(side_x=-1), [0.00, -0.02, -0.08, -0.27, -1.54, -5.62], 5.1e-3),
-    ("l2 + 1 mm", PointingMechanism(l2=0.151), Reading(), [0.00, 0.00, 0.00, 0.01, 0.04, 0.12], 5.1e-3),
-    ("l1 + 0.5 mm", PointingMechanism(l1=0.1005), Reading(), [-0.89, -1.78, -2.69, -3.64, -5.62, -7.75], 5.1e-3),
-    ("l3 + 0.5 mm", PointingMechanism(l3=0.0597), Reading(), [0.75, 1.51, 2.27, 3.05, 4.65, 6.29], 5.1e-3),
-    ("normal", ART, Reading(output="normal"), [0.12, 0.94, 3.14, 7.33, 23.50, 51.19], 5.1e-3),
+    ("order XY", XY, Convention(), [0.008, 0.130, 0.656, 2.060, 10.201, 30.990], 5.1e-4),
+    ("both reversed", ART, Convention(side_y=-1, side_x=-1), [0.008, 0.130, 0.656, 2.060, 10.201, 30.990], 5.1e-4),
+    ("Y reversed", ART, Convention(side_y=-1), [0.01, 0.15, 0.74, 2.34, 11.81, 37.19], 5.1e-3),
+    ("X reversed", ART, Convention(side_x=-1), [0.00, -0.02, -0.08, -0.27, -1.54, -5.62], 5.1e-3),
+    ("l2 + 1 mm", PointingMechanism(l2=0.151), Convention(), [0.00, 0.00, 0.00, 0.01, 0.04, 0.12], 5.1e-3),
+    ("l1 + 0.5 mm", PointingMechanism(l1=0.1005), Convention(), [-0.89, -1.78, -2.69, -3.64, -5.62, -7.75], 5.1e-3),
+    ("l3 + 0.5 mm", PointingMechanism(l3=0.0597), Convention(), [0.75, 1.51, 2.27, 3.05, 4.65, 6.29], 5.1e-3),
+    ("normal", ART, Convention(output="normal"), [0.12, 0.94, 3.14, 7.33, 23.50, 51.19], 5.1e-3),
 ]
 
 
@@ -56,7 +56,7 @@ def test_other_cranks_that_fit():
     def end(l2, crank, **reading):
         one = PointingMechanism(l2=l2, l4=l2, l3=crank, l5=crank)
         two = one if reading else PointingMechanism(l2=l2, l4=l2, l3=crank, l5=crank, order="XY")
-        return float(one.compare(two, math.radians(40), other_reading=Reading(**reading)).arcminutes)
+        return float(one.compare(two, math.radians(40), other_reading=Convention(**reading)).arcminutes)
 
     assert end(0.10, 0.05432) == pytest.approx(31.0, abs=0.03)
     assert end(0.20, 0.06280) == pytest.approx(31.0, abs=0.03)
@@ -78,7 +78,7 @@ def test_mirrored_legs_have_rigid_rods(order, side_y, side_x):
     l1, l2, l3, l4, l5 = mechanism.lengths
     random = np.random.default_rng(4)
     x, y = random.uniform(-0.7, 0.7, (2, 50))
-    a, b, _ = read_angles(mechanism, Reading(side_y=side_y, side_x=side_x), x, y)
+    a, b, _ = read_angles(mechanism, Convention(side_y=side_y, side_x=side_x), x, y)
     R, zero = orientation(a, b, order), np.zeros(50)
     # crank vector (0, side l3, 0) turned by R_x(phi), (side l5, 0, 0) turned by R_y(phi)
     S_y = np.stack([zero, side_y * (l1 - l3 + l3 * np.cos(x)), -l2 + side_y * l3 * np.sin(x)], -1)
@@ -96,6 +96,6 @@ def test_unreachable_poses_stay_nan():
 
 def test_bad_readings():
     with pytest.raises(GeometryError, match="side_y = 0"):
-        Reading(side_y=0)
+        Convention(side_y=0)
     with pytest.raises(GeometryError, match="output = 'beam'"):
-        Reading(output="beam")
+        Convention(output="beam")
