@@ -33,11 +33,11 @@ class Verdict(Enum):
     included, so none of them is a certificate.
     """
 
-    CERTIFIED_FREE = "never binds, for all parameters given (certified)"
+    CERTIFIED_FREE = "free over the whole range, for all parameters given (certified)"
     CERTIFIED_JAMMED = "binds over part of the range, for all parameters given (certified)"
     CERTIFIED_JAMMED_FOR_SOME = "binds over part of the range, for some of the parameters given (certified)"
     UNDECIDED = "undecided"
-    FREE_ESTIMATED = "never binds (estimated)"
+    FREE_ESTIMATED = "free over the whole range (estimated)"
     JAMMED_ESTIMATED = "binds over part of the range (estimated)"
     TOUCHING_ESTIMATED = "touches with no clearance left, within rounding (estimated)"
     CANNOT_ASSEMBLE = "the parts cannot be assembled"
