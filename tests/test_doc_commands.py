@@ -223,7 +223,10 @@ def test_the_first_run_is_as_the_tutorial_tells(tmp_path, monkeypatch):
     assert np.allclose([float(x) for arc in arcs for x in arc], [*first, *(180 + x for x in first)], atol=1e-6)
 
     after = execute(reads(merged(scene, opened)))
-    assert after["records"][0].verdict.startswith("free over the whole range") and "certified" in after["records"][0].verdict
+    assert (
+        after["records"][0].verdict.startswith("free over the whole range")
+        and "certified" in after["records"][0].verdict
+    )
 
     wrong = re.sub(r"(?m)^clearance_mm = 0\.03$", "clearence_mm = 0.07", text, count=1)
     (tmp_path / "mine.toml").write_text(wrong, "utf-8")
