@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import pages
 import public_api
 from docutils import nodes
-from docutils.utils.math import MathError, latex2mathml
+from mathml import mathml
 
 ROOT = Path(__file__).resolve().parents[1]
 META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -78,13 +78,9 @@ def _note_objects(app: Any, doctree: nodes.document) -> None:
             app.env.domains.python_domain.note_object(full, kind, anchors[room_name, name])
 
 
-def _mathml(writer: Any, node: Any) -> None:
-    """Formulas as MathML, which browsers draw themselves: the site needs no script and no network."""
+def _formula(writer: Any, node: Any) -> None:
     block = node.tagname == "math_block"
-    try:
-        markup = latex2mathml.tex2mathml(node.astext(), as_block=block)
-    except MathError as error:
-        raise ValueError(f"formula {node.astext()!r}: {error}") from error
+    markup = mathml(node.astext(), block)
     writer.body.append(f'<div class="math">{markup}</div>' if block else markup)
     raise nodes.SkipNode
 
@@ -93,5 +89,5 @@ def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
     app.connect("source-read", _read)
     app.connect("doctree-read", _note_objects)
-    app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))
+    app.add_html_math_renderer("mathml", (_formula, None), (_formula, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

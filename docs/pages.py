@@ -35,10 +35,7 @@ def theory() -> dict[str, set[int]]:
 
 
 def _last_names(author: str) -> list[str]:
-    names = [name.strip() for name in author.split(" and ")]
-    return [
-        name.strip("{}").removeprefix("The ").split(" ")[0] if "{" in name else name.split(",")[0] for name in names
-    ]
+    return [name.strip("{} ") if "{" in name else name.split(",")[0].strip() for name in author.split(" and ")]
 
 
 def bibliography() -> dict[str, dict[str, str]]:

@@ -6,8 +6,7 @@ does not reach, infinite where a link does not turn.
 
 References
 ----------
-Bottema & Roth, Theoretical Kinematics (1979), chapter 8; Hunt, Kinematic Geometry of Mechanisms (1978), chapter 5;
-Uicker, Pennock & Shigley, Theory of Machines and Mechanisms (2003), chapters 3 and 4.
+[Bottema & Roth 1979], chapter 8; [Hunt 1978], chapter 5; [Uicker et al. 2003], chapters 3 and 4.
 """
 
 from __future__ import annotations
@@ -237,7 +236,7 @@ def mechanical_advantage(motion: Motion, link: int) -> Array:
 
     References
     ----------
-    Norton, Design of Machinery (2004), section 6.4.
+    [Norton 2004], section 6.4.
     """
     mechanism = motion.mechanism
     if len(mechanism.drivers) != 1:

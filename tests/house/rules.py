@@ -134,7 +134,9 @@ def unformatted() -> Iterator[str]:
 
 def unresolved_references() -> Iterator[str]:
     """Rule 6: a mention of a section of something that is not in the repository."""
-    pattern = re.compile(r"(?i)\b(?:spec(?:ification)?\b[^.\n]{0,40}?\bsections?|sections?|spec) \d+(?:\.\d+)*")
+    book = r"(?<!\d\], )(?<!chapter \d, )"  # [Hunt 1978], section 5.4
+    words = rf"spec(?:ification)?\b[^.\n]{{0,40}}?\bsections?|{book}sections?|spec"
+    pattern = re.compile(rf"(?i)\b(?:{words}) \d+(?:\.\d+)*")
     for name, path in modules().items():
         for match in pattern.findall(path.read_text(encoding="utf-8")):
             yield f"{name}: {match}"

@@ -100,7 +100,7 @@ def test_both_circles_of_bresse_meet_in_the_acceleration_pole(rocker):
 
 
 def test_mechanical_advantage_of_the_four_bar(rocker):
-    """Norton, section 6.4: the ratio of the distances of the poles (Freudenstein), and sin mu / sin nu."""
+    """[Norton 2004], section 6.4: the ratio of the distances of the poles (Freudenstein), and sin mu / sin nu."""
     advantage = rocker.mechanical_advantage(3)
     place = rocker.instant_centre(3, 1)
     x = ((place[:, 0] + 1j * place[:, 1]) * np.exp(1j * rocker.poses[:, 1, 2])).real

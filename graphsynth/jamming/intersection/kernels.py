@@ -4,7 +4,7 @@ Data of the problem: ``data = (ql, qh, el, eh, al, ah, bl, bh)`` with ``x^2 + y^
 ``alpha x^2 + beta y^2`` in [el, eh], alpha in [al, ah], beta in [bl, bh].
 A box is ``(xl, xh, yl, yh)`` with bounds of at least 0; a queue holds boxes, first in, first out.
 
-Bounds are stepped outward after every operation (Rump and others 2009), exact or not: a box costs half as much as with
+Bounds are stepped outward after every operation [Rump et al. 2009], exact or not: a box costs half as much as with
 the tightest bounds, and the search needs speed, not the last digit.  What overflows becomes NaN or an infinite bound on
 the safe side; every test is written so that NaN proves nothing.
 """

@@ -41,7 +41,7 @@ def world(x, link, px, py):
 
 @kernel(inline="always")
 def upper_half(a):
-    """Return the upper 26 bits of a number (Veltkamp 1968): products of such halves are exact."""
+    """Return the upper 26 bits of a number [Veltkamp 1968]: products of such halves are exact."""
     big = 134217729.0 * a
     return big - (big - a)
 

@@ -29,7 +29,7 @@ TANGENT = 0.41421356237309503  # tan(pi / 8)
 def angle_of(y, x):
     """``atan2(y, x)`` in (-pi, pi] without branches; error below 0.75 ulp of pi and 2 ulp of a small result.
 
-    Reduced to |t| <= tan(pi/8); polynomial of fdlibm (Sun Microsystems 1993) for the arc tangent.  NaN at the origin.
+    Reduced to |t| <= tan(pi/8); polynomial of fdlibm [Sun Microsystems 1993] for the arc tangent.  NaN at the origin.
     """
     ax, ay = abs(x), abs(y)
     steep = ay > ax
@@ -61,7 +61,7 @@ def angle_of(y, x):
 
 @kernel
 def direction(a):
-    """Cosine and sine without branches, for |a| < 1e5; error below 1 ulp (polynomials of fdlibm, [Sun 1993])."""
+    """Cosine and sine without branches, for |a| < 1e5; error below 1 ulp (polynomials of fdlibm, [Sun Microsystems 1993])."""
     n = (a * TWO_OVER_PI + ROUND) - ROUND
     r = fma(-n, HALF_PI_LOW, fma(-n, HALF_PI, a))
     z = r * r

@@ -1,0 +1,34 @@
+"""Formulas as MathML, which browsers draw themselves: the site needs no script and no network.
+
+docutils writes the markup; what browsers without a mathematical typeface draw badly is put differently: accents become
+combining characters of their letter, and names of functions get the thin spaces of TeX.
+"""
+
+from __future__ import annotations
+
+import re
+
+from docutils.utils.math import MathError, latex2mathml
+
+COMBINING = {"˙": "\u0307", "¨": "\u0308", "ˉ": "\u0304", "ˆ": "\u0302", "_": "\u0304"}
+ACCENT = r"<mo(?: \w+=\"\w+\")*>([˙¨ˉˆ_])</mo>\s*"
+OVER = re.compile(rf"<mover[^>]*>\s*<mi>(\w)</mi>\s*{ACCENT}</mover>")
+OVER_INDEXED = re.compile(
+    rf"<munderover>\s*<mi>(\w)</mi>\s*((?:(?!<munderover|</munderover).)*?){ACCENT}</munderover>", re.DOTALL
+)
+NAMES = "cos|sin|tan|arccos|arcsin|arctan|exp|ln|log|det|max|min|sup|atan2|cross|dot|seg|dseg|xms|sign|sgn|arg|diag"
+AFTER = re.compile(r"<mo>&ApplyFunction;</mo>\s*(?=(<mo stretchy=\"false\">[(\[])?)")
+BEFORE = re.compile(rf"(</m(?:i|n|sub|sup|subsup|sqrt)>\s*)(?=(?:<msup>\s*)?<mi>(?:{NAMES})</mi>)")
+SPACE = '<mspace width="0.17em"/>'
+
+
+def mathml(tex: str, block: bool) -> str:
+    """Markup of a formula; a ValueError names one that docutils cannot read."""
+    try:
+        markup = latex2mathml.tex2mathml(tex, as_block=block)
+    except MathError as error:
+        raise ValueError(f"formula {tex!r}: {error}") from error
+    markup = OVER.sub(lambda m: f"<mi>{m[1]}{COMBINING[m[2]]}</mi>", markup)
+    markup = OVER_INDEXED.sub(lambda m: f"<msub><mi>{m[1]}{COMBINING[m[3]]}</mi>{m[2]}</msub>", markup)
+    markup = AFTER.sub(lambda m: "" if m[1] else SPACE, markup)
+    return BEFORE.sub(rf"\1{SPACE}", markup)
