@@ -61,7 +61,7 @@ def angle_of(y, x):
 
 @kernel
 def direction(a):
-    """Cosine and sine without branches, for |a| < 1e5; error below 1 ulp (polynomials of fdlibm, [Sun Microsystems 1993])."""
+    """Cosine and sine without branches, for |a| < 1e5; error below 1 ulp (polynomials of [Sun Microsystems 1993])."""
     n = (a * TWO_OVER_PI + ROUND) - ROUND
     r = fma(-n, HALF_PI_LOW, fma(-n, HALF_PI, a))
     z = r * r
