@@ -21,8 +21,8 @@ __all__ = ["run"]
 
 def run(options: argparse.Namespace) -> int:
     """Run a scene and print its summary."""
-    from graphsynth.pipeline.journal import JOURNAL
     from graphsynth.pipeline.scene import load_scene
+    from graphsynth.pipeline.store import JOURNAL
 
     scene = load_scene(options.scene)
     folder = options.out or Path("graphsynth-out") / scene.name
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
         console.put_json(_document(report, options.explain))
         return 0
     if options.explain:
-        from graphsynth.pipeline.explain import explain
+        from graphsynth.pipeline.measure import explain
 
         console.put(explain(report))
         return 0
@@ -64,7 +64,7 @@ def _document(report: Report, explained: bool) -> dict[str, Any]:
         "notes": list(report.notes),
     }
     if explained:
-        from graphsynth.pipeline.explain import explain_json
+        from graphsynth.pipeline.measure import explain_json
 
         document["explain"] = explain_json(report)
     return document

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from html import escape
-from typing import TYPE_CHECKING, Any
+from functools import cache
+from typing import TYPE_CHECKING
 
 from graphsynth.drawing.pages import whole_page
 from graphsynth.drawing.palette import LIGHT, STYLE
 from graphsynth.drawing.svg import bare
-from graphsynth.pipeline.headline import facts, sentences
-from graphsynth.pipeline.products import Finding, Picture, Record, Table
-from graphsynth.pipeline.summary import summary_tables
+from graphsynth.pipeline.products import Picture
+from graphsynth.pipeline.summary import facts, sentences, summary_tables
 
 if TYPE_CHECKING:
+    from jinja2 import Template
+
     from graphsynth.pipeline.runner import Report
 
 __all__ = ["report_html"]
@@ -66,36 +66,101 @@ _PICTURES = STYLE + "".join(
 )
 
 
+#: Headings of the galleries, in the order of the page; other products that are pictures follow under their names.
+_HEADINGS = {"animations": "In motion", "mechanism_pictures": "The mechanism", "plots": "Curves"}
+
+_PAGE = """
+{%- macro grid(columns, rows) -%}
+<div class="scroll"><table><thead><tr>
+{%- for column in columns %}<th scope="col">{{ column }}</th>{% endfor -%}
+</tr></thead><tbody>
+{%- for row in rows -%}
+<tr>{% for cell in row %}<td{% if cell is number %} class="num"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
+{%- endfor -%}
+</tbody></table></div>
+{%- endmacro -%}
+
+{%- macro gallery(pictures, kind="") -%}
+<div class="pictures{{ kind }}">
+{%- for picture in pictures -%}
+<figure class="{{ picture.size }}">{{ picture.svg | drawing }}<figcaption><b>{{ picture.title }}</b>
+{%- if picture.caption %}. {{ picture.caption }}{% endif %}</figcaption></figure>
+{%- endfor -%}
+</div>
+{%- endmacro -%}
+
+{%- macro finding(item) -%}
+<p class="verdict {{ item.good | tone }}">{% if item.good is none %}{{ item.text }}{% else %}<b>{{ item.text }}</b>
+{%- endif %}</p>
+{%- endmacro -%}
+
+<h1>{{ scene.scene.title }}</h1>
+{% for text in notes %}<p class="verdict"><b>{{ text }}</b></p>{% endfor %}
+{% for item in first %}{{ finding(item) }}{% endfor -%}
+<ul class="facts">
+{%- for fact in facts %}<li><b class="{{ fact.good | tone }}">{{ fact.value }}</b><span>{{ fact.text }}</span></li>
+{%- endfor -%}
+</ul>
+{%- for item in then %}{{ finding(item) }}{% endfor %}
+{% for text in description if text %}<p>{{ text }}</p>{% endfor %}
+{% for heading, pictures in galleries %}<h2>{{ heading }}</h2>{{ gallery(pictures) }}
+{% endfor %}
+{%- for table in tables -%}
+<h2>{{ table.title }}</h2>{{ grid(table.columns, table.rows) }}
+{%- if table.note %}<p class="soft">{{ table.note }}</p>{% endif %}
+{% endfor %}
+{%- if graphs -%}
+<h2>Candidate graphs</h2><p class="soft">By adjacency levels: the frame on top, below it the links jointed to it, and
+so on. A line is a joint of mobility 1, a dashed line one of mobility 2.</p>{{ gallery(graphs, " sheet") }}
+{%- endif %}
+{% if candidates -%}
+<h2>Every candidate</h2><details><summary>{{ candidates | length }} row{{ "s" if candidates | length != 1 }}, as in
+results.csv</summary>{{ grid(("no.", "assortment", "status", "verdict or reason", "key"), candidates) }}</details>
+{%- endif %}
+<h2>How this was made</h2><p class="soft">Scene <code>{{ scene.source }}{% if scene.digest %}, SHA-256
+{{- " " + scene.digest }}
+{%- endif %}</code>, seed {{ scene.scene.seed }}. {{ versions }}. The scene as read and the times are in
+<code>scene.json</code>.</p>"""
+
+
 def report_html(report: Report) -> str:
     """Return the page of a run.
 
     Everything is in the one string: styles, tables, pictures as inline SVG. Values are escaped.
     """
-    scene = report.scene.scene
-    products = report.products
-    parts = [
-        f"<h1>{escape(scene.title)}</h1>",
-        *(f'<p class="verdict"><b>{escape(text)}</b></p>' for text in report.notes),
-        _answer(report),
-        *(f"<p>{escape(text)}</p>" for text in scene.description.strip().split("\n\n") if text),
-    ]
+    scene, products = report.scene, report.products
+    found = sentences(report)
+    first = next((k for k, item in enumerate(found) if item.good is None), 0) or len(found)
     galleries = {name: value for name, value in products.items() if name != "graph_pictures" and _are_pictures(value)}
-    parts += [_gallery(_heading(name), galleries[name]) for name in sorted(galleries, key=_place_of)]
-    parts += [_table(table) for table in summary_tables(report)]
-    parts.append(_sheet(products.get("graph_pictures", ())))
-    if any(r.key for r in products.get("records", ())):
-        parts.append(_records(products["records"]))
-    parts.append(_provenance(report))
-    return whole_page(scene.title, _CSS + _PICTURES, "\n".join(part for part in parts if part))
+    order = [*_HEADINGS, *sorted(galleries)]
+    records = products.get("records", ())
+    candidates = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
+    body = _template().render(
+        scene=scene,
+        notes=report.notes,
+        first=found[:first],
+        then=found[first:],
+        facts=facts(report),
+        description=scene.scene.description.strip().split("\n\n"),
+        galleries=[(_heading(name), galleries[name]) for name in sorted(galleries, key=order.index)],
+        tables=summary_tables(report),
+        graphs=products.get("graph_pictures", ()),
+        candidates=candidates if any(r.key for r in records) else (),
+        versions=", ".join(f"{name} {version}" for name, version in report.versions.items()),
+    )
+    return whole_page(scene.scene.title, _CSS + _PICTURES, body)
 
 
-#: Headings of the galleries, in the order of the page; other products that are pictures follow under their names.
-_HEADINGS = {"animations": "In motion", "mechanism_pictures": "The mechanism", "plots": "Curves"}
+@cache
+def _template() -> Template:
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
 
-
-def _place_of(name: str) -> tuple[int, str]:
-    order = list(_HEADINGS)
-    return (order.index(name) if name in order else len(order), name)
+    own = Environment(autoescape=True, undefined=StrictUndefined)
+    own.filters["tone"] = {True: "good", False: "bad", None: ""}.__getitem__
+    own.filters["drawing"] = lambda svg: Markup(bare(svg))  # of our own making
+    own.tests["number"] = lambda text: len(text) < 40 and text[:1] in tuple("0123456789-+")
+    return own.from_string(_PAGE)
 
 
 def _heading(name: str) -> str:
@@ -104,81 +169,3 @@ def _heading(name: str) -> str:
 
 def _are_pictures(value: object) -> bool:
     return isinstance(value, tuple) and bool(value) and all(isinstance(item, Picture) for item in value)
-
-
-_TONES = {True: "good", False: "bad", None: ""}
-
-
-def _answer(report: Report) -> str:
-    """Give the run in a few sentences and, behind what is good or bad, a row of numbers."""
-    found = sentences(report)
-    told = [f'<p class="verdict {_TONES[finding.good]}">{_strong(finding)}</p>' for finding in found]
-    items = "".join(
-        f'<li><b class="{_TONES[fact.good]}">{escape(fact.value)}</b><span>{escape(fact.text)}</span></li>'
-        for fact in facts(report)
-    )
-    first = next((k for k, finding in enumerate(found) if finding.good is None), len(told)) or len(told)
-    return f'{"".join(told[:first])}<ul class="facts">{items}</ul>{"".join(told[first:])}'
-
-
-def _strong(finding: Finding) -> str:
-    """Print what is good or bad in bold and colour, the rest plain."""
-    text = escape(finding.text)
-    return text if finding.good is None else f"<b>{text}</b>"
-
-
-def _figure(picture: Picture) -> str:
-    return (
-        f'<figure class="{picture.size}">{bare(picture.svg)}<figcaption><b>{escape(picture.title)}</b>'
-        f"{'. ' if picture.caption else ''}{escape(picture.caption)}</figcaption></figure>"
-    )
-
-
-def _gallery(heading: str, pictures: Iterable[Picture]) -> str:
-    figures = "".join(map(_figure, pictures))
-    return f'<h2>{escape(heading)}</h2><div class="pictures">{figures}</div>' if figures else ""
-
-
-def _sheet(pictures: Iterable[Picture]) -> str:
-    figures = "".join(map(_figure, pictures))
-    if not figures:
-        return ""
-    note = (
-        "By adjacency levels: the frame on top, below it the links jointed to it, and so on. "
-        "A line is a joint of mobility 1, a dashed line one of mobility 2."
-    )
-    return f'<h2>Candidate graphs</h2><p class="soft">{note}</p><div class="pictures sheet">{figures}</div>'
-
-
-def _table(table: Table) -> str:
-    return f"<h2>{escape(table.title)}</h2>{_grid(table.columns, table.rows)}" + (
-        f'<p class="soft">{escape(table.note)}</p>' if table.note else ""
-    )
-
-
-def _grid(columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
-    body = "".join("<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows)
-    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _cell(text: str) -> str:
-    numeric = text[:1].isdigit() or text[:1] in "-+"
-    return f'<td class="num">{escape(text)}</td>' if numeric and len(text) < 40 else f"<td>{escape(text)}</td>"
-
-
-def _records(records: tuple[Record, ...]) -> str:
-    rows = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
-    grid = _grid(("no.", "assortment", "status", "verdict or reason", "key"), rows)
-    summary = f"{len(rows)} row{'s' if len(rows) != 1 else ''}, as in results.csv"
-    return f"<h2>Every candidate</h2><details><summary>{summary}</summary>{grid}</details>"
-
-
-def _provenance(report: Report) -> str:
-    versions = ", ".join(f"{name} {version}" for name, version in report.versions.items())
-    scene: Any = report.scene
-    source = f"{scene.source}{', SHA-256 ' + scene.digest if scene.digest else ''}"
-    return (
-        f'<h2>How this was made</h2><p class="soft">Scene <code>{escape(source)}</code>, seed {scene.scene.seed}. '
-        f"{escape(versions)}. The scene as read and the times are in <code>scene.json</code>.</p>"
-    )

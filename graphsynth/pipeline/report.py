@@ -12,11 +12,9 @@ from typing import TYPE_CHECKING
 from graphsynth.core.errors import SceneError
 from graphsynth.core.journal import writing
 from graphsynth.pipeline.datafiles import data_files
-from graphsynth.pipeline.headline import facts, sentences
-from graphsynth.pipeline.journal import JOURNAL, mark_reported
 from graphsynth.pipeline.page import report_html
-from graphsynth.pipeline.parts import REMEDY, write_whole
-from graphsynth.pipeline.summary import summary_tables
+from graphsynth.pipeline.store import JOURNAL, REMEDY, mark_reported, write_whole
+from graphsynth.pipeline.summary import facts, sentences, summary_tables
 
 if TYPE_CHECKING:
     from rich.console import Console, Group

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from concurrent.futures import Executor
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -12,16 +14,15 @@ from typing import Any
 from graphsynth.core.errors import SceneError
 from graphsynth.core.ordered import check_executor
 from graphsynth.pipeline.datafiles import check_files
-from graphsynth.pipeline.journal import JOURNAL
-from graphsynth.pipeline.measure import StageTime
-from graphsynth.pipeline.parts import check_folder
+from graphsynth.pipeline.measure import StageTime, measured, memory_in_use, new_modules, peak_memory, reset_peak, rooms
 from graphsynth.pipeline.report import loaded_versions, write_report
-from graphsynth.pipeline.running import Running
 from graphsynth.pipeline.scene import Scene, load_scene
-from graphsynth.pipeline.stages import Context, Progress, Stage, resolve
+from graphsynth.pipeline.stages import Context, Progress, Stage, load, resolve
+from graphsynth.pipeline.store import JOURNAL, Candidates, check_folder, signature
+from graphsynth.pipeline.streaming import Plan, Spent, Streamed, given_by, plan_stream, stream
 from graphsynth.pipeline.tables import Place
 
-__all__ = ["Report", "StageTime", "execute", "has_stream", "run"]
+__all__ = ["Report", "Running", "StageTime", "execute", "has_stream", "run"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,3 +163,215 @@ def execute(
         notes=tuple(done.notes),
         seconds=done.seconds,
     )
+
+
+class Running:
+    """Resolved stages and what they have given so far.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        Each behind all it needs.
+    wanted : tuple of str
+        Products to return.
+    context : Context
+        For every stage.
+    progress : callable, optional
+        Told what is under way.
+    journal : Path, optional
+        Where outcomes of candidates are kept.
+    fresh : bool, optional
+        Do not go on from what the journal holds.
+
+    Attributes
+    ----------
+    stages : tuple of Stage
+        In the order of running.
+    times : list of StageTime
+    notes : list of str
+    seconds : float
+        Wall clock of all together.
+    """
+
+    def __init__(
+        self,
+        stages: Sequence[Stage],
+        wanted: tuple[str, ...],
+        context: Context,
+        progress: Progress | None = None,
+        journal: Path | None = None,
+        fresh: bool = False,
+    ) -> None:
+        self._plan = plan_stream(stages, wanted)
+        self.stages = _around_stream(stages, self._plan)
+        self._wanted = wanted
+        self._context = context
+        self._progress = progress
+        self._journal = journal
+        self._fresh = fresh
+        self._products: dict[str, Any] = {}
+        self._started = time.perf_counter()
+        self._source_seconds = 0.0
+        self._aside: dict[str, Future[tuple[Any, StageTime]]] = {}  # by stage
+        self.times: list[StageTime] = []
+        self.notes: list[str] = []
+        self.seconds = 0.0
+
+    def run(self) -> dict[str, Any]:
+        """Run all stages and return the wanted products.
+
+        A product nobody needs any more is dropped at once, so memory holds what is in use.
+        """
+        streamed = False
+        for done, stage in enumerate(self.stages):
+            if stage.each and streamed:
+                continue
+            self._tell(stage.name, done)
+            self._refuse_if_used_up(stage)
+            self._start_aside(self.stages[done:])
+            if stage.each and self._plan is not None:
+                self._run_stream(self._plan, done)
+                streamed = True
+            elif stage.name in self._aside:
+                self.times.append(StageTime(stage.name, 0.0, 0.0))  # until it is gathered
+            else:
+                self._run_stage(stage, self.stages[done + 1 :])
+            needed = {need for later in self.stages[done + 1 :] for need in later.needs} | set(self._wanted)
+            self._products = {name: value for name, value in self._products.items() if name in needed}
+        self._gather_aside()
+        self.seconds = time.perf_counter() - self._started
+        self._tell("done", len(self.stages))
+        return {name: self._products[name] for name in self._wanted}
+
+    def _tell(self, what: str, done: int) -> None:
+        if self._progress:
+            self._progress(what, done, len(self.stages))
+
+    def _run_stage(self, stage: Stage, later: Sequence[Stage]) -> None:
+        """Import and call one stage; a stream is gathered if a stage over all candidates needs it whole."""
+        result, spent = measured(stage, self._context, [self._products[need] for need in stage.needs])
+        if stage.stream:
+            start = time.perf_counter()
+            whole = set(self._wanted).union(*(other.needs for other in later if not other.each))
+            result = tuple(result) if whole & set(stage.gives) else self._timed(result)
+            spent = replace(spent, seconds=spent.seconds + time.perf_counter() - start)
+        self._products.update(given_by(stage, result))
+        self.times.append(spent)
+
+    def _start_aside(self, waiting: Sequence[Stage]) -> None:
+        """Have another process run every stage that only gives outputs, as soon as what it needs is there."""
+        executor = self._context.executor
+        if executor is None:
+            return
+        needed = {need for stage in self.stages for need in stage.needs}
+        for stage in waiting:
+            ready = set(stage.needs) <= set(self._products)
+            if stage.aside and ready and stage.name not in self._aside and not needed & set(stage.gives):
+                needs = [self._products[need] for need in stage.needs]
+                alone = replace(self._context, executor=None)
+                self._aside[stage.name] = executor.submit(measured, stage, alone, needs)
+
+    def _gather_aside(self) -> None:
+        given = {stage.name: stage for stage in self.stages}
+        for place, spent in enumerate(self.times):
+            if spent.stage in self._aside:
+                result, self.times[place] = self._aside[spent.stage].result()
+                self._products.update(given_by(given[spent.stage], result))
+
+    def _timed(self, items: Iterable[Any]) -> Iterator[Any]:
+        """Pass candidates on, adding up the time it takes to make them."""
+        source = iter(items)
+        while True:
+            start = time.perf_counter()
+            try:
+                item = next(source)
+            except StopIteration:
+                return
+            finally:
+                self._source_seconds += time.perf_counter() - start
+            yield item
+
+    def _run_stream(self, plan: Plan, done: int) -> None:
+        """Run the stages for each candidate."""
+        loads = {}
+        for stage in plan.stages:
+            before, start = frozenset(sys.modules), time.perf_counter()
+            load(stage)
+            loads[stage.name] = StageTime(stage.name, time.perf_counter() - start, 0.0, modules=new_modules(before))
+        reset_peak()
+        mark = signature(self._context.scene, plan.stages, plan.kept)
+        with Candidates(self._journal, self._context.scene.name, mark, self._fresh) as journal:
+            shared = {name: self._products[name] for name in plan.shared}
+            found = stream(
+                plan,
+                self._context,
+                shared,
+                self._products[plan.source],
+                journal,
+                self._used_up,
+                lambda count: self._tell(f"candidates: {count} done", done),
+            )
+        self._note_stream(found)
+        self._products.update({name: tuple(found.outcomes) for name in plan.kept})
+        self._record_times(plan, found, loads)
+
+    def _note_stream(self, found: Streamed) -> None:
+        if found.resumed:
+            self.notes.append(f"{found.resumed} candidates were taken over from an interrupted run.")
+        if found.stopped:
+            self.notes.append(
+                f"Stopped after {len(found.outcomes)} candidates: {found.stopped}. What is stored stays; run again "
+                "with a larger [budget] to go on."
+            )
+
+    def _record_times(self, plan: Plan, found: Streamed, loads: dict[str, StageTime]) -> None:
+        peak = peak_memory()
+        source = next((i for i, t in enumerate(self.times) if t.stage == self._giver(plan.source)), None)
+        if source is not None:
+            made = self.times[source]
+            self.times[source] = replace(made, seconds=made.seconds + self._source_seconds)
+        for stage in plan.stages:
+            loaded, spent = loads[stage.name], found.spent.get(stage.name, Spent())
+            modules = tuple(sorted({*loaded.modules, *rooms(spent.modules)}))
+            self.times.append(replace(loaded, seconds=spent.seconds, peak_mb=peak, modules=modules, runs=spent.runs))
+
+    def _giver(self, product: str) -> str:
+        return next(stage.name for stage in self.stages if product in stage.gives)
+
+    def _used_up(self) -> str:
+        """Say which budget is used up, or nothing."""
+        budget = self._context.scene.budget
+        spent = time.perf_counter() - self._started
+        if budget.time is not None and spent > budget.time:
+            return f"the time of {budget.time:g} s is used up"
+        if budget.memory is not None and (used := 1e6 * memory_in_use()) > budget.memory:
+            return f"{used / 1e6:.0f} MB of memory are in use, [budget] allows {budget.memory / 1e6:g} MB"
+        return ""
+
+    def _refuse_if_used_up(self, stage: Stage) -> None:
+        """Stop before a stage when a budget is used up; behind the stream a run is finished, with what there is."""
+        behind = any(other.each for other in self.stages[: self.stages.index(stage)])
+        why = "" if behind else self._used_up()
+        if why:
+            raise SceneError(
+                f"{self._context.scene.place / 'budget'} stops the run before stage {stage.name!r}: {why}; raise it, "
+                "or ask for fewer outputs"
+            )
+
+
+def _around_stream(stages: Sequence[Stage], plan: Plan | None) -> tuple[Stage, ...]:
+    """Order stages: those the stream does not wait for, the stages for each candidate, those that need the stream."""
+    if plan is None:
+        return tuple(stages)
+    after: set[str] = {product for stage in plan.stages for product in stage.gives}
+    first: list[Stage] = []
+    last: list[Stage] = []
+    for stage in stages:
+        if stage.each:
+            continue
+        if after & set(stage.needs):
+            after |= set(stage.gives)
+            last.append(stage)
+        else:
+            first.append(stage)
+    return (*first, *plan.stages, *last)

@@ -84,17 +84,17 @@ class StageFunction(Protocol):
 
 #: Stages of ``[structure]``, which every system shares; "sketch graphs" asks the system for ``recognised``.
 STRUCTURE = (
-    Stage("solve", f"{_HERE}.steps.structural:solve", (), ("solutions",)),
-    Stage("generate", f"{_HERE}.steps.structural:generate", ("solutions",), ("candidates",), stream=True),
-    Stage("sketch graphs", f"{_HERE}.steps.graphs:pictures", ("candidates", "recognised"), ("graph_pictures",)),
+    Stage("solve", f"{_HERE}.steps:solve", (), ("solutions",)),
+    Stage("generate", f"{_HERE}.steps:generate", ("solutions",), ("candidates",), stream=True),
+    Stage("sketch graphs", f"{_HERE}.steps:pictures", ("candidates", "recognised"), ("graph_pictures",)),
 )
 
 
 #: Collects what stages for each candidate gave as ``record`` into ``records``: one per candidate, with reasons.
-COLLECT = Stage("collect", f"{_HERE}.steps.collect:records", ("record",), ("records",))
+COLLECT = Stage("collect", f"{_HERE}.steps:records", ("record",), ("records",))
 
 #: Ranks the records by the objectives of ``[ranking]``.
-RANK = Stage("rank", f"{_HERE}.steps.rank:rank", ("records",), ("ranking",))
+RANK = Stage("rank", f"{_HERE}.rank:rank", ("records",), ("ranking",))
 
 #: Entry points of this group are stages of other packages: ``product = "package.module:STAGE"``, one for each product.
 GROUP = "graphsynth.stages"

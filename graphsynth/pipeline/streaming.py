@@ -15,11 +15,9 @@ from typing import Any
 
 from graphsynth.core.errors import SceneError
 from graphsynth.core.ordered import in_order
-from graphsynth.pipeline.codec import decode, encode
-from graphsynth.pipeline.journal import Candidates
-from graphsynth.pipeline.parts import PartFolder, split_parts
 from graphsynth.pipeline.products import Outcome, Rejected
 from graphsynth.pipeline.stages import Context, Stage, load
+from graphsynth.pipeline.store import Candidates, PartFolder, decode, encode, split_parts
 
 __all__ = ["Plan", "Spent", "Streamed", "evaluate", "plan_stream", "stream"]
 

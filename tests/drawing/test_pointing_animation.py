@@ -13,7 +13,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.moving import Moving
 from graphsynth.systems.antenna import PointingMechanism
 from graphsynth.systems.antenna.animation import pointing_animation, project
-from graphsynth.systems.antenna.map_pictures import difference_map_picture
+from graphsynth.systems.antenna.pictures import difference_map_picture
 
 ART = PointingMechanism()
 

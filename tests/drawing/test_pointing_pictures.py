@@ -10,8 +10,12 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna import Convention, PointingMechanism
-from graphsynth.systems.antenna.map_pictures import fold_map_picture, tolerance_map_picture
-from graphsynth.systems.antenna.pictures import comparison_picture, pointing_picture
+from graphsynth.systems.antenna.pictures import (
+    comparison_picture,
+    fold_map_picture,
+    pointing_picture,
+    tolerance_map_picture,
+)
 
 ART = PointingMechanism()
 PARALLELOGRAM = PointingMechanism(l3=0.1, l5=0.1)

@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from graphsynth.pipeline.runner import execute
-from graphsynth.pipeline.running import Running
+from graphsynth.pipeline.runner import Running, execute
 from graphsynth.pipeline.scene import Scene, find_scene
 from graphsynth.pipeline.stages import Context, Stage
 

@@ -13,14 +13,14 @@ import pytest
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.pipeline.products import Quantity, Record
+from graphsynth.pipeline.rank import rank
 from graphsynth.pipeline.runner import run
 from graphsynth.pipeline.scene import GenerateTable, Scene, load_scene
 from graphsynth.pipeline.stages import Context
-from graphsynth.pipeline.steps.rank import rank
 
 
 def check(report: Any) -> None:
-    """Every candidate is embodied or turned down with a reason; what is kept draws its line, seen another way."""
+    """Every candidate is embodied or rejected with a reason; what is kept draws its line, seen another way."""
     kept = report["mechanisms"].columns
     texts = dict(zip(kept["number"], kept["mechanism"], strict=True))
     for record in report["records"]:

@@ -1,4 +1,4 @@
-"""The first screen answers: which is best and by what, how many were looked at, turned down and why, how sure."""
+"""The first screen answers: which is best and by what, how many were looked at, rejected and why, how sure."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graphsynth.pipeline.headline import facts, sentences
 from graphsynth.pipeline.measure import StageTime
 from graphsynth.pipeline.page import report_html
 from graphsynth.pipeline.products import Finding, Objective, Quantity, Record, Table
+from graphsynth.pipeline.rank import ranking_of
 from graphsynth.pipeline.report import print_summary
 from graphsynth.pipeline.runner import Report, execute, run
 from graphsynth.pipeline.scene import Scene
-from graphsynth.pipeline.steps.rank import ranking_of
-from graphsynth.pipeline.summary import summary_tables
+from graphsynth.pipeline.summary import facts, sentences, summary_tables
 
 
 def record(number: int, mass: float, stroke: float, good: bool | None = True, **more: Any) -> Record:
@@ -57,8 +56,9 @@ def test_the_best_is_named_with_its_measures_places_score_and_verdict(lambda_tab
         "Best of 3 ranked: no. 2, n2=2: mass 1 kg (least), stroke 5 mm (2nd greatest); score 0.73 of 1 with weights "
         "2:1; holds (certified)."
     )
-    assert "3 of 3: holds (certified)." in rest
-    assert rest[-1] == "How sure: mass: estimated in floating point, not proved; stroke: certified (proved bounds)."
+    assert "3 of the 3 candidates have the verdict: holds (certified)." in rest
+    sure = "mass: estimated in floating point, not proved; stroke: certified (proved bounds)."
+    assert rest[-1] == f"Guarantee of the objectives: {sure}"
 
 
 def test_a_best_that_jams_is_said_to_and_the_best_good_one_is_named(lambda_tables: dict[str, Any]) -> None:
@@ -80,9 +80,9 @@ def test_reasons_are_counted_the_most_frequent_first(lambda_tables: dict[str, An
         replace(rejected(12, "ZeroDivisionError"), status="failed"),
     )
     report = report_of(lambda_tables, records)
-    told = next(text for text in said(report) if text.startswith("Turned down"))
+    told = next(text for text in said(report) if text.startswith("Rejected"))
     assert told == (
-        "Turned down: 11 of 12: 6 because too weak; 3 because too long; 1 because ZeroDivisionError; 1 more reasons."
+        "Rejected: 11 of 12: 6 because too weak; 3 because too long; 1 because ZeroDivisionError; 1 more reasons."
     )
     numbers = {fact.text: (fact.value, fact.good) for fact in facts(report)}
     assert numbers["candidate mechanisms"] == ("12", None) and numbers["failed"] == ("1", False)
@@ -105,7 +105,10 @@ def test_a_single_record_shows_its_margins(lambda_tables: dict[str, Any]) -> Non
 def test_what_a_stage_says_itself_comes_behind_the_best(lambda_tables: dict[str, Any]) -> None:
     table = Table("T", ("a",), (), findings=(Finding("sets looked at", value="7"), Finding("All <agree>.")))
     report = report_of(lambda_tables, (record(1, 1.0, 1.0), record(2, 2.0, 3.0)), True, table)
-    assert said(report)[1:3] == ["2 of 2: holds (certified).", "All <agree>."] and facts(report)[0].value == "7"
+    assert (
+        said(report)[1:3] == ["2 of the 2 candidates have the verdict: holds (certified).", "All <agree>."]
+        and facts(report)[0].value == "7"
+    )
     many = tuple(record(number, 1.0, 1.0) for number in range(1, 6))
     assert said(report_of(lambda_tables, many, False, table)) == ["All <agree>."]
     page = report_html(report)
@@ -163,7 +166,7 @@ def test_a_run_of_which_nothing_came_through_says_so_first(lambda_tables: dict[s
         report_of(lambda_tables, (failed, rejected(2, "too slow"), rejected(3, "too slow")), False)
     )
     assert first == Finding("None of the 3 candidates came through all stages.", False)
-    assert rest[0].text.startswith("Turned down: 3 of 3: 2 because too slow; 1 because OverflowError")
+    assert rest[0].text.startswith("Rejected: 3 of 3: 2 because too slow; 1 because OverflowError")
 
 
 def test_a_candidate_that_came_through_or_none_known_is_no_failure(lambda_tables: dict[str, Any]) -> None:

@@ -288,7 +288,7 @@ def test_a_listing_without_end_obeys_the_time_of_the_budget(monkeypatch: pytest.
 
 def test_only_what_is_asked_for_is_a_stage(tmp_path: Path) -> None:
     report = execute(scene(tmp_path, ["records"]))
-    assert [stage.name for stage in report.stages] == ["take", "embody", "move", "judge", "collect"]
+    assert [stage.name for stage in report.stages] == ["take", "embody", "move", "assess", "collect"]
     loaded = {room for time in report.times for room in time.modules}
     assert not {"graphsynth.jamming", "graphsynth.dynamics", "matplotlib"} & loaded
 
@@ -299,7 +299,15 @@ def test_the_scene_of_the_how_to_uses_every_part(tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8").split("```toml\n")[1].split("```")[0]
     (tmp_path / "six.toml").write_text(text, encoding="utf-8")
     report = run(tmp_path / "six.toml", out=tmp_path / "out")
-    assert {stage.name for stage in report.stages} >= {"take", "embody", "move", "jamming", "dynamics", "judge", "rank"}
+    assert {stage.name for stage in report.stages} >= {
+        "take",
+        "embody",
+        "move",
+        "jamming",
+        "dynamics",
+        "assess",
+        "rank",
+    }
     assert 1 <= len(report["records"]) <= 3 and {record.status for record in report["records"]} == {"assessed"}
     names = {margin.name for margin in report["records"][0].margins}
     assert names >= {"tilt allowed", "largest torque", "mean speed with the motor", "transmission angle"}

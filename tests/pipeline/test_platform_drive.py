@@ -159,7 +159,7 @@ def test_the_real_machine_has_its_motor_in_its_own_scene() -> None:
     from graphsynth.pipeline.products import Attempt
     from graphsynth.pipeline.scene import load_scene
     from graphsynth.pipeline.stages import Context
-    from graphsynth.systems.platform.motor_stages_machine import drive, tables
+    from graphsynth.systems.platform.motor_stages import drive, tables
     from graphsynth.systems.platform.stages import PlatformMotion, _mechanism
 
     scene = load_scene("didenko")

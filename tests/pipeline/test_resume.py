@@ -175,7 +175,7 @@ def test_a_run_stopped_between_its_last_candidate_and_its_report_computes_no_can
 def test_a_full_disk_while_candidates_come_leaves_what_is_stored(
     springs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from graphsynth.pipeline.journal import Journal
+    from graphsynth.pipeline.store import Journal
 
     usual = Journal.append
     count = 0

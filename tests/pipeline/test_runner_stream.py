@@ -15,12 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import SceneError
-from graphsynth.pipeline.codec import decode, encode
 from graphsynth.pipeline.products import Objective, Outcome, Quantity, Record
+from graphsynth.pipeline.rank import ranking_of
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import BudgetTable, OutputsTable, Scene, load_scene
 from graphsynth.pipeline.stages import Stage, resolve
-from graphsynth.pipeline.steps.rank import ranking_of
+from graphsynth.pipeline.store import decode, encode
 from graphsynth.pipeline.streaming import plan_stream
 
 
@@ -57,7 +57,11 @@ def test_cheap_rejections_come_first_and_later_stages_see_the_rest_only(springs:
 def test_ranking_in_the_report_counts_reasons(springs: Path, tmp_path: Path) -> None:
     report = run(springs, out=tmp_path / "out")
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "Why candidates were turned down" in page and "check: a multiple of three" in page and "Pareto front" in page
+    assert (
+        "Rejected and failed candidates, by reason" in page
+        and "check: a multiple of three" in page
+        and "Pareto front" in page
+    )
     assert (tmp_path / "out" / "results.csv").read_text(encoding="utf-8").count("\n") == 21
     ranking = report["ranking"]
     assert set(ranking.numbers) == {n for n in range(1, 21) if n % 3 and n != 7}

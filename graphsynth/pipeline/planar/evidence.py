@@ -54,7 +54,7 @@ def linkage_dynamics(context: Any, effort: Effort) -> Problem:
     """Measure a mechanism of the scene with its loads, free to move from the speed of the scene."""
     from graphsynth.dynamics.start import consistent_start
     from graphsynth.evidence.dynamics import dynamics_problem
-    from graphsynth.pipeline.planar.stages_loads import model_of
+    from graphsynth.pipeline.planar.stages import model_of
 
     table = getattr(context.scene.mechanism, "loads", None)
     if table is None:

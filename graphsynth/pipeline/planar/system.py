@@ -171,12 +171,12 @@ def _more(scene: Any) -> tuple[Stage, ...]:
         )
     parts, stages = ["moved"], []
     if table.bearings is not None:
-        stages.append(Stage("jamming", f"{_HERE}.stages_loads:jamming", ("moved",), ("jammed",), each=True, cost=2.0))
+        stages.append(Stage("jamming", f"{_HERE}.stages:jamming", ("moved",), ("jammed",), each=True, cost=2.0))
         parts.append("jammed")
     if table.loads is not None:
-        stages.append(Stage("dynamics", f"{_HERE}.stages_loads:dynamics", ("moved",), ("driven",), each=True, cost=3.0))
+        stages.append(Stage("dynamics", f"{_HERE}.stages:dynamics", ("moved",), ("driven",), each=True, cost=3.0))
         parts.append("driven")
-    stages.append(Stage("judge", f"{_HERE}.stages:judge", tuple(parts), ("record",), each=True))
+    stages.append(Stage("assess", f"{_HERE}.stages:assess", tuple(parts), ("record",), each=True))
     if scene.ranking is not None:
         best = ("written", "ranking")
         stages += [

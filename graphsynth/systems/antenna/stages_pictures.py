@@ -71,8 +71,12 @@ def animations(context: Context, motion: AntennaMotion) -> tuple[Picture, ...]:
 
 def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) -> tuple[Picture, ...]:
     """Draw Figure 4, the growth of the difference, velocities, passive angles, maps of tolerances and folds."""
-    from graphsynth.systems.antenna.map_pictures import difference_map_picture, fold_map_picture, tolerance_map_picture
-    from graphsynth.systems.antenna.pictures import comparison_picture
+    from graphsynth.systems.antenna.pictures import (
+        comparison_picture,
+        difference_map_picture,
+        fold_map_picture,
+        tolerance_map_picture,
+    )
 
     table, antenna = table_of(context), antenna_of(context)
     other, reading = other_model(context)

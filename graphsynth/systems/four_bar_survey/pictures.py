@@ -95,7 +95,7 @@ def _classes(context: Context, lattice: Lattice) -> Picture:
         loc="outside lower center", ncols=4, frameon=False, fontsize=9,
     )  # fmt: skip
     caption = (
-        "Grashof's classes, decided in whole numbers. Blue and green: the crank turns fully. Dark lines: change "
+        "Grashof's classes, decided in exact arithmetic. Blue and green: the crank turns fully. Dark lines: change "
         "points; red ones: immovable, they can only lie stretched."
     )
     return Picture("Classes", _svg(figure), caption, "wide")

@@ -1,4 +1,4 @@
-"""Stages of a four-bar survey over all shards: gather, certify the best, lay out records and tables."""
+"""Stages of a four-bar survey over all shards: gather, certify the best, records, tables and the answer."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.pipeline.products import Outcome, Quantity, Record, Table, exact
+from graphsynth.pipeline.products import Finding, Outcome, Quantity, Record, Table, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.four_bar_survey.lattice import KINDS, TYPES, Lattice, lattice_of
-from graphsynth.systems.four_bar_survey.order import Order, order_of
+from graphsynth.systems.four_bar_survey.order import Order, edges_of, order_of
 from graphsynth.systems.four_bar_survey.system import SurveyTable
 
 if TYPE_CHECKING:
     from graphsynth.jamming.bearing.parameters import ToleranceBox
 
-__all__ = ["Certificate", "Survey", "certify", "gather", "judge"]
+__all__ = ["Certificate", "Survey", "assess", "certify", "findings", "gather"]
 
 _PIECE = 20  # certificates made in one go
 
@@ -78,7 +78,7 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
     for shard in done:
         for type_, kind, found, count in shard["classes"]:
             classes[type_, kind, found] += count
-        turned_down.update(shard["turned down"])
+        turned_down.update(shard["rejected"])
         for name, column in shard["maps"].items():
             maps.setdefault(name, []).extend(column)
     return Survey(
@@ -184,18 +184,6 @@ def _written(context: Context, path: tuple[str, ...], field: str, table: object)
     return number if number is not None and float(number) == value else Fraction(value)
 
 
-def judge(
-    context: Context, survey: Survey, certificates: tuple[Certificate, ...]
-) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
-    """Give one record per certified set, and the tables of the survey."""
-    records = _records(context, survey, certificates)
-    tables = [_summary(context, survey), _class_table(survey), _limits_table(survey), _proof_table(certificates)]
-    if survey.failed:
-        rows = tuple((text,) for text in survey.failed)
-        tables.insert(0, Table(f"Shards that failed: {len(rows)}", ("shard and reason",), rows))
-    return records, tuple(tables)
-
-
 def _records(context: Context, survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Record, ...]:
     import numpy as np
 
@@ -247,7 +235,7 @@ def _summary(context: Context, survey: Survey) -> Table:
         ("crank positions computed", str(survey.positions)),
         ("motion against the exact class", f"{survey.disagreements} sets of {survey.sets} disagree"),
         ("keep all limits", str(survey.passing)),
-        ("of them on the Pareto front", str(len(survey.front))),
+        ("of these, on the Pareto front", str(len(survey.front))),
         ("certified", str(len(survey.chosen))),
     )
     note = f"{table.positions} crank positions a turn; the front is that of all sets, not only of the certified ones."
@@ -261,7 +249,7 @@ def _class_table(survey: Survey) -> Table:
         for (type_, kind, found), count in sorted(survey.classes.items())
     ]
     note = (
-        "Type and kind are decided in whole numbers (Grashof's rule, exact); the motion is that of the engine in "
+        "Type and kind are decided in exact arithmetic (Grashof's rule, exact); the motion is that of the engine in "
         "floating point at the sampled crank angles, which contain both positions in line with the frame."
     )
     columns = ("type (exact)", "crank (exact)", "crank (found in motion)", "sets", "agree")
@@ -270,7 +258,7 @@ def _class_table(survey: Survey) -> Table:
 
 def _limits_table(survey: Survey) -> Table:
     rows = tuple((str(count), reason) for reason, count in survey.turned_down.items())
-    return Table("Why sets were turned down", ("sets", "first limit missed"), (*rows, (str(survey.passing), "none")))
+    return Table("Rejected sets, by limit", ("sets", "first limit missed"), (*rows, (str(survey.passing), "none")))
 
 
 def _proof_table(certificates: tuple[Certificate, ...]) -> Table:
@@ -278,3 +266,78 @@ def _proof_table(certificates: tuple[Certificate, ...]) -> Table:
     rows = tuple((str(count), *what) for what, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
     note = "For the whole turn and every combination of the tolerances, with outward rounding."
     return Table("What is proved about the best sets", ("sets", "verdict", "assembled", "reason"), rows, note)
+
+
+def assess(
+    context: Context, survey: Survey, certificates: tuple[Certificate, ...]
+) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
+    """Give one record per certified set, and the tables of the survey, the first with its answer."""
+    records = _records(context, survey, certificates)
+    summary = replace(_summary(context, survey), findings=findings(survey, certificates))
+    tables = [summary, _class_table(survey), _limits_table(survey), _proof_table(certificates)]
+    if survey.failed:
+        rows = tuple((text,) for text in survey.failed)
+        tables.insert(0, Table(f"Shards that failed: {len(rows)}", ("shard and reason",), rows))
+    return records, tuple(tables)
+
+
+def findings(survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Finding, ...]:
+    """Return the numbers of the survey and, in words, what was rejected and how sure all that is."""
+    proved = Counter(certificate.free for certificate in certificates)
+    found = [
+        Finding("dimension sets looked at", value=_number(survey.sets)),
+        Finding("keep all limits", value=_number(survey.passing)),
+        Finding("of the best proved free", True if proved[True] else None, _number(proved[True])),
+    ]
+    if proved[False]:
+        found.append(Finding("of the best proved to jam within the tolerances", False, _number(proved[False])))
+    if proved[None]:
+        found.append(Finding("of the best undecided", None, _number(proved[None])))
+    if survey.failed:
+        found.append(Finding("shards failed", False, _number(len(survey.failed))))
+    return (*found, *_edge(survey), _rejected(survey), _motion(survey))
+
+
+def _edge(survey: Survey) -> list[Finding]:
+    """Warn if the best set is at the edge of the lattice."""
+    import numpy as np
+
+    if not survey.chosen:
+        return []
+    lengths = survey.lattice.lengths(np.array(survey.chosen[:1]))[0].tolist()
+    edges = edges_of(survey.lattice, lengths)
+    if not edges:
+        return []
+    words = f"The best set is on the edge of the lattice ({', '.join(edges)} of its range)"
+    return [Finding(f"{words}: better ones may lie beyond; widen the range.", False)]
+
+
+def _number(count: int) -> str:
+    """Group thousands with a thin space, as ISO 80000 does."""
+    return f"{count:,}".replace(",", "\u202f")
+
+
+def _rejected(survey: Survey) -> Finding:
+    counts = sorted(survey.turned_down.items(), key=lambda item: (-item[1], item[0]))
+    reasons = "; ".join(f"{_number(count)} because {reason}" for reason, count in counts if count)
+    total = sum(survey.turned_down.values())
+    share = f"{100.0 * survey.passing / survey.sets:.3g} %" if survey.sets else "none"
+    return Finding(
+        f"Of {_number(survey.sets)} sets {_number(survey.passing)} ({share}) keep all limits. "
+        f"Rejected: {_number(total)}{': ' + reasons if reasons else ''} (each counted at the first limit it misses)."
+    )
+
+
+def _motion(survey: Survey) -> Finding:
+    """Compare the motion with the exact class, and say what rests on floating point."""
+    agree = survey.disagreements == 0
+    words = (
+        "in every set the computed motion agrees with the exact class"
+        if agree
+        else f"in {_number(survey.disagreements)} sets the computed motion disagrees with the exact class"
+    )
+    return Finding(
+        f"Whether a crank turns is decided exactly; {words}. The bearing is certified for the "
+        f"{_number(len(survey.chosen))} best, tolerances included; for the others it is estimated in closed form.",
+        None if agree else False,
+    )

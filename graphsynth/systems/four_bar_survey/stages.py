@@ -94,7 +94,7 @@ class Evaluated:
         return found[name]
 
     def rounded(self, name: str) -> Array:
-        """Return a margin to the 9 decimals by which sets are turned down, ranked and stored: rounding decides nothing.
+        """Return a margin to the 9 decimals by which sets are rejected, ranked and stored: rounding decides nothing.
 
         What is 30 degrees but for rounding keeps a limit of 30 degrees, and what differs by rounding alone is a tie.
         """
@@ -145,7 +145,7 @@ def evaluate_sets(context: Context, lattice: Lattice, sets: Ints) -> Evaluated:
 
 
 def _kept(table: SurveyTable, done: Evaluated) -> dict[str, NDArray[np.bool_]]:
-    """Return which sets keep each limit, by the words that turn the others down, in the order of asking."""
+    """Return which sets keep each limit, by the words that reject the others, in the order of asking."""
     return {
         "the crank does not turn fully": done.kind == KINDS.index("full turn"),
         f"not {' or '.join(table.limits.types)}": np.isin(done.type, [TYPES.index(t) for t in table.limits.types]),
@@ -164,7 +164,7 @@ def evaluate(context: Context, shard: Shard) -> tuple[Evaluated, dict[str, Any]]
         "sets": len(done.sets),
         "positions": int(done.moved.positions),
         "classes": _classes(done),
-        "turned down": _turned_down(table, done),
+        "rejected": _rejected(table, done),
         "maps": _maps(lattice, done),
         **ranked_by(context, done),
     }
@@ -179,8 +179,8 @@ def _classes(done: Evaluated) -> list[list[int]]:
     return np.stack([types, kinds, found, counts], axis=1).tolist()  # type: ignore[no-any-return]
 
 
-def _turned_down(table: SurveyTable, done: Evaluated) -> dict[str, int]:
-    """Count the sets that a limit turns down; each is counted at the first limit it misses."""
+def _rejected(table: SurveyTable, done: Evaluated) -> dict[str, int]:
+    """Count the sets that a limit rejects; each is counted at the first limit it misses."""
     left, found = np.ones(len(done.sets), dtype=np.bool_), {}
     for words, kept in _kept(table, done).items():
         found[words] = int(np.sum(left & ~kept))

@@ -118,7 +118,7 @@ SYSTEM = System(
         Stage("store rows", f"{_HERE}.stages:store", ("evaluated",), ("rows",), each=True),
         Stage("gather", f"{_HERE}.results:gather", ("surveyed",), ("survey",)),
         Stage("certify", f"{_HERE}.results:certify", ("survey",), ("certificates",)),
-        Stage("judge", f"{_HERE}.answer:judge", ("survey", "certificates"), ("records", "tables")),
+        Stage("assess", f"{_HERE}.results:assess", ("survey", "certificates"), ("records", "tables")),
         Stage("maps", f"{_HERE}.pictures:maps", ("survey",), ("plots",), aside=True),
         Stage("sketch best", f"{_HERE}.pictures:sketches", ("records", "ranking"), ("mechanism_pictures",)),
         Stage("animate best", f"{_HERE}.pictures:animations", ("records", "ranking"), ("animations",)),

@@ -1,4 +1,4 @@
-"""The lambda linkage of a scene: recognise four-bars, move them, assess the tilted bearing, judge."""
+"""The lambda linkage of a scene: recognise four-bars, move them, assess the tilted bearing with its tolerances."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from graphsynth.pipeline.products import Attempt, Candidate, Finding, Quantity, Recognised, Record, Table, each
 from graphsynth.pipeline.stages import Context
-from graphsynth.pipeline.steps.records import recognise_by_key, records_of
-from graphsynth.systems.lambda_linkage.stages_tolerances import tolerance_box
+from graphsynth.pipeline.steps import recognise_by_key, records_of
 from graphsynth.systems.lambda_linkage.system import LambdaTable
 
 if TYPE_CHECKING:
+    from graphsynth.core.errors import SceneError
     from graphsynth.jamming.assess import JammingReport
     from graphsynth.jamming.bearing.arcs import Span
     from graphsynth.jamming.bearing.certify import JamCertificate
     from graphsynth.jamming.bearing.limits import CertifiedLimit
+    from graphsynth.jamming.bearing.parameters import ToleranceBox
     from graphsynth.mechanism.four_bar import FourBarPositions, TiltedFourBar
 
-__all__ = ["LambdaMotion", "jamming", "judge", "kinematics", "recognise", "tolerance_box"]
+__all__ = ["LambdaMotion", "assess", "jamming", "kinematics", "recognise", "tolerance_box"]
 
 _C = Literal["A", "B"]
 
@@ -97,13 +98,13 @@ def jamming(context: Context, motions: tuple[Attempt, ...]) -> tuple[Attempt, ..
     table, box = _table(context), tolerance_box(context)
     bearing = Bearing(table.bearing.radius_mm, table.bearing.height_mm, table.bearing.clearance_mm)
 
-    def assess(motion: LambdaMotion) -> dict[_C, JammingReport]:
+    def both(motion: LambdaMotion) -> dict[_C, JammingReport]:
         return {c: assess_bearing(motion.linkage, bearing, c, motion.tilted.f, box, True) for c in _CONDITIONS}
 
-    return each(motions, assess)
+    return each(motions, both)
 
 
-def judge(
+def assess(
     context: Context, recognised: tuple[Recognised, ...], motions: tuple[Attempt, ...], assessments: tuple[Attempt, ...]
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record per candidate and the tables of the first one assessed."""
@@ -123,12 +124,12 @@ def judge(
         return records, ()
     motion = next(m.value for m in motions if m.candidate.number == done.candidate.number)
     proved = _proof_table(context, done.value, limits)
-    told = _arcs_told(done.value[condition]) + _limits_told(limits[condition])
-    jam = replace(_jam_table(context, done.value, limits), findings=told)
+    found = _arc_findings(done.value[condition]) + _limit_findings(limits[condition])
+    jam = replace(_jam_table(context, done.value, limits), findings=found)
     return records, (_motion_table(motion), jam, proved, _fit_table(context))
 
 
-def _arcs_told(report: JammingReport) -> tuple[Finding, ...]:
+def _arc_findings(report: JammingReport) -> tuple[Finding, ...]:
     """Say at which crank angles the nominal bearing jams."""
     arcs = report.arcs.arcs
     if not arcs or sum(arc.length for arc in arcs) >= math.tau:
@@ -137,7 +138,7 @@ def _arcs_told(report: JammingReport) -> tuple[Finding, ...]:
     return (Finding(f"With the nominal dimensions it jams at crank angles {angles} (estimated)."),)
 
 
-def _limits_told(limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]:
+def _limit_findings(limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]:
     """Say which clearance is proved to be enough and which tilt harmless, rounded to the safe side."""
     from graphsynth.intervals.reading import shortened
 
@@ -224,7 +225,7 @@ def _proof_table(
 
 
 def _fit_table(context: Context) -> Table:
-    """Judge standard fits for the tilt and the dimensions of the scene."""
+    """Assess standard fits for the tilt and the dimensions of the scene."""
     from graphsynth.core.errors import GeometryError
     from graphsynth.intervals.reading import shortened
     from graphsynth.jamming.bearing.fits import assess_fits
@@ -235,7 +236,7 @@ def _fit_table(context: Context) -> Table:
     try:
         found = assess_fits(box, bearing.condition, diameter=Fraction(repr(2 * bearing.radius_mm)))
     except GeometryError as error:
-        return Table("Standard fits (ISO 286)", columns, (), f"Not judged: {error}")
+        return Table("Standard fits (ISO 286)", columns, (), f"Not assessed: {error}")
     rows = tuple((f.fit.name, str(f.fit.clearance), f.words, shortened(f.clearance_left, -1, 4)) for f in found)
     return Table("Standard fits (ISO 286)", columns, rows, note)
 
@@ -310,7 +311,7 @@ def _motion_table(motion: LambdaMotion) -> Table:
         ("the tilt moves M in the plane by at most", f"{shift:.6g}", "estimated, largest sample"),
         ("relative error of the rod length", f"{motion.residual:.1e}", "estimated, largest sample"),
     )
-    return Table("Motion", ("quantity", "value", "how had"), rows, "Lengths in the unit of the link lengths.")
+    return Table("Motion", ("quantity", "value", "method"), rows, "Lengths in the unit of the link lengths.")
 
 
 def _stroke(linkage: TiltedFourBar) -> str:
@@ -322,3 +323,113 @@ def _stroke(linkage: TiltedFourBar) -> str:
     except GeometryError as error:
         return f"none: {error}"
     return f"{stroke.chord:.8g} long, {stroke.deviation:.6g} wide"
+
+
+#: Key of ``[mechanism.tolerances]``: parameter of the box, and where its nominal value stands in the scene.
+_TOLERANCES: dict[str, tuple[str, tuple[str, str] | None]] = {
+    "frame": ("l1", ("lengths", "frame")),
+    "crank": ("l2", ("lengths", "crank")),
+    "coupler": ("l3", ("lengths", "coupler")),
+    "rocker": ("l4", ("lengths", "rocker")),
+    "alpha_rad": ("alpha", ("tilt", "alpha_rad")),
+    "azimuth_rad": ("azimuth", None),
+    "radius_mm": ("Rb", ("bearing", "radius_mm")),
+    "height_mm": ("Hb", ("bearing", "height_mm")),
+    "clearance_mm": ("clearance", ("bearing", "clearance_mm")),
+}
+
+
+def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
+    """Return the exact dimensions of the scene, with the tolerances of ``[mechanism.tolerances]`` if there are any.
+
+    Numbers of the file are taken as the decimals that stand there, not as the doubles nearest to them; a dimension that
+    was changed after reading is taken as the double it is.
+
+    Raises
+    ------
+    SceneError
+        For a tolerance with an unknown name, one that is no number, or one so large that a dimension may vanish.
+    """
+    from graphsynth.core.errors import GeometryError
+    from graphsynth.jamming.bearing.parameters import Range, ToleranceBox, spread
+
+    table = _table(context)
+    raw = context.scene.raw.get("mechanism", {})
+    raw = raw if isinstance(raw, Mapping) else {}
+    given: dict[str, Any] = {"azimuth": 0}
+    for name, place in _TOLERANCES.values():
+        if place:
+            part = getattr(table, place[0])
+            given[name] = _exact(_inside(raw, *place), getattr(part, place[1].removesuffix("_rad")))
+    axis = [_exact(number, value) for number, value in zip(_axis(raw), table.tilt.axis)]
+    for key, size in table.tolerances.items() if tolerances else ():
+        name = _tolerance_name(context, key)
+        absolute, relative = _tolerance(context, key, size)
+        given[name] = spread(Range.read(key, given[name]), absolute, relative)
+    try:
+        return ToleranceBox(**given, axis=axis, sgn=table.branch)
+    except GeometryError as error:
+        raise _refused(context, str(error)) from None
+
+
+def _refused(context: Context, sentence: str) -> SceneError:
+    """Return a sentence about a parameter of the box with the place and the key of its tolerance in the scene."""
+    place = context.scene.place / "mechanism"
+    for key, (name, _) in _TOLERANCES.items():
+        if sentence.startswith(f"{name} = ") and key in _table(context).tolerances:
+            size = _table(context).tolerances[key]
+            return (place / "tolerances").error(f"has {key} = {size!r}, so that {sentence}", key)
+    return place.error(f"gives what no bearing has: {sentence}")
+
+
+def _axis(raw: Mapping[str, Any]) -> list[Fraction | None]:
+    from graphsynth.pipeline.tables import exact_number
+    from graphsynth.pipeline.units import Unit
+
+    tilt = raw.get("tilt", {})
+    numbers = tilt.get("axis") if isinstance(tilt, Mapping) else None
+    return [exact_number(number, Unit.parse("")) for number in numbers or [None] * 3]
+
+
+def _inside(raw: Mapping[str, Any], table: str, key: str) -> Fraction | None:
+    from graphsynth.pipeline.tables import written
+
+    return written(raw.get(table, {}), key)
+
+
+def _exact(number: Fraction | None, value: float) -> Any:
+    """Return the number that stands in the file, if it is the one that was read; else the double."""
+    return number if number is not None and float(number) == value else value
+
+
+def _tolerance_name(context: Context, key: str) -> str:
+    from graphsynth.pipeline.tables import suggest
+
+    if key not in _TOLERANCES:
+        raise (context.scene.place / "mechanism" / "tolerances").error(
+            f"has an unknown key {key!r}{suggest(key, _TOLERANCES)}", key
+        )
+    return _TOLERANCES[key][0]
+
+
+def _tolerance(context: Context, key: str, size: Any) -> tuple[Fraction, Fraction]:
+    """Read an absolute tolerance, or a relative one such as ``"1 %"``."""
+    from graphsynth.pipeline.tables import ANY_LENGTH
+    from graphsynth.pipeline.units import Unit, convert, split_suffix, split_value
+
+    expected = Unit.parse(split_suffix(key)[1]) if split_suffix(key)[1] else ANY_LENGTH
+    try:
+        number, text = split_value(size if isinstance(size, str) else repr(size))
+        unit = Unit.parse(text)
+        if text and text != "%":
+            number, exact = convert(number, unit, expected) if unit.agrees(expected) else (Fraction(-1), True)
+            number *= 1 if exact else 1 + Fraction(1, 10**40)  # outward: more than the error of pi
+    except ValueError:
+        number, text = Fraction(-1), ""
+    if number < 0 or isinstance(size, bool):
+        raise (context.scene.place / "mechanism" / "tolerances").error(
+            f'has {key} = {size!r}; give a tolerance of zero or more, as in 0.005 or "0.005 {expected.text}", '
+            'or relative, as in "1 %"',
+            key,
+        )
+    return (Fraction(0), number / 100) if text == "%" else (number, Fraction(0))

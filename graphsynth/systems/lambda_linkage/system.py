@@ -69,7 +69,7 @@ SYSTEM = System(
         Stage("recognise", f"{_HERE}.stages:recognise", ("candidates",), ("recognised",)),
         Stage("kinematics", f"{_HERE}.stages:kinematics", ("recognised",), ("motions",)),
         Stage("jamming", f"{_HERE}.stages:jamming", ("motions",), ("assessments",)),
-        Stage("judge", f"{_HERE}.stages:judge", ("recognised", "motions", "assessments"), ("records", "tables")),
+        Stage("assess", f"{_HERE}.stages:assess", ("recognised", "motions", "assessments"), ("records", "tables")),
         Stage(
             "sketch mechanism",
             f"{_HERE}.stages_pictures:sketches",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from graphsynth.core.errors import GeometryError
 from graphsynth.pipeline.products import Candidate, Quantity, Recognised, Record, Table, exact
 from graphsynth.pipeline.stages import Context
-from graphsynth.pipeline.steps.records import recognise_by_key
+from graphsynth.pipeline.steps import recognise_by_key
 from graphsynth.systems.piston.system import PistonTable
 
 if TYPE_CHECKING:

@@ -158,7 +158,7 @@ SYSTEM = System(
         Stage("without inertia", f"{_STEPS}:without_inertia", (), ("without_inertia",)),
         Stage("resistance", f"{_STEPS}:claim", (), ("claim",)),
         Stage("inductance", f"{_STEPS}:limit", (), ("limit",)),
-        Stage("judge", f"{_STEPS}_tables:judge", ("runs", "without_inertia", "claim", "limit"), ("records", "tables")),
+        Stage("assess", f"{_STEPS}:assess", ("runs", "without_inertia", "claim", "limit"), ("records", "tables")),
         Stage("sketch mechanism", f"{_STEPS}_pictures:sketches", (), ("mechanism_pictures",)),
         Stage("animate", f"{_STEPS}_pictures:animations", ("runs",), ("animations",)),
         Stage("plot", f"{_STEPS}_pictures:plots", ("runs", "without_inertia", "claim", "limit"), ("plots",)),

@@ -1,4 +1,4 @@
-"""The single-motor platform of a scene: recognise its graph, move it through a full turn, judge."""
+"""The single-motor platform of a scene: recognise its graph, move it through a full turn, assess."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.pipeline.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each, exact
 from graphsynth.pipeline.stages import Context
-from graphsynth.pipeline.steps.records import recognise_by_key, records_of
+from graphsynth.pipeline.steps import recognise_by_key, records_of
 from graphsynth.systems.platform.system import PlatformTable
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.motion import Motion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["PlatformMotion", "judge", "kinematics", "platform_of", "recognise"]
+__all__ = ["PlatformMotion", "assess", "kinematics", "platform_of", "recognise"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +139,7 @@ def _move(table: PlatformTable) -> PlatformMotion:
     )
 
 
-def judge(
+def assess(
     context: Context, recognised: tuple[Recognised, ...], motions: tuple[Attempt, ...]
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record per candidate and the tables of the first one moved."""
@@ -186,7 +186,7 @@ def _margins(motion: Motion) -> tuple[Quantity, ...]:
 
 
 def _turn_table(moved: PlatformMotion) -> Table:
-    """State what the turn is, how it was had and what the drives allow."""
+    """State what the turn is, its method and what the drives allow."""
     motion, mechanism = moved.motion, moved.mechanism
     drives = ", ".join(turn.kind for turn in mechanism.drive_turns())
     label = motion.label
@@ -201,7 +201,7 @@ def _turn_table(moved: PlatformMotion) -> Table:
         *((q.name, q.text, q.guarantee) for q in _margins(motion)),
         ("time of the turn", f"{motion.seconds:.3f} s", "measured once"),
     ]
-    return Table("The full turn", ("quantity", "value", "how had"), tuple(rows), f"How had: {motion.method}.")
+    return Table("The full turn", ("quantity", "value", "method"), tuple(rows), f"Method: {motion.method}.")
 
 
 def _sign(value: int) -> str:

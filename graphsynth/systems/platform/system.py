@@ -51,13 +51,13 @@ SYSTEM = System(
     stages=(
         Stage("recognise", f"{_HERE}.stages:recognise", ("candidates",), ("recognised",)),
         Stage("kinematics", f"{_HERE}.stages:kinematics", ("recognised",), ("motions",)),
-        Stage("judge", f"{_HERE}.stages:judge", ("recognised", "motions"), ("records", "tables")),
+        Stage("assess", f"{_HERE}.stages:assess", ("recognised", "motions"), ("records", "tables")),
         Stage("sketch mechanism", f"{_HERE}.stages_pictures:sketches", ("motions",), ("mechanism_pictures",)),
         Stage("animate", f"{_HERE}.stages_pictures:animations", ("motions",), ("animations",)),
         Stage("plot", f"{_HERE}.stages_pictures:plots", ("motions",), ("plots",)),
-        Stage("drive", f"{_HERE}.motor_stages_machine:drive", ("motions",), ("drive",)),
-        Stage("tell the drive", f"{_HERE}.motor_stages_machine:tables", ("drive",), ("drive_tables",)),
-        Stage("plot the drive", f"{_HERE}.motor_stages_machine:curves", ("drive",), ("drive_curves",)),
+        Stage("drive", f"{_HERE}.motor_stages:drive_machine", ("motions",), ("drive",)),
+        Stage("report the drive", f"{_HERE}.motor_stages:tables", ("drive",), ("drive_tables",)),
+        Stage("plot the drive", f"{_HERE}.motor_stages:curves", ("drive",), ("drive_curves",)),
     ),
     evidence=plans("graphsynth.systems.platform.evidence", "assembly-modes", "double-root", "turn", "drive"),
 )

@@ -1,13 +1,14 @@
-"""From the structural question to candidate mechanism graphs."""
+"""Stages that every system shares: from the question to candidates, recognition by key, records, pictures of graphs."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import FormatError, GraphError, SceneError, SpecError, TooLargeError
-from graphsynth.pipeline.products import Candidate
+from graphsynth.pipeline.products import Attempt, Candidate, Outcome, Picture, Quantity, Recognised, Record
 from graphsynth.pipeline.scene import StructureTable
 from graphsynth.pipeline.stages import Context
 
@@ -15,7 +16,17 @@ if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
 
-__all__ = ["check_count", "generate", "has_threefold_symmetry", "solve"]
+__all__ = [
+    "UNKNOWN",
+    "check_count",
+    "generate",
+    "has_threefold_symmetry",
+    "pictures",
+    "recognise_by_key",
+    "records",
+    "records_of",
+    "solve",
+]
 
 
 def solve(context: Context) -> tuple[LinkAssortment, ...]:
@@ -216,3 +227,93 @@ def has_threefold_symmetry(graph: MechanismGraph, fixed_moving_links: int) -> bo
         return False  # no three-cycle left, or the rest does not fall into three-cycles
     image[frame] = frame
     return search(tuple(link for link in range(graph.links) if link != frame), fixed_moving_links)
+
+
+#: Words, whether they are good news, and margins, from the value of an outcome.
+Verdict = Callable[[Any], tuple[str, bool, tuple[Quantity, ...]]]
+
+
+#: The reason of a candidate that no module knows: not a failure.
+UNKNOWN = "no kinematic module yet recognises this graph"
+
+
+def recognise_by_key(candidates: tuple[Candidate, ...], known: MechanismGraph, module: str) -> tuple[Recognised, ...]:
+    """Mark the candidates isomorphic to `known` (frame and joint mobilities respected) as belonging to `module`."""
+    return tuple(
+        Recognised(c, module) if c.graph.key == known.key else Recognised(c, None, UNKNOWN) for c in candidates
+    )
+
+
+def records_of(
+    recognised: tuple[Recognised, ...],
+    outcomes: tuple[Attempt, ...],
+    verdict: Verdict,
+) -> tuple[Record, ...]:
+    """Return one record per candidate, in their order; `verdict` reads the value of an outcome."""
+    by_number = {outcome.candidate.number: outcome for outcome in outcomes}
+    return tuple(_record(item, by_number.get(item.candidate.number), verdict) for item in recognised)
+
+
+def _record(item: Recognised, outcome: Attempt | None, verdict: Verdict) -> Record:
+    candidate = item.candidate
+    number, key, solution = candidate.number, candidate.graph.key, candidate.solution
+    if outcome is None or item.module is None:
+        return Record(number, key, solution, "not recognised", reason=item.reason)
+    if outcome.failed:
+        return Record(number, key, solution, "failed", item.module, reason=outcome.reason)
+    words, good, margins = verdict(outcome.value)
+    return Record(number, key, solution, "assessed", item.module, words, good, margins)
+
+
+def records(context: Context, outcomes: tuple[Outcome, ...]) -> tuple[Record, ...]:
+    """Return one record per candidate, in their order.
+
+    Examples
+    --------
+    >>> records(None, (Outcome(2, "k", status="rejected", stage="goals", cause="too long", reason="too long: 3 m"),))[0]
+    ... # doctest: +ELLIPSIS
+    Record(number=2, key='k', ..., status='rejected', ..., reason='too long: 3 m', cause='goals: too long')
+    """
+    return tuple(map(_record_of, outcomes))
+
+
+def _record_of(outcome: Outcome) -> Record:
+    if outcome.status == "assessed":
+        record: Record = outcome.products["record"]
+        return replace(record, number=outcome.number, key=outcome.key, solution=outcome.solution)
+    return Record(
+        outcome.number,
+        outcome.key,
+        outcome.solution,
+        outcome.status,
+        reason=outcome.reason,
+        cause=f"{outcome.stage}: {outcome.cause}",
+    )
+
+
+_MOST = 60  # more is not a contact sheet any more
+
+
+def pictures(
+    context: Context, candidates: tuple[object, ...], recognised: tuple[Recognised, ...]
+) -> tuple[Picture, ...]:
+    """Draw every candidate by adjacency levels, the recognised ones first and larger; at most sixty."""
+    chosen = sorted(recognised, key=lambda r: (r.module is None, r.candidate.number))[:_MOST]
+    return tuple(_picture(item) for item in chosen)
+
+
+def _picture(item: Recognised) -> Picture:
+    from graphsynth.drawing.levels import draw_levels
+
+    graph, known = item.candidate.graph, item.module is not None
+    title = f"No. {item.candidate.number}"
+    caption = (
+        f"Recognised as {item.module}; {item.candidate.solution}, levels of {_sizes(graph)} links" if known else ""
+    )
+    return Picture(
+        title, draw_levels(graph, 460 if known else 210, f"{title}, by levels"), caption, "wide" if known else "small"
+    )
+
+
+def _sizes(graph: object) -> str:
+    return ", ".join(str(len(level)) for level in graph.levels)  # type: ignore[attr-defined]

@@ -1,1 +1,0 @@
-"""Stage functions: thin adapters between a scene and the rooms that do the work, imported by name on demand."""

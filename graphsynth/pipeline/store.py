@@ -1,0 +1,355 @@
+"""What a run keeps: outcomes of candidates as lines of a journal, their columns as files, whole or not at all."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import os
+import tempfile
+import typing
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.core.errors import FormatError, GraphsynthError, SceneError
+from graphsynth.core.journal import Journal, Work, digest_of, writing
+from graphsynth.pipeline import products
+from graphsynth.pipeline.products import Columns, Outcome, Part
+
+if TYPE_CHECKING:
+    from graphsynth.pipeline.scene import Scene
+    from graphsynth.pipeline.stages import Stage
+
+__all__ = [
+    "JOURNAL",
+    "REMEDY",
+    "Candidates",
+    "PartFolder",
+    "check_folder",
+    "decode",
+    "encode",
+    "mark_reported",
+    "signature",
+    "split_parts",
+    "write_whole",
+]
+
+_TAG = "~"  # names the dataclass, or "number" for one that JSON has no sign for
+_CLASSES: dict[str, type] = {
+    name: getattr(products, name)
+    for name in ("Finding", "Objective", "Outcome", "Part", "Picture", "Quantity", "Ranking", "Record", "Table")
+}
+
+
+def encode(value: object) -> str:
+    """Return a value as one line of JSON, the same for equal values.
+
+    Parameters
+    ----------
+    value : object
+        Text, numbers, booleans, None, lists, tuples, dictionaries with text keys, numpy scalars, and the frozen
+        dataclasses of :mod:`graphsynth.pipeline.products`; nested.
+
+    Raises
+    ------
+    SceneError
+        For anything else; the message names the type.
+
+    Examples
+    --------
+    >>> encode({"b": (1, 2.5), "a": float("inf")})
+    '{"a": {"is": "inf", "~": "number"}, "b": [1, 2.5]}'
+    """
+    return json.dumps(_plain(value), ensure_ascii=False, sort_keys=True, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else {_TAG: "number", "is": repr(float(value))}
+    if type(value).__name__ in _CLASSES and type(value) is _CLASSES[type(value).__name__]:
+        fields = {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(typing.cast(Any, value))}
+        return {_TAG: type(value).__name__, **fields}
+    if isinstance(value, Mapping) and all(isinstance(key, str) and key != _TAG for key in value):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if getattr(value, "shape", None) == () and hasattr(value, "item"):
+        return _plain(value.item())
+    raise SceneError(
+        f"a stage for each candidate gave a {type(value).__name__}, which cannot be kept as text; give text, numbers, "
+        "tuples, dictionaries with text keys, or the dataclasses of graphsynth.pipeline.products"
+    )
+
+
+def decode(line: str) -> Any:
+    """Return the value of a line; lists come back as tuples.
+
+    Raises
+    ------
+    FormatError
+        If the line is not one that :func:`encode` writes.
+
+    Examples
+    --------
+    >>> decode(encode({"b": [1, float("-inf")]}))
+    {'b': (1, -inf)}
+    """
+    try:
+        return _value(json.loads(line))
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise FormatError(f"not a line of results: {type(error).__name__}: {error}") from None
+
+
+def _value(plain: Any) -> Any:
+    if isinstance(plain, list):
+        return tuple(map(_value, plain))
+    if not isinstance(plain, dict):
+        return plain
+    tag = plain.get(_TAG)
+    inner = {key: _value(value) for key, value in plain.items() if key != _TAG}
+    if tag is None:
+        return inner
+    return float(inner["is"]) if tag == "number" else _CLASSES[tag](**inner)
+
+
+#: Name of the file in the report folder.
+JOURNAL = "candidates.jsonl"
+
+_COMPLETE = '{"complete": true}'
+_REPORTED = '{"reported": true}'
+
+
+def signature(scene: Scene, stages: Sequence[Stage], kept: Sequence[str]) -> str:
+    """Digest of all that the lines of a journal depend on: the question, the stages, the version of graphsynth.
+
+    Titles, budgets, outputs and the limit on the number of candidates may change between runs.
+    """
+    structure = scene.structure
+    if structure is not None:
+        least = structure.generate.sample or 1  # any limit that is allowed
+        structure = replace(structure, generate=replace(structure.generate, limit=least))
+    return digest_of(
+        scene.scene.seed,
+        repr(scene.mechanism),
+        repr(structure),
+        scene.budget.boxes,
+        [(stage.name, stage.function) for stage in stages],
+        list(kept),
+    )
+
+
+def _work(scene: str, digest: str) -> Work:
+    foreign = "holds an interrupted run of another question or version"
+    remedy = f"add --fresh to start anew, or {REMEDY}"
+    return Work("run", scene, digest, "candidate", foreign, remedy, REMEDY, error=SceneError)
+
+
+class Candidates(Journal):
+    """The journal of one run; without a path nothing is kept on disk.
+
+    Parameters
+    ----------
+    path : Path or None
+        The file.
+    scene : str
+        Name of the scene, for people.
+    signature : str
+        Of this run; a file of another unfinished run is refused.
+    fresh : bool
+        Replace whatever is there.
+
+    Attributes
+    ----------
+    done : tuple of Outcome
+        What an interrupted run had written.
+
+    Raises
+    ------
+    SceneError
+        If the file belongs to another unfinished run, or another process writes it.
+    FormatError
+        If it is not a file of results.
+    """
+
+    def __init__(self, path: Path | None, scene: str, signature: str, fresh: bool = False) -> None:
+        if path is not None:
+            with writing(path, REMEDY, SceneError):
+                path.parent.mkdir(parents=True, exist_ok=True)
+        super().__init__(path, _work(scene, signature), lambda entries: entries[-1:] == [_REPORTED], fresh)
+        if self.entries[-1:] == (_COMPLETE,):
+            self.keep(len(self.entries) - 1)  # there may be more candidates now
+        self.done = tuple(self._outcome(number, entry) for number, entry in enumerate(self.entries, 1))
+
+    def complete(self) -> None:
+        """Say that no more candidates come."""
+        self.append(_COMPLETE)
+
+    def _outcome(self, number: int, entry: str) -> Outcome:
+        try:
+            outcome = decode(entry)
+        except FormatError:
+            outcome = None
+        if not isinstance(outcome, Outcome) or outcome.number != number:
+            self.close()
+            raise FormatError(f"not the result of candidate {number}; {self.work.remedy}", str(self.path))
+        return outcome
+
+
+def mark_reported(path: Path) -> None:
+    """Say in a journal that all its candidates are reported: the next run starts anew; an unfinished one stays.
+
+    A run that is stopped between its last candidate and its report goes on from there, too.
+    """
+    try:
+        with path.open("rb") as stream:
+            head = json.loads(stream.readline())
+        with Journal(path, _work(head["title"], head["question"])) as journal:
+            if journal.entries[-1:] == (_COMPLETE,):
+                journal.append(_REPORTED)
+    except (FileNotFoundError, ValueError, LookupError, TypeError, GraphsynthError):
+        return  # a scene without candidates; or another process has begun to go on with it, and will report
+
+
+#: What to do where a report folder cannot be written.
+REMEDY = "choose another folder with --out"
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file so that nobody ever sees half of it."""
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def check_folder(folder: Path) -> None:
+    """Try whether files can be written into a folder; what is made for that is removed.
+
+    Raises
+    ------
+    SceneError
+        If not.
+    """
+    made: list[Path] = []
+    try:
+        with writing(f"the report into {folder}", REMEDY, SceneError):
+            for part in (*reversed(folder.parents), folder):
+                if not part.exists():
+                    part.mkdir()
+                    made.append(part)
+            with tempfile.TemporaryFile(dir=folder) as stream:
+                stream.write(b"x")
+    finally:
+        for part in reversed(made):
+            with suppress(OSError):  # somebody else began to use it
+                part.rmdir()
+
+
+def split_parts(outcome: Outcome, kinds: Sequence[str]) -> tuple[Outcome, dict[str, bytes]]:
+    """Take the columns out of an outcome: each becomes a `Part`, and the files to be written come besides.
+
+    Parameters
+    ----------
+    kinds : sequence of str
+        "csv", "parquet".
+    """
+    from graphsynth.pipeline.datafiles import column_files
+
+    products = dict(outcome.products)
+    files: dict[str, bytes] = {}
+    for product, value in outcome.products.items():
+        if not isinstance(value, Columns):
+            continue
+        made = column_files(f"{value.name}/part-{outcome.number:05}", value.columns, kinds)
+        rows = len(next(iter(value.columns.values()), ()))
+        digests = tuple((path, hashlib.sha256(data).hexdigest()) for path, data in made.items())
+        products[product] = Part(value.name, rows, digests)
+        files |= made
+    return (replace(outcome, products=products), files) if files else (outcome, {})
+
+
+class PartFolder:
+    """The files of one run below its report folder; without a folder nothing is written.
+
+    Parameters
+    ----------
+    folder : Path or None
+        The report folder.
+    done : sequence of Outcome
+        Taken over from an interrupted run; their files must be there and unchanged.
+    kinds : sequence of str
+        "csv", "parquet", as asked for now.
+
+    Raises
+    ------
+    SceneError
+        If one is not.
+    """
+
+    def __init__(self, folder: Path | None, done: Sequence[Outcome], kinds: Sequence[str] = ()) -> None:
+        self._folder = folder
+        self._kinds = tuple(kinds)
+        self._kept: set[str] = set()
+        self._begun: set[Path] = set()
+        for outcome in done if folder is not None else ():
+            for part in outcome.products.values():
+                if isinstance(part, Part):
+                    self._check_kinds(part)
+                    for path, digest in part.files:
+                        self._check(path, digest)
+
+    def _check_kinds(self, part: Part) -> None:
+        had = {path.rpartition(".")[2] for path, _ in part.files}
+        if self._kinds and had != set(self._kinds):
+            raise SceneError(
+                f"the interrupted run in {self._folder} wrote {part.name} as {', '.join(sorted(had))}, and now files = "
+                f"{list(self._kinds)} are asked for; add --fresh to start anew"
+            )
+
+    def _check(self, path: str, digest: str) -> None:
+        assert self._folder is not None
+        try:
+            data = (self._folder / path).read_bytes()
+        except OSError:
+            data = b""
+        if hashlib.sha256(data).hexdigest() != digest:
+            raise SceneError(
+                f"{self._folder / path} of the interrupted run is missing or changed; add --fresh to start anew"
+            )
+        self._kept.add(path)
+
+    def write(self, files: Mapping[str, bytes]) -> None:
+        """Write files; the first time in a folder, parts of older runs are removed.
+
+        Raises
+        ------
+        SceneError
+            If the folder cannot be written.
+        """
+        if self._folder is None:
+            return
+        with writing(f"into {self._folder}", REMEDY, SceneError):
+            for path, data in files.items():
+                place = self._folder / path
+                if place.parent not in self._begun:
+                    self._begin(place.parent)
+                write_whole(place, data)
+
+    def _begin(self, folder: Path) -> None:
+        assert self._folder is not None
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("part-*.*"):
+            if str(old.relative_to(self._folder).as_posix()) not in self._kept:
+                old.unlink()
+        self._begun.add(folder)
