@@ -71,6 +71,34 @@ def test_the_family_of_another_package_runs_from_the_command_line(site: Path, sc
     assert float(row["period [s]"]) == pytest.approx(float(period), rel=1e-14)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "The period is 7.32 % longer than that of small swings." in page
+    assert '<td class="num">60</td><td class="num">2152.' in page  # SI values in the units of the columns
+
+
+def test_it_is_small(site: Path) -> None:
+    lines = [line for path in (site / "my_package").glob("*.py") for line in path.read_text("utf-8").splitlines()]
+    assert len(lines) <= 300
+
+
+def test_its_chart_its_evidence_and_its_stress_case(site: Path, scene: Path, tmp_path: Path) -> None:
+    from graphsynth.evidence.registry import load
+    from graphsynth.evidence.rows import Effort
+    from graphsynth.pipeline.scene import load_scene
+    from graphsynth.pipeline.stages import Context
+    from graphsynth.pipeline.system import plans_of
+
+    scene.write_text(scene.read_text(encoding="utf-8").replace('"tables"', '"plots"'), encoding="utf-8")
+    (picture,) = execute(scene)["plots"]
+    assert "swing [°]" in picture.svg or "<svg" in picture.svg
+    (plan,) = plans_of("pendulum")
+    (row,) = load(plan)(Context(load_scene(scene)), Effort(1, quick=True)).rows
+    assert row.good and row.error < 1e-14
+    cases = tmp_path / "pendulum.toml"
+    cases.write_text(block("toml", "[[case]]"), encoding="utf-8")
+    command = [sys.executable, "-m", "graphsynth", "stress", "--cases", str(cases)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=60, env={**os.environ, "PYTHONPATH": str(site)}, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_its_mistakes_are_answered_like_ours(site: Path, scene: Path) -> None:
@@ -90,4 +118,4 @@ def test_a_stage_of_another_package_gives_one_more_product(site: Path, scene: Pa
     report = execute(scene)
     period = report["records"][0].margins[0].value
     assert report["swings_per_hour"] == pytest.approx(3600.0 / period)
-    assert [stage.name for stage in report.stages] == ["swing", "judge", "count"]
+    assert [stage.name for stage in report.stages] == ["swing", "assess", "count"]
