@@ -159,14 +159,14 @@ def test_the_real_machine_has_its_motor_in_its_own_scene() -> None:
     from graphsynth.pipeline.products import Attempt
     from graphsynth.pipeline.scene import load_scene
     from graphsynth.pipeline.stages import Context
-    from graphsynth.systems.platform.motor_stages import drive, tables
+    from graphsynth.systems.platform.motor_stages import drive_machine, tables
     from graphsynth.systems.platform.stages import PlatformMotion, _mechanism
 
     scene = load_scene("didenko")
     assert {"drive_tables", "drive_curves"} <= set(scene.outputs.products)
     machine = _mechanism(scene.mechanism)
     moved = PlatformMotion(machine, *[None] * 8)  # type: ignore[arg-type]  # the drive needs the mechanism alone
-    runs = drive(Context(scene), (Attempt(None, moved),))  # type: ignore[arg-type]
+    runs = drive_machine(Context(scene), (Attempt(None, moved),))  # type: ignore[arg-type]
     assert [item.label for item in runs] == ["5 ohm", "20 ohm"]
     assert runs[0].drive.constant_inertia == pytest.approx(4 * (3e-6 + 2e-7) + 3 * 4e-6, rel=1e-14)
     for item in runs:
@@ -178,4 +178,4 @@ def test_the_real_machine_has_its_motor_in_its_own_scene() -> None:
     torque = [np.ptp(item.run.motor_torque[item.run.time >= 0.3]) for item in runs]
     assert ripple[1] > 3 * ripple[0] and torque[1] < torque[0]
     assert tables(Context(scene), runs)[0].title == "What the motor feels"
-    assert drive(Context(scene), ()) == ()
+    assert drive_machine(Context(scene), ()) == ()
