@@ -22,7 +22,7 @@ INTERRUPTED = 130
 
 def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the arguments; ``verb`` makes the parser of a name, a module and a summary."""
-    parser = verb("stress", "stress", "Run the stiff and extreme cases: what is right, what the library gives.")
+    parser = verb("stress", "stress", "Run the stiff and extreme cases and compare the results with the right values.")
     parser.add_argument(
         "names", nargs="*", metavar="NAME", help="platform-12.5, or all of platform-12, or of platform (default: all)"
     )

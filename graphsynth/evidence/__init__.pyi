@@ -7,10 +7,10 @@ from .crossing import area_problem as area_problem
 from .crossing import crossing_problem as crossing_problem
 from .dynamics import dynamics_work_precision as dynamics_work_precision
 from .jamming import arc_problem as arc_problem
+from .page import write_report as write_report
 from .pictures import work_precision_picture as work_precision_picture
 from .report import AccuracyReport as AccuracyReport
 from .report import measure as measure
-from .report import write_report as write_report
 from .rows import Effort as Effort
 from .rows import Problem as Problem
 from .rows import Row as Row

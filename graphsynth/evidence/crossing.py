@@ -97,7 +97,7 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
         setting = f"up to {boxes} boxes"
         rows.append(_enclosed("general solver", setting, paved, hull, truth, (seconds, rounds)))
     question = f"Where circle and ellipse of the bearing cross at the tilt asin({float(sine):.6g})"
-    note = "A limit of boxes ends the search before its end; what is left is then enclosed, only wider."
+    note = "A limit on the number of boxes stops the search early; the enclosure is then valid, but wider."
     return Problem("crossing", question, "mm", tuple(rows), note=note)
 
 

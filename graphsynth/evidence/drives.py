@@ -276,7 +276,10 @@ def drive_problem(
         "which shares the compiled right-hand side with them. scipy's DOP853 is that method at a looser tolerance."
     )
     if truth is None:
-        note = f"No reference of its own for this motor. All are compared with {reference}: the same right-hand side."
+        note = (
+            f"There is no independent reference for this motor: all methods are compared with {reference}, which uses "
+            "the same right-hand side."
+        )
     else:
         drive = _Drive(plant, motor, train, times)
         rows = [_against(row, _Truth(truth, _PRECISE), drive) for row in rows]

@@ -195,7 +195,7 @@ def dynamics_problem(
         rows += [_with_drift(model, start, times, row, right, truth) for row in found]
     note = "Drift and energy are those of a further run; positions are projected onto the joints (the default)."
     if truth is None:
-        note += " The reference is another formulation of the same model, by the same integrator: no code of its own."
+        note += " The reference is another formulation of the same model by the same integrator, so it shares code."
     return Problem("linkage-dynamics", f"Motion of {name}, over {end:g} s", "relative", tuple(rows), "run", note)
 
 

@@ -1,6 +1,6 @@
 """The search for dimensions: error against run time, where the best dimensions are known.
 
-A search draws lots: rows of one setting are several seeds, of which the median counts.
+A search is random: rows of one setting are several seeds, of which the median counts.
 """
 
 from __future__ import annotations
@@ -88,9 +88,9 @@ def _rows(
 
 
 def line_problem(effort: Effort | None = None) -> Problem:
-    """Find a four-bar linkage that draws a straight line, the wish that leads to the lambda linkage.
+    """Find a four-bar linkage that draws a straight line, the requirement that leads to the lambda linkage.
 
-    The error is how much wider the strip is than that of Chebyshev's proportions, which solve this wish exactly
+    The error is how much wider the strip is than that of Chebyshev's proportions, which solve this exactly
     (``docs/explanation/embodiment.md``).
     """
     from graphsynth.kinematics.dimensional.goals import Goals, LineGoal
@@ -107,12 +107,12 @@ def line_problem(effort: Effort | None = None) -> Problem:
 
     kind = f"width of the strip over its length against the best, median of {seeds} seeds"
     rows = _rows(goals, settings, seeds, error, kind, "closed form with 50 digits")
-    question = "Dimensions of a four-bar linkage from the wish for a straight line of four cranks (Chebyshev's lambda)"
+    question = "Dimensions of a four-bar linkage for a straight line of four crank lengths (Chebyshev's lambda)"
     return Problem("dimensions", question, "relative", rows, "search", _NOTE)
 
 
 _NOTE = (
-    "A search draws lots and proves nothing; times and errors are medians over seeds. By default the effort is 1, with "
+    "A search is random and proves nothing; times and errors are medians over seeds. By default the effort is 1, with "
     "up to 12 tries, fewer when the target is met exactly."
 )
 

@@ -19,8 +19,8 @@ __all__ = ["PUBLISHED", "Growth", "enumeration_problem", "growth", "of_scene"]
 PUBLISHED: Mapping[int, int] = {4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318_162, 16: 19_819_281, 18: 1_535_380_884}
 _GRAPHS = "graphs"
 _NOTE = (
-    "Kinematic chains of mobility 1, whose numbers are published, whatever the scene asks. Extrapolated: one process, "
-    "and the law holds on."
+    "Measured on kinematic chains of mobility 1, whose counts are published, and not on the question of the scene. "
+    "Extrapolations assume one process, and that the law continues."
 )
 
 

@@ -323,7 +323,7 @@ def coupled_problem(
         found, seconds, done = best_of(partial(prove, relative_gap=gap), rounds, warm=gap == gaps[0])
         rows.append(_gap_row(found, gap, (low, high, reference), (seconds, done), default=gap == default))
     question = f"Largest misalignment of {name} whose bearings share it"
-    note = "Samples err on the wrong side: they never find the worst input itself."
+    note = "Samples overestimate the misalignment allowed, because they miss the worst input itself."
     return Problem("coupled-joints", question, "relative", tuple(rows), note=note)
 
 

@@ -1,10 +1,12 @@
-"""``accuracy.html``: one file without outside resources, readable on a phone."""
+"""The files of a report; ``accuracy.html`` is one file without outside resources, readable on a phone."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from graphsynth.drawing.pages import whole_page
@@ -16,7 +18,7 @@ from graphsynth.evidence.rows import Problem, Row
 if TYPE_CHECKING:
     from graphsynth.evidence.report import AccuracyReport
 
-__all__ = ["page"]
+__all__ = ["page", "write_report"]
 
 _CSS = """
 :root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--rule:#d5dbe1;--bad:#b34700}
@@ -106,3 +108,34 @@ def _number(value: float) -> str:
     if math.isnan(value):
         return ""
     return f"{value:.0f}" if value == round(value) and abs(value) < 1e6 else f"{value:.2e}"
+
+
+def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
+    """Write ``accuracy.csv``, ``.json``, ``.html`` and a PNG and SVG for each problem; return the files.
+
+    Parameters
+    ----------
+    report : AccuracyReport
+    folder : Path
+        Made if it is missing; files of an earlier run are replaced.
+
+    Returns
+    -------
+    tuple of Path
+    """
+    from graphsynth.drawing.figures import themed_svg
+    from graphsynth.evidence.pictures import work_precision_picture
+
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / "accuracy.csv", folder / "accuracy.json", folder / "accuracy.html"]
+    report.to_pandas().to_csv(files[0], index=False)
+    files[1].write_text(json.dumps(report.document(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    pictures = {}
+    for problem in report.problems:
+        figure = work_precision_picture(problem)
+        pictures[problem.name] = themed_svg(figure)
+        files += [folder / f"{problem.name}.{suffix}" for suffix in ("png", "svg")]
+        figure.savefig(files[-2], dpi=150)
+        files[-1].write_text(pictures[problem.name], encoding="utf-8")
+    files[2].write_text(page(report, pictures), encoding="utf-8")
+    return tuple(files)

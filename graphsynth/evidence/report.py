@@ -1,8 +1,7 @@
-"""Measure the problems of a scene, and write tables, pictures and a page."""
+"""Measure the problems of a scene; the report as data and as lines for a terminal."""
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import platform
@@ -22,7 +21,7 @@ from graphsynth.evidence.rows import Effort, Problem, table
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["AccuracyReport", "measure", "write_report"]
+__all__ = ["AccuracyReport", "measure", "summary"]
 
 #: Told before each problem (``done`` of ``total``), and once more at the end.
 Progress = Callable[[str, int, int], None]
@@ -198,38 +197,6 @@ def _processor() -> str:
     except OSError:
         return platform.processor() or platform.machine()
     return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), sys.platform)
-
-
-def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
-    """Write ``accuracy.csv``, ``.json``, ``.html`` and a PNG and SVG for each problem; return the files.
-
-    Parameters
-    ----------
-    report : AccuracyReport
-    folder : Path
-        Made if it is missing; files of an earlier run are replaced.
-
-    Returns
-    -------
-    tuple of Path
-    """
-    from graphsynth.drawing.figures import themed_svg
-    from graphsynth.evidence.page import page
-    from graphsynth.evidence.pictures import work_precision_picture
-
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / "accuracy.csv", folder / "accuracy.json", folder / "accuracy.html"]
-    report.to_pandas().to_csv(files[0], index=False)
-    files[1].write_text(json.dumps(report.document(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    pictures = {}
-    for problem in report.problems:
-        figure = work_precision_picture(problem)
-        pictures[problem.name] = themed_svg(figure)
-        files += [folder / f"{problem.name}.{suffix}" for suffix in ("png", "svg")]
-        figure.savefig(files[-2], dpi=150)
-        files[-1].write_text(pictures[problem.name], encoding="utf-8")
-    files[2].write_text(page(report, pictures), encoding="utf-8")
-    return tuple(files)
 
 
 def summary(report: AccuracyReport) -> Iterable[str]:

@@ -54,7 +54,7 @@ def test_bearings_are_those_of_the_scene(tmp_path):
 
 def test_loads_are_those_of_the_scene(tmp_path):
     problem = planar.linkage_dynamics(stated(tmp_path, loads={"bar_kg_per_m": 1.0, "speed_rad_s": 5.0}), QUICK)
-    assert "own of the scene" in problem.question and "no code of its own" in problem.note
+    assert "own of the scene" in problem.question and "so it shares code" in problem.note
     default = next(row for row in problem.rows if row.default)
     assert default.good and default.error < 1e-8
 
@@ -73,7 +73,7 @@ def test_a_mechanism_that_does_not_move_through_the_range_is_no_problem_but_a_re
 
 def test_searches_say_that_they_are_not_the_scene_s():
     problem = planar._fixed(planar.replace(_nothing(), note="They draw lots."))
-    assert problem.note.startswith("Not the scene's own wish") and problem.note.endswith("They draw lots.")
+    assert problem.note.startswith("Not the target of the scene") and problem.note.endswith("They draw lots.")
 
 
 def _nothing():

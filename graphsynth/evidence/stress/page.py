@@ -75,9 +75,10 @@ def stress_html(report: StressReport) -> str:
         _CSS,
         "<h1>Stress cases</h1>"
         f"<p>{escape(report.statement)}</p>"
-        + "<p>Each case compares what the library gives with what is right: a printed value, a closed form, many "
-        "digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: the situation is extreme, and "
-        "the library reports it as it must. <b>WRONG</b>: neither. Open a case to see its comparisons.</p>"
+        + "<p>Each case compares results of the library with the right values, which come from printed tables, closed "
+        "forms or computations with many digits. <b>ok</b>: all numbers are within the error allowed. <b>flagged</b>: "
+        "the situation is extreme, and the library reports it as required. <b>WRONG</b>: anything else. Open a case to "
+        "see its comparisons.</p>"
         + (f"<p>Left out because they are slow: {escape(left)}.</p>" if left else "")
         + (f'<p class="not-run">Interrupted, not reached: {escape(lost)}.</p>' if lost else "")
         + f'<ul class="facts">{facts}<li><b>{report.seconds:.0f} s</b>run time</li></ul>'
@@ -110,7 +111,7 @@ def _case(outcome: Outcome) -> str:
         f'<span>{escape(outcome.case.title)}</span><span class="{_class(status)}">{status.value}</span>'
         f"<span>{error}</span><span>{outcome.seconds:.2f} s</span></summary>{reason}"
         '<div class="scroll"><table><thead><tr><th>what</th><th>right</th><th>given</th><th>error</th><th>allowed</th>'
-        f"<th>status</th><th>what is right comes from</th></tr></thead><tbody>{rows}</tbody></table></div></details>"
+        f"<th>status</th><th>source of the right value</th></tr></thead><tbody>{rows}</tbody></table></div></details>"
     )
 
 
@@ -125,7 +126,7 @@ def _row(check: Check) -> str:
         f'<td data-name="given">{escape(check.given)}</td>{_number("error", numbers[0])}'
         f"{_number('allowed', numbers[1])}"
         f'<td class="{_class(check.status)}">{check.status.value}</td>'
-        f'<td data-name="what is right comes from">{escape(check.source)}</td></tr>'
+        f'<td data-name="source of the right value">{escape(check.source)}</td></tr>'
     )
 
 

@@ -81,7 +81,7 @@ def path_dimensions(context: Any, effort: Effort) -> Problem:
 
 
 def _fixed(problem: Problem) -> Problem:
-    own = "Not the scene's own wish, whose best is not known: a fixed one, whose best is."
+    own = "Not the target of the scene, whose best answer is unknown, but a fixed one, whose best answer is known."
     return replace(problem, note=f"{own} {problem.note}")
 
 

@@ -67,7 +67,7 @@ def positions(context: Any, effort: Effort) -> Problem:
 
 
 def dimensions(context: Any, effort: Effort) -> Problem:
-    """Search for the source's proportions from the wish alone."""
+    """Search for the source's proportions from the requirement alone."""
     from graphsynth.evidence.embodiment import line_problem
 
     return line_problem(effort)
