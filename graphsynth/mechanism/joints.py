@@ -2,6 +2,10 @@
 
 Every point and direction is given in the frame of its own link; the frame link's own frame is the fixed one.
 Complex notation below: link k carries the point p to ``r_k + exp(i theta_k) p``.
+
+A new kind of joint is a class here, among `KINDS` and in `JointGeometry`, with ``values`` and ``gradients``; its
+equations for the kernels stand in ``ROWS`` of `graphsynth.kinematics.engine.program`, its symbol in
+`graphsynth.drawing.symbols`, its reactions in `graphsynth.dynamics.reactions`.
 """
 
 from __future__ import annotations

@@ -183,23 +183,25 @@ def touches(tracker: Tracker, trace: Trace) -> list[MotionEvent]:
     """Where a dyad's margin touches zero, or dips below it between samples; at most one event ends the motion."""
     found: list[MotionEvent] = []
     for s, step in enumerate(tracker.program.steps):
-        parallel = step.code == codes.P_LINE
-        if not (step.has_two_modes or parallel):
-            continue
-        M, u = trace.M[: trace.done, s], trace.u[: trace.done]
-        M = np.abs(M) if parallel else M
-        middle = M[1:-1]
-        least = (middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])
-        low = np.flatnonzero(least & (_vertex(u, M) < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
-        around = [(int(k) - 1, int(k), int(k) + 1) for k in low] + _outer_dips(tracker, trace, M, s)
-        examine = _parallel_between if parallel else _touch
-        events = (examine(tracker, trace, where, s) for where in around)
-        found += [event for event in events if event is not None]
-        if parallel:
-            continue
-        ends = {0, len(M) - 1} if trace.stop is None else {0}  # the stop has an event of its own
-        found += [_at_end(trace, k, step) for k in sorted(ends) if len(M) and M[k] <= _TOUCH]
+        M = trace.M[: trace.done, s]
+        if step.code == codes.P_LINE:
+            found += _examined(tracker, trace, np.abs(M), s, _parallel_between)
+        elif step.has_two_modes:
+            found += _examined(tracker, trace, M, s, _touch)
+            ends = {0, len(M) - 1} if trace.stop is None else {0}  # the stop has an event of its own
+            found += [_at_end(trace, k, step) for k in sorted(ends) if len(M) and M[k] <= _TOUCH]
     return found
+
+
+def _examined(
+    tracker: Tracker, trace: Trace, M: Array, s: int, examine: Callable[..., MotionEvent | None]
+) -> list[MotionEvent]:
+    """Events at the places where a margin may vanish between samples."""
+    middle, u = M[1:-1], trace.u[: trace.done]
+    least = (middle < _NEAR) & (middle <= M[:-2]) & (middle <= M[2:])
+    low = np.flatnonzero(least & (_vertex(u, M) < np.where(middle < _FLAT, math.inf, 0.5 * middle))) + 1
+    around = [(int(k) - 1, int(k), int(k) + 1) for k in low] + _outer_dips(tracker, trace, M, s)
+    return [event for where in around if (event := examine(tracker, trace, where, s)) is not None]
 
 
 def _outer_dips(tracker: Tracker, trace: Trace, M: Array, s: int) -> list[tuple[int, int, int]]:

@@ -102,10 +102,9 @@ class PlatformSystem:
     def derivatives(self, x: Balls, u: Balls, units: Balls) -> tuple[Balls, Balls]:
         """Jacobian (N, 6, 6) and derivative by psi (N, 6)."""
         v = self._vectors(x, u, units)
-        two = exact(2.0)
-        h_phi, f_phi = two * _cross(v.arm, v.link), -(two * _cross(v.rocker, v.leg))
-        columns = stack([two * v.leg.real, two * v.leg.imag, two * _cross(v.vertex, v.leg)])
-        h_psi = -(two * _cross(v.crank, v.link))
+        h_phi, f_phi = 2.0 * _cross(v.arm, v.link), -(2.0 * _cross(v.rocker, v.leg))
+        columns = stack([2.0 * v.leg.real, 2.0 * v.leg.imag, 2.0 * _cross(v.vertex, v.leg)])
+        h_psi = -(2.0 * _cross(v.crank, v.link))
         N = len(x.mid)
         mid, rad = np.zeros((N, 6, 6)), np.zeros((N, 6, 6))
         for k in range(3):
@@ -124,7 +123,7 @@ class PlatformSystem:
         """Quantities whose signs are the working mode and the drive branches, over boxes."""
         v, n = self._vectors(x, u, self.units(x.mid, u.mid)), self.lengths
         rho2, total, gap = _square(v.reach), n["l1"] + n["l2"], n["l1"] - n["l2"]
-        JT, h_phi = -(exact(2.0) * _cross(v.rocker, v.leg)), exact(2.0) * _cross(v.arm, v.link)
+        JT, h_phi = -(2.0 * _cross(v.rocker, v.leg)), 2.0 * _cross(v.arm, v.link)
         return LegBounds(total * total - rho2, rho2 - gap * gap, JT, h_phi)
 
 

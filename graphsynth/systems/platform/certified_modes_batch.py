@@ -68,12 +68,12 @@ class _Coefficients(NamedTuple):
     def value(self, z: Balls) -> Balls:
         """Return G at points of the circle."""
         g0, g1, g2, g3 = self.g
-        return g0 + exact(2.0) * (z * (g1 + z * (g2 + z * g3))).real
+        return g0 + 2.0 * (z * (g1 + z * (g2 + z * g3))).real
 
     def slope(self, z: Balls) -> Balls:
         """Return the derivative of G by alpha."""
         _, g1, g2, g3 = self.g
-        return exact(-2.0) * (z * (g1 + z * (exact(2.0) * g2 + z * (exact(3.0) * g3)))).imag
+        return -2.0 * (z * (g1 + z * (2.0 * g2 + z * (3.0 * g3)))).imag
 
     def bend(self) -> Array:
         """Bound of ``|G''|``."""
@@ -227,12 +227,12 @@ def _coefficients(A: Balls, b: Balls, l2: Balls) -> _Coefficients:
     n1 = w20 * b3 - w21 * a3 - w30 * b2 + w31 * a2
     n0 = w21.conj * b3 - w20 * a3 + w30 * a2 - w31.conj * b2
     nm = w31.conj * a2 - w21.conj * a3
-    d0 = (exact(2.0) * (b2.conj * b3 + a2.conj * a3).imag).times_i
+    d0 = (2.0 * (b2.conj * b3 + a2.conj * a3).imag).times_i
     de = b2 * a3.conj - a2.conj * b3
     g3 = n2 * nm.conj
     g2 = n2 * n0.conj + n1 * nm.conj + L * de * de
-    g1 = n2 * n1.conj + n1 * n0.conj + n0 * nm.conj + exact(2.0) * L * d0 * de
-    g0 = _square(n2) + _square(n1) + _square(n0) + _square(nm) - L * (_square(d0) + exact(2.0) * _square(de))
+    g1 = n2 * n1.conj + n1 * n0.conj + n0 * nm.conj + 2.0 * L * d0 * de
+    g0 = _square(n2) + _square(n1) + _square(n0) + _square(nm) - L * (_square(d0) + 2.0 * _square(de))
     return _Coefficients((g0, g1, g2, g3), (n2, n1, n0, nm), (d0, de))
 
 
@@ -379,7 +379,7 @@ def _poses(s: _Coefficients, A: Balls, b: Balls, alpha: Balls) -> tuple[Balls, B
         d = p + arm - A[:, k]
         rows.append((d.real, d.imag, (arm.conj * d).imag))
     (a, q, c), (e, f, g), (h, i, j) = rows
-    determinant = exact(8.0) * (a * (f * j - g * i) - q * (e * j - g * h) + c * (e * i - f * h))
+    determinant = 8.0 * (a * (f * j - g * i) - q * (e * j - g * h) + c * (e * i - f * h))
     return x, y, determinant
 
 
