@@ -98,7 +98,7 @@ def count_by_grid(A: Any, b: Any, lengths: Any) -> int:
 
 def companion_roots(anchors: Any, vertices: Any, lengths: Any) -> int:
     """Count the roots of the sextic on the unit circle, as eigenvalues of its companion matrix."""
-    from graphsynth.kinematics.triad.sextic import sextic
+    from graphsynth.kinematics.triad.assembly_modes import sextic
 
     g = np.array(sextic(anchors, vertices, lengths).g, dtype=complex)
     roots = np.roots([g[3], g[2], g[1], g[0], *np.conj(g[1:])])

@@ -13,7 +13,7 @@ import time
 import numpy as np
 import pytest
 
-from graphsynth.kinematics.triad.sextic import sextic
+from graphsynth.kinematics.triad.assembly_modes import sextic
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 

@@ -363,7 +363,7 @@ def eigenvalue_modes(
     list of ndarray, shape (m, 3)
         ``(x, y, alpha)`` by alpha, for each problem; estimated, and a mode may be missing or too many.
     """
-    from graphsynth.kinematics.triad.sextic import sextic
+    from graphsynth.kinematics.triad.assembly_modes import sextic
 
     scale = float(np.abs(lengths).max())
     s = sextic(anchors / scale, vertices / scale, lengths / scale)

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, plane_point, three
-from graphsynth.systems.platform.harmonics import Harmonics, harmonics
-from graphsynth.systems.platform.small_crank import SmallCrank, small_crank
+from graphsynth.systems.platform.small_crank import Harmonics, SmallCrank, harmonics, small_crank
 from graphsynth.systems.platform.sweep import Sweep, cold_sweep, pose_derivatives, warm_sweep
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.attainable import attainable, ellipticity, lengths_only_design
 from graphsynth.systems.platform.extreme_poses import two_pose_design
-from graphsynth.systems.platform.harmonics import harmonics
 from graphsynth.systems.platform.inverse_design import (
     linear_design,
     refine_design,
@@ -24,7 +23,7 @@ from graphsynth.systems.platform.inverse_design import (
     translation_along,
 )
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-from graphsynth.systems.platform.small_crank import crank_scaling, small_crank
+from graphsynth.systems.platform.small_crank import crank_scaling, harmonics, small_crank
 from graphsynth.systems.platform.sweep import cold_sweep, pose_derivatives, warm_sweep
 
 MOCK = SingleMotorPlatform()

@@ -15,10 +15,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.triad.assembly_modes import assembly_modes, assembly_modes_batch
+from graphsynth.kinematics.triad.assembly_modes import assembly_modes, assembly_modes_batch, sextic
 from graphsynth.kinematics.triad.kernels.leg import cross_sum
 from graphsynth.kinematics.triad.leg import LegStatus, solve_leg
-from graphsynth.kinematics.triad.sextic import sextic
 from graphsynth.systems.platform.drive import FourBarDrive
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
