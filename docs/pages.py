@@ -88,8 +88,11 @@ def _kind(schema: dict[str, Any]) -> str:
         return " or ".join(kind for kind in kinds if kind != "quantity" or len(kinds) == 1)
     if schema.get("type") == "array":
         items = schema.get("prefixItems") or [schema.get("items") or {}]
-        many = f"{len(items)} of " if "prefixItems" in schema else "list of "
-        return many + " and ".join(dict.fromkeys(_kind(item) for item in items if isinstance(item, dict)))
+        many = f"{len(items)} " if "prefixItems" in schema else "list of "
+        kinds = dict.fromkeys(_kind(item) for item in items if isinstance(item, dict))
+        return many + " and ".join(
+            f"{kind}s" if kind in ("number", "integer", "text", "table") else kind for kind in kinds
+        )
     if schema.get("type") == "string" and "pattern" in schema:
         return "quantity"
     return {"string": "text", "object": "table", "boolean": "true or false"}.get(
