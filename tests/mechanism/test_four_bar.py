@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import pickle
+from dataclasses import replace
 
 import mpmath as mp
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from graphsynth import LambdaLinkage
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.four_bar import AssemblyStatus, TiltedFourBar
 
@@ -359,3 +362,10 @@ def test_graph_is_the_four_bar_chain():
     assert isinstance(graph, graph_module.MechanismGraph)
     assert (graph.links, graph.frame) == (4, 0)
     assert [(j.a, j.b) for j in graph.joints] == [(0, 1), (0, 3), (1, 2), (2, 3)]
+
+
+def test_lambda_linkage_is_the_four_bar_of_its_system():
+    own, again = LambdaLinkage(alpha=0.1), LambdaLinkage(alpha=0.1)
+    assert repr(own).startswith("LambdaLinkage(l1=2.0, l2=1.0, l3=2.5, l4=2.5, sgn=1, k=1.0, alpha=0.1,")
+    assert own == again == pickle.loads(pickle.dumps(own)) and hash(own) == hash(again)
+    assert own != TiltedFourBar(alpha=0.1) and isinstance(replace(own, alpha=0.0), LambdaLinkage)
