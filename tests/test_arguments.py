@@ -178,7 +178,7 @@ def test_protocols_of_python_stay() -> None:
 
 
 def test_every_kind_of_annotation_is_kept() -> None:
-    checked = checker(GeometryError, ("Interval", "Dual"), {"Condition": "str"})
+    checked = checker(GeometryError, {"Condition": "str"})
 
     @checked
     def call(

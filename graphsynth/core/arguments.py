@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping
-from functools import partial, wraps
+from collections.abc import Callable, Mapping
+from functools import cache, partial, wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -17,6 +19,8 @@ from graphsynth.core.errors import GraphsynthError
 
 __all__ = ["Budget", "Count", "Positive", "Real", "checker"]
 
+#: Packages whose classes are told apart.
+_TOLD_APART = ("graphsynth", "fractions")
 F = TypeVar("F", bound=Callable[..., Any])
 #: Looks at a value: what is wrong with it, as the end of a sentence that begins with its name; "" for nothing.
 Look = Callable[[Any], str]
@@ -28,28 +32,26 @@ Budget = float  # above zero; infinite is no limit
 Count = int  # 1 or more
 
 
-def checker(
-    error: type[GraphsynthError], classes: Iterable[str], aliases: Mapping[str, str] | None = None
-) -> Callable[[F], F]:
+def checker(error: type[GraphsynthError], aliases: Mapping[str, str] | None = None) -> Callable[[F], F]:
     """Return a decorator that lets a function, or a dataclass, keep what its annotations say.
 
     Kept are ``float`` (finite), ``int``, ``bool``, ``str``, ``Real``, ``Positive``, ``Budget``, ``Count``,
-    ``ArrayLike`` (numbers, NaN among them), ``Path``, ``Callable``, the classes named, iterables and mappings of
-    these, and what is joined by ``|``; any other annotation is left to the function.
+    ``ArrayLike`` (numbers, NaN among them), ``Path``, ``Callable``, classes of the package and fractions, iterables
+    and mappings of these, and what is joined by ``|``; any other annotation is left to the function.  What a name is
+    says the function's module, its imports for type checking among them, which are followed for a value of another
+    class only: no module is loaded for what is right.
 
     Parameters
     ----------
     error : type
         Exception of the caller's room.
-    classes : iterable of str
-        Classes of the package that are told apart; by name, so that no module is loaded for the check.
     aliases : mapping of str to str, optional
         Other names of annotations.
 
     Examples
     --------
     >>> from graphsynth.core.errors import GeometryError
-    >>> @checker(GeometryError, ())
+    >>> @checker(GeometryError)
     ... def half(size: float, parts: "Count" = 2) -> float:
     ...     return size / parts
     >>> half("x")
@@ -58,17 +60,18 @@ def checker(
     graphsynth.core.errors.GeometryError: size = 'x' is not a real number; give a finite one
     """
     known = _SIMPLE | {name: _SIMPLE[meaning] for name, meaning in (aliases or {}).items()}
-    words = known | {name: partial(_instance, name) for name in classes}
 
     def decorate(function: Any) -> Any:
         if isinstance(function, type):
             function.__init__ = decorate(function.__init__)  # type: ignore[misc]
             return function
-        signature = inspect.signature(function)
+        signature, module = inspect.signature(function), getattr(function, "__globals__", {})
         looks = {}
         for name, parameter in signature.parameters.items():
             annotation = parameter.annotation
-            look = _union(annotation if isinstance(annotation, str) else getattr(annotation, "__name__", ""), words)
+            look = _union(
+                annotation if isinstance(annotation, str) else getattr(annotation, "__name__", ""), known, module
+            )
             if look is not None:
                 looks[name] = look
 
@@ -103,10 +106,10 @@ def _split(text: str, at: str) -> list[str]:
     return [part.strip() for part in parts]
 
 
-def _union(annotation: str, words: Mapping[str, Look]) -> Look | None:
+def _union(annotation: str, words: Mapping[str, Look], module: Mapping[str, Any]) -> Look | None:
     """Return the look at values of a whole annotation; None if one of its parts says nothing."""
     parts = _split(annotation, "|")
-    looks = [_part(part, words) for part in parts if part != "None"]
+    looks = [_part(part, words, module) for part in parts if part != "None"]
     known = [look for look in looks if look is not None]
     if not known or len(known) < len(looks):
         return None
@@ -120,7 +123,7 @@ def _union(annotation: str, words: Mapping[str, Look]) -> Look | None:
     return look
 
 
-def _part(annotation: str, words: Mapping[str, Look]) -> Look | None:
+def _part(annotation: str, words: Mapping[str, Look], module: Mapping[str, Any]) -> Look | None:
     if annotation in words:
         return words[annotation]
     match = re.fullmatch(r"(\w+)\[(.*)\]", annotation)
@@ -128,16 +131,31 @@ def _part(annotation: str, words: Mapping[str, Look]) -> Look | None:
     if head == "Callable":
         return words[head]
     if head == "Mapping" and len(inner) == 2:
-        return partial(_mapping, _union(inner[1], words))
+        return partial(_mapping, _union(inner[1], words, module))
     if inner and (head in ("Iterable", "Sequence", "list") or (head == "tuple" and inner[1:] == ["..."])):
-        return partial(_iterable, _union(inner[0], words))
-    return None
+        return partial(_iterable, _union(inner[0], words, module))
+    return partial(_instance, annotation, module) if re.fullmatch(r"[A-Z]\w+", annotation) else None
 
 
-def _instance(name: str, value: Any) -> str:
+def _instance(name: str, module: Mapping[str, Any], value: Any) -> str:
     if name in (base.__name__ for base in type(value).__mro__):
         return ""
+    meant = module.get(name) or _imported_for_types(name, str(module.get("__file__")))
+    if not isinstance(meant, type) or meant.__module__.partition(".")[0] not in _TOLD_APART:
+        return ""
     return f"is {type(value).__name__}, no {name}; give one"
+
+
+@cache
+def _imported_for_types(name: str, file: str) -> Any:
+    """Return what a module imports under a name for type checkers alone; None for nothing."""
+    if not Path(file).is_file():
+        return None
+    for node in ast.walk(ast.parse(Path(file).read_text("utf-8"))):
+        for alias in node.names if isinstance(node, ast.ImportFrom) and not node.level else ():
+            if name == (alias.asname or alias.name):
+                return getattr(import_module(str(node.module)), alias.name, None)
+    return None
 
 
 def _real(value: Any) -> float | None:

@@ -39,33 +39,8 @@ __all__ = [
     "whole",
 ]
 
-_CLASSES = [
-    "Bearing",
-    "Braider",
-    "CircleEllipse",
-    "DynamicModel",
-    "DynamicMotion",
-    "EngineSettings",
-    "ExudynSettings",
-    "Fraction",
-    "Interval",
-    "TiltedFourBar",
-    "Mechanism",
-    "MechanismGraph",
-    "MotorDrivenPlatform",
-    "MujocoSettings",
-    "ParallelPlatform",
-    "PistonMachine",
-    "Range",
-    "Reading",
-    "SingleMotorPlatform",
-    "StartReport",
-    "Sweep",
-    "ToleranceBox",
-    "Tribometer",
-]
 #: Lets a function keep what its annotations say; a `GeometryError` names the argument that is something else.
-checked = checker(GeometryError, _CLASSES, {"Condition": "str"})
+checked = checker(GeometryError, {"Condition": "str"})
 
 Point = tuple[float, float]
 Size = float | complex | None

@@ -17,7 +17,7 @@ from graphsynth.core.errors import GraphsynthError, IntervalError
 __all__ = ["check_quickly", "check_rounding", "checked", "rounding_faults"]
 
 #: Lets a function keep what its annotations say; an `IntervalError` names the argument that is something else.
-checked = checker(IntervalError, ("Interval",), {"System": "Callable"})
+checked = checker(IntervalError, {"System": "Callable"})
 
 
 _U = 2.0**-53
