@@ -118,7 +118,11 @@ def _union(annotation: str, words: Mapping[str, Look], module: Mapping[str, Any]
         if value is None and "None" in parts:
             return ""
         said = [look(value) for look in known]
-        return "" if "" in said else said[0]
+        if "" in said:
+            return ""
+        if len(said) > 1 and all(isinstance(look, partial) and look.func is _instance for look in known):
+            return f"is {type(value).__name__}, neither a {' nor a '.join(p for p in parts if p != 'None')}; give one"
+        return said[0]
 
     return look
 
