@@ -156,9 +156,10 @@ def _imported_for_types(name: str, file: str) -> Any:
     if not Path(file).is_file():
         return None
     for node in ast.walk(ast.parse(Path(file).read_text("utf-8"))):
-        for alias in node.names if isinstance(node, ast.ImportFrom) and not node.level else ():
-            if name == (alias.asname or alias.name):
-                return getattr(import_module(str(node.module)), alias.name, None)
+        if isinstance(node, ast.ImportFrom) and not node.level:
+            for alias in node.names:
+                if name == (alias.asname or alias.name):
+                    return getattr(import_module(str(node.module)), alias.name, None)
     return None
 
 

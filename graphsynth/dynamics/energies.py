@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.friction.history import FrictionAt
 from graphsynth.dynamics.result import Checks, FrictionHistory, MotorHistory
 from graphsynth.dynamics.switching import motor_torques, shaft_speeds
 from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.values import applied_loads
 
 __all__ = ["Balance", "balance_at", "checks_of", "warnings_of"]
 

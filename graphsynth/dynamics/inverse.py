@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.elements import MotorDrive
 from graphsynth.dynamics.friction.loads import fitting_loads
 from graphsynth.dynamics.friction.problem import joint_names
@@ -21,6 +20,7 @@ from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
 from graphsynth.dynamics.result import MotorHistory
 from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
+from graphsynth.dynamics.values import applied_loads
 from graphsynth.mechanism.model import Driver
 
 if TYPE_CHECKING:

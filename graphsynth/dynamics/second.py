@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm, one_coordinate_obstacle
 from graphsynth.dynamics.model import Rack, Rigid
 from graphsynth.dynamics.reactions import reactions_from_multipliers, world
 from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
-from graphsynth.dynamics.values import Values, initial_slots
+from graphsynth.dynamics.values import Values, applied_loads, initial_slots
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
 from graphsynth.mechanism.model import Driver
 

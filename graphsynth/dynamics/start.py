@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,16 +11,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.model import DynamicModel
-from graphsynth.dynamics.posing import pose_from_drivers
 from graphsynth.dynamics.singular import BranchTangents, PoseClass, classify_pose
 from graphsynth.dynamics.tables import Compiled, compile_model, coordinate_row
-from graphsynth.dynamics.values import Values, initial_slots
+from graphsynth.dynamics.values import Values, applied_loads, initial_slots
+from graphsynth.mechanism.laws import Linear
+from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["StartReport", "check_start", "consistent_start"]
+__all__ = ["StartReport", "check_start", "consistent_start", "pose_from_drivers"]
 
 Array = NDArray[np.float64]
+
+
+def pose_from_drivers(
+    mechanism: Mechanism, wanted: Sequence[tuple[Any, float]], modes: Mapping[int, int]
+) -> Array | None:
+    """Poses (links, 3) with the drivers at given coordinates (key, value) in their order; None if out of reach."""
+    from graphsynth.kinematics.simulation import simulate
+
+    drivers = []
+    for driver, (key, value) in zip(mechanism.drivers, wanted):
+        sense = 1.0 if tuple(key) == (driver.base, driver.link) else -1.0
+        drivers.append(replace(driver, law=Linear(0.0, sense * float(value))))
+    motion = simulate(replace(mechanism, drivers=tuple(drivers)), [0.0], modes=modes, events=False)
+    return np.array(motion.poses[0]) if motion.assembled[0] else None
+
+
 Keys = Mapping[Any, float]
 
 #: Singular values below this part of the largest count as zero.

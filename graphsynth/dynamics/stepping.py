@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.dynamics.result import DynamicEvent
-from graphsynth.dynamics.stalling import lock, stalled
+from graphsynth.dynamics.singular import lock, stalled
 from graphsynth.dynamics.switching import KINDS, Switches
 
 if TYPE_CHECKING:
@@ -128,12 +128,12 @@ class Stepper:
         from scipy import integrate as scipy_integrate
 
         if self.method == "CVODE":
-            from graphsynth.dynamics.stiff import CvodeStepper
+            from graphsynth.dynamics.steppers import CvodeStepper
 
             return CvodeStepper(self.rates, t, y, bound, self.rtol, self.atol)
         stages = getattr(self.form, "stages", None)
         if self.method == "DOP853" and stages is not None:
-            from graphsynth.dynamics.compiled_steps import compiled_stepper
+            from graphsynth.dynamics.steppers import compiled_stepper
 
             return compiled_stepper(stages, self.rates, t, y, bound, self.rtol, self.atol, first, self.trail)
         options: dict[str, Any] = {"rtol": self.rtol, "atol": self.atol}
@@ -162,9 +162,9 @@ class Stepper:
             if solver is None or solver.status == "finished":
                 solver = self._next(solver, trail.time, y, bound, step)
             before = trail.time
-            leap = self._leap(solver) if self.method == "DOP853" else None
-            if leap is not None:
-                trail.time, y, path = leap
+            cross = self._cross(solver) if self.method == "DOP853" else None
+            if cross is not None:
+                trail.time, y, path = cross
                 while k < len(grid) and grid[k] <= trail.time:
                     output(k, float(grid[k]), path(float(grid[k])))
                     k += 1
@@ -220,13 +220,13 @@ class Stepper:
         self.stalled = self.stalled + 1 if short else 0
         return self.stalled > _STALLED
 
-    def _leap(self, solver: Any) -> Any:
+    def _cross(self, solver: Any) -> Any:
         """Propose the next step; where a singular pose is ahead, the state beyond it."""
         propose = getattr(self.form, "proposed_step", None)
         if propose is None:
             return None
         solver.h_abs = propose(self.trail.time, solver.h_abs)
-        found: Any = getattr(self.form, "leap", lambda *_: None)(self.trail, self.end)
+        found: Any = getattr(self.form, "cross", lambda *_: None)(self.trail, self.end)
         return found
 
     def _refused(self, solver: Any) -> bool:

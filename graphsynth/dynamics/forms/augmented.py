@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.compiled_steps import ONE_STAGE, Stages
+from graphsynth.dynamics.crossing import GaussStep, HermiteGuess, gauss_step, passed_singular_pose
 from graphsynth.dynamics.friction.problem import NO_LOADS
-from graphsynth.dynamics.leap import GaussStep, HermiteLeap, gauss_step
-from graphsynth.dynamics.passing import passed_singular_pose
 from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.steppers import ONE_STAGE, Stages
 from graphsynth.dynamics.tables import Compiled
-from graphsynth.dynamics.values import initial_slots
+from graphsynth.dynamics.values import applied_loads, initial_slots
 
 __all__ = ["AugmentedForm"]
 
@@ -181,7 +179,7 @@ class AugmentedForm:
         return float(pivot), q
 
     def proposed_step(self, t: float, step: float) -> float:
-        """Look for a singular pose within the next step, which no step may end next to; see `leap`."""
+        """Look for a singular pose within the next step, which no step may end next to; see `cross`."""
         self._due = 0.0
         if not self._history and self.project:
             return self._away_from_start(t, step)
@@ -230,8 +228,8 @@ class AugmentedForm:
             self._due = _AWAY / speed
         return step
 
-    def leap(self, trail: Trail, bound: float) -> tuple[float, Array, GaussStep] | None:
-        """Time and state beyond a singular pose, and the polynomial that leads there; None if no leap is due."""
+    def cross(self, trail: Trail, bound: float) -> tuple[float, Array, GaussStep] | None:
+        """Time and state beyond a singular pose, and the polynomial that leads there; None if no cross is due."""
         ahead, t = self._due, trail.time
         if not ahead > 0.0:
             return None
@@ -259,7 +257,7 @@ class AugmentedForm:
         if len(self._nodes) == 1:
             return lambda at: np.concatenate([y[:n] + (at - t) * y[n : 2 * n], y[n:]])
         times, states = zip(*self._nodes)
-        return HermiteLeap(n, list(times), list(states), [self.rates(at, state) for at, state in zip(times, states)])
+        return HermiteGuess(n, list(times), list(states), [self.rates(at, state) for at, state in zip(times, states)])
 
     def _across(
         self, t: float, h: float, guess: Callable[[float], Array]

@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.compiled_steps import ONE_STAGE, Stages
 from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem
 from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.steppers import ONE_STAGE, Stages
 from graphsynth.dynamics.tables import Compiled
-from graphsynth.dynamics.values import initial_slots
+from graphsynth.dynamics.values import applied_loads, initial_slots
 from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import started

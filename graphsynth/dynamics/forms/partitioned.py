@@ -8,12 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.dynamics.applied import applied_loads
-from graphsynth.dynamics.compiled_steps import Stages
 from graphsynth.dynamics.friction.problem import NO_LOADS
 from graphsynth.dynamics.start import StartReport
+from graphsynth.dynamics.steppers import Stages
 from graphsynth.dynamics.tables import Compiled
-from graphsynth.dynamics.values import initial_slots
+from graphsynth.dynamics.values import applied_loads, initial_slots
 
 __all__ = ["PartitionedForm", "independent_coordinates"]
 

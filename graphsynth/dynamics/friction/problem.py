@@ -14,11 +14,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.dynamics.applied import applied_loads
 from graphsynth.dynamics.friction.linear import respond
 from graphsynth.dynamics.friction.loads import fitting_loads
 from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.tables import Compiled
+from graphsynth.dynamics.values import applied_loads
 
 __all__ = ["AT_REST", "MOST", "NO_LOADS", "FrictionProblem", "FrictionSolution", "joint_names"]
 

@@ -164,7 +164,7 @@ def state_values(piece: Piece, t: float, q: Array, v: Array, slots: Array) -> tu
     Of an element that slides the rate in its sense; of one that sticks the friction still to be had (N or N m); 1 of
     others.
     """
-    from graphsynth.dynamics.applied import applied_loads
+    from graphsynth.dynamics.values import applied_loads
 
     rows, base = piece.rows, piece.rows.compiled
     count, m = len(rows.elements), len(base.info)
