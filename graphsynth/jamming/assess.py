@@ -239,7 +239,7 @@ def assess_jamming(
 
 @checked
 def assess_jamming(
-    subject: TiltedFourBar | ToleranceBox | Motion | None = None,
+    subject: Motion | TiltedFourBar | ToleranceBox | None = None,
     bearing: Bearings | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike | None = None,
