@@ -305,15 +305,21 @@ def assess_jamming(
     if isinstance(subject, TiltedFourBar | ToleranceBox):
         _refuse("a TiltedFourBar or a ToleranceBox", "the motion of a mechanism (simulate)",
                 tilts=tilts is not None, length_tolerance=length_tolerance != 0.0)  # fmt: skip
-        if bearing is not None and not isinstance(bearing, Bearing):
-            raise GeometryError(f"bearing = {bearing!r} does not fit a TiltedFourBar; give one Bearing(...)")
-        samples = 361 if samples is None else samples
-        if isinstance(subject, ToleranceBox):
-            linkage, own = subject.nominal()
-            return assess_bearing(linkage, bearing or own, condition, samples, subject, certify)
-        return assess_bearing(subject, bearing or Bearing(), condition, samples, None, certify)
+        return _one_bearing(subject, bearing, condition, 361 if samples is None else samples, certify)
     _refuse("a motion", "a TiltedFourBar or a ToleranceBox", samples=samples is not None)
     from graphsynth.jamming.joints.assess import assess_coupled
+
+    subject, bearing, tilts = _of_a_motion(subject, bearing, tilts)
+    return assess_coupled(
+        subject, bearing, tilts, condition=condition, certify=certify, length_tolerance=length_tolerance,
+        seconds=seconds,
+    )  # fmt: skip
+
+
+def _of_a_motion(
+    subject: Any, bearing: Bearings | None, tilts: Misalignment | Iterable[Misalignment] | None
+) -> tuple[Motion, Bearings, Misalignment | Iterable[Misalignment]]:
+    """Refuse what is no motion, and a motion without bearings or tilts."""
     from graphsynth.kinematics.simulation import Motion
 
     if not isinstance(subject, Motion):
@@ -324,10 +330,19 @@ def assess_jamming(
         raise GeometryError("no axis is misaligned; give tilts=Misalignment(base, link, alpha)")
     if bearing is None:
         raise GeometryError("the joints have no bearings; give a Bearing or JointLimits, or {(link, link): ...}")
-    return assess_coupled(
-        subject, bearing, tilts, condition=condition, certify=certify, length_tolerance=length_tolerance,
-        seconds=seconds,
-    )  # fmt: skip
+    return subject, bearing, tilts
+
+
+def _one_bearing(
+    subject: TiltedFourBar | ToleranceBox, bearing: Any, condition: Condition, samples: int | ArrayLike, certify: bool
+) -> JammingReport:
+    """Assess the models, or the box with the models in its middle."""
+    if bearing is not None and not isinstance(bearing, Bearing):
+        raise GeometryError(f"bearing = {bearing!r} does not fit a TiltedFourBar; give one Bearing(...)")
+    if isinstance(subject, TiltedFourBar):
+        return assess_bearing(subject, bearing or Bearing(), condition, samples, None, certify)
+    linkage, own = subject.nominal()
+    return assess_bearing(linkage, bearing or own, condition, samples, subject, certify)
 
 
 def _refuse(subject: str, other: str, **given: bool) -> None:

@@ -1,4 +1,4 @@
-"""How fast the coupled jamming model is, beside scipy's HiGHS on a polygonal form of the same program.
+"""How fast the coupled jamming model is, beside HiGHS on a polygonal form and clarabel on the same cone program.
 
 Run by the normal suite once each, without timing; with times: ``pytest tests/bench/test_coupled_jamming_speed.py
 --benchmark-enable -n0``. No time is asserted: machines differ.  Every benchmark checks its result.
@@ -12,6 +12,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from scipy.sparse import csc_matrix
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains, simulate
 from graphsynth.jamming import Bearing
@@ -117,3 +118,41 @@ def test_largest_misalignment_of_the_lambda_linkage(benchmark):
     run = lambda: largest_scale(motion, Bearing(), Misalignment(0, 1, 1 / 30), relative_gap=gap)  # noqa: E731
     found = timed(benchmark, run, 1)
     assert found.low / 30 < 2 * 0.006064396559156420 < found.high / 30 * (1 + 1e-15)
+
+
+@pytest.mark.parametrize("method", ["batched", "clarabel"])
+def test_the_cone_program_of_many_poses(benchmark, eight, method):
+    """The same second-order cone programs: all poses at once here, one call for each pose in clarabel."""
+    mechanism, tilt = eight
+    poses = simulate(mechanism, np.linspace(0.0, 6.28, 360 if benchmark.enabled else 6)).poses
+    given = problem(mechanism, JointLimits(0.006), tilt)
+    layout = given.layout
+    exact = given.solve(poses)
+    if method == "batched":
+        found = timed(benchmark, lambda: given.solve(poses), len(poses))
+        assert ((found.upper - found.lower) <= 1e-9 * found.upper).all()
+        return
+    clarabel = pytest.importorskip("clarabel")
+    r, e, base = joint_places(mechanism, layout.joints, poses)
+    rows, work = moment_rows(layout, r, e), work_row(layout, r, shifts(layout, base))
+    costly = np.flatnonzero(layout.limit > 0.0)
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+
+    def one(moments, own):
+        """Maximise the work of the wrenches q subject to sum of t |M q| <= 1, with u_b >= |M_b q|."""
+        k, blocks = len(own), len(costly)
+        matrix = np.zeros((1 + 3 * blocks, k + blocks))
+        matrix[0, k:] = layout.limit[costly]
+        for i, block in enumerate(costly):
+            matrix[1 + 3 * i, k + i] = -1.0
+            matrix[2 + 3 * i : 4 + 3 * i, :k] = -moments[block]
+        right = np.zeros(len(matrix))
+        right[0] = 1.0
+        cones = [clarabel.NonnegativeConeT(1), *[clarabel.SecondOrderConeT(3)] * blocks]
+        cost = np.append(-own, np.zeros(blocks))
+        nothing = csc_matrix((len(cost), len(cost)))
+        return -clarabel.DefaultSolver(nothing, cost, csc_matrix(matrix), right, cones, settings).solve().obj_val
+
+    values = timed(benchmark, lambda: np.array([one(*pair) for pair in zip(rows, work)]), len(poses))
+    np.testing.assert_allclose(values, exact.lower, rtol=1e-6)

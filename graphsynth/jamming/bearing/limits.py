@@ -249,7 +249,8 @@ def certified_largest_misalignment(box: ToleranceBox, condition: Condition = "A"
     def propose(worst: ToleranceBox) -> float | None:
         return largest_misalignment(*worst.nominal(), _reading(condition)).value
 
-    return _bracket(box.replace(alpha="1/100"), condition, propose, at, milder, (0.0, 1.5), "rad", 1, "-works to works")
+    search = _LimitSearch(condition, at, milder, 1, "rad", "-works to works")
+    return _bracket(search, box.replace(alpha="1/100"), propose, (0.0, 1.5))
 
 
 @checked
@@ -285,7 +286,8 @@ def certified_smallest_clearance(box: ToleranceBox, condition: Condition = "A") 
         return smallest_clearance(*worst.nominal(), _reading(condition)).value
 
     top = float(box["Rb"].upper + box["Hb"].upper)
-    return _bracket(box.replace(clearance=0), condition, propose, at, at, (0.0, top), "mm", -1, "works and more")
+    search = _LimitSearch(condition, at, at, -1, "mm", "works and more")
+    return _bracket(search, box.replace(clearance=0), propose, (0.0, top))
 
 
 @checked
@@ -323,7 +325,7 @@ def certified_largest_height(box: ToleranceBox, condition: Condition = "A") -> C
         return largest_height(*worst.nominal(), _reading(condition)).value
 
     top = 1000.0 * float(box["Rb"].upper)
-    return _bracket(box, condition, propose, at, milder, (0.0, top), "mm", 1, "0 to works")
+    return _bracket(_LimitSearch(condition, at, milder, 1, "mm", "0 to works"), box, propose, (0.0, top))
 
 
 def _reading(condition: Condition) -> Condition:
@@ -333,29 +335,23 @@ def _reading(condition: Condition) -> Condition:
 
 
 def _bracket(
+    search: _LimitSearch,
     box: ToleranceBox,
-    condition: Condition,
     propose: Callable[[ToleranceBox], float | None],
-    at: Callable[[float], ToleranceBox],
-    milder: Callable[[float], ToleranceBox],
     span: tuple[float, float],
-    unit: str,
-    direction: int,
-    covers: str,
 ) -> CertifiedLimit:
-    """Prove both sides of an edge; ``direction`` +1 if larger values are worse, -1 if smaller ones are."""
-    begin = perf_counter()
-    check_condition(box, condition)
-    search = _Search(condition, at, milder, direction)
+    """Prove both sides of the edge that is proposed, or else found by halving ``span``."""
+    check_condition(box, search.condition)
+    direction = search.direction
     try:
-        edge = propose(worst_corner(box, condition))
+        edge = propose(worst_corner(box, search.condition))
     except GeometryError:
         edge = None
     mild, harsh = span if direction > 0 else span[::-1]
     if edge is None or not math.isfinite(edge) or edge <= 0.0:
         edge = search.halve(mild, harsh)
     if edge is None:
-        return search.one_sided(mild, harsh, unit, covers, begin)
+        return search.one_sided(mild, harsh)
     works = fails = None
     distance = _FIRST
     for _ in range(_STEPS):
@@ -369,11 +365,11 @@ def _bracket(
         if distance >= 0.5:
             break
     reason = "" if works is not None and fails is not None else search.why or "no proof within half of the edge"
-    return CertifiedLimit(works, fails, unit, reason, covers, search.trials, perf_counter() - begin)
+    return search.answer(works, fails, reason)
 
 
-class _Search:
-    """Certificates of one question, counted."""
+class _LimitSearch:
+    """Certificates of one question, counted; ``direction`` +1 if larger values are worse, -1 if smaller ones are."""
 
     def __init__(
         self,
@@ -381,9 +377,16 @@ class _Search:
         at: Callable[[float], ToleranceBox],
         milder: Callable[[float], ToleranceBox],
         direction: int,
+        unit: str,
+        covers: str,
     ) -> None:
         self.condition, self.at, self.milder, self.direction = condition, at, milder, direction
+        self.unit, self.covers, self.begin = unit, covers, perf_counter()
         self.trials, self.why = 0, ""
+
+    def answer(self, works: float | None, fails: float | None, reason: str) -> CertifiedLimit:
+        seconds = perf_counter() - self.begin
+        return CertifiedLimit(works, fails, self.unit, reason, self.covers, self.trials, seconds)
 
     def _certificate(self, box: ToleranceBox) -> JamCertificate:
         self.trials += 1
@@ -414,19 +417,19 @@ class _Search:
                 return middle
         return 0.5 * (mild + harsh)
 
-    def one_sided(self, mild: float, harsh: float, unit: str, covers: str, begin: float) -> CertifiedLimit:
+    def one_sided(self, mild: float, harsh: float) -> CertifiedLimit:
         """Answer when no edge was found in the span searched."""
         if self.free(harsh):
-            reason = f"no limit: free up to the end of the search, {harsh!r} {unit}"
-            return CertifiedLimit(harsh, None, unit, reason, covers, self.trials, perf_counter() - begin)
+            reason = f"no limit: free up to the end of the search, {harsh!r} {self.unit}"
+            return self.answer(harsh, None, reason)
         speck = harsh + 2.0**-60 * abs(mild - harsh)
         if self.direction < 0 and self.free(speck):
-            reason = f"no limit above {harsh!r} {unit}: {self.why or 'every larger value is free'}"
-            return CertifiedLimit(speck, None, unit, reason, covers, self.trials, perf_counter() - begin)
+            reason = f"no limit above {harsh!r} {self.unit}: {self.why or 'every larger value is free'}"
+            return self.answer(speck, None, reason)
         works = mild if self.free(mild) else None
         fails = mild if works is None and self.jams(mild) else None
         if fails is not None:
-            reason = f"no value works: even {mild!r} {unit} is certified to bind"
+            reason = f"no value works: even {mild!r} {self.unit} is certified to bind"
         else:
             reason = self.why or "neither side is proved"
-        return CertifiedLimit(works, fails, unit, reason, covers, self.trials, perf_counter() - begin)
+        return self.answer(works, fails, reason)
