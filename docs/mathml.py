@@ -22,13 +22,23 @@ BEFORE = re.compile(rf"(</m(?:i|n|sub|sup|subsup|sqrt)>\s*)(?=(?:<msup>\s*)?<mi>
 SPACE = '<mspace width="0.17em"/>'
 
 
+def _italic(letter: str) -> str:
+    """Return a letter as mathematical italic, which browsers choose by themselves for a single letter only."""
+    if letter == "h":
+        return "\u210e"
+    for first, last, start in (("a", "z", 0x1D44E), ("A", "Z", 0x1D434), ("α", "ω", 0x1D6FC)):
+        if first <= letter <= last:
+            return chr(start + ord(letter) - ord(first))
+    return letter
+
+
 def mathml(tex: str, block: bool) -> str:
     """Markup of a formula; a ValueError names one that docutils cannot read."""
     try:
         markup = latex2mathml.tex2mathml(tex, as_block=block)
     except MathError as error:
         raise ValueError(f"formula {tex!r}: {error}") from error
-    markup = OVER.sub(lambda m: f"<mi>{m[1]}{COMBINING[m[2]]}</mi>", markup)
-    markup = OVER_INDEXED.sub(lambda m: f"<msub><mi>{m[1]}{COMBINING[m[3]]}</mi>{m[2]}</msub>", markup)
+    markup = OVER.sub(lambda m: f"<mi>{_italic(m[1])}{COMBINING[m[2]]}</mi>", markup)
+    markup = OVER_INDEXED.sub(lambda m: f"<msub><mi>{_italic(m[1])}{COMBINING[m[3]]}</mi>{m[2]}</msub>", markup)
     markup = AFTER.sub(lambda m: "" if m[1] else SPACE, markup)
     return BEFORE.sub(rf"\1{SPACE}", markup)
