@@ -112,7 +112,7 @@ def test_lambda_run_reproduces_the_published_values(tmp_path: Path) -> None:
     margins = {m.name: m.value for m in record.margins}
     assert math.isclose(margins["largest tilt"], 0.0133312592085829611560698, rel_tol=1e-15)
     assert math.isclose(margins["critical tilt"], 0.006064396559156420060266, rel_tol=1e-14)
-    assert math.isclose(margins["least clearance over the turn"], -0.03509927307354575852847, rel_tol=1e-12)
+    assert math.isclose(margins["clearance left at the worst crank angle"], -0.03509927307354575852847, rel_tol=1e-12)
     assert math.isclose(margins["smallest clearance"], 0.06509927307354575852847, rel_tol=1e-13)
     assert math.isclose(margins["largest axis tilt"], 0.0151614793250201376610981, rel_tol=1e-13)
     jam = next(t for t in report["tables"] if t.title.startswith("Jamming"))

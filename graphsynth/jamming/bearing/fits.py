@@ -163,7 +163,7 @@ class FitVerdict:
         """Plain values for a table."""
         c = self.fit.clearance
         return {
-            "fit": self.fit.name, "least clearance [mm]": float(c.lower), "largest clearance [mm]": float(c.upper),
+            "fit": self.fit.name, "smallest clearance [mm]": float(c.lower), "largest clearance [mm]": float(c.upper),
             "verdict": self.verdict.name, "clearance left [mm]": self.clearance_left,
         }  # fmt: skip
 

@@ -135,7 +135,7 @@ def _arc_findings(report: JammingReport) -> tuple[Finding, ...]:
     if not arcs or sum(arc.length for arc in arcs) >= math.tau:
         return ()
     angles = " and ".join(f"{math.degrees(arc.start):.2f}° to {math.degrees(arc.stop):.2f}°" for arc in arcs)
-    return (Finding(f"With the nominal dimensions it jams at crank angles {angles} (estimated)."),)
+    return (Finding(f"With the nominal dimensions it binds at crank angles {angles} (estimated)."),)
 
 
 def _limit_findings(limits: Mapping[str, CertifiedLimit]) -> tuple[Finding, ...]:
@@ -176,7 +176,7 @@ def _margins(
     """Margins of the nominal dimensions, each with the proved bound of its error where there is one."""
     part = sum(arc.length for arc in report.arcs.arcs) / math.tau
     values: list[tuple[str, float | None, str, tuple[float | None, float | None]]] = [
-        ("least clearance over the turn", -report.worst_interference, "mm", proved.clearance_left),
+        ("clearance left at the worst crank angle", -report.worst_interference, "mm", proved.clearance_left),
         ("largest tilt", report.largest_tilt, "rad", proved.largest_tilt),
         ("critical tilt", report.critical_tilt, "rad", proved.critical_tilt),
         ("jammed part of the turn", part, "", (None, None)),
@@ -208,8 +208,11 @@ def _proof_table(
     if not tolerance_box(context).is_point:
         rows.append(("without tolerances", *(_nominal(context, c).statement for c in found)))
     rows += [
-        ("largest gap, mm", *(_bounds(f.largest_interference.lo, f.largest_interference.hi) for f in found.values())),
-        ("jams for certain", *(_spans(f.arcs.inner) for f in found.values())),
+        (
+            "largest interference, mm",
+            *(_bounds(f.largest_interference.lo, f.largest_interference.hi) for f in found.values()),
+        ),
+        ("binds for certain", *(_spans(f.arcs.inner) for f in found.values())),
         ("free for certain", *(_spans(f.arcs.free) for f in found.values())),
         ("neither is proved", *(_total(f.arcs.undecided) for f in found.values())),
         ("assembled", *(f.assembles for f in found.values())),
