@@ -212,7 +212,21 @@ def precise_area(bearing: Bearing, sine: str) -> Any:
 
 
 def area_problem(bearing: Bearing, sine: str, effort: Effort | None = None) -> Problem:
-    """Compute the free gap of the surrogate ellipse; arguments and errors as for `crossing_problem`.
+    """Compute the free gap of the surrogate ellipse.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        The bearing.
+    sine : str
+        Sine of the tilt, exact text.
+    effort : Effort, optional
+        Rounds and sizes of the measurement.
+
+    Returns
+    -------
+    Problem
+        Error and time of every method; errors as for `crossing_problem`.
 
     Examples
     --------
