@@ -19,12 +19,12 @@ from graphsynth.pipeline.units import Unit
 if TYPE_CHECKING:
     from graphsynth.drawing.plots import Line
 
-__all__ = ["chart", "quantity_table", "shown", "table", "unit_in"]
+__all__ = ["TURN", "chart", "quantity_table", "shown", "table", "unit_in"]
 
 _COLUMN = re.compile(r"(.*?)(?: \| (?:(\d+) )?(\S+))?")
 _UNIT = re.compile(r".*\[([^\]]*)\]")
 
-#: Ticks of an axis over one rotation, degrees.
+#: Ticks of an axis over one rotation, in the degrees of its label.
 TURN = tuple(range(0, 361, 45))
 
 
@@ -100,7 +100,7 @@ def chart(
     *,
     levels: Sequence[Line] = (),
     bands: Sequence[Any] = (),
-    size: Literal["small", "normal", "wide"] = "normal",
+    place: Literal["small", "normal", "wide"] = "normal",
     **options: Any,
 ) -> Picture:
     """Draw curves of SI values over one axis; what :func:`graphsynth.drawing.plots.line_plot` takes more is passed on.
@@ -113,6 +113,8 @@ def chart(
         Labels of the axes, with their units in brackets.
     bands : sequence of Band
         In SI of `x`.
+    place : {"small", "normal", "wide"}
+        On the page.
     """
     import numpy as np
 
@@ -132,4 +134,4 @@ def chart(
         bands=bands,
         **options,
     )
-    return Picture(title, svg, caption, size)
+    return Picture(title, svg, caption, place)

@@ -1,20 +1,27 @@
 """On which line of a TOML text a key stands.
 
-``tomllib`` tells values, not places, so a message about a value would have no line.  This reader walks over a text
-that ``tomllib`` has accepted and notes where each key and each item of a list begins; it reads no values.
+``tomllib`` gives values, not places, so a message about a value would have no line.  A text that it has accepted is read
+here again statement by statement: as many lines as it takes to parse are one statement, and its keys begin there.
 """
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any
 
 __all__ = ["key_lines", "line_of"]
 
-_CLOSING = {'"""': '"""', "'''": "'''", '"': '"', "'": "'"}
+_Path = tuple[str, ...]
+
+#: Lines of one statement that are tried; keys behind a longer one get the line of the table around them.
+_LONGEST = 2000
+#: What may close a list that is cut at the end of a line.
+_CLOSINGS = ["".join(ends) for count in range(5) for ends in product("]}", repeat=count)]
 
 
-def key_lines(text: str) -> dict[tuple[str, ...], int]:
+def key_lines(text: str) -> dict[_Path, int]:
     r"""Return the line, from 1, of every key, table and list item of a valid TOML text.
 
     Items of lists are keyed by their index as a string.  On a text that is not TOML, what was found up to the error.
@@ -24,148 +31,72 @@ def key_lines(text: str) -> dict[tuple[str, ...], int]:
     >>> key_lines('[a]\nb = [\n  1, {c = 2}]\n')
     {('a',): 1, ('a', 'b'): 2, ('a', 'b', '0'): 3, ('a', 'b', '1'): 3, ('a', 'b', '1', 'c'): 3}
     """
-    reader = _Reader(text.replace("\r\n", "\n"))
-    with contextlib.suppress(IndexError, ValueError, RecursionError):
-        reader.document()
-    return reader.lines
-
-
-def line_of(lines: Mapping[tuple[str, ...], int], keys: tuple[str, ...]) -> int | None:
-    """Return the line of a key, else of the nearest table or list around it; None if there is none."""
-    for end in range(len(keys), 0, -1):
-        if keys[:end] in lines:
-            return lines[keys[:end]]
-    return None
-
-
-class _Reader:
-    """Position in a text, and the lines noted so far."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.at = 0
-        self.lines: dict[tuple[str, ...], int] = {}
-        self._counted = (0, 1)
-
-    def note(self, path: tuple[str, ...]) -> None:
-        start, line = self._counted
-        line += self.text.count("\n", start, self.at)
-        self._counted = (self.at, line)
-        for end in range(1, len(path) + 1):
-            self.lines.setdefault(path[:end], line)
-
-    def skip(self, also: str = "") -> None:
-        """Skip blanks and comments, and the characters of `also`."""
-        while self.at < len(self.text):
-            char = self.text[self.at]
-            if char == "#":
-                end = self.text.find("\n", self.at)
-                self.at = len(self.text) if end < 0 else end
-            elif char in " \t" or char in also:
-                self.at += 1
-            else:
-                return
-
-    def document(self) -> None:
-        table: tuple[str, ...] = ()
-        arrays: dict[tuple[str, ...], int] = {}
-        self.skip("\n")
-        while self.at < len(self.text):
-            if self.text[self.at] == "[":
-                table = self.header(arrays)
-            else:
-                self.pair(table)
-            self.skip("\n")
-
-    def header(self, arrays: dict[tuple[str, ...], int]) -> tuple[str, ...]:
-        """Read ``[a.b]`` or ``[[a.b]]``; return the path, with the index of each array of tables it passes."""
-        double = self.text.startswith("[[", self.at)
-        start = self.at
-        self.at += 2 if double else 1
-        written = self.key()
-        path: tuple[str, ...] = ()
-        for place, part in enumerate(written):
-            path = (*path, part)
-            if double and place == len(written) - 1:
-                arrays[path] = arrays.get(path, -1) + 1
-            if path in arrays:
-                path = (*path, str(arrays[path]))
-        self.at = self.text.index("]", self.at) + (2 if double else 1)
-        end, self.at = self.at, start
-        self.note(path)
-        self.at = end
-        return path
-
-    def key(self) -> tuple[str, ...]:
-        """Read a dotted key."""
-        parts: list[str] = []
-        while True:
-            self.skip()
-            if self.text[self.at] in "\"'":
-                parts.append(self.string())
-            else:
-                start = self.at
-                while self.text[self.at].isalnum() or self.text[self.at] in "_-":
-                    self.at += 1
-                if start == self.at:
-                    raise ValueError
-                parts.append(self.text[start : self.at])
-            self.skip()
-            if self.text[self.at] != ".":
-                return tuple(parts)
-            self.at += 1
-
-    def string(self) -> str:
-        """Skip a string; return what stands in it, escapes of a key in double quotes read."""
-        opening = next(quote for quote in _CLOSING if self.text.startswith(quote, self.at))
-        start = self.at = self.at + len(opening)
-        while not self.text.startswith(opening, self.at):
-            self.at += 2 if self.text[self.at] == "\\" and opening[0] == '"' else 1
-        if len(opening) == 3:  # up to two more quotes belong to the string
-            while self.text.startswith(opening[0], self.at + 3):
-                self.at += 1
-        inside = self.text[start : self.at]
-        self.at += len(opening)
-        if opening == '"' and "\\" in inside:
-            import tomllib
-
-            return str(tomllib.loads(f'k = "{inside}"')["k"])
-        return inside
-
-    def pair(self, table: tuple[str, ...]) -> None:
-        self.skip()
-        start = self.at
-        path = (*table, *self.key())
-        end, self.at = self.at, start
-        self.note(path)
-        self.at = self.text.index("=", end) + 1
-        self.value(path)
-
-    def value(self, path: tuple[str, ...]) -> None:
-        self.skip()
-        char = self.text[self.at]
-        if char in "\"'":
-            self.string()
-        elif char == "[":
-            self.items(path)
-        elif char == "{":
-            self.at += 1
-            self.skip("\n,")
-            while self.text[self.at] != "}":
-                self.pair(path)
-                self.skip("\n,")
-            self.at += 1
+    rows = text.replace("\r\n", "\n").split("\n")
+    lines: dict[_Path, int] = {}
+    table: _Path = ()
+    items: dict[_Path, int] = {}  # of each array of tables, the index of the last one
+    first = 0
+    while first < len(rows):
+        if rows[first].strip(" \t")[:1] in ("", "#"):
+            first += 1
+            continue
+        tried = range(first + 1, min(len(rows), first + _LONGEST) + 1)
+        end = next((end for end in tried if _parsed(rows[first:end]) is not None), None)
+        if end is None:
+            break
+        value = _parsed(rows[first:end]) or {}
+        if rows[first].lstrip(" \t").startswith("["):
+            table = _header(value, items)
+            found: Mapping[_Path, int] = {table: first}
         else:
-            while self.at < len(self.text) and self.text[self.at] not in ",]}#\n":
-                self.at += 1
+            found = {(*table, *path): line for path, line in _pair(value, rows, first, end)}
+        for path, line in found.items():
+            for length in range(1, len(path) + 1):
+                lines.setdefault(path[:length], line + 1)
+        first = end
+    return lines
 
-    def items(self, path: tuple[str, ...]) -> None:
-        self.at += 1
-        self.skip("\n,")
-        index = 0
-        while self.text[self.at] != "]":
-            self.note((*path, str(index)))
-            self.value((*path, str(index)))
-            index += 1
-            self.skip("\n,")
-        self.at += 1
+
+def line_of(lines: Mapping[_Path, int], keys: _Path) -> int | None:
+    """Return the line of a key, else of the nearest table or list around it; None if there is none."""
+    return next((lines[keys[:end]] for end in range(len(keys), 0, -1) if keys[:end] in lines), None)
+
+
+def _parsed(rows: Sequence[str], closing: str = "") -> dict[str, Any] | None:
+    try:
+        return tomllib.loads("\n".join([*rows, closing]) if closing else "\n".join(rows))
+    except (ValueError, RecursionError):
+        return None
+
+
+def _header(value: Any, items: dict[_Path, int]) -> _Path:
+    """Return the path of ``[a.b]`` or ``[[a.b]]``, with the index of each array of tables it passes."""
+    path: _Path = ()
+    while value:
+        ((key, value),) = value.items()
+        path = (*path, key)
+        if isinstance(value, list):
+            items[path] = items.get(path, -1) + 1
+            value = None
+        if path in items:
+            path = (*path, str(items[path]))
+    return path
+
+
+def _pair(value: Any, rows: Sequence[str], first: int, end: int) -> Iterator[tuple[_Path, int]]:
+    """Yield the paths of one statement with the index of their line."""
+    known: set[_Path] = set()
+    for line in range(first, end):
+        cut = (_parsed(rows[first : line + 1], closing) for closing in _CLOSINGS) if line + 1 < end else iter([value])
+        for path in _paths(next((found for found in cut if found is not None), {})):
+            if path not in known:
+                known.add(path)
+                yield path, first if not any(key.isdigit() for key in path) else line
+
+
+def _paths(value: Any, path: _Path = ()) -> Iterator[_Path]:
+    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    if path:
+        yield path
+    for key, inner in inside:
+        yield from _paths(inner, (*path, str(key)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.drawing.sketch import degrees
 from graphsynth.pipeline.products import Attempt, Picture
@@ -93,53 +93,40 @@ def plots(context: Context, motions: tuple[Attempt, ...], assessments: tuple[Att
     assessed = _first(assessments)
     if assessed is None:
         return ()
+    from graphsynth.drawing.plots import Line
+    from graphsynth.pipeline.display import TURN, chart, unit_in
+
     condition = _condition(context)
     report: JammingReport = assessed.value[condition]
+    table, bands, critical = report.table, _jam_bands(report), report.critical_tilt
     shaded = f"Shaded: the bearing jams under condition {condition}."
-    return (
-        Picture("Tilt of the coupler at B", _plot_tilt(report), shaded),
-        Picture("Interference of bearing and hole", _plot_gap(report), f"Negative: clearance left. {shaded}"),
-    )
-
-
-_TICKS = tuple(range(0, 361, 45))
-
-
-def _plot_tilt(report: JammingReport) -> str:
-    import numpy as np
-
-    from graphsynth.drawing.plots import Line, line_plot
-
-    tilt = Line(np.degrees(report.table.f), report.table.theta * 1e3, "tilt of the coupler")
-    critical = report.critical_tilt
-    limits = []
+    levels = []
     if critical is not None:
-        limits = [Line((), critical * 1e3, "critical tilt", "soft", "--"), Line((), -critical * 1e3, "", "soft", "--")]
-    return line_plot([tilt], "crank angle [°]", "tilt [mrad]", bands=_jam_bands(report), xticks=_TICKS, levels=limits)
-
-
-def _plot_gap(report: JammingReport) -> str:
-    import numpy as np
-
-    from graphsynth.drawing.plots import Line, line_plot
-
-    table, f = report.table, np.degrees(report.table.f)
-    gaps = [Line(f, table.interference_a, "condition A", "a"), Line(f, table.interference_b, "condition B", "c", "--")]
-    zero = Line((), 0.0, "", "soft")
-    return line_plot(
-        gaps, "crank angle [°]", "interference [mm]", bands=_jam_bands(report), xticks=_TICKS, levels=[zero]
+        levels = [Line((), critical, "critical tilt", "soft", "--"), Line((), -critical, "", "soft", "--")]
+    tilt = [Line(table.f, table.theta, "tilt of the coupler")]
+    mm = unit_in("[mm]").to_si(1.0)
+    gaps = [
+        Line(table.f, table.interference_a * mm, "condition A"),
+        Line(table.f, table.interference_b * mm, "condition B", "c", "--"),
+    ]
+    words, x = f"Negative: clearance left. {shaded}", "crank angle [°]"
+    more: dict[str, Any] = {"bands": bands, "xticks": TURN}
+    zero = [Line((), 0.0, "", "soft")]
+    return (
+        chart("Tilt of the coupler at B", tilt, x, "tilt [mrad]", shaded, levels=levels, **more),
+        chart("Interference of bearing and hole", gaps, x, "interference [mm]", words, levels=zero, **more),
     )
 
 
 def _jam_bands(report: JammingReport) -> list[Band]:
-    """Return the jam arcs in degrees, cut at 360, the first one labelled."""
+    """Return the jam arcs, cut at a full rotation, the first one labelled."""
     from graphsynth.drawing.plots import Band
 
-    spans = [_within_turn(math.degrees(arc.start), math.degrees(arc.stop)) for arc in report.arcs.arcs]
+    spans = [_within_turn(arc.start, arc.stop) for arc in report.arcs.arcs]
     pieces = [piece for span in spans for piece in span]
     return [Band(start, stop, "jams" if i == 0 else "") for i, (start, stop) in enumerate(pieces)]
 
 
 def _within_turn(start: float, stop: float) -> list[tuple[float, float]]:
-    """Cut an arc that runs past 360 degrees into pieces inside the turn."""
-    return [(start, stop)] if stop <= 360.0 else [(start, 360.0), (0.0, stop - 360.0)]
+    """Cut an arc that runs past a full rotation into pieces inside."""
+    return [(start, stop)] if stop <= math.tau else [(start, math.tau), (0.0, stop - math.tau)]

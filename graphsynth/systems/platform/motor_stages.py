@@ -480,24 +480,22 @@ def curves(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ..
         return ()
     import numpy as np
 
-    from graphsynth.drawing.plots import Line, line_plot
+    from graphsynth.drawing.plots import Line
+    from graphsynth.pipeline.display import TURN, chart
     from graphsynth.systems.platform.motor_stages_pictures import run_pictures
 
     model, table = runs[0].drive, _machine_table(context)
     inertia: EffectiveInertia = model.inertia
     q = np.linspace(0.0, math.tau, 361)
-    ticks = tuple(range(0, 361, 45))
-    felt = 1e6 * (inertia.value(q) + model.constant_inertia)
-    own = Line((), 1e6 * model.constant_inertia, "rotor, pinion, wheels", "soft", "--")
-    turn = line_plot([Line(np.degrees(q), felt)], "wheel angle [°]", "inertia [kg mm²]", xticks=ticks, levels=[own])
+    own = Line((), model.constant_inertia, "rotor, pinion, wheels", "soft", "--")
+    felt = [Line(q, inertia.value(q) + model.constant_inertia)]
     w = table.motor.speed / model.train.ratio
-    held = line_plot(
-        [Line(np.degrees(q), 1e3 * model.torque_at_speed(q, w))], "wheel angle [°]", "torque [mN m]", xticks=ticks
-    )
+    held = [Line(q, model.torque_at_speed(q, w))]
+    words = "Of the real geometry: velocities of the platform per crank speed, squared."
+    even = f"At the crank, at {w:g} rad/s: inverse dynamics."
+    x = "wheel angle [°]"
     return (
-        Picture(
-            "Inertia at the crank", turn, "Of the real geometry: velocities of the platform per crank speed, squared."
-        ),
-        Picture("Torque that would keep the speed even", held, f"At the crank, at {w:g} rad/s: inverse dynamics."),
+        chart("Inertia at the crank", felt, x, "inertia [kg mm²]", words, xticks=TURN, levels=[own]),
+        chart("Torque that would keep the speed even", held, x, "torque [mN m]", even, xticks=TURN),
         *run_pictures(runs),
     )

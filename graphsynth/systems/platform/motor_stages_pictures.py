@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.pipeline.display import TURN, chart
 from graphsynth.pipeline.motor_tables import shown_motion
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
@@ -25,7 +26,7 @@ def sketches(context: Context) -> tuple[Picture, ...]:
     import numpy as np
 
     from graphsynth.drawing.diagram import mechanism_sketch
-    from graphsynth.drawing.plots import Line, line_plot
+    from graphsynth.drawing.plots import Line
     from graphsynth.dynamics.driven.inertia import EffectiveInertia
 
     moved = table_of(context).platform
@@ -39,13 +40,11 @@ def sketches(context: Context) -> tuple[Picture, ...]:
         svg = mechanism_sketch(mechanism, poses, width=420, height=360).svg(poses[52].tolist())
         pictures.append(Picture("Crank and platform", svg, caption))
     own = moved.inertia
-    total = 1e3 * (EffectiveInertia.of_slider(moved.mass, moved.amplitude).value(q) + own)
-    curve = line_plot(
-        [Line(np.degrees(q), total)], "crank angle [°]", "effective inertia [g m²]", xticks=range(0, 361, 45),
-        levels=[Line((), 1e3 * own, "constant part", "soft", "--")],
-    )  # fmt: skip
+    total = EffectiveInertia.of_slider(moved.mass, moved.amplitude).value(q) + own
+    level = Line((), own, "constant part", "soft", "--")
     caption = "At the dead centres, 90° and 270°, the platform stands still and only the constant part is left."
-    pictures.append(Picture("Inertia at the crank", curve, caption))
+    x, y = "crank angle [°]", "effective inertia [g m²]"
+    pictures.append(chart("Inertia at the crank", [Line(q, total)], x, y, caption, xticks=TURN, levels=[level]))
     return tuple(pictures)
 
 
@@ -133,7 +132,7 @@ def plots(
 
 def run_pictures(runs: tuple[LabelledRun, ...]) -> list[Picture]:
     """Torque and speed over time (Figures 6 and 7 of the source), and two phase portraits of the steady motion."""
-    from graphsynth.drawing.plots import Line, line_plot
+    from graphsynth.drawing.plots import Line
 
     torque, speed, turn, spiral = [], [], [], []
     for k, item in enumerate(runs):
@@ -141,31 +140,28 @@ def run_pictures(runs: tuple[LabelledRun, ...]) -> list[Picture]:
         late = run.time >= 0.5 * run.time[-1]
         torque.append(Line(run.time, run.motor_torque, *look))
         speed.append(Line(run.time, run.speed, *look))
-        angle, value = _wrapped(run, late)
-        turn.append(Line(angle, value, *look))
+        turn.append(Line(*_wrapped(run, late), *look))
         spiral.append(Line(run.motor_torque, run.speed, *look))
-    ticks = tuple(range(0, 361, 45))
-    said = "From rest, for each armature resistance."
+    rest, steady = (
+        "From rest, for each armature resistance.",
+        "Second half of the run: a closed curve is a steady motion.",
+    )
+    loop = "From rest (0, 0) into the steady loop."
+    y = "speed [rad/s]"
     return [
-        Picture("Motor torque", line_plot(torque, "time [s]", "torque [N m]"), said),
-        Picture("Crank speed", line_plot(speed, "time [s]", "speed [rad/s]"), said),
-        Picture(
-            "Phase portrait over a turn", line_plot(turn, "crank angle [°]", "speed [rad/s]", xticks=ticks),
-            "Second half of the run: a closed curve is a steady motion.",
-        ),
-        Picture(
-            "Phase portrait of motor and crank", line_plot(spiral, "torque [N m]", "speed [rad/s]", size=(5.4, 3.6)),
-            "From rest (0, 0) into the steady loop.",
-        ),
-    ]  # fmt: skip
+        chart("Motor torque", torque, "time [s]", "torque [N m]", rest),
+        chart("Crank speed", speed, "time [s]", y, rest),
+        chart("Phase portrait over a full rotation", turn, "crank angle [°]", y, steady, xticks=TURN),
+        chart("Phase portrait of motor and crank", spiral, "torque [N m]", y, loop, size=(5.4, 3.6)),
+    ]
 
 
 def _wrapped(run: DriveRun, rows: Any) -> tuple[Any, Any]:
-    """Crank angle within a turn (degrees) and speed, with a gap where a turn ends."""
+    """Crank angle within a rotation and speed, with a gap where a rotation ends."""
     import numpy as np
 
-    angle, value = np.degrees(run.angle[rows]) % 360.0, run.speed[rows].copy()
-    ends = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
+    angle, value = run.angle[rows] % math.tau, run.speed[rows].copy()
+    ends = np.flatnonzero(np.abs(np.diff(angle)) > math.pi) + 1
     return np.insert(angle, ends, np.nan), np.insert(value, ends, np.nan)
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Attempt, Candidate, Quantity, Recognised, Record, Table, each, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.steps import recognise_by_key, records_of
@@ -234,5 +235,6 @@ def _working_mode(motion: Motion, i: int) -> tuple[int, ...]:
 
 def _event_table(motion: Motion) -> Table:
     """List dead points and everything else the module met on the way."""
-    rows = tuple((f"{math.degrees(e.psi):.6f}", e.kind, e.statement) for e in motion.events)
-    return Table(f"Events of the turn: {len(rows)}", ("wheel [°]", "event", "what it means"), rows)
+    rows = ((event.psi, event.kind, event.statement) for event in motion.events)
+    title = f"Events of the turn: {len(motion.events)}"
+    return table(title, ("wheel [°] | .6f", "event", "what it means"), rows)

@@ -146,24 +146,20 @@ def plots(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, ...]
     motion = _first(motions)
     if motion is None:
         return ()
-    import numpy as np
+    from graphsynth.drawing.plots import Line
+    from graphsynth.pipeline.display import TURN, chart, unit_in
 
-    from graphsynth.drawing.plots import Line, line_plot
-
-    turn = motion.motion
-    psi, ticks = np.degrees(turn.psi), tuple(range(0, 361, 45))
-    x, y, alpha = turn.pose.T
-    path = line_plot([Line(x, y)], "x [mm]", "y [mm]", equal=True)
-    shift = line_plot(
-        [Line(psi, x, "x", "a"), Line(psi, y, "y", "b", "--")], "wheel angle [°]", "displacement [mm]", xticks=ticks
-    )
-    swing = line_plot([Line(psi, np.degrees(alpha))], "wheel angle [°]", "rotation [°]", xticks=ticks)
-    relative = turn.determinant / abs(turn.determinant[0])
+    turn, wheel = motion.motion, "wheel angle [°]"
+    x, y = unit_in("[mm]").to_si(1.0) * turn.pose.T[:2]
+    alpha = turn.pose[:, 2]
+    shift = [Line(turn.psi, x, "x", "a"), Line(turn.psi, y, "y", "b", "--")]
+    far = [Line(turn.psi, turn.determinant / abs(turn.determinant[0]))]
     zero = Line((), 0.0, "singular", "jam", "--")
-    far = line_plot([Line(psi, relative)], "wheel angle [°]", "det JX / |det JX at 0|", xticks=ticks, levels=[zero])
+    held = "The platform is held as long as the determinant keeps its sign."
+    ratio = "det JX / |det JX at 0|"
     return (
-        Picture("Path of the platform's centre", path),
-        Picture("Displacement", shift),
-        Picture("Rotation", swing),
-        Picture("Distance from singular poses", far, "The platform is held as long as the determinant keeps its sign."),
+        chart("Path of the platform's centre", [Line(x, y)], "x [mm]", "y [mm]", equal=True),
+        chart("Displacement", shift, wheel, "displacement [mm]", xticks=TURN),
+        chart("Rotation", [Line(turn.psi, alpha)], wheel, "rotation [°]", xticks=TURN),
+        chart("Distance from singular poses", far, wheel, ratio, held, xticks=TURN, levels=[zero]),
     )
