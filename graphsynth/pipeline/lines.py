@@ -1,7 +1,7 @@
 """On which line of a TOML text a key stands.
 
-``tomllib`` gives values, not places, so a message about a value would have no line.  A text that it has accepted is read
-here again statement by statement: as many lines as it takes to parse are one statement, and its keys begin there.
+``tomllib`` gives values, not places, so a message about a value would have no line.  A text that it has accepted is
+read here again statement by statement: as many lines as it takes to parse are one statement; its keys begin there.
 """
 
 from __future__ import annotations
