@@ -59,6 +59,11 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
         Sine of the tilt, a decimal; the curves must cross.
     effort : Effort, optional
 
+    Returns
+    -------
+    Problem
+        Error and time of every method.
+
     Raises
     ------
     GeometryError

@@ -135,6 +135,11 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
     condition : {"A", "B"}
     effort : Effort, optional
 
+    Returns
+    -------
+    Problem
+        Error and time of every method.
+
     Raises
     ------
     GeometryError
