@@ -17,6 +17,7 @@ MODULES = (
     "graphsynth.mechanism.joints",
     "graphsynth.mechanism.laws",
     "graphsynth.mechanism.files",
+    "graphsynth.mechanism.gallery",
 )
 
 

@@ -17,6 +17,7 @@ _shown.WORK.update(
     {
         "simulate": "graphsynth.kinematics.simulation:simulate",
         "modes": "graphsynth.kinematics.assembly:assembly_modes",
+        "assess jamming": "graphsynth.jamming.assess:assess_jamming",
         "static forces": "graphsynth.dynamics.static:static_forces",
         "embody": "graphsynth.kinematics.dimensional.api:embody",
         "draw graph": "graphsynth.drawing.methods:draw_graph",

@@ -3,6 +3,12 @@ __version__: str
 from .atlas.catalogue import Catalogue as Catalogue
 from .core.angles import degrees as degrees
 from .core.errors import GraphsynthError as GraphsynthError
+from .dynamics.elements import (
+    Force as Force,
+)
+from .dynamics.elements import (
+    Torque as Torque,
+)
 from .intervals.interval import Interval as Interval
 from .intervals.paving import pave as pave
 from .intervals.proving import krawczyk as krawczyk
@@ -13,15 +19,36 @@ from .jamming.assess import (
 from .jamming.assess import (
     assess_jamming as assess_jamming,
 )
+from .jamming.joints.limits import (
+    JointLimits as JointLimits,
+)
+from .jamming.joints.limits import (
+    Misalignment as Misalignment,
+)
 from .kinematics.certify.poses import certify as certify
 from .kinematics.dimensional.api import embody as embody
-from .kinematics.dimensional.goals import Goals as Goals
+from .kinematics.dimensional.goals import (
+    FunctionGoal as FunctionGoal,
+)
+from .kinematics.dimensional.goals import (
+    Goals as Goals,
+)
+from .kinematics.dimensional.goals import (
+    LineGoal as LineGoal,
+)
+from .kinematics.dimensional.goals import (
+    PathGoal as PathGoal,
+)
+from .kinematics.dimensional.goals import (
+    PosesGoal as PosesGoal,
+)
 from .kinematics.simulation import (
     simulate as simulate,
 )
 from .kinematics.simulation import (
     simulate_batch as simulate_batch,
 )
+from .mechanism import gallery as gallery
 from .mechanism.four_bar import TiltedFourBar as TiltedFourBar
 from .mechanism.joints import (
     Cam as Cam,

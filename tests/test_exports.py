@@ -24,9 +24,9 @@ def documented_names():
 @pytest.mark.parametrize("name", [name for name in graphsynth.__all__ if name != "__version__"])
 def test_public_name_resolves_and_is_documented(name):
     value = getattr(graphsynth, name)
-    assert value.__name__ == name
+    assert value.__name__.rpartition(".")[2] == name
     assert value.__doc__
-    assert value.__module__.startswith("graphsynth.")
+    assert getattr(value, "__module__", value.__name__).startswith("graphsynth.")
     assert name in documented_names()
 
 

@@ -10,7 +10,7 @@ from html import escape
 from importlib import import_module
 from typing import Any
 
-__all__ = ["WORK", "Shown", "table", "work"]
+__all__ = ["WORK", "Printed", "Shown", "table", "work"]
 
 #: Function of every such method, as "module:name"; loaded on first use.
 WORK: dict[str, str] = {}
@@ -48,6 +48,13 @@ class Shown:
     def _repr_html_(self) -> str:
         title, rows = self._told()
         return f"<figure>{self._picture()}<figcaption>{escape(title)}{table(rows)}</figcaption></figure>"
+
+
+class Printed:
+    """Shows itself in a notebook as it prints itself."""
+
+    def _repr_html_(self) -> str:
+        return f"<figure><pre>{escape(repr(self))}</pre></figure>"
 
 
 def table(rows: list[tuple[str, str]]) -> str:

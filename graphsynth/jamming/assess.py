@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.angles import angle
 from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
+from graphsynth.core.shown import Printed
 from graphsynth.jamming.bearing.arcs import JamArcs, jam_arcs, strictly_inside
 from graphsynth.jamming.bearing.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
@@ -94,7 +96,7 @@ _MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JammingReport:
+class JammingReport(Printed):
     """Result of `assess_jamming`.
 
     Attributes
@@ -227,10 +229,10 @@ def assess_jamming(
 @overload
 def assess_jamming(
     subject: Motion,
-    bearing: Bearings,
+    bearing: Bearings | float | str,
     condition: Condition = "A",
     *,
-    tilts: Misalignment | Iterable[Misalignment],
+    tilts: Misalignment | Iterable[Misalignment] | float | str,
     certify: bool = True,
     length_tolerance: float = 0.0,
     seconds: float = 20.0,
@@ -240,11 +242,11 @@ def assess_jamming(
 @checked
 def assess_jamming(
     subject: Motion | TiltedFourBar | ToleranceBox | None = None,
-    bearing: Bearings | None = None,
+    bearing: Bearings | float | str | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike | None = None,
     *,
-    tilts: Misalignment | Iterable[Misalignment] | None = None,
+    tilts: Misalignment | Iterable[Misalignment] | float | str | None = None,
     certify: bool = True,
     length_tolerance: float = 0.0,
     seconds: float = 20.0,
@@ -257,15 +259,16 @@ def assess_jamming(
         A `Motion` of `graphsynth.simulate` is assessed with all its joints (model L1, needs ``tilts``); a
         `TiltedFourBar` with its tilted motor axis by the model of the source (L0).  With a `ToleranceBox` the verdict
         of L0 holds for the whole box; table and closed-form arcs are those of its middle.
-    bearing : Bearing, optional
+    bearing : Bearing, float or str, optional
         L0: the bearing at B, by default that of the box, else of the source (17.5 mm, 10 mm, 0.03 mm).  L1: limits for
-        all joints, or a mapping of pairs of links to limits, see `graphsynth.jamming.joints.assess_coupled`.
+        all joints, or a mapping of pairs of links to limits, see `graphsynth.jamming.joints.assess_coupled`; or the
+        tilt that every joint allows, radians or "0.5 deg".
     condition : {"A", "B", "general"}
         Contact condition; "A" (short bearing in a long hole) is what the source means.
     samples : int or array_like, optional
         L0: number of crank angles of the table over [0, 2 pi] (361), or the angles themselves (radians).
-    tilts : Misalignment or several, optional
-        L1: the axes that are tilted.
+    tilts : Misalignment or several, float or str, optional
+        L1: the axes that are tilted; or the tilt of the first driver's axis, radians or "0.5 deg".
     certify : bool
         If False the verdict is an estimate in double precision, and says so.
     length_tolerance, seconds : float
@@ -317,15 +320,23 @@ def assess_jamming(
 
 
 def _of_a_motion(
-    subject: Any, bearing: Bearings | None, tilts: Misalignment | Iterable[Misalignment] | None
+    subject: Any,
+    bearing: Bearings | float | str | None,
+    tilts: Misalignment | Iterable[Misalignment] | float | str | None,
 ) -> tuple[Motion, Bearings, Misalignment | Iterable[Misalignment]]:
     """Refuse what is no motion, and a motion without bearings or tilts."""
+    from graphsynth.jamming.joints.limits import JointLimits, Misalignment
     from graphsynth.kinematics.simulation import Motion
 
     if not isinstance(subject, Motion):
         raise GeometryError(
             f"subject = {subject!r} is neither a Motion (simulate) nor a TiltedFourBar or ToleranceBox; give one"
         )
+    if isinstance(tilts, float | int | str):
+        driver = subject.mechanism.drivers[0]
+        tilts = Misalignment(driver.base, driver.link, angle("tilts", tilts))
+    if isinstance(bearing, float | int | str):
+        bearing = JointLimits(angle("bearing", bearing))
     if tilts is None:
         raise GeometryError("no axis is misaligned; give tilts=Misalignment(base, link, alpha)")
     if bearing is None:

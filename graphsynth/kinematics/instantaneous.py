@@ -6,7 +6,7 @@ does not reach, infinite where a link does not turn.
 
 References
 ----------
-[Bottema & Roth 1979], chapter 8; [Hunt 1978], chapter 5; [Uicker et al. 2003], chapters 3 and 4.
+[Bottema & Roth 1979], chapter 8; [Hunt 1978]; [Uicker et al. 2003], chapters 3 and 4.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ def inflection_circle(motion: Motion, link: int, base: int | None = None) -> Cir
 
     References
     ----------
-    [Bottema & Roth 1979], chapter 8, section 2; [Hunt 1978], section 5.4.
+    [Bottema & Roth 1979], chapter 8; [Hunt 1978].
     """
     pole, a, turn = _acceleration_at_pole(motion, link, base)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -236,7 +236,7 @@ def mechanical_advantage(motion: Motion, link: int) -> Array:
 
     References
     ----------
-    [Norton 2004], section 6.4.
+    [Norton 2004], chapter 6.
     """
     mechanism = motion.mechanism
     if len(mechanism.drivers) != 1:

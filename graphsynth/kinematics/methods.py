@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from graphsynth.drawing.methods import Drawing
     from graphsynth.drawing.plots import Chart
     from graphsynth.dynamics.static import StaticForces
+    from graphsynth.jamming.joints.assess import CoupledReport
     from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
     from graphsynth.mechanism.model import Mechanism
 
@@ -131,6 +132,15 @@ class MotionMethods(Shown):
         See :func:`graphsynth.kinematics.instantaneous.mechanical_advantage`.
         """
         return mechanical_advantage(cast("Motion", self), link)
+
+    def assess_jamming(self, bearing: Any, tilts: Any, **options: Any) -> CoupledReport:
+        """Assess whether the joints bind if an axis leans; see :func:`graphsynth.assess_jamming`.
+
+        ``motion.assess_jamming("1 deg", tilts="0.5 deg")``: every joint allows a tilt of one degree, and the axis of
+        the first driver leans by half a degree.
+        """
+        found: CoupledReport = work("assess jamming")(self, bearing, tilts=tilts, **options)
+        return found
 
     def forces(self, loads: Mapping[str | int, Any], **options: Any) -> StaticForces:
         """Return the static forces in all joints under loads, as in ``motion.forces({"P": (0.0, -100.0)})``.

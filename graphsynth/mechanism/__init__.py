@@ -1,4 +1,8 @@
 """Dimensioned mechanisms: a graph, the geometry of its joints on the links, drivers and their motion laws.
 
-Import from the modules; this file loads none of them.
+The gallery of classic mechanisms is loaded on first use; everything else is imported from the modules.
 """
+
+import lazy_loader as _lazy
+
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -233,6 +233,7 @@ class Constructors:
         *,
         slides: Mapping[str, str | Sequence[str]] | None = None,
         cylinders: Sequence[str | Sequence[str]] = (),
+        trace: str | Sequence[str] = (),
     ) -> Self:
         """Make a mechanism from the coordinates of its joints at one position.
 
@@ -255,11 +256,12 @@ class Constructors:
             slides becomes a link of its own, numbered after the others.
         cylinders : sequence, optional
             Pairs of points with a telescopic link between them: two links more, the first of them at the first point.
+        trace : str or sequence of str
+            Joints that are named points of the mechanism too, as are the points on one link only.
 
         Returns
         -------
         Mechanism
-            Points on one link only are its named points.
 
         Raises
         ------
@@ -284,8 +286,10 @@ class Constructors:
         graph = MechanismGraph(len(drawn.links), [(j.a, j.b) for j in joints], frame=0)
         given = [driver] if driver is None or isinstance(driver, str) or _is_pair(driver) else list(driver)
         drivers = [Driver(*drawn.driven(each, joints)) for each in given]
-        alone = {name: (own[0], at) for name, at in places.items() if len(own := drawn.at(name)) == 1 and own != [0]}
-        return cls(graph, joints, drivers, alone, ((0.0, 0.0, 0.0),) * len(drawn.links))
+        traced = set(_names("trace", trace, places)) if trace else set()
+        traced |= {name for name in places if len(own := drawn.at(name)) == 1 and own != [0]}
+        named = {name: (drawn.at(name)[-1], at) for name, at in places.items() if name in traced}
+        return cls(graph, joints, drivers, named, ((0.0, 0.0, 0.0),) * len(drawn.links))
 
     @classmethod
     def from_sketch(cls, sketch: str | bytes | Mapping[str, Any], *, driver: Any = None) -> Self:

@@ -122,7 +122,7 @@ def coupler_curve(mechanism: Mechanism, name_or_link: str | int, at: tuple[float
     -----
     With ``A = P - R(theta) a`` each condition is linear in ``cos theta`` and ``sin theta``; Cramer's rule and
     ``cos^2 + sin^2 = 1`` eliminate the angle.  For a four-bar it is Roberts' tricircular sextic: S. Roberts, On
-    three-bar motion in plane space, Proc. London Math. Soc. 7 (1875) 14-23; [Hunt 1978], theory/jam-arcs 4.
+    three-bar motion in plane space, Proc. London Math. Soc. 7 (1875) 14-23.
 
     Examples
     --------

@@ -39,7 +39,7 @@ def test_the_coupler_turns_about_the_crossing_of_crank_and_rocker(rocker):
 
 
 def test_the_polodes_of_a_trammel_are_cardan_circles():
-    """Elliptic trammel of length L: a circle of diameter L rolls in one of radius L ([Hunt 1978], section 5.3)."""
+    """Elliptic trammel of length L: a circle of diameter L rolls in one of radius L."""
     L = 2.0
     places = {
         "A": (L * math.cos(0.4), 0),
@@ -100,7 +100,7 @@ def test_both_circles_of_bresse_meet_in_the_acceleration_pole(rocker):
 
 
 def test_mechanical_advantage_of_the_four_bar(rocker):
-    """[Norton 2004], section 6.4: the ratio of the distances of the poles (Freudenstein), and sin mu / sin nu."""
+    """The ratio of the distances of the poles (Freudenstein), and sin mu / sin nu."""
     advantage = rocker.mechanical_advantage(3)
     place = rocker.instant_centre(3, 1)
     x = ((place[:, 0] + 1j * place[:, 1]) * np.exp(1j * rocker.poses[:, 1, 2])).real

@@ -25,7 +25,7 @@ def test_the_four_bar_draws_a_tricircular_sextic(branch):
 
 
 def test_the_sextic_is_roberts_form():
-    """Hunt 1978, equation 7.6, with the joints of the coupler at distances a = 2, b from P."""
+    """Roberts' equation, with the joints of the coupler at distances m and n from P, seen under the angle gamma."""
     linkage = gs.Mechanism.four_bar(4, 2, 3, 3)
     x, y = sympy.symbols("x y", real=True)
     (p, q), r, s, k = (sympy.Rational(3, 2), 2), 2, 3, 4
@@ -45,7 +45,7 @@ def test_the_sextic_is_roberts_form():
 def test_the_slider_crank_draws_a_quartic():
     linkage = gs.Mechanism.slider_crank(1, 3, 0.25, rod_point=(1.5, 0.5))
     curve = linkage.coupler_curve("P")
-    assert (curve.degree, curve.circularity) == (4, 1)  # [Hunt 1978], theory/jam-arcs 3
+    assert (curve.degree, curve.circularity) == (4, 1)
     assert value_on(curve, linkage.simulate().point("P").position).max() < 1e-13
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.checks import checked
+from graphsynth.core.shown import Printed
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, JointProblem, PoseSolution, check_motion, problem
@@ -41,7 +42,7 @@ class Sensitivity(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CoupledReport:
+class CoupledReport(Printed):
     """Result of `assess_coupled`; arrays over the n inputs, NaN where the mechanism is not assembled.
 
     Attributes

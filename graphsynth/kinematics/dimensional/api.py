@@ -13,10 +13,11 @@ import numpy as np
 
 from graphsynth.core.checks import positive
 from graphsynth.core.errors import GeometryError, GraphError
+from graphsynth.core.shown import Shown
 from graphsynth.kinematics.dimensional.choice import Drivers, choices
 from graphsynth.kinematics.dimensional.design import Design
 from graphsynth.kinematics.dimensional.dimension import dimensioned
-from graphsynth.kinematics.dimensional.goals import Goals
+from graphsynth.kinematics.dimensional.goals import Goals, Target
 from graphsynth.kinematics.dimensional.problem import Problem
 from graphsynth.kinematics.dimensional.search import EXACT, HistoryRow, Search, search, verdict
 from graphsynth.kinematics.dimensional.verify import Figures, verify
@@ -32,8 +33,8 @@ __all__ = ["Embodiment", "embody"]
 _CONTINUED = 2
 
 
-@dataclass(frozen=True, eq=False)
-class Embodiment:
+@dataclass(frozen=True, eq=False, repr=False)
+class Embodiment(Shown):
     """Dimensions found for a mechanism graph, and how they were judged.
 
     Attributes
@@ -74,6 +75,18 @@ class Embodiment:
     seconds: float
     history: tuple[HistoryRow, ...] = field(default=(), repr=False)
 
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        rows = [
+            ("graph", self.graph.to_text()),
+            ("searched", f"{self.evaluations} candidate motions, {self.seconds:.2g} s"),
+        ]
+        if self.figures is not None and self.goals.target is not None:
+            rows.append(("error of the goal", f"{self.figures.goal_error:.2g}"))
+        return f"Dimensions {self.statement}", rows
+
+    def _picture(self) -> str:
+        return "" if self.motion is None else self.motion._picture()
+
     def to_pandas(self) -> Any:
         """Return the search history as a table: attempt, generation, evaluations, cost."""
         import pandas as pd
@@ -83,7 +96,7 @@ class Embodiment:
 
 def embody(
     graph: MechanismGraph,
-    goals: Goals | None = None,
+    goals: Goals | Target | None = None,
     seed: int = 0,
     *,
     driver: Drivers | None = None,
@@ -99,7 +112,7 @@ def embody(
     graph : MechanismGraph
         A chain (frame and driver are chosen) or a mechanism (driver chosen unless given).
         Space 3, joint mobilities 1 and 2.
-    goals : Goals, optional
+    goals : Goals, or its target alone, optional
         A full turn with the default bounds unless given.
     seed : int
         Same labelled graph, goals and seed, same result (unless ``seconds`` cuts the search short).
@@ -135,7 +148,8 @@ def embody(
     >>> found.accepted, found.motion.completed, found.motion.closure.closed
     (True, True, True)
     """
-    begin, wanted = perf_counter(), Goals() if goals is None else goals
+    begin = perf_counter()
+    wanted = Goals() if goals is None else Goals(target=goals) if isinstance(goals, Target) else goals
     _check(graph, wanted, seed, tries, seconds)
     positive("effort", effort)
     order = choices(graph, driver)
