@@ -16,7 +16,9 @@ import pytest
 
 import graphsynth
 from graphsynth.core import compilation
-from graphsynth.core.compilation import kernel, source_digest
+from graphsynth.core.compilation import kernel
+from graphsynth.core.native import sources
+from graphsynth.core.native.sources import source_digest
 
 BELOW = "from graphsynth.core.compilation import kernel\n\n@kernel\ndef below(x):\n    return x + {}\n"
 ABOVE = """
@@ -31,9 +33,10 @@ RUN = """
 import sys
 sys.path.insert(0, {folder!r})
 import graphsynth.core.compilation as c
+import graphsynth.core.native.sources as s
 from pathlib import Path
-c._IMPORT = c.re.compile(c._IMPORT.pattern.replace("graphsynth", "graphsynth(?:_probe)?"), c.re.MULTILINE)
-c.source_digest.__wrapped__.__defaults__ = (Path({folder!r}),)
+s._IMPORT = s.re.compile(s._IMPORT.pattern.replace("graphsynth", "graphsynth(?:_probe)?"), s.re.MULTILINE)
+s.source_digest.__wrapped__.__defaults__ = (Path({folder!r}),)
 from graphsynth_probe.above import above
 c.announce(lambda: sys.stderr.write("compiling\\n"))
 print(above(1.0), sum(above.stats.cache_hits.values()), sum(above.stats.cache_misses.values()))
@@ -84,8 +87,9 @@ def test_digest_follows_imports(tmp_path: Path) -> None:
     start = Path("graphsynth/room/kernels/one.py")
     digest = source_digest(first / start, first)
     for name, changed in (("room/codes", True), ("room/more", True), ("room/kernels/two", True), ("other", False)):
-        other = written(tmp_path / name.replace("/", "-"), {**texts, name: texts[name] + "# new\n"})
-        assert (source_digest(other / start, other) != digest) == changed
+        for line in ("D = 2", "D = '#'", "# new", '"""New."""'):
+            other = written(tmp_path / f"{name}-{line}".replace("/", "-"), {**texts, name: texts[name] + f"{line}\n"})
+            assert (source_digest(other / start, other) != digest) == (changed and line.startswith("D"))
 
 
 def test_every_kernel_module_depends_on_what_it_imports(tmp_path: Path) -> None:
@@ -95,6 +99,12 @@ def test_every_kernel_module_depends_on_what_it_imports(tmp_path: Path) -> None:
     assert source_digest(Path(listing.__file__)) != source_digest(Path(variables.__file__))
     for module in (listing, variables):  # what they import is found where the package is
         assert source_digest(Path(module.__file__)) != source_digest(Path(module.__file__), tmp_path)
+
+
+def forget_sources() -> None:
+    """Read them anew, as a new process does."""
+    source_digest.cache_clear()
+    sources._read_source.cache_clear()
 
 
 # -- every state of the cache ----------------------------------------------------------------------------------------
@@ -170,7 +180,7 @@ def test_a_file_of_another_function_numba_or_machine_is_not_taken(place: Place, 
     (path,) = place.kept()
     data = path.read_bytes()
     place.source.write_text("def twice(x):\n    return 2.0 * x\n")
-    source_digest.cache_clear()
+    forget_sources()
     assert place.hits() == 0
     (other,) = set(place.kept()) - {path}
     other.write_bytes(data)  # under the name of the new one
@@ -239,7 +249,7 @@ def test_many_processes_at_once_and_many_versions(place: Place) -> None:
     assert not wrong
     for number in range(20):
         place.source.write_text(f"def twice(x):\n    return x + x  # {number}\n")
-        source_digest.cache_clear()
+        forget_sources()
         compilation._write(place.beside, f"small.twice-0.{number}.nbc", b"")
         compilation._drop_old(place.beside, "small.twice-0")
     assert len(list(place.beside.glob("small.*"))) == compilation._VERSIONS

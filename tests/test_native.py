@@ -1,39 +1,406 @@
-"""The library of kernels that were compiled ahead of time."""
+"""The library of kernels that were compiled ahead of time: it is that of the sources, and does what numba does."""
 
 from __future__ import annotations
 
+import copy
+import json
 import os
+import pickle
+import shutil
 import subprocess
 import sys
+import threading
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from graphsynth.cli.main import main
 from graphsynth.core.native import library
-from graphsynth.core.native.signatures import Signature, read_list
+from graphsynth.core.native.record import united
+from graphsynth.core.native.signatures import Signature, parse, read_list, text_of, write_list
 
 needs_library = pytest.mark.skipif(not library.contents(), reason=library.reason)
+ROOT = Path(__file__).parents[1]
+
+
+def kernel_of(name: str) -> Any:
+    module, _, function = name.rpartition(".")
+    return getattr(import_module(module), function)
 
 
 def python(code: str, **environment: str) -> str:
     """Run a program in a process of its own; what it prints."""
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=os.environ | environment, check=True
-    )
-    return done.stdout
+    command = [sys.executable, "-P", "-c", code]
+    environment = {"PYTHONPATH": str(ROOT)} | environment
+    return subprocess.run(command, capture_output=True, text=True, env=os.environ | environment, check=True).stdout
+
+
+# -- of these sources ------------------------------------------------------------------------------------------------
 
 
 @needs_library
 def test_the_library_is_of_these_sources_and_this_list() -> None:
     held = {Signature(name, types) for name, _, overloads in library.contents() for types, _ in overloads}
     assert held == set(read_list())
-    for name, digest, _ in library.contents():
-        module, _, function = name.rpartition(".")
-        assert getattr(import_module(module), function).digest == digest, f"{name}: build the library anew"
+    changed = {name for name, digest, _ in library.contents() if kernel_of(name).digest != digest}
+    assert not changed, "build the library anew: python -m graphsynth.core.native.build"
+
+
+@pytest.mark.slow
+@needs_library
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+def test_the_same_sources_give_the_same_bytes(tmp_path: Path) -> None:
+    made = tmp_path / "made.so"
+    command = [sys.executable, "-m", "graphsynth.core.native.build", "--output", str(made)]
+    subprocess.run(command, check=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    assert made.read_bytes() == library.path().read_bytes()
+
+
+def test_the_list_is_sorted_and_written_as_it_is_read(tmp_path: Path) -> None:
+    signatures = read_list()
+    write_list(set(signatures), tmp_path / "list.txt")
+    assert read_list(tmp_path / "list.txt") == signatures == sorted(signatures)
+    assert {Signature(*signature) for signature in signatures} == united(set(signatures))
+    for signature in signatures:
+        assert ", ".join(map(text_of, parse(signature.types))) == signature.types
+
+
+def test_calls_that_differ_in_what_may_be_written_are_one() -> None:
+    calls = {Signature("f", types) for types in ("f8[1Cr], f8[1C], i8", "f8[1C], f8[1Cr], i8", "f8[2C], f8[1C], i8")}
+    assert united(calls) == {Signature("f", "f8[1Cr], f8[1Cr], i8"), Signature("f", "f8[2C], f8[1C], i8")}
+
+
+# -- used, or not ----------------------------------------------------------------------------------------------------
+
+COUNT = "import sys, graphsynth as gs; print(gs.count_chains(12), 'numba' in sys.modules)"
 
 
 @needs_library
 def test_counting_does_not_load_numba() -> None:
-    code = "import sys, graphsynth as gs; print(gs.count_chains(12), 'numba' in sys.modules)"
-    assert python(code).split() == ["6856", "False"]
-    assert python(code, GRAPHSYNTH_NATIVE="0").split() == ["6856", "True"]
+    assert python(COUNT).split() == ["6856", "False"]
+    assert python(COUNT, GRAPHSYNTH_NATIVE="0").split() == ["6856", "True"]
+
+
+@needs_library
+def test_a_changed_source_falls_back_and_says_so(tmp_path: Path) -> None:
+    package = tmp_path / "graphsynth"
+    ignored = shutil.ignore_patterns("*.nbc", "__pycache__")
+    shutil.copytree(ROOT / "graphsynth", package, ignore=ignored)
+    changed = package / "synthesis" / "kernels" / "counting.py"
+    environment = {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    doctor = "from graphsynth.cli.main import main; main(['doctor', '--json'])"
+
+    def reasons() -> dict[str, str]:
+        kernels = json.loads(python(doctor, **environment))["kernels"]
+        return {kernel["kernel"].removeprefix("graphsynth."): kernel["why"] for kernel in kernels}
+
+    first = reasons()
+    changed.write_text(changed.read_text() + "\n# a comment\n")
+    assert reasons() == first and not first["synthesis.kernels.counting.count_block"]
+    assert python(COUNT, **environment).split() == ["6856", "False"]
+    changed.write_text(changed.read_text() + "\nCHANGED = 1\n")
+    then = {name: why for name, why in reasons().items() if why != first[name]}
+    assert "their sources have changed since the library was made" in then["synthesis.kernels.counting.count_block"]
+    users = ("synthesis.kernels.", "atlas.kernels.")  # modules that import the changed one
+    assert all(name.startswith(users) for name in then)
+    assert python(COUNT, **environment).split() == ["6856", "True"]
+
+
+@needs_library
+def test_the_doctor_counts_calls_and_names_what_is_compiled(capsys: pytest.CaptureFixture[str]) -> None:
+    from graphsynth.intervals.kernels import arithmetic, loops
+
+    arrays = [np.ones(3) for _ in range(6)]
+    loops.add(*arrays)
+    arithmetic.multiply(1.0, 2.0, 3.0, 4.0)
+    assert main(["doctor", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    found = {kernel["kernel"].removeprefix("graphsynth.intervals.kernels."): kernel for kernel in said["kernels"]}
+    assert said["loaded"] and said["library"] == str(library.path())
+    assert found["loops.add"]["place"] == "in the library" and found["loops.add"]["calls"] > 0
+    assert found["arithmetic.multiply"]["place"] in ("compiled here and kept on disk", "compiled in memory")
+    assert main(["doctor"]) == 0
+    said = capsys.readouterr().out
+    assert library.reason in said and "graphsynth.intervals.kernels.arithmetic.multiply" in said
+
+
+def test_another_machine_or_a_damaged_file_is_not_loaded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(library, "FOLDER", tmp_path)
+    monkeypatch.delenv("GRAPHSYNTH_NATIVE", raising=False)
+    assert library._load() == (None, f"there is none for {library.target()}")
+    library.path().write_bytes(b"\x7fELF of another machine")
+    assert "cannot be loaded" in library._load()[1]
+    monkeypatch.setenv("GRAPHSYNTH_NATIVE", "0")
+    assert "GRAPHSYNTH_NATIVE" in library._load()[1]
+
+
+@needs_library
+def test_a_numpy_with_other_arrays_is_noticed() -> None:
+    code = """
+import numpy as np
+from graphsynth.core.native import library
+from graphsynth.intervals.kernels import loops
+library._seen = lambda array: (0,)
+out = [np.empty(1), np.empty(1)]
+loops.add(np.ones(1), np.ones(1), np.ones(1), np.ones(1), *out)
+print(out[0][0], library.reason)
+"""
+    assert python(code).split(maxsplit=1) == ["2.0", "arrays of this numpy are laid out in another way\n"]
+
+
+# -- as numba calls --------------------------------------------------------------------------------------------------
+
+
+def calls_of(kernel: Any) -> int:
+    entry = kernel.entry()
+    return sum(calls for _, calls in entry[2]) if entry else 0
+
+
+@needs_library
+@pytest.mark.parametrize(
+    ("change", "taken"),
+    [
+        (lambda a: a, True),
+        (lambda a: np.frombuffer(a.tobytes()), True),  # read only
+        (lambda a: a[:0], True),
+        (lambda a: np.ascontiguousarray(a).astype(np.float32), False),
+        (lambda a: np.repeat(a, 2)[::2], False),
+        (lambda a: a.astype(">f8"), None),
+        (lambda a: np.frombuffer(b"\0" + a.tobytes(), dtype=np.uint8)[1:].view(np.float64), False),
+        (lambda a: a.view(type("Derived", (np.ndarray,), {})), False),
+        (lambda a: list(a), None),
+    ],
+    ids=["plain", "read only", "empty", "single", "strided", "swapped", "unaligned", "derived", "list"],
+)
+def test_arguments_are_told_apart_as_numba_does(change: Any, taken: bool | None) -> None:
+    from graphsynth.intervals.kernels import loops
+
+    given = [change(np.array([1.0, 2.0, 4.0])) for _ in range(4)]
+    size = len(given[0])
+    out, numbas = ([np.zeros(size), np.zeros(size)] for _ in range(2))
+    before = calls_of(loops.add)
+    try:
+        loops.add(*given, *out)
+    except Exception as error:
+        assert taken is None
+        with pytest.raises(type(error)):
+            loops.add.dispatcher(*given, *numbas)
+    else:
+        loops.add.dispatcher(*given, *numbas)
+    assert calls_of(loops.add) - before == (1 if taken else 0)
+    assert np.array_equal(out, numbas)
+
+
+@needs_library
+def test_wrong_calls_say_what_numba_says() -> None:
+    from graphsynth.intervals.kernels import loops
+    from graphsynth.structure.kernels import canon_workspace
+
+    for kernel, args in ((loops.add, ()), (loops.add, (1, 2, 3, 4, 5, 6, 7)), (canon_workspace, ("3", 1))):
+        with pytest.raises(Exception) as ours:
+            kernel(*args)
+        with pytest.raises(Exception) as numbas:
+            kernel.dispatcher(*args)
+        assert ours.type is numbas.type and str(ours.value) == str(numbas.value)
+
+
+@needs_library
+def test_numbers_of_python_and_numpy_are_alike() -> None:
+    from numba.core.errors import TypingError
+
+    from graphsynth.structure.kernels import canon_workspace
+
+    before = calls_of(canon_workspace)
+    for n in (3, np.int64(3)):
+        assert canon_workspace(n, 1)[0].shape == (3,)
+    assert calls_of(canon_workspace) == before + 2
+    with pytest.raises(ValueError, match="negative dimensions"):
+        canon_workspace(-1, 1)
+    assert calls_of(canon_workspace) == before + 3
+    for n in (np.int32(3), np.uint8(3)):  # other types: numba's affair
+        assert canon_workspace(n, 1)[0].shape == (int(n),)
+    with pytest.raises(TypingError):
+        canon_workspace(None, 1)
+    assert calls_of(canon_workspace) == before + 3
+
+
+@needs_library
+def test_arrays_that_are_returned_own_their_memory() -> None:
+    from graphsynth.structure.kernels import canon_workspace
+
+    def resident() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) if Path("/proc/self/statm").exists() else 0
+
+    found = [canon_workspace(200, 1) for _ in range(20)]
+    parts = [arrays[5][7:9] for arrays in found]
+    for number, part in enumerate(parts):
+        part[:] = number
+    del found
+    before = resident()
+    for _ in range(2000):  # 2 MB each
+        canon_workspace(400, 1)
+    assert resident() - before < 20_000  # pages: nothing is lost
+    assert all((part == number).all() for number, part in enumerate(parts))
+
+
+@needs_library
+def test_many_threads_call_at_once() -> None:
+    from graphsynth.intervals.kernels import loops
+
+    wrong = []
+
+    def work(seed: int) -> None:
+        values = np.random.default_rng(seed).normal(size=(4, 500))
+        expected = np.empty((2, 500))
+        loops.add(*values, *expected)
+        for _ in range(300):
+            found = np.empty((2, 500))
+            loops.add(*values, *found)
+            if not np.array_equal(found, expected):
+                wrong.append(seed)
+
+    workers = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert not wrong
+
+
+# -- the same bits as numba --------------------------------------------------------------------------------------------
+
+#: Results that hold memory as it was found.
+UNSET = {"graphsynth.structure.kernels.canon_workspace"}
+#: Kernels of one operation after another on flat arrays: any number may come.
+FLAT = ("graphsynth.intervals.kernels.loops.", "graphsynth.intervals.kernels.elementary.")
+SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, -5e-324, 2.2e-308, 1.8e308, -1.8e308, 1.0, -1.0])
+
+
+def flattened(value: Any) -> list[np.ndarray]:
+    if isinstance(value, tuple):
+        return [part for item in value for part in flattened(item)]
+    return [] if value is None else [np.asarray(value)]
+
+
+def same(ours: Any, theirs: Any) -> bool:
+    """Whether two results have the same types, shapes and bits; any NaN equals any other."""
+    a, b = flattened(ours), flattened(theirs)
+    if [(x.dtype, x.shape) for x in a] != [(x.dtype, x.shape) for x in b]:
+        return False
+    pairs = [
+        (x.ravel().view(np.float64), y.ravel().view(np.float64)) if x.dtype.kind in "fc" and x.itemsize != 4 else (x, y)
+        for x, y in zip(a, b, strict=True)
+    ]
+    return all(
+        bool(np.all((x.view(np.int64) == y.view(np.int64)) | (np.isnan(x) & np.isnan(y))))
+        if x.dtype == np.float64
+        else np.array_equal(x, y)
+        for x, y in pairs
+    )
+
+
+def moved(value: Any, rng: np.random.Generator) -> Any:
+    """Copy arguments; floats are changed a little, some by nothing, numbers of things and choices stay."""
+    if isinstance(value, tuple):
+        parts = [moved(part, rng) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fc":
+        size = 10.0 ** rng.uniform(-15, -1) * (rng.random(value.shape) < rng.random())
+        found = (value * (1.0 + size * rng.standard_normal(value.shape))).astype(value.dtype)
+        found.flags.writeable = value.flags.writeable
+        return found
+    return copy.deepcopy(value)
+
+
+def differing(kernel: Any, args: tuple[Any, ...]) -> bool:
+    """Call the library, in every version of its code, and numba."""
+    theirs = copy.deepcopy(args)
+    expected = kernel.dispatcher(*theirs)
+    levels = range(len(library.LEVELS["x86_64"]))
+    for level in levels if library.target().startswith("x86_64") and library.reason == "x86-64-v3" else [None]:
+        ours = copy.deepcopy(args)
+        if level is not None:
+            library._library.set_level(level)
+        before = calls_of(kernel)
+        found = kernel(*ours)
+        assert calls_of(kernel) == before + 1, "the library was not used"
+        results = (
+            (ours, theirs)
+            if f"{kernel.__module__}.{kernel.__qualname__}" in UNSET
+            else ((ours, found), (theirs, expected))
+        )
+        if not same(*results):
+            return True
+    return False
+
+
+@pytest.fixture(scope="session")
+def real_calls(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[Signature, list[Any]]:
+    """Arguments of calls that the examples of the documentation make."""
+    path = tmp_path_factory.mktemp("calls") / "calls.pickle"
+    command = [sys.executable, str(Path(__file__).with_name("kernel_calls.py")), str(path)]
+    if "slow" in request.config.getoption("-m") and "not slow" not in request.config.getoption("-m"):
+        command.append("slow")
+    environment = os.environ | {"GRAPHSYNTH_NATIVE": "0", "PYTHONPATH": str(ROOT)}
+    subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
+    return pickle.loads(path.read_bytes())
+
+
+def check_bits(calls: dict[Signature, list[Any]], each: int) -> int:
+    """Compare each listed kernel with numba, on real arguments and on changed ones; return how many calls."""
+    rng = np.random.default_rng(20)
+    total, wrong = 0, []
+    for kind, kept in calls.items():
+        kernel = kernel_of(kind.kernel)
+        floats = any(array.dtype.kind in "fc" for array in flattened(kept[0]))
+        for k in range(each if floats else len(kept)):
+            args = kept[k % len(kept)]
+            args = args if k < len(kept) else moved(args, rng)
+            total += 1
+            if differing(kernel, args):
+                wrong.append((kind.kernel, k))
+    assert not wrong
+    return total
+
+
+@needs_library
+def test_the_library_gives_the_bits_of_numba(real_calls: dict[Signature, list[Any]]) -> None:
+    listed = set(read_list())
+    calls = {kind: kept for kind, kept in real_calls.items() if united({kind, *listed}) == united(listed)}
+    assert len(calls) > 30
+    check_bits(calls, 300)
+
+
+@needs_library
+@pytest.mark.parametrize(
+    "signature", [s for s in read_list() if s.kernel.startswith(FLAT)], ids=lambda s: s.kernel[31:]
+)
+def test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature: Signature, each: int = 2000) -> None:
+    rng = np.random.default_rng(5)
+    kernel = kernel_of(signature.kernel)
+    types = signature.types.split(", ")
+    inputs = sum(kind == "f8[1Cr]" for kind in types)
+    any_bits = rng.integers(-(2**63), 2**63 - 1, (inputs, each)).view(np.float64)
+    usual = rng.standard_normal((inputs, each)) * 10.0 ** rng.integers(-3, 4, (inputs, each))
+    values = np.where(rng.random((inputs, each)) < 0.4, any_bits, usual)
+    values = np.where(rng.random((inputs, each)) < 0.2, rng.choice(SPECIAL, (inputs, each)), values)
+    for k in range(0, inputs, 2):  # bounds in order, mostly
+        values[k : k + 2] = np.sort(values[k : k + 2], axis=0)
+    arrays = iter(values)
+    args = [int(rng.integers(-5, 9)) if kind == "i8" else next(arrays, None) for kind in types]
+    assert not differing(kernel, tuple(np.empty(each) if value is None else value for value in args))
+
+
+@pytest.mark.slow
+@needs_library
+def test_the_library_gives_the_bits_of_numba_on_a_million_calls(real_calls: dict[Signature, list[Any]]) -> None:
+    listed = set(read_list())
+    assert united(set(real_calls) | listed) == united(listed)
+    for signature in listed:
+        if signature.kernel.startswith(FLAT):
+            test_interval_loops_give_the_bits_of_numba_for_any_numbers(signature, 1_000_000)
+    check_bits(real_calls, 2000)

@@ -178,6 +178,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(verbs)
     _add_accuracy(verbs)
     _add_schema(verbs)
+    _verb(verbs, "doctor", "doctor", "Say where the machine code of the kernels comes from, and why.")
     add_stress(partial(_verb, verbs))
     add_catalog(verbs, _shard, _workers)
     return parser

@@ -22,11 +22,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from graphsynth.core.native.library import Native
+from graphsynth.core.native.sources import source_digest
 
-__all__ = ["Intrinsic", "Kernel", "announce", "kernel", "prepare_numba", "source_digest"]
+__all__ = ["Intrinsic", "Kernel", "announce", "kept", "kernel", "prepare_numba"]
 
-_IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+(\([^)]*\)|[^#\n]+))?", re.MULTILINE)
-_ROOT = Path(__file__).parents[2]
 _VERSIONS = 8  # of one function for one machine that are kept beside each other
 _UNKEPT = (
     "kernels are compiled in memory, anew in every process, as no folder can be written to keep them: name one with "
@@ -66,6 +65,11 @@ class Kernel(Native):  # type: ignore[misc]  # of the library, where there is on
             compiled.compile(self._signature())
             compiled.disable_compile()
         return compiled
+
+    @property
+    def compiled(self) -> int:
+        """For how many types numba has the function in this process."""
+        return len(self.dispatcher.overloads) if "dispatcher" in vars(self) else 0
 
     @cached_property
     def fallback(self) -> Callable[..., Any]:
@@ -171,7 +175,7 @@ def _cache_class() -> Any:
 
         def __init__(self, function: Callable[..., Any], digest: str) -> None:
             self._file = Path(function.__code__.co_filename)
-            self._name = f"{self._file.stem}.{re.sub(r'[^0-9A-Za-z_.]', '', function.__qualname__)}"
+            self._name = _name_of(function)
             self._digest = digest
 
         @property
@@ -209,6 +213,17 @@ def _cache_class() -> Any:
                 _warners.pop()(_UNKEPT)
 
     return SourceCache
+
+
+def _name_of(function: Callable[..., Any]) -> str:
+    """How the names of files of a function begin."""
+    return f"{Path(function.__code__.co_filename).stem}.{re.sub(r'[^0-9A-Za-z_.]', '', function.__qualname__)}"
+
+
+def kept(kernel: Kernel) -> list[Path]:
+    """Files on disk that hold a kernel as its sources are now, for any types and machine."""
+    pattern = f"{_name_of(kernel.py_func)}-*.{kernel.digest[:16]}.nbc"
+    return [path for folder in _folders(Path(kernel.py_func.__code__.co_filename)) for path in folder.glob(pattern)]
 
 
 def _folders(source: Path) -> Iterator[Path]:
@@ -253,39 +268,3 @@ def _drop_old(folder: Path, begin: str) -> None:
         kept = [path for path in folder.iterdir() if path.name.startswith(begin)]
         for path in sorted(kept, key=lambda path: path.stat().st_mtime)[:-_VERSIONS]:
             path.unlink()
-
-
-@cache
-def source_digest(module: Path, root: Path = _ROOT) -> str:
-    """Digest of a source file and of all modules of the package that it imports, directly or through others.
-
-    Parameters
-    ----------
-    module : Path
-        The source file.
-    root : Path, optional
-        Folder that holds the package.
-    """
-    found: dict[Path, bytes] = {}
-    waiting = [module]
-    while waiting:
-        path = waiting.pop()
-        if path in found:
-            continue
-        found[path] = path.read_bytes()
-        waiting += _imported(found[path].decode(), root)
-    digest = sha256()
-    for path in sorted(found, key=str):
-        digest.update(path.name.encode() + b"\0" + found[path] + b"\0")
-    return digest.hexdigest()
-
-
-def _imported(source: str, root: Path) -> list[Path]:
-    """Source files of the package that a module names in its import lines."""
-    paths = []
-    for name, parts in _IMPORT.findall(source):
-        base = root.joinpath(*name.split("."))
-        names = re.findall(r"\w+", parts)
-        candidates = [base.with_suffix(".py"), base / "__init__.py", *(base / f"{part}.py" for part in names)]
-        paths += [path for path in candidates if path.is_file() and path != Path(__file__)]
-    return paths

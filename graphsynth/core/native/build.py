@@ -18,6 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from graphsynth.core.compilation import Kernel
+from graphsynth.core.native.doctor import kernels
 from graphsynth.core.native.library import FOLDER, LEVELS, target
 from graphsynth.core.native.signatures import LIST, Signature, code_of, parse, read_list
 
@@ -25,7 +26,7 @@ __all__ = ["build", "main"]
 
 _RUNTIME = (
     "NRT_Allocate NRT_Free NRT_MemInfo_alloc_aligned NRT_MemInfo_alloc_safe_aligned NRT_MemInfo_call_dtor numba_frexp "
-    "numba_ldexp memcpy memmove memset memcmp"
+    "NRT_MemInfo_alloc numba_ldexp numba_nextafter memcpy memmove memset memcmp"
 )
 _MATHEMATICS = (
     "acos asin atan atan2 cbrt ceil copysign cos cosh exp exp2 expm1 fabs floor fma fmod frexp hypot ldexp log log10 "
@@ -52,7 +53,7 @@ class Lowered(NamedTuple):
     code: bytes
     entries: list[Entry]
     named: list[tuple[str, str]]
-    digests: dict[str, str]
+    digests: dict[str, str]  # of these kernels and of those that they call
 
 
 def lower(signatures: list[Signature]) -> Lowered:
@@ -75,13 +76,15 @@ def lower(signatures: list[Signature]) -> Lowered:
         return named.index((name, fields))
 
     entries: list[Entry] = []
-    digests = {}
     calls = ir.Module("entries")
     for signature in signatures:
         kernel = _found(signature.kernel)
-        types = parse(signature.types)
-        compiled = _compiled(kernel, types)
-        digests[signature.kernel] = kernel.digest
+        try:
+            types = parse(signature.types)
+            compiled = _compiled(kernel, types)
+        except Exception as error:
+            error.add_note(f"The list has {signature.kernel}({signature.types}).")
+            raise
         result = compiled.signature.return_type
         code = code_of(result, number)
         if "<" in code:
@@ -90,34 +93,45 @@ def lower(signatures: list[Signature]) -> Lowered:
         slots = _write_entry(ir.Function(calls, kind, compiled.fndesc.llvm_func_name), f"entry_{len(entries)}")
         entries.append(Entry(signature, "".join(code_of(part, number) for part in types), code, *slots))
     merged = ll.parse_assembly(str(create_nrt_module(context)[0]))
-    for module in [*modules, ll.parse_assembly(str(calls))]:
+    for name in sorted({function.name for module in modules for function in module.functions}):
+        if name.startswith("__excinfo_unwrap_args"):  # would make Python objects of what an exception tells
+            _write_nothing(ir.Function(calls, ir.FunctionType(ir.PointerType(), [ir.PointerType()]), name))
+    for module in modules:
+        for function in module.functions:
+            if not function.is_declaration:
+                function.linkage = "weak_odr"
+    for module in [ll.parse_assembly(str(calls)), *modules]:
         merged.link_in(module, preserve=True)
     for part in (*merged.functions, *merged.global_variables):
         if not part.is_declaration and not part.name.startswith("entry_"):
             part.linkage = "internal"
+    inlined = {"inline": "always"}.items()
+    parts = {
+        name: kernel for name, kernel in kernels().items() if kernel.compiled or inlined <= kernel.targetoptions.items()
+    }
+    digests = {name: kernel.digest for name, kernel in parts.items()}
     return Lowered(merged.as_bitcode(), entries, named, digests)
 
 
 def _collect_modules() -> list[Any]:
-    """Make numba keep its LLVM code: nothing is linked, optimised or loaded, and no place in it is absolute."""
+    """Make numba keep its LLVM code: nothing is linked, optimised or loaded, and exceptions tell no line."""
+    from numba.core.callconv import CPUCallConv
     from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
-    from numba.core.ir import Loc
 
     modules: list[Any] = []
-    root = str(FOLDER.parents[2]) + os.sep
-    begin = Loc.__init__
+    told = CPUCallConv.build_excinfo_struct
 
     def finalize(library: Any) -> None:
         library._finalized = True
         modules.append(library._final_module)
 
-    def located(loc: Any, filename: str, *args: Any, **keywords: Any) -> None:
-        begin(loc, filename.removeprefix(root), *args, **keywords)
+    def without_place(convention: Any, kind: Any, arguments: Any, loc: Any, name: Any) -> Any:
+        return told(convention, kind, arguments, None, name)
 
     CPUCodeLibrary.finalize = finalize
     JITCodeLibrary.get_pointer_to_function = lambda library, name: 0
     JITCPUCodegen.set_env = lambda codegen, name, env: None
-    Loc.__init__ = located
+    CPUCallConv.build_excinfo_struct = without_place
     return modules
 
 
@@ -172,6 +186,13 @@ def _write_entry(kernel: Any, name: str) -> tuple[int, int]:
     return len(kinds), count
 
 
+def _write_nothing(function: Any) -> None:
+    """Let a function return a null pointer."""
+    from llvmlite import ir
+
+    ir.IRBuilder(function.append_basic_block()).ret(ir.Constant(function.ftype.return_type, None))
+
+
 def emit(code: bytes, triple: str, processor: str, level: int) -> bytes:
     """Optimise for a processor, as numba does, and return an object file."""
     import llvmlite.binding as ll
@@ -221,9 +242,9 @@ def table(lowered: Lowered, levels: int) -> str:
         "MAX_OUT": max(entry.slots_out for entry in entries) + 1,
         "MAX_ARRAYS": max(entry.types.count("A") for entry in entries) + 1,
     }
-    rows: dict[str, list[int]] = {}
+    rows: dict[str, list[int]] = {name: [] for name in sorted(lowered.digests)}
     for k, entry in enumerate(entries):
-        rows.setdefault(entry.signature.kernel, []).append(k)
+        rows[entry.signature.kernel].append(k)
     overloads = (
         f'{{"{entry.types}", "{entry.result}", "{entry.signature.types}", {{{", ".join(code)}}}, 0}},'
         for entry, code in zip(entries, names, strict=True)
@@ -238,7 +259,7 @@ def table(lowered: Lowered, levels: int) -> str:
         *overloads,
         "};",
         "static const Kernel kernels[] = {",
-        *(f'{{"{name}", "{lowered.digests[name]}", {which[0]}, {len(which)}}},' for name, which in rows.items()),
+        *(f'{{"{name}", "{lowered.digests[name]}", {min(k, default=0)}, {len(k)}}},' for name, k in rows.items()),
         "};",
         "",
     ]

@@ -8,12 +8,13 @@ import platform
 import sys
 import sysconfig
 from collections.abc import Callable
+from functools import cache
 from importlib.machinery import ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
-__all__ = ["FOLDER", "LEVELS", "Native", "contents", "reason", "target"]
+__all__ = ["FOLDER", "LEVELS", "Native", "contents", "path", "reason", "target"]
 
 FOLDER = Path(__file__).parent
 #: Versions of the code in a library, the plainest first.
@@ -27,6 +28,11 @@ def target() -> str:
     return f"{machine}-{system}"
 
 
+def path() -> Path:
+    """Where the library of this machine is, if there is one."""
+    return FOLDER / f"{target()}.so"
+
+
 def _load() -> tuple[Any, str]:
     """Return the library and the version of its code, or None and why there is none."""
     if os.environ.get("GRAPHSYNTH_NATIVE") == "0":
@@ -35,57 +41,59 @@ def _load() -> tuple[Any, str]:
         return None, "kernels are interpreted, by NUMBA_DISABLE_JIT"
     if sysconfig.get_config_var("Py_GIL_DISABLED") or sys.implementation.name != "cpython":
         return None, "this Python has another interface for extensions"
-    path = FOLDER / f"{target()}.so"
-    if not path.is_file():
+    if not path().is_file():
         return None, f"there is none for {target()}"
     try:
-        loader = ExtensionFileLoader("graphsynth.core.native._library", str(path))
-        spec = spec_from_file_location("graphsynth.core.native._library", path, loader=loader)
+        loader = ExtensionFileLoader("graphsynth.core.native._library", str(path()))
+        spec = spec_from_file_location("graphsynth.core.native._library", path(), loader=loader)
         assert spec is not None
         library = module_from_spec(spec)
         loader.exec_module(library)
-        level = _set_up(library)
+        level = library.set_hooks(_bound, _raise)
     except Exception as error:  # another C library, an older processor, a damaged file: kernels are compiled
-        return None, f"{path.name} cannot be loaded: {' '.join(str(error).split())}"
+        return None, f"{path().name} cannot be loaded: {' '.join(str(error).split())}"
     return library, LEVELS.get(target().split("-")[0], ("",))[level]
-
-
-def _set_up(library: Any) -> int:
-    """Hand over what the library needs of numpy, and see that arrays are laid out as it thinks."""
-    import numpy as np
-    from numpy._core import _multiarray_umath as multiarray  # type: ignore[attr-defined]
-
-    names = "bool int8 uint8 int16 uint16 int32 uint32 int64 uint64 - - float32 float64 - - complex128"
-    scalars = tuple(None if name == "-" else getattr(np, name) for name in names.split())
-    level: int = library.setup(np.ndarray, scalars, multiarray._ARRAY_API, _bound, _raise)
-    for array in (np.arange(6.0)[::2], np.zeros((3, 4), dtype=np.uint8), np.frombuffer(bytes(8), dtype=np.int64)):
-        flags = array.flags
-        bits = 1 * flags.c_contiguous + 2 * flags.f_contiguous + 0x100 * flags.aligned + 0x400 * flags.writeable
-        found = library.peek(array)
-        first = (
-            array.ctypes.data,
-            array.ndim,
-            array.shape[0],
-            array.strides[0],
-            array.dtype.num,
-            ord("=|"[array.itemsize == 1]),
-        )
-        if found[:-1] != first or found[-1] & 0x503 != bits:
-            raise ImportError("arrays of this numpy are laid out in another way")
-    if any(scalar is not None and scalar(7).dtype.num != number for number, scalar in enumerate(scalars)):
-        raise ImportError("this numpy numbers its types in another way")
-    return level
 
 
 def _bound(kernel: Any) -> bool:
     """Whether a kernel of the library was compiled from the sources that are here; asked at its first call."""
-    return bool(kernel.digest == kernel.entry()[1])
+    return _knows_arrays() and bool(kernel.digest == kernel.entry()[1])
+
+
+@cache
+def _knows_arrays() -> bool:
+    """Hand over what the library needs of numpy, and see that arrays are laid out as it thinks."""
+    global _library, reason
+    import numpy as np
+
+    names = "bool int8 uint8 int16 uint16 int32 uint32 int64 uint64 - - float32 float64 - - complex128"
+    scalars = tuple(None if name == "-" else getattr(np, name) for name in names.split())
+    arrays = (np.arange(6.0)[::2], np.zeros((3, 4), dtype=np.uint8), np.frombuffer(bytes(8), dtype=np.int64))
+    try:
+        from numpy._core import _multiarray_umath as functions  # type: ignore[attr-defined]
+
+        _library.set_numpy(np.ndarray, scalars, functions._ARRAY_API)
+        alike = all(_library.peek(array) == _seen(array) for array in arrays)
+        alike &= all(scalar is None or scalar(7).dtype.num == number for number, scalar in enumerate(scalars))
+    except Exception:  # whatever another numpy does
+        alike = False
+    if not alike:
+        _library, reason = None, "arrays of this numpy are laid out in another way"
+    return alike
+
+
+def _seen(array: Any) -> tuple[int, ...]:
+    """Return what the library must read of an array."""
+    flags = array.flags
+    bits = 1 * flags.c_contiguous + 2 * flags.f_contiguous + 0x100 * flags.aligned + 0x400 * flags.writeable
+    order = ord("|" if array.itemsize == 1 else "=")
+    return array.ctypes.data, array.ndim, array.shape[0], array.strides[0], array.dtype.num, order, bits
 
 
 def _raise(data: bytes) -> None:
-    """Raise what a compiled kernel tells: an exception, its arguments and a place in the source."""
+    """Raise what a compiled kernel tells: an exception, its arguments (without numbers) and a place in the source."""
     kind, arguments, _ = pickle.loads(data)
-    raise kind(*arguments)
+    raise kind(*(part for part in arguments if isinstance(part, str | int | float)))
 
 
 class _Plain:
@@ -112,5 +120,5 @@ Native: Any = _Plain if _library is None else _library.Native
 
 
 def contents() -> tuple[tuple[str, str, tuple[tuple[str, int], ...]], ...]:
-    """Return ``(name, digest, ((types, calls), ...))`` of every kernel in the library."""
+    """Return ``(name, digest, ((types, calls), ...))`` of every kernel in the library; no types: others call it."""
     return () if _library is None else _library.contents()

@@ -98,6 +98,8 @@ void *NRT_MemInfo_alloc_aligned(size_t size, unsigned align) {
     return owner;
 }
 
+void *NRT_MemInfo_alloc(size_t size) { return NRT_MemInfo_alloc_aligned(size, 16); }
+
 void *NRT_MemInfo_alloc_safe_aligned(size_t size, unsigned align) { return NRT_MemInfo_alloc_aligned(size, align); }
 
 void NRT_MemInfo_call_dtor(Owner *owner) {
@@ -118,6 +120,8 @@ double numba_frexp(double x, int *exponent) {
     return frexp(x, exponent);
 }
 double numba_ldexp(double x, int exponent) { return ldexp(x, exponent); }
+double nextafter(double, double);
+double numba_nextafter(double x, double y) { return nextafter(x, y); }
 
 /* -- table of the kernels --------------------------------------------------------------------------------------------- */
 
@@ -463,10 +467,17 @@ static PyObject *entry(PyObject *self, PyObject *unused) {
 
 /* -- the module ------------------------------------------------------------------------------------------------------- */
 
-/* numpy's array type, the scalar types by number, the table of its functions, what binds, what raises */
-static PyObject *setup(PyObject *module, PyObject *args) {
+/* What is asked at the first call of a kernel, and what raises; returns the version of the code. */
+static PyObject *set_hooks(PyObject *module, PyObject *args) {
+    if (!PyArg_ParseTuple(args, "OO", &bind_hook, &raise_hook)) return NULL;
+    Py_IncRef(args); /* kept for good */
+    return Py_BuildValue("i", level);
+}
+
+/* numpy's array type, the scalar types by number and the table of its functions */
+static PyObject *set_numpy(PyObject *module, PyObject *args) {
     PyObject *types, *table;
-    if (!PyArg_ParseTuple(args, "OOOOO", &array_type, &types, &table, &bind_hook, &raise_hook)) return NULL;
+    if (!PyArg_ParseTuple(args, "OOO", &array_type, &types, &table)) return NULL;
     void **functions = PyCapsule_GetPointer(table, NULL);
     if (!functions) return NULL;
     Py_IncRef(args); /* kept for good */
@@ -478,14 +489,16 @@ static PyObject *setup(PyObject *module, PyObject *args) {
     dtype_of = (DtypeOf)functions[45];
     new_array = (NewArray)functions[94];
     set_base = (SetBase)functions[282];
-    return Py_BuildValue("i", level);
+    Py_IncRef(&_Py_NoneStruct);
+    return &_Py_NoneStruct;
 }
 
 /* What is read of an array: (data, ndim, shape and stride of the first axis, number of its type, order, flags). */
 static PyObject *peek(PyObject *module, PyObject *object) {
     Array *a = (Array *)object;
     return Py_BuildValue("(LiLLiii)", (long long)(intptr_t)a->data, a->ndim, (long long)a->shape[0],
-                         (long long)a->strides[0], a->dtype->number, a->dtype->order, a->flags);
+                         (long long)a->strides[0], a->dtype->number, a->dtype->order,
+                         a->flags & (C_ORDER | F_ORDER | ALIGNED | WRITEABLE));
 }
 
 static PyObject *contents(PyObject *module, PyObject *unused) {
@@ -502,7 +515,7 @@ static PyObject *set_level(PyObject *module, PyObject *args) {
 }
 
 static const Method methods[] = {
-    {"setup", setup, VARARGS, NULL}, {"peek", peek, ONE, NULL}, {"contents", contents, NOARGS, NULL},
+    {"set_hooks", set_hooks, VARARGS, NULL}, {"set_numpy", set_numpy, VARARGS, NULL}, {"peek", peek, ONE, NULL}, {"contents", contents, NOARGS, NULL},
     {"set_level", set_level, VARARGS, NULL}, {NULL, NULL, 0, NULL}};
 static const Method kernel_methods[] = {
     {"set_fallback", set_fallback, ONE, NULL}, {"entry", entry, NOARGS, NULL}, {NULL, NULL, 0, NULL}};

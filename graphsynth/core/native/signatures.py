@@ -120,7 +120,10 @@ def _argument(token: str, tokens: list[str]) -> Any:
     if tokens and tokens[0] == "(":
         tokens.pop(0)
         module, name = token.rsplit(".", 1)
-        return types.NamedTuple([kind for _, kind in _arguments(tokens)], getattr(import_module(module), name))
+        cls, fields = getattr(import_module(module), name), _arguments(tokens)
+        if cls._fields != tuple(field for field, _ in fields):
+            raise ValueError(f"{token} has other fields than in the list; record its calls again")
+        return types.NamedTuple([kind for _, kind in fields], cls)
     if token == "none":
         return types.none
     if token.startswith("="):

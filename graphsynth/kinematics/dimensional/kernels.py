@@ -126,10 +126,11 @@ def even_out(x, y, joints, sides, stiffness, triangles, sense, corners, turned, 
     nx, ny, held = np.empty_like(x), np.empty_like(y), np.empty(x.size, dtype=np.bool_)
     step = 0.15
     for _ in range(steps):
+        # forces
         for t in range(count):
             areas[t] = _doubled_area(x, y, triangles[t, 0], triangles[t, 1], triangles[t, 2]) * sense[t]
-        fx[:] = 0.0
-        fy[:] = 0.0
+        for v in range(x.size):
+            fx[v] = fy[v] = 0.0
         _springs(x, y, fx, fy, joints, sides, stiffness, apart)
         _room(x, y, fx, fy, triangles, sense, areas, barrier)
         _clearing(x, y, fx, fy, joints, sides, clear, clearing)
@@ -137,14 +138,21 @@ def even_out(x, y, joints, sides, stiffness, triangles, sense, corners, turned, 
         if crowded:
             _limit(x, y, fx, fy, step)
         else:
-            share = min(step, 0.2 / max(np.sqrt((fx * fx + fy * fy).max()), 1e-9))
-            fx *= share
-            fy *= share
+            largest = 0.0  # of the squared forces; a NaN stays
+            for v in range(x.size):
+                square = fx[v] * fx[v] + fy[v] * fy[v]
+                if square > largest or square != square:
+                    largest = square
+            share = min(step, 0.2 / max(np.sqrt(largest), 1e-9))
+            for v in range(x.size):
+                fx[v] *= share
+                fy[v] *= share
+        # moves, shortened until every triangle keeps its share
         done = False
         for _ in range(3 * int(retries) if crowded else int(retries)):
-            nx[:] = x + fx
-            ny[:] = y + fy
-            held[:] = False
+            for v in range(x.size):
+                nx[v], ny[v] = x[v] + fx[v], y[v] + fy[v]
+                held[v] = False
             for t in range(count):
                 a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
                 if not _doubled_area(nx, ny, a, b, c) * sense[t] >= kept * areas[t]:
@@ -157,8 +165,8 @@ def even_out(x, y, joints, sides, stiffness, triangles, sense, corners, turned, 
                     fx[v] *= 0.3
                     fy[v] *= 0.3
         if done:
-            x[:] = nx
-            y[:] = ny
+            for v in range(x.size):
+                x[v], y[v] = nx[v], ny[v]
             step = min(0.3, step * 1.2)
         else:
             step *= 0.5
