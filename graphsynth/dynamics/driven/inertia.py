@@ -112,9 +112,7 @@ class EffectiveInertia:
         return np.asarray(2.0 * (value * slope).sum(axis=0))
 
     def range(self) -> tuple[float, float, float]:
-        """Least, largest and mean value over a turn; the extremes polished from 2048 samples."""
-        from scipy.optimize import minimize_scalar
-
+        """Least, largest and mean value over a turn; the extremes from 2048 samples by bisection of the derivative."""
         q = np.linspace(0.0, math.tau, 2048, endpoint=False)
         values = self.value(q)
         mean = float((self.rows[:, 0] ** 2).sum() + 0.5 * (self.rows[:, 1:] ** 2).sum())
@@ -122,13 +120,12 @@ class EffectiveInertia:
         found = []
         for sign in (1.0, -1.0):
             at = float(q[np.argmin(sign * values)])
-            best = minimize_scalar(
-                lambda x, sign=sign: sign * float(self.value(x)), bounds=(at - step, at + step), method="bounded",
-                options={"xatol": 1e-12},
-            )  # fmt: skip
-            found.append(sign * float(best.fun))
-        low = 0.0 if self.dead_centres else found[0]
-        return low, found[1], mean
+            low, high = at - step, at + step
+            for _ in range(50):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if sign * self.derivative(middle) < 0.0 else (low, middle)
+            found.append(float(min(self.value(at), self.value(low), key=lambda value, sign=sign: sign * value)))
+        return 0.0 if self.dead_centres else found[0], found[1], mean
 
 
 def _series(values: Array) -> tuple[Array, float]:
