@@ -42,6 +42,10 @@ def chebyshev_lambda() -> Mechanism:
 
     Source: P. L. Chebyshev, Sur les parallelogrammes (1854) and later; Artobolevsky, volume 1; the proportions as in
     docs/explanation/lambda-linkage.md.
+
+    Returns
+    -------
+    Mechanism
     """
     return Mechanism.four_bar(2.0, 1.0, 2.5, 2.5, coupler_point=(5.0, 0.0))
 
@@ -50,6 +54,10 @@ def watt_straight_line() -> Mechanism:
     """Watt's straight-line linkage: two equal levers and a link whose middle "P" draws a slender figure of eight.
 
     Source: J. Watt, British patent 1432 (1784); Kempe (1877).  Levers 5, link 2, drawn in the middle of its stroke.
+
+    Returns
+    -------
+    Mechanism
     """
     places: Places = {"A": (-5.0, 1.0), "B": (0.0, 1.0), "C": (0.0, -1.0), "D": (5.0, -1.0), "P": (0.0, 0.0)}
     return Mechanism.from_points(places, ["AB", "BPC", "CD"], "AD", "AB")
@@ -59,6 +67,10 @@ def watt_six_bar() -> Mechanism:
     """Watt's six-bar, its two ternary links jointed: a crank-rocker whose rocker swings a second one further.
 
     Source: the chain of Watt's engine (1784), as the type Watt II in Norton, chapter 2.
+
+    Returns
+    -------
+    Mechanism
     """
     return Mechanism.six_bar("watt", 4.0, 1.0, 4.0, 3.0, joint=(2.0, 1.0), link=3.0, output=3.0, pivot=(7.0, 0.0))
 
@@ -67,6 +79,10 @@ def stephenson_six_bar() -> Mechanism:
     """Stephenson's six-bar, its two ternary links apart: the coupler of a crank-rocker drives a second rocker.
 
     Source: the chain of Stephenson's valve gear (1842), as the type Stephenson III in Norton, chapter 2.
+
+    Returns
+    -------
+    Mechanism
     """
     return Mechanism.six_bar(
         "stephenson", 4.0, 1.0, 3.5, 3.0, joint=(2.0, 1.0), link=4.0, output=3.0, pivot=(6.0, -1.0)
@@ -83,6 +99,10 @@ def peaucellier(long: float = 5.0, short: float = 3.0, crank: float = 1.5) -> Me
     ----------
     long, short, crank : float
         Sides of the cell, and the crank about the second pivot at (crank, 0).
+
+    Returns
+    -------
+    Mechanism
 
     Raises
     ------
@@ -110,6 +130,10 @@ def scott_russell(length: float = 2.0) -> Mechanism:
     ----------
     length : float
         Of the rod; the crank is half as long and jointed to its middle.
+
+    Returns
+    -------
+    Mechanism
     """
     half = 0.5 * length
     B = rect(half, math.radians(40.0))
@@ -132,6 +156,10 @@ def pantograph(scale: float = 2.0) -> Mechanism:
     ----------
     scale : float
         Above 1.
+
+    Returns
+    -------
+    Mechanism
 
     Raises
     ------
@@ -165,6 +193,10 @@ def whitworth_quick_return(ratio: float = 2.0) -> Mechanism:
     ratio : float
         Time of the slow half turn over that of the fast one, above 1: ``cos(pi / (1 + ratio)) = e``.
 
+    Returns
+    -------
+    Mechanism
+
     Raises
     ------
     GeometryError
@@ -188,6 +220,10 @@ def toggle_press(link: float = 1.0) -> Mechanism:
     ----------
     link : float
         Length of both links of the toggle.
+
+    Returns
+    -------
+    Mechanism
     """
     K = rect(link, math.radians(-80.0))
     Q = complex(1.6 * link, -0.6 * link)
@@ -200,6 +236,10 @@ def klann() -> Mechanism:
     """Klann's walking leg: a six-bar of Stephenson's chain whose foot "P" steps once for a turn of the crank.
 
     Source: J. C. Klann, US patent 6260862 (2001), table of coordinates.
+
+    Returns
+    -------
+    Mechanism
     """
     places: Places = {
         "A": (1.366, 1.366), "B": (1.009, 0.574), "O": (1.599, 0.75), "M": (1.331, 0.75), "E": (0.741, 0.75),
@@ -213,6 +253,10 @@ def jansen() -> Mechanism:
 
     Source: T. Jansen, The Great Pretender (2007); a = 38, b = 41.5, c = 39.3, d = 40.1, e = 55.8, f = 39.4, g = 36.7,
     h = 65.7, i = 49, j = 50, k = 61.9, l = 7.8, m = 15.
+
+    Returns
+    -------
+    Mechanism
     """
     a, b, c, d, e, f, g, h, i, j, k, low, m = (
         38.0, 41.5, 39.3, 40.1, 55.8, 39.4, 36.7, 65.7, 49.0, 50.0, 61.9, 7.8, 15.0,
@@ -233,6 +277,10 @@ def excavator_arm() -> Mechanism:
 
     Source: the usual arrangement of a backhoe; round lengths of a machine of about 20 tonnes, of no particular maker.
     The bucket with its tip "P" is turned through a four-bar.
+
+    Returns
+    -------
+    Mechanism
     """
     places: Places = {
         "A": (0.0, 1.8), "B": (0.6, 1.4), "C": (2.6, 4.6), "D": (5.4, 5.0), "E": (3.0, 5.3), "F": (5.09, 5.515),

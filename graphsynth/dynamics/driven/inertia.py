@@ -124,7 +124,7 @@ class EffectiveInertia:
             for _ in range(50):
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if sign * self.derivative(middle) < 0.0 else (low, middle)
-            found.append(float(min(self.value(at), self.value(low), key=lambda value, sign=sign: sign * value)))
+            found.append(sign * float(min(sign * self.value(at), sign * self.value(low))))
         return 0.0 if self.dead_centres else found[0], found[1], mean
 
 
