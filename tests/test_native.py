@@ -367,6 +367,7 @@ def check_bits(calls: dict[Signature, list[Any]], each: int) -> int:
     return total
 
 
+@pytest.mark.slow  # numba compiles every kernel of the library: minutes
 @needs_library
 def test_the_library_gives_the_bits_of_numba(real_calls: dict[Signature, list[Any]]) -> None:
     listed = set(read_list())
