@@ -1,7 +1,7 @@
 """graphsynth: from an integer equation to a proved verdict.
 
-``import graphsynth`` loads nothing but this file: every public name is resolved on first use (PEP 562), so that a
-script pays only for what it asks.
+``import graphsynth`` loads this file and the table of methods (`graphsynth.core.shown`): every public name is resolved
+on first use (PEP 562), so that a script pays only for what it asks.
 """
 
 import lazy_loader as _lazy

@@ -6,11 +6,8 @@ function.  The table of these functions is filled by ``graphsynth/__init__.py``,
 
 from __future__ import annotations
 
-from html import escape
 from importlib import import_module
 from typing import Any
-
-__all__ = ["WORK", "Printed", "Shown", "table", "work"]
 
 #: Function of every such method, as "module:name"; loaded on first use.
 WORK: dict[str, str] = {}
@@ -46,6 +43,8 @@ class Shown:
         return "\n".join(line if len(line) <= _LETTERS else f"{line[: _LETTERS - 3]}..." for line in lines)
 
     def _repr_html_(self) -> str:
+        from html import escape  # not before a notebook asks: every import of graphsynth loads this module
+
         title, rows = self._told()
         return f"<figure>{self._picture()}<figcaption>{escape(title)}{table(rows)}</figcaption></figure>"
 
@@ -54,10 +53,14 @@ class Printed:
     """Shows itself in a notebook as it prints itself."""
 
     def _repr_html_(self) -> str:
+        from html import escape
+
         return f"<figure><pre>{escape(repr(self))}</pre></figure>"
 
 
 def table(rows: list[tuple[str, str]]) -> str:
     """Write rows of a name and a value as a small HTML table."""
+    from html import escape
+
     cells = (f"<tr><th scope='row'>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
     return f"<table>{''.join(cells)}</table>" if rows else ""

@@ -8,8 +8,6 @@ from typing import Any
 
 from graphsynth.core.errors import SpecError
 
-__all__ = ["index_of", "nearest", "plain", "shown", "whole"]
-
 
 def plain(text: str) -> str:
     r"""Return a text without characters that are not seen or that steer a terminal; they stand as escapes.
