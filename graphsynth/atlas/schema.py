@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -29,6 +30,8 @@ __all__ = [
 
 #: Longest text or row that is read, in bytes; the longest that a catalogue may hold is a fifth of it.
 _LONGEST = 5_000_000
+#: How long another writer is waited for, in seconds.
+_PATIENCE = 10.0
 #: What values that nobody wrote may cause in a reader, beside the errors of SQLite.
 GARBAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError, MemoryError)
 
@@ -47,7 +50,6 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
     if create and not path.absolute().parent.is_dir():
         raise FormatError("the folder of the catalogue does not exist: make it, or name another file", str(path))
     mode = "ro" if readonly else "rwc" if create else "rw"
-    connection = None
     left = unfinished(path)
     if readonly and _is_still(path):
         mode = "ro&immutable=1"
@@ -60,26 +62,40 @@ def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqli
     try:
         if readonly and any(name.endswith("-journal") for name in left):
             take_back(path)
-        connection = sqlite3.connect(
-            f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
-        )
+        return _patiently(lambda: _opened(path, mode, create, readonly))
+    except (sqlite3.Error, MemoryError, UnicodeError) as error:
+        full = getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+        remedy = ": make room, or name another file" if create or full else ""
+        raise FormatError(f"cannot be opened as a catalogue ({plain(str(error))[:300]}){remedy}", str(path)) from None
+
+
+def _opened(path: Path, mode: str, create: bool, readonly: bool) -> sqlite3.Connection:
+    connection = sqlite3.connect(
+        f"{path.absolute().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
+    )
+    try:
         _distrust(connection)
         _check(connection, path, create)
         if not readonly:
             _check_seal(connection, path)
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
-    except (sqlite3.Error, MemoryError, UnicodeError) as error:
-        if connection:
-            connection.close()
-        full = getattr(error, "sqlite_errorcode", 0) & 0xFF in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
-        remedy = ": make room, or name another file" if create or full else ""
-        raise FormatError(f"cannot be opened as a catalogue ({plain(str(error))[:300]}){remedy}", str(path)) from None
-    except FormatError:
-        if connection:
-            connection.close()
+    except BaseException:
+        connection.close()
         raise
     return connection
+
+
+def _patiently(work: Callable[[], sqlite3.Connection]) -> sqlite3.Connection:
+    """Try again for some seconds: a change of the journal's mode by another writer is refused at once, not waited for."""
+    last = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            return work()
+        except sqlite3.OperationalError as error:
+            if getattr(error, "sqlite_errorcode", 0) & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() > last:
+                raise
+        time.sleep(0.02)
 
 
 def _is_still(path: Path) -> bool:

@@ -254,6 +254,31 @@ def test_columns_of_one_name_and_bytes_can_be_shown(path, capsys):
     assert main(["catalog", "query", str(path), "--sql", "SELECT 1 AS a, x'ff' AS a"]) == 0
 
 
+def test_a_lock_that_is_not_waited_for_is_tried_again(path, monkeypatch):
+    # two writers that change the journal's mode in the same moment: SQLite refuses one of them at once
+    from graphsynth.atlas import schema
+
+    refused = sqlite3.OperationalError("database is locked")
+    refused.sqlite_errorcode = sqlite3.SQLITE_BUSY
+    tries, check = [], schema._check_seal
+
+    def busy_twice(*args):
+        tries.append(args)
+        if len(tries) < 3:
+            raise refused
+        return check(*args)
+
+    monkeypatch.setattr(schema, "_check_seal", busy_twice)
+    evaluation = Evaluation("1.4.4.1", 0, 2, "mass", "found", 2.0, "kg", "estimated")
+    with Catalogue(path) as catalogue:
+        catalogue.record([evaluation])
+        assert len(tries) == 3
+        monkeypatch.setattr(schema, "_PATIENCE", 0.0)
+        tries.clear()
+        with pytest.raises(FormatError, match="database is locked"):
+            catalogue.record([evaluation])
+
+
 def test_several_threads_share_one_catalogue(path):
     from concurrent.futures import ThreadPoolExecutor
 
