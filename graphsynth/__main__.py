@@ -7,7 +7,5 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C before the command line i
 
 from graphsynth.cli import main  # noqa: E402
 
-__all__ = ["main"]
-
 if __name__ == "__main__":
     sys.exit(main())

@@ -23,17 +23,12 @@ from graphsynth.jamming import Bearing, Fit, ToleranceBox
 from graphsynth.jamming.bearing import areas as circle_areas
 from graphsynth.jamming.bearing.parameters import Range
 from graphsynth.jamming.bearing.sweep import PieceInterference
-from graphsynth.jamming.intersection import (
-    Reading,
-    circle_ellipse,
-    krawczyk_boxes,
-    reading_ellipse,
-    surrogate_problem,
-)
+from graphsynth.jamming.intersection import Reading, circle_ellipse, krawczyk_boxes, reading_ellipse, surrogate_problem
 from graphsynth.jamming.joints import bearing_limits
 from graphsynth.mechanism import constraints, files, joints, laws
 from graphsynth.mechanism.four_bar import TiltedFourBar
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import mobility_report
 from graphsynth.structure.graph import MechanismGraph
 

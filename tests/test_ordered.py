@@ -12,8 +12,7 @@ from multiprocessing import get_context, parent_process
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from graphsynth.core.errors import GraphsynthError, SpecError
 from graphsynth.core.ordered import AHEAD, RETRIES, Crew, in_order, processes

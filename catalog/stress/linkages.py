@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 def built(graph: MechanismGraph, joints: Iterable[Any], pose: Iterable[Any] | None = None) -> Mechanism:
     """Mechanism with link 1 driven."""
-    from graphsynth.mechanism.model import Driver, Mechanism
+    from graphsynth.mechanism.laws import Driver
+    from graphsynth.mechanism.model import Mechanism
 
     placed = None if pose is None else tuple((float(x), float(y), float(theta)) for x, y, theta in pose)
     return Mechanism(graph, tuple(joints), (Driver(0, 1),), pose=placed)
@@ -103,7 +104,8 @@ def flat_four_bar() -> Any:
 def sliding_block(elements: list[Any], gravity: tuple[float, float], **options: Any) -> Any:
     from graphsynth.dynamics.model import Body, DynamicModel
     from graphsynth.mechanism.joints import Prismatic
-    from graphsynth.mechanism.model import Driver, Mechanism
+    from graphsynth.mechanism.laws import Driver
+    from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
     centre = options.pop("centre", (0.0, 0.0))

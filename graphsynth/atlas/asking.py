@@ -12,8 +12,6 @@ from typing import Any
 
 from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
 
-__all__ = ["SECONDS", "Answer", "ask", "columns"]
-
 #: Longest time of a question, unless another is given.
 SECONDS = 60.0
 _STEPS = 100_000

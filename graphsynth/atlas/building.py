@@ -15,8 +15,6 @@ from graphsynth.core.errors import GraphsynthError
 if TYPE_CHECKING:
     from graphsynth.atlas.facts import GroupRow, Rows
 
-__all__ = ["BuildStep", "Writer", "build_family", "finish_family", "open_family", "transaction"]
-
 
 @dataclass(frozen=True, slots=True)
 class BuildStep:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["BuildStep", "Catalogue"]
-
 
 class Catalogue(OpenCatalogue):
     """A catalogue file, open for questions.

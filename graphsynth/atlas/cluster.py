@@ -10,8 +10,6 @@ from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.extras import need
 from graphsynth.core.ordered import RETRIES, Again
 
-__all__ = ["dask_executor"]
-
 
 @contextmanager
 def dask_executor(address: str, timeout: float = 20.0) -> Iterator[Executor]:

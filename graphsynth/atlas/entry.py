@@ -8,8 +8,6 @@ from typing import Any
 from graphsynth.atlas.evaluations import KINDS, NOT_COMPUTED
 from graphsynth.atlas.stored import data_of
 
-__all__ = ["entry"]
-
 
 def entry(connection: sqlite3.Connection, chain: dict[str, Any]) -> dict[str, Any]:
     """Return everything known of a chain, ready for JSON; see :meth:`graphsynth.atlas.catalogue.Catalogue.entry`."""

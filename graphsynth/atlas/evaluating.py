@@ -25,19 +25,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = [
-    "VERDICTS",
-    "EvaluationStep",
-    "Settings",
-    "Task",
-    "evaluate",
-    "evaluate_task",
-    "jamming_proof",
-    "motion_of",
-    "tasks",
-    "turn_is_proved",
-]
-
 #: Samples of a turn behind the proof that it does not jam, and bounds of the proofs; no limit of time decides a result.
 _SAMPLES, _PIECES, _BOXES, _SECONDS = 181, 2000, 20_000, 3600.0
 _MOST_TRIES = 1000

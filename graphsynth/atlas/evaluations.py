@@ -21,8 +21,6 @@ from graphsynth.atlas.schema import connect, settle
 from graphsynth.atlas.stored import TIED, data_of, fingerprint, fingerprint_at, mechanism_in
 from graphsynth.core.errors import SpecError
 
-__all__ = ["GUARANTEES", "KINDS", "NOT_COMPUTED", "Evaluation", "record", "store"]
-
 #: Kinds that every entry lists, computed or not; others may be stored too.
 KINDS = ("dimensions", "transmission", "jamming")
 GUARANTEES = ("exact", "certified", "estimated")

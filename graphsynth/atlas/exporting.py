@@ -14,8 +14,6 @@ from typing import Any
 from graphsynth.core.errors import GraphsynthError, SpecError
 from graphsynth.core.extras import need
 
-__all__ = ["FORMS", "TABLES", "digest", "export"]
-
 _CHAIN = "c.mobility, c.links, c.key"
 
 #: Rows of each table in an order that depends on the content alone.  A number of a group is its rank by size and key.

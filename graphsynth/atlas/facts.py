@@ -17,8 +17,6 @@ from graphsynth.structure.canonical import KEY_VERSION
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["Block", "GroupRow", "Rows", "analyse_block", "edges_text", "group_graph", "rows_of"]
-
 Bytes = NDArray[np.uint8]
 
 #: A group as (moving links, upper triangle of base and links as a number).

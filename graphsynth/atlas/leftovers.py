@@ -13,8 +13,6 @@ from pathlib import Path
 
 from graphsynth.core.errors import FormatError
 
-__all__ = ["take_back", "unfinished"]
-
 _NAMES = bytes.fromhex("d9d505f920a163d7")  # the end of a journal that names another file
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from graphsynth.atlas.facts import Rows
     from graphsynth.synthesis.problem import Problem
 
-__all__ = ["expected_of", "make", "processes"]
-
 Watch = Callable[[BuildStep], None]
 
 #: What the kernels are laid out for, see :mod:`graphsynth.atlas.kernels.facts`.

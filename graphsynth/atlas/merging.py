@@ -19,9 +19,6 @@ from graphsynth.atlas.sealing import broken_seal
 from graphsynth.atlas.statement import PUBLISHED
 from graphsynth.core.errors import FormatError, GraphsynthError, SpecError
 
-__all__ = ["merge"]
-
-
 #: Shards open at a time: a process may open some hundred files, a build may have thousands of shards.
 _OPEN = 64
 

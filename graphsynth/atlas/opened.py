@@ -16,8 +16,6 @@ from graphsynth.core.errors import SpecError
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["TABLES", "OpenCatalogue"]
-
 TABLES = (
     "chains", "inversions", "mechanisms", "groups", "structures", "contracted", "dyads", "relatives", "evaluations",
     "families",

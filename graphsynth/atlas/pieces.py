@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from graphsynth.synthesis.problem import Piece, Problem
     from graphsynth.synthesis.units import Unit
 
-__all__ = ["Task", "fingerprint", "problem_of", "rows_of_task", "share_of", "tasks_of"]
-
 #: Bound on the labellings of a piece; about a quarter of them are chains.  A piece takes a second at most.
 PIECE = 8000.0
 #: A family of very many chains is cut into so many pieces, of more work each.

@@ -19,8 +19,6 @@ from graphsynth.atlas.turning import Turning
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["recheck"]
-
 #: ``same(field, where, stored, recomputed)``
 Same = Callable[[str, str, Any, Any], None]
 

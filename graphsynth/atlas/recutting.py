@@ -6,8 +6,6 @@ import sqlite3
 from collections.abc import Callable
 from typing import Any
 
-__all__ = ["check_families"]
-
 #: ``same(field, where, stored, recomputed)``
 Same = Callable[[str, str, Any, Any], None]
 

@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Reference", "group_key", "search_key", "wanted_class"]
-
 Masks = NDArray[np.int64]
 
 

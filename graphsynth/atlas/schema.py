@@ -16,18 +16,6 @@ from graphsynth.atlas.tables import APPLICATION_ID, EDGES, INDEXES, SCHEMA, SCHE
 from graphsynth.core.errors import FormatError, GraphsynthError
 from graphsynth.core.wording import plain
 
-__all__ = [
-    "APPLICATION_ID",
-    "GARBAGE",
-    "INDEXES",
-    "SCHEMA",
-    "SCHEMA_VERSION",
-    "connect",
-    "readable",
-    "screen",
-    "settle",
-]
-
 #: Longest text or row that is read, in bytes; the longest that a catalogue may hold is a fifth of it.
 _LONGEST = 5_000_000
 #: How long another writer is waited for, in seconds.
@@ -87,7 +75,7 @@ def _opened(path: Path, mode: str, create: bool, readonly: bool) -> sqlite3.Conn
 
 
 def _patiently(work: Callable[[], sqlite3.Connection]) -> sqlite3.Connection:
-    """Try again for some seconds: a change of the journal's mode by another writer is refused at once, not waited for."""
+    """Try again for some seconds: SQLite refuses some locks at once, without waiting for their owner."""
     last = time.monotonic() + _PATIENCE
     while True:
         try:

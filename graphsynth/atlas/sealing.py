@@ -12,8 +12,6 @@ from hashlib import blake2b
 from io import FileIO
 from pathlib import Path
 
-__all__ = ["broken_seal", "seal", "unseal"]
-
 _BLOCK = 1 << 20
 #: Bytes of the header: journal mode, change counter, its copy, and the version of SQLite that wrote.
 _PASSING = ((18, 20), (24, 28), (92, 100))

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["PUBLISHED", "completeness"]
-
 _OEIS = "OEIS A233288"
 _PAIR = "literature, confirmed by two independent programs (catalog/counts/published.toml)"
 _TESTS = "independent generator and subset test (tests/synthesis)"

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
-__all__ = ["TIED", "StoredMechanism", "data_of", "fingerprint", "fingerprint_at", "mechanism_in", "stored_mechanisms"]
-
 #: Kinds of evaluations that hold for one set of dimensions only.
 TIED = ("transmission", "jamming")
 _DEEPEST = 100

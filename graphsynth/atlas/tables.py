@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-__all__ = ["APPLICATION_ID", "EDGES", "INDEXES", "SCHEMA", "SCHEMA_VERSION", "wrong_rows"]
-
 #: In the header of every catalogue file ("GSyn"), so that another SQLite file is not taken for one.
 APPLICATION_ID = 0x4753796E
 SCHEMA_VERSION = 4

@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Turning"]
-
 Array = NDArray[np.float64]
 
 #: Steps of a turn: half a degree, the grid of :mod:`graphsynth.kinematics.dimensional.verify`.

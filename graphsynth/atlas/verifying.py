@@ -20,8 +20,6 @@ from graphsynth.atlas.stored import data_of, mechanism_in
 from graphsynth.atlas.tables import wrong_rows
 from graphsynth.structure.assur import is_assur_group
 
-__all__ = ["Verification", "verify"]
-
 _SHOWN = 1000
 #: Of contracted graphs of eight loops, those of 18 links.
 _VERTICES, _PATHS = 14, 21

@@ -11,8 +11,6 @@ from pathlib import Path
 from graphsynth.cli import console
 from graphsynth.core.errors import SceneError
 
-__all__ = ["run"]
-
 
 def run(options: argparse.Namespace) -> int:
     """Measure error against run time of every method of a scene; print what to choose."""

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["run"]
-
 _SUFFIXES = (".html", ".gif", ".svg")
 _FRAMES = {".html": 120, ".gif": 60, ".svg": 90}
 

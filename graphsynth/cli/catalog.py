@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from graphsynth.atlas.building import BuildStep
     from graphsynth.atlas.catalogue import Catalogue
 
-__all__ = ["run"]
-
 DIFFERENT = 1
 
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
     from graphsynth.atlas.evaluating import EvaluationStep
 
-__all__ = ["add_evaluate", "run"]
-
 _DEFAULT_LIMIT = 0.3
 
 

@@ -9,8 +9,6 @@ from pathlib import Path
 from graphsynth.cli.catalog_evaluate import add_evaluate
 from graphsynth.cli.catalog_site import add_site
 
-__all__ = ["add_catalog"]
-
 Parsers = argparse._SubParsersAction  # argparse has no public name for it
 _MOST_NUMBERS = 300
 

@@ -15,8 +15,6 @@ from graphsynth.cli.workers import workers_for
 if TYPE_CHECKING:
     from graphsynth.atlas.site.building import Watch
 
-__all__ = ["add_site", "run"]
-
 #: Chains from which all cores are used.
 _MANY = 1000
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from graphsynth.synthesis.writing import Step
 
-__all__ = ["note", "progress", "put", "put_json", "screen", "settle", "table"]
-
 
 def put(text: str) -> None:
     """Print a result."""

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from graphsynth.formats.registry import Item
 
-__all__ = ["run"]
-
 PIPE = "-"
 
 

@@ -9,8 +9,6 @@ from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
 from graphsynth.cli.workers import workers_for
 
-__all__ = ["run"]
-
 
 def run(options: argparse.Namespace) -> int:
     """Print the count; the number stands alone on the last line."""

@@ -6,8 +6,6 @@ import argparse
 
 from graphsynth.cli import console
 
-__all__ = ["run"]
-
 
 def run(options: argparse.Namespace) -> int:
     """Print where the machine code of the kernels comes from, and why."""

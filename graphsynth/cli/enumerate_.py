@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from graphsynth.synthesis.problem import Problem
 
-__all__ = ["run"]
-
 BIG = 5e7  # labellings (before sparsity) from which all cores are used
 
 

@@ -25,8 +25,6 @@ from graphsynth.core.compilation import announce
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.wording import plain
 
-__all__ = ["main"]
-
 USAGE_ERROR = 2
 
 

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from graphsynth.structure.system.spec import StructuralSpec
     from graphsynth.synthesis.problem import Problem
 
-__all__ = ["add_question", "problem_of", "spec_of"]
-
 _VARIABLES = {
     "mobility": ("W", "mobility"),
     "space": ("Pi", "mobility of the space (default 3, the plane)"),

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from graphsynth.pipeline.runner import Report
     from graphsynth.pipeline.stages import Progress
 
-__all__ = ["run"]
-
 
 def run(options: argparse.Namespace) -> int:
     """Run a scene and print its summary."""
@@ -48,8 +46,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _run(scene: Any, folder: Path, options: argparse.Namespace) -> Report:
     from graphsynth.core.ordered import processes
-    from graphsynth.pipeline.runner import has_stream
-    from graphsynth.pipeline.runner import run as run_scene
+    from graphsynth.pipeline.runner import has_stream, run as run_scene
 
     with _progress() as progress, processes(workers_for(options.workers, has_stream(scene))) as executor:
         return run_scene(scene, folder, executor, progress, options.fresh)

@@ -6,8 +6,6 @@ import argparse
 
 from graphsynth.cli import console
 
-__all__ = ["run"]
-
 
 def run(options: argparse.Namespace) -> int:
     """Print the JSON Schema of scene files."""

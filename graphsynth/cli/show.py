@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 #: Suffixes of pictures; see graphsynth.drawing.sketching.pictures.
 PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 
-__all__ = ["check_place", "read_graph", "run"]
-
 
 def run(options: argparse.Namespace) -> int:
     """Describe one graph, and draw it if asked."""

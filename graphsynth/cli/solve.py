@@ -7,14 +7,12 @@ import argparse
 from graphsynth.cli import console
 from graphsynth.cli.question import spec_of
 
-__all__ = ["run"]
-
 MOST_DRAWN = 1000  # rows of a table with lines, which takes a millisecond a row
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the integer solutions."""
-    from graphsynth.structure.system.spec import solutions_table
+    from graphsynth.structure.system.assortment import solutions_table
 
     spec = spec_of(options)
     solutions = spec.solve()

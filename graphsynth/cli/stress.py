@@ -14,8 +14,6 @@ from graphsynth.cli import console
 if TYPE_CHECKING:
     from graphsynth.evidence.stress import Case, StressReport
 
-__all__ = ["add_stress", "run"]
-
 WRONG = 1
 INTERRUPTED = 130
 

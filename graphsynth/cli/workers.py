@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 
-__all__ = ["workers_for"]
-
 
 def workers_for(asked: int | None, big: bool) -> int:
     """Return the number of worker processes: as asked, else all cores for big work and one for small."""

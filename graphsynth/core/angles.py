@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
 
-__all__ = ["angle", "angles", "degrees"]
-
 #: Radians of a unit.
 _UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0, "turn": math.tau, "turns": math.tau}
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

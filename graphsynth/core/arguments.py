@@ -17,8 +17,6 @@ import numpy as np
 
 from graphsynth.core.errors import GraphsynthError
 
-__all__ = ["Budget", "Count", "Positive", "Real", "checker"]
-
 #: Packages whose classes are told apart.
 _TOLD_APART = ("graphsynth", "fractions")
 F = TypeVar("F", bound=Callable[..., Any])

@@ -13,32 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.arguments import checker
 from graphsynth.core.errors import GeometryError, GraphsynthError
 
-__all__ = [
-    "LARGEST",
-    "SMALLEST",
-    "Size",
-    "called",
-    "check_fields",
-    "check_largest",
-    "check_sizes",
-    "checked",
-    "choice",
-    "finite",
-    "finite_array",
-    "link_number",
-    "plane_point",
-    "point",
-    "positive",
-    "sign",
-    "three",
-    "three_points",
-    "together",
-    "triple",
-    "triples",
-    "unit_vector",
-    "whole",
-]
-
 #: Lets a function keep what its annotations say; a `GeometryError` names the argument that is something else.
 checked = checker(GeometryError, {"Condition": "str"})
 

@@ -24,8 +24,6 @@ from typing import Any, ClassVar
 from graphsynth.core.native.library import Native
 from graphsynth.core.native.sources import source_digest
 
-__all__ = ["Intrinsic", "Kernel", "announce", "kept", "kernel", "prepare_numba"]
-
 _VERSIONS = 8  # of one function for one machine that are kept beside each other
 _UNKEPT = (
     "kernels are compiled in memory, anew in every process, as no folder can be written to keep them: name one with "

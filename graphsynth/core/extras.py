@@ -7,8 +7,6 @@ from typing import Any
 
 from graphsynth.core.errors import MissingExtraError
 
-__all__ = ["need"]
-
 
 def need(module: str, extra: str, purpose: str) -> Any:
     """Import an optional package, or a module of it.

@@ -6,8 +6,6 @@ from typing import Any
 
 from graphsynth.core.compilation import Intrinsic
 
-__all__ = ["fma", "lowest_bit", "popcount"]
-
 
 @Intrinsic
 def popcount(typing_context: Any, x: Any) -> Any:

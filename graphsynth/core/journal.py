@@ -24,8 +24,6 @@ from typing import BinaryIO, Self
 import graphsynth
 from graphsynth.core.errors import FormatError, GraphsynthError
 
-__all__ = ["FULL", "Journal", "Work", "digest_of", "writing"]
-
 #: What the system says of a full disk or a used-up quota.
 FULL = (errno.ENOSPC, errno.EDQUOT)
 

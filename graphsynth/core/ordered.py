@@ -13,8 +13,6 @@ from typing import Any, TypeVar
 
 from graphsynth.core.errors import GraphsynthError, SpecError
 
-__all__ = ["AHEAD", "RETRIES", "Again", "Crew", "check_executor", "in_order", "processes"]
-
 P = TypeVar("P")
 T = TypeVar("T")
 AHEAD = 16  # pieces under way or waiting to be read: bounds memory whatever the number of pieces

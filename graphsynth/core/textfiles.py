@@ -10,8 +10,6 @@ from typing import Any
 
 from graphsynth.core.errors import FormatError
 
-__all__ = ["FILE_MAX", "json_value", "read_bytes", "text_of", "toml_tables"]
-
 #: Most bytes of a file that a person writes: a question, a scene.
 FILE_MAX = 1 << 20
 _BITS = 10_000  # of a whole number that Python can still show

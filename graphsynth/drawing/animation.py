@@ -34,8 +34,6 @@ from graphsynth.mechanism.joints import Revolute
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["animated_svg", "animation_html"]
-
 Array = NDArray[np.float64]
 _LINE = 17.0  # height of a line of the note, pixels
 

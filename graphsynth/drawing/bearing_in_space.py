@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from graphsynth.jamming.bearing.bearing import Bearing
 
-__all__ = ["check_panels", "panel_title", "space_picture"]
-
 Array = NDArray[np.float64]
 
 _AROUND, _ALONG = 217, 45

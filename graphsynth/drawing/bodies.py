@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Body", "Guide", "bodies", "bounds", "hull", "outline", "rounded", "thickness", "world"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

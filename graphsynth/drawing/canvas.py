@@ -13,8 +13,6 @@ from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.shapes import FIXED, Circle, Path, Shape, Style, Text, placement
 from graphsynth.drawing.sketch import Sketch
 
-__all__ = ["Canvas", "draw", "figure_of", "save"]
-
 Pose = Sequence[Sequence[float]]
 
 #: Pixels of a sketch per inch of a figure.
@@ -56,8 +54,7 @@ class Canvas:
         return float(min(box.width / self.sketch.width, box.height / self.sketch.height) * 72.0 / self.axes.figure.dpi)
 
     def _artist(self, shape: Shape, order: float) -> Any:
-        from matplotlib.patches import Circle as CirclePatch
-        from matplotlib.patches import PathPatch
+        from matplotlib.patches import Circle as CirclePatch, PathPatch
 
         if isinstance(shape, Text):
             return self._text(shape, order)

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from graphsynth.jamming.joints import CoupledReport, SensitivityTable
 
-__all__ = ["clearance_picture", "sensitivity_picture"]
-
 #: Shown at most: how many times the allowed scale at the worst input.
 _HIGH = 4.0
 

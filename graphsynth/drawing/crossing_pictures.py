@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from graphsynth.intervals.interval import Interval
     from graphsynth.jamming.intersection import CircleEllipse, IntersectionBoxes
 
-__all__ = ["crossing_picture", "dress", "region_picture"]
-
 Array = NDArray[np.float64]
 
 

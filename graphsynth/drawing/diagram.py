@@ -32,8 +32,6 @@ from graphsynth.mechanism.model import Mechanism
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["draw_mechanism", "mechanism_sketch", "mechanism_svg"]
-
 Array = NDArray[np.float64]
 
 _MARGIN = 40.0
@@ -175,7 +173,8 @@ def mechanism_svg(
 
     Examples
     --------
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph, Revolute
+    >>> from graphsynth.mechanism.laws import Driver
+    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph, Revolute
     >>> graph = MechanismGraph(2, [(0, 1)], frame=0)
     >>> crank = Mechanism(graph, [Revolute(0, 1)], [Driver(0, 1)], {"A": (1, (1, 0))}, pose=[(0, 0, 0), (0, 0, 0.5)])
     >>> mechanism_svg(crank).count('data-part="joint 0-1"')

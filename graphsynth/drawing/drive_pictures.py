@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.driven.reduction import ReductionStudy
     from graphsynth.dynamics.driven.run import DriveRun
 
-__all__ = ["COLOURS", "STYLES", "drive_curves", "panel", "reduction_picture"]
-
 #: Readable in grey and by colour-blind readers [Okabe & Ito 2008].
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 STYLES = ("-", (0, (5, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2)), (0, (2, 2)))

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["legend_place", "new_figure", "themed_svg"]
-
 #: Points up to which the emptiest corner is found at once.
 _FEW = 20_000
 

@@ -17,8 +17,6 @@ from graphsynth.mechanism.model import Mechanism, TracePoint
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["Frames", "check_frames", "frames_of", "with_trace_points"]
-
 Array = NDArray[np.float64]
 
 #: Most frames an animation may have.

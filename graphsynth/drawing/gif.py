@@ -18,8 +18,6 @@ from graphsynth.drawing.palette import LIGHT
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["save_gif"]
-
 
 def save_gif(
     motion: Motion,

@@ -10,12 +10,11 @@ from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.kinematics.dimensional.sketch import JointLayout, layout
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
-
-__all__ = ["graph_sketch", "graph_svg"]
 
 
 def graph_sketch(

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.bearing_in_space import check_panels, panel_title, space_picture
-from graphsynth.drawing.crossing_pictures import crossing_picture, dress, region_picture
+from graphsynth.drawing.bearing_in_space import check_panels, panel_title
+from graphsynth.drawing.crossing_pictures import dress
 from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT
 
@@ -25,11 +25,6 @@ if TYPE_CHECKING:
     from graphsynth.jamming.assess import JammingReport
     from graphsynth.jamming.bearing.area_curve import AreaCurve
     from graphsynth.jamming.bearing.bearing import Bearing
-
-__all__ = [
-    "area_chart", "area_picture", "crossing_picture", "region_picture", "report_picture",
-    "section_picture", "space_picture",
-]  # fmt: skip
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,6 @@ from graphsynth.drawing.bodies import Body, outline, thickness
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["place_letters"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

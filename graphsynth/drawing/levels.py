@@ -9,8 +9,6 @@ from graphsynth.drawing.sketch import Sketch
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["draw_levels", "level_order", "levels_sketch"]
-
 
 def level_order(graph: MechanismGraph, sweeps: int = 12) -> tuple[tuple[int, ...], ...]:
     """Order the links inside each adjacency level so that edges cross little.

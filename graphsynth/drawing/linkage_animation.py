@@ -12,8 +12,6 @@ from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.drawing.svg import element, painted, words
 
-__all__ = ["Bar", "linkage_animation"]
-
 Points = NDArray[np.float64]
 
 

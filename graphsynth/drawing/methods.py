@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["Drawing"]
-
 
 @dataclass(frozen=True, repr=False)
 class Drawing:

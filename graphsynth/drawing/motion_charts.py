@@ -21,8 +21,6 @@ from graphsynth.mechanism.joints import Prismatic
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["coupler_curves", "margin_chart", "motion_chart", "transmission_chart"]
-
 Array = NDArray[np.float64]
 
 _STYLES = ("-", "--", "-.", ":")

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from graphsynth.drawing.svg import number, picture
 
-__all__ = ["Moving"]
-
 Points = NDArray[np.float64]
 
 

@@ -7,8 +7,6 @@ from collections.abc import Iterable
 from hashlib import sha256
 from html import escape
 
-__all__ = ["policy", "whole_page"]
-
 
 def policy(scripts: Iterable[str] = ()) -> str:
     r"""Return the Content-Security-Policy of a page that runs these scripts and no others, and loads nothing.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["DARK", "LIGHT", "STYLE", "TRACE_COLOURS", "VARIABLES", "WHITE"]
-
 #: Values on a light page, and of pictures without pages (PNG, PDF, GIF).  SVG elements carry them as plain attributes.
 LIGHT = {
     "ink": "#1b2733", "soft": "#8794a1", "note": "#55626f", "paper": "#ffffff", "link": "#1b2733", "fill": "#dbe4ee",

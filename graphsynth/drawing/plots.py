@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike
 
 from graphsynth.drawing.palette import LIGHT
 
-__all__ = ["Band", "Chart", "Line", "Mark", "line_plot"]
-
 _RC = {
     "font.family": "sans-serif",
     "font.size": 10,

@@ -19,8 +19,6 @@ from graphsynth.mechanism.rank import characteristic_length
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["motion_over_reach"]
-
 Array = NDArray[np.float64]
 
 _STARTS = 24  # inputs tried where the first pose is not known

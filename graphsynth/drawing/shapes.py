@@ -11,8 +11,6 @@ import cmath
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-__all__ = ["FIXED", "LAYERS", "Circle", "Path", "Placement", "Shape", "Style", "Text", "placement"]
-
 Point = complex
 
 #: Link number of shapes that do not move.

@@ -18,8 +18,6 @@ from dataclasses import dataclass, field
 from graphsynth.drawing.shapes import FIXED, LAYERS, Circle, Path, Placement, Point, Shape, Style, Text, placement
 from graphsynth.drawing.svg import element, picture
 
-__all__ = ["Sketch", "degrees"]
-
 _CHAIN = (8.0, 3.0, 2.0, 3.0)  # dash-dotted: pitch circles
 
 

@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterable
 from graphsynth.drawing.palette import LIGHT, STYLE
 from graphsynth.drawing.shapes import Circle, Path, Point, Shape, Style, Text
 
-__all__ = ["FONT", "bare", "element", "escape", "number", "painted", "picture", "sound", "words"]
-
 ToPage = Callable[[Point], tuple[float, float]]
 
 #: Typefaces of the root element, the first that is there.

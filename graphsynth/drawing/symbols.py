@@ -16,9 +16,8 @@ from graphsynth.drawing.bodies import Body, Guide, outline, rounded, thickness, 
 from graphsynth.drawing.palette import TRACE_COLOURS
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.mechanism.joints import Cam, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
-
-__all__ = ["BLOCK", "Plan", "draw_arrow", "draw_joints", "draw_link", "draw_points", "draw_slider", "draw_traces"]
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 

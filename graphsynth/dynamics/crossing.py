@@ -23,8 +23,6 @@ from graphsynth.dynamics.values import Values
 if TYPE_CHECKING:
     from graphsynth.dynamics.forms.augmented import AugmentedForm
 
-__all__ = ["STAGES", "GaussStep", "HermiteGuess", "gauss_step", "passed_singular_pose"]
-
 Array = NDArray[np.float64]
 
 #: Stages of the step over a pose: an even number keeps the middle free.  The order is twice as high.

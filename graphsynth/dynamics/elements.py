@@ -16,10 +16,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.motors import DCMotor, IdealTorque, LinearCharacteristic, Motor, SynchronousMotor
 from graphsynth.dynamics.trains import Train
 
-__all__ = [
-    "Element", "Force", "JointFriction", "MotorDrive", "Pulse", "Spring", "Torque", "TorqueSource", "TorsionSpring",
-]  # fmt: skip
-
 #: (t, place, velocity of the point) -> (fx, fy), world coordinates.
 ForceLaw = Callable[[float, Point, Point], Sequence[float]]
 #: (t, relative angle, relative speed) -> torque.

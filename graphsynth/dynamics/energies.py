@@ -13,8 +13,6 @@ from graphsynth.dynamics.switching import motor_torques, shaft_speeds
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads
 
-__all__ = ["Balance", "balance_at", "checks_of", "warnings_of"]
-
 Array = NDArray[np.float64]
 #: Part of the largest accelerations of a motion below which those of a state are no measure of an error.
 _ROUNDED = 1e-9

@@ -13,14 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.extras import need
-from graphsynth.dynamics.energies import (
-    Balance,
-    balance_at,
-    checks_of,
-    electric_error,
-    motor_histories,
-    warnings_of,
-)
+from graphsynth.dynamics.energies import Balance, balance_at, checks_of, electric_error, motor_histories, warnings_of
 from graphsynth.dynamics.friction.history import FrictionAt, friction_at, friction_history
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.motors import current_scale
@@ -34,8 +27,6 @@ from graphsynth.dynamics.tables import Compiled, compile_model
 if TYPE_CHECKING:
     from graphsynth.dynamics.friction.problem import Senses
     from graphsynth.dynamics.friction.rows import FrictionRows
-
-__all__ = ["simulate_dynamics"]
 
 Array = NDArray[np.float64]
 FormName = Literal["auto", "one-coordinate", "partitioned", "augmented"]
@@ -104,7 +95,8 @@ def simulate_dynamics(
     --------
     >>> from graphsynth.dynamics.model import Body
     >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> from graphsynth.mechanism.laws import Driver
+    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 11), keep={(0, 1): 0.0})
@@ -177,10 +169,17 @@ class Form(Protocol):
     contraction: float
     changes: list[tuple[float, str]]
 
-    def begin(self) -> Array: ...
-    def rates(self, t: float, y: Array) -> Array: ...
-    def accept(self, t: float, y: Array) -> Array: ...
-    def state(self, t: float, y: Array) -> tuple[Array, Array]: ...
+    def begin(self) -> Array:
+        """State of the form at the start."""
+
+    def rates(self, t: float, y: Array) -> Array:
+        """Rate of that state."""
+
+    def accept(self, t: float, y: Array) -> Array:
+        """State that the next step starts from."""
+
+    def state(self, t: float, y: Array) -> tuple[Array, Array]:
+        """Coordinates and velocities of the mechanism."""
 
 
 @dataclass

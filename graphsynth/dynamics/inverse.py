@@ -21,12 +21,10 @@ from graphsynth.dynamics.result import MotorHistory
 from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.dynamics.values import applied_loads
-from graphsynth.mechanism.model import Driver
+from graphsynth.mechanism.laws import Driver
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
-
-__all__ = ["InverseDynamics", "inverse_dynamics"]
 
 Array = NDArray[np.float64]
 
@@ -105,7 +103,8 @@ def inverse_dynamics(
     >>> from graphsynth.dynamics.model import Body
     >>> from graphsynth.kinematics import simulate
     >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> from graphsynth.mechanism.laws import Driver
+    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
     >>> arm = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(arm, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> inverse_dynamics(model, simulate(arm, [0.0]), speed=0.0).efforts.round(6).tolist()

@@ -20,9 +20,8 @@ from graphsynth.dynamics.elements import (
     not_negative,
 )  # fmt: skip
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
-
-__all__ = ["Body", "DynamicModel", "Rack", "Rigid"]
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import check_fields
 from graphsynth.core.errors import SpecError
 
-__all__ = ["DCMotor", "IdealSpeed", "IdealTorque", "LinearCharacteristic", "Motor", "SynchronousMotor"]
-
 
 def number(name: str, value: float, *, least: float = -math.inf, above: bool = False, infinite: bool = False) -> float:
     """Return a finite float not below ``least`` (or above it), or raise `SpecError` naming value, bound and remedy."""

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import link_number
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.joints import Cam, Gear
-from graphsynth.mechanism.model import Driver
+from graphsynth.mechanism.laws import Driver
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.tables import Compiled
-
-__all__ = ["JointReaction", "Reactions", "reactions_from_multipliers"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

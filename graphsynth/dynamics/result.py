@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.reactions import Reactions
     from graphsynth.dynamics.tables import Compiled
 
-__all__ = ["Checks", "DynamicEvent", "DynamicMotion", "FrictionHistory", "MotorHistory"]
-
 Array = NDArray[np.float64]
 
 

@@ -16,9 +16,7 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import Values, applied_loads, initial_slots
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver
-
-__all__ = ["newton_euler", "newton_euler_difference", "second_accelerations"]
+from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import Values, initial_slots
 
-__all__ = ["BranchTangents", "PoseClass", "branch_tangents", "classify_pose", "lock", "stalled"]
-
 Array = NDArray[np.float64]
 PoseClass = Literal["regular", "redundant", "singular", "not tested"]
 

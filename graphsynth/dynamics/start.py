@@ -18,8 +18,6 @@ from graphsynth.dynamics.values import Values, applied_loads, initial_slots
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["StartReport", "check_start", "consistent_start", "pose_from_drivers"]
-
 Array = NDArray[np.float64]
 
 
@@ -163,7 +161,8 @@ def consistent_start(
     Examples
     --------
     >>> from graphsynth.dynamics.model import Body
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> from graphsynth.mechanism.laws import Driver
+    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
     >>> from graphsynth.mechanism.joints import Revolute
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})

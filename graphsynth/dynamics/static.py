@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.reactions import Reactions
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["StaticForces", "static_forces"]
-
 Array = NDArray[np.float64]
 
 

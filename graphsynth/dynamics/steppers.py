@@ -17,8 +17,6 @@ from graphsynth.core.extras import need
 if TYPE_CHECKING:
     from graphsynth.dynamics.stepping import Trail
 
-__all__ = ["ONE_STAGE", "CvodeStepper", "Stages", "compiled_stepper"]
-
 Array = NDArray[np.float64]
 
 #: ``(t, y, h, A, K) -> new state``: fills the rows of K after the first with the rates at ``y + h A[s] K``.

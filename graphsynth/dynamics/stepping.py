@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.friction.guard import Guard
     from graphsynth.dynamics.integrate import Form
 
-__all__ = ["METHODS", "StepOptions", "Stepper", "Trail", "integrate"]
-
 Array = NDArray[np.float64]
 Output = Callable[[int, float, Array], None]
 

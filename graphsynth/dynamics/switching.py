@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.integrate import Form
     from graphsynth.dynamics.stepping import Stepper
 
-__all__ = ["Finding", "Switches", "motor_torques", "shaft_speeds", "starting_modes"]
-
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 

@@ -16,23 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.elements import (
-    Force,
-    JointFriction,
-    MotorDrive,
-    Spring,
-    Torque,
-    TorqueSource,
-    TorsionSpring,
-)
+from graphsynth.dynamics.elements import Force, JointFriction, MotorDrive, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver
-
-__all__ = ["RACK", "Compiled", "RowInfo", "Tables", "compile_model", "coordinate_row"]
+from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

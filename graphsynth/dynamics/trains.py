@@ -10,8 +10,6 @@ from graphsynth.core.checks import check_fields
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.motors import number, whole
 
-__all__ = ["Train"]
-
 
 @dataclass(frozen=True)
 class Train:

@@ -16,8 +16,6 @@ from graphsynth.dynamics.elements import Force, TorqueSource
 from graphsynth.dynamics.tables import RACK, Compiled
 from graphsynth.kinematics.engine import codes
 
-__all__ = ["Values", "applied_loads", "initial_slots"]
-
 Array = NDArray[np.float64]
 
 

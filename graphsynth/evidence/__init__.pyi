@@ -1,18 +1,8 @@
-from .choice import Knee as Knee
-from .choice import advice as advice
-from .choice import front as front
-from .choice import knee as knee
-from .choice import knees as knees
-from .crossing import area_problem as area_problem
-from .crossing import crossing_problem as crossing_problem
+from .choice import Knee as Knee, advice as advice, front as front, knee as knee, knees as knees
+from .crossing import area_problem as area_problem, crossing_problem as crossing_problem
 from .dynamics import dynamics_work_precision as dynamics_work_precision
 from .jamming import arc_problem as arc_problem
 from .page import write_report as write_report
 from .pictures import work_precision_picture as work_precision_picture
-from .report import AccuracyReport as AccuracyReport
-from .report import measure as measure
-from .rows import Effort as Effort
-from .rows import Problem as Problem
-from .rows import Row as Row
-from .rows import RowStatus as RowStatus
-from .rows import table as table
+from .report import AccuracyReport as AccuracyReport, measure as measure
+from .rows import Effort as Effort, Problem as Problem, Row as Row, RowStatus as RowStatus, table as table

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 from graphsynth.evidence.rows import FLOOR, Problem, Row, RowStatus
 
-__all__ = ["Knee", "advice", "front", "knee", "knees", "seconds_text"]
-
 #: Factor in time that one more decade of accuracy may cost before the knee is passed.
 DECADE_COST = 2.0
 #: Below this ratio two times are equal: wall times on a shared machine are not known better.

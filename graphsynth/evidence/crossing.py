@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.jamming.bearing.bearing import Bearing
     from graphsynth.jamming.intersection import CircleEllipse
 
-__all__ = ["area_problem", "crossing_problem", "precise_area", "precise_crossing"]
-
 _DIGITS = 50
 #: Parts of the search by boxes after which it is stopped.
 _PARTS = (0.3, 0.6, 0.75, 0.85, 0.92, 0.97)

@@ -14,15 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.run import Plant, run
-from graphsynth.dynamics.driven.setup import output_times, prepare
+from graphsynth.dynamics.driven.run import run
+from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
 from graphsynth.dynamics.motors import IdealSpeed, Motor, whole
 from graphsynth.dynamics.trains import Train
 from graphsynth.evidence.choice import seconds_text
 from graphsynth.evidence.precise_drive import NAME, Shape, precise_drive, shape_of_series
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
-
-__all__ = ["drive_problem", "drive_work_precision", "reduction_problem", "rows_as_text", "work_precision"]
 
 Array = NDArray[np.float64]
 _L = "inductance [H]"
@@ -244,7 +242,7 @@ def drive_problem(
 
     Examples
     --------
-    >>> from graphsynth.dynamics.driven.run import Plant
+    >>> from graphsynth.dynamics.driven.setup import Plant
     >>> from graphsynth.dynamics.motors import DCMotor
     >>> from graphsynth.dynamics.trains import Train
     >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)

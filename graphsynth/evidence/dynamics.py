@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.result import DynamicMotion
     from graphsynth.dynamics.start import StartReport
 
-__all__ = ["Truth", "dynamics_problem", "dynamics_work_precision"]
-
 Array = NDArray[np.float64]
 #: Beyond this many tolerances the error is not what was asked for.
 _MISSED = 1e3
@@ -82,7 +80,8 @@ def dynamics_work_precision(
     >>> from graphsynth.dynamics.model import Body, DynamicModel
     >>> from graphsynth.dynamics.start import consistent_start
     >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> from graphsynth.mechanism.laws import Driver
+    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> rows = dynamics_work_precision(model, consistent_start(model, keep={(0, 1): 0.0}), [0.0, 1.0],

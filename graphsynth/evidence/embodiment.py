@@ -19,8 +19,6 @@ from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus
 if TYPE_CHECKING:
     from graphsynth.kinematics.dimensional.goals import Goals
 
-__all__ = ["line_problem", "path_problem", "precise_strip"]
-
 
 @cache
 def precise_strip() -> float:

@@ -13,8 +13,6 @@ from typing import Any
 from graphsynth.evidence.choice import seconds_text
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 
-__all__ = ["PUBLISHED", "Growth", "enumeration_problem", "growth", "of_scene"]
-
 #: Planar kinematic chains of mobility 1 by links: The On-Line Encyclopedia of Integer Sequences, A233288.
 PUBLISHED: Mapping[int, int] = {4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318_162, 16: 19_819_281, 18: 1_535_380_884}
 _GRAPHS = "graphs"

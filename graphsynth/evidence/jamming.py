@@ -23,18 +23,9 @@ if TYPE_CHECKING:
     from graphsynth.jamming.joints.assess import CoupledReport
     from graphsynth.jamming.joints.limits import Misalignment
     from graphsynth.jamming.joints.scale import ScaleCertificate
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.mechanism.model import Mechanism
-
-__all__ = [
-    "arc_problem",
-    "coupled_problem",
-    "exact_largest",
-    "lambda_problem",
-    "precise_arc_ends",
-    "precise_critical_tilt",
-]
 
 _DIGITS = 50
 #: Gap of the proved bounds that are the reference where no closed form is known.

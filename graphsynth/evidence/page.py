@@ -18,8 +18,6 @@ from graphsynth.evidence.rows import Problem, Row
 if TYPE_CHECKING:
     from graphsynth.evidence.report import AccuracyReport
 
-__all__ = ["page", "write_report"]
-
 _CSS = """
 :root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--rule:#d5dbe1;--bad:#b34700}
 @media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#9aa7b4;--paper:#12181f;--rule:#323d48;--bad:#f0883e}}

@@ -13,8 +13,6 @@ from graphsynth.evidence.rows import FLOOR, Problem, Row, RowStatus
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["work_precision_picture"]
-
 #: Okabe and Ito's colours, told apart by colour-blind readers, and markers.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#56b4e9", "#b8860b", "#1b2733", "#7f7f7f", "#e66fb0")
 _MARKERS = "osD^vPXp*"

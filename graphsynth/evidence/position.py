@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.four_bar import TiltedFourBar
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["NODES", "Closed", "batch_problem", "four_bar", "position_problem", "precise_points", "precise_poses"]
-
 Array = NDArray[np.float64]
 #: Name of a closed form, and what it gives at inputs (n,): the position (n,) of the watched point, complex.
 Closed = tuple[str, Callable[[Array], NDArray[np.complex128]]]
@@ -52,7 +50,8 @@ def four_bar(linkage: TiltedFourBar) -> tuple[Mechanism, Closed]:
     (4, [(1.5+2.449489743j)])
     """
     from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism
+    from graphsynth.mechanism.laws import Driver
+    from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
     if linkage.alpha:
@@ -442,7 +441,7 @@ def _crank_rockers(crank: float, largest: float, count: int) -> list[TiltedFourB
 
 
 def _batch(mechanisms: list[Mechanism], f: Array, sets: int, rates: bool) -> Complex:
-    from graphsynth.kinematics.simulation import simulate_batch
+    from graphsynth.kinematics.engine.batch import simulate_batch
 
     dimensions = np.stack([mechanisms[k % len(mechanisms)].dimensions for k in range(sets)])
     found = simulate_batch(mechanisms[0], f, dimensions, rates=rates, keep=(3,))

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 
-__all__ = ["DIGITS", "NAME", "Long", "Shape", "Vector", "precise_drive", "shape_of_series"]
-
 Long = np.longdouble
 Vector = NDArray[np.longdouble]
 #: Crank angle -> inertia without rotor and train, half its derivative, load torque (SI).

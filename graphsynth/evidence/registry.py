@@ -13,8 +13,6 @@ from typing import Any
 
 from graphsynth.core.errors import SceneError
 
-__all__ = ["Plan", "load", "plans"]
-
 
 @dataclass(frozen=True)
 class Plan:

@@ -21,8 +21,6 @@ from graphsynth.evidence.rows import Effort, Problem, table
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["AccuracyReport", "measure", "summary"]
-
 #: Told before each problem (``done`` of ``total``), and once more at the end.
 Progress = Callable[[str, int, int], None]
 

@@ -14,8 +14,6 @@ from graphsynth.core.errors import SpecError
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["FLOOR", "Effort", "Problem", "Row", "RowStatus", "best_of", "table"]
-
 T = TypeVar("T")
 
 #: Errors below this are drawn and compared as this: the rounding of a number of size one.

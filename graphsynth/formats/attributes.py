@@ -18,8 +18,6 @@ from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["OF_EDGE", "OF_GRAPH", "Edge", "Item", "Spent", "attributes_of", "item_from", "whole_number"]
-
 Item = MechanismGraph | Mechanism
 
 _WHOLE = ("drivers", "points", "pose")

@@ -17,8 +17,6 @@ from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.formats.attributes import OF_EDGE, OF_GRAPH, Edge, Item, Spent, attributes_of, item_from
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["LENGTH_MAX", "TOKENS_MAX", "compose", "parse"]
-
 _TOKEN = re.compile(
     r"(?:\s++|//[^\n]*+|\#[^\n]*+|/\*[^*]*+(?:\*(?!/)[^*]*+)*+\*/)*+"
     r'(?:(?P<quoted>"[^"\\]*+(?:\\.[^"\\]*+)*+")'

@@ -10,8 +10,6 @@ from graphsynth.formats.lines import head_of, read_rows
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["compose", "parse"]
-
 _MOST = LINKS_MAX * (LINKS_MAX - 1) // 2
 _DICTIONARY = re.compile(r"\{(?:'mobility': ([0-9]))?\}", re.ASCII)  # what networkx.write_edgelist puts behind an edge
 

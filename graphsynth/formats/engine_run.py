@@ -12,8 +12,6 @@ from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.extras import need
 
-__all__ = ["EngineRun", "load_engine", "steps_between", "turn"]
-
 Array = NDArray[np.float64]
 
 

@@ -21,8 +21,6 @@ from graphsynth.formats.engine_run import EngineRun
 from graphsynth.formats.exudyn_model import ExudynSettings
 from graphsynth.formats.mjcf import MujocoSettings, to_mjcf
 
-__all__ = ["ExportCertificate", "Trial", "certify_export"]
-
 Array = NDArray[np.float64]
 Settings = MujocoSettings | ExudynSettings
 #: Part of the requested tolerance that the reference may be wrong by.

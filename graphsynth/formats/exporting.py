@@ -11,8 +11,6 @@ from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport, check_start
 from graphsynth.mechanism.joints import Gear, Revolute
 
-__all__ = ["carrier_of", "check_common", "check_settings", "constant_torque", "gear_weights"]
-
 Point = tuple[float, float]
 
 

@@ -22,9 +22,7 @@ from graphsynth.dynamics.start import StartReport, check_start
 from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between, turn
 from graphsynth.formats.exporting import check_common, check_settings, constant_torque, gear_weights
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver
-
-__all__ = ["ExudynModel", "ExudynSettings", "run_exudyn", "to_exudyn"]
+from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
 Point = tuple[float, float]

@@ -12,8 +12,6 @@ from graphsynth.mechanism import files
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["compose", "compose_lines", "graph_of", "parse", "parse_line", "record_of"]
-
 FORMAT = "graphsynth graph"
 VERSION = 1
 #: Links up to which a canonical labelling takes no time worth speaking of, whatever the graph.

@@ -19,8 +19,6 @@ from graphsynth.core.errors import FormatError
 from graphsynth.formats.attributes import OF_EDGE, OF_GRAPH, Edge, Item, Spent, attributes_of, item_from
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["LENGTH_MAX", "compose", "parse"]
-
 #: Bytes of one graph, of what stands before the first and of what stands between two.
 LENGTH_MAX = 3_000_000
 

@@ -9,8 +9,6 @@ from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = ["LENGTH_MAX", "Row", "head_of", "read_rows", "within"]
-
 #: Characters of a text; larger graphs need a sparse format.
 LENGTH_MAX = 4_000_000
 #: Lines of a text, comments and empty ones too.

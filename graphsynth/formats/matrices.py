@@ -18,17 +18,6 @@ from graphsynth.formats.lines import Row, head_of, read_rows, within
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.structure.text import LINKS_MAX
 
-__all__ = [
-    "adjacency_matrix",
-    "compose_adjacency",
-    "compose_incidence",
-    "graph_from_adjacency",
-    "graph_from_incidence",
-    "incidence_matrix",
-    "parse_adjacency",
-    "parse_incidence",
-]
-
 Matrix = NDArray[np.int64]
 
 

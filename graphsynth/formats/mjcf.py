@@ -23,8 +23,6 @@ from graphsynth.formats.mjcf_parts import Work, combine, fixed, site, text, writ
 from graphsynth.formats.trees import SpanningTree, spanning_tree
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
-__all__ = ["MjcfModel", "MujocoSettings", "to_mjcf"]
-
 Array = NDArray[np.float64]
 Point = tuple[float, float]
 #: MuJoCo's own bound of masses and inertias.
@@ -149,7 +147,8 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     Examples
     --------
     >>> from graphsynth.dynamics import Body, consistent_start
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+    >>> from graphsynth.mechanism.laws import Driver
+    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> export = to_mjcf(model, consistent_start(model, keep={(0, 1): 0.5}))

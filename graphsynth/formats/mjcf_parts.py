@@ -13,8 +13,6 @@ from graphsynth.dynamics.start import StartReport
 from graphsynth.formats.exporting import constant_torque
 from graphsynth.formats.trees import SpanningTree
 
-__all__ = ["Work", "combine", "fixed", "site", "text", "write_load"]
-
 Point = tuple[float, float]
 
 

@@ -16,8 +16,6 @@ from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between
 from graphsynth.formats.exporting import check_settings
 from graphsynth.formats.mjcf import MjcfModel, MujocoSettings, to_mjcf
 
-__all__ = ["run_mujoco"]
-
 Array = NDArray[np.float64]
 
 

@@ -10,18 +10,6 @@ from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.canonical import decode_key
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = [
-    "compose_graph6",
-    "compose_text",
-    "compose_toml",
-    "graph_of_key",
-    "graph_of_text",
-    "parse_graph6",
-    "parse_text",
-    "parse_toml",
-    "placed",
-]
-
 
 def parse_text(line: str, place: str) -> MechanismGraph:
     """Read a line: a canonical key, or the text form."""

@@ -21,20 +21,6 @@ from graphsynth.core.wholefiles import replacing
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = [
-    "FORMATS",
-    "GRAPHS_MAX",
-    "JOINTS_MAX",
-    "Format",
-    "format_of",
-    "read",
-    "read_all",
-    "read_stream",
-    "read_text",
-    "write",
-    "write_text",
-]
-
 Item = MechanismGraph | Mechanism
 
 #: Longest line of a file of lines; the longest text form is shorter.

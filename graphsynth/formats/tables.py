@@ -10,8 +10,6 @@ from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.formats.plain import graph_of_key, graph_of_text, placed
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["COLUMNS", "ROW_MAX", "compose", "parse"]
-
 #: Characters of a row, which may hold line ends.
 ROW_MAX = 1_000_000
 

@@ -13,8 +13,6 @@ from graphsynth.core.errors import GraphError
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["SpanningTree", "spanning_tree"]
-
 
 @dataclass(frozen=True)
 class SpanningTree:

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from graphsynth.intervals import blocks, rounding
 from graphsynth.intervals.rounding import down, up
 
-__all__ = ["absolute", "add", "divide", "multiply", "power", "root", "square", "subtract"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Bounds = tuple[Array, Array]

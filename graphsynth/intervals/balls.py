@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.intervals.exact import precision
 
-__all__ = ["TINY", "UP", "Balls", "argument", "exact", "join", "root", "stack", "tau_times", "unit"]
-
 Array = NDArray[np.float64]
 
 #: Unit roundoff of binary64.

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals.rounding import MAX, PRODUCT_MIN, SPLIT, SPLIT_MAX
 
-__all__ = ["BLOCK", "add", "in_blocks", "multiply", "subtract"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Bounds = tuple[Array, Array]

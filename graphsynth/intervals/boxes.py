@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from graphsynth.intervals.interval import Interval, _make
 from graphsynth.intervals.status import Status
 
-__all__ = ["Paving", "Progress"]
-
 Mask = NDArray[np.bool_]
 
 

@@ -24,8 +24,6 @@ from graphsynth.intervals.paving import pave
 from graphsynth.intervals.proving import System
 from graphsynth.intervals.status import Status
 
-__all__ = ["CellPaving", "pave_cells"]
-
 #: A cell that is wide is not worth fine boxes: their widths, relative to the start box, next to that of the cell.
 _COARSE = 0.4
 

@@ -20,8 +20,6 @@ from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.proving import read_parameters
 from graphsynth.intervals.status import Status
 
-__all__ = ["compiled_system", "pave_compiled"]
-
 Array = NDArray[np.float64]
 _AT_ONCE = 100_000
 _DEPTH, _KEPT = 256, 64

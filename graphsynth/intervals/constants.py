@@ -9,8 +9,6 @@ from __future__ import annotations
 from fractions import Fraction
 from functools import cache
 
-__all__ = ["PI", "atan_fixed", "log2_fixed", "pi_fixed", "split", "two_over_pi_words"]
-
 _GUARD = 32
 
 

@@ -16,8 +16,6 @@ from graphsynth.core.errors import GraphsynthError, IntervalError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make, interval
 
-__all__ = ["Dual", "evaluate", "jacobian", "jacobian_of", "values_of", "variables"]
-
 
 class Dual:
     """Value of shape S and derivatives of shape (n,) + S by n variables.

@@ -15,8 +15,6 @@ import numpy as np
 from graphsynth.core.errors import FormatError, GeometryError
 from graphsynth.intervals.reading import fraction
 
-__all__ = ["Gaussian", "ball", "complex_ball", "gaussian", "precision", "rational"]
-
 
 @contextmanager
 def precision(bits: int) -> Iterator[None]:

@@ -21,11 +21,6 @@ from graphsynth.intervals.interval import Interval, _clipped, _make, interval
 from graphsynth.intervals.operations import common_shape, flat_of
 from graphsynth.intervals.reading import DISCONTINUOUS
 
-__all__ = [
-    "acos", "asin", "atan", "atan2", "cos", "divide_extended", "exp", "hypot", "log", "maximum", "minimum", "pi", "sin",
-    "sqr", "sqrt", "tan",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 
 

@@ -14,8 +14,6 @@ import numpy as np
 from graphsynth.core.arguments import checker
 from graphsynth.core.errors import GraphsynthError, IntervalError
 
-__all__ = ["check_quickly", "check_rounding", "checked", "rounding_faults"]
-
 #: Lets a function keep what its annotations say; an `IntervalError` names the argument that is something else.
 checked = checker(IntervalError, {"System": "Callable"})
 

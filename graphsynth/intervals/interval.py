@@ -19,9 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals import operations
 from graphsynth.intervals.measures import Measures
-from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, Decoration, decimal_outward, read_bounds, read_points
-
-__all__ = ["Decoration", "Interval"]
+from graphsynth.intervals.reading import CLIPPED, NO_FLAGS, decimal_outward, read_bounds, read_points
 
 Array = NDArray[np.float64]
 _MOST = int(np.finfo(np.float64).max)

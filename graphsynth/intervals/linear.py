@@ -23,8 +23,6 @@ from graphsynth.intervals.interval import Interval, interval
 from graphsynth.intervals.proving import inverses, points, spectral_radius
 from graphsynth.intervals.status import Status
 
-__all__ = ["LinearResult", "gauss_seidel", "solve_linear"]
-
 _ROUNDS = 15
 
 

@@ -14,8 +14,6 @@ from graphsynth.core.errors import FormatError
 from graphsynth.intervals import operations
 from graphsynth.intervals.reading import CLIPPED, DISCONTINUOUS, FLOAT_INPUT, fraction
 
-__all__ = ["Measures"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Flags = NDArray[np.uint8]

@@ -30,20 +30,6 @@ from numpy.typing import NDArray
 from graphsynth.intervals.balls import TINY, UP, Balls, exact, join, tau_times
 from graphsynth.intervals.proving import inverses, krawczyk_image
 
-__all__ = [
-    "Boxes",
-    "Budget",
-    "Cover",
-    "MovingSystem",
-    "Nodes",
-    "Proof",
-    "correct",
-    "cover",
-    "prove",
-    "prove_nodes",
-    "whole_turns",
-]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]

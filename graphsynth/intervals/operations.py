@@ -14,8 +14,6 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import arrays
 from graphsynth.intervals.guard import check_quickly
 
-__all__ = ["binary", "common_shape", "flat_of", "power", "unary"]
-
 Array = NDArray[np.float64]
 
 #: From this size on the compiled form is loaded; once it is there it is used for every size: a call costs 6 to 15

@@ -24,8 +24,6 @@ from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.proving import System, image, read_parameters
 from graphsynth.intervals.status import Status
 
-__all__ = ["Search", "pave"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

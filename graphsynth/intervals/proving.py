@@ -26,8 +26,6 @@ from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.status import Status
 
-__all__ = ["Image", "KrawczykResult", "System", "image", "krawczyk"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: ``f(x)`` or ``f(x, p)``: sequences of unknowns and parameters in, a sequence of as many equations as unknowns out.

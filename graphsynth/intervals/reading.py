@@ -16,23 +16,6 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import FormatError, IntervalError
 from graphsynth.intervals.guard import check_quickly
 
-__all__ = [
-    "CLIPPED",
-    "DISCONTINUOUS",
-    "FLOAT_INPUT",
-    "NO_FLAGS",
-    "Decoration",
-    "decimal_outward",
-    "enclose",
-    "lower_bound",
-    "read_bounds",
-    "read_one",
-    "read_points",
-    "shortened",
-    "text_ends",
-    "upper_bound",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 CLIPPED: Final = np.uint8(1)

@@ -13,8 +13,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MAX", "PRODUCT_MIN", "SPLIT", "SPLIT_MAX", "down", "up"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

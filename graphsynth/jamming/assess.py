@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from graphsynth.jamming.joints.assess import CoupledReport
     from graphsynth.jamming.joints.limits import Misalignment
     from graphsynth.jamming.joints.program import Bearings
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
 
 Array = NDArray[np.float64]
@@ -326,7 +326,7 @@ def _of_a_motion(
 ) -> tuple[Motion, Bearings, Misalignment | Iterable[Misalignment]]:
     """Refuse what is no motion, and a motion without bearings or tilts."""
     from graphsynth.jamming.joints.limits import JointLimits, Misalignment
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
     if not isinstance(subject, Motion):
         raise GeometryError(

@@ -1,9 +1,3 @@
-from .simulation import (
-    Motion as Motion,
-)
-from .simulation import (
-    simulate as simulate,
-)
-from .simulation import (
-    simulate_batch as simulate_batch,
-)
+from .engine.batch import simulate_batch as simulate_batch
+from .engine.result import Motion as Motion
+from .simulation import simulate as simulate

@@ -19,8 +19,6 @@ from graphsynth.mechanism.laws import Harmonic, Linear, Table
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import characteristic_length
 
-__all__ = ["AssemblyMode", "assembly_modes", "first_input", "whole_range"]
-
 Array = NDArray[np.float64]
 
 

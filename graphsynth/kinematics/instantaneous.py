@@ -24,11 +24,6 @@ from graphsynth.mechanism.joints import Prismatic
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = [
-    "Circles", "Polodes", "bresse_circle", "inflection_circle", "instant_centre", "mechanical_advantage", "polodes",
-    "transmission_index",
-]  # fmt: skip
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["MotionMethods"]
-
 Array = NDArray[np.float64]
 
 

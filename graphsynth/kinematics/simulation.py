@@ -15,7 +15,6 @@ from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.assembly import whole_range
 from graphsynth.kinematics.engine import codes
-from graphsynth.kinematics.engine.batch import BatchMotion, simulate_batch
 from graphsynth.kinematics.engine.escapes import pivot_passes, refined
 from graphsynth.kinematics.engine.events import ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
@@ -29,8 +28,6 @@ from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.dimensional.api import Embodiment
-
-__all__ = ["BatchMotion", "Motion", "simulate", "simulate_batch"]
 
 Array = NDArray[np.float64]
 

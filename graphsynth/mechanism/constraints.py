@@ -16,8 +16,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.equations import Floats, Seen, derivatives, seen
 from graphsynth.mechanism.joints import JointGeometry
 
-__all__ = ["jacobian", "residual"]
-
 Array = NDArray[np.float64]
 
 

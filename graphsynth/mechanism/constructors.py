@@ -21,8 +21,6 @@ from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["Constructors"]
-
 Pose = tuple[float, float, float]
 _LOOP = ((0, 1), (1, 2), (2, 3), (0, 3))
 

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-__all__ = ["Floats", "Gradient", "Pair", "Pairs", "Plane", "Seen", "derivatives", "seen"]
-
 #: A number, and a vector of the plane, of the arithmetic in use.
 Number = Any
 Vector = Any

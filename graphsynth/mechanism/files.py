@@ -16,8 +16,8 @@ from graphsynth.core.checks import checked
 from graphsynth.core.errors import FormatError, GeometryError
 from graphsynth.core.textfiles import json_value, text_of, toml_tables
 from graphsynth.mechanism.joints import KINDS, JointGeometry
-from graphsynth.mechanism.laws import LAWS, Linear
-from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+from graphsynth.mechanism.laws import LAWS, Driver, Linear
+from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 
 __all__ = [

@@ -16,22 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import (
-    check_fields,
-    check_sizes,
-    choice,
-    finite,
-    finite_array,
-    positive,
-    sign,
-    unit_vector,
-)
+from graphsynth.core.checks import check_fields, check_sizes, choice, finite, finite_array, positive, sign, unit_vector
 from graphsynth.mechanism.rotatability import FullTurn, full_turn
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
-
-__all__ = ["AssemblyStatus", "FourBarPositions", "Straightness", "TiltedFourBar"]
 
 Array = NDArray[np.float64]
 _BESIDE = 1e-140

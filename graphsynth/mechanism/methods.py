@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.symbolic import CouplerCurve
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["Methods"]
-
 
 class Methods(Shown):
     """Methods that every `Mechanism` has."""

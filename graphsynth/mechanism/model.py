@@ -21,8 +21,6 @@ from graphsynth.structure.graph import MechanismGraph
 if TYPE_CHECKING:
     from graphsynth.mechanism.rank import MobilityReport
 
-__all__ = ["Driver", "Mechanism", "TracePoint"]
-
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
 

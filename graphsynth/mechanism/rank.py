@@ -16,8 +16,6 @@ from graphsynth.mechanism.joints import Cam, Gear
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["MobilityReport", "mobility_report"]
-
 Array = NDArray[np.float64]
 
 #: Singular values below this fraction of the largest count as zero.

@@ -22,19 +22,6 @@ from graphsynth.core.errors import GeometryError
 if TYPE_CHECKING:
     from graphsynth.mechanism.four_bar import Straightness, TiltedFourBar
 
-__all__ = [
-    "KINDS",
-    "TYPES",
-    "FourBarRotation",
-    "FullTurn",
-    "four_bar_rotation",
-    "full_turn",
-    "grashof_type",
-    "rotation_kind",
-    "straightness",
-    "type_of",
-]
-
 Array = NDArray[np.float64]
 _SAMPLES = 1440
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["CouplerCurve", "closure_equations", "coupler_curve"]
-
 
 class CouplerCurve(NamedTuple):
     """The algebraic curve on which a coupler point lies.

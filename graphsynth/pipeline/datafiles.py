@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from graphsynth.pipeline.runner import Report
     from graphsynth.pipeline.scene import Scene
 
-__all__ = ["check_files", "column_files", "data_files", "results_csv", "results_table"]
-
 
 def check_files(scene: Scene) -> None:
     """Refuse, before anything runs, kinds of files that this installation cannot write.

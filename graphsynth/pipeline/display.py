@@ -19,8 +19,6 @@ from graphsynth.pipeline.units import Unit
 if TYPE_CHECKING:
     from graphsynth.drawing.plots import Line
 
-__all__ = ["TURN", "chart", "quantity_table", "shown", "table", "unit_in"]
-
 _COLUMN = re.compile(r"(.*?)(?: \| (?:(\d+) )?(\S+))?")
 _UNIT = re.compile(r".*\[([^\]]*)\]")
 

@@ -11,8 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
-__all__ = ["key_lines", "line_of"]
-
 _Path = tuple[str, ...]
 
 #: Lines of one statement that are tried; keys behind a longer one get the line of the table around them.

@@ -15,20 +15,6 @@ from graphsynth.pipeline.stages import Context, Stage, load
 if TYPE_CHECKING:
     from graphsynth.pipeline.runner import Report
 
-__all__ = [
-    "StageTime",
-    "explain",
-    "explain_json",
-    "measured",
-    "memory_in_use",
-    "new_modules",
-    "peak_memory",
-    "reset_peak",
-    "rooms",
-    "why_not",
-    "why_run",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class StageTime:

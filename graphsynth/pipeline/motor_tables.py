@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.pipeline.display import quantity_table, table
+from graphsynth.pipeline.display import table
 from graphsynth.pipeline.products import Table
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.driven.reduction import ReductionStudy
     from graphsynth.dynamics.driven.run import DriveRun
     from graphsynth.kinematics.engine.result import Motion
-
-__all__ = ["balance_rows", "limit_table", "quantity_table", "shown_motion"]
 
 
 def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:

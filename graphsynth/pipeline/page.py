@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from graphsynth.pipeline.runner import Report
 
-__all__ = ["report_html"]
-
 _CSS = """
 :root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;
 --good:#00735a;--bad:#b34700}

@@ -9,25 +9,6 @@ from typing import Any, Literal, TypeVar
 from graphsynth.core.errors import GraphsynthError
 from graphsynth.pipeline.units import Unit
 
-__all__ = [
-    "Attempt",
-    "Candidate",
-    "Columns",
-    "Finding",
-    "Objective",
-    "Outcome",
-    "Part",
-    "Picture",
-    "Quantity",
-    "Ranking",
-    "Recognised",
-    "Record",
-    "Rejected",
-    "Table",
-    "each",
-    "exact",
-]
-
 T = TypeVar("T")
 R = TypeVar("R")
 Guarantee = Literal["exact", "certified", "estimated"]

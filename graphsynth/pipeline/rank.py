@@ -11,8 +11,6 @@ from graphsynth.pipeline.products import Objective, Ranking, Record
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.tables import suggest
 
-__all__ = ["DIGITS", "rank", "ranking_of"]
-
 #: Decimals of a score: what differs by rounding alone is a tie.
 DIGITS = 12
 

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from graphsynth.pipeline.products import Table
     from graphsynth.pipeline.runner import Report
 
-__all__ = ["column_widths", "loaded_versions", "print_summary", "scene_json", "write_report"]
-
 _KINDS = {".html", ".csv", ".parquet", ".json", ".jsonl"}
 _PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")
 

@@ -22,8 +22,6 @@ from graphsynth.pipeline.store import JOURNAL, Candidates, check_folder, signatu
 from graphsynth.pipeline.streaming import Plan, Spent, Streamed, given_by, plan_stream, stream
 from graphsynth.pipeline.tables import Place
 
-__all__ = ["Report", "Running", "StageTime", "execute", "has_stream", "run"]
-
 
 @dataclass(frozen=True, slots=True)
 class Report:

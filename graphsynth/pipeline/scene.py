@@ -16,19 +16,6 @@ from graphsynth.pipeline.stages import RANK, STRUCTURE, Stage
 from graphsynth.pipeline.system import System, system, system_names
 from graphsynth.pipeline.tables import In, Place, read_table, require, suggest
 
-__all__ = [
-    "TABLES",
-    "BudgetTable",
-    "GenerateTable",
-    "OutputsTable",
-    "RankingTable",
-    "Scene",
-    "StructureTable",
-    "available_scenes",
-    "find_scene",
-    "load_scene",
-]
-
 _PACKAGE = Path(__file__).resolve().parent
 
 

@@ -14,8 +14,6 @@ from graphsynth.pipeline.scene import TABLES
 from graphsynth.pipeline.system import system, system_names
 from graphsynth.pipeline.tables import fields_of
 
-__all__ = ["scene_schema", "schema_text", "table_schema"]
-
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 

@@ -19,8 +19,6 @@ from graphsynth.pipeline.tables import Place, shortened, suggest
 if TYPE_CHECKING:
     from graphsynth.pipeline.scene import Scene
 
-__all__ = ["COLLECT", "GROUP", "RANK", "STRUCTURE", "Context", "Progress", "Stage", "StageFunction", "load", "resolve"]
-
 _HERE = "graphsynth.pipeline"
 
 

@@ -14,19 +14,8 @@ from graphsynth.pipeline.stages import Context
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
-
-__all__ = [
-    "UNKNOWN",
-    "check_count",
-    "generate",
-    "has_threefold_symmetry",
-    "pictures",
-    "recognise_by_key",
-    "records",
-    "records_of",
-    "solve",
-]
+    from graphsynth.structure.system.assortment import LinkAssortment
+    from graphsynth.structure.system.spec import StructuralSpec
 
 
 def solve(context: Context) -> tuple[LinkAssortment, ...]:

@@ -24,20 +24,6 @@ if TYPE_CHECKING:
     from graphsynth.pipeline.scene import Scene
     from graphsynth.pipeline.stages import Stage
 
-__all__ = [
-    "JOURNAL",
-    "REMEDY",
-    "Candidates",
-    "PartFolder",
-    "check_folder",
-    "decode",
-    "encode",
-    "mark_reported",
-    "signature",
-    "split_parts",
-    "write_whole",
-]
-
 _TAG = "~"  # names the dataclass, or "number" for one that JSON has no sign for
 _CLASSES: dict[str, type] = {
     name: getattr(products, name)

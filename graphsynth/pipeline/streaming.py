@@ -19,8 +19,6 @@ from graphsynth.pipeline.products import Outcome, Rejected
 from graphsynth.pipeline.stages import Context, Stage, load
 from graphsynth.pipeline.store import Candidates, PartFolder, decode, encode, split_parts
 
-__all__ = ["Plan", "Spent", "Streamed", "evaluate", "plan_stream", "stream"]
-
 _LONG = 0.05  # seconds: chunks of candidates grow until they take this long
 _MOST = 32
 

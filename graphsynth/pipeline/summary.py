@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from graphsynth.pipeline.runner import Report
     from graphsynth.structure.system.assortment import LinkAssortment
 
-__all__ = ["facts", "sentences", "summary_tables"]
-
 #: Verdicts told in words; more are read in the tables.
 _VERDICTS = 4
 #: Reasons of rejection told in words; all are counted in a table of their own.

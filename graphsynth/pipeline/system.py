@@ -15,8 +15,6 @@ from graphsynth.evidence.registry import Plan
 from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.tables import Place, suggest
 
-__all__ = ["EVIDENCE", "GROUP", "System", "plans_of", "system", "system_names"]
-
 #: Measured of every scene with a structural question.
 ENUMERATION = Plan("enumeration", "graphsynth.evidence.enumeration:of_scene", structure=True)
 

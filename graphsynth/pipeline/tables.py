@@ -28,21 +28,6 @@ from graphsynth.core.wording import nearest
 from graphsynth.pipeline.lines import key_lines, line_of
 from graphsynth.pipeline.units import SUFFIXES, Unit, convert, split_suffix, split_value
 
-__all__ = [
-    "ANY_LENGTH",
-    "Field",
-    "In",
-    "Place",
-    "Positions",
-    "fields_of",
-    "read_table",
-    "require",
-    "shortened",
-    "suggest",
-    "unknown",
-    "written",
-]
-
 T = TypeVar("T")
 
 _WORDS: dict[type, str] = {str: "a string", int: "an integer", float: "a number", bool: "true or false"}

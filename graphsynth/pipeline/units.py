@@ -13,8 +13,6 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, TypeVar
 
-__all__ = ["DEGREE", "SUFFIXES", "Unit", "convert", "split_suffix", "split_value"]
-
 T = TypeVar("T")
 
 Dimensions = tuple[int, int, int, int, int, int]

@@ -22,8 +22,6 @@ from graphsynth.structure.text import LINKS_MAX
 if TYPE_CHECKING:
     from graphsynth.structure.graph import Joint, MechanismGraph
 
-__all__ = ["KEY_VERSION", "Labelling", "decode_key", "joint_orbits", "key", "label"]
-
 #: First character of every key.  It changes when any graph would get another key, and never otherwise.
 KEY_VERSION = "1"
 

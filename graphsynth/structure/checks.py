@@ -8,8 +8,6 @@ from typing import Any
 
 from graphsynth.core.errors import FormatError
 
-__all__ = ["integer", "packed_joints"]
-
 
 def integer(value: object, place: str, low: int, high: int, what: str) -> int:
     """Return a plain int within its bounds or raise FormatError."""

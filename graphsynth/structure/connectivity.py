@@ -12,17 +12,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from graphsynth.structure.graph import Joint, MechanismGraph
 
-__all__ = [
-    "bits",
-    "breadth_first",
-    "component_of",
-    "components_of",
-    "cut_joints",
-    "cut_links",
-    "girth",
-    "is_planar",
-]
-
 
 def bits(mask: int) -> list[int]:
     """Return the positions of the set bits, ascending.

@@ -10,8 +10,6 @@ from graphsynth.structure.text import LINKS_MAX
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["from_networkx", "to_networkx"]
-
 
 def to_networkx(graph: MechanismGraph) -> Any:
     """Return a ``networkx.Graph`` with nodes 0..N-1.

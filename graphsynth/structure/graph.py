@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from graphsynth.structure.loop_rank import GenericMobility
     from graphsynth.structure.rigidity import RigidSubchain
 
-__all__ = ["Joint", "MechanismGraph"]
-
 _T = TypeVar("_T")
 
 

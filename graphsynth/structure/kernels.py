@@ -10,8 +10,6 @@ import numpy as np
 from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import lowest_bit, popcount
 
-__all__ = ["canon", "canon_packed", "canon_workspace", "lowest_bit", "popcount"]
-
 ZERO = np.uint64(0)
 ONE = np.uint64(1)
 EIGHT = np.uint64(8)

@@ -19,8 +19,6 @@ from graphsynth.structure.connectivity import bits
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["GenericMobility", "generic_mobility"]
-
 #: Rank is taken over the integers modulo this prime (2^31 - 1), so that products fit in 64 bits.
 _PRIME = 2_147_483_647
 #: Largest number of entries of a loop matrix: some seconds of elimination.

@@ -18,8 +18,6 @@ from graphsynth.structure.connectivity import bits
 if TYPE_CHECKING:
     from graphsynth.structure.graph import Joint, MechanismGraph
 
-__all__ = ["PebbleGame", "RigidSubchain", "find_rigid_subchain", "first_violation", "is_sparse", "rigid_bodies"]
-
 
 @dataclass(frozen=True, slots=True)
 class RigidSubchain:

@@ -33,8 +33,6 @@ from collections.abc import Sequence
 from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.connectivity import bits
 
-__all__ = ["WORK_MAX", "Search"]
-
 #: Looks at a vertex or a cell in one search; a minute or two.
 WORK_MAX = 200_000_000
 _WORD = (1 << 64) - 1

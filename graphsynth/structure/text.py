@@ -18,8 +18,6 @@ from math import isqrt
 
 from graphsynth.core.errors import FormatError
 
-__all__ = ["LINKS_MAX", "decode_graph6", "decode_text", "encode_graph6", "encode_text"]
-
 #: Joints are packed as three bytes, so a link number is at most 254.
 LINKS_MAX = 255
 

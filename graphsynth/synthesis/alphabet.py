@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import TooLargeError
 from graphsynth.synthesis.kernels.layout import Tables
 
-__all__ = ["Alphabet", "Label", "Word"]
-
 Word = tuple[int, ...]
 _MAX_LABELS = 2_000_000
 _DIGIT = 8

@@ -10,20 +10,9 @@ from graphsynth.synthesis.problem import Problem, counts, graphs
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
+    from graphsynth.structure.system.assortment import LinkAssortment
+    from graphsynth.structure.system.spec import StructuralSpec
     from graphsynth.synthesis.listed import Graphs
-
-__all__ = [
-    "count_assur_groups",
-    "count_baranov_trusses",
-    "count_chains",
-    "count_mechanisms",
-    "enumerate_assur_groups",
-    "enumerate_baranov_trusses",
-    "enumerate_chains",
-    "enumerate_mechanisms",
-    "sample_mechanisms",
-]
 
 
 def _list(what: str, problem: Problem, executor: Executor | None) -> Graphs:

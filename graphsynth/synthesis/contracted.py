@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import FormatError, TooLargeError
 
-__all__ = ["SHIPPED_LOOPS", "contracted_graphs", "decode", "encode", "generate", "has_contracted_graphs"]
-
 SHIPPED_LOOPS = 8
 #: With one loop more, graphs of so few vertices are made when they are asked for: some minutes and 0.7 GB at most.
 MADE_VERTICES = 11

@@ -21,9 +21,7 @@ from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.structure.system.spec import LinkAssortment
-
-__all__ = ["Family", "chain_families", "chain_joints", "chain_numbers", "mechanism_families", "rings", "truss_families"]
+    from graphsynth.structure.system.assortment import LinkAssortment
 
 MOST_LINKS = 255
 

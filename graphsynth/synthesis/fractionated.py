@@ -20,8 +20,6 @@ from graphsynth.structure.kernels import canon_packed
 from graphsynth.synthesis.families import chain_families, rings
 from graphsynth.synthesis.units import cut, graphs_of
 
-__all__ = ["Higher", "blocks_of", "fractionated_chains"]
-
 Higher = tuple[tuple[int, int], ...]
 
 

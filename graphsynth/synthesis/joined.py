@@ -24,8 +24,6 @@ from graphsynth.synthesis.families import chain_families, chain_joints, rings
 from graphsynth.synthesis.fractionated import Higher, blocks_of
 from graphsynth.synthesis.units import count_unit, cut
 
-__all__ = ["count_fractionated"]
-
 Exponents = tuple[int, ...]
 Series = dict[Exponents, int]
 Cycles = tuple[tuple[int, int], ...]

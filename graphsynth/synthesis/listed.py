@@ -10,8 +10,6 @@ from typing import overload
 from graphsynth.core.errors import GraphError
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["Graphs"]
-
 #: Graphs shown in a notebook.
 _SHOWN = 12
 

@@ -10,9 +10,7 @@ from graphsynth.synthesis.families import Levels, rings
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.structure.system.spec import LinkAssortment
-
-__all__ = ["OneByOne"]
+    from graphsynth.structure.system.assortment import LinkAssortment
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS
 from graphsynth.synthesis.families import chain_families, truss_families
 from graphsynth.synthesis.units import count_unit, cut
 
-__all__ = ["extrapolated", "refuse"]
-
 LISTED_PER_SECOND = 1e6  # order of magnitude, one core
 MOST_LOOPS = 10  # what the kernels are laid out for
 _COUNTED_LOOPS = 6  # counts of so many loops take a moment

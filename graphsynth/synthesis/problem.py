@@ -13,8 +13,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import InfeasibleSpecError, SpecError
-from graphsynth.core.ordered import in_order
-from graphsynth.core.ordered import processes as processes_of
+from graphsynth.core.ordered import in_order, processes as processes_of
 from graphsynth.core.wording import shown, whole
 from graphsynth.synthesis.contracted import has_contracted_graphs
 from graphsynth.synthesis.families import (
@@ -32,19 +31,8 @@ from graphsynth.synthesis.units import Unit, count_unit, cut, graphs_of, text_of
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
-
-__all__ = [
-    "Piece",
-    "Problem",
-    "count_piece",
-    "counts",
-    "graphs",
-    "graphs_of_piece",
-    "processes",
-    "text_of_piece",
-    "texts",
-]
+    from graphsynth.structure.system.assortment import LinkAssortment
+    from graphsynth.structure.system.spec import StructuralSpec
 
 _PRIMES = (2, 3, 5, 7, 11, 13)
 
@@ -135,7 +123,8 @@ class Problem:
         TooLargeError
             More loops than there are contracted graphs.
         """
-        from graphsynth.structure.system.spec import LinkAssortment, StructuralSpec
+        from graphsynth.structure.system.assortment import LinkAssortment
+        from graphsynth.structure.system.spec import StructuralSpec
 
         order = check_symmetry(symmetry)
         levels: Levels = ()

@@ -7,8 +7,6 @@ from pathlib import Path
 
 from graphsynth.synthesis.contracted import Layers, encode, generate
 
-__all__ = ["main"]
-
 
 def main(arguments: list[str]) -> int:
     """Make the lists for 2..LOOPS loops and write them to FOLDER."""

@@ -26,8 +26,6 @@ from graphsynth.synthesis.kernels.listing import HEADER
 from graphsynth.synthesis.problem import Problem
 from graphsynth.synthesis.units import count_each, spelling_of
 
-__all__ = ["sample"]
-
 _PAIRS = 1 << 16
 
 

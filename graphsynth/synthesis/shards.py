@@ -23,8 +23,6 @@ from graphsynth.synthesis.one_by_one import OneByOne
 from graphsynth.synthesis.problem import Piece
 from graphsynth.synthesis.units import Unit, estimates, workspace
 
-__all__ = ["shard_of", "share_of", "works"]
-
 Shard = tuple[int, int]
 Costs = NDArray[np.float64]
 _WEIGHED = 20_000  # contracted graphs of a problem whose work is estimated one by one

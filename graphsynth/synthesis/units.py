@@ -21,19 +21,6 @@ if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
     from graphsynth.synthesis.kernels.expanding import Spelling
 
-__all__ = [
-    "Unit",
-    "count_each",
-    "count_unit",
-    "cut",
-    "estimates",
-    "graphs_of",
-    "packed_of",
-    "spelling_of",
-    "text_of",
-    "workspace",
-]
-
 LISTING_SIZE = 200_000.0  # bound on the labellings of a unit to list, before sparsity and symmetry
 COUNTING_SIZE = 512  # contracted graphs in a unit to count
 _ROWS = 4096

@@ -24,8 +24,6 @@ from graphsynth.synthesis.problem import Piece, Problem, counts, graphs, graphs_
 from graphsynth.synthesis.shards import shard_of
 from graphsynth.synthesis.units import Unit
 
-__all__ = ["Step", "count_with_checkpoint", "estimated_size", "shard_of", "write_listing"]
-
 _SAMPLED = 16  # pieces made to estimate the size of a listing
 
 

@@ -14,7 +14,8 @@ from graphsynth.atlas.sealing import seal
 from graphsynth.atlas.stored import fingerprint, stored_mechanisms
 from graphsynth.core.errors import SpecError
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 
 PLACE = "1.4.4.1", 0, 2
 

@@ -14,8 +14,8 @@ import pytest
 from scipy.optimize import fsolve
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute
-from graphsynth.kinematics.engine.batch import solve_rrr
-from graphsynth.kinematics.simulation import simulate, simulate_batch
+from graphsynth.kinematics.engine.batch import simulate_batch, solve_rrr
+from graphsynth.kinematics.simulation import simulate
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 361)
 

@@ -18,8 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from graphsynth.intervals import Interval, Status, image, pave, sin
-from graphsynth.intervals import arrays as numpy_form
+from graphsynth.intervals import Interval, Status, arrays as numpy_form, image, pave, sin
 
 COUNT = 100_000
 SMALL = 200
@@ -139,8 +138,7 @@ def system(x):
 
 def test_krawczyk_compiled(benchmark):
     """Two-dimensional boxes per second, one core, a compiled system."""
-    from graphsynth.intervals.kernels import arithmetic as ia
-    from graphsynth.intervals.kernels import krawczyk as compiled
+    from graphsynth.intervals.kernels import arithmetic as ia, krawczyk as compiled
 
     @compiled.system
     def equations(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
@@ -217,9 +215,7 @@ def own_times(count, seconds):
     import interval_peers as same
 
     from graphsynth.intervals import krawczyk, pave_compiled
-    from graphsynth.intervals.kernels import arithmetic as ia
-    from graphsynth.intervals.kernels import elementary, loops
-    from graphsynth.intervals.kernels import krawczyk as compiled
+    from graphsynth.intervals.kernels import arithmetic as ia, elementary, krawczyk as compiled, loops
     from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes
 
     @compiled.system

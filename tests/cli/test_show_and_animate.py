@@ -13,7 +13,8 @@ import pytest
 
 from graphsynth.cli import main
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 

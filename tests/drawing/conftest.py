@@ -10,7 +10,8 @@ import pytest
 
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 TURN = np.linspace(0.0, math.tau, 181)

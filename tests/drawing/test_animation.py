@@ -30,8 +30,8 @@ from graphsynth.drawing.reach import motion_over_reach
 from graphsynth.drawing.shapes import FIXED
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 from .conftest import TURN, cylinder, four_bar

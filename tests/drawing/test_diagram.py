@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import hull, outline, rounded, thickness
@@ -248,8 +247,7 @@ def test_driven_link_and_arrow_have_their_own_colour(motions: dict[str, Any]) ->
 def test_arrow_turns_with_the_sense_of_the_driver(motions: dict[str, Any]) -> None:
     from dataclasses import replace
 
-    from graphsynth.mechanism.laws import Linear
-    from graphsynth.mechanism.model import Driver
+    from graphsynth.mechanism.laws import Driver, Linear
 
     def swept(rate: float) -> float:
         old = motions["lambda"].mechanism

@@ -7,15 +7,9 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.jamming_pictures import (
-    area_chart,
-    area_picture,
-    crossing_picture,
-    region_picture,
-    report_picture,
-    section_picture,
-    space_picture,
-)
+from graphsynth.drawing.bearing_in_space import space_picture
+from graphsynth.drawing.crossing_pictures import crossing_picture, region_picture
+from graphsynth.drawing.jamming_pictures import area_chart, area_picture, report_picture, section_picture
 from graphsynth.jamming import Bearing, ToleranceBox, assess_jamming
 from graphsynth.jamming.bearing.area_curve import area_curve
 from graphsynth.jamming.intersection import circle_ellipse, exact_hull, krawczyk_boxes

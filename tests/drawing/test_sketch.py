@@ -7,8 +7,7 @@ import re
 import xml.etree.ElementTree as ET
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from graphsynth.drawing.levels import draw_levels, level_order
 from graphsynth.drawing.sketch import Sketch

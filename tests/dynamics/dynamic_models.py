@@ -6,7 +6,8 @@ import math
 
 from graphsynth.dynamics import Body, DynamicModel, Force, Spring, Torque, TorsionSpring
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 

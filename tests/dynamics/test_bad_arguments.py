@@ -33,7 +33,8 @@ from graphsynth.dynamics import (
 from graphsynth.formats import ExudynSettings, MujocoSettings, run_mujoco, to_mjcf
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems import braider
 from graphsynth.systems.braider import Braider

@@ -8,24 +8,14 @@ import sys
 import numpy as np
 import pytest
 from dynamic_models import slider_crank
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError, MissingExtraError, SpecError
-from graphsynth.dynamics import (
-    Body,
-    DynamicModel,
-    Force,
-    JointFriction,
-    Pulse,
-    Spring,
-    Torque,
-    simulate_dynamics,
-)
+from graphsynth.dynamics import Body, DynamicModel, Force, JointFriction, Pulse, Spring, Torque, simulate_dynamics
 from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear, Polynomial
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear, Polynomial
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.tribometer.drives import BeltDrive, HarmonicDrive
 from graphsynth.systems.tribometer.general_model import general_model

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 from dynamic_models import bar, four_bar
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from graphsynth.core.errors import GeometryError
@@ -27,8 +26,8 @@ from graphsynth.dynamics import (
     simulate_dynamics,
 )  # fmt: skip
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Harmonic, Polynomial
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Harmonic, Polynomial
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 NO_GRAVITY = (0.0, 0.0)

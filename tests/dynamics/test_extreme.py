@@ -25,8 +25,8 @@ from graphsynth.dynamics.result import Checks
 from graphsynth.dynamics.steppers import CvodeStepper
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 

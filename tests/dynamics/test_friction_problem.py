@@ -15,7 +15,8 @@ from graphsynth.dynamics.friction.problem import FrictionProblem
 from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 G = 9.81

@@ -9,7 +9,8 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import Body, DynamicModel, Force, Pulse, Torque, consistent_start, inverse_dynamics
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 ARM = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])

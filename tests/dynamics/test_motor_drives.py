@@ -30,8 +30,8 @@ from graphsynth.dynamics import (
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.braider.model import Braider
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform

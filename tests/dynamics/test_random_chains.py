@@ -10,7 +10,8 @@ import pytest
 import graphsynth
 from graphsynth.dynamics import Body, DynamicModel, Spring, Torque, TorsionSpring, consistent_start, simulate_dynamics
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 

@@ -14,7 +14,8 @@ from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 from graphsynth.dynamics.trains import Train
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.braider import FourBar
 from graphsynth.systems.braider.model import Braider, Thread

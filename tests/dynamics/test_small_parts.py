@@ -19,7 +19,8 @@ from graphsynth.dynamics.result import Checks
 from graphsynth.dynamics.start import consistent_start
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.tribometer.kernels import plant
 

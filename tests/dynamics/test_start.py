@@ -7,7 +7,8 @@ from dynamic_models import bar, four_bar, g1, g3
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import Body, DynamicModel, consistent_start, simulate_dynamics
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 G3_START = {"keep": {(0, 1): 0.5}, "keep_rates": {(0, 1): 15.0}, "modes": {0: 1}}

@@ -2,8 +2,7 @@
 
 import math
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from graphsynth.evidence import Problem, Row, RowStatus, advice, front, knee, knees
 from graphsynth.evidence.choice import seconds_text

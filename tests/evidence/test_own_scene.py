@@ -9,7 +9,8 @@ import pytest
 from graphsynth.core.errors import GeometryError
 from graphsynth.evidence import Effort, RowStatus
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.pipeline.planar import evidence as planar
 from graphsynth.pipeline.scene import Scene, load_scene
 from graphsynth.pipeline.stages import Context

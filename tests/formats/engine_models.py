@@ -16,7 +16,8 @@ from graphsynth.dynamics import (
     consistent_start,
 )
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 LOOP = [(0, 1), (1, 2), (2, 3), (0, 3)]

@@ -8,14 +8,13 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth import formats
 from graphsynth.core.errors import FormatError, GraphError, SpecError
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear, Table
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear, Table
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 from graphsynth.testing import graphs

@@ -11,8 +11,7 @@ from dynamic_models import g1
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import consistent_start, simulate_dynamics
 from graphsynth.formats import ExudynSettings, run_exudyn
-from graphsynth.mechanism.laws import Harmonic
-from graphsynth.mechanism.model import Driver
+from graphsynth.mechanism.laws import Driver, Harmonic
 
 pytest.importorskip("exudyn")
 

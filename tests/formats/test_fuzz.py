@@ -19,8 +19,8 @@ import pytest
 from graphsynth import formats
 from graphsynth.core.errors import FormatError
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 

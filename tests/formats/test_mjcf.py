@@ -24,7 +24,8 @@ from graphsynth.dynamics import (
 )
 from graphsynth.formats import MujocoSettings, certify_export, run_mujoco, spanning_tree, to_mjcf
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 G1_THETA, G1_OMEGA = 19.151183313715786848, 13.058518322326194277

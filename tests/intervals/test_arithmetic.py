@@ -5,12 +5,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 from interval_samples import SPECIAL, bounds
 
-from graphsynth.intervals import Interval, divide_extended
-from graphsynth.intervals import arrays as numpy_form
+from graphsynth.intervals import Interval, arrays as numpy_form, divide_extended
 from graphsynth.testing import finite_numbers
 
 INF = math.inf

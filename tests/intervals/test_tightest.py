@@ -12,8 +12,7 @@ import pytest
 from interval_samples import bounds
 
 from graphsynth.intervals import Interval, arrays, blocks, hypot
-from graphsynth.intervals.kernels import arithmetic, loops
-from graphsynth.intervals.kernels import rounding as compiled
+from graphsynth.intervals.kernels import arithmetic, loops, rounding as compiled
 from graphsynth.intervals.reading import lower_bound, upper_bound
 
 INF = math.inf

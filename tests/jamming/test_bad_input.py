@@ -20,13 +20,13 @@ from graphsynth.jamming import (
     certified_largest_misalignment,
     certified_smallest_clearance,
     certify_jamming,
+    joints as coupled,
     largest_interference,
     sample_interference,
     smallest_clearance,
     sweep_linkage,
     wedging,
 )
-from graphsynth.jamming import joints as coupled
 from graphsynth.jamming.bearing.area_curve import area_curve
 from graphsynth.jamming.bearing.areas import lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.areas_enclosed import enclose_lid_area

@@ -9,8 +9,8 @@ import numpy as np
 
 from graphsynth.mechanism.constraints import jacobian
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.assur import find_fault
 from graphsynth.structure.graph import MechanismGraph
 

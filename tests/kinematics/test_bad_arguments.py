@@ -16,7 +16,8 @@ from graphsynth.kinematics.dimensional import PathGoal, PosesGoal, embody
 from graphsynth.kinematics.engine.batch import solve_rrr
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.antenna import PointingMechanism
 from graphsynth.systems.piston import rotary_assignments

@@ -7,8 +7,7 @@ from fractions import Fraction
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from graphsynth.intervals.balls import Balls, exact, tau_times, unit
 from graphsynth.intervals.guard import check_rounding

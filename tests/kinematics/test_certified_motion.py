@@ -8,8 +8,7 @@ from dataclasses import replace
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.balls import Balls, exact
@@ -19,8 +18,8 @@ from graphsynth.kinematics.certify.equations import MechanismSystem
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Harmonic, Linear, Polynomial, Table
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Harmonic, Linear, Polynomial, Table
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 

@@ -7,8 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.kinematics import simulate
@@ -20,8 +19,8 @@ from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.kinematics.dimensional.transmission import GroupForm, group_forms, transmission_sines
 from graphsynth.kinematics.dimensional.verify import length_ratio, smallest_transmission, verify
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 

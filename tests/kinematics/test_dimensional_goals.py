@@ -13,7 +13,8 @@ from graphsynth.kinematics.dimensional import FunctionGoal, Goals, LineGoal, Pat
 from graphsynth.kinematics.dimensional.verify import in_order, strip_width, verify
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)

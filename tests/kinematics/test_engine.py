@@ -8,16 +8,15 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.triad.assembly_modes import assembly_modes
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
-from graphsynth.mechanism.laws import Harmonic, Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Harmonic, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.platform.plane import directions
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform

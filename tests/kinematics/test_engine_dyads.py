@@ -10,8 +10,8 @@ import pytest
 
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)

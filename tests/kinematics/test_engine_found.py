@@ -15,8 +15,8 @@ from graphsynth.kinematics.engine.codes import E_PP
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.mechanism.constraints import residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear, Polynomial
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear, Polynomial
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -14,8 +14,8 @@ from graphsynth.kinematics.engine.batch import solve_rrr
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.mechanism.constraints import jacobian
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 

@@ -14,8 +14,8 @@ from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.escapes import between
 from graphsynth.kinematics.engine.events import _touch
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Harmonic, Linear, Table
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Harmonic, Linear, Table
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 TURN = np.linspace(0.0, math.tau, 73)

@@ -14,7 +14,8 @@ from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.start import sign_table
 from graphsynth.kinematics.engine.triads import conditions, triad_modes
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 TRIAD = MechanismGraph(6, [(0, 1), (1, 3), (2, 3), (2, 4), (0, 4), (2, 5), (0, 5)], frame=0)

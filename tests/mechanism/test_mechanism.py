@@ -9,14 +9,13 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import FormatError, GeometryError
 from graphsynth.mechanism.constraints import jacobian, residual
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Harmonic, Linear, Polynomial, Table
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Harmonic, Linear, Polynomial, Table
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 CYCLE = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)

@@ -17,7 +17,8 @@ import pytest
 from graphsynth.core.errors import SceneError, TooLargeError
 from graphsynth.jamming.bearing.bearing import Bearing
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.pipeline.planar import stages as stages
 from graphsynth.pipeline.planar.stages import scaled
 from graphsynth.pipeline.runner import execute, run

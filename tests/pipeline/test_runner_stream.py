@@ -11,8 +11,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from graphsynth.core.errors import SceneError
 from graphsynth.pipeline.products import Objective, Outcome, Quantity, Record

@@ -16,21 +16,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from graphsynth.core.errors import SceneError
 from graphsynth.jamming.bearing.arcs import jam_arcs
 from graphsynth.jamming.bearing.bearing import Bearing
 from graphsynth.jamming.bearing.limits import largest_misalignment, smallest_clearance
 from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.mechanism.rotatability import KINDS, TYPES
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import BudgetTable, Scene, find_scene, load_scene
 from graphsynth.pipeline.stages import Context
-from graphsynth.systems.four_bar_survey import motion as survey_motion
-from graphsynth.systems.four_bar_survey import stages as stages
+from graphsynth.systems.four_bar_survey import motion as survey_motion, stages as stages
 from graphsynth.systems.four_bar_survey.jamming import close_form
-from graphsynth.systems.four_bar_survey.lattice import KINDS, TYPES, classify, lattice_of
+from graphsynth.systems.four_bar_survey.lattice import classify, lattice_of
 from graphsynth.systems.four_bar_survey.motion import move
 from graphsynth.systems.four_bar_survey.results import certify
 from graphsynth.systems.four_bar_survey.stages import QUANTITIES, evaluate_sets, front_of, losses_of, objectives_of

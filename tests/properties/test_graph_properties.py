@@ -1,7 +1,6 @@
 import networkx as nx
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import FormatError
 from graphsynth.structure.graph import MechanismGraph

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from hypothesis import event, given, settings
-from hypothesis import strategies as st
+from hypothesis import event, given, settings, strategies as st
 
 from graphsynth import Mechanism, StructuralSpec, enumerate_mechanisms, simulate
 from graphsynth.kinematics.certify import certify_four_bar

@@ -10,8 +10,7 @@ from functools import cache
 from itertools import combinations_with_replacement, product
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from graphsynth import StructuralSpec
 from graphsynth.core.errors import InfeasibleSpecError, SpecError

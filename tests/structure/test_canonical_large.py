@@ -7,8 +7,7 @@ from math import factorial, prod
 
 import networkx as nx
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import TooLargeError
 from graphsynth.structure import search

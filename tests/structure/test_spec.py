@@ -15,7 +15,7 @@ import pytest
 import graphsynth
 from graphsynth import LinkAssortment, StructuralSpec
 from graphsynth.core.errors import InfeasibleSpecError, SpecError, TooLargeError
-from graphsynth.structure.system.spec import solutions_table
+from graphsynth.structure.system.assortment import solutions_table
 
 SOURCE = {"W": 1, "Pi": 3, "v_ct": 6, "p": 22, "p2": 3, "n": 14, "t0": 7}
 FIVE = [(5, 9, 0), (6, 7, 1), (7, 5, 2), (8, 3, 3), (9, 1, 4)]

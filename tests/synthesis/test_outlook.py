@@ -4,13 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from graphsynth import (
-    StructuralSpec,
-    count_assur_groups,
-    count_baranov_trusses,
-    count_chains,
-    count_mechanisms,
-)
+from graphsynth import StructuralSpec, count_assur_groups, count_baranov_trusses, count_chains, count_mechanisms
 from graphsynth.cli import main
 from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.system.solving import number_of_solutions, solutions

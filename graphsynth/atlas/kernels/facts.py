@@ -8,7 +8,8 @@ import numpy as np
 
 from graphsynth.atlas.kernels.grouping import groups_of
 from graphsynth.core.compilation import kernel
-from graphsynth.structure.kernels import ONE, ZERO, canon, canon_workspace, lowest_bit, popcount
+from graphsynth.core.intrinsics import lowest_bit, popcount
+from graphsynth.structure.kernels import ONE, ZERO, canon, canon_workspace
 
 #: A group with its base has at most 17 vertices, and 136 pairs of them: they fit into three words.
 MOST_LINKS = 18

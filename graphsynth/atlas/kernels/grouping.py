@@ -7,7 +7,8 @@ frame: frame and driven links are one placed body, every other link is a body of
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.structure.kernels import ONE, ZERO, lowest_bit
+from graphsynth.core.intrinsics import lowest_bit
+from graphsynth.structure.kernels import ONE, ZERO
 
 #: Constraints of a joint, and freedoms of a body, in the plane.
 PER_JOINT, PER_BODY = 2, 3

@@ -1,2 +1,1 @@
-from .building import SiteReport as SiteReport
-from .building import build_site as build_site
+from .building import SiteReport as SiteReport, build_site as build_site

@@ -9,14 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.atlas.site.families import (
-    Family,
-    contents,
-    families,
-    family_script,
-    groups_script,
-    relatives_script,
-)
+from graphsynth.atlas.site.families import Family, contents, families, family_script, groups_script, relatives_script
 from graphsynth.atlas.site.motions import MotionTask, motion_of
 from graphsynth.atlas.site.place import MARK, replaced, unwritten
 from graphsynth.atlas.site.sketches import PER_FILE, sketch_scripts
@@ -25,8 +18,6 @@ from graphsynth.core.errors import GraphsynthError, SpecError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
-
-__all__ = ["SCRIPTS", "SiteReport", "build_site"]
 
 #: Scripts of the page, in the order in which they are loaded.
 SCRIPTS = (

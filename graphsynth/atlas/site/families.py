@@ -10,16 +10,6 @@ from typing import Any
 
 from graphsynth.structure.canonical import decode_key
 
-__all__ = [
-    "Family",
-    "contents",
-    "families",
-    "family_script",
-    "groups_script",
-    "relatives_script",
-    "script",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Family:

@@ -9,8 +9,6 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["MotionTask", "ShownMotion", "choice_of", "motion_of"]
-
 #: Frames and drivers tried, and searches for dimensions with each.
 _CHOICES, _TRIES = 3, 4
 #: Samples of a turn with stored dimensions.

@@ -10,8 +10,6 @@ from pathlib import Path
 
 from graphsynth.core.errors import GraphsynthError
 
-__all__ = ["MARK", "replaced", "unwritten"]
-
 #: In every folder that was written as a page.
 MARK = "atlas-page.txt"
 #: What pages consist of; a folder with anything else is somebody's.

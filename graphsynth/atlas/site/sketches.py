@@ -7,8 +7,6 @@ from concurrent.futures import Executor
 
 from graphsynth.atlas.site.families import Family, script
 
-__all__ = ["PER_FILE", "places_of", "sketch_scripts"]
-
 #: Chains in one file of sketches: about 70 kB for twelve links.
 PER_FILE = 1024
 _CHUNK = 64

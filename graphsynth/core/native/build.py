@@ -22,8 +22,6 @@ from graphsynth.core.native.doctor import kernels
 from graphsynth.core.native.library import FOLDER, LEVELS, target
 from graphsynth.core.native.signatures import LIST, Signature, code_of, parse, read_list
 
-__all__ = ["build", "main"]
-
 _RUNTIME = (
     "NRT_Allocate NRT_Free NRT_MemInfo_alloc_aligned NRT_MemInfo_alloc_safe_aligned NRT_MemInfo_call_dtor numba_frexp "
     "NRT_MemInfo_alloc numba_ldexp numba_nextafter memcpy memmove memset memcmp"

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 import graphsynth
 from graphsynth.core.native import library
 
-__all__ = ["Finding", "examine", "kernels"]
-
 #: Places that machine code comes from.
 LIBRARY, INSIDE = "in the library", "in the library as parts of others"
 KEPT, MEMORY, COMPILED = "compiled here and kept on disk", "compiled in memory", "compiled when first used"

@@ -14,8 +14,6 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
-__all__ = ["FOLDER", "LEVELS", "Native", "contents", "path", "reason", "target"]
-
 FOLDER = Path(__file__).parent
 #: Versions of the code in a library, the plainest first.
 LEVELS = {"x86_64": ("x86-64-v2", "x86-64-v3")}

@@ -19,8 +19,6 @@ from typing import Any
 from graphsynth.core.native.library import FOLDER
 from graphsynth.core.native.signatures import Signature, read_list, text_of, write_list
 
-__all__ = ["VARIABLE", "main", "noting", "united"]
-
 #: Environment variable that names the file where calls are noted.
 VARIABLE = "GRAPHSYNTH_RECORD"
 _ROOT = FOLDER.parents[2]

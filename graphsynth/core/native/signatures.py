@@ -13,8 +13,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-__all__ = ["LIST", "Signature", "code_of", "parse", "read_list", "text_of", "write_list"]
-
 LIST = Path(__file__).with_name("signatures.txt")
 _HEAD = """\
 # Calls of kernels that are compiled ahead of time: made by ``python -m graphsynth.core.native.record``, sorted.

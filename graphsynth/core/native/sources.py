@@ -7,8 +7,6 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-__all__ = ["source_digest", "sources"]
-
 _IMPORT = re.compile(r"^\s*(?:from|import)\s+(graphsynth[\w.]*)(?:\s+import\s+(\([^)]*\)|[^#\n]+))?", re.MULTILINE)
 _TRIPLE = r'"""[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"""'
 #: A docstring; any other text, which is kept; a comment; lines without anything.

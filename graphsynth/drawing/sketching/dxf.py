@@ -14,8 +14,6 @@ from graphsynth.core.extras import need
 from graphsynth.drawing.shapes import LAYERS, Circle, Path, Placement, Point, Shape, Text, placement
 from graphsynth.drawing.sketch import Sketch
 
-__all__ = ["dxf", "save_dxf"]
-
 _ALIGN = {"middle": "MIDDLE_CENTER", "start": "MIDDLE_LEFT", "end": "MIDDLE_RIGHT"}
 _CURVE = 12  # straight pieces of a curve
 

@@ -9,8 +9,6 @@ from graphsynth.core.errors import GraphsynthError
 from graphsynth.drawing import canvas
 from graphsynth.drawing.sketch import Sketch
 
-__all__ = ["SUFFIXES", "save"]
-
 #: Suffixes of pictures.
 SUFFIXES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 

@@ -14,8 +14,6 @@ from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.shapes import Circle, Path, Placement, Point, Shape, Style, Text, placement
 from graphsynth.drawing.sketch import Sketch
 
-__all__ = ["MAX_WIDTH", "document", "tikz"]
-
 #: Widest picture in centimetres: the column of LaTeX's article class at 10 pt is 12.1 cm wide.
 MAX_WIDTH = 12.0
 _CM = 2.54 / 96.0

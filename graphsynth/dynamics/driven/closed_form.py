@@ -11,8 +11,6 @@ from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.motors import DCMotor, number, numbers
 from graphsynth.dynamics.trains import Train
 
-__all__ = ["linear_response"]
-
 Array = NDArray[np.float64]
 
 

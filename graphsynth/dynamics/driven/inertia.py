@@ -12,8 +12,6 @@ from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.motors import number, numbers
 
-__all__ = ["EffectiveInertia"]
-
 Array = NDArray[np.float64]
 
 

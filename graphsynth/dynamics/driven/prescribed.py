@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.run import DriveRun, Plant, RunStatus
-from graphsynth.dynamics.driven.setup import output_times, prepare
+from graphsynth.dynamics.driven.run import DriveRun, RunStatus
+from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
 from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, number
 from graphsynth.dynamics.trains import Train
-
-__all__ = ["prescribed_run"]
 
 Array = NDArray[np.float64]
 #: Largest angle of a panel of the quadrature that checks the energy, rad.

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.driven.run import DriveRun, Plant, run
-from graphsynth.dynamics.driven.setup import output_times
+from graphsynth.dynamics.driven.run import DriveRun, run
+from graphsynth.dynamics.driven.setup import Plant, output_times
 from graphsynth.dynamics.motors import DCMotor, Motor, SynchronousMotor, number
 from graphsynth.dynamics.trains import Train
-
-__all__ = ["ReductionStudy", "choose_motor", "inductance_study", "reduction_error"]
 
 Array = NDArray[np.float64]
 

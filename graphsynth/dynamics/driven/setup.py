@@ -20,8 +20,6 @@ from graphsynth.dynamics.motors import (
 )
 from graphsynth.dynamics.trains import Train
 
-__all__ = ["Plant", "Prepared", "load_coefficients", "output_times", "prepare"]
-
 Array = NDArray[np.float64]
 
 

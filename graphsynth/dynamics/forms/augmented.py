@@ -16,8 +16,6 @@ from graphsynth.dynamics.steppers import ONE_STAGE, Stages
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots
 
-__all__ = ["AugmentedForm"]
-
 if TYPE_CHECKING:
     from graphsynth.dynamics.stepping import Trail
 

@@ -14,8 +14,6 @@ from graphsynth.dynamics.steppers import Stages
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots
 
-__all__ = ["PartitionedForm", "independent_coordinates"]
-
 Array = NDArray[np.float64]
 
 #: Coordinates are changed when the smallest pivot falls below this part of what it was when they were chosen.

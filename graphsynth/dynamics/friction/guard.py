@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.integrate import Form
     from graphsynth.dynamics.stepping import Stepper
 
-__all__ = ["Guard"]
-
 Array = NDArray[np.float64]
 
 #: Places inside a step where sticking is looked at, as parts of it.

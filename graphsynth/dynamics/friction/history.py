@@ -12,8 +12,6 @@ from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.result import FrictionHistory
 from graphsynth.dynamics.tables import Compiled
 
-__all__ = ["FrictionAt", "friction_at", "friction_history", "open_shares"]
-
 Array = NDArray[np.float64]
 
 

@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import check_fields
 from graphsynth.core.errors import SpecError
 
-__all__ = ["FrictionLaw", "StribeckLaw", "TwoCoefficientLaw", "finite", "positive"]
-
 
 def finite(name: str, value: float) -> float:
     """Return a number as float, or refuse it.

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.friction.rows import FrictionRows
 
-__all__ = ["LinearResponse", "respond"]
-
 Array = NDArray[np.float64]
 
 #: Singular values of the joints' rows below this part of the largest count as zero.

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from graphsynth.dynamics.friction.rows import FrictionElement
 
-__all__ = ["fitting_loads"]
-
 Array = NDArray[np.float64]
 
 #: Relative residual of loads that count as solved, difference of loads that count as equal, and rounding of sums.

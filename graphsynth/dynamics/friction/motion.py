@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.friction.guard import Guard
     from graphsynth.dynamics.integrate import Form
 
-__all__ = ["DryMotion", "RestForm", "rest_until"]
-
 Array = NDArray[np.float64]
 
 #: Steps of the search over the whole time: the longest, and the first.

@@ -20,8 +20,6 @@ from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads
 
-__all__ = ["AT_REST", "MOST", "NO_LOADS", "FrictionProblem", "FrictionSolution", "joint_names"]
-
 Array = NDArray[np.float64]
 Senses = tuple[int, ...]
 

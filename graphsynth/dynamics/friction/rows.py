@@ -13,8 +13,6 @@ from graphsynth.dynamics.elements import JointFriction
 from graphsynth.dynamics.tables import Compiled, RowInfo, coordinate_row
 from graphsynth.kinematics.engine import codes
 
-__all__ = ["FrictionElement", "FrictionRows", "locked"]
-
 Array = NDArray[np.float64]
 
 

@@ -13,8 +13,6 @@ from graphsynth.dynamics.friction.rows import FrictionRows, locked
 from graphsynth.dynamics.kernels import accelerate, constraint_system, load_vector, state_rows
 from graphsynth.dynamics.tables import BY_SPEED, Compiled
 
-__all__ = ["Decision", "Piece", "decide", "make_piece", "state_values"]
-
 Array = NDArray[np.float64]
 
 

@@ -32,8 +32,6 @@ from graphsynth.core.errors import SpecError
 if TYPE_CHECKING:
     from graphsynth.evidence.stress.checks import Checks
 
-__all__ = ["KINDS", "PAGES", "Case", "read_cases", "stress_cases"]
-
 #: First word of an id -> title of the page.
 PAGES = {
     "lambda": "Lambda linkage and bearing jamming",

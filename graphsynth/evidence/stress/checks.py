@@ -17,8 +17,6 @@ from typing import Any
 
 from graphsynth.core.errors import GraphsynthError
 
-__all__ = ["Check", "Checks", "Status", "exact"]
-
 
 class Status(enum.Enum):
     """Outcome of a check or of a case; a case has the worst of its checks."""

@@ -14,8 +14,6 @@ from graphsynth.evidence.stress.checks import SEVERITY, Check, Status
 if TYPE_CHECKING:
     from graphsynth.evidence.stress.running import Outcome, StressReport
 
-__all__ = ["stress_html", "write_report"]
-
 _CSS = """
 :root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;
 --good:#00735a;--told:#0b66b0;--bad:#b3261e;--none:#8a6100}

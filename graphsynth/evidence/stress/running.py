@@ -21,8 +21,6 @@ from graphsynth.evidence.stress.checks import SEVERITY, Check, Checks, Status
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Outcome", "StressReport", "run_case", "run_stress"]
-
 
 @dataclass(frozen=True)
 class Outcome:

@@ -252,9 +252,3 @@ def power(al, ah, n):
         l, h = absolute(al, ah)
         lo, hi = power_down(l, m), power_up(h, m)
     return (lo, hi) if n > 0 else divide(1.0, 1.0, lo, hi)
-
-
-__all__ = [
-    "absolute", "add", "divide", "down", "multiply", "power", "power_down", "power_up", "root", "scale", "square",
-    "subtract", "up",
-]  # fmt: skip

@@ -9,17 +9,7 @@ from graphsynth.core.compilation import kernel
 from graphsynth.core.intrinsics import fma
 from graphsynth.intervals import constants
 from graphsynth.intervals.kernels import double_double as dd
-from graphsynth.intervals.kernels.rounding import (
-    ETA,
-    INF,
-    MAX,
-    add_down,
-    add_up,
-    multiply_both,
-    root_down,
-    root_up,
-    up,
-)
+from graphsynth.intervals.kernels.rounding import ETA, INF, MAX, add_down, add_up, multiply_both, root_down, root_up, up
 
 _LOG2 = Fraction(constants.log2_fixed(300), 2**300)
 _TOP = float(Fraction(int(_LOG2 * 2**40), 2**40))  # 40 bits: its products with exponents are exact

@@ -21,7 +21,7 @@ from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.certify import TurnCertificate
     from graphsynth.jamming.joints.limits import Limits, Misalignment
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
 
 Array = NDArray[np.float64]

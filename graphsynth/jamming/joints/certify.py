@@ -26,7 +26,7 @@ from graphsynth.jamming.joints.search import Budget, MemberWitness, jamming_memb
 from graphsynth.jamming.verdict import Verdict
 
 if TYPE_CHECKING:
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
 
 States = NDArray[np.int8]

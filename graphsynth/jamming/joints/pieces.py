@@ -21,14 +21,7 @@ from graphsynth.core.checks import finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, check_rounding
 from graphsynth.jamming.joints.closure import Layout
-from graphsynth.jamming.joints.enclosure import (
-    Moving,
-    Pieces,
-    lower_bounds,
-    shifts_enclosed,
-    start_tilts,
-    upper_bounds,
-)
+from graphsynth.jamming.joints.enclosure import Moving, Pieces, lower_bounds, shifts_enclosed, start_tilts, upper_bounds
 from graphsynth.jamming.joints.exact import neglected
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.positions import Positions
@@ -36,7 +29,7 @@ from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_
 from graphsynth.jamming.joints.tubes import Tubes, linked, points, prove_tubes, slopes
 
 if TYPE_CHECKING:
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
 
 #: Widest angle between two corners (the polygon is 0.9 % larger than the circle), most corners, largest radius.

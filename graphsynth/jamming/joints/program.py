@@ -351,7 +351,7 @@ class JointProblem:
 
 def check_motion(motion: Any) -> None:
     """Refuse anything that is no `Motion`."""
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
     if not isinstance(motion, Motion):
         raise GeometryError(f"motion = {motion!r} is no Motion; give the result of simulate(mechanism, inputs)")

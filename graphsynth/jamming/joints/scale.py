@@ -27,7 +27,7 @@ from graphsynth.jamming.joints.program import Bearings, check_motion, problem
 from graphsynth.jamming.joints.search import Budget
 
 if TYPE_CHECKING:
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, JointProblem, check_motion, problem
 
 if TYPE_CHECKING:
-    from graphsynth.kinematics.simulation import Motion
+    from graphsynth.kinematics.engine.result import Motion
 
 
 Array = NDArray[np.float64]

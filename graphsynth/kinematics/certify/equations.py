@@ -17,11 +17,9 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.balls import Balls, argument, exact, root, stack, tau_times, unit
 from graphsynth.mechanism.equations import Gradient, Number, Seen, derivatives
 from graphsynth.mechanism.joints import Cam, JointGeometry, Prismatic, Revolute
-from graphsynth.mechanism.laws import Harmonic, Law, Linear, Polynomial
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver, Harmonic, Law, Linear, Polynomial
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import characteristic_length
-
-__all__ = ["MechanismSystem", "enclosed", "law_over", "whole_periods"]
 
 Array = NDArray[np.float64]
 

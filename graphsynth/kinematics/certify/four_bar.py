@@ -18,14 +18,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.exact import ball, precision, rational
 from graphsynth.mechanism.rotatability import KINDS, four_bar_rotation, rotation_kind, type_of
 
-__all__ = [
-    "CrankCertificate",
-    "LimitAngle",
-    "certify_four_bar",
-    "certify_inverted_slider_crank",
-    "certify_slider_crank",
-]
-
 _BITS = 80
 #: Kinds with limits.
 _BOUNDED = ("limited", "immovable")

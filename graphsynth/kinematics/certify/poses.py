@@ -20,8 +20,6 @@ from graphsynth.kinematics.certify.equations import MechanismSystem, enclosed, w
 from graphsynth.kinematics.engine.result import Motion
 from graphsynth.mechanism.joints import Gear, Prismatic
 
-__all__ = ["MotionCertificate", "Verdict", "certify"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Embodiment", "embody"]
-
 #: Searches for a target that are continued to their end.
 _CONTINUED = 2
 

@@ -10,8 +10,6 @@ from graphsynth.core.errors import GraphError
 from graphsynth.structure.assur import decompose, find_fault
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["Drivers", "choices"]
-
 #: A driver is a link on the frame, or (base, link).
 Drivers = int | tuple[int, int] | Iterable[int | tuple[int, int]]
 

@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["crossing_pairs", "fewest_crossings", "merged"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 IntArray = NDArray[np.intp]

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.mechanism.joints import COLUMNS, JointGeometry, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
-
-__all__ = ["Design"]
 
 Array = NDArray[np.float64]
 

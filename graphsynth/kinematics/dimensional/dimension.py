@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from graphsynth.kinematics.dimensional.goals import LineGoal
 from graphsynth.kinematics.dimensional.problem import Problem
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
-
-__all__ = ["dimensioned"]
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism, TracePoint
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,6 @@ from graphsynth.core.errors import GeometryError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-__all__ = ["FunctionGoal", "Goals", "LineGoal", "PathGoal", "PosesGoal", "Target"]
-
 Array = NDArray[np.float64]
 
 

@@ -14,11 +14,10 @@ from graphsynth.kinematics.dimensional.goals import Goals
 from graphsynth.kinematics.dimensional.sketch import layout
 from graphsynth.kinematics.dimensional.targets import Fit, PathFit, Placed, Sampled, make_fit, target_link
 from graphsynth.kinematics.dimensional.transmission import group_forms, transmission_sines
-from graphsynth.kinematics.simulation import simulate, simulate_batch
-from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Driver, Mechanism
-
-__all__ = ["Outcome", "Problem"]
+from graphsynth.kinematics.engine.batch import simulate_batch
+from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.laws import Driver, Linear
+from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -19,8 +19,6 @@ from numpy.typing import NDArray
 
 from graphsynth.kinematics.dimensional.problem import INCOMPLETE, OUTSIDE, Problem
 
-__all__ = ["EXACT", "HistoryRow", "Search", "search", "verdict"]
-
 Array = NDArray[np.float64]
 
 #: Merit at which a search without a target is content: all bounds kept with this to spare.

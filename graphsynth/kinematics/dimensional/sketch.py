@@ -23,8 +23,6 @@ from graphsynth.core.errors import GraphError
 from graphsynth.kinematics.dimensional.crossings import crossing_pairs, fewest_crossings, merged
 from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["JointLayout", "layout"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Polygons = tuple[tuple[int, ...], ...]

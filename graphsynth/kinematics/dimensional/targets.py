@@ -17,8 +17,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.dimensional.design import Design
 from graphsynth.kinematics.dimensional.goals import FunctionGoal, LineGoal, PathGoal, PosesGoal, Target
 
-__all__ = ["Fit", "Sampled", "make_fit", "target_link"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

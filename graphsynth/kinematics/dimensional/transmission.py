@@ -21,8 +21,6 @@ from graphsynth.kinematics.engine.program import Step
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["GroupForm", "group_forms", "transmission_sines"]
-
 Array = NDArray[np.float64]
 
 

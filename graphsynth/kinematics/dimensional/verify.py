@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Figures", "length_ratio", "smallest_transmission", "verify"]
-
 Array = NDArray[np.float64]
 
 _SAMPLES = 720

@@ -21,8 +21,6 @@ from graphsynth.kinematics.engine.start import initial, lines_of_centres, sign_t
 from graphsynth.mechanism.joints import COLUMNS, Gear
 from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["BatchMotion", "simulate_batch", "solve_rrr"]
-
 Array = NDArray[np.float64]
 
 _REASONS = {
@@ -155,7 +153,8 @@ def simulate_batch(
 
     Examples
     --------
-    >>> from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph, Revolute
+    >>> from graphsynth.mechanism.laws import Driver
+    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph, Revolute
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     >>> base = Mechanism(graph, [
     ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),

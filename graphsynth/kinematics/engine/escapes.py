@@ -22,18 +22,6 @@ from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, Step
 from graphsynth.kinematics.engine.result import MotionEvent
 
-__all__ = [
-    "between",
-    "blow_up",
-    "centres_that_meet",
-    "closed_limit",
-    "escape_at",
-    "escapes",
-    "lost_before",
-    "pivot_passes",
-    "refined",
-]
-
 #: Cosine of the largest turn of a link between neighbouring samples that is taken as it is.
 _SUDDEN = 0.5
 #: Halvings after which the step of the grid has no double left in it.

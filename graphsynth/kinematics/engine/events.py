@@ -23,8 +23,6 @@ from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
 from graphsynth.kinematics.engine.program import Step
 from graphsynth.kinematics.engine.result import MotionEvent
 
-__all__ = ["ending", "flattest", "touches"]
-
 Array = NDArray[np.float64]
 
 #: A margin that dips below this between samples is examined.

@@ -16,8 +16,6 @@ from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
 from graphsynth.kinematics.engine.program import Program
 
-__all__ = ["Delivery", "Stop", "Trace", "Tracker", "run_program", "workspace"]
-
 Array = NDArray[np.float64]
 
 #: Smallest step, relative to the length of the whole range.

@@ -15,9 +15,8 @@ from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.laws import LAWS, Linear
 
 if TYPE_CHECKING:
-    from graphsynth.mechanism.model import Driver, Mechanism
-
-__all__ = ["coordinates", "fine_grid", "full_turn", "monotonic", "warn_of_degrees"]
+    from graphsynth.mechanism.laws import Driver
+    from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 

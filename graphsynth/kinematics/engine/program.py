@@ -23,8 +23,6 @@ from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rank import characteristic_length
 from graphsynth.structure.assur import Decomposition, decompose
 
-__all__ = ["Program", "Step", "compile_program"]
-
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Complex = NDArray[np.complex128]

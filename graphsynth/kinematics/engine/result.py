@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.program import Step
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["Closure", "Motion", "MotionEvent", "PointPath"]
-
 Array = NDArray[np.float64]
 
 

@@ -14,8 +14,6 @@ from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.result import MotionEvent
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 
-__all__ = ["dead_centres"]
-
 Array = NDArray[np.float64]
 #: Speed and acceleration of a joint coordinate at all samples of a trace.
 Rate = Callable[[Trace], tuple[Array, Array]]

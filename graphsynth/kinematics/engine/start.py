@@ -15,8 +15,6 @@ from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program
 from graphsynth.kinematics.engine.triads import conditions, triad_modes
 
-__all__ = ["group_modes", "initial", "lines_of_centres", "sign_table", "started", "with_turns"]
-
 Array = NDArray[np.float64]
 
 _STARTS = 200

@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.program import Program
 
-__all__ = ["Condition", "conditions", "triad_modes"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

@@ -20,8 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import LARGEST, SMALLEST, check_largest, positive
 from graphsynth.core.errors import GeometryError
 
-__all__ = ["AssemblyModeBatch", "AssemblyModes", "Sextic", "assembly_modes", "assembly_modes_batch", "sextic"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from graphsynth.kinematics.triad.assembly_modes import Arms
 
-__all__ = ["escalate"]
-
 Array = NDArray[np.float64]
 
 _DIGITS = 50

@@ -15,8 +15,6 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["LegSolution", "LegStatus", "PlatformLegs", "length_constants", "solve_leg"]
-
 Array = NDArray[np.float64]
 
 _SPLITTER = 134217729.0  # 2^27 + 1, Dekker's constant for binary64

@@ -16,8 +16,6 @@ from graphsynth.evidence.rows import Effort, Problem
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = ["coupled_joints", "dimensions", "linkage_dynamics", "path_dimensions", "positions"]
-
 #: Candidates that are given dimensions before the first that moved is taken.
 _LOOKED_AT = 12
 

@@ -20,24 +20,6 @@ if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
     from graphsynth.mechanism.model import Mechanism
 
-__all__ = [
-    "Built",
-    "Driven",
-    "FileCandidate",
-    "Jammed",
-    "Moved",
-    "assess",
-    "dynamics",
-    "embody",
-    "jamming",
-    "mechanisms",
-    "model_of",
-    "move",
-    "scaled",
-    "take",
-    "write",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class FileCandidate:

@@ -12,8 +12,6 @@ from graphsynth.pipeline.stages import Context
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
 
-__all__ = ["animations", "plots", "sketches"]
-
 _FRAMES = 72
 
 

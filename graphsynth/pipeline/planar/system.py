@@ -13,9 +13,6 @@ from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import In, Positions, require
 from graphsynth.pipeline.units import DEGREE
 
-__all__ = ["SYSTEM", "BearingsTable", "EmbodyTable", "LoadsTable", "MotionTable", "MotorTable", "PlanarTable"]
-
-
 Deg = Annotated[float, In("deg")]
 Degs = Annotated[tuple[float, ...], In("deg")]
 

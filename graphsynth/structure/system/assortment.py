@@ -11,8 +11,6 @@ from graphsynth.core.errors import SpecError
 from graphsynth.core.wording import shown, whole
 from graphsynth.structure.system.variables import LARGEST, Counts
 
-__all__ = ["LinkAssortment", "solutions_table"]
-
 _KIND = re.compile(r"([np])([1-9][0-9]{0,3})")
 
 

@@ -19,8 +19,6 @@ from graphsynth.structure.system.equations import (
 )
 from graphsynth.structure.system.variables import SPACES, Range, show_range
 
-__all__ = ["explain"]
-
 _BUDGET = 400  # search nodes of one feasibility test; a test that runs out counts as "feasible": sound, not minimal
 _TRIES = 40  # values tried of a variable without an upper bound
 

@@ -16,8 +16,6 @@ from typing import TypeAlias
 
 from graphsynth.structure.system.variables import Range
 
-__all__ = ["EQUATIONS", "NATURAL", "Domains", "Problem", "Row", "domains_of", "propagate", "rows_of"]
-
 Domains: TypeAlias = "dict[str, Range]"
 
 #: Printed form of the equations, in the order of docs/explanation/structural-system.md.

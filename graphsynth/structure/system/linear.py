@@ -11,8 +11,6 @@ from fractions import Fraction
 from graphsynth.structure.system.equations import Row
 from graphsynth.structure.system.variables import Range
 
-__all__ = ["maximum"]
-
 _Terms = dict[str, Fraction]
 
 

@@ -11,17 +11,6 @@ from graphsynth.core.errors import FormatError, SpecError
 from graphsynth.core.wording import nearest, shown, whole
 from graphsynth.structure.system.variables import ALIASES, LARGEST, Range, is_variable, read_range, show_range
 
-__all__ = [
-    "assigned_question",
-    "changed_question",
-    "is_single",
-    "load_toml",
-    "plain_question",
-    "read_question",
-    "symbol_of",
-    "toml_of",
-]
-
 OPTIONS = ("fractionated", "simple_joints", "max_joint_mobility", "max_link_joints", "levels")
 _SYMBOLS = ("W", "Pi", "n", "N", "p", "p1", "p2", "p3", "p4", "p5", "t0", "n2", "n3", "n4", "n5", "n6")
 _KNOWN = (*_SYMBOLS, "v", "v_ct", "v_P", "G", *ALIASES, *OPTIONS)

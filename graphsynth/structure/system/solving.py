@@ -17,8 +17,6 @@ from graphsynth.structure.system.equations import Domains, Problem, Row, domains
 from graphsynth.structure.system.linear import maximum
 from graphsynth.structure.system.variables import LARGEST, SPACES, Counts, Range
 
-__all__ = ["number_of_solutions", "solutions"]
-
 _WORDS = {"n": "n (moving links)", "p": "p (joints)", "W": "W (mobility)"}
 
 

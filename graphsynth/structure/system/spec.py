@@ -10,13 +10,11 @@ from typing import Any
 from graphsynth.core.errors import FormatError, SpecError, TooLargeError
 from graphsynth.core.wording import shown, whole
 from graphsynth.structure.system import reading
-from graphsynth.structure.system.assortment import LinkAssortment, solutions_table
+from graphsynth.structure.system.assortment import LinkAssortment
 from graphsynth.structure.system.clash import explain
 from graphsynth.structure.system.equations import Problem
 from graphsynth.structure.system.solving import number_of_solutions, solutions
 from graphsynth.structure.system.variables import SPACES, Range, order_key, show_range
-
-__all__ = ["LinkAssortment", "StructuralSpec", "solutions_table"]
 
 #: Kinds of moving links in a question of the source's form: its system reads n = n_2 + n_3 + n_4.
 SOURCE_LINK_JOINTS = 4

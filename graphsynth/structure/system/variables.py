@@ -11,9 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
 
 from graphsynth.core.errors import SpecError
-from graphsynth.core.wording import index_of, nearest, shown
-
-__all__ = ["ALIASES", "LARGEST", "SPACES", "Counts", "Range", "nearest", "order_key", "read_range", "show_range"]
+from graphsynth.core.wording import index_of, shown
 
 Range: TypeAlias = "tuple[int | None, int | None]"
 

@@ -15,8 +15,6 @@ from graphsynth.drawing.svg import painted, words
 if TYPE_CHECKING:
     from graphsynth.systems.antenna.mechanism import PointingMechanism
 
-__all__ = ["pointing_animation", "project"]
-
 Array = NDArray[np.float64]
 _ROUND = 'stroke-linecap="round" stroke-linejoin="round"'
 _CIRCLE = 48

@@ -19,8 +19,6 @@ from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 if TYPE_CHECKING:
     from graphsynth.systems.antenna import PointingMechanism
 
-__all__ = ["pointing_errors", "pose_problem", "poses", "rod_angles"]
-
 Array = NDArray[np.float64]
 _DIGITS = 50
 _REFERENCE = f"Newton's method with {_DIGITS} digits on the lengths of both rods"

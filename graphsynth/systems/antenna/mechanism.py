@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.antenna.sweep import PointingSweep
     from graphsynth.systems.antenna.tolerance import Tolerance
 
-__all__ = ["PointingMechanism"]
-
 
 @dataclass(frozen=True)
 class PointingMechanism(PointingDimensions):

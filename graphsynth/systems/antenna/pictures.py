@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.antenna.mechanism import PointingMechanism
     from graphsynth.systems.antenna.model import Poses
 
-__all__ = [
-    "comparison_picture",
-    "difference_map_picture",
-    "fold_map_picture",
-    "pointing_picture",
-    "tolerance_map_picture",
-]
-
 Array = NDArray[np.float64]
 
 _LEG_Y, _LEG_X, _REST = LIGHT["a"], LIGHT["b"], LIGHT["soft"]

@@ -30,11 +30,6 @@ if TYPE_CHECKING:
         Tolerance,
     )
 
-__all__ = [
-    "AntennaMotion", "CrossCheck", "SingularPoses", "antenna_of", "assess", "compare", "cross_check", "other_model",
-    "singular_poses", "solvers", "sweep", "table_of", "tolerances", "widths_of",
-]  # fmt: skip
-
 #: Keys of the lengths in the order l1 to l5.
 LENGTH_NAMES = ("cardan", "rod_y", "crank_y", "rod_x", "crank_x")
 _CHECKED_POSES = 9

@@ -12,8 +12,6 @@ from graphsynth.systems.antenna.stages import AntennaMotion, antenna_of, other_m
 if TYPE_CHECKING:
     from graphsynth.systems.antenna import ModelComparison
 
-__all__ = ["animations", "plots", "sketches"]
-
 _FRAMES = 97
 
 

@@ -11,8 +11,6 @@ from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import In, require
 from graphsynth.pipeline.units import DEGREE
 
-__all__ = ["SYSTEM", "AntennaComparison", "AntennaLengths", "AntennaSweep", "AntennaTable", "AntennaTolerances"]
-
 _Length = Annotated[float, In("mm", above=0, why="a length must be positive")]
 _Tolerance = Annotated[float, In("mm", least=0, why="a tolerance must not be negative")]
 

@@ -1,7 +1,2 @@
 from .linkage import FourBar as FourBar
-from .model import (
-    Braider as Braider,
-)
-from .model import (
-    Thread as Thread,
-)
+from .model import Braider as Braider, Thread as Thread

@@ -6,8 +6,6 @@ from typing import Any
 
 from graphsynth.evidence.rows import Effort, Problem
 
-__all__ = ["linkage_dynamics", "positions", "start_up"]
-
 
 def _braider(context: Any) -> Any:
     from graphsynth.systems.braider.stages import braider_of

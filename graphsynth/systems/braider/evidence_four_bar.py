@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.braider.linkage import FourBar
     from graphsynth.systems.braider.model import Braider
 
-__all__ = ["free_linkage", "places", "precise_swing", "shape_of_braider", "shape_of_four_bar"]
-
 Array = NDArray[np.float64]
 
 

@@ -13,8 +13,6 @@ from graphsynth.core.checks import check_fields, finite_array
 from graphsynth.core.errors import GeometryError, SpecError
 from graphsynth.dynamics.motors import number
 
-__all__ = ["ChangePoint", "FourBar", "FourBarState"]
-
 Array = NDArray[np.float64]
 
 

@@ -14,7 +14,8 @@ from graphsynth.core.checks import check_fields, check_sizes, checked, finite_ar
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.prescribed import prescribed_run
 from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, inductance_study
-from graphsynth.dynamics.driven.run import DriveRun, Plant, RunStatus, run
+from graphsynth.dynamics.driven.run import DriveRun, RunStatus, run
+from graphsynth.dynamics.driven.setup import Plant
 from graphsynth.dynamics.elements import Element, Force, MotorDrive
 from graphsynth.dynamics.model import Body, DynamicModel
 from graphsynth.dynamics.motors import (
@@ -28,11 +29,10 @@ from graphsynth.dynamics.motors import (
 )
 from graphsynth.dynamics.trains import Train
 from graphsynth.mechanism.joints import Revolute
-from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.braider.linkage import FourBar
-
-__all__ = ["Braider", "LinkMotion", "Peak", "Settling", "Thread"]
 
 Array = NDArray[np.float64]
 

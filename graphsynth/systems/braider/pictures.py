@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.braider.model import Braider
     from graphsynth.systems.braider.reactions import Reactions
 
-__all__ = ["sensor_picture", "start_up_picture"]
-
 _JOINTS = ("O1: frame on crank", "A: crank on coupler", "B: coupler on rocker", "O2: frame on rocker")
 
 

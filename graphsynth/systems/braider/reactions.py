@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.driven.run import DriveRun
     from graphsynth.systems.braider.model import Braider
 
-__all__ = ["Reactions", "general_reactions", "reactions", "run_reactions"]
-
 Array = NDArray[np.float64]
 
 
@@ -148,8 +146,7 @@ def general_reactions(
     """
     from graphsynth.dynamics.inverse import inverse_dynamics
     from graphsynth.kinematics.simulation import simulate
-    from graphsynth.mechanism.laws import Linear
-    from graphsynth.mechanism.model import Driver
+    from graphsynth.mechanism.laws import Driver, Linear
 
     theta, w, alpha = _together(theta, speed, acceleration)
     model = braider.model(motor=False)

@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GeometryError, SpecError
-from graphsynth.pipeline.motor_tables import balance_rows, limit_table, quantity_table
+from graphsynth.pipeline.display import quantity_table
+from graphsynth.pipeline.motor_tables import balance_rows, limit_table
 from graphsynth.pipeline.products import Finding, Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.braider.system import BraiderTable
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.driven.run import DriveRun
     from graphsynth.systems.braider.model import Braider
     from graphsynth.systems.braider.reactions import Reactions
-
-__all__ = ["JOINTS", "braider_of", "inductance", "judge", "sensors", "solvers", "start_up", "table_of"]
 
 #: Joint, body that is acted on and by which.
 JOINTS = ("O1: frame on crank", "A: crank on coupler", "B: coupler on rocker", "O2: frame on rocker")

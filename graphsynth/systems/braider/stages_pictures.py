@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.braider.model import Braider
     from graphsynth.systems.braider.reactions import Reactions
 
-__all__ = ["animations", "plots", "sketches"]
-
 _SHOWN = 6  # crank angles drawn one by one
 _COLOURS = ("a", "b", "c", "d")
 _STYLES = ("-", "--", "-.", ":")

@@ -11,8 +11,6 @@ from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import In, Positions, require
 
-__all__ = ["SYSTEM", "BraiderTable", "MotorTable", "StartTable", "SwitchTable", "ThreadTable", "TrainTable"]
-
 _Length = Annotated[float, In(above=0, why="a length must be positive")]
 
 

@@ -6,8 +6,6 @@ from typing import Any
 
 from graphsynth.evidence.rows import Effort, Problem
 
-__all__ = ["arc_ends", "crossing", "dimensions", "many_sets"]
-
 
 def many_sets(context: Any, effort: Effort) -> Problem:
     """Measure the positions of many sets at once."""

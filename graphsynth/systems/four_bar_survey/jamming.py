@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from graphsynth.systems.four_bar_survey.system import SurveyTable
 
-__all__ = ["Jamming", "close_form"]
-
 Array = NDArray[np.float64]
 
 

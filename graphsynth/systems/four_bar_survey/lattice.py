@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.mechanism.rotatability import KINDS, TYPES, grashof_type, rotation_kind
+from graphsynth.mechanism.rotatability import grashof_type, rotation_kind
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.tables import exact_number
 from graphsynth.pipeline.units import Unit
 from graphsynth.systems.four_bar_survey.system import RangeTable, SurveyTable
-
-__all__ = ["KINDS", "LONGEST", "TYPES", "Lattice", "classify", "lattice_of"]
 
 Ints = NDArray[np.int64]
 

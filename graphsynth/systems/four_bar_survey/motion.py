@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.systems.four_bar_survey.lattice import KINDS, Ints
+from graphsynth.mechanism.rotatability import KINDS
+from graphsynth.systems.four_bar_survey.lattice import Ints
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
-
-__all__ = ["Moved", "four_bar", "move"]
 
 Array = NDArray[np.float64]
 
@@ -51,7 +50,8 @@ class Moved:
 def four_bar(frame: float = 2.0, crank: float = 1.0, coupler: float = 2.5, rocker: float = 2.5) -> Mechanism:
     """Return a four-bar driven at its crank, of which all others are dimension sets."""
     from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism
+    from graphsynth.mechanism.laws import Driver
+    from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
     graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
@@ -102,7 +102,7 @@ def move(lengths: Ints, positions: int) -> Moved:
 
 
 def _move(lengths: Ints, positions: int) -> Moved:
-    from graphsynth.kinematics.simulation import simulate_batch
+    from graphsynth.kinematics.engine.batch import simulate_batch
 
     sizes = lengths.astype(np.float64)
     turn = np.linspace(0.0, math.tau, positions + 1)
@@ -136,7 +136,7 @@ def _assembled_elsewhere(sizes: Array) -> tuple[NDArray[np.bool_], NDArray[np.bo
     Tried are pi, and the angle at which coupler and rocker are at right angles: a crank that is assembled anywhere is
     assembled at one of the three.
     """
-    from graphsynth.kinematics.simulation import simulate_batch
+    from graphsynth.kinematics.engine.batch import simulate_batch
 
     if not len(sizes):
         return np.zeros(0, dtype=np.bool_), np.zeros(0, dtype=np.bool_)
@@ -155,7 +155,7 @@ def _assembled_beside(sizes: Array, angle: float) -> NDArray[np.bool_]:
     Tried is an angle at which the pin comes nearer or goes farther by less than the dyad can give, if it can give at
     all: ``g a (1 - cos) <= b c / 2``.
     """
-    from graphsynth.kinematics.simulation import simulate_batch
+    from graphsynth.kinematics.engine.batch import simulate_batch
 
     if not len(sizes):
         return np.zeros(0, dtype=np.bool_)
@@ -167,7 +167,7 @@ def _assembled_beside(sizes: Array, angle: float) -> NDArray[np.bool_]:
 
 def _assembled_between(sizes: Array, turn: Array) -> NDArray[np.bool_]:
     """Whether sets that are not determined at crank angle 0 pass all other angles."""
-    from graphsynth.kinematics.simulation import simulate_batch
+    from graphsynth.kinematics.engine.batch import simulate_batch
 
     if not len(sizes):
         return np.zeros(0, dtype=np.bool_)

@@ -11,8 +11,6 @@ from graphsynth.pipeline.rank import DIGITS
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.four_bar_survey.lattice import Lattice
 
-__all__ = ["Order", "edges_of", "order_of", "rank"]
-
 
 @dataclass(frozen=True, slots=True)
 class Order:

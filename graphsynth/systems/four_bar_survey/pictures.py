@@ -7,9 +7,10 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.drawing.palette import WHITE
+from graphsynth.mechanism.rotatability import TYPES
 from graphsynth.pipeline.products import Picture, Ranking, Record
 from graphsynth.pipeline.stages import Context
-from graphsynth.systems.four_bar_survey.lattice import TYPES, Lattice, classify, lattice_of
+from graphsynth.systems.four_bar_survey.lattice import Lattice, classify, lattice_of
 from graphsynth.systems.four_bar_survey.results import Survey
 from graphsynth.systems.four_bar_survey.stages import evaluate_sets
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.mechanism.model import Mechanism
-
-__all__ = ["animations", "maps", "sketches"]
 
 #: Colours of `TYPES`: cranks that turn are strong, the others pale, change points dark.
 #: Not quite those of the palette: on a dark page the map would keep them, and its legend would not.

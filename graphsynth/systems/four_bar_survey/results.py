@@ -9,16 +9,15 @@ from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from graphsynth.mechanism.rotatability import KINDS, TYPES
 from graphsynth.pipeline.products import Finding, Outcome, Quantity, Record, Table, exact
 from graphsynth.pipeline.stages import Context
-from graphsynth.systems.four_bar_survey.lattice import KINDS, TYPES, Lattice, lattice_of
+from graphsynth.systems.four_bar_survey.lattice import Lattice, lattice_of
 from graphsynth.systems.four_bar_survey.order import Order, edges_of, order_of
 from graphsynth.systems.four_bar_survey.system import SurveyTable
 
 if TYPE_CHECKING:
     from graphsynth.jamming.bearing.parameters import ToleranceBox
-
-__all__ = ["Certificate", "Survey", "assess", "certify", "findings", "gather"]
 
 _PIECE = 20  # certificates made in one go
 

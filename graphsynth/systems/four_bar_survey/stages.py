@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.mechanism.rotatability import KINDS, TYPES
 from graphsynth.pipeline.products import Columns, Objective
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.tables import suggest
 from graphsynth.systems.four_bar_survey.jamming import Jamming, close_form
-from graphsynth.systems.four_bar_survey.lattice import KINDS, TYPES, Ints, Lattice, classify, lattice_of
+from graphsynth.systems.four_bar_survey.lattice import Ints, Lattice, classify, lattice_of
 from graphsynth.systems.four_bar_survey.motion import Moved, move
 from graphsynth.systems.four_bar_survey.system import SurveyTable
-
-__all__ = ["QUANTITIES", "Evaluated", "Shard", "evaluate", "evaluate_sets", "front_of", "losses_of", "objectives_of"]
-__all__ += ["shards", "store", "unpacked"]
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,6 @@ from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import In, require
 from graphsynth.systems.lambda_linkage.system import BearingTable, Tilt
 
-__all__ = ["SYSTEM", "Grashof", "RangeTable", "SurveyLengths", "SurveyLimits", "SurveyTable", "SurveyTolerances"]
-
 _MOST = 10**8
 _Length = Annotated[float, In(above=0, why="a length must be positive")]
 _Tolerance = Annotated[float, In(least=0, why="a tolerance is zero or more")]

@@ -9,8 +9,6 @@ from typing import Any
 from graphsynth.core.errors import GeometryError
 from graphsynth.evidence.rows import Effort, Problem
 
-__all__ = ["arc_ends", "areas", "coupled_joints", "crossing", "dimensions", "positions"]
-
 
 def _box(context: Any) -> Any:
     from graphsynth.systems.lambda_linkage.stages import tolerance_box

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from graphsynth.mechanism.four_bar import TiltedFourBar
 
-__all__ = ["LambdaLinkage"]
-
 
 @dataclass(frozen=True)
 class LambdaLinkage(TiltedFourBar):

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from graphsynth.drawing.plots import Band, Chart, Line
     from graphsynth.mechanism.four_bar import FourBarPositions, TiltedFourBar
 
-__all__ = ["lambda_animation", "lambda_sketch", "lambda_sketch_3d", "lambda_tilt_chart"]
-
 Array = NDArray[np.float64]
 
 #: Crank angles between which the tracing point of the lambda proportions moves nearly straight.

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.jamming.bearing.parameters import ToleranceBox
     from graphsynth.mechanism.four_bar import FourBarPositions, TiltedFourBar
 
-__all__ = ["LambdaMotion", "assess", "jamming", "kinematics", "recognise", "tolerance_box"]
-
 _C = Literal["A", "B"]
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from graphsynth.jamming.bearing.arcs import JamArc
     from graphsynth.systems.lambda_linkage.stages import LambdaMotion
 
-__all__ = ["animations", "plots", "sketches"]
-
 _SHOWN = 6  # crank angles drawn one by one
 
 

@@ -12,8 +12,6 @@ from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import ANY_LENGTH, In, Positions, require
 
-__all__ = ["SYSTEM", "BearingTable", "LambdaLengths", "LambdaTable", "Tilt"]
-
 _Length = Annotated[float, ANY_LENGTH, In(above=0, why="a length must be positive")]
 
 

@@ -13,8 +13,6 @@ from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.piston.spaces import LoopSpaces, loop_spaces
 
-__all__ = ["Assignment", "rotary_assignments"]
-
 _JOINTS = ((0, 1), (1, 2), (2, 3), (0, 3), (3, 4), (0, 4))
 _FULL_TURN = {
     "RR": (True, "crank-slider: the crank turns fully if the rod is longer than crank + |offset|"),

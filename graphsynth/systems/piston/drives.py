@@ -13,8 +13,6 @@ from graphsynth.core.checks import check_fields, finite, positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
 
-__all__ = ["CrankSlider", "Derivatives", "ScotchYoke"]
-
 Array = NDArray[np.float64]
 
 

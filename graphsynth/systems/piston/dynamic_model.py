@@ -18,9 +18,8 @@ from graphsynth.kinematics.engine.inputs import monotonic
 from graphsynth.kinematics.simulation import simulate
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.systems.piston.drives import CrankSlider
-from graphsynth.systems.piston.machine import PistonLoads, PistonMachine
-
-__all__ = ["MultiplierCheck", "check_by_multipliers", "dynamic_model"]
+from graphsynth.systems.piston.loads import PistonLoads
+from graphsynth.systems.piston.machine import PistonMachine
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.piston.gas import CompressorCycle
     from graphsynth.systems.piston.machine import PistonMachine
 
-__all__ = ["load_problem", "loads", "positions", "precise_work", "work", "work_problem"]
-
 
 def _first(context: Any) -> Any:
     from graphsynth.systems.piston.stages import machines_of

@@ -16,8 +16,6 @@ from graphsynth.core.checks import called, check_fields, finite, finite_array, p
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import not_negative
 
-__all__ = ["CompressorCycle", "ConstantForce", "GasLaw", "GivenForce"]
-
 Array = NDArray[np.float64]
 
 

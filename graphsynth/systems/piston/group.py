@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from graphsynth.core.checks import check_fields, finite
 from graphsynth.core.errors import GeometryError
 
-__all__ = ["FloatingGroup"]
-
 _PARALLEL = 1e-9
 
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import check_fields, finite, positive
 from graphsynth.dynamics.elements import not_negative
 
-__all__ = ["PistonFriction", "PistonLoads", "PistonMasses"]
-
 Array = NDArray[np.float64]
 
 

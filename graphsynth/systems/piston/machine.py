@@ -21,8 +21,6 @@ from graphsynth.systems.piston.loads import PistonFriction, PistonLoads, PistonM
 from graphsynth.systems.piston.model import FloatingPiston, PistonMotion
 from graphsynth.systems.piston.solving import Reaction, cross, one_contact, two_contacts, wedge
 
-__all__ = ["PistonFriction", "PistonLoads", "PistonMachine", "PistonMasses"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 

@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic
-from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.piston.drives import CrankSlider, Derivatives, ScotchYoke
 from graphsynth.systems.piston.group import FloatingGroup
-
-__all__ = ["DeadCentre", "FloatingPiston", "PistonMotion"]
 
 Array = NDArray[np.float64]
 

@@ -22,17 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.piston.machine import PistonMachine
     from graphsynth.systems.piston.model import FloatingPiston
 
-__all__ = [
-    "indicator_chart",
-    "piston_animated_svg",
-    "piston_animation",
-    "piston_motion_chart",
-    "piston_sketch",
-    "reaction_chart",
-    "side_load_chart",
-    "torque_chart",
-]
-
 Array = NDArray[np.float64]
 
 _TURN = np.linspace(0.0, 2.0 * math.pi, 721)

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Reaction", "Wedge", "cross", "one_contact", "two_contacts", "wedge"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 

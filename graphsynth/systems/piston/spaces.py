@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["LoopSpace", "LoopSpaces", "loop_spaces"]
-
 Array = NDArray[np.float64]
 Pair = tuple[int, int]
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.piston.spaces import LoopSpaces
     from graphsynth.systems.piston.turn import PistonComparison
 
-__all__ = ["Turn", "judge", "loops", "machines_of", "recognise", "table_of", "turn", "words_of"]
-
 _KINDS = {"crank_slider": "crank-slider", "scotch_yoke": "Scotch yoke"}
 
 
@@ -81,7 +79,8 @@ def _machine(table: PistonTable, kind: str) -> PistonMachine:
     from graphsynth.systems.piston.drives import CrankSlider, ScotchYoke
     from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce
     from graphsynth.systems.piston.group import FloatingGroup
-    from graphsynth.systems.piston.machine import PistonFriction, PistonMachine, PistonMasses
+    from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
+    from graphsynth.systems.piston.machine import PistonMachine
     from graphsynth.systems.piston.model import FloatingPiston
 
     drive, group, gas, masses, friction = table.drive, table.group, table.gas, table.masses, table.friction

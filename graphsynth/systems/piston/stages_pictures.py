@@ -6,8 +6,6 @@ from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.piston.stages import machines_of, table_of, words_of
 
-__all__ = ["animations", "plots", "sketches"]
-
 _POSES = (1.0, 4.0)
 
 

@@ -11,8 +11,6 @@ from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import Positions, require
 
-__all__ = ["SYSTEM", "DriveTable", "FrictionTable", "GasTable", "GroupTable", "MassTable", "PistonTable"]
-
 Kind = Literal["crank_slider", "scotch_yoke"]
 
 

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.piston.drives import CrankSlider
-from graphsynth.systems.piston.machine import PistonLoads, PistonMachine
-
-__all__ = ["PistonComparison", "PistonTurn", "compare_pistons", "piston_turn"]
+from graphsynth.systems.piston.loads import PistonLoads
+from graphsynth.systems.piston.machine import PistonMachine
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.field import determinant, pose_grid, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["Aspect", "Aspects", "aspects"]
-
 #: Parts of fewer grid cells are not listed.
 LEAST = 8
 

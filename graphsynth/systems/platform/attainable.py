@@ -16,8 +16,6 @@ from graphsynth.systems.platform.small_crank import small_crank
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["Attainable", "attainable", "ellipticity", "lengths_only_design"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

@@ -28,8 +28,6 @@ from graphsynth.systems.platform.certified_exact_modes import (
 )
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["AssemblyCertificate", "AssemblyVerdict", "ModeEnclosure", "certify_assembly_modes", "certify_direct"]
-
 Array = NDArray[np.float64]
 
 _LADDER = (64, 128, 256, 512, 1024)

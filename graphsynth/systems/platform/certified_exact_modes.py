@@ -18,19 +18,6 @@ import flint
 
 from graphsynth.intervals.exact import Gaussian, ball, complex_ball
 
-__all__ = [
-    "ExactRoot",
-    "Isolation",
-    "SexticBalls",
-    "exact_roots",
-    "isolate",
-    "mirror_count",
-    "parallel_positions",
-    "refine",
-    "self_motion",
-    "sextic_balls",
-]
-
 _NODES = 32
 #: Nodes are shifted by 1/997 of a turn over the number of nodes: no simple fraction of a turn is a node.
 _SHIFT = 997

@@ -25,8 +25,6 @@ from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.moving import Boxes, Budget, Cover, Nodes, cover, prove_nodes, whole_turns
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["FullTurnCertificate", "LegBounds", "PlatformSystem", "TurnVerdict", "certify_full_turn"]
-
 Array = NDArray[np.float64]
 
 #: Angles of the dimensions are meant within this many radians.

@@ -19,8 +19,6 @@ from graphsynth.intervals.balls import TINY, UP, Balls, exact, join, tau_times, 
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["AssemblyCertificateBatch", "certify_assembly_modes_batch", "certify_direct_batch"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]

@@ -17,8 +17,6 @@ from graphsynth.core.checks import checked, finite, three_points
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.plane import cross
 
-__all__ = ["BoundaryCircle", "Limits", "Meeting", "SingularConic", "leg_circles", "meet", "singular_conic"]
-
 #: Range (low, high) of a rocker angle in radians; None for no limit.
 Limits = tuple[float, float] | None
 

@@ -16,8 +16,6 @@ from graphsynth.systems.platform.field import characteristic_length, determinant
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.tracing import CurveEquations
 
-__all__ = ["NearestSingularity", "SingularityDistance", "singularity_distance"]
-
 Array = NDArray[np.float64]
 
 

@@ -21,8 +21,6 @@ from graphsynth.kinematics.triad.leg import solve_leg
 from graphsynth.mechanism.rotatability import FourBarRotation, four_bar_rotation
 from graphsynth.systems.platform.motion import Event
 
-__all__ = ["DriveMotion", "DriveTurn", "FourBarDrive", "GearTrain", "first_barrier"]
-
 
 @dataclass(frozen=True)
 class GearTrain:

@@ -20,18 +20,6 @@ from graphsynth.systems.platform.evidence_direct import Proved, assessed, eigenv
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = [
-    "assembly_modes",
-    "double_root",
-    "double_root_problem",
-    "drive",
-    "motor_drive",
-    "precise_branch",
-    "small_inductance",
-    "turn",
-    "turn_problem",
-]
-
 Array = NDArray[np.float64]
 _NODES = 12
 _REFERENCE = "interpolated closure condition, roots with 50 digits, drives in closed form with 50 digits"

@@ -22,17 +22,6 @@ from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 if TYPE_CHECKING:
     from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = [
-    "DIGITS",
-    "Proved",
-    "assessed",
-    "eigenvalue_modes",
-    "mode_problem",
-    "precise_anchors",
-    "precise_modes",
-    "proof_row",
-]
-
 DIGITS = 50
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.motion import Motion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["TwoPoseDesign", "two_pose_design"]
-
 Array = NDArray[np.float64]
 
 

@@ -11,8 +11,6 @@ from graphsynth.core.checks import whole
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["characteristic_length", "cofactors", "determinant", "pose_grid", "scaled_rows", "working_mode"]
-
 Array = NDArray[np.float64]
 
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.motion import Motion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["Design", "assess_design", "linear_design", "refine_design", "rotation_about", "translation_along"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

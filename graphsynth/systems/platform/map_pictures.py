@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.singular_loci import SingularLoci
     from graphsynth.systems.platform.workspace import Workspace
 
-__all__ = ["harmonics_picture", "loci_picture", "map_picture", "workspace_picture"]
-
 #: One colour for each leg, readable in grey and by colour-blind readers [Okabe & Ito 2008].
 _LEGS = ("#0072B2", "#D55E00", "#009E73")
 _SINGULAR = LIGHT["bad"]

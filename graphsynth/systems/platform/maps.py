@@ -11,16 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, finite_array, positive, whole
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.field import (
-    characteristic_length,
-    cofactors,
-    pose_grid,
-    scaled_rows,
-    working_mode,
-)
+from graphsynth.systems.platform.field import characteristic_length, cofactors, pose_grid, scaled_rows, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
-
-__all__ = ["PlatformMap", "Quality", "platform_map", "quality"]
 
 Array = NDArray[np.float64]
 

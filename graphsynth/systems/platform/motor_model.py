@@ -14,21 +14,14 @@ from graphsynth.core.checks import check_fields, finite_array
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.prescribed import prescribed_run
-from graphsynth.dynamics.driven.reduction import (
-    ReductionStudy,
-    choose_motor,
-    inductance_study,
-    reduction_error,
-)
-from graphsynth.dynamics.driven.run import DriveRun, Plant, run
-from graphsynth.dynamics.driven.setup import load_coefficients
+from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, inductance_study, reduction_error
+from graphsynth.dynamics.driven.run import DriveRun, run
+from graphsynth.dynamics.driven.setup import Plant, load_coefficients
 from graphsynth.dynamics.motors import IdealSpeed, Motor, check_motor, number
 from graphsynth.dynamics.trains import Train
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-
-__all__ = ["MotorDrivenPlatform", "platform_inertia"]
 
 Array = NDArray[np.float64]
 _SAMPLES = (128, 256, 512, 1024, 2048, 4096)  # of a turn

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GeometryError, SceneError, SpecError
-from graphsynth.pipeline.motor_tables import balance_rows, limit_table, quantity_table
+from graphsynth.pipeline.display import quantity_table
+from graphsynth.pipeline.motor_tables import balance_rows, limit_table
 from graphsynth.pipeline.products import Attempt, Finding, Picture, Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.platform.motor_system import DCMotorTable, MachineDriveTable, PlatformDriveTable
@@ -19,25 +20,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.motors import DCMotor
     from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
     from graphsynth.systems.platform.resistance import ResistanceEffect, RippleMap
-
-__all__ = [
-    "Claim",
-    "LabelledRun",
-    "WithoutInertia",
-    "assess",
-    "claim",
-    "curves",
-    "dc_motor",
-    "drive",
-    "drive_machine",
-    "drive_of",
-    "limit",
-    "run_tables",
-    "solvers",
-    "table_of",
-    "tables",
-    "without_inertia",
-]
 
 
 @dataclass(frozen=True, slots=True)

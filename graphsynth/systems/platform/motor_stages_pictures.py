@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from graphsynth.dynamics.driven.reduction import ReductionStudy
     from graphsynth.dynamics.driven.run import DriveRun
 
-__all__ = ["animations", "plots", "run_pictures", "sketches"]
-
 _COLOURS = ("a", "b", "c", "d")
 _STYLES = ("-", "--", "-.", ":")
 
@@ -53,7 +51,8 @@ def _yoke(amplitude: float, q: Any) -> tuple[Any, Any]:
     import numpy as np
 
     from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
-    from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+    from graphsynth.mechanism.laws import Driver
+    from graphsynth.mechanism.model import Mechanism, TracePoint
     from graphsynth.structure.graph import MechanismGraph
 
     mechanism = Mechanism(

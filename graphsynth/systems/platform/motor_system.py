@@ -10,17 +10,6 @@ from graphsynth.pipeline.stages import Stage
 from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import In, require
 
-__all__ = [
-    "SYSTEM",
-    "ClaimTable",
-    "DCMotorTable",
-    "LimitTable",
-    "MachineDriveTable",
-    "PlatformDriveTable",
-    "WithoutInertiaTable",
-]
-
-
 _Positive = "each must be positive"
 _Friction = Annotated[float, In("N m s/rad")]
 _Inertia = Annotated[float, In("kg m^2")]

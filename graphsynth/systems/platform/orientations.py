@@ -18,8 +18,6 @@ from graphsynth.core.checks import checked, finite, plane_point, positive
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["RegionArea", "orientations", "reachable_workspace", "total_orientation_workspace"]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Test = Callable[[Complex, float], NDArray[np.bool_]]

@@ -13,16 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import (
-    check_largest,
-    finite_array,
-    positive,
-    three,
-    three_points,
-    together,
-    triple,
-    triples,
-)
+from graphsynth.core.checks import check_largest, finite_array, positive, three, three_points, together, triple, triples
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.assembly_modes import (
     AssemblyModeBatch,
@@ -32,8 +23,6 @@ from graphsynth.kinematics.triad.assembly_modes import (
 )
 from graphsynth.kinematics.triad.leg import LegStatus, PlatformLegs, sensitivity
 from graphsynth.systems.platform.plane import cross, directions
-
-__all__ = ["WORKING_MODES", "InverseSolution", "ParallelPlatform"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

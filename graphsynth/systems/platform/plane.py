@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cross", "directions"]
-
 
 def cross(a: Any, b: Any) -> Any:
     """Cross product ``x_a y_b - y_a x_b`` of complex numbers or arrays of them.

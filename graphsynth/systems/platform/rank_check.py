@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["LoopClosure", "as_mechanism", "link_poses", "loop_closure", "platform_loop_closure"]
-
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9
@@ -127,8 +125,8 @@ def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLik
     >>> mechanism.graph.links, mechanism.mobility().count, mechanism.mobility().by_rank
     (15, 1, 1)
     """
-    from graphsynth.mechanism.laws import Linear
-    from graphsynth.mechanism.model import Driver, Mechanism, TracePoint
+    from graphsynth.mechanism.laws import Driver, Linear
+    from graphsynth.mechanism.model import Mechanism, TracePoint
 
     start = platform.home_pose(psi) if pose is None else triple("pose", pose)
     poses = link_poses(platform, psi, start)

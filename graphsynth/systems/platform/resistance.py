@@ -13,8 +13,6 @@ from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.motors import DCMotor, number, numbers, whole
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
-__all__ = ["ResistanceEffect", "RippleMap", "resistance_effect", "ripple_gain", "ripple_map", "steady_ripple"]
-
 Array = NDArray[np.float64]
 
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from graphsynth.systems.platform.resistance import ResistanceEffect, RippleMap
 
-__all__ = ["resistance_picture", "ripple_map_picture", "ripple_picture"]
-
 
 def resistance_picture(
     effects: Mapping[str, ResistanceEffect], *, size: tuple[float, float] = (10.0, 4.4)

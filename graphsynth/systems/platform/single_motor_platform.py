@@ -37,8 +37,6 @@ from graphsynth.systems.platform.tracking import (
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-__all__ = ["DriveState", "SingleMotorPlatform"]
-
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 

@@ -16,15 +16,6 @@ from graphsynth.systems.platform.parallel_platform import WORKING_MODES, Paralle
 from graphsynth.systems.platform.tracing import CurveEquations, Traced, trace
 from graphsynth.systems.platform.workspace import Arc, constant_orientation_workspace
 
-__all__ = [
-    "SingularCurve",
-    "SingularLoci",
-    "isolated_singular_points",
-    "singular_loci",
-    "type_one_circles",
-    "type_two_curves",
-]
-
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 

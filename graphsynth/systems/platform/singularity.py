@@ -13,8 +13,6 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.field import characteristic_length, scaled_rows
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["Singularity", "closed_pose", "singularity"]
-
 Array = NDArray[np.float64]
 
 #: A pose whose relative margin is below this counts as singular.

@@ -16,8 +16,6 @@ from graphsynth.core.errors import GeometryError
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["CrankScale", "Harmonics", "SmallCrank", "crank_scaling", "harmonics", "small_crank"]
-
 Array = NDArray[np.float64]
 
 

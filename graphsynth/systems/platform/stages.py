@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.motion import Motion
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["PlatformMotion", "assess", "kinematics", "platform_of", "recognise"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlatformMotion:

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from graphsynth.systems.platform.stages import PlatformMotion
 
-__all__ = ["animations", "plots", "sketches"]
-
 _SHOWN = 6  # wheel angles drawn one by one
 _FRAMES = 90  # of the animation
 _LEG_COLOURS = ("a", "b", "c")

@@ -16,8 +16,6 @@ from graphsynth.systems.platform.singularity import TOLERANCE, Singularity, clos
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["CrankStatics", "Statics", "crank_statics", "statics"]
-
 Array = NDArray[np.float64]
 
 

@@ -19,8 +19,6 @@ from graphsynth.systems.platform.field import determinant
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = ["Sweep", "cold_sweep", "pose_derivatives", "warm_sweep"]
-
 Array = NDArray[np.float64]
 
 

@@ -11,8 +11,6 @@ from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import In, Positions
 from graphsynth.systems.platform.motor_system import MachineDriveTable
 
-__all__ = ["SYSTEM", "PlatformTable"]
-
 _Length = Annotated[float, In(above=0, why="a length must be positive")]
 _Teeth = Annotated[int, In(above=0, why="a gear needs teeth")]
 

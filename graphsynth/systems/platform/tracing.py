@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.plane import cross
 
-__all__ = ["CurveEquations", "Traced", "trace"]
-
 Array = NDArray[np.float64]
 
 _LARGEST = 0.05

@@ -24,21 +24,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.parallel_platform import ParallelPlatform
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-__all__ = [
-    "SAME",
-    "SINGULAR",
-    "BranchEnd",
-    "Tracked",
-    "compare",
-    "distance",
-    "events",
-    "machine_rows",
-    "monodromy",
-    "track",
-    "turn_batch",
-    "wheel_angles",
-]
-
 Array = NDArray[np.float64]
 
 

@@ -18,8 +18,6 @@ from graphsynth.systems.platform.conic import BoundaryCircle, Limits, leg_circle
 from graphsynth.systems.platform.field import working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
-__all__ = ["Arc", "Contact", "Workspace", "constant_orientation_workspace"]
-
 #: Circles closer to tangency than this fraction of the largest length are treated and reported as tangent.
 TOLERANCE = 1e-12
 

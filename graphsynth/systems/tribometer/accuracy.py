@@ -19,8 +19,6 @@ from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 from graphsynth.systems.tribometer.stick_slip_forms import model_error
 from graphsynth.systems.tribometer.stick_slip_precise import PreciseMotion
 
-__all__ = ["method_study", "regularisation_study", "step_study", "tolerance_study"]
-
 Array = NDArray[np.float64]
 _SETTINGS = {"event-driven": "rtol {:.0e}", "time stepping": "step {:g} s"}
 _KIND = "largest error of the position"

@@ -15,8 +15,6 @@ from graphsynth.drawing.svg import painted, words
 if TYPE_CHECKING:
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 
-__all__ = ["tribometer_animation", "tribometer_sketch"]
-
 Array = NDArray[np.float64]
 _WIDTH, _SCENE, _CURVES = 640.0, 200.0, 130.0
 _LOWER, _UPPER = painted("a", opacity=0.55), painted("b")

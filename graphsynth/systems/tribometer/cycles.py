@@ -15,8 +15,6 @@ from graphsynth.systems.tribometer.drives import BeltDrive
 from graphsynth.systems.tribometer.events import EventGuard, StickSlipEvent
 from graphsynth.systems.tribometer.model import Tribometer
 
-__all__ = ["BeltCycle", "LimitCycle", "belt_cycle", "limit_cycle"]
-
 Array = NDArray[np.float64]
 #: Relative change of the state by which the multipliers are measured.
 _NUDGE = 1e-5

@@ -14,8 +14,6 @@ from graphsynth.core.checks import check_fields, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.friction.laws import finite, positive
 
-__all__ = ["BeltDrive", "CrankDrive", "Drive", "DriveMotion", "HarmonicDrive"]
-
 Array = NDArray[np.float64]
 
 

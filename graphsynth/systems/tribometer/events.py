@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.friction.laws import positive
 
-__all__ = ["EventGuard", "EventPath", "RunStatus", "StickSlipEvent", "follow"]
-
 Array = NDArray[np.float64]
 _FIRST, _LARGEST = 256, 1 << 16
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.tribometer.model import Tribometer
     from graphsynth.systems.tribometer.stick_slip_precise import PreciseMotion
 
-__all__ = ["event_problem", "events", "stick_slip", "stick_slip_problem"]
-
 _DIGITS = 22
 _PRECISE_S = 2.0
 

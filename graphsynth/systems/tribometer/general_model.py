@@ -13,14 +13,13 @@ from graphsynth.dynamics.friction.laws import StribeckLaw
 from graphsynth.dynamics.model import Body, DynamicModel
 from graphsynth.dynamics.start import StartReport, consistent_start
 from graphsynth.mechanism.joints import Prismatic
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 
 if TYPE_CHECKING:
     from graphsynth.systems.tribometer.drives import Drive
     from graphsynth.systems.tribometer.model import Tribometer
-
-__all__ = ["general_model"]
 
 Array = NDArray[np.float64]
 

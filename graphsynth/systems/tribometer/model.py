@@ -21,8 +21,6 @@ from graphsynth.systems.tribometer.events import EventGuard
 from graphsynth.systems.tribometer.stick_slip import StickSlipMotion, event_driven
 from graphsynth.systems.tribometer.stick_slip_forms import regularised, time_stepping
 
-__all__ = ["Tribometer"]
-
 Array = NDArray[np.float64]
 
 

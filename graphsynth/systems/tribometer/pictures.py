@@ -24,15 +24,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.tribometer.model import Tribometer
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 
-__all__ = [
-    "error_picture",
-    "friction_picture",
-    "phase_picture",
-    "platforms_picture",
-    "save_tribometer_gif",
-    "stiffness_picture",
-]
-
 Array = NDArray[np.float64]
 #: Readable in grey and by colour-blind readers [Okabe & Ito 2008].
 _LOWER, _UPPER, _THIRD, _FOURTH = "#0072B2", "#D55E00", "#009E73", "#AA4499"

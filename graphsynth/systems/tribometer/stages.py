@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.tribometer.model import Tribometer
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 
-__all__ = ["cycle", "method_rows", "methods", "move", "solvers", "table_of", "tribometer_of"]
-
 
 def table_of(context: Context) -> TribometerTable:
     """Return ``[mechanism]`` of the scene."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.tribometer.cycles import LimitCycle
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 
-__all__ = ["animations", "plots", "sketches"]
-
 _MOST_NODES = 4000
 
 

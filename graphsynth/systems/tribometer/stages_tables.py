@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from graphsynth.pipeline.motor_tables import quantity_table
+from graphsynth.pipeline.display import quantity_table
 from graphsynth.pipeline.products import Quantity, Record, Table, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.tribometer.stages import METHOD_COLUMNS, method_rows, tribometer_of
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from graphsynth.systems.tribometer.cycles import BeltCycle, LimitCycle
     from graphsynth.systems.tribometer.model import Tribometer
     from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
-
-__all__ = ["judge"]
 
 #: Above this part of the energy exchanged the balance gets a warning.
 BALANCE = 1e-9

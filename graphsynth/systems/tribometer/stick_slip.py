@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from graphsynth.systems.tribometer.model import Tribometer
 
-__all__ = ["StickSlipMotion", "event_driven"]
-
 Array = NDArray[np.float64]
 #: The error is estimated by a second run with a tolerance larger by this factor ...
 _COARSER = 100.0

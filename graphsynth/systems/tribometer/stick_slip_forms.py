@@ -20,8 +20,6 @@ from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
 if TYPE_CHECKING:
     from graphsynth.systems.tribometer.model import Tribometer
 
-__all__ = ["SOLVERS", "model_error", "regularised", "time_stepping"]
-
 Array = NDArray[np.float64]
 #: Solvers of scipy that the regularised form accepts.
 SOLVERS = ("LSODA", "BDF", "Radau", "DOP853", "RK45", "RK23")
@@ -248,8 +246,7 @@ class _ExhaustedError(Exception):
 def _functions(
     model: Tribometer, speed: float, most: int
 ) -> tuple[Callable[[float, Array], Array], Callable[[float, Array], Array]]:
-    from graphsynth.systems.tribometer.kernels.stepping import regularised as rate
-    from graphsynth.systems.tribometer.kernels.stepping import regularised_slope as slope
+    from graphsynth.systems.tribometer.kernels.stepping import regularised as rate, regularised_slope as slope
 
     data, calls = model.data(), 0
     stiffness, damping, mass = model.stiffness, model.damping, model.mass

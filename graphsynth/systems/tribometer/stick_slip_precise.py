@@ -17,8 +17,6 @@ from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive
 if TYPE_CHECKING:
     from graphsynth.systems.tribometer.model import Tribometer
 
-__all__ = ["PreciseEvent", "PreciseMotion", "precise_motion"]
-
 Series = list[Any]
 
 

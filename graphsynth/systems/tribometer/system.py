@@ -11,8 +11,6 @@ from graphsynth.pipeline.system import System
 from graphsynth.pipeline.tables import require
 from graphsynth.pipeline.units import Unit
 
-__all__ = ["SYSTEM", "DriveTable", "FrictionTable", "MethodsTable", "PlatformsTable", "RunTable", "TribometerTable"]
-
 
 @dataclass(frozen=True, slots=True)
 class PlatformsTable:

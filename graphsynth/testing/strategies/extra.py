@@ -9,8 +9,7 @@ from graphsynth.core.errors import MissingExtraError, SpecError
 __all__ = ["assume", "check_range", "ready", "st"]
 
 try:
-    from hypothesis import assume
-    from hypothesis import strategies as st
+    from hypothesis import assume, strategies as st
 except ImportError as error:  # pragma: no cover - tested in a process of its own
     raise MissingExtraError(
         "graphsynth.testing draws its examples with hypothesis, which is not installed; pip install hypothesis"

@@ -9,8 +9,6 @@ from graphsynth.core.errors import SpecError
 from graphsynth.mechanism.rotatability import TYPES, type_of
 from graphsynth.testing.strategies.extra import assume, st
 
-__all__ = ["CLASSES", "FourBarLengths", "four_bars"]
-
 #: Classes, seen from the crank; the last is drawn only where it is asked for.
 CLASSES = (*(kind for kind in TYPES if kind != "never assembled"), "never assembled")
 

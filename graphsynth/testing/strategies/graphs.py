@@ -8,8 +8,6 @@ from graphsynth.core.errors import SpecError
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.testing.strategies.extra import check_range, ready, st
 
-__all__ = ["chains", "graphs", "mechanism_graphs"]
-
 #: Largest chains that are listed in a moment: 230 of one degree of freedom.
 MOST_LINKS = 10
 

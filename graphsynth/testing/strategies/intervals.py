@@ -12,8 +12,6 @@ from graphsynth.core.errors import SpecError
 from graphsynth.intervals import Interval
 from graphsynth.testing.strategies.extra import st
 
-__all__ = ["finite_numbers", "intervals", "intervals_and_members"]
-
 #: Doubles at which arithmetic changes its behaviour.
 SPECIAL = (
     0.0, -0.0, 1.0, -1.0, 0.1, 1 / 3, 5e-324, -5e-324, 2.0**-1022, -(2.0**-1022), 1.7976931348623157e308,

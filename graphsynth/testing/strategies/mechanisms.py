@@ -8,14 +8,12 @@ from typing import Any
 
 from graphsynth.core.errors import SpecError
 from graphsynth.mechanism.joints import Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.testing.strategies.extra import check_range, ready, st
 from graphsynth.testing.strategies.four_bars import CLASSES, four_bars
 from graphsynth.testing.strategies.graphs import mechanism_graphs
-
-__all__ = ["four_bar_mechanisms", "mechanisms"]
-
 
 _GRID = st.integers(-16, 16)
 _ANGLE = st.floats(-math.pi, math.pi)

@@ -8,8 +8,6 @@ import math
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.testing.strategies.extra import assume, st
 
-__all__ = ["platform_poses", "platforms"]
-
 Pose = tuple[float, float, float]
 
 

@@ -7,8 +7,6 @@ from typing import Any
 
 from graphsynth.testing.strategies.extra import st
 
-__all__ = ["scenes", "toml_text"]
-
 #: Titles hold any printable character, quotes and backslashes included.
 _PRINTABLE = st.characters(exclude_categories=("C", "Z"), include_characters=" ")
 

@@ -9,8 +9,6 @@ from graphsynth.structure.system.spec import StructuralSpec
 from graphsynth.testing.strategies.extra import check_range, ready, st
 from graphsynth.testing.strategies.graphs import mechanism_graphs
 
-__all__ = ["specs"]
-
 _FREE = ("p", "v", "v_ct", "v_P", "t0", "G", "n2", "n3", "n4", "p1")
 
 

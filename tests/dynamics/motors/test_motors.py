@@ -10,7 +10,8 @@ import pytest
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.closed_form import linear_response
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
-from graphsynth.dynamics.driven.run import Plant, run
+from graphsynth.dynamics.driven.run import run
+from graphsynth.dynamics.driven.setup import Plant
 from graphsynth.dynamics.motors import DCMotor, IdealSpeed, IdealTorque, LinearCharacteristic, SynchronousMotor
 from graphsynth.dynamics.trains import Train
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform

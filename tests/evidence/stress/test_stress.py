@@ -22,9 +22,16 @@ import pytest
 
 from graphsynth.cli import main
 from graphsynth.core.errors import GraphsynthError, MissingExtraError, SpecError
-from graphsynth.evidence.stress import Case, Checks, Status, run_case, run_stress, stress_cases
-from graphsynth.evidence.stress import cases as cases_module
-from graphsynth.evidence.stress import running as running_module
+from graphsynth.evidence.stress import (
+    Case,
+    Checks,
+    Status,
+    cases as cases_module,
+    run_case,
+    run_stress,
+    running as running_module,
+    stress_cases,
+)
 from graphsynth.evidence.stress.cases import PAGES
 from graphsynth.evidence.stress.checks import exact
 from graphsynth.evidence.stress.page import stress_html, write_report

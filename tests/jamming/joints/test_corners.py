@@ -8,8 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 from coupled_oracles import driven_pair, embodied, four_bar
-from hypothesis import assume, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, settings, strategies as st
 from scipy.optimize import nnls
 
 from graphsynth import simulate

@@ -7,8 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from coupled_oracles import driven_pair, embodied, four_bar, polygon_bounds, single_loop
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import minimize
 
 from graphsynth import Driver, Gear, Mechanism, MechanismGraph, PinSlot, Prismatic, Revolute, simulate

@@ -7,8 +7,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna import PointingMechanism, PoseStatus

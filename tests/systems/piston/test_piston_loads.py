@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import quad
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.piston import CrankSlider, FloatingGroup, FloatingPiston, ScotchYoke
 from graphsynth.systems.piston.dynamic_model import check_by_multipliers, dynamic_model
 from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce, GivenForce
-from graphsynth.systems.piston.machine import PistonFriction, PistonMachine, PistonMasses
+from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
+from graphsynth.systems.piston.machine import PistonMachine
 from graphsynth.systems.piston.turn import compare_pistons, piston_turn
 
 MASSES = PistonMasses(2.0, 1.5, 3.0, 1.0, 0.01, 0.02, 0.01, 0.07)

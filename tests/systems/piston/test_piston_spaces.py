@@ -8,7 +8,8 @@ import pytest
 from graphsynth.core.errors import GraphError
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
-from graphsynth.mechanism.model import Driver, Mechanism, MechanismGraph
+from graphsynth.mechanism.laws import Driver
+from graphsynth.mechanism.model import Mechanism, MechanismGraph
 from graphsynth.systems.piston import FloatingPiston, ScotchYoke, loop_spaces, rotary_assignments
 from graphsynth.systems.piston.group import FloatingGroup
 

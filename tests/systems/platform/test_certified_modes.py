@@ -13,8 +13,7 @@ import flint
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.exact import ball, complex_ball, gaussian, precision, rational

@@ -8,8 +8,7 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.assembly_modes import assembly_modes, assembly_modes_batch, sextic

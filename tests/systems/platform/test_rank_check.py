@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics import simulate
@@ -16,12 +15,7 @@ from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.platform.drive import GearTrain
-from graphsynth.systems.platform.rank_check import (
-    as_mechanism,
-    link_poses,
-    loop_closure,
-    platform_loop_closure,
-)
+from graphsynth.systems.platform.rank_check import as_mechanism, link_poses, loop_closure, platform_loop_closure
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 REFERENCE = SingleMotorPlatform(crank=(10, 5, 1), phase=(0, 0.5, 1))

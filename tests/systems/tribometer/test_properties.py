@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import mpmath
 import numpy as np
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
 from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive, HarmonicDrive

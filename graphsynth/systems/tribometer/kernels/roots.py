@@ -3,15 +3,7 @@
 import math
 
 from graphsynth.core.compilation import kernel
-from graphsynth.systems.tribometer.kernels.plant import (
-    NORMAL,
-    STATIC,
-    acceleration,
-    drive,
-    glide,
-    holding,
-    spacing,
-)
+from graphsynth.systems.tribometer.kernels.plant import NORMAL, STATIC, acceleration, drive, glide, holding, spacing
 from graphsynth.systems.tribometer.kernels.runge_kutta import step
 
 RELEASE, HOLDING_RATE, GLIDE, GLIDE_RATE, STEP, STEP_RATE = 0, 1, 2, 3, 4, 5

@@ -6,15 +6,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from graphsynth.core.compilation import kernel
-from graphsynth.systems.tribometer.kernels.plant import (
-    DAMPING,
-    MASS,
-    NORMAL,
-    STATIC,
-    STIFFNESS,
-    acceleration,
-    drive,
-)
+from graphsynth.systems.tribometer.kernels.plant import DAMPING, MASS, NORMAL, STATIC, STIFFNESS, acceleration, drive
 
 STAGES = 12
 A, B, C = np.ascontiguousarray(DOP853.A[:STAGES, :STAGES]), DOP853.B.copy(), DOP853.C[:STAGES].copy()
