@@ -173,8 +173,7 @@ def mechanism_svg(
 
     Examples
     --------
-    >>> from graphsynth.mechanism.laws import Driver
-    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph, Revolute
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute
     >>> graph = MechanismGraph(2, [(0, 1)], frame=0)
     >>> crank = Mechanism(graph, [Revolute(0, 1)], [Driver(0, 1)], {"A": (1, (1, 0))}, pose=[(0, 0, 0), (0, 0, 0.5)])
     >>> mechanism_svg(crank).count('data-part="joint 0-1"')

@@ -95,8 +95,7 @@ def simulate_dynamics(
     --------
     >>> from graphsynth.dynamics.model import Body
     >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth.mechanism.laws import Driver
-    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> motion = simulate_dynamics(model, np.linspace(0.0, 1.0, 11), keep={(0, 1): 0.0})

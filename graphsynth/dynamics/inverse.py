@@ -103,8 +103,7 @@ def inverse_dynamics(
     >>> from graphsynth.dynamics.model import Body
     >>> from graphsynth.kinematics import simulate
     >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth.mechanism.laws import Driver
-    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph
     >>> arm = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(arm, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> inverse_dynamics(model, simulate(arm, [0.0]), speed=0.0).efforts.round(6).tolist()

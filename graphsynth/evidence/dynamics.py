@@ -80,8 +80,7 @@ def dynamics_work_precision(
     >>> from graphsynth.dynamics.model import Body, DynamicModel
     >>> from graphsynth.dynamics.start import consistent_start
     >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth.mechanism.laws import Driver
-    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> rows = dynamics_work_precision(model, consistent_start(model, keep={(0, 1): 0.0}), [0.0, 1.0],

@@ -147,8 +147,7 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     Examples
     --------
     >>> from graphsynth.dynamics import Body, consistent_start
-    >>> from graphsynth.mechanism.laws import Driver
-    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> export = to_mjcf(model, consistent_start(model, keep={(0, 1): 0.5}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 import re
 from collections import defaultdict
 from collections.abc import Iterator
@@ -35,22 +36,33 @@ def modules() -> dict[str, Path]:
 @cache
 def tree(name: str) -> ast.Module:
     """Return the syntax tree of a module."""
-    return ast.parse(modules()[name].read_text(encoding="utf-8"))
+    gc.disable()  # it would look through all trees again and again, and finds nothing to free
+    try:
+        return ast.parse(modules()[name].read_text(encoding="utf-8"))
+    finally:
+        gc.enable()
+
+
+@cache
+def nodes(name: str) -> list[ast.AST]:
+    """Return what the rules ask of a module: its imports, functions and constants, wherever they stand."""
+    kinds = (ast.Import, ast.ImportFrom, ast.Constant, ast.FunctionDef)
+    return [node for node in ast.walk(tree(name)) if isinstance(node, kinds)]
 
 
 @cache
 def imports(name: str) -> frozenset[str]:
     """Modules that a module imports anywhere, for type checkers too, or names in a string."""
     found = set()
-    for node in ast.walk(tree(name)):
+    for node in nodes(name):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             whole = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= whole & set(modules()) or {node.module}
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found |= whole & modules().keys() or {node.module}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("graphsynth."):
             found |= {match[1] for match in re.finditer(r"^(graphsynth(?:\.\w+)+)(?::\w+)?$", node.value)}
-    return frozenset(found & set(modules()) - {name})
+    return frozenset(found & modules().keys() - {name})
 
 
 def room(name: str) -> str:
@@ -95,9 +107,7 @@ def systems_named_outside() -> Iterator[str]:
 
 def _functions() -> Iterator[tuple[str, ast.FunctionDef]]:
     for name in modules():
-        for node in ast.walk(tree(name)):
-            if isinstance(node, ast.FunctionDef):
-                yield name, node
+        yield from ((name, node) for node in nodes(name) if isinstance(node, ast.FunctionDef))
 
 
 def many_parameters() -> Iterator[str]:

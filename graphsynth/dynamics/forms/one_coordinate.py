@@ -397,8 +397,7 @@ def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object)
     --------
     >>> from graphsynth.dynamics.model import Body
     >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth.mechanism.laws import Driver
-    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph
     >>> pendulum = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(pendulum, {1: Body.bar(3.0, (0.0, 0.0), (1.0, 0.0))})
     >>> effective_inertia(model, [0.0, 1.0]).inertia.round(12).tolist()

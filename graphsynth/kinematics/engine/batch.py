@@ -153,8 +153,7 @@ def simulate_batch(
 
     Examples
     --------
-    >>> from graphsynth.mechanism.laws import Driver
-    >>> from graphsynth.mechanism.model import Mechanism, MechanismGraph, Revolute
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute
     >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
     >>> base = Mechanism(graph, [
     ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
