@@ -13,8 +13,7 @@ from graphsynth.cli import console
 from graphsynth.cli.workers import workers_for
 
 if TYPE_CHECKING:
-    from graphsynth.pipeline.runner import Report
-    from graphsynth.pipeline.stages import Progress
+    from graphsynth.pipeline.stages import Progress, Report
 
 
 def run(options: argparse.Namespace) -> int:

@@ -22,7 +22,10 @@ def add_stress(verb: Callable[[str, str, str], argparse.ArgumentParser]) -> None
     """Add the arguments; ``verb`` makes the parser of a name, a module and a summary."""
     parser = verb("stress", "stress", "Run the stiff and extreme cases and compare the results with the right values.")
     parser.add_argument(
-        "names", nargs="*", metavar="NAME", help="platform-12.5, or all of platform-12, or of platform (default: all)"
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="platform-12.5, or all of platform-12, of platform, or of a system, such as braider (default: all)",
     )
     parser.add_argument(
         "--cases",
@@ -46,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
     with _progress() as progress:
-        report = run_stress(options.names, slow=not options.fast, files=options.cases, progress=progress)
+        report = run_stress(_names(options), slow=not options.fast, files=options.cases, progress=progress)
     if options.out:
         from graphsynth.evidence.stress.page import write_report
 
@@ -65,10 +68,18 @@ def run(options: argparse.Namespace) -> int:
     return WRONG if report.wrong else 0
 
 
+def _names(options: argparse.Namespace) -> list[str]:
+    """Return the names of cases; that of a system stands for its cases."""
+    from graphsynth.pipeline.system import system, system_names
+
+    systems = system_names()
+    return [case for name in options.names for case in (system(name).cases if name in systems else ()) or (name,)]
+
+
 def _list(options: argparse.Namespace) -> int:
     from graphsynth.evidence.stress import stress_cases
 
-    chosen = stress_cases(options.names, slow=not options.fast, files=options.cases)
+    chosen = stress_cases(_names(options), slow=not options.fast, files=options.cases)
     if options.json:
         console.put_json([{"name": case.name, "title": case.title, "slow": case.slow} for case in chosen])
         return 0

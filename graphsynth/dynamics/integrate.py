@@ -73,7 +73,7 @@ def simulate_dynamics(
         Of the integrator.  ``atol`` by default a hundredth of ``rtol`` in units of the mechanism's own length,
         time and energy, component by component.
     outputs : {"interpolated", "exact"}
-        Exact: steps end at every output time; dearer, and as accurate as the steps themselves.
+        Exact: steps end at every output time; slower, and as accurate as the steps themselves.
     project : bool, optional
         Project onto the constraints after every accepted step (augmented form).
     estimate_error : bool, optional

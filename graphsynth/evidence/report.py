@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GraphsynthError, SceneError
 from graphsynth.evidence.choice import Knee, advice, knees
-from graphsynth.evidence.registry import Plan, load
-from graphsynth.evidence.rows import Effort, Problem, table
+from graphsynth.evidence.rows import Effort, Plan, Problem, table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -139,7 +138,7 @@ def measure(
             progress(plan.name, done, len(plans))
         start = perf_counter()
         try:
-            found.append(replace(load(plan)(context, effort), name=plan.name))
+            found.append(replace(plan.load()(context, effort), name=plan.name))
         except SceneError:
             raise
         except (KeyboardInterrupt, Exception) as error:

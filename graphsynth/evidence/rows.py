@@ -1,4 +1,7 @@
-"""What a measurement of error against run time is made of: rows, and the problems they belong to."""
+"""What a measurement of error against run time is made of: rows, the problems they belong to, and plans of problems.
+
+A plan is a string, imported when the problem is measured.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,11 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from importlib import import_module
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from graphsynth.core.errors import SpecError
+from graphsynth.core.errors import SceneError, SpecError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -240,3 +244,49 @@ def table(problems: Iterable[Problem]) -> pd.DataFrame:
     first = ["problem", "method", "setting", "error", "unit", "kind", "reference", "seconds", "per", "rounds", "status"]
     frame = pd.DataFrame(records, columns=None if records else [*first, "reason", "default", "proved"])
     return frame[[*first, *(name for name in frame.columns if name not in first)]]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A problem that can be measured.
+
+    Attributes
+    ----------
+    name : str
+        Short; that of the problem.
+    function : str
+        ``"package.module:function"``, called as ``function(context, effort)``; ``context.scene`` is the scene as read.
+    structure : bool
+        Only for scenes with a table ``[structure]``.
+    """
+
+    name: str
+    function: str
+    structure: bool = False
+
+    def load(self) -> Callable[[Any, Effort], Problem]:
+        """Import the function; `imported` says what is raised."""
+        return imported(self.function, f"problem {self.name!r}")
+
+
+def plans(module: str, *names: str) -> tuple[Plan, ...]:
+    """Return plans whose functions are in one module, each under its own name with ``_`` for ``-``."""
+    return tuple(Plan(name, f"{module}:{name.replace('-', '_')}") for name in names)
+
+
+def imported(text: str, who: str) -> Callable[..., Any]:
+    """Import a function named as ``"package.module:function"``.
+
+    Raises
+    ------
+    SceneError
+        If the text does not name a function; it begins with `who`.
+    """
+    module, _, name = text.partition(":")
+    try:
+        function = getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise SceneError(f"{who} names {text!r}, which cannot be imported: {error}") from error
+    if not callable(function):
+        raise SceneError(f"{who} names {text!r}, which is not a function")
+    return function  # type: ignore[no-any-return]

@@ -6,39 +6,11 @@ import math
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from graphsynth.pipeline.stages import Context, Stage, load
-
-if TYPE_CHECKING:
-    from graphsynth.pipeline.runner import Report
-
-
-@dataclass(frozen=True, slots=True)
-class StageTime:
-    """What a stage took (estimated, one measurement).
-
-    Attributes
-    ----------
-    import_seconds, seconds : float
-        Wall clock; for a stage for each candidate the sum over candidates, wherever they were computed.
-    peak_mb : float
-        Largest resident memory of the process where it ran, while it ran, in MB; of all stages for each candidate
-        together.
-    modules : tuple of str
-        Rooms of graphsynth and third-party packages it was the first to import, in the process where it ran.
-    runs : int
-        How many candidates it looked at; 1 for a stage over all.
-    """
-
-    stage: str
-    import_seconds: float
-    seconds: float
-    peak_mb: float = math.nan
-    modules: tuple[str, ...] = ()
-    runs: int = 1
+from graphsynth.pipeline.stages import Context, Report, StageTime
+from graphsynth.pipeline.system import Stage
 
 
 def measured(stage: Stage, context: Context, needs: Sequence[Any]) -> tuple[Any, StageTime]:
@@ -46,7 +18,7 @@ def measured(stage: Stage, context: Context, needs: Sequence[Any]) -> tuple[Any,
     before = frozenset(sys.modules)
     reset_peak()
     start = time.perf_counter()
-    function = load(stage)
+    function = stage.load()
     imported = time.perf_counter()
     result = function(context, *needs)
     seconds = time.perf_counter() - imported
@@ -113,10 +85,12 @@ def rooms(modules: Iterable[str]) -> tuple[str, ...]:
     for module in modules:
         first, *rest = module.split(".")
         if first == "graphsynth":
-            found.add(".".join([first, *rest[: 2 if rest[:1] == ["systems"] else 1]]))
+            depth = 2 if rest[:1] == ["systems"] else 1
+            if depth == 1 or len(rest) > 1:
+                found.add(".".join([first, *rest[:depth]]))
         elif first not in sys.stdlib_module_names and not first.startswith("_"):
             found.add(first)
-    return tuple(sorted(found - {"graphsynth.systems"}))
+    return tuple(sorted(found))
 
 
 def why_run(stage: Stage, stages: Sequence[Stage], wanted: Sequence[str]) -> str:

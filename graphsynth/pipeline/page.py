@@ -14,7 +14,7 @@ from graphsynth.pipeline.summary import facts, sentences, summary_tables
 if TYPE_CHECKING:
     from jinja2 import Template
 
-    from graphsynth.pipeline.runner import Report
+    from graphsynth.pipeline.stages import Report
 
 _CSS = """
 :root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--card:#f5f7f9;--rule:#d5dbe1;

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import SceneError
 from graphsynth.core.journal import writing
-from graphsynth.pipeline.datafiles import data_files
 from graphsynth.pipeline.page import report_html
-from graphsynth.pipeline.store import JOURNAL, REMEDY, mark_reported, write_whole
+from graphsynth.pipeline.store import JOURNAL, REMEDY, data_files, mark_reported, write_whole
 from graphsynth.pipeline.summary import facts, sentences, summary_tables
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from graphsynth.pipeline.products import Table
-    from graphsynth.pipeline.runner import Report
+    from graphsynth.pipeline.stages import Report
 
 _KINDS = {".html", ".csv", ".parquet", ".json", ".jsonl"}
 _PACKAGES = ("numpy", "numba", "scipy", "networkx", "sympy", "pandas", "matplotlib", "rich", "distributed")

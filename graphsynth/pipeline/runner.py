@@ -4,71 +4,23 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from graphsynth.core.errors import SceneError
 from graphsynth.core.ordered import check_executor
-from graphsynth.pipeline.datafiles import check_files
-from graphsynth.pipeline.measure import StageTime, measured, memory_in_use, new_modules, peak_memory, reset_peak, rooms
+from graphsynth.pipeline.measure import measured, memory_in_use, new_modules, peak_memory, reset_peak, rooms
 from graphsynth.pipeline.report import loaded_versions, write_report
 from graphsynth.pipeline.scene import Scene, load_scene
-from graphsynth.pipeline.stages import Context, Progress, Stage, load, resolve
-from graphsynth.pipeline.store import JOURNAL, Candidates, check_folder, signature
+from graphsynth.pipeline.stages import Context, Progress, Report, StageTime, resolve
+from graphsynth.pipeline.store import JOURNAL, Candidates, check_files, check_folder, signature
 from graphsynth.pipeline.streaming import Plan, Spent, Streamed, given_by, plan_stream, stream
+from graphsynth.pipeline.system import Stage
 from graphsynth.pipeline.tables import Place
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """What a run gave.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene that was run.
-    products : Mapping
-        The outputs asked for, and the records and tables that say what became of the candidates; name to value.
-    times : tuple of StageTime
-        In the order of running.
-    versions : Mapping
-        Of Python, graphsynth and the third-party packages that were loaded.
-    folder : Path or None
-        Where the report was written.
-    stages : tuple of Stage
-        That ran, in order.
-    notes : tuple of str
-        What a reader must know: a budget that was used up, candidates taken over from an interrupted run.
-    seconds : float
-        Wall clock of the run; the stages of candidates that several processes share take longer together.
-    """
-
-    scene: Scene
-    products: Mapping[str, Any]
-    times: tuple[StageTime, ...]
-    versions: Mapping[str, str] = field(default_factory=dict)
-    folder: Path | None = None
-    stages: tuple[Stage, ...] = ()
-    notes: tuple[str, ...] = ()
-    seconds: float = 0.0
-
-    def __getitem__(self, product: str) -> Any:
-        """Return one output.
-
-        Raises
-        ------
-        SceneError
-            If the scene did not ask for it.
-        """
-        if product not in self.products:
-            raise SceneError(
-                f"this run did not keep {product!r}; add it to [outputs] products (kept: {', '.join(self.products)})"
-            )
-        return self.products[product]
 
 
 def run(
@@ -294,7 +246,7 @@ class Running:
         loads = {}
         for stage in plan.stages:
             before, start = frozenset(sys.modules), time.perf_counter()
-            load(stage)
+            stage.load()
             loads[stage.name] = StageTime(stage.name, time.perf_counter() - start, 0.0, modules=new_modules(before))
         reset_peak()
         mark = signature(self._context.scene, plan.stages, plan.kept)

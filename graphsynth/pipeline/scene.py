@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,8 +13,7 @@ from typing import Annotated, Any, Literal
 from graphsynth.core.errors import SceneError
 from graphsynth.core.textfiles import read_bytes, text_of, toml_tables
 from graphsynth.core.wording import nearest
-from graphsynth.pipeline.stages import RANK, STRUCTURE, Stage
-from graphsynth.pipeline.system import System, system, system_names
+from graphsynth.pipeline.system import RANK, STRUCTURE, Stage, System, system, system_names
 from graphsynth.pipeline.tables import In, Place, read_table, require, suggest
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -152,6 +152,27 @@ class RankingTable:
 
     def __post_init__(self) -> None:
         require(bool(self.objectives), "has no objectives; name at least one quantity")
+
+
+@dataclass(frozen=True, slots=True)
+class TiltTable:
+    """Tilt of the motor axis: by `alpha_rad` about the direction `axis`."""
+
+    alpha: Annotated[float, In("rad", above=-math.pi / 2, below=math.pi / 2, why="it must be within pi/2")]
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require(any(self.axis), "has axis [0, 0, 0]; a direction must not vanish")
+
+
+@dataclass(frozen=True, slots=True)
+class BearingTable:
+    """The bearing at B: radius, height and radial clearance in millimetres, and the contact condition."""
+
+    radius_mm: Annotated[float, In(above=0)]
+    height_mm: Annotated[float, In(above=0)]
+    clearance_mm: Annotated[float, In(least=0)]
+    condition: Literal["A", "B"] = "A"
 
 
 #: Every table of a scene but ``[mechanism]``, which its system describes.

@@ -1,104 +1,129 @@
-"""Stages: what a scene can compute, each named by a string, and the smallest set that yields the outputs asked for.
-
-A stage is data: a name, a function as ``"package.module:function"``, the products it needs and the products it
-gives. Nothing here imports the function; the runner does, when the scene needs it. Products travel one way, from
-the stage that gives them to the stages that need them, and each product has one giver.
-"""
+"""The stages of a run: the fewest that yield the outputs asked for, what each is called with, what a run gave."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from graphsynth.core.errors import SceneError
+from graphsynth.evidence.rows import imported
+from graphsynth.pipeline.scene import Scene
+from graphsynth.pipeline.system import Stage, announced, system
 from graphsynth.pipeline.tables import Place, shortened, suggest
 
-if TYPE_CHECKING:
-    from graphsynth.pipeline.scene import Scene
-
-_HERE = "graphsynth.pipeline"
-
-
-@dataclass(frozen=True, slots=True)
-class Stage:
-    """One arrow of the pipeline.
-
-    Attributes
-    ----------
-    name : str
-        Short name for tables and messages.
-    function : str
-        ``"package.module:function"``; called as ``function(context, *needs)`` in the order of `needs`.
-    needs, gives : tuple of str
-        Names of products. A stage that gives several returns a tuple in the order of `gives`.
-    stream : bool
-        It gives one product, an iterable of candidates, and may make them one by one.
-    each : bool
-        It works on one candidate at a time: of what the stream or another such stage gives it gets the candidate's
-        own value, of everything else the whole product.  Candidates go through all such stages one after the other,
-        in parallel if there is an executor; one that raises is recorded and stops nobody else
-        (:class:`~graphsynth.pipeline.products.Rejected`: it does not meet a goal; anything else: it failed).
-    cost : float
-        Of stages for each candidate that could come next, the cheapest comes first.
-    aside : bool
-        Nothing but outputs comes of it, of products that can be sent to another process: with an executor it may run
-        there while later stages run here.
-    """
-
-    name: str
-    function: str
-    needs: tuple[str, ...] = ()
-    gives: tuple[str, ...] = ()
-    stream: bool = False
-    each: bool = False
-    cost: float = 1.0
-    aside: bool = False
-
-
-class Progress(Protocol):
-    """Told before each stage (``done`` of ``total`` finished), after candidates, and once more at the end."""
-
-    def __call__(self, stage: str, done: int, total: int) -> None:
-        """Show the progress; must not raise."""
+#: Told the name of a stage, how many are done, and of how many: before each, after candidates, and once at the end.
+Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What every stage may read besides the products it needs."""
+    """What every stage may read besides the products it needs: it is called as ``function(context, *products)``."""
 
     scene: Scene
     executor: Executor | None = None
 
 
-class StageFunction(Protocol):
-    """The extension point: any function of a context and products."""
+def build(scene: Scene) -> Any:
+    """Return the mechanism of a scene, as its system builds it.
 
-    def __call__(self, context: Context, *products: Any) -> Any:
-        """Return the product, or a tuple of the products in the order of ``gives``."""
+    Raises
+    ------
+    SceneError
+        If the numbers of the scene cannot be built, or the scene has many mechanisms.
 
-
-#: Stages of ``[structure]``, which every system shares; "sketch graphs" asks the system for ``recognised``.
-STRUCTURE = (
-    Stage("solve", f"{_HERE}.steps:solve", (), ("solutions",)),
-    Stage("generate", f"{_HERE}.steps:generate", ("solutions",), ("candidates",), stream=True),
-    Stage("sketch graphs", f"{_HERE}.steps:pictures", ("candidates", "recognised"), ("graph_pictures",)),
-)
-
-
-#: Collects what stages for each candidate gave as ``record`` into ``records``: one per candidate, with reasons.
-COLLECT = Stage("collect", f"{_HERE}.steps:records", ("record",), ("records",))
-
-#: Ranks the records by the objectives of ``[ranking]``.
-RANK = Stage("rank", f"{_HERE}.rank:rank", ("records",), ("ranking",))
-
-#: Entry points of this group are stages of other packages: ``product = "package.module:STAGE"``, one for each product.
-GROUP = "graphsynth.stages"
+    Examples
+    --------
+    >>> from graphsynth.pipeline.scene import load_scene
+    >>> build(load_scene("antenna")).lengths
+    (0.1, 0.15, 0.0592, 0.15, 0.0592)
+    """
+    name = scene.mechanism.module
+    builder = system(name).build
+    if not builder:
+        raise (scene.place / "mechanism").error(
+            f"has many mechanisms, not one: module = {name!r} builds none by itself"
+        )
+    return imported(builder, f"system {name!r}")(Context(scene))
 
 
-def installed_stage(product: str) -> Stage | None:
+@dataclass(frozen=True, slots=True)
+class StageTime:
+    """What a stage took (estimated, one measurement).
+
+    Attributes
+    ----------
+    import_seconds, seconds : float
+        Wall clock; for a stage for each candidate the sum over candidates, wherever they were computed.
+    peak_mb : float
+        Largest resident memory of the process where it ran, while it ran, in MB; of all stages for each candidate
+        together.
+    modules : tuple of str
+        Rooms of graphsynth and third-party packages it was the first to import, in the process where it ran.
+    runs : int
+        How many candidates it looked at; 1 for a stage over all.
+    """
+
+    stage: str
+    import_seconds: float
+    seconds: float
+    peak_mb: float = math.nan
+    modules: tuple[str, ...] = ()
+    runs: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a run gave.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene that was run.
+    products : Mapping
+        The outputs asked for, and the records and tables that say what became of the candidates; name to value.
+    times : tuple of StageTime
+        In the order of running.
+    versions : Mapping
+        Of Python, graphsynth and the third-party packages that were loaded.
+    folder : Path or None
+        Where the report was written.
+    stages : tuple of Stage
+        That ran, in order.
+    notes : tuple of str
+        What a reader must know: a budget that was used up, candidates taken over from an interrupted run.
+    seconds : float
+        Wall clock of the run; the stages of candidates that several processes share take longer together.
+    """
+
+    scene: Scene
+    products: Mapping[str, Any]
+    times: tuple[StageTime, ...]
+    versions: Mapping[str, str] = field(default_factory=dict)
+    folder: Path | None = None
+    stages: tuple[Stage, ...] = ()
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    def __getitem__(self, product: str) -> Any:
+        """Return one output.
+
+        Raises
+        ------
+        SceneError
+            If the scene did not ask for it.
+        """
+        if product not in self.products:
+            raise SceneError(
+                f"this run did not keep {product!r}; add it to [outputs] products (kept: {', '.join(self.products)})"
+            )
+        return self.products[product]
+
+
+def _installed(product: str) -> Stage | None:
     """Return the stage of another package that gives this product, or None if no package announces one.
 
     Raises
@@ -106,9 +131,7 @@ def installed_stage(product: str) -> Stage | None:
     SceneError
         If it cannot be imported, is no stage or does not give the product.
     """
-    from importlib.metadata import entry_points
-
-    for point in entry_points(group=GROUP, name=product):
+    for point in announced("stages").select(name=product):
         try:
             stage = point.load()
         except (ImportError, AttributeError, ValueError) as error:
@@ -119,13 +142,6 @@ def installed_stage(product: str) -> Stage | None:
             raise SceneError(f"product {product!r} is announced by {point.value!r}, which is no Stage that gives it")
         return stage
     return None
-
-
-def installed_products() -> tuple[str, ...]:
-    """Return the products that stages of other packages announce."""
-    from importlib.metadata import entry_points
-
-    return tuple(sorted(entry_points(group=GROUP).names))
 
 
 def _givers(stages: Iterable[Stage]) -> dict[str, Stage]:
@@ -145,11 +161,11 @@ def resolve(
     stages: Iterable[Stage],
     outputs: Sequence[str],
     place: Place | None = None,
-    installed: Callable[[str], Stage | None] = installed_stage,
 ) -> tuple[Stage, ...]:
     """Return the smallest set of stages that yields `outputs`, in an order in which each finds what it needs.
 
-    Backward from the outputs; the order depends on `outputs` and `stages` alone.
+    Backward from the outputs; the order depends on `outputs` and `stages` alone.  A product that none of `stages` gives
+    may come from a stage that another package announces.
 
     Parameters
     ----------
@@ -159,8 +175,6 @@ def resolve(
         Products wanted.
     place : Place, optional
         Where the outputs were named, for the message.
-    installed : callable, optional
-        Finds a stage of another package for a product that none of `stages` gives.
 
     Raises
     ------
@@ -179,10 +193,10 @@ def resolve(
     path: list[str] = []
 
     def visit(product: str) -> None:
-        giver = givers.get(product) or installed(product)
+        giver = givers.get(product) or _installed(product)
         if giver is None:
             who = f"stage {path[-1]!r} needs" if path else "asks for"
-            known = suggest(product, (*givers, *installed_products()))
+            known = suggest(product, (*givers, *announced("stages").names))
             raise SceneError(f"{at}{who} {shortened(repr(product))}, which no stage gives{known}")
         givers[product] = giver
         if giver in order:
@@ -200,21 +214,3 @@ def resolve(
     for output in outputs:
         visit(output)
     return tuple(order)
-
-
-def load(stage: Stage) -> Callable[..., Any]:
-    """Import the function of a stage.
-
-    Raises
-    ------
-    SceneError
-        If the string does not name a function.
-    """
-    module_name, _, function_name = stage.function.partition(":")
-    try:
-        function = getattr(import_module(module_name), function_name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise SceneError(f"stage {stage.name!r} names {stage.function!r}, which cannot be imported: {error}") from error
-    if not callable(function):
-        raise SceneError(f"stage {stage.name!r} names {stage.function!r}, which is not a function")
-    return function  # type: ignore[no-any-return]

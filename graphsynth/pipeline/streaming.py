@@ -16,8 +16,9 @@ from typing import Any
 from graphsynth.core.errors import SceneError
 from graphsynth.core.ordered import in_order
 from graphsynth.pipeline.products import Outcome, Rejected
-from graphsynth.pipeline.stages import Context, Stage, load
+from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.store import Candidates, PartFolder, decode, encode, split_parts
+from graphsynth.pipeline.system import Stage
 
 _LONG = 0.05  # seconds: chunks of candidates grow until they take this long
 _MOST = 32
@@ -120,7 +121,7 @@ def evaluate(
     for stage in plan.stages:
         start, imported = time.perf_counter(), len(sys.modules)
         try:
-            values = given_by(stage, load(stage)(context, *(have[need] for need in stage.needs)))
+            values = given_by(stage, stage.load()(context, *(have[need] for need in stage.needs)))
         except Rejected as why:
             return replace(outcome, status="rejected", stage=stage.name, cause=why.cause, reason=str(why))
         except Exception as error:

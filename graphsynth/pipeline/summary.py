@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from graphsynth.pipeline.products import Finding, Quantity, Ranking, Record, Table
 
 if TYPE_CHECKING:
-    from graphsynth.pipeline.runner import Report
+    from graphsynth.pipeline.stages import Report
     from graphsynth.structure.system.assortment import LinkAssortment
 
 #: Verdicts told in words; more are read in the tables.

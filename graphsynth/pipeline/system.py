@@ -2,6 +2,10 @@
 
 ``[mechanism] module = "name"`` chooses the system among the installed entry points of the group
 ``graphsynth.systems``, those of graphsynth itself and of other packages alike; it is imported when a scene names it.
+
+A stage is data: a name, a function as ``"package.module:function"``, the products it needs and the products it
+gives.  Nothing here imports the function; the runner does, when the scene needs it.  Products travel one way, from
+the stage that gives them to the stages that need them, and each product has one giver.
 """
 
 from __future__ import annotations
@@ -9,19 +13,68 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from graphsynth.evidence.registry import Plan
-from graphsynth.pipeline.stages import Stage
+from graphsynth.evidence.rows import Plan, imported
 from graphsynth.pipeline.tables import Place, suggest
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One arrow of the pipeline.
+
+    Attributes
+    ----------
+    name : str
+        Short name for tables and messages.
+    function : str
+        ``"package.module:function"``; called as ``function(context, *needs)`` in the order of `needs`.
+    needs, gives : tuple of str
+        Names of products. A stage that gives several returns a tuple in the order of `gives`.
+    stream : bool
+        It gives one product, an iterable of candidates, and may make them one by one.
+    each : bool
+        It works on one candidate at a time: of what the stream or another such stage gives it gets the candidate's
+        own value, of everything else the whole product.  Candidates go through all such stages one after the other,
+        in parallel if there is an executor; one that raises is recorded and stops nobody else
+        (:class:`~graphsynth.pipeline.products.Rejected`: it does not meet a goal; anything else: it failed).
+    cost : float
+        Of stages for each candidate that could come next, the cheapest comes first.
+    aside : bool
+        Nothing but outputs comes of it, of products that can be sent to another process: with an executor it may run
+        there while later stages run here.
+    """
+
+    name: str
+    function: str
+    needs: tuple[str, ...] = ()
+    gives: tuple[str, ...] = ()
+    stream: bool = False
+    each: bool = False
+    cost: float = 1.0
+    aside: bool = False
+
+    def load(self) -> Callable[..., Any]:
+        """Import the function; a `SceneError` if there is none."""
+        return imported(self.function, f"stage {self.name!r}")
+
+
+_HERE = "graphsynth.pipeline"
+#: Stages of ``[structure]``, which every system shares; "sketch graphs" asks the system for ``recognised``.
+STRUCTURE = (
+    Stage("solve", f"{_HERE}.steps:solve", (), ("solutions",)),
+    Stage("generate", f"{_HERE}.steps:generate", ("solutions",), ("candidates",), stream=True),
+    Stage("sketch graphs", f"{_HERE}.steps:pictures", ("candidates", "recognised"), ("graph_pictures",)),
+)
+#: Collects what stages for each candidate gave as ``record`` into ``records``: one per candidate, with reasons.
+COLLECT = Stage("collect", f"{_HERE}.steps:records", ("record",), ("records",))
+#: Ranks the records by the objectives of ``[ranking]``.
+RANK = Stage("rank", f"{_HERE}.steps:rank", ("records",), ("ranking",))
 #: Measured of every scene with a structural question.
 ENUMERATION = Plan("enumeration", "graphsynth.evidence.enumeration:of_scene", structure=True)
-
-#: Entry points of this group name systems: ``name = "package.module"`` or ``"package.module:SYSTEM"``.
-GROUP = "graphsynth.systems"
-#: Entry points of this group add problems to a system: ``system = "package.module:PLANS"``, a sequence of `Plan`.
-EVIDENCE = "graphsynth.evidence"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,24 +86,45 @@ class System:
     table : type
         Frozen dataclass: the schema of ``[mechanism]``.  Its first field is ``module: Literal["name"]``.
     stages : tuple of Stage
-        What can be computed, besides the stages of ``[structure]``.
+        What can be computed, besides the stages of ``[structure]``: tables, charts and pictures among it.
     structure : {"required", "optional", "none"}
         Whether a scene must, may or must not have a table ``[structure]``.
     more : callable, optional
         Further stages for a scene as read: those of parts that only some scenes have.
+    build : str
+        ``"package.module:function"`` that makes the mechanism of a scene, called with a
+        `graphsynth.pipeline.stages.Context`; empty if a scene has many.
     evidence : tuple of Plan
         Problems on which error against run time is measured.
+    cases : tuple of str
+        Its stress cases, by name or section, as ``graphsynth stress`` takes them.
     """
 
     table: type
     stages: tuple[Stage, ...]
     structure: Literal["required", "optional", "none"] = "optional"
     more: Callable[[Any], tuple[Stage, ...]] | None = None
+    build: str = ""
     evidence: tuple[Plan, ...] = ()
+    cases: tuple[str, ...] = ()
 
     def stages_for(self, scene: object) -> tuple[Stage, ...]:
         """Return all stages that a scene of this system can use."""
         return (*self.stages, *(self.more(scene) if self.more else ()))
+
+
+def announced(kind: str) -> EntryPoints:
+    """Return the entry points of a group, of graphsynth and of other packages: what a name stands for.
+
+    Parameters
+    ----------
+    kind : {"systems", "stages", "evidence"}
+        ``name = "package.module"`` or ``"package.module:SYSTEM"``; ``product = "package.module:STAGE"``; ``system =
+        "package.module:PLANS"``, a sequence of further `Plan`.
+    """
+    from importlib.metadata import entry_points
+
+    return entry_points(group=f"graphsynth.{kind}")
 
 
 def system_names() -> tuple[str, ...]:
@@ -61,13 +135,7 @@ def system_names() -> tuple[str, ...]:
     >>> "planar" in system_names()
     True
     """
-    return tuple(sorted(_installed()))
-
-
-def _installed() -> dict[str, str]:
-    from importlib.metadata import entry_points
-
-    return {point.name: point.value for point in entry_points(group=GROUP)}
+    return tuple(sorted(announced("systems").names))
 
 
 def system(name: str, place: Place | None = None) -> System:
@@ -91,11 +159,10 @@ def system(name: str, place: Place | None = None) -> System:
     'optional'
     """
     at = place or Place("scene")
-    value = _installed().get(name)
+    values = {point.name: point.value for point in announced("systems")}
+    value = values.get(name)
     if value is None:
-        raise at.error(
-            f"has module = {name!r}, which is no system of mechanisms{suggest(name, system_names())}", "module"
-        )
+        raise at.error(f"has module = {name!r}, which is no system of mechanisms{suggest(name, values)}", "module")
     module, _, attribute = value.partition(":")
     try:
         found = getattr(import_module(module), attribute or "SYSTEM")
@@ -118,10 +185,8 @@ def plans_of(name: str, *, structure: bool = False) -> tuple[Plan, ...]:
     structure : bool
         Whether the scene has a structural question.
     """
-    from importlib.metadata import entry_points
-
     found = list(system(name).evidence)
-    for point in entry_points(group=EVIDENCE, name=name):
+    for point in announced("evidence").select(name=name):
         found += point.load()
     found += [ENUMERATION] if structure else []
     return tuple(plan for plan in found if structure or not plan.structure)

@@ -15,8 +15,7 @@ import pytest
 from graphsynth.cli import main
 from graphsynth.core.errors import GeometryError, SceneError, SpecError
 from graphsynth.evidence import Effort, Problem, Row, RowStatus, measure, table, work_precision_picture, write_report
-from graphsynth.evidence.registry import Plan, load
-from graphsynth.evidence.rows import best_of
+from graphsynth.evidence.rows import Plan, best_of
 from graphsynth.pipeline.scene import available_scenes, load_scene
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.system import plans_of, system_names
@@ -220,20 +219,19 @@ def test_every_system_has_problems_and_every_plan_a_function():
         plans = plans_of(name, structure=True)
         assert len({plan.name for plan in plans}) == len(plans) >= 2
         for each in plans:
-            assert callable(load(each))
+            assert callable(each.load())
 
 
 def test_a_plan_that_names_nothing():
     with pytest.raises(SceneError, match="cannot be imported"):
-        load(Plan("x", "graphsynth.evidence:nothing_of_that_name"))
+        Plan("x", "graphsynth.evidence:nothing_of_that_name").load()
 
 
 def test_only_the_methods_of_the_scene_are_loaded():
     code = (
         "import sys\n"
-        "from graphsynth.evidence.registry import load\n"
         "from graphsynth.pipeline.system import plans_of\n"
-        "[load(plan) for plan in plans_of('tribometer')]\n"
+        "[plan.load() for plan in plans_of('tribometer')]\n"
         "import graphsynth.evidence.report\n"
         "heavy = ('graphsynth.', 'numba', 'matplotlib', 'scipy')\n"
         "print(*sorted(name for name in sys.modules if name.startswith(heavy)))\n"

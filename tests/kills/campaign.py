@@ -48,7 +48,7 @@ from dataclasses import dataclass
 from typing import Literal
 from graphsynth.pipeline.system import System
 from graphsynth.pipeline.products import Record
-from graphsynth.pipeline.stages import COLLECT, Stage
+from graphsynth.pipeline.system import COLLECT, Stage
 
 @dataclass(frozen=True, slots=True)
 class Table:

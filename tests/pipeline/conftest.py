@@ -40,7 +40,7 @@ from typing import Literal
 
 from graphsynth.pipeline.system import System
 from graphsynth.pipeline.products import Candidate, Quantity, Record, Rejected
-from graphsynth.pipeline.stages import COLLECT, Stage
+from graphsynth.pipeline.system import COLLECT, Stage
 
 
 @dataclass(frozen=True, slots=True)

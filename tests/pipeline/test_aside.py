@@ -12,7 +12,8 @@ import pytest
 
 from graphsynth.pipeline.runner import Running, execute
 from graphsynth.pipeline.scene import Scene, find_scene
-from graphsynth.pipeline.stages import Context, Stage
+from graphsynth.pipeline.stages import Context
+from graphsynth.pipeline.system import Stage
 
 
 def survey() -> Scene:
@@ -73,7 +74,7 @@ def count(context: Context) -> int:
 
 
 def fake(monkeypatch: pytest.MonkeyPatch, **functions: Any) -> None:
-    monkeypatch.setattr("graphsynth.pipeline.measure.load", lambda stage: functions[stage.function])
+    monkeypatch.setattr(Stage, "load", lambda stage: functions[stage.function])
 
 
 @pytest.fixture

@@ -13,10 +13,10 @@ import pytest
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.pipeline.products import Quantity, Record
-from graphsynth.pipeline.rank import rank
 from graphsynth.pipeline.runner import run
 from graphsynth.pipeline.scene import GenerateTable, Scene, load_scene
 from graphsynth.pipeline.stages import Context
+from graphsynth.pipeline.steps import rank
 
 
 def check(report: Any) -> None:

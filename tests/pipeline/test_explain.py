@@ -14,7 +14,7 @@ from graphsynth.cli.main import main
 from graphsynth.core.native import library
 from graphsynth.pipeline.measure import rooms, why_not, why_run
 from graphsynth.pipeline.scene import available_scenes
-from graphsynth.pipeline.stages import Stage
+from graphsynth.pipeline.system import Stage
 
 LOADS = tomllib.loads(Path(__file__).with_name("loads.toml").read_text(encoding="utf-8"))
 

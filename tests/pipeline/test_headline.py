@@ -13,13 +13,13 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from graphsynth.pipeline.measure import StageTime
 from graphsynth.pipeline.page import report_html
 from graphsynth.pipeline.products import Finding, Objective, Quantity, Record, Table
-from graphsynth.pipeline.rank import ranking_of
 from graphsynth.pipeline.report import print_summary
-from graphsynth.pipeline.runner import Report, execute, run
+from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import Scene
+from graphsynth.pipeline.stages import Report, StageTime
+from graphsynth.pipeline.steps import ranking_of
 from graphsynth.pipeline.summary import facts, sentences, summary_tables
 
 

@@ -16,15 +16,14 @@ from hypothesis import given, strategies as st
 from rich.console import Console
 
 from graphsynth.core.errors import SceneError
-from graphsynth.pipeline.datafiles import results_csv
-from graphsynth.pipeline.measure import StageTime
 from graphsynth.pipeline.page import report_html
 from graphsynth.pipeline.products import Attempt, Candidate, Columns, Picture, Quantity, Record, Table, each
 from graphsynth.pipeline.report import column_widths, print_summary, scene_json, write_report
-from graphsynth.pipeline.runner import Report, Running, run
+from graphsynth.pipeline.runner import Running, run
 from graphsynth.pipeline.scene import OutputsTable, Scene
-from graphsynth.pipeline.stages import Context, Stage
-from graphsynth.pipeline.store import check_folder
+from graphsynth.pipeline.stages import Context, Report, StageTime
+from graphsynth.pipeline.store import check_folder, results_csv
+from graphsynth.pipeline.system import Stage
 
 RECORDS = (
     Record(

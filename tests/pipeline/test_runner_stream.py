@@ -15,12 +15,13 @@ from hypothesis import given, strategies as st
 
 from graphsynth.core.errors import SceneError
 from graphsynth.pipeline.products import Objective, Outcome, Quantity, Record
-from graphsynth.pipeline.rank import ranking_of
 from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import BudgetTable, OutputsTable, Scene, load_scene
-from graphsynth.pipeline.stages import Stage, resolve
+from graphsynth.pipeline.stages import resolve
+from graphsynth.pipeline.steps import ranking_of
 from graphsynth.pipeline.store import decode, encode
 from graphsynth.pipeline.streaming import plan_stream
+from graphsynth.pipeline.system import Stage
 
 
 def with_mechanism(scene: Scene, **changes: object) -> Scene:

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from graphsynth.core.errors import SceneError
+from graphsynth.evidence.stress import stress_cases
 from graphsynth.pipeline.scene import available_scenes, load_scene
-from graphsynth.pipeline.stages import Stage, load, resolve
+from graphsynth.pipeline.stages import build, resolve
+from graphsynth.pipeline.system import Stage, system, system_names
 
 
 def stage(name: str, needs: str = "", gives: str = "") -> Stage:
@@ -62,7 +64,7 @@ def test_every_stage_of_a_shipped_scene_can_be_loaded_and_resolved(name: str) ->
     stages = load_scene(name).stages()
     products = [product for s in stages for product in s.gives]
     assert {s.name for s in resolve(stages, products)} == {s.name for s in stages}
-    assert all(callable(load(s)) for s in stages)
+    assert all(callable(s.load()) for s in stages)
     assert all(a.name != b.name for a, b in pairwise(sorted(stages, key=lambda s: s.name)))
 
 
@@ -71,4 +73,16 @@ def test_every_stage_of_a_shipped_scene_can_be_loaded_and_resolved(name: str) ->
 )
 def test_a_function_that_cannot_be_imported_is_named(function: str) -> None:
     with pytest.raises(SceneError, match=r"stage 's' names"):
-        load(Stage("s", function, (), ("x",)))
+        Stage("s", function, (), ("x",)).load()
+
+
+def test_the_stress_cases_of_every_system_exist() -> None:
+    named = [case for name in system_names() for case in system(name).cases]
+    assert len(named) > 20
+    for case in named:
+        assert stress_cases([case])
+
+
+def test_a_scene_of_many_mechanisms_builds_none_by_itself() -> None:
+    with pytest.raises(SceneError, match="has many mechanisms, not one: module = 'four_bar_survey'"):
+        build(load_scene("four_bar_survey"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import os
 import re
 import subprocess
@@ -80,17 +81,17 @@ def test_it_is_small(site: Path) -> None:
 
 
 def test_its_chart_its_evidence_and_its_stress_case(site: Path, scene: Path, tmp_path: Path) -> None:
-    from graphsynth.evidence.registry import load
     from graphsynth.evidence.rows import Effort
     from graphsynth.pipeline.scene import load_scene
-    from graphsynth.pipeline.stages import Context
+    from graphsynth.pipeline.stages import Context, build
     from graphsynth.pipeline.system import plans_of
 
     scene.write_text(scene.read_text(encoding="utf-8").replace('"tables"', '"plots"'), encoding="utf-8")
     (picture,) = execute(scene)["plots"]
     assert "swing [°]" in picture.svg or "<svg" in picture.svg
+    assert build(load_scene(scene)) == pytest.approx((1.0, math.radians(60.0)))
     (plan,) = plans_of("pendulum")
-    (row,) = load(plan)(Context(load_scene(scene)), Effort(1, quick=True)).rows
+    (row,) = plan.load()(Context(load_scene(scene)), Effort(1, quick=True)).rows
     assert row.good and row.error < 1e-14
     cases = tmp_path / "pendulum.toml"
     cases.write_text(block("toml", "[[case]]"), encoding="utf-8")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import FormatError, GraphsynthError
-from graphsynth.pipeline.planar.system import BearingsTable, EmbodyTable, LoadsTable, MotorTable, PlanarTable
+from graphsynth.pipeline.planar.tables import BearingsTable, EmbodyTable, LoadsTable, MotorTable, PlanarTable
 from graphsynth.pipeline.products import Candidate, Columns, Outcome, Quantity, Record, Rejected, exact
 from graphsynth.pipeline.stages import Context
 
@@ -162,8 +162,8 @@ def scaled(mechanism: Mechanism, factor: float) -> Mechanism:
 
     Examples
     --------
-    >>> from graphsynth.systems.four_bar_survey.motion import four_bar
-    >>> scaled(four_bar(), 0.5).joint(2, 3).at_a
+    >>> from graphsynth.mechanism.model import Mechanism
+    >>> scaled(Mechanism.four_bar(2.0, 1.0, 2.5, 2.5), 0.5).joint(2, 3).at_a
     (1.25, 0.0)
     """
     from graphsynth.mechanism.model import Mechanism

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from graphsynth.pipeline.planar.stages import restored
-from graphsynth.pipeline.planar.system import PlanarTable
+from graphsynth.pipeline.planar.tables import PlanarTable
 from graphsynth.pipeline.products import Outcome, Picture, Ranking, Record
 from graphsynth.pipeline.stages import Context
 

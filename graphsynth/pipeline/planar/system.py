@@ -2,157 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from graphsynth.core.errors import SceneError
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import COLLECT, Stage
-from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import In, Positions, require
-from graphsynth.pipeline.units import DEGREE
-
-Deg = Annotated[float, In("deg")]
-Degs = Annotated[tuple[float, ...], In("deg")]
-
-
-@dataclass(frozen=True, slots=True)
-class LineTable:
-    """A point draws a straight segment: length in cranks, part of the turn, largest width over length."""
-
-    length: float
-    span: Deg = math.pi
-    tolerance: float = 0.01
-    on_bar: bool = False
-    link: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class PathTable:
-    """A point passes points in order, at given inputs or at free ones; largest distance over the size of the set."""
-
-    points: tuple[tuple[float, float], ...]
-    inputs: Degs = ()
-    tolerance: float = 0.01
-    link: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class PosesTable:
-    """A link passes poses at given inputs: points, and the angles there."""
-
-    points: tuple[tuple[float, float], ...]
-    angles: Degs
-    inputs: Degs
-    tolerance: float = 0.01
-    link: int | None = None
-
-    def __post_init__(self) -> None:
-        require(
-            len(self.points) == len(self.angles),
-            f"has {len(self.points)} points and {len(self.angles)} angles_deg; give one angle for each point",
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class FunctionTable:
-    """The angle of a link on the frame is a function of the input; only differences of outputs count."""
-
-    inputs: Degs
-    outputs: Degs
-    tolerance: Deg = 0.5 * DEGREE
-    link: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class EmbodyTable:
-    """Goals for dimensions: bounds, at most one target, and how much work each candidate may cost."""
-
-    span: Deg = math.tau
-    min_transmission: Deg = 25.0 * DEGREE
-    max_length_ratio: float = 6.0
-    tries: Annotated[int, In(least=1, most=10_000)] = 12
-    effort: Annotated[float, In(above=0, most=100)] = 1.0
-    line: LineTable | None = None
-    path: PathTable | None = None
-    poses: PosesTable | None = None
-    function: FunctionTable | None = None
-
-    def __post_init__(self) -> None:
-        targets = [name for name in ("line", "path", "poses", "function") if getattr(self, name) is not None]
-        require(len(targets) < 2, f"has {' and '.join(targets)}; only one target works")
-
-
-@dataclass(frozen=True, slots=True)
-class MotionTable:
-    """The range of the input and what the motion must keep."""
-
-    span: Annotated[float, In("deg", above=0, most=36_000, why="use more than 0 and at most 36000, 100 turns")] = (
-        math.tau
-    )
-    positions: Positions = 360
-    min_transmission: Deg = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class BearingsTable:
-    """All bearings alike, the driven axis tilted; tolerances are plus or minus, and only certificates use them."""
-
-    radius_mm: Annotated[float, In(above=0)]
-    height_mm: Annotated[float, In(above=0)]
-    clearance_mm: Annotated[float, In(least=0)]
-    alpha: Annotated[float, In("deg", above=0)]
-    condition: Literal["A", "B"] = "A"
-    direction: Deg = 0.0
-    any_direction: bool = False
-    certify: bool = False
-    must_be_free: bool = False
-    alpha_tolerance: Deg = 0.0
-    clearance_tolerance_mm: float = 0.0
-    length_tolerance: Annotated[float, In("%")] = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class MotorTable:
-    """A motor with a straight characteristic on the driven link: torque at rest, speed without load."""
-
-    stall: Annotated[float, In("Nm", above=0)]
-    no_load: Annotated[float, In("rad/s", above=0)]
-    end: Annotated[float, In("s", above=0)]
-    inertia: Annotated[float, In("kg m^2")] = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class LoadsTable:
-    """Links as uniform bars between joints, gravity, a force on the first named point; a constant speed, a motor."""
-
-    bar_kg_per_m: Annotated[float, In("kg/m", above=0)]
-    gravity: Annotated[tuple[float, float], In("m/s^2")] = (0.0, 0.0)
-    force: Annotated[tuple[float, float], In("N")] = (0.0, 0.0)
-    speed: Annotated[float, In("rad/s")] = 1.0
-    motor: MotorTable | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class PlanarTable:
-    """``[mechanism]`` with ``module = "planar"``: candidates come from ``[structure]`` or from `files`."""
-
-    module: Literal["planar"]
-    files: tuple[str, ...] = ()
-    crank: Annotated[float | None, In("mm", above=0)] = None
-    embody: EmbodyTable = field(default_factory=EmbodyTable)
-    motion: MotionTable = field(default_factory=MotionTable)
-    bearings: BearingsTable | None = None
-    loads: LoadsTable | None = None
-    pictures: Annotated[int, In(least=1)] = 10
-
-    def __post_init__(self) -> None:
-        require(
-            bool(self.files) or self.crank is not None or self.loads is None,
-            "has [mechanism.loads] but no crank_mm; masses need the size of the mechanism: give it",
-        )
-
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.planar.tables import PlanarTable
+from graphsynth.pipeline.system import COLLECT, Stage, System
 
 _HERE = "graphsynth.pipeline.planar"
 
@@ -196,7 +51,7 @@ SYSTEM = System(
     ),
     more=_more,
     evidence=plans(
-        "graphsynth.pipeline.planar.evidence",
+        f"{_HERE}.evidence",
         "positions",
         "coupled-joints",
         "linkage-dynamics",

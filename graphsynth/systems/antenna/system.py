@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, require
 from graphsynth.pipeline.units import DEGREE
 
@@ -84,7 +83,9 @@ class AntennaTable:
 _HERE = "graphsynth.systems.antenna"
 SYSTEM = System(
     table=AntennaTable,
+    cases=tuple(f"instruments-9.{k}" for k in range(1, 8)),
     structure="none",
+    build=f"{_HERE}.stages:antenna_of",
     stages=(
         Stage("sweep", f"{_HERE}.stages:sweep", (), ("sweep",)),
         Stage("compare models", f"{_HERE}.stages:compare", (), ("comparison",)),

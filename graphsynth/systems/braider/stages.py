@@ -6,8 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GeometryError, SpecError
-from graphsynth.pipeline.display import quantity_table
-from graphsynth.pipeline.motor_tables import balance_rows, limit_table
+from graphsynth.pipeline.display import balance_rows, limit_table, quantity_table
 from graphsynth.pipeline.products import Finding, Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.braider.system import BraiderTable

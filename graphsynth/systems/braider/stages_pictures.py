@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.pipeline.motor_tables import shown_motion
+from graphsynth.pipeline.display import shown_motion
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.braider.stages import JOINTS, braider_of, table_of

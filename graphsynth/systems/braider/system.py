@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, Positions, require
 
 _Length = Annotated[float, In(above=0, why="a length must be positive")]
@@ -120,6 +119,7 @@ class BraiderTable:
 _HERE = "graphsynth.systems.braider"
 SYSTEM = System(
     table=BraiderTable,
+    cases=("instruments-9.16", "instruments-9.17"),
     structure="none",
     stages=(
         Stage("start up", f"{_HERE}.stages:start_up", (), ("start_up",)),

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from graphsynth.pipeline.products import Ranking, Record
-from graphsynth.pipeline.rank import DIGITS
 from graphsynth.pipeline.stages import Context
+from graphsynth.pipeline.steps import DIGITS
 from graphsynth.systems.four_bar_survey.lattice import Lattice
 
 

@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.scene import BearingTable, TiltTable
+from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, require
-from graphsynth.systems.lambda_linkage.system import BearingTable, Tilt
 
 _MOST = 10**8
 _Length = Annotated[float, In(above=0, why="a length must be positive")]
@@ -83,7 +82,7 @@ class SurveyTable:
 
     module: Literal["four_bar_survey"]
     lengths: SurveyLengths
-    tilt: Tilt
+    tilt: TiltTable
     bearing: BearingTable
     limits: SurveyLimits = field(default_factory=SurveyLimits)
     tolerances: SurveyTolerances = field(default_factory=SurveyTolerances)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
-from graphsynth.pipeline.tables import ANY_LENGTH, In, Positions, require
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.scene import BearingTable, TiltTable
+from graphsynth.pipeline.system import Stage, System
+from graphsynth.pipeline.tables import ANY_LENGTH, In, Positions
 
 _Length = Annotated[float, ANY_LENGTH, In(above=0, why="a length must be positive")]
 
@@ -26,33 +25,12 @@ class LambdaLengths:
 
 
 @dataclass(frozen=True, slots=True)
-class Tilt:
-    """Tilt of the motor axis: by `alpha_rad` about the direction `axis`."""
-
-    alpha: Annotated[float, In("rad", above=-math.pi / 2, below=math.pi / 2, why="it must be within pi/2")]
-    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        require(any(self.axis), "has axis [0, 0, 0]; a direction must not vanish")
-
-
-@dataclass(frozen=True, slots=True)
-class BearingTable:
-    """The bearing at B: radius, height and radial clearance in millimetres, and the contact condition."""
-
-    radius_mm: Annotated[float, In(above=0)]
-    height_mm: Annotated[float, In(above=0)]
-    clearance_mm: Annotated[float, In(least=0)]
-    condition: Literal["A", "B"] = "A"
-
-
-@dataclass(frozen=True, slots=True)
 class LambdaTable:
     """``[mechanism]`` with ``module = "lambda_linkage"``."""
 
     module: Literal["lambda_linkage"]
     lengths: LambdaLengths
-    tilt: Tilt
+    tilt: TiltTable
     bearing: BearingTable
     branch: Literal[1, -1] = 1
     positions: Positions = 360
@@ -62,6 +40,7 @@ class LambdaTable:
 _HERE = "graphsynth.systems.lambda_linkage"
 SYSTEM = System(
     table=LambdaTable,
+    cases=("lambda",),
     structure="required",
     stages=(
         Stage("recognise", f"{_HERE}.stages:recognise", ("candidates",), ("recognised",)),

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import Positions, require
 
 Kind = Literal["crank_slider", "scotch_yoke"]

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GeometryError, SceneError, SpecError
-from graphsynth.pipeline.display import quantity_table
-from graphsynth.pipeline.motor_tables import balance_rows, limit_table
+from graphsynth.pipeline.display import balance_rows, limit_table, quantity_table
 from graphsynth.pipeline.products import Attempt, Finding, Picture, Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.platform.motor_system import DCMotorTable, MachineDriveTable, PlatformDriveTable

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.pipeline.display import TURN, chart
-from graphsynth.pipeline.motor_tables import shown_motion
+from graphsynth.pipeline.display import TURN, chart, shown_motion
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.platform.motor_stages import Claim, LabelledRun, WithoutInertia, table_of

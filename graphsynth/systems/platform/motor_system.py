@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import Plan, plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
+from graphsynth.evidence.rows import Plan, plans
+from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, require
 
 _Positive = "each must be positive"
@@ -141,6 +140,7 @@ def _check_resistances(resistances: tuple[float, ...]) -> None:
 _STEPS = "graphsynth.systems.platform.motor_stages"
 SYSTEM = System(
     table=PlatformDriveTable,
+    cases=("platform-14.8", *(f"platform-12.{k}" for k in range(24, 31))),
     structure="none",
     stages=(
         Stage("drive", f"{_STEPS}:drive", (), ("runs",)),

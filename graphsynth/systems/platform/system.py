@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, Positions
 from graphsynth.systems.platform.motor_system import MachineDriveTable
 
@@ -45,6 +44,7 @@ class PlatformTable:
 _HERE = "graphsynth.systems.platform"
 SYSTEM = System(
     table=PlatformTable,
+    cases=("platform",),
     structure="required",
     stages=(
         Stage("recognise", f"{_HERE}.stages:recognise", ("candidates",), ("recognised",)),

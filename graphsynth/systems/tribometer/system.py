@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from graphsynth.evidence.registry import plans
-from graphsynth.pipeline.stages import Stage
-from graphsynth.pipeline.system import System
+from graphsynth.evidence.rows import plans
+from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import require
 from graphsynth.pipeline.units import Unit
 
@@ -99,6 +98,7 @@ class TribometerTable:
 _HERE = "graphsynth.systems.tribometer"
 SYSTEM = System(
     table=TribometerTable,
+    cases=("instruments-3.8", *(f"instruments-9.{k}" for k in range(10, 16))),
     structure="none",
     stages=(
         Stage("run", f"{_HERE}.stages:move", (), ("motion",)),
