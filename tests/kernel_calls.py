@@ -9,8 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from numba import typeof
 
 from graphsynth.core.compilation import Kernel
 from graphsynth.core.native.signatures import Signature, text_of
@@ -23,6 +23,17 @@ def size_of(value: Any) -> int:
     return sum(map(size_of, value)) if isinstance(value, tuple) else getattr(value, "nbytes", 8)
 
 
+def duplicate(value: Any) -> Any:
+    """Copy arguments; arrays that may only be read stay so."""
+    if isinstance(value, tuple):
+        parts = [duplicate(part) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    found = copy.deepcopy(value)
+    if isinstance(value, np.ndarray):
+        found.flags.writeable = value.flags.writeable
+    return found
+
+
 class Calls:
     """Copies of arguments by kernel and types."""
 
@@ -32,6 +43,8 @@ class Calls:
 
     def around(self, kernel: Kernel) -> Any:
         """What is called instead of a kernel."""
+        from numba import typeof
+
         name = f"{kernel.__module__}.{kernel.__qualname__}"
 
         def call(*args: Any) -> Any:
@@ -43,7 +56,7 @@ class Calls:
             kept, size = self.kept.setdefault(kind, []), size_of(args)
             # of many calls the first ones, and then ever rarer ones
             if size < HUGE and len(kept) < (2 if size > LARGE else MOST) and count & (count - 1) == 0:
-                kept.append(copy.deepcopy(args))
+                kept.append(duplicate(args))
             return kernel.dispatcher(*args)
 
         return call
@@ -58,7 +71,8 @@ def main(path: Path, *slow: str) -> None:
     options = ["-q", "-n", "0", "-p", "no:cacheprovider", *(["-m", ""] if slow else [])]
     pages = [f"{here / 'test_docs.py'}::test_examples_run", str(here / "test_doc_commands.py")]
     assert pytest.main([*options, *pages]) in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)  # that is for others
-    path.write_bytes(pickle.dumps({kind: kept for kind, kept in calls.kept.items() if kept}))
+    calls.kept = {kind: kept for kind, kept in calls.kept.items() if kept}
+    path.write_bytes(pickle.dumps(calls.kept, protocol=5))  # the first that tells what may be written
 
 
 if __name__ == "__main__":

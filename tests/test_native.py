@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import os
 import pickle
@@ -22,6 +21,8 @@ from graphsynth.cli.main import main
 from graphsynth.core.native import library
 from graphsynth.core.native.record import united
 from graphsynth.core.native.signatures import Signature, parse, read_list, text_of, write_list
+
+from .kernel_calls import duplicate
 
 needs_library = pytest.mark.skipif(not library.contents(), reason=library.reason)
 ROOT = Path(__file__).parents[1]
@@ -319,16 +320,16 @@ def moved(value: Any, rng: np.random.Generator) -> Any:
         found = (value * (1.0 + size * rng.standard_normal(value.shape))).astype(value.dtype)
         found.flags.writeable = value.flags.writeable
         return found
-    return copy.deepcopy(value)
+    return duplicate(value)
 
 
 def differing(kernel: Any, args: tuple[Any, ...]) -> bool:
     """Call the library, in every version of its code, and numba."""
-    theirs = copy.deepcopy(args)
+    theirs = duplicate(args)
     expected = kernel.dispatcher(*theirs)
     levels = range(len(library.LEVELS["x86_64"]))
     for level in levels if library.target().startswith("x86_64") and library.reason == "x86-64-v3" else [None]:
-        ours = copy.deepcopy(args)
+        ours = duplicate(args)
         if level is not None:
             library._library.set_level(level)
         before = calls_of(kernel)
