@@ -280,14 +280,14 @@ class MotorDrive:
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Dry friction in an R or P joint: at rest up to ``static`` times the load, sliding ``mu(v)`` times the load.
+    """Dry friction in a joint: at rest up to ``static`` times the load, sliding ``mu(v)`` times the load.
 
     ``mu(v) = kinetic + (static - kinetic) exp(-(v/stribeck_speed)^2)``; with ``stribeck_speed=0`` the coefficient falls
     at once.  In a turning pair v is ``radius`` times the relative speed and the friction torque ``mu radius |F|`` with
     F the pin force; in a sliding pair the friction force is ``mu (|N1| + |N2|)``, N1 and N2 the normal forces at the
     ends of a shoe of the given ``length`` that carry the guide's force and couple (0: the force alone).  Sticking is a
     state with events, see ``docs/explanation/planar-dynamics.md``; ``smoothing_velocity > 0`` asks for the smooth law
-    ``mu(v) tanh(v/smoothing_velocity)`` instead, which never sticks.
+    ``mu(v) tanh(v/smoothing_velocity)`` instead, which never sticks; a pin in a slot knows no other law.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import MotorDrive
-from graphsynth.dynamics.friction.loads import fitting_loads
+from graphsynth.dynamics.friction.loads import fitting_loads, sliding_loads
 from graphsynth.dynamics.friction.problem import joint_names
 from graphsynth.dynamics.friction.rows import FrictionElement, FrictionRows
 from graphsynth.dynamics.model import DynamicModel
@@ -20,7 +20,7 @@ from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
 from graphsynth.dynamics.result import MotorHistory
 from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
-from graphsynth.dynamics.values import applied_loads
+from graphsynth.dynamics.values import applied_loads, jacobians
 from graphsynth.mechanism.laws import Driver
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ def inverse_dynamics(
     acceleration: ArrayLike = 0.0,
     *,
     times: ArrayLike | None = None,
+    refuse: bool = True,
 ) -> InverseDynamics:
     """Find the efforts of the mechanism's drivers, and the reactions, for a motion of the planar engine.
 
@@ -84,6 +85,8 @@ def inverse_dynamics(
     times : array_like, scalar or shape (n,), optional
         Time of every sample, s, at which loads given as functions are taken.  By default ``input / speed``, the time
         since the input was 0, if the speed is constant (0 at rest); at a speed that varies it must be given.
+    refuse : bool, optional
+        False: NaN at inputs where friction leaves no loads, or several; by default that is an error.
 
     Returns
     -------
@@ -122,18 +125,19 @@ def inverse_dynamics(
     rates = motion.velocities * rate
     v = compiled.to_rates(q, rates)
     a = _accelerations(compiled, motion.poses, rates, motion.accelerations * rate**2 + motion.velocities * second)
-    elements = FrictionRows(compiled).elements if compiled.tables.friction.size else ()
     lam = np.full((n, len(compiled.info)), np.nan)
-    error, scale = 0.0, 1e-300
-    for k in np.flatnonzero(motion.assembled & np.isfinite(a).all(axis=1)):
-        lam[k], wrong, size = _multipliers(compiled, float(instants[k]), q[k], v[k], a[k], elements)
-        error, scale = max(error, wrong), max(scale, size)
+    there = np.flatnonzero(motion.assembled & np.isfinite(a).all(axis=1))
+    found = balance(compiled, instants[there], q[there], v[there], a[there])
+    if refuse and found.refusals:
+        raise found.refusals[min(found.refusals)]
+    lam[there] = found.multipliers
+    power_error = float(np.fmax.reduce(found.error, initial=0.0) / np.fmax.reduce(found.size, initial=1e-300))
     reactions = reactions_from_multipliers(compiled, q, v, lam, instants)
     efforts, power = _efforts(compiled, reactions, motion, rates)
     good = np.flatnonzero(np.isfinite(lam).all(axis=1))
     chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good
     return InverseDynamics(
-        motion.inputs, instants, efforts, reactions, power, error / scale,
+        motion.inputs, instants, efforts, reactions, power, power_error,
         newton_euler_difference(
             compiled, instants[chosen], q[chosen], v[chosen], a[chosen], lam[chosen], np.zeros((len(chosen), 0))
         ),
@@ -212,31 +216,64 @@ def _accelerations(compiled: Compiled, poses: Array, rates: Array, seconds: Arra
     return np.asarray(found.reshape(len(poses), compiled.n))
 
 
-def _multipliers(
-    compiled: Compiled, t: float, q: Array, v: Array, a: Array, elements: tuple[FrictionElement, ...]
-) -> tuple[Array, float, float]:
-    """Multipliers of all rows, the drivers' included; error and size of the balance along the velocity."""
+class Balance(NamedTuple):
+    """Balance of all bodies at n samples.
+
+    Attributes
+    ----------
+    multipliers : ndarray, shape (n, rows)
+        The drivers' included; NaN where a sample is refused.
+    error, size : ndarray, shape (n,)
+        Of the power along the velocity, W.
+    refusals : dict of int to GeometryError
+        Why friction leaves no loads, several, or needs an open reaction, by sample.
+    """
+
+    multipliers: Array
+    error: Array
+    size: Array
+    refusals: dict[int, GeometryError]
+
+
+def balance(compiled: Compiled, times: Array, q: Array, v: Array, a: Array) -> Balance:
+    """Multipliers of all rows for given motions; coordinates, rates and accelerations have the shape (n, coordinates).
+
+    All samples are solved at once; those where friction returns to itself with a factor of 1 or more, or where a row is
+    redundant, are then looked at one by one.
+    """
     from graphsynth.dynamics import kernels
-    from graphsynth.dynamics.values import initial_slots
 
     T = compiled.tables
-    x = kernels.state_rows(T, q, v)
-    Q, _, _, _, _ = kernels.load_vector(T, x, applied_loads(compiled, t, q, v), compiled.currents)
-    _, J, _, _ = kernels.constraint_system(T, x, initial_slots(compiled, q), np.zeros((max(1, len(compiled.laws)), 3)))
-    unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
-    inertial = T.mass @ a
-    matrix = (J * unit).T
-    lam = np.linalg.lstsq(matrix, (Q - inertial) * unit, rcond=1e-12)[0]
-    rubbing = np.zeros_like(Q)
-    if elements:
-        units = np.zeros((len(elements), compiled.n))
+    elements = FrictionRows(compiled).elements if T.friction.size else ()
+    n = len(q)
+    loads, units = np.zeros((n, compiled.n)), np.zeros((n, len(elements), compiled.n))
+    J = jacobians(compiled, q, v)
+    for k in range(n):
+        x = kernels.state_rows(T, q[k], v[k])
+        loads[k] = kernels.load_vector(T, x, applied_loads(compiled, float(times[k]), q[k], v[k]), compiled.currents)[0]
         for f in range(len(elements)):
-            kernels.friction_unit(T, x, J, f, units[f])
-        parts = np.linalg.lstsq(matrix, (units * unit).T, rcond=1e-12)[0]
-        loads = _loads(compiled, elements, matrix, lam, parts, units)
-        lam, rubbing = lam + parts @ loads, loads @ units
-    along = float((inertial + J.T @ lam - Q - rubbing) @ v)
-    return lam, abs(along), float(np.abs(v) @ (np.abs(inertial) + np.abs(Q) + np.abs(J.T) @ np.abs(lam)))
+            kernels.friction_unit(T, x, J[k], f, units[k, f])
+    inertial = a @ T.mass
+    unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
+    U, S, Vt = np.linalg.svd((J * unit).swapaxes(1, 2), full_matrices=False)
+    kept = 1e-12 * S[:, :1] < S
+    right = np.concatenate([(loads - inertial)[:, None], units], axis=1) * unit
+    parts = right @ U * np.divide(1.0, S, out=np.zeros_like(S), where=kept)[:, None]
+    solved = parts @ Vt  # multipliers of the loads, then of each element's friction for 1 N
+    start, slopes = solved[:, 0], solved[:, 1:].swapaxes(1, 2)
+    rubbing, refusals = np.zeros((n, len(elements))), {}
+    if elements:
+        rubbing, plain = sliding_loads(elements, start, slopes)
+        for k in np.flatnonzero(~(plain & kept.all(axis=1) & (J.shape[1] <= J.shape[2]))).tolist():
+            try:
+                rubbing[k] = _loads(compiled, elements, (J[k] * unit).T, start[k], slopes[k], units[k])
+            except GeometryError as error:
+                rubbing[k], refusals[k] = np.nan, error
+    lam = start + np.einsum("nmf,nf->nm", slopes, rubbing)
+    made = np.einsum("nmc,nm->nc", J, lam)
+    rest = inertial + made - loads - np.einsum("nf,nfc->nc", rubbing, units)
+    size = np.abs(inertial) + np.abs(loads) + np.einsum("nmc,nm->nc", np.abs(J), np.abs(lam))
+    return Balance(lam, np.abs((rest * v).sum(axis=1)), (np.abs(v) * size).sum(axis=1), refusals)
 
 
 def _loads(

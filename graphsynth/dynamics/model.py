@@ -213,8 +213,15 @@ class DynamicModel:
         if isinstance(joint, Revolute):
             if not element.radius > 0.0:
                 raise GeometryError(f"friction in turning pair {element.a}-{element.b} needs the radius of the pin")
-        elif not isinstance(joint, Prismatic):
-            raise GeometryError(f"friction in joint {element.a}-{element.b}: only R and P joints, not {joint.kind}")
+        elif not isinstance(joint, Prismatic | PinSlot):
+            raise GeometryError(
+                f"friction in joint {element.a}-{element.b}: only R and P joints and pins in slots, not {joint.kind}"
+            )
+        elif isinstance(joint, PinSlot) and (element.smoothing_velocity == 0.0 or element.length > 0.0):
+            raise GeometryError(
+                f"friction of the pin in slot {element.a}-{element.b} needs smoothing_velocity, and no length; a pin "
+                "that sticks is not known"
+            )
 
     def _check_together(self) -> None:
         for element in self.elements:

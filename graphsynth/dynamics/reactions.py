@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import link_number
 from graphsynth.core.errors import GeometryError
-from graphsynth.mechanism.joints import Cam, Gear
+from graphsynth.mechanism.joints import Gear
 from graphsynth.mechanism.laws import Driver
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.tables import Compiled
+    from graphsynth.dynamics.values import Values
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -130,7 +131,7 @@ def reactions_from_multipliers(
     more : mapping of int to ndarray, optional
         At some instants, changes of the multipliers that joints which stick together leave open, shape (rows, changes).
     """
-    from graphsynth.dynamics.values import Values, initial_slots
+    from graphsynth.dynamics.values import Values, jacobians
 
     count, joints = len(q), compiled.joints
     wrench = np.full((len(joints), count, 3), np.nan)  # on b (on a if b is the frame: negated), about its origin
@@ -138,31 +139,26 @@ def reactions_from_multipliers(
     angles, points = np.zeros((compiled.links, count)), np.full((len(joints), count), np.nan, dtype=np.complex128)
     apart = np.zeros((len(joints), count), dtype=np.complex128)
     ends = [*compiled.first, len(compiled.info)]
-    for k in range(count):
-        if not np.isfinite(q[k]).all():
-            continue
-        values = Values(compiled, float(times[k]), initial_slots(compiled, q[k]))
-        _, J, _, _ = values.system(q[k], v[k])
-        left = _left_null(J * values.column_scale / values.row_scale[:, None]) / values.row_scale[:, None]
-        if more is not None and k in more:
-            left = np.hstack([left, more[k]])
-        place = np.zeros((compiled.links, 3))
-        place[compiled.moving] = q[k].reshape(-1, 3)
-        angles[:, k] = place[:, 2]
-        for index in range(len(joints)):
-            rows = slice(ends[index], ends[index + 1])
-            link, sign, at = _application(compiled, index, place)
-            points[index, k] = at
-            if isinstance(joints[index], Gear):
-                apart[index, k] = _separation(compiled, joints[index], place)
-            column = int(compiled.tables.column[link])
-            own = -sign * J[rows, column : column + 3].T
-            arm = at - complex(*place[link, :2])
-            move = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [arm.imag, -arm.real, 1.0]])
-            own = move @ own
-            wrench[index, k] = own @ multipliers[k, rows]
-            free = np.abs(own @ left[rows]).max(axis=1, initial=0.0)
-            determined[index, k] = free <= 1e-8 * max(1.0, float(np.abs(own).max(initial=0.0)))
+    there = np.flatnonzero(np.isfinite(q).all(axis=1))
+    J = jacobians(compiled, q[there], v[there])
+    stuck = {k: more[int(i)] for k, i in enumerate(there) if i in more} if more else {}
+    left = _open_changes(Values(compiled, 0.0, np.zeros(0)), J, stuck)
+    place = np.zeros((len(there), compiled.links, 3))
+    place[:, compiled.moving] = q[there].reshape(len(there), -1, 3)
+    angles[:, there] = place[:, :, 2].T
+    for index in range(len(joints)):
+        rows = slice(ends[index], ends[index + 1])
+        link, sign, at = _application(compiled, index, place)
+        points[index, there] = at
+        if isinstance(joints[index], Gear):
+            apart[index, there] = _separation(compiled, joints[index], place)
+        column = int(compiled.tables.column[link])
+        own = -sign * J[:, rows, column : column + 3].swapaxes(1, 2)
+        arm = at - (place[:, link, 0] + 1j * place[:, link, 1])
+        own[:, 2] += arm.imag[:, None] * own[:, 0] - arm.real[:, None] * own[:, 1]
+        wrench[index, there] = np.einsum("nck,nk->nc", own, multipliers[there, rows])
+        free = np.abs(own @ left[:, rows]).max(axis=2, initial=0.0)
+        determined[index, there] = free <= 1e-8 * np.maximum(1.0, np.abs(own).max(axis=(1, 2), initial=0.0))[:, None]
     found = []
     for index, joint in enumerate(joints):
         a, b = _ends(compiled, joint)
@@ -174,13 +170,13 @@ def reactions_from_multipliers(
     return Reactions(times, tuple(found))
 
 
-def _separation(compiled: Compiled, gear: Gear, place: Array) -> complex:
-    """Return the unit vector of the separating force on link b.
+def _separation(compiled: Compiled, gear: Gear, place: Array) -> Complex:
+    """Return the unit vectors of the separating force on link b.
 
     A wheel with outer teeth is pushed from the pitch point towards its own centre, a ring the other way.
     """
     u = world(place, compiled, gear.b, gear.at_b) - world(place, compiled, gear.a, gear.at_a)
-    return (-u if gear.internal else u) / (abs(u) or 1.0)
+    return np.asarray((-u if gear.internal else u) / np.where(u == 0.0, 1.0, np.abs(u)))
 
 
 def kind_of(joint: Any) -> str:
@@ -197,28 +193,36 @@ def _ends(compiled: Compiled, joint: Any) -> tuple[int, int]:
     return (joint.rack, joint.pinion) if hasattr(joint, "rack") else (joint.a, joint.b)
 
 
-def _left_null(J: Array) -> Array:
-    """Columns: null vectors of the transposed Jacobian."""
-    U, S, _ = np.linalg.svd(J)
-    rank = int(np.sum(1e-10 * S[0] < S)) if S.size else 0
-    return np.asarray(U[:, rank:])
+def _open_changes(values: Values, J: Array, found: dict[int, Array]) -> Array:
+    """Columns: changes of the multipliers that the balance leaves open, filled up with zeros, (n, rows, changes)."""
+    n, m, _ = J.shape
+    scaled = J * values.column_scale / values.row_scale[:, None]
+    S = np.linalg.svd(scaled, compute_uv=False) if scaled.size else np.zeros((n, 1))
+    ranks = (1e-10 * S[:, :1] < S).sum(axis=1)
+    for k in np.flatnonzero(ranks < m).tolist():
+        U = np.linalg.svd(scaled[k])[0]
+        parts = [U[:, ranks[k] :] / values.row_scale[:, None], *([found[k]] if k in found else [])]
+        found[k] = np.hstack(parts)
+    left = np.zeros((n, m, max((part.shape[1] for part in found.values()), default=0)))
+    for k, part in found.items():
+        left[k, :, : part.shape[1]] = part
+    return left
 
 
-def world(place: Array, compiled: Compiled, link: int, at: tuple[float, float]) -> complex:
-    """World point of a point given in the link frame."""
+def world(place: Array, compiled: Compiled, link: int, at: tuple[float, float]) -> Any:
+    """World points, complex, of a point given in the link frame, at places of all links (..., links, 3)."""
     local = complex(*at) - complex(*compiled.centres[link])
-    return complex(complex(*place[link, :2]) + np.exp(1j * place[link, 2]) * local)
+    return place[..., link, 0] + 1j * place[..., link, 1] + np.exp(1j * place[..., link, 2]) * local
 
 
-def _application(compiled: Compiled, index: int, place: Array) -> tuple[int, float, complex]:
-    """Find the moving link whose wrench is read, its sign for link b, and the point of application."""
+def _application(compiled: Compiled, index: int, place: Array) -> tuple[int, float, Any]:
+    """Find the moving link whose wrench is read, its sign for link b, and the points of application."""
     joint = compiled.joints[index]
     a, b = _ends(compiled, joint)
     if isinstance(joint, Driver):
         joint = compiled.model.mechanism.joint(*joint.pair)
     if hasattr(joint, "rack"):
-        centre = world(place, compiled, joint.pinion, joint.centre)
-        at = complex(centre - 1j * np.exp(1j * joint.angle) * joint.radius)
+        at = world(place, compiled, joint.pinion, joint.centre) - 1j * np.exp(1j * joint.angle) * joint.radius
         return (b, 1.0, at) if compiled.tables.column[b] >= 0 else (a, -1.0, at)
     at = world(place, compiled, b, joint.at_b)
     if isinstance(joint, Gear):
@@ -226,6 +230,4 @@ def _application(compiled: Compiled, index: int, place: Array) -> tuple[int, flo
         total = joint.radius_a + (-1.0 if joint.internal else 1.0) * joint.radius_b
         if abs(total) > 1e-9 * (joint.radius_a + joint.radius_b):
             at = other + (at - other) * (joint.radius_a / total)
-    if isinstance(joint, Cam):
-        at = world(place, compiled, b, joint.at_b)
     return (b, 1.0, at) if compiled.tables.column[b] >= 0 else (a, -1.0, at)

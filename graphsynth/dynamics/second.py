@@ -151,7 +151,7 @@ def _cam_normal(compiled: Compiled, joint: Cam, place: Array, roller: complex) -
     out = (roller - centre) / abs(roller - centre)
     rho, first, _ = joint.pitch_radius(math.atan2(out.imag, out.real) - place[joint.a, 2] - joint.angle_a)
     tangent = first * out + rho * 1j * out
-    return -1j * tangent / abs(tangent)
+    return complex(-1j * tangent / abs(tangent))
 
 
 def newton_euler_difference(

@@ -21,7 +21,7 @@ from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
-from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
+from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
@@ -269,7 +269,7 @@ def _constraints(
     for index, joint in enumerate(joints):
         first.append(len(found))
         if isinstance(joint, Driver):
-            own = _driver_rows(model, joint, centres, len(first) - 1 - len(joints) + len(model.prescribed))
+            own = [driver_row(model, joint, centres, len(first) - 1 - len(joints) + len(model.prescribed))]
         else:
             own = joint_rows(_moved(joint, centres), model.mechanism.frame)
         for kind, a, b, parameters in own:
@@ -326,18 +326,17 @@ def joint_rows(joint: Any, frame: int) -> list[tuple[int, int, int, list[float]]
     return found
 
 
-def _driver_rows(
-    model: DynamicModel, driver: Driver, centres: Array, slot: int
-) -> list[tuple[int, int, int, list[float]]]:
+def driver_row(model: DynamicModel, driver: Driver, centres: Array, slot: int) -> tuple[int, int, int, list[float]]:
+    """Row that prescribes the coordinate of a joint; of a pin in a slot it is the way along the slot."""
     joint = model.mechanism.joint(*driver.pair)
     sign = 1.0 if driver.base == joint.a else -1.0
     moved = _moved(joint, centres)
     row = [*moved.at_a, *moved.at_b, 1.0, 0.0, *[0.0] * 6]
     row[codes.SIGN], row[codes.SLOT] = sign, float(slot)
-    if isinstance(joint, Prismatic):
+    if isinstance(joint, Prismatic | PinSlot):
         row[codes.TX], row[codes.TY] = math.cos(joint.angle_a), math.sin(joint.angle_a)
-        return [(codes.DRIVE_SLIDE, joint.a, joint.b, row)]
-    return [(codes.DRIVE_ANGLE, joint.a, joint.b, row)]
+        return codes.DRIVE_SLIDE, joint.a, joint.b, row
+    return codes.DRIVE_ANGLE, joint.a, joint.b, row
 
 
 def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> tuple[int, int, int, list[float], bool]:
@@ -360,7 +359,7 @@ def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> tuple[i
         joint = model.mechanism.joint(*driver.pair)
         if not isinstance(joint, Revolute | Prismatic):
             raise GeometryError(f"joint {one}-{two} is {joint.kind}; only coordinates of R and P joints can be kept")
-        kind, a, b, row = _driver_rows(model, driver, compiled.centres, slot)[0]
+        kind, a, b, row = driver_row(model, driver, compiled.centres, slot)
         return kind, a, b, row, kind == codes.DRIVE_ANGLE
     if two not in ("x", "y", "theta") or one not in model.bodies:
         raise GeometryError(f"{key!r} names no coordinate; give (moving link, 'x' | 'y' | 'theta')")

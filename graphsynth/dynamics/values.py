@@ -84,6 +84,19 @@ def _number(value: Any, element: Any) -> float:
     return number
 
 
+def jacobians(compiled: Compiled, q: Array, v: Array) -> Array:
+    """Jacobians of all rows at n states, shape (n, rows, coordinates)."""
+    from graphsynth.dynamics import kernels
+
+    T, still = compiled.tables, np.zeros((max(1, len(compiled.laws) + len(compiled.held)), 3))
+    found = np.zeros((len(q), len(compiled.info), compiled.n))
+    for k in range(len(q)):
+        found[k] = kernels.constraint_system(
+            T, kernels.state_rows(T, q[k], v[k]), initial_slots(compiled, q[k]), still
+        )[1]
+    return found
+
+
 def initial_slots(compiled: Compiled, q: Array, near: Array | None = None) -> Array:
     """Line-of-centres angles of gears, on the turn that closes best, and constants of racks.
 

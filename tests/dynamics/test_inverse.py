@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics import Body, DynamicModel, Force, Pulse, Torque, consistent_start, inverse_dynamics
+from graphsynth.dynamics import (
+    Body,
+    DynamicModel,
+    Force,
+    JointFriction,
+    Pulse,
+    Torque,
+    consistent_start,
+    inverse_dynamics,
+)
 from graphsynth.kinematics import simulate
-from graphsynth.mechanism.joints import Revolute
+from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
@@ -59,3 +68,20 @@ def test_what_is_no_motion_or_has_another_shape_is_refused() -> None:
             inverse_dynamics(model, motion, **{name: [1.0, 2.0]})
         with pytest.raises(GeometryError, match=f"{name} holds nan"):
             inverse_dynamics(model, motion, **{name: np.nan})
+
+
+def test_friction_of_a_pin_in_a_slot() -> None:
+    """A crank's pin drives a yoke: ``N (sin u - mu cos u)`` moves the yoke of 2 kg, the rest is the crank's torque."""
+    pairs = [(0, 1), (1, 2, 2), (0, 2)]
+    joints = [Revolute(0, 1), PinSlot(2, 1, at_b=(0.5, 0.0), angle_a=np.pi / 2), Prismatic(0, 2)]
+    yoke = Mechanism(MechanismGraph(3, pairs, frame=0), joints, [Driver(0, 1)])
+    bodies = {1: Body(0.0, 0.0), 2: Body(2.0, 0.0)}
+    u, speed, mu = np.array([0.4, 1.0, 2.0, 2.5]), 3.0, 0.2
+    friction = JointFriction(1, 2, mu, smoothing_velocity=1e-9)
+    found = inverse_dynamics(DynamicModel(yoke, bodies, [friction], gravity=(0, 0)), simulate(yoke, u), speed)
+    push = -2.0 * 0.5 * speed**2 * np.cos(u)  # the slot is square to the guide: the normal force moves the yoke alone
+    rub = mu * np.abs(push) * np.sign(np.cos(u))  # against the pin's way in the slot
+    assert found.efforts[:, 0] == pytest.approx(0.5 * (-push * np.sin(u) + rub * np.cos(u)), abs=1e-12)
+    assert found.power_error < 1e-13
+    with pytest.raises(GeometryError, match="pin in slot 1-2 needs smoothing_velocity"):
+        DynamicModel(yoke, bodies, [JointFriction(1, 2, mu)])

@@ -59,6 +59,31 @@ def fitting_loads(elements: Sequence[FrictionElement], start: Array, slopes: Arr
     return found, known
 
 
+def sliding_loads(elements: Sequence[FrictionElement], start: Array, slopes: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the loads of n samples at once, and where they are found: guides with one normal force that contract.
+
+    Parameters
+    ----------
+    elements : sequence of FrictionElement
+    start : ndarray, shape (n, m)
+    slopes : ndarray, shape (n, m, elements)
+        As in `fitting_loads`, for every sample.
+    """
+    if any(e.pin or e.length > 0.0 for e in elements):
+        return np.zeros((len(start), len(elements))), np.zeros(len(start), dtype=np.bool_)
+    rows = [e.row for e in elements]
+    base, change = start[:, rows], slopes[:, rows]
+    known = np.abs(np.linalg.eigvals(np.abs(change))).max(axis=1) < 1.0 - 1e-9
+    x, identity = np.abs(base), np.eye(len(rows))
+    for _ in range(2 ** len(rows) + 4):  # Newton's method among the pieces, each a choice of signs
+        signs = np.copysign(1.0, base + np.einsum("nfg,ng->nf", change, x))
+        matrix = np.where(known[:, None, None], identity - signs[:, :, None] * change, identity)
+        x = np.linalg.solve(matrix, (signs * base)[:, :, None])[:, :, 0]
+    normal = base + np.einsum("nfg,ng->nf", change, x)
+    rounding = 1e-14 * (np.abs(base) + np.einsum("nfg,ng->nf", np.abs(change), np.abs(x))).max(axis=1, keepdims=True)
+    return np.abs(normal), known & (np.abs(np.abs(normal) - x) <= rounding).all(axis=1)
+
+
 def _loads(elements: Sequence[FrictionElement], lam: Array) -> Array:
     return np.array([e.load(lam) for e in elements])
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.elements import JointFriction
-from graphsynth.dynamics.tables import Compiled, RowInfo, coordinate_row
+from graphsynth.dynamics.tables import Compiled, RowInfo, driver_row
 from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
 
@@ -98,13 +99,16 @@ def locked(compiled: Compiled, rows: FrictionRows, which: Sequence[int], held: A
     ints, floats, info = [], np.zeros((len(which), T.table.shape[1])), []
     for k, f in enumerate(which):
         joint = rows.joints[f]
-        kind, a, b, own, angular = coordinate_row(compiled, (joint.a, joint.b), count + k)
+        kind, a, b, own = driver_row(compiled.model, Driver(joint.a, joint.b), compiled.centres, count + k)
         ints.append((kind, a, b))
         floats[k, : len(own)] = own
         info.append(
-            RowInfo(f"sticking {joint.kind} {joint.a}-{joint.b}", angular, compiled.info[int(T.friction[f, 0])].joint)
+            RowInfo(
+                f"sticking {joint.kind} {joint.a}-{joint.b}",
+                kind == codes.DRIVE_ANGLE,
+                compiled.info[int(T.friction[f, 0])].joint,
+            )
         )
-    assert all(kind in (codes.DRIVE_ANGLE, codes.DRIVE_SLIDE) for kind, _, _ in ints)
     tables = T._replace(
         rows=np.vstack([T.rows, np.array(ints, dtype=np.int64).reshape(-1, 3)]), table=np.vstack([T.table, floats]),
         slots=np.concatenate([T.slots, np.full(len(ints), -1, dtype=np.int64)]),

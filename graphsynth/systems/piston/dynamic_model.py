@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import Point, checked
-from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Element, Force, JointFriction
 from graphsynth.dynamics.inverse import InverseDynamics, inverse_dynamics
 from graphsynth.dynamics.model import Body, DynamicModel
@@ -52,13 +51,7 @@ def dynamic_model(machine: PistonMachine, slot: Literal["sliding", "crowned"] = 
     ----------
     machine : PistonMachine
     slot : {"sliding", "crowned"}
-        See :meth:`graphsynth.systems.piston.model.FloatingPiston.mechanism`.  Friction in a crowned slot is no joint
-        friction; it is left out.
-
-    Raises
-    ------
-    GeometryError
-        Friction in a crowned slot.
+        See :meth:`graphsynth.systems.piston.model.FloatingPiston.mechanism`.
 
     Examples
     --------
@@ -69,10 +62,6 @@ def dynamic_model(machine: PistonMachine, slot: Literal["sliding", "crowned"] = 
     mechanism = machine.mechanism.mechanism(slot)
     masses, friction = machine.masses, machine.friction
     group = machine.mechanism.group
-    if group is not None and slot == "crowned" and friction.slot > 0.0:
-        raise GeometryError(
-            f"friction slot = {friction.slot:g} in a crowned slot has no general element; use slot = 'sliding', or 0"
-        )
     slider = isinstance(machine.mechanism.drive, CrankSlider)
     bodies = {
         1: Body(masses.crank, masses.crank_inertia, (masses.crank_centre, 0.0)),

@@ -53,7 +53,7 @@ def test_determinate_slot_gives_the_couples():
     from graphsynth.dynamics import inverse_dynamics
     from graphsynth.kinematics import simulate
 
-    machine = replace(MACHINES["askew"], friction=replace(RUB, slot=0.0))
+    machine = MACHINES["askew"]
     model = dynamic_model(machine)
     phi = np.linspace(0.1, 6.1, 9)
     general = inverse_dynamics(model, simulate(model.mechanism, phi, events=False), machine.speed)
@@ -392,7 +392,6 @@ def test_free_motion_of_the_model():
         (lambda: piston_turn(MACHINES["accelerated"]), "acceleration = 400"),
         (lambda: compare_pistons(MACHINES["askew"].without_group()), "no second group"),
         (lambda: piston_turn(MACHINES["smooth"], length=-1.0), "length of the piston"),
-        (lambda: dynamic_model(MACHINES["askew"]), "friction slot = 0.08"),
         (lambda: PistonMachine(ASKEW, gas=GivenForce(lambda a, g, c: g * math.nan)).loads(1.0), "finite number"),
         (lambda: MACHINES["askew"].loads([math.nan]), "angle"),
     ],
