@@ -14,10 +14,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
 from graphsynth.systems.tribometer.cycles import limit_cycle
-from graphsynth.systems.tribometer.drives import HarmonicDrive
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.platforms import HarmonicDrive, TwoCoefficientLaw
 
 CRANK = Tribometer()
 HARMONIC = Tribometer(law=TwoCoefficientLaw(0.4, 0.25), drive=HarmonicDrive(0.03, 2.0))

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
 from graphsynth.systems.tribometer.animation import tribometer_animation, tribometer_sketch
-from graphsynth.systems.tribometer.drives import BeltDrive, HarmonicDrive
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.platforms import BeltDrive, HarmonicDrive, TwoCoefficientLaw
 
 PLAIN = TwoCoefficientLaw(0.4, 0.25)
 MODELS = [

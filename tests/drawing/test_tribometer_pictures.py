@@ -6,19 +6,11 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
-from graphsynth.systems.tribometer.accuracy import regularisation_study, step_study
-from graphsynth.systems.tribometer.drives import BeltDrive
-from graphsynth.systems.tribometer.events import EventGuard
+from graphsynth.systems.tribometer.cycles import limit_cycle
+from graphsynth.systems.tribometer.evidence import method_study
 from graphsynth.systems.tribometer.model import Tribometer
-from graphsynth.systems.tribometer.pictures import (
-    error_picture,
-    friction_picture,
-    phase_picture,
-    platforms_picture,
-    save_tribometer_gif,
-    stiffness_picture,
-)
+from graphsynth.systems.tribometer.motion import EventGuard
+from graphsynth.systems.tribometer.pictures import friction_picture, phase_picture, platforms_picture, plots
 
 MODEL = Tribometer()
 
@@ -64,40 +56,19 @@ def test_friction_picture(motion):
     assert axes.get_xlabel() == "sliding velocity [mm/s]"
 
 
-def test_failures_stay_in_the_error_picture():
-    bad = regularisation_study(MODEL, 0.5, speeds=[1e-3, 1e-5], solvers=["DOP853"], most_calls=5000)
-    good = step_study(MODEL, 0.5, steps=[1e-3, 1e-4])
-    for over in ("time", "parameter"):
-        (axes,) = error_picture([bad, good], over=over).axes
-        crosses = [line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
-        assert len(crosses) == 1
-        assert "failed or unreliable" in [text.get_text() for text in axes.get_legend().get_texts()]
-        assert axes.get_ylabel() == "largest error of the position [m]"
-    with pytest.raises(SpecError, match="abscissa"):
-        error_picture([good], over="weight")
-
-
-def test_stiffness_picture():
-    (axes,) = stiffness_picture(MODEL, factors=(1.0, 1e2), duration=1.0).axes
-    assert len(axes.lines) == 3
-    assert axes.lines[-1].get_ydata() == pytest.approx(MODEL.limit_force(axes.lines[-1].get_xdata()))
-
-
-@pytest.mark.parametrize(
-    "model", [MODEL, Tribometer(law=TwoCoefficientLaw(0.4, 0.25), drive=BeltDrive(0.02))], ids=["crank", "belt"]
-)
-def test_animation(tmp_path, model):
-    from PIL import Image
-
-    path = tmp_path / "moving.gif"
-    assert save_tribometer_gif(model.event_driven(1.0), path, frames=4, dpi=40) == 4
-    with Image.open(path) as picture:
-        assert picture.n_frames == 4
+def test_failures_stay_in_the_pictures_of_errors():
+    study = method_study(
+        MODEL, 0.5, tolerances=[], steps=[1e-3, 1e-4], speeds=[1e-3, 1e-5], solvers=["DOP853"], most_calls=5000
+    )
+    cycle = limit_cycle(MODEL, most_turns=1)
+    pictures = {picture.title: picture for picture in plots(None, MODEL.event_driven(0.5), cycle, study)}
+    assert "Limit cycle" not in pictures
+    for over in ("run time", "tolerance, step and smoothing velocity"):
+        svg = pictures[f"Error against {over}"].svg
+        assert "failed (upper edge) or unreliable" in svg and "error [m]" in svg
 
 
 def test_nothing_to_draw():
     failed = MODEL.regularised(1.0, speed=1e-5, solver="DOP853", most_calls=100)
     with pytest.raises(SpecError, match="nothing to draw"):
         platforms_picture(failed)
-    with pytest.raises(SpecError, match="frames"):
-        save_tribometer_gif(MODEL.event_driven(0.1), "never.gif", frames=1)

@@ -41,8 +41,8 @@ from graphsynth.systems.braider import Braider
 from graphsynth.systems.piston import FloatingPiston, GivenForce, PistonMachine
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-from graphsynth.systems.tribometer.drives import HarmonicDrive
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.platforms import HarmonicDrive
 
 G1 = ParallelPlatform.g1()
 POSE, SIGMA = (1.2, 0.9, 0.15), (1, 1, 1)

@@ -12,14 +12,12 @@ from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError, MissingExtraError, SpecError
 from graphsynth.dynamics import Body, DynamicModel, Force, JointFriction, Pulse, Spring, Torque, simulate_dynamics
-from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Linear, Polynomial
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.systems.tribometer.drives import BeltDrive, HarmonicDrive
-from graphsynth.systems.tribometer.general_model import general_model
-from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.model import Tribometer, general_model
+from graphsynth.systems.tribometer.platforms import BeltDrive, HarmonicDrive, TwoCoefficientLaw
 
 FORMS = ("augmented", "partitioned", "one-coordinate")
 G = 9.81

@@ -10,7 +10,6 @@ import pytest
 
 from graphsynth.core.errors import GeometryError, SpecError
 from graphsynth.dynamics import Body, DynamicModel, Torque, simulate_dynamics
-from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 from graphsynth.dynamics.trains import Train
 from graphsynth.mechanism.joints import Revolute
@@ -23,8 +22,8 @@ from graphsynth.systems.piston.drives import CrankSlider, ScotchYoke
 from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce
 from graphsynth.systems.piston.group import FloatingGroup
 from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
-from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive, HarmonicDrive
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, HarmonicDrive, StribeckLaw, TwoCoefficientLaw
 
 HUGE: dict[str, Any] = {
     "Braider": lambda x: Braider(switch=x), "Braider masses": lambda x: Braider(masses=(x, 1.0, 1.0, 1.0)),

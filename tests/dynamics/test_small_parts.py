@@ -38,7 +38,7 @@ def test_a_force_at_a_point_has_the_power_of_that_point():
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 1.5, 2.0])
 @pytest.mark.parametrize("speed", [0.02, 0.3])
 def test_stribeck_curve(exponent, speed):
-    p = np.zeros(plant.SIZE)
+    p = np.zeros(plant.SPEED + 1)
     p[[plant.STATIC, plant.KINETIC, plant.STRIBECK, plant.EXPONENT, plant.VISCOUS]] = 0.4, 0.25, 0.1, exponent, 0.05
     p[plant.LAW] = plant.STRIBECK_LAW
     expected = 0.25 + 0.05 * speed + 0.15 * math.exp(-((speed / 0.1) ** exponent))

@@ -11,13 +11,39 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import SpecError
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.svg import painted, words
+from graphsynth.pipeline.products import Picture
 
 if TYPE_CHECKING:
-    from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
+    from graphsynth.pipeline.stages import Context
+    from graphsynth.systems.tribometer.motion import StickSlipMotion
 
 Array = NDArray[np.float64]
 _WIDTH, _SCENE, _CURVES = 640.0, 200.0, 130.0
 _LOWER, _UPPER = painted("a", opacity=0.55), painted("b")
+
+
+def sketches(context: Context, motion: StickSlipMotion) -> tuple[Picture, ...]:
+    """Draw the machine with the names of its parts."""
+    if not np.isfinite(motion.x2).sum() > 1:
+        return ()
+    first = next((event.time for event in motion.events if event.state != 0), 0.0)
+    caption = (
+        "The spring and the damper hold the upper platform to the frame; friction with the lower one drags it along. "
+        f"Shown at {first:.4g} s, where it is first released."
+        if first
+        else "Shown at the start."
+    )
+    return (Picture("The tribometer", tribometer_sketch(motion, first), caption, "wide"),)
+
+
+def animations(context: Context, motion: StickSlipMotion) -> tuple[Picture, ...]:
+    """Let both platforms move in the page."""
+    if not np.isfinite(motion.x2).sum() > 1:
+        return ()
+    seconds = min(max(motion.end, 4.0), 20.0)
+    pace = "In real time" if seconds == motion.end else f"{motion.end:.4g} s in {seconds:g} s"
+    caption = f"{pace}. Below: displacements of the lower (blue) and the upper platform (orange)."
+    return (Picture("In motion", tribometer_animation(motion, seconds=seconds), caption, "wide"),)
 
 
 def tribometer_sketch(motion: StickSlipMotion, at: float = 0.0) -> str:
@@ -150,17 +176,16 @@ class _Stage:
         """Crank and rod to scale, or for a pure cosine only the arrow of the drive."""
         height = self.floor - 20.0
         if not self.rod:
-            arrow = [np.array([[x - 26.0, height], [x, height], [x - 7, height - 5], [x, height], [x - 7, height + 5]])
-                     for x in pin]  # fmt: skip
-            drawing.path(arrow, _line(1.6))
+            arrow = np.array([[-26.0, 0.0], [0.0, 0.0], [-7.0, -5.0], [0.0, 0.0], [-7.0, 5.0]])
+            drawing.path([arrow + np.array([x, height]) for x in pin], _line(1.6))
             return
         angle = self.drive.speed * self.motion.t[frames]
         centre = pin[0] - self.scale * (self.rod + float(self.motion.x1[frames][0]))
-        tip = np.stack([centre + self.scale * self.radius * np.cos(angle),
-                        height - self.scale * self.radius * np.sin(angle)], -1)  # fmt: skip
+        radius = self.scale * self.radius
+        tip = np.stack([centre + radius * np.cos(angle), height - radius * np.sin(angle)], -1)
         end = np.stack([pin, np.full_like(pin, height)], -1)
         drawing.fixed(
-            f'<circle cx="{centre:.1f}" cy="{height:.1f}" r="{self.scale * self.radius:.1f}" '
+            f'<circle cx="{centre:.1f}" cy="{height:.1f}" r="{radius:.1f}" '
             f'{painted(stroke="soft")} stroke-dasharray="2 4"/>'
         )
         middle = np.broadcast_to([centre, height], tip.shape)

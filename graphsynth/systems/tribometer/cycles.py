@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
-from graphsynth.systems.tribometer.drives import BeltDrive
-from graphsynth.systems.tribometer.events import EventGuard, StickSlipEvent
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.motion import EventGuard, StickSlipEvent
+from graphsynth.systems.tribometer.platforms import BeltDrive, TwoCoefficientLaw
 
 Array = NDArray[np.float64]
 #: Relative change of the state by which the multipliers are measured.
@@ -43,7 +42,7 @@ def belt_cycle(model: Tribometer) -> BeltCycle:
 
     Examples
     --------
-    >>> from graphsynth.dynamics.friction.laws import TwoCoefficientLaw
+    >>> from graphsynth.systems.tribometer.platforms import TwoCoefficientLaw
     >>> cycle = belt_cycle(Tribometer(damping=0.0, law=TwoCoefficientLaw(0.4, 0.25), drive=BeltDrive(0.02)))
     >>> round(cycle.period, 15)
     0.551496439575209
@@ -137,7 +136,7 @@ def limit_cycle(
     if isinstance(model.drive, BeltDrive):
         return _on_belt(model, guard)
     spell = model.drive.period
-    states = [np.array([model.x2, model._start()[0]])]
+    states = [np.array([model.x2, model.start()[0]])]
     scale = max(model.reach, 1e-3 * abs(float(np.abs(model.drive.motion(0.0).x))))
     now = model
     while len(states) <= most_turns:
@@ -176,7 +175,7 @@ def _describe(model: Tribometer, state: Array, stuck: bool, turns: int, guard: E
     period = turns * model.drive.period
     motion = start.event_driven(period, times=[period], guard=guard)
     residual = _gap(model, np.array([motion.x2[-1], motion.v2[-1]]), state)
-    sticking = (motion.path.nodes[:, 3] == 0.0) if motion.path is not None else np.array([True])
+    sticking = (motion.path.columns.state == 0.0) if motion.path is not None else np.array([True])
     kind = "sliding" if not sticking.any() else "stuck" if not motion.events else "stick-slip"
     factors = (1.0 + 0j,) if kind == "stuck" else _multipliers(model, state, stuck, period, guard)
     stable = all(abs(factor) < 1.0 for factor in factors)
@@ -228,10 +227,8 @@ def _on_belt(model: Tribometer, guard: EventGuard) -> LimitCycle:
             return _none(f"The run stopped before the second release: {motion.statement}")
         opening = StickSlipEvent(0.0, int(side), release, 0.0)
         text = f"stick-slip: period {again[0].time:.12g} s; a stick piece forgets everything, so the cycle is stable."
-        return LimitCycle(
-            "stick-slip", again[0].time, 0, release, v0, (opening, first), (0j, 0j), True,
-            abs(again[0].position - release), text,
-        )  # fmt: skip
+        gap = abs(again[0].position - release)
+        return LimitCycle("stick-slip", again[0].time, 0, release, v0, (opening, first), (0j, 0j), True, gap, text)
     pair = np.roots([1.0, ratio, model.frequency**2])
     factors = tuple(complex(value) for value in np.exp(pair * spell))
     stable = bool(ratio > 0.0)

@@ -7,44 +7,169 @@ approximations with the event-driven run at its tightest tolerance.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.errors import SpecError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.systems.tribometer.forms import model_error
+from graphsynth.systems.tribometer.model import Tribometer, general_model
+from graphsynth.systems.tribometer.motion import RunStatus, StickSlipMotion
 
 if TYPE_CHECKING:
-    from graphsynth.systems.tribometer.model import Tribometer
-    from graphsynth.systems.tribometer.stick_slip_precise import PreciseMotion
+    from graphsynth.systems.tribometer.precise import PreciseMotion
 
+Array = NDArray[np.float64]
 _DIGITS = 22
 _PRECISE_S = 2.0
-
-
-def _model(context: Any) -> Any:
-    from graphsynth.systems.tribometer.stages import tribometer_of
-
-    return tribometer_of(context)
+_SETTINGS = {"event-driven": "rtol {:.0e}", "time stepping": "step {:g} s"}
+_FINAL = "error of the final position"
+_STATUS = {RunStatus.COMPLETE: RowStatus.OK, RunStatus.UNRELIABLE: RowStatus.UNRELIABLE}
 
 
 def events(context: Any, effort: Effort) -> Problem:
     """Event-driven run against multiple precision, over the first seconds."""
-    duration = min(context.scene.mechanism.run.duration_s, 0.5 if effort.quick else _PRECISE_S)
-    return event_problem(_model(context), duration, effort)
+    table = context.scene.mechanism
+    duration = min(table.run.duration, 0.5 if effort.quick else _PRECISE_S)
+    return event_problem(table.tribometer(context.scene.place), duration, effort)
 
 
 def stick_slip(context: Any, effort: Effort) -> Problem:
     """All methods over the duration of the scene, with its settings."""
     table = context.scene.mechanism
-    duration = min(table.run.duration_s, 1.0) if effort.quick else table.run.duration_s
+    duration = min(table.run.duration, 1.0) if effort.quick else table.run.duration
     m = table.methods
-    return stick_slip_problem(_model(context), duration, m.steps_s, m.speeds_m_s, m.solvers, effort)
+    return stick_slip_problem(table.tribometer(context.scene.place), duration, m.steps, m.speeds, m.solvers, effort)
+
+
+class _Truth(NamedTuple):
+    """Positions at the times of a study, times of the events, and where they are from."""
+
+    times: Array
+    positions: Array
+    events: Array
+    name: str
+
+
+def _reference(model: Tribometer, duration: float) -> _Truth:
+    """Run the automaton at the times of theory/tribometer 10: 0.05, 0.10, ... below the duration."""
+    times: Array = 0.05 * np.arange(1, max(2, round(duration / 0.05)), dtype=np.float64)
+    motion = model.event_driven(duration, times=times)
+    if not motion.complete:
+        raise SpecError(f"There is no reference to compare with: {motion.statement}")
+    name = f"event-driven run with relative tolerance 1e-14, error estimated {motion.error:.1e} m"
+    return _Truth(times, motion.x2, np.array([event.time for event in motion.events]), name)
+
+
+def _row(method: str, value: float, run: Callable[[], StickSlipMotion], truth: _Truth, effort: Effort) -> Row:
+    """Measure one run; a setting that the method refuses is a failure."""
+    setting = _SETTINGS.get(method, "speed {:.0e} m/s").format(value)
+    row = Row(method, setting, math.nan, math.nan, 0, "largest error of the position", truth.name, value=value)
+    try:
+        motion, seconds, rounds = best_of(run, effort, warm=False)
+    except SpecError as refusal:
+        if method in _SETTINGS:
+            raise
+        none = {"events": 0.0, "steps or calls": 0.0}
+        return replace(row, status=RowStatus.FAILED, reason=str(refusal), more=none)
+    status = _STATUS.get(motion.status, RowStatus.FAILED)
+    found = np.array([event.time for event in motion.events])
+    more = {"events": float(found.size), "steps or calls": float(motion.evaluations)}
+    if found.size == truth.events.size and found.size:
+        more["event error [s]"] = float(np.abs(found - truth.events).max())
+    return replace(
+        row,
+        error=math.nan if status is RowStatus.FAILED else float(np.abs(motion.x2 - truth.positions).max()),
+        seconds=seconds,
+        rounds=rounds,
+        status=status,
+        reason="" if status is RowStatus.OK else motion.statement,
+        more=more,
+    )
+
+
+def method_study(
+    model: Tribometer,
+    duration: float = 10.0,
+    *,
+    tolerances: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12),
+    steps: Sequence[float] = (1e-3, 1e-4, 1e-5),
+    speeds: Sequence[float] = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+    solvers: Sequence[str] = ("LSODA",),
+    rounds: int = 3,
+    most_calls: int = 600_000,
+) -> Problem:
+    """Error and run time of all three methods on one tribometer, failures and refusals included.
+
+    The reference is the automaton with the tolerance 1e-14: for its own rows it is itself, for the others a different
+    method.  Rows of the regularised form say "unreliable" if the error is more than three times that of the form with
+    the other solvers at the same speed, or more than ten times `model_error` if there is no other.
+
+    Parameters
+    ----------
+    model : Tribometer
+    duration : float
+        s.
+    tolerances, steps, speeds : sequence of float
+        Of the automaton; of time stepping, s; of the regularised form, m/s.  A method with none is left out.
+    solvers : sequence of str
+    rounds : int
+        Runs for the wall time, of which the shortest counts; solvers but LSODA run once.
+    most_calls : int
+        A solver that needs more is shown as failed.
+
+    Raises
+    ------
+    SpecError
+        There is no reference: the automaton did not finish.
+
+    Examples
+    --------
+    >>> study = method_study(Tribometer(), 0.5, tolerances=[1e-8], steps=[1e-4], speeds=[1e-3], rounds=1)
+    >>> [row.method for row in study.rows]
+    ['event-driven', 'time stepping', 'LSODA']
+    """
+    truth = _reference(model, duration)
+
+    def rows(method: str, name: str, values: Sequence[float], run: Callable[..., StickSlipMotion]) -> list[Row]:
+        effort = Effort(1 if method in solvers and method != "LSODA" else rounds)
+        return [
+            _row(method, value, partial(run, duration, times=truth.times, **{name: value}), truth, effort)
+            for value in values
+        ]
+
+    run, step = partial(model.event_driven, estimate=False), partial(model.time_stepping, estimate=False)
+    found = rows("event-driven", "rtol", () if model.closed_form else tolerances, run)
+    found += rows("time stepping", "step", steps, step)
+    smooth: list[Row] = []
+    for solver in solvers:
+        solve = partial(model.regularised, solver=solver, check=False, most_calls=most_calls)
+        smooth += rows(solver, "speed", speeds, solve)
+    question = f"Stick-slip over {duration:g} s: position of the upper platform every 50 ms"
+    found += [_doubted(row, smooth) for row in smooth]
+    return Problem("stick-slip", question, "m", tuple(found), note=f"Error against {truth.name}.")
+
+
+def _doubted(row: Row, all_rows: list[Row]) -> Row:
+    """Mark a success whose error is far above that of the form itself."""
+    if row.status is not RowStatus.OK:
+        return row
+    others = [other.error for other in all_rows if other.value == row.value and other.method != row.method]
+    others = [error for error in others if not math.isnan(error)]
+    bound = 3.0 * min(others) if others else 10.0 * model_error(row.value)
+    if row.error <= bound:
+        return row
+    text = f"{row.method} reports success with an error of {row.error:.1e} m, above that of the form itself."
+    return replace(row, status=RowStatus.UNRELIABLE, reason=text)
 
 
 def _default(method: str, name: str) -> Any:
-    from graphsynth.systems.tribometer.model import Tribometer
-
     return signature(getattr(Tribometer, method)).parameters[name].default
 
 
@@ -64,22 +189,40 @@ def event_problem(model: Tribometer, duration: float, effort: Effort | None = No
     SpecError
         A law without a Taylor series.
     """
-    from graphsynth.systems.tribometer.accuracy import tolerance_study
-    from graphsynth.systems.tribometer.stick_slip_precise import precise_motion
+    from graphsynth.systems.tribometer.precise import precise_motion
 
     effort = effort or Effort()
     default = _default("event_driven", "rtol")
     truth = precise_motion(model, duration, digits=_DIGITS)
     tolerances = sorted({1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, default}, reverse=True)
-    found = tolerance_study(model, truth, duration, tolerances=effort.some(tolerances), rounds=effort.rounds)
-    rows = tuple(replace(row, default=row.value == default) for row in found.rows)
-    return replace(found, rows=rows + _general_rows(model, truth, duration, effort))
+    rows = tolerance_rows(model, truth, duration, effort.some(tolerances), effort.rounds)
+    rows = [replace(row, default=row.value == default) for row in rows] + _general_rows(model, truth, duration, effort)
+    count = len(truth.events)
+    question = f"Event-driven run over {duration:g} s: final position of the upper platform, {count} events"
+    return Problem("events", question, "m", tuple(rows))
 
 
-def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effort: Effort) -> tuple[Row, ...]:
+def tolerance_rows(
+    model: Tribometer, reference: PreciseMotion, duration: float, tolerances: Sequence[float], rounds: int
+) -> list[Row]:
+    """Error of the automaton against a motion in multiple precision of the same model and duration, by tolerance."""
+    times = np.array([float(event.time) for event in reference.events])
+    name = f"Taylor series with {reference.digits} digits"
+    truth = _Truth(np.array([duration]), np.array([float(reference.x2)]), times, name)
+    rows = []
+    for rtol in tolerances:
+        run = partial(model.event_driven, duration, times=[duration], rtol=rtol, estimate=False)
+        row = replace(_row("event-driven", rtol, run, truth, Effort(rounds)), kind=_FINAL)
+        if row.more["events"] != times.size:
+            reason = f"{row.more['events']:.0f} events for {times.size}."
+            row = replace(row, status=RowStatus.UNRELIABLE, reason=reason)
+        rows.append(row)
+    return rows
+
+
+def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effort: Effort) -> list[Row]:
     """Compare the same as a model of the general dynamics, with sticking as a state of its joint."""
     from graphsynth.dynamics.integrate import simulate_dynamics
-    from graphsynth.systems.tribometer.general_model import general_model
 
     own = signature(simulate_dynamics).parameters["rtol"].default
     general, start = general_model(model)
@@ -87,27 +230,25 @@ def _general_rows(model: Tribometer, truth: PreciseMotion, duration: float, effo
     for rtol in effort.some(sorted({1e-6, 1e-8, 1e-10, own}, reverse=True)):
         run = partial(simulate_dynamics, general, [0.0, duration], start=start, form="augmented", rtol=rtol)
         found, seconds, rounds = best_of(run, effort)
-        why = "" if found.completed else found.message
         same = found.completed and len(found.events) == len(truth.events)
         gap = max((abs(e.time - float(t.time)) for e, t in zip(found.events, truth.events)), default=0.0)
-        error = abs(float(found.poses[-1, 2, 0]) - float(truth.x2)) if found.completed else math.nan
         more = {"events": float(len(found.events)), "steps or calls": float(found.steps)}
-        rows.append(
-            Row(
-                "general model",
-                f"rtol {rtol:.0e}",
-                error,
-                seconds,
-                rounds,
-                "error of the final position",
-                f"Taylor series with {_DIGITS} digits",
-                RowStatus.OK if same else RowStatus.FAILED,
-                "" if same else why or "other events than the reference",
-                rtol == own,
-                more=more | ({"event error [s]": gap} if same else {}),
-            )
+        row = Row(
+            "general model",
+            f"rtol {rtol:.0e}",
+            abs(float(found.poses[-1, 2, 0]) - float(truth.x2)) if found.completed else math.nan,
+            seconds,
+            rounds,
+            _FINAL,
+            f"Taylor series with {_DIGITS} digits",
+            default=rtol == own,
+            more=more | ({"event error [s]": gap} if same else {}),
         )
-    return tuple(rows)
+        if not same:
+            why = "other events than the reference" if found.completed else found.message
+            row = replace(row, status=RowStatus.FAILED, reason=why)
+        rows.append(row)
+    return rows
 
 
 def stick_slip_problem(
@@ -136,8 +277,6 @@ def stick_slip_problem(
     SpecError
         If the event-driven run does not finish: then there is no reference.
     """
-    from graphsynth.systems.tribometer.accuracy import method_study, regularisation_study
-
     effort = effort or Effort()
     defaults = {
         "event-driven": _default("event_driven", "rtol"),
@@ -145,38 +284,31 @@ def stick_slip_problem(
         "": _default("regularised", "speed"),
     }
     own_solver = _default("regularised", "solver")
-    found = method_study(
-        model,
-        duration,
+    study = partial(method_study, model, duration, most_calls=200_000)
+    found = study(
         tolerances=effort.some((1e-4, 1e-6, 1e-8, 1e-10, 1e-12)),
         steps=effort.some(steps),
         speeds=effort.some(speeds),
         solvers=solvers,
         rounds=effort.rounds,
-        most_calls=200_000,
     )
     rows = list(found.rows)
     if own_solver not in solvers and not effort.quick:
-        rows += regularisation_study(
-            model, duration, speeds=(1e-2, 1e-3, defaults[""]), solvers=(own_solver,), most_calls=200_000
-        ).rows
+        rows += study(tolerances=(), steps=(), speeds=(1e-2, 1e-3, defaults[""]), solvers=(own_solver,)).rows
     shaped = []
     for row in rows:
         own = row.method in defaults
-        row = replace(
-            row, default=row.value == defaults[row.method if own else ""] and own | (row.method == own_solver)
-        )
+        is_default = row.value == defaults[row.method if own else ""] and (own or row.method == own_solver)
+        row = replace(row, default=is_default)
         if row.method == "event-driven":
             row = replace(row, reference=row.reference + " (the same method; see the problem events)")
-        shaped.append(row if own else _regularised(row))
+        if not own:
+            more = {key: value for key, value in row.more.items() if not key.startswith("event")}
+            row = replace(row, method=f"regularised, {row.method}", more=more)
+        shaped.append(row)
     note = (
         f"Observed order of time stepping: {found.order('time stepping'):.2f}. The regularised form never sticks: it "
         "has no events, and its error is that of the form, not of the solver. The event-driven run is compared with "
         "itself at its tightest tolerance here, and with multiple precision in the problem events."
     )
     return replace(found, rows=tuple(shaped), note=note)
-
-
-def _regularised(row: Row) -> Row:
-    more = {key: value for key, value in row.more.items() if not key.startswith("event")}
-    return replace(row, method=f"regularised, {row.method}", more=more)

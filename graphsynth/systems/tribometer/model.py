@@ -1,31 +1,31 @@
 """The tribometer: an upper platform on a spring, dragged by friction on a driven lower platform.
 
 One model, three methods: the event-driven automaton (the reference), time stepping with complementarity, and the
-regularised ordinary differential equation.
+regularised ordinary differential equation; and the same as a model of the general dynamics.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.friction.laws import FrictionLaw, StribeckLaw, TwoCoefficientLaw, finite, positive
-from graphsynth.dynamics.motors import numbers, whole
-from graphsynth.systems.tribometer.drives import CrankDrive, Drive
-from graphsynth.systems.tribometer.events import EventGuard
-from graphsynth.systems.tribometer.stick_slip import StickSlipMotion, event_driven
-from graphsynth.systems.tribometer.stick_slip_forms import regularised, time_stepping
+from graphsynth.systems.tribometer.forms import Solving, regularised, time_stepping
+from graphsynth.systems.tribometer.motion import EventGuard, StickSlipMotion, event_driven
+from graphsynth.systems.tribometer.platforms import Drive, Platforms, StribeckLaw, finite, positive
+
+if TYPE_CHECKING:
+    from graphsynth.dynamics.model import DynamicModel
+    from graphsynth.dynamics.start import StartReport
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Tribometer:
+class Tribometer(Platforms):
     """A tribometer; the defaults are the chosen values of theory/tribometer 1 (Stribeck law, crank drive).
 
     ``m x2'' = -k x2 - c x2' + F``; ``F = sgn(u) N mu(|u|)`` while slipping with ``u = x1' - x2'``, and whatever keeps
@@ -68,97 +68,9 @@ class Tribometer:
     0.365311879706
     """
 
-    mass: float = 1.0
-    stiffness: float = 400.0
-    damping: float = 2.0
-    load: float = 0.0
-    gravity: float = 9.81
-    law: FrictionLaw = field(default_factory=lambda: StribeckLaw(0.40, 0.25, 0.02))
-    drive: Drive = field(default_factory=lambda: CrankDrive(0.03, 0.12, 2.0))
-    x2: float = 0.0
-    v2: float | None = None
-
-    def __post_init__(self) -> None:
-        for name, value in (
-            ("mass", positive("mass", self.mass)),
-            ("stiffness", positive("spring stiffness", self.stiffness)),
-            ("damping", positive("damping", self.damping, or_zero=True)),
-            ("load", finite("load", self.load)),
-            ("gravity", positive("gravity", self.gravity, or_zero=True)),
-            ("x2", finite("initial position", self.x2)),
-            ("v2", None if self.v2 is None else finite("initial velocity", self.v2)),
-        ):
-            object.__setattr__(self, name, value)
-        check_fields(self, ("mass", "stiffness"), SpecError, small=("damping", "load", "gravity", "x2", "v2"))
-        if not isinstance(self.law, FrictionLaw):
-            raise SpecError(f"The friction law is {self.law!r}; give a TwoCoefficientLaw or a StribeckLaw.")
-        if not isinstance(self.drive, Drive):
-            raise SpecError(f"The drive is {self.drive!r}; give a CrankDrive, a HarmonicDrive or a BeltDrive.")
-        if not self.normal > 0.0:
-            raise SpecError(
-                f"The normal force is {self.normal:g} N; the platforms separate: "
-                "raise the load so that mass * gravity + load is greater than zero."
-            )
-
-    @property
-    def normal(self) -> float:
-        """Normal force ``N = m g + P``, N."""
-        return self.mass * self.gravity + self.load
-
-    @property
-    def frequency(self) -> float:
-        """Natural angular frequency ``sqrt(k/m)``, rad/s."""
-        return math.sqrt(self.stiffness / self.mass)
-
-    @property
-    def reach(self) -> float:
-        """Natural scale of the displacement, ``mu_s N / k``, m."""
-        return self.law.static * self.normal / self.stiffness
-
-    @property
-    def closed_form(self) -> bool:
-        """Whether slip pieces have a closed form (two coefficients, no viscous part)."""
-        return isinstance(self.law, TwoCoefficientLaw) and self.law.viscous == 0.0
-
-    def stiffened(self, factor: float, *, scaled_damping: bool = True) -> Tribometer:
-        """Return the same tribometer with the stiffness times ``factor``.
-
-        Parameters
-        ----------
-        factor : float
-        scaled_damping : bool
-            Change the damping so that the damping ratio stays.
-        """
-        factor = positive("factor on the stiffness", factor)
-        damping = self.damping * math.sqrt(factor) if scaled_damping else self.damping
-        return replace(self, stiffness=self.stiffness * factor, damping=damping)
-
-    def limit_force(self, times: ArrayLike) -> Array:
-        """Spring force over the normal force in the limit of a stiff, damped spring, ``sgn(v1) mu(|v1|)``.
-
-        The averaged limit to which ``k x2 / N`` tends (theory/tribometer 11).
-        """
-        v = self.drive.motion(times).v
-        found: Array = np.sign(v) * self.law.coefficient(np.abs(v))
-        return found
-
-    def data(self) -> Array:
-        """Return the data of the kernels."""
-        return np.array(
-            [self.mass, self.stiffness, self.damping, self.normal, *self.law._packed(), *self.drive._packed()]
-        )
-
-    def _start(self) -> tuple[float, float]:
-        """Return the initial velocity and state."""
-        begin = self.drive.motion(0.0)
-        v1, a1 = float(begin.v), float(begin.a)
-        v = v1 if self.v2 is None else self.v2
-        if v != v1:
-            return v, math.copysign(1.0, v1 - v)
-        force = self.mass * a1 + self.stiffness * self.x2 + self.damping * v1
-        return v, 0.0 if abs(force) <= self.law.static * self.normal else math.copysign(1.0, force)
-
     def _times(self, duration: float, times: ArrayLike | None) -> tuple[float, Array]:
+        from graphsynth.dynamics.motors import numbers
+
         duration = positive("duration", duration)
         if times is None:
             return duration, np.linspace(0.0, duration, 1001)
@@ -293,9 +205,79 @@ class Tribometer:
         SpecError
             If the law has two coefficients, or a number is out of its bounds.
         """
+        from graphsynth.dynamics.motors import whole
+
         duration, wanted = self._times(duration, times)
         if not 1e-13 <= finite("relative tolerance", rtol) <= 1e-2:
             raise SpecError(f"The relative tolerance is {rtol:g}; give a number from 1e-13 to 1e-2.")
-        checked = solver == "LSODA" if check is None else check
         calls = whole("most_calls", most_calls, "raise it for long runs")
-        return regularised(self, duration, wanted, speed, str(solver), rtol, jacobian, checked, calls)
+        how = Solving(speed, str(solver), rtol, jacobian, calls)
+        return regularised(self, duration, wanted, how, solver == "LSODA" if check is None else check)
+
+
+class _DriveLaw:
+    """A drive of a tribometer as a motion law."""
+
+    def __init__(self, drive: Drive) -> None:
+        self._drive = drive
+
+    def __call__(self, u: Array) -> tuple[Array, Array, Array]:
+        motion = self._drive.motion(u)
+        return motion.x, motion.v, motion.a
+
+
+def general_model(tribometer: Tribometer) -> tuple[DynamicModel, StartReport]:
+    """Return a tribometer as a general model with its start: two guides, a spring, a prescribed motion, dry friction.
+
+    Parameters
+    ----------
+    tribometer : Tribometer
+        With two coefficients or a Stribeck law of exponent 2, without a viscous part.
+
+    Returns
+    -------
+    model : DynamicModel
+        Link 1 is the lower platform, link 2 the upper one; the weight carries the load.
+    start : StartReport
+
+    Raises
+    ------
+    SpecError
+        A law that `JointFriction` does not have.
+
+    Examples
+    --------
+    >>> from graphsynth.dynamics.integrate import simulate_dynamics
+    >>> model, start = general_model(Tribometer())
+    >>> motion = simulate_dynamics(model, [0.0, 0.5], start=start)
+    >>> [(event.kind, round(event.time, 9)) for event in motion.events]
+    [('slip', 0.36531188)]
+    """
+    from graphsynth.dynamics.elements import JointFriction, Spring
+    from graphsynth.dynamics.model import Body, DynamicModel
+    from graphsynth.dynamics.start import consistent_start
+    from graphsynth.mechanism.joints import Prismatic
+    from graphsynth.mechanism.laws import Driver
+    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.structure.graph import MechanismGraph
+
+    law, drive = tribometer.law, tribometer.drive
+    stribeck = law.velocity if isinstance(law, StribeckLaw) else 0.0
+    if law.viscous or (isinstance(law, StribeckLaw) and law.exponent != 2.0):
+        raise SpecError(f"{law} has no general element; take the Stribeck exponent 2, and no viscous part.")
+    begin = drive.motion(0.0)
+    graph = MechanismGraph(3, [(0, 1), (1, 2)], frame=0)
+    pose = ((0.0, 0.0, 0.0), (float(begin.x), 0.0, 0.0), (tribometer.x2, 0.0, 0.0))
+    far = 1.0 + 10.0 * tribometer.reach  # the spring never comes to length 0
+    model = DynamicModel(
+        Mechanism(graph, (Prismatic(0, 1), Prismatic(1, 2)), pose=pose),
+        {1: Body(tribometer.mass, tribometer.mass), 2: Body(tribometer.mass, tribometer.mass)},
+        (
+            Spring(0, 2, (-far, 0.0), (0.0, 0.0), tribometer.stiffness, far, tribometer.damping),
+            JointFriction(1, 2, law.kinetic, law.static, stribeck_speed=stribeck),
+        ),
+        gravity=(0.0, -tribometer.normal / tribometer.mass),
+        prescribed=(Driver(0, 1, _DriveLaw(drive)),),
+    )
+    rate = float(begin.v) if tribometer.v2 is None else tribometer.v2
+    return model, consistent_start(model, keep={(2, "x"): tribometer.x2}, keep_rates={(2, "x"): rate})

@@ -1,37 +1,120 @@
-"""Pictures of the tribometer: both platforms over time, phase portrait, friction loop, errors of the methods.
+"""Pictures of the tribometer: both platforms over time, phase portrait, friction loop, energies, errors of methods.
 
-Every function returns a matplotlib figure that belongs to no window; write it with ``figure.savefig(path)``.
+Figures are those of matplotlib and belong to no window; write one with ``figure.savefig(path)``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.drawing.figures import legend_place, new_figure
+from graphsynth.drawing.figures import legend_place, new_figure, themed_svg
 from graphsynth.drawing.palette import LIGHT
+from graphsynth.pipeline.display import chart
+from graphsynth.pipeline.products import Picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.evidence.rows import Problem
-    from graphsynth.systems.tribometer.model import Tribometer
-    from graphsynth.systems.tribometer.stick_slip import StickSlipMotion
+    from graphsynth.pipeline.stages import Context
+    from graphsynth.systems.tribometer.cycles import LimitCycle
+    from graphsynth.systems.tribometer.motion import StickSlipMotion
 
 Array = NDArray[np.float64]
 #: Readable in grey and by colour-blind readers [Okabe & Ito 2008].
-_LOWER, _UPPER, _THIRD, _FOURTH = "#0072B2", "#D55E00", "#009E73", "#AA4499"
-_STICK, _FAIL, _SOFT = LIGHT["pale"], LIGHT["bad"], LIGHT["soft"]
-_COLOURS = (_LOWER, _UPPER, _THIRD, _FOURTH, "#56B4E9", "#E69F00", "#555555")
+_LOWER, _UPPER, _FRICTION = "#0072B2", "#D55E00", "#009E73"
+_SOFT = LIGHT["soft"]
 #: Points of a path drawn at most.
-_MOST_NODES = 20_000
-_MARKERS = "osD^vP*"
+_MOST_NODES, _MOST_ENERGIES = 20_000, 4000
+
+
+def plots(context: Context, motion: StickSlipMotion, cycle: LimitCycle, study: Problem | None) -> tuple[Picture, ...]:
+    """Draw Figure 7b, friction, phase portraits, energies and errors."""
+    if not _drawable(motion):
+        return ()
+    stuck = "Shaded: the platforms stick. Below: the force of friction."
+    colours = "Of the upper platform: stick and slip in two colours."
+    pictures = [
+        _shown("Figure 7b: both platforms over time", platforms_picture(motion, size=(8.4, 5.4)), stuck, wide=True),
+        _shown("Phase portrait of the run", phase_picture(motion, size=(5.2, 4.4)), colours),
+    ]
+    if math.isfinite(cycle.period) and cycle.kind not in ("none found", "steady"):
+        words = f"{cycle.period:.6g} s, {len(cycle.events)} changes; {'stable' if cycle.stable else 'not stable'}."
+        pictures.append(_shown("Limit cycle", phase_picture(_once(motion, cycle), size=(5.2, 4.4)), words))
+    loop = friction_picture(motion, size=(5.2, 3.8))
+    pictures.append(_shown("Friction force over sliding velocity", loop, "Grey: the law; points: what the run did."))
+    return (*pictures, *_curves(motion), *_errors(study))
+
+
+def _drawable(motion: StickSlipMotion) -> bool:
+    return bool(np.isfinite(motion.x2).sum() > 1)
+
+
+def _shown(title: str, figure: Figure, caption: str, *, wide: bool = False) -> Picture:
+    return Picture(title, themed_svg(figure), caption, "wide" if wide else "normal")
+
+
+def _once(motion: StickSlipMotion, cycle: LimitCycle) -> StickSlipMotion:
+    """One period of the cycle by itself."""
+    from dataclasses import replace
+
+    from graphsynth.systems.tribometer.motion import EventGuard, event_driven
+
+    model = motion.model
+    stuck = bool(abs(cycle.v2 - float(model.drive.motion(0.0).v)) < 1e-12 * max(model.frequency * model.reach, 1e-12))
+    start = replace(model, x2=cycle.x2, v2=None if stuck else cycle.v2)
+    return event_driven(start, cycle.period, np.linspace(0.0, cycle.period, 1001), 1e-14, EventGuard(), False)
+
+
+def _curves(motion: StickSlipMotion) -> list[Picture]:
+    from graphsynth.drawing.plots import Line
+
+    t = motion.t
+    both = [Line(t, motion.v1, "lower platform", "a"), Line(t, motion.v2, "upper platform", "b", "--")]
+    zero = "Lower minus upper platform; exactly zero while they stick."
+    pictures = [
+        chart("Velocities", both, "time [s]", "velocity [mm/s]"),
+        chart("Sliding velocity", [Line(t, motion.sliding)], "time [s]", "sliding velocity [mm/s]", zero),
+    ]
+    if motion.path is None:
+        return pictures
+    c, stored = motion.path.columns, motion.path.stored
+    gap = np.abs(stored - stored[0] - (c.driven - c.heat - c.damped))
+    few = np.linspace(0, len(gap) - 1, min(len(gap), _MOST_ENERGIES)).astype(int)  # Zeno behaviour has many nodes
+    names, styles = ("drive", "friction", "damper", "stored"), ("-", "--", ":", "-.")
+    energies = [
+        Line(c.t[few], energy[few], name, colour, style)
+        for energy, name, colour, style in zip((c.driven, c.heat, c.damped, stored), names, "abcd", styles)
+    ]
+    spent = "Given by the drive, lost in friction and damper, stored."
+    residual = f"At most {motion.energy_residual:.1e} of what is exchanged."
+    return [
+        *pictures,
+        chart("Energies since the start", energies, "time [s]", "energy [J]", spent),
+        chart("Gap of the energy balance", [Line(c.t[few], gap[few])], "time [s]", "gap of the balance [J]", residual),
+    ]
+
+
+def _errors(study: Problem | None) -> list[Picture]:
+    from dataclasses import replace
+
+    from graphsynth.evidence.pictures import work_precision_picture
+
+    if study is None or not any(row.good and row.error > 0.0 for row in study.rows):
+        return []
+    setting = "smoothing velocity [m/s], step [s] or tolerance"
+    rows = tuple(replace(row, more={**row.more, setting: row.value}) for row in study.rows)
+    by_setting = replace(study, rows=rows, over=setting)
+    crosses = "Crosses: failed or unreliable."
+    return [
+        _shown("Error against run time", work_precision_picture(study), crosses),
+        _shown("Error against tolerance, step and smoothing velocity", work_precision_picture(by_setting), crosses),
+    ]
 
 
 def _plain(axes: Any) -> None:
@@ -39,7 +122,7 @@ def _plain(axes: Any) -> None:
 
 
 def _known(motion: StickSlipMotion) -> None:
-    if not np.isfinite(motion.x2).sum() > 1:
+    if not _drawable(motion):
         raise SpecError(f"There is nothing to draw: {motion.statement}")
 
 
@@ -83,23 +166,23 @@ def platforms_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (9
     for axes in (above, below):
         _plain(axes)
         for index, (start, stop) in enumerate(_sticking(motion)):
-            axes.axvspan(start, stop, color=_STICK, lw=0, zorder=0, label="stick" if index == 0 else None)
+            axes.axvspan(start, stop, color=LIGHT["pale"], lw=0, zorder=0, label="stick" if index == 0 else None)
     if math.isfinite(motion.model.drive.period):  # a belt would run out of the picture
         above.plot(motion.t, 1e3 * motion.x1, color=_LOWER, label="lower platform")
     above.plot(motion.t, 1e3 * motion.x2, color=_UPPER, ls="--", label="upper platform")
     above.set_ylabel("displacement [mm]")
     above.legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=3, frameon=False)
     bound = motion.model.law.static * motion.model.normal
-    below.plot(motion.t, motion.friction, color=_THIRD, lw=1.2)
+    below.plot(motion.t, motion.friction, color=_FRICTION, lw=1.2)
     for side in (-bound, bound):
         below.axhline(side, color=_SOFT, ls=":", lw=1)
-    below.annotate("largest static friction", (motion.t[-1], bound), xytext=(0, 3), textcoords="offset points",
-                   ha="right", va="bottom", fontsize=8, color=LIGHT["note"])  # fmt: skip
+    place = {"xytext": (0, 3), "textcoords": "offset points", "ha": "right", "va": "bottom"}
+    below.annotate("largest static friction", (motion.t[-1], bound), fontsize=8, color=LIGHT["note"], **place)
     below.set(xlabel="time [s]", ylabel="friction force [N]", xlim=(motion.t[0], motion.t[-1]))
     below.set_ylim(-1.3 * bound, 1.3 * bound)
     if not motion.complete:
-        above.set_title(motion.status.value, color=_FAIL, fontsize=10, loc="left")
-        above.axvline(motion.end, color=_FAIL, lw=1)
+        above.set_title(motion.status.value, color=LIGHT["bad"], fontsize=10, loc="left")
+        above.axvline(motion.end, color=LIGHT["bad"], lw=1)
     return figure
 
 
@@ -134,12 +217,10 @@ def phase_picture(
         # a piece reaches to the first point of the next one
         inside = (state == 0) == now
         shown = inside | np.concatenate([[False], inside[:-1]])
-        for part, width, alpha, name in (
-            (t >= (settled or 0.0), 1.8, 1.0, label), (t < (settled or 0.0), 0.8, 0.35, None),
-        ):  # fmt: skip
-            chosen = shown & part
-            axes.plot(1e3 * np.where(chosen, x, np.nan), 1e3 * np.where(chosen, v, np.nan), color=colour, lw=width,
-                      alpha=alpha, label=name)  # fmt: skip
+        late = t >= (settled or 0.0)
+        for part, style in ((late, {"lw": 1.8, "label": label}), (~late, {"lw": 0.8, "alpha": 0.35})):
+            place = [1e3 * np.where(shown & part, values, np.nan) for values in (x, v)]
+            axes.plot(*place, color=colour, **style)
     axes.set(xlabel="displacement of the upper platform [mm]", ylabel="velocity [mm/s]")
     axes.legend(frameon=False, loc=legend_place(t.size))
     return figure
@@ -171,193 +252,3 @@ def friction_picture(motion: StickSlipMotion, *, size: tuple[float, float] = (6.
     axes.set(xlabel="sliding velocity [mm/s]", ylabel="friction force [N]")
     axes.legend(frameon=False, loc=legend_place(stick.size))
     return figure
-
-
-def error_picture(studies: Sequence[Problem], *, over: str = "time", size: tuple[float, float] = (7.0, 5.0)) -> Figure:
-    """Errors of the methods, log-log: over run time, or over the parameter (smoothing velocity, step).
-
-    An error of exactly zero has no place on a logarithmic axis and is left out.
-    What failed or is unreliable is a cross in the colour of its method: at its error if it has one, else at the upper
-    edge.
-
-    Parameters
-    ----------
-    studies : sequence of Problem
-    over : str
-        "time" or "parameter".
-    size : tuple of float
-        Inches.
-
-    Raises
-    ------
-    SpecError
-        If ``over`` is something else, or no run succeeded.
-    """
-    if over not in ("time", "parameter"):
-        raise SpecError(f"The abscissa {over!r} is not known; give 'time' or 'parameter'.")
-    rows = [row for study in studies for row in study.rows]
-    good = [row for row in rows if row.good and row.error > 0.0]
-    if not good:
-        raise SpecError("No run of the studies succeeded with an error above zero, so there is nothing to draw.")
-    figure = new_figure(size)
-    axes = figure.subplots()
-    _plain(axes)
-
-    def place(row: Any) -> float:
-        return float(row.seconds if over == "time" else row.value)
-
-    top = 10.0 * max(row.error for row in good)
-    for index, method in enumerate(dict.fromkeys(row.method for row in rows)):
-        colour = _COLOURS[index % 7]
-        own = [row for row in good if row.method == method]
-        axes.loglog([place(row) for row in own], [row.error for row in own], color=colour, marker=_MARKERS[index % 7],
-                    ms=5, lw=1.2, label=method)  # fmt: skip
-        for row in rows:
-            if row.method == method and not row.good:
-                height = top if math.isnan(row.error) else row.error
-                axes.loglog(place(row), height, "x", color=colour, ms=9, mew=2.5)
-    if len(good) < len(rows):
-        axes.loglog([], [], "x", color=_SOFT, ms=9, mew=2.5, label="failed or unreliable")
-    speeds = all(row.method not in ("time stepping", "event-driven") for row in rows)
-    name = "smoothing velocity [m/s]" if speeds else "smoothing velocity [m/s], step [s] or tolerance"
-    axes.set(xlabel="run time [s]" if over == "time" else name, ylabel="largest error of the position [m]")
-    axes.margins(0.08, 0.12)
-    axes.grid(which="major", color=LIGHT["pale"], lw=0.8)
-    axes.legend(frameon=False, fontsize=8)
-    return figure
-
-
-def stiffness_picture(
-    model: Tribometer,
-    factors: Sequence[float] = (1.0, 1e2, 1e4),
-    duration: float = 3.0,
-    *,
-    size: tuple[float, float] = (8.0, 5.0),
-) -> Figure:
-    """Spring force over normal force for stiffer and stiffer springs with equal damping ratio, and its limit.
-
-    Parameters
-    ----------
-    model : Tribometer
-    factors : sequence of float
-        Factors on the stiffness.
-    duration : float
-        s.
-    size : tuple of float
-        Inches.
-    """
-    figure = new_figure(size)
-    axes = figure.subplots()
-    _plain(axes)
-    times = np.linspace(0.0, duration, 3001)
-    for index, factor in enumerate(factors):
-        stiff = model.stiffened(factor)
-        motion = stiff.event_driven(duration, times=times, estimate=False)
-        exponent = math.log10(factor)
-        name = f"stiffness × {factor:g}" if exponent < 3 else f"stiffness × 10$^{{{exponent:.3g}}}$"
-        name += "" if motion.complete else f" ({motion.status.value})"
-        axes.plot(times, stiff.stiffness * motion.x2 / stiff.normal, color=_COLOURS[index % 7], lw=1.2, label=name)
-    axes.plot(times, model.limit_force(times), color="black", ls=(0, (4, 3)), lw=1, label="limit sgn(v) μ(|v|)")
-    axes.set(xlabel="time [s]", ylabel="spring force / normal force", xlim=(0.0, duration))
-    axes.legend(frameon=False, ncols=2, loc="upper center", bbox_to_anchor=(0.5, 1.15))
-    return figure
-
-
-def save_tribometer_gif(
-    motion: StickSlipMotion, path: str | Path, *, frames: int = 100, seconds: float = 8.0, dpi: int = 70
-) -> int:
-    """Write an animation: crank and rod, both platforms, spring, and the curves growing below.
-
-    The upper platform is dark while it sticks.
-
-    Parameters
-    ----------
-    motion : StickSlipMotion
-    path : path-like
-    frames : int
-        Pictures, 2 to 1000.
-    seconds : float
-        Time of one pass.
-    dpi : int
-        Dots per inch of a picture of 6.4 x 4.2 inches.
-
-    Returns
-    -------
-    int
-        Number of frames.
-
-    Raises
-    ------
-    SpecError
-        If the run failed at its start, or the number of frames is out of bounds.
-    """
-    from matplotlib.animation import FuncAnimation, PillowWriter
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    _known(motion)
-    if not 2 <= frames <= 1000:
-        raise SpecError(f"The number of frames is {frames}; give 2 to 1000.")
-    figure = new_figure((6.4, 4.2))
-    FigureCanvasAgg(figure)
-    scene, curves = figure.subplots(2, 1, height_ratios=(3, 2))
-    last = int(np.flatnonzero(np.isfinite(motion.x2))[-1])
-    chosen = np.linspace(0, last, frames).round().astype(int)
-    show = _Stage(motion, scene, curves)
-    movie = FuncAnimation(figure, lambda i: show(int(chosen[i])), frames=frames)
-    movie.save(str(path), writer=PillowWriter(fps=max(1, round(frames / seconds))), dpi=dpi)
-    return frames
-
-
-class _Stage:
-    """What an animation moves."""
-
-    def __init__(self, motion: StickSlipMotion, scene: Any, curves: Any) -> None:
-        from matplotlib.patches import Rectangle
-
-        drive = motion.model.drive
-        self.motion, self.belt = motion, not math.isfinite(drive.period)
-        shown = [motion.x2, motion.x2 if self.belt else motion.x1]
-        self.width = 2.2 * float(np.nanmax(np.abs(np.concatenate(shown)))) or 1.0
-        self.radius, self.rod = getattr(drive, "radius", 0.0), getattr(drive, "rod", 0.0)
-        width = self.width
-        self.lower = scene.add_patch(Rectangle((-0.5 * width, 0), width, 0.18 * width, color=_LOWER, alpha=0.55))
-        (self.marks,) = scene.plot([], [], "|", color="black", ms=8)
-        self.upper = scene.add_patch(Rectangle((0, 0.18 * width), 0.5 * width, 0.18 * width, color=_UPPER))
-        (self.spring,) = scene.plot([], [], color="black", lw=1)
-        (self.crank,) = scene.plot([], [], "o-", color="black", lw=2, ms=4)
-        self.wall = 1.6 * width
-        scene.plot([self.wall] * 2, [0.14 * width, 0.42 * width], color="black", lw=3)
-        self.centre = -0.5 * width - self.rod
-        left = min(-1.1 * width, self.centre - 1.3 * self.radius if self.rod else 0.0)
-        scene.set(xlim=(left, 1.7 * width), ylim=(-0.35 * width, 0.6 * width), aspect="equal")
-        scene.axis("off")
-        if not self.belt:
-            curves.plot(motion.t, 1e3 * motion.x1, color=_LOWER, lw=0.8, alpha=0.4)
-        curves.plot(motion.t, 1e3 * motion.x2, color=_UPPER, lw=0.8, alpha=0.4, ls="--")
-        (self.first,) = curves.plot([], [], color=_LOWER)
-        (self.second,) = curves.plot([], [], color=_UPPER)
-        curves.set(xlabel="time [s]", ylabel="displacement [mm]", xlim=(motion.t[0], motion.t[-1]))
-        _plain(curves)
-
-    def __call__(self, i: int) -> list[Any]:
-        """Show the moment ``i``."""
-        motion, width = self.motion, self.width
-        x1, x2 = float(motion.x1[i]), float(motion.x2[i])
-        if self.belt:
-            places = (x1 / width + np.linspace(0.0, 1.0, 6, endpoint=False)) % 1.0 - 0.5
-            self.marks.set_data(width * places, np.full(6, 0.05 * width))
-        else:
-            self.lower.set_x(x1 - 0.5 * width)
-            self.first.set_data(motion.t[: i + 1], 1e3 * motion.x1[: i + 1])
-        self.upper.set_x(x2 - 0.25 * width)
-        self.upper.set_alpha(1.0 if motion.state[i] == 0 else 0.55)
-        turns = np.linspace(0.0, 1.0, 17)
-        zigzag = 0.27 * width + 0.05 * width * np.array([0, 0, *([1, -1] * 6), 0, 0, 0])
-        self.spring.set_data(x2 + 0.25 * width + turns * (self.wall - x2 - 0.25 * width), zigzag)
-        if self.rod:
-            angle = motion.model.drive.speed * float(motion.t[i])
-            pin = (self.centre + self.radius * math.cos(angle), self.radius * math.sin(angle))
-            end = self.centre + x1 + self.rod
-            self.crank.set_data([self.centre, pin[0], end], [0.09 * width, pin[1] + 0.09 * width, 0.09 * width])
-        self.second.set_data(motion.t[: i + 1], 1e3 * motion.x2[: i + 1])
-        return [self.lower, self.marks, self.upper, self.spring, self.crank, self.first, self.second]

@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
-from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive, HarmonicDrive
-from graphsynth.systems.tribometer.events import EventGuard, RunStatus
 from graphsynth.systems.tribometer.model import Tribometer
-from graphsynth.systems.tribometer.stick_slip_precise import precise_motion
+from graphsynth.systems.tribometer.motion import EventGuard, RunStatus
+from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, HarmonicDrive, StribeckLaw, TwoCoefficientLaw
+from graphsynth.systems.tribometer.precise import precise_motion
 
 from . import printed
 
@@ -180,11 +179,11 @@ def test_capture_may_pass_through_to_the_other_direction():
 
 def test_long_resumed_run_equals_a_run_in_one_piece(monkeypatch):
     """Runs with more nodes than fit go on where they stopped, to the bit."""
-    from graphsynth.systems.tribometer import events
+    from graphsynth.systems.tribometer import motion as runs
 
     whole = CRANK.event_driven(5.0, estimate=False)
-    monkeypatch.setattr(events, "_FIRST", 7)
-    monkeypatch.setattr(events, "_LARGEST", 7)
+    monkeypatch.setattr(runs, "_FIRST", 7)
+    monkeypatch.setattr(runs, "_LARGEST", 7)
     pieces = CRANK.event_driven(5.0, estimate=False)
     assert np.array_equal(whole.path.nodes, pieces.path.nodes)
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
 from graphsynth.systems.tribometer.cycles import belt_cycle, limit_cycle
-from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive, HarmonicDrive
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, HarmonicDrive, StribeckLaw, TwoCoefficientLaw
 
 from . import printed
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import SpecError, TooLargeError
-from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
-from graphsynth.systems.tribometer import stick_slip_forms
-from graphsynth.systems.tribometer.accuracy import regularisation_study, step_study, tolerance_study
-from graphsynth.systems.tribometer.drives import HarmonicDrive
-from graphsynth.systems.tribometer.events import EventGuard, RunStatus
+from graphsynth.systems.tribometer import forms
+from graphsynth.systems.tribometer.evidence import method_study, tolerance_rows
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.motion import EventGuard, RunStatus
+from graphsynth.systems.tribometer.platforms import HarmonicDrive, StribeckLaw, TwoCoefficientLaw
 
 from . import printed
 
@@ -38,7 +37,8 @@ def test_time_stepping_to_the_printed_digits(exact, step):
 
 
 def test_time_stepping_is_of_first_order():
-    assert step_study(CRANK, 2.0, steps=[1e-3, 1e-4, 1e-5]).order("time stepping") == pytest.approx(1.0, abs=0.05)
+    study = method_study(CRANK, 2.0, tolerances=[], speeds=[], steps=[1e-3, 1e-4, 1e-5])
+    assert study.order("time stepping") == pytest.approx(1.0, abs=0.05)
 
 
 def test_time_stepping_with_two_coefficients():
@@ -54,7 +54,7 @@ def test_error_against_regularisation_speed(exact, speed, solver):
     error = float(np.abs(motion.x2 - exact.x2[:-1]).max())
     assert error == pytest.approx(printed.REGULARISED[speed], rel=0.03)
     assert motion.error == pytest.approx(error, rel=1e-9)
-    assert stick_slip_forms.model_error(speed) == pytest.approx(error, rel=0.5)
+    assert forms.model_error(speed) == pytest.approx(error, rel=0.5)
 
 
 def test_unreliable_success_is_found_out(exact):
@@ -100,25 +100,28 @@ def test_short_result_of_a_solver_is_a_failure(monkeypatch):
 
 
 def test_study_keeps_failures():
-    study = regularisation_study(CRANK, 1.0, speeds=[1e-3, 1e-5], solvers=["DOP853"], most_calls=10_000)
+    study = method_study(
+        CRANK, 1.0, tolerances=[], steps=[], speeds=[1e-3, 1e-5], solvers=["DOP853"], most_calls=10_000
+    )
     table = study.to_pandas()
     assert table["status"].tolist() == ["ok", "failed"]
     assert np.isnan(table["error"][1])
 
 
 def test_tolerances_against_more_digits():
-    from graphsynth.systems.tribometer.stick_slip_precise import precise_motion
+    from graphsynth.systems.tribometer.precise import precise_motion
 
-    study = tolerance_study(CRANK, precise_motion(CRANK, 1.0, digits=16), 1.0, rounds=1)
-    errors = [row.more["event error [s]"] for row in study.rows]
-    assert all(row.more["events"] == 4 for row in study.rows)
+    tolerances = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14)
+    rows = tolerance_rows(CRANK, precise_motion(CRANK, 1.0, digits=16), 1.0, tolerances, 1)
+    errors = [row.more["event error [s]"] for row in rows]
+    assert all(row.more["events"] == 4 for row in rows)
     assert errors[-1] < 3e-15
     assert errors[0] < 1e-5
 
 
 @pytest.mark.slow
 def test_whole_table_of_regularisation_speeds():
-    study = regularisation_study(CRANK, 10.0, solvers=["LSODA", "BDF", "Radau"])
+    study = method_study(CRANK, 10.0, tolerances=[], steps=[], solvers=["LSODA", "BDF", "Radau"])
     for row in study.rows:
         if row.method == "Radau":
             assert row.good
@@ -159,7 +162,7 @@ def test_chatter(factor, count):
 
 @pytest.mark.slow
 def test_chatter_with_more_digits():
-    from graphsynth.systems.tribometer.stick_slip_precise import precise_motion
+    from graphsynth.systems.tribometer.precise import precise_motion
 
     model = CRANK.stiffened(1e2, scaled_damping=False)
     reference = precise_motion(model, 1.0, digits=18)

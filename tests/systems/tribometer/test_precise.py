@@ -6,10 +6,9 @@ import mpmath
 import pytest
 
 from graphsynth.core.errors import SpecError, TooLargeError
-from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
-from graphsynth.systems.tribometer.drives import BeltDrive, HarmonicDrive
 from graphsynth.systems.tribometer.model import Tribometer
-from graphsynth.systems.tribometer.stick_slip_precise import precise_motion
+from graphsynth.systems.tribometer.platforms import BeltDrive, HarmonicDrive, StribeckLaw, TwoCoefficientLaw
+from graphsynth.systems.tribometer.precise import precise_motion
 
 from . import printed
 

@@ -8,9 +8,8 @@ import mpmath
 import numpy as np
 from hypothesis import assume, given, settings, strategies as st
 
-from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
-from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive, HarmonicDrive
 from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, HarmonicDrive, StribeckLaw, TwoCoefficientLaw
 
 
 def number(low, high):

@@ -13,37 +13,34 @@ from graphsynth.systems.tribometer.kernels.plant import (
     CRANK,
     DAMPING,
     DRIVE,
+    GLIDE,
+    GLIDE_RATE,
+    HOLDING_RATE,
     KINETIC,
     LAW,
     MASS,
     NORMAL,
     RADIUS,
+    RELEASE,
     ROD,
     SPEED,
     STATIC,
+    STEP,
     STIFFNESS,
     STRIBECK,
     STRIBECK_LAW,
     acceleration,
+    crossing,
     drive,
     glide,
     holding,
     parameters_are_closed,
+    root,
     shift,
     spacing,
-)
-from graphsynth.systems.tribometer.kernels.roots import (
-    GLIDE,
-    GLIDE_RATE,
-    HOLDING_RATE,
-    RELEASE,
-    STEP,
-    STEP_RATE,
-    crossing,
-    root,
+    step,
     value,
 )
-from graphsynth.systems.tribometer.kernels.runge_kutta import step
 
 TIME, POSITION, VELOCITY, STATE, DRIVEN, HEAT, DAMPED, EVENT = 0, 1, 2, 3, 4, 5, 6, 7
 WIDTH = 8
@@ -159,7 +156,7 @@ def glide_until(p, s, t, x, v, end, limit, work):
             u, rate = value(GLIDE, p, s, t, x, v, low, work), 0.0
             if u <= 0.0:
                 return math.nan, loss, count
-        found = crossing(GLIDE, GLIDE_RATE, p, s, t, x, v, low, high, u, after, rate, slope, work)
+        found = crossing(GLIDE, p, s, t, x, v, low, high, (u, after, rate, slope), work)
         stop = high if math.isnan(found) else found
         start = low
         if count == 0:
@@ -204,7 +201,7 @@ def slip_step(p, s, t, x, v, h, end, tolerance, work):
             continue
         slope = s * (b1 - acceleration(p, s, new[0], new[1], w1)[0])
         proposal = h * min(5.0, 0.9 * max(error, 1e-10) ** -0.125)
-        found = crossing(STEP, STEP_RATE, p, s, t, x, v, 0.0, h, u, after, rate, slope, work)
+        found = crossing(STEP, p, s, t, x, v, 0.0, h, (u, after, rate, slope), work)
         if math.isnan(found):
             return h, proposal, 0.0
         return found, proposal, 1.0
@@ -214,9 +211,8 @@ def slip_step(p, s, t, x, v, h, end, tolerance, work):
 def advance(p, start, end, guard, tolerance, limit, nodes, memory):
     """Run from the node ``start`` to ``end``; returns the number of nodes written, the status, the steps taken.
 
-    Status COMPLETE (end reached), FULL (no room; go on from the last node), STORM, STEP_LIMIT, UNRESOLVED or BROKEN.
-    ``memory`` holds what a later call goes on from: number of events, short dwells in a row, proposed step, times of
-    the last events.
+    Status COMPLETE (end reached), FULL (no room; go on from the last node), STORM, STEP_LIMIT, UNRESOLVED or BROKEN;
+    ``memory``: number of events, short dwells in a row, proposed step, times of the last events.
     """
     work = np.zeros((2, 12))
     recent = memory[3:]
@@ -233,7 +229,7 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
             return count, STEP_LIMIT, steps
         event = 0.0
         if state == 0.0:
-            span, side, taken = release(p, t, x, end, limit - steps, work)
+            span, side, taken = release(p, t, x, end, limit - steps, work)  # carried along, up to the release
             if taken > limit - steps:
                 return count, STEP_LIMIT, steps + taken
             steps += 1
@@ -247,6 +243,7 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
             t = arrive
         else:
             if closed:
+                # slip in closed form: one piece up to the capture
                 span, loss, taken = glide_until(p, state, t, x, v, end, limit - steps, work)
                 steps += taken
                 if steps > limit:
@@ -259,6 +256,7 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
                 new_x, new_v, _ = glide(p, state, x, v, span)
                 driven, heat, damped = driven + force * way, heat + force * (way - (new_x - x)), damped + loss
             else:
+                # slip integrated: one step, cut at the capture
                 span, h, code = slip_step(p, state, t, x, v, min(h, SLIP_STEP * slip_scale(p, t)), end, tolerance, work)
                 steps += 1
                 if code < 0.0:
@@ -269,6 +267,7 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
             x, v = new_x, new_v
             t = end if span >= end - t else t + span
             if met:
+                # the platforms move alike: stick if friction can hold them together, else slip on
                 v = drive(p, t)[1]
                 force = holding(p, t, 0.0, x)[0]
                 after = 0.0 if abs(force) <= bound else math.copysign(1.0, force)
@@ -280,6 +279,7 @@ def advance(p, start, end, guard, tolerance, limit, nodes, memory):
         if not abs(x) + abs(v) < math.inf:
             return count, BROKEN, steps
         if event == 1.0:
+            # Zeno behaviour: dwells of rounding size, or too many events within the window
             slot = events % recent.size
             short = short + 1.0 if t - recent[(events - 1) % recent.size] < guard[DWELL] * spacing(t) else 0.0
             if short >= 3.0 or t - recent[slot] < recent.size / guard[RATE]:

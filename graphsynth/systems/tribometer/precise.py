@@ -8,14 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from graphsynth.core.errors import SpecError, TooLargeError
-from graphsynth.dynamics.friction.laws import StribeckLaw, TwoCoefficientLaw
-from graphsynth.systems.tribometer.drives import BeltDrive, CrankDrive
-
-if TYPE_CHECKING:
-    from graphsynth.systems.tribometer.model import Tribometer
+from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, Platforms, StribeckLaw, TwoCoefficientLaw
 
 Series = list[Any]
 
@@ -39,7 +35,7 @@ class PreciseMotion:
     digits: int
 
 
-def precise_motion(model: Tribometer, duration: float, *, digits: int = 30, most_events: int = 1000) -> PreciseMotion:
+def precise_motion(model: Platforms, duration: float, *, digits: int = 30, most_events: int = 1000) -> PreciseMotion:
     """Run the automaton in multiple precision.
 
     The data of the model are taken as they are stored, or as the shortest decimal numbers that round to them: 0.4 means
@@ -47,7 +43,7 @@ def precise_motion(model: Tribometer, duration: float, *, digits: int = 30, most
 
     Parameters
     ----------
-    model : Tribometer
+    model : Platforms
         With a `TwoCoefficientLaw`, or a `StribeckLaw` whose exponent is a whole number.
     duration : float
         Final time, s.
@@ -95,7 +91,7 @@ def _times(a: Series, b: Series, n: int) -> Any:
 class _Run:
     """State of a run; every number is an mpmath number."""
 
-    def __init__(self, model: Tribometer, digits: int) -> None:
+    def __init__(self, model: Platforms, digits: int) -> None:
         from mpmath import mpf
 
         law, drive = model.law, model.drive

@@ -1,0 +1,325 @@
+"""The two other forms of the stick-slip model: time stepping with complementarity, regularised friction."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graphsynth.core.errors import SpecError, TooLargeError
+from graphsynth.systems.tribometer.motion import EventGuard, RunStatus, StickSlipEvent, StickSlipMotion, event_driven
+from graphsynth.systems.tribometer.platforms import Platforms, StribeckLaw, TwoCoefficientLaw, finite, positive
+
+Array = NDArray[np.float64]
+#: Solvers of scipy that the regularised form accepts.
+SOLVERS = ("LSODA", "BDF", "Radau", "DOP853", "RK45", "RK23")
+_IMPLICIT = ("LSODA", "BDF", "Radau")
+_MOST_STEPS = 20_000_000
+#: A solver is called unreliable if another one differs by more than this share of the error of the form.
+_SHARE = 0.5
+
+
+def time_stepping(
+    model: Platforms, duration: float, times: Array, step: float, weight: float, estimate: bool
+) -> StickSlipMotion:
+    """March with fixed steps; see `graphsynth.systems.tribometer.model.Tribometer.time_stepping`."""
+    step = positive("step", step)
+    if not 0.0 <= finite("weight of the step", weight) <= 1.0:
+        raise SpecError(f"The weight of the step is {weight:g}; give a number from 0 to 1, best 0.5.")
+    count = max(1, math.ceil(duration / step * (1.0 - 1e-12)))
+    if count > _MOST_STEPS:
+        raise TooLargeError(
+            f"The step {step:g} s needs {count} steps, more than {_MOST_STEPS}; give a step of at least "
+            f"{duration / _MOST_STEPS:.2g} s or a shorter run.",
+            count,
+        )
+    _march(model, duration, 1, weight)  # compilation is no part of the run time
+    begin = time.perf_counter()
+    march = _march(model, duration, count, weight)
+    x2 = march.between(times, duration, 0)
+    seconds = time.perf_counter() - begin
+    failed, h = march.done < count, duration / count
+    error, events = math.nan, march.changes(h)
+    if estimate and not failed:
+        error, events = _stepping_error(model, duration, times, weight, count, x2, events)
+    end = march.done * h if failed else duration
+    statement = f"{len(events)} changes of the contact in {duration:g} s, step {h:g} s."
+    if failed:
+        statement = (
+            f"Failed: the numbers left the range of floating point at {end:.9g} s; use a weight of at least 0.5."
+        )
+    drive = model.drive.motion(times)
+    _, _, state, friction = march.path[np.minimum(np.ceil(times / h - 1e-9).astype(int), count)].T
+    driven, heat, damped = march.energies.tolist()
+    return StickSlipMotion(
+        model=model,
+        method="time stepping",
+        t=times,
+        x1=drive.x,
+        v1=drive.v,
+        x2=x2,
+        v2=march.between(times, duration, 1),
+        friction=friction,
+        state=np.nan_to_num(state).astype(np.int64),
+        status=RunStatus.FAILED if failed else RunStatus.COMPLETE,
+        statement=statement,
+        end=end,
+        error=error,
+        evaluations=march.done,
+        seconds=seconds,
+        events=events,
+        energy_residual=_residual(model, march),
+        friction_loss=heat,
+        drive_work=driven,
+        damper_loss=damped,
+    )
+
+
+class _March(NamedTuple):
+    """Position, velocity, state and friction force at every step; energies, and the steps that stayed finite."""
+
+    path: Array
+    energies: Array
+    done: int
+
+    def between(self, times: Array, duration: float, column: int) -> Array:
+        """Interpolate between steps, linearly: the method itself knows no more."""
+        found: Array = np.interp(times, np.linspace(0.0, duration, len(self.path)), self.path[:, column])
+        return found
+
+    def changes(self, h: float) -> tuple[StickSlipEvent, ...]:
+        """Return the changes of the contact."""
+        path = self.path[: self.done + 1]
+        at = np.flatnonzero(np.diff(path[:, 2])) + 1
+        return tuple(
+            StickSlipEvent(float(i) * h, int(state), float(x), math.nan)
+            for i, (x, state) in zip(at, path[at][:, [0, 2]].tolist())
+        )
+
+
+def _march(model: Platforms, duration: float, count: int, weight: float) -> _March:
+    from graphsynth.systems.tribometer.kernels.plant import march
+
+    path, energies = np.full((count + 1, 4), math.nan), np.zeros(3)
+    v, state = model.start()
+    path[0] = model.x2, v, state, math.nan
+    with np.errstate(over="ignore", invalid="ignore"):
+        done = march(model.data(), model.x2, v, duration / count, weight, path, energies)
+    path[0, 3] = path[1, 3]
+    return _March(path, energies, int(done))
+
+
+def _stepping_error(
+    model: Platforms,
+    duration: float,
+    times: Array,
+    weight: float,
+    count: int,
+    x2: Array,
+    events: tuple[StickSlipEvent, ...],
+) -> tuple[float, tuple[StickSlipEvent, ...]]:
+    """Estimate the errors from two coarser runs: one alone agrees by chance where releases fall alike on the steps.
+
+    Errors of the event times are from the run with steps of twice the length; NaN if its events differ.
+    """
+    worst = 0.0
+    for share in (0.5, 0.7):
+        fewer = max(1, int(share * count))
+        other = _march(model, duration, fewer, weight)
+        if other.done < fewer or fewer == count:
+            return math.nan, events
+        gap = float(np.abs(x2 - other.between(times, duration, 0)).max())
+        worst = max(worst, gap * fewer / (count - fewer))
+        coarse = other.changes(duration / fewer) if share == 0.5 else ()
+        if [event.state for event in events] == [event.state for event in coarse]:
+            step = duration / count
+            events = tuple(a._replace(error=abs(a.time - b.time) + step) for a, b in zip(events, coarse))
+    return worst, events
+
+
+def _residual(model: Platforms, march: _March) -> float:
+    path = march.path[: march.done + 1]
+    energy = 0.5 * model.mass * path[:, 1] ** 2 + 0.5 * model.stiffness * path[:, 0] ** 2
+    driven, heat, damped = march.energies
+    exchanged = max(float(np.abs(march.energies).max()), float(np.ptp(energy)))
+    gap = abs(energy[-1] - energy[0] - (driven - heat - damped))
+    return float(gap / exchanged) if exchanged > 0.0 else 0.0
+
+
+def model_error(speed: float) -> float:
+    """Error of the position that regularised friction makes in reference C, ``0.15 s eps ln((1 m/s)/eps)``, m.
+
+    Measured for ``eps`` from 1e-8 to 1e-2 m/s (theory/tribometer 10); for another tribometer an order of magnitude.
+
+    Examples
+    --------
+    >>> f"{model_error(1e-5):.1e}"
+    '1.7e-05'
+    """
+    return 0.15 * speed * max(math.log(1.0 / speed), 1.0)
+
+
+class Solving(NamedTuple):
+    """How the regularised form is solved: smoothing velocity (m/s), solver of scipy, tolerance, bound on its calls."""
+
+    speed: float
+    solver: str
+    rtol: float
+    jacobian: bool
+    most_calls: int
+
+
+class _Solution(NamedTuple):
+    """What a solver returned: x2 and v2 at the times (NaN beyond its end), the end, calls, complaint."""
+
+    y: Array
+    end: float
+    calls: int
+    seconds: float
+    complaint: str
+
+
+def regularised(model: Platforms, duration: float, times: Array, how: Solving, check: bool) -> StickSlipMotion:
+    """Solve the regularised form; see `graphsynth.systems.tribometer.model.Tribometer.regularised`."""
+    _refuse(model, how)
+    found = _solve(model, duration, times, how)
+    reference = event_driven(model, duration, times, 1e-14, EventGuard(), False)
+    exact = reference.x2 if reference.complete else None
+    status, statement = RunStatus.COMPLETE, f"{how.solver} reached {duration:g} s."
+    if found.complaint:
+        status = RunStatus.FAILED
+        stopped = f"{how.solver} stopped at {found.end:.9g} s of {duration:g} s ({found.complaint})"
+        statement = f"Failed: {stopped}; use Radau."
+    elif check:
+        status, statement = _cross_checked(model, duration, times, how, found.y[0], exact)
+    drive = model.drive.motion(times)
+    u = drive.v - found.y[1]
+    return StickSlipMotion(
+        model=model,
+        method=f"regularised ({how.solver})",
+        t=times,
+        x1=drive.x,
+        v1=drive.v,
+        x2=found.y[0],
+        v2=found.y[1],
+        friction=model.normal * model.law.coefficient(np.abs(u)) * np.tanh(u / how.speed),
+        state=np.nan_to_num(np.sign(u)).astype(np.int64),
+        status=status,
+        statement=statement,
+        end=found.end,
+        error=math.nan if exact is None else float(np.abs(found.y[0] - exact).max()),
+        evaluations=found.calls,
+        seconds=found.seconds,
+    )
+
+
+def _cross_checked(
+    model: Platforms, duration: float, times: Array, how: Solving, x2: Array, exact: Array | None
+) -> tuple[RunStatus, str]:
+    """Compare with a second implicit solver; their difference has to be small beside the error of the form."""
+    solver, other = how.solver, "BDF" if how.solver == "Radau" else "Radau"
+    second = _solve(model, duration, times, how._replace(solver=other, jacobian=True))
+    if second.complaint:
+        return (
+            RunStatus.UNRELIABLE,
+            f"{solver} reached {duration:g} s, but {other} failed ({second.complaint}): no cross-check; use Radau.",
+        )
+    gap = float(np.abs(x2 - second.y[0]).max())
+    form = model_error(how.speed) if exact is None else float(np.abs(second.y[0] - exact).max())
+    if gap <= _SHARE * form:
+        return RunStatus.COMPLETE, f"{solver} reached {duration:g} s; {other} differs by {gap:.2g} m."
+    return (
+        RunStatus.UNRELIABLE,
+        f"{solver} reports success, but {other} differs by {gap:.2g} m, not small beside the error {form:.2g} m "
+        "of the form itself; use Radau or a smaller tolerance.",
+    )
+
+
+def _refuse(model: Platforms, how: Solving) -> None:
+    positive("smoothing velocity", how.speed)
+    if how.solver not in SOLVERS:
+        raise SpecError(f"The solver {how.solver!r} is not known; give one of {', '.join(SOLVERS)}.")
+    law = model.law
+    if isinstance(law, TwoCoefficientLaw) and law.static != law.kinetic:
+        raise SpecError(
+            "The regularised form cannot represent the two-coefficient law: it needs a smoothing velocity far below "
+            "the Stribeck velocity, and here that is zero; use event_driven or time_stepping, or a StribeckLaw."
+        )
+    if isinstance(law, StribeckLaw) and not how.speed < law.velocity:
+        raise SpecError(
+            f"The smoothing velocity {how.speed:g} m/s is not below the Stribeck velocity {law.velocity:g} m/s, "
+            "so that the static friction would never be reached; give at most a tenth of it."
+        )
+
+
+class _ExhaustedError(Exception):
+    """The bound on the calls of the right-hand side is reached; holds the time."""
+
+    def __init__(self, at: float) -> None:
+        super().__init__()
+        self.at = at
+
+
+def _functions(
+    model: Platforms, how: Solving
+) -> tuple[Callable[[float, Array], Array], Callable[[float, Array], Array]]:
+    from graphsynth.systems.tribometer.kernels.plant import regularised as rate, regularised_slope as slope
+
+    data, calls = model.data(), 0
+
+    def rhs(t: float, y: Array) -> Array:
+        nonlocal calls
+        calls += 1
+        if calls > how.most_calls:
+            raise _ExhaustedError(float(t))
+        out = np.empty(2)
+        rate(t, y, data, how.speed, out)
+        return out
+
+    def jac(t: float, y: Array) -> Array:
+        damping = model.damping + slope(t, y, data, how.speed)
+        return np.array([[0.0, 1.0], [-model.stiffness / model.mass, -damping / model.mass]])
+
+    return rhs, jac
+
+
+def _solve(model: Platforms, duration: float, times: Array, how: Solving) -> _Solution:
+    """Run a solver of scipy and believe nothing: status, end and finite numbers are checked."""
+    from scipy.integrate import solve_ivp
+
+    rhs, jac = _functions(model, how)
+    start = np.array([model.x2, model.start()[0]])
+    rhs(0.0, start)
+    jac(0.0, start)
+    options: dict[str, Any] = {"jac": jac} if how.jacobian and how.solver in _IMPLICIT else {}
+    # the absolute tolerance is 1e-10 for the relative one 1e-8 of theory/tribometer 10
+    options |= {"method": how.solver, "t_eval": times, "rtol": how.rtol, "atol": 0.01 * how.rtol, "max_step": 0.02}
+    blank = np.full((2, times.size), math.nan)
+    begin = time.perf_counter()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = solve_ivp(rhs, (0.0, duration), start, **options)
+    except _ExhaustedError as stop:
+        seconds = time.perf_counter() - begin
+        return _Solution(blank, stop.at, how.most_calls, seconds, f"more than {how.most_calls} calls")
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as problem:
+        return _Solution(blank, 0.0, 0, time.perf_counter() - begin, str(problem).rstrip("."))
+    seconds = time.perf_counter() - begin
+    got = np.asarray(found.y, float).reshape(2, -1) if np.size(found.y) else np.empty((2, 0))
+    reached = got.shape[1]
+    blank[:, :reached] = got[:, : times.size]
+    complaint = ""
+    if found.status != 0:
+        complaint = f"status {found.status}, {found.message}".rstrip(".")
+    elif reached != times.size:
+        complaint = f"{reached} of {times.size} times returned"
+    elif not np.isfinite(blank).all():
+        complaint = "not a number in the result"
+    end = duration if not complaint else float(times[reached - 1]) if reached else 0.0
+    return _Solution(blank, end, int(found.nfev), seconds, complaint)
