@@ -88,11 +88,6 @@ def inverse_dynamics(
     refuse : bool, optional
         False: NaN at inputs where friction leaves no loads, or several; by default that is an error.
 
-    Returns
-    -------
-    InverseDynamics
-        Efforts of the drivers, N m or N, and reactions at every sample (estimated).
-
     Raises
     ------
     GeometryError
@@ -103,10 +98,8 @@ def inverse_dynamics(
     --------
     A bar of 1 kg and 1 m held still, level: half its weight times its length.
 
+    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
     >>> from graphsynth.dynamics.model import Body
-    >>> from graphsynth.kinematics import simulate
-    >>> from graphsynth.mechanism.joints import Revolute
-    >>> from graphsynth import Driver, Mechanism, MechanismGraph
     >>> arm = Mechanism(MechanismGraph(2, [(0, 1)], frame=0), [Revolute(0, 1)], [Driver(0, 1)])
     >>> model = DynamicModel(arm, {1: Body.bar(1.0, (0.0, 0.0), (1.0, 0.0))})
     >>> inverse_dynamics(model, simulate(arm, [0.0]), speed=0.0).efforts.round(6).tolist()
