@@ -14,6 +14,8 @@ import pages
 import public_api
 from docutils import nodes
 from mathml import mathml
+from sphinx import addnodes
+from sphinx.domains.python import PyObject
 
 ROOT = Path(__file__).resolve().parents[1]
 META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -23,7 +25,18 @@ author = "The graphsynth developers"
 project_copyright = author
 version = release = META["version"]
 
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+autodoc_default_options = {"members": True, "inherited-members": "Enum,Exception,int,object,str,tuple"}
+autodoc_member_order = "bysource"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "NDArray")}
+autodoc_typehints_format = "short"
+default_role = "literal"
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+python_maximum_signature_line_length = 88
+suppress_warnings = ["ref.python"]  # "x" names the attribute of several classes
+toc_object_entries_show_parents = "hide"
 myst_enable_extensions = ["deflist", "dollarmath"]
 html_math_renderer = "mathml"
 myst_heading_anchors = 4
@@ -61,21 +74,34 @@ def _read(app: object, page: str, source: list[str]) -> None:
     if page == "index":
         source[0] = _toctrees(source[0])
     elif page == "reference/api":
-        source[0] = source[0].replace("<!-- docstrings -->", public_api.reference())
+        source[0] = source[0].replace("<!-- names -->", public_api.index())
+    elif page.startswith("reference/"):
+        source[0] = public_api.with_docstrings(source[0], page)
 
 
-def _note_objects(app: Any, doctree: nodes.document) -> None:
-    """Enter every public name in the inventory of the site (``objects.inv``), so that other sites can link to it."""
-    if app.env.current_document.docname != "reference/api":
-        return
-    anchors = {}
-    for room in doctree.findall(nodes.section):
-        for entry in room.children:
-            if isinstance(entry, nodes.section):
-                anchors[room[0].astext(), entry[0].astext()] = entry["ids"][0]
-    for room_name, name, dotted, kind in public_api.places():
-        for full in dotted:
-            app.env.domains.python_domain.note_object(full, kind, anchors[room_name, name])
+def _docstring(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Lead citations of the theory and of the bibliography to their pages; |x| is an absolute value."""
+    text = re.sub(r"(?<!`)\|(\w+)\|(?!`)", r"\\|\1\\|", "\n".join(lines))
+    text = re.sub(r"(?<![`\w/])theory/([\w-]+)((?:,? (?:and |to )?\d+\b)*)", r":doc:`theory/\1\2 </theory/\1>`", text)
+    for label, entry in pages.bibliography().items():
+        text = text.replace(f"[{label}]", f":ref:`[{label}] <{entry['key'].lower()}>`")
+    lines[:] = text.split("\n")
+
+
+def _without_chance_links(app: object, doctree: nodes.document) -> None:
+    """Unlink words of numpydoc's types: "ndarray, shape (n,)" does not mean the attribute ``n`` of some class."""
+    for node in list(doctree.findall(addnodes.pending_xref)):
+        if node.get("refdomain") == "py" and not re.search(r"[A-Z.]", node["reftarget"]):
+            node.replace_self(node.children)
+
+
+def _note_other_names(app: Any, env: Any) -> None:
+    """Enter the longer names of public objects in the inventory (``objects.inv``) too."""
+    domain = env.domains.python_domain
+    for short, names in public_api.places().items():
+        entry = domain.objects[short]
+        for name in names:
+            domain.objects.setdefault(name, entry._replace(aliased=True))
 
 
 def _formula(writer: Any, node: Any) -> None:
@@ -87,7 +113,10 @@ def _formula(writer: Any, node: Any) -> None:
 
 def setup(app: Any) -> dict[str, bool]:
     """Register with Sphinx."""
+    next(field for field in PyObject.doc_field_types if field.name == "variable").label = "Attributes"
     app.connect("source-read", _read)
-    app.connect("doctree-read", _note_objects)
+    app.connect("autodoc-process-docstring", _docstring)
+    app.connect("doctree-read", _without_chance_links)
+    app.connect("env-updated", _note_other_names)
     app.add_html_math_renderer("mathml", (_formula, None), (_formula, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,19 +1,26 @@
-"""Turns the docstrings of all public names into Markdown, for `docs/reference/api.md` of the built site."""
+"""The public names and the pages that show their docstrings.
+
+Public is what stands in the stubs of the packages, and in a few modules beside them. A page of the reference asks for
+the docstrings of objects or of whole packages with ``<!-- api: NAME NAME -->``; Sphinx's autodoc sets them.
+"""
 
 from __future__ import annotations
 
-import enum
+import ast
 import inspect
 import re
 from importlib import import_module
 from pathlib import Path
 
-PACKAGE = Path(__file__).resolve().parents[1] / "graphsynth"
+DOCS = Path(__file__).resolve().parent
+PACKAGE = DOCS.parent / "graphsynth"
+MARK = re.compile(r"<!-- api: ([^>]*?) -->")
 
-#: Modules that are public beside the packages with an ``__all__``.
+#: Modules that are public beside the packages with stubs.
 MODULES = (
     "graphsynth.core.errors",
     "graphsynth.structure.assur",
+    "graphsynth.jamming.intersection",
     "graphsynth.mechanism.joints",
     "graphsynth.mechanism.laws",
     "graphsynth.mechanism.files",
@@ -22,86 +29,29 @@ MODULES = (
 
 
 def rooms() -> list[str]:
-    """Public modules, and every package whose ``__init__`` has an ``__all__``; deeper ones first."""
-    found = list(MODULES)
-    for init in PACKAGE.rglob("__init__.py"):
-        name = ".".join(init.parent.relative_to(PACKAGE.parent).parts)
-        public = re.search(r"^(?:\w+, )*__all__\b", init.read_text("utf-8"), re.MULTILINE)
-        if public and not {"kernels", "cli"} & set(name.split(".")):
-            found.append(name)
-    return sorted(found, key=lambda name: (-name.count("."), name))
+    """Public modules, and every package with a stub; deeper ones first."""
+    found = [".".join(stub.parent.relative_to(PACKAGE.parent).parts) for stub in PACKAGE.rglob("__init__.pyi")]
+    return sorted([*MODULES, *found], key=lambda name: (-name.count("."), name))
 
 
 def public_names(room: str) -> list[str]:
-    """Names of ``__all__`` without dunder names."""
-    return [name for name in import_module(room).__all__ if not name.startswith("__")]
+    """Public names of a room, without dunder names."""
+    if room in MODULES:
+        names = import_module(room).__all__
+    else:
+        stub = PACKAGE.parent.joinpath(*room.split("."), "__init__.pyi")
+        lines = [node for node in ast.parse(stub.read_text("utf-8")).body if isinstance(node, ast.ImportFrom)]
+        names = [alias.asname or alias.name for node in lines for alias in node.names]
+    return [name for name in names if not name.startswith("__")]
 
 
-def signature_of(name: str, thing: object) -> str:
-    """Call signature as text; empty for what is not called."""
-    if not callable(thing):
-        return ""
+def thing_of(dotted: str) -> object:
+    """Return what a dotted name stands for."""
+    room, _, name = dotted.rpartition(".")
     try:
-        signature = inspect.signature(thing)
-    except (TypeError, ValueError):
-        return ""
-    bare = [p.replace(annotation=p.empty) for p in signature.parameters.values()]
-    text = f"{name}{signature.replace(parameters=bare, return_annotation=signature.empty)}"
-    return re.sub(r"<([\w.]+)[^<>]*>", r"\1", text)
-
-
-def members(thing: type) -> str:
-    """Public methods and properties of a class with the first line of their docstrings; values of an enumeration."""
-    if issubclass(thing, enum.Enum):
-        return "\n".join(f"{member.name} = {member.value!r}" for member in thing)
-    lines = []
-    for name, raw in sorted(vars(thing).items()):
-        member = raw.__func__ if isinstance(raw, classmethod | staticmethod) else raw
-        told = inspect.getdoc(member) if inspect.isfunction(member) or hasattr(member, "__get__") else None
-        if name.startswith("_") or not told or inspect.ismemberdescriptor(member):
-            continue
-        call = signature_of(name, member) if inspect.isfunction(member) else name
-        first = " ".join(told.partition("\n\n")[0].split()).replace("``", "`")
-        lines.append(f".{re.sub(r'[(](self|cls)(, )?', '(', call)}\n    {first}")
-    return "\n".join(lines)
-
-
-def entry(name: str, thing: object) -> str:
-    """Markdown of one name: signature, docstring, examples."""
-    parts = [f"### `{name}`\n"]
-    call = signature_of(name, thing)
-    if call:
-        parts.append(f"```python\n{call}\n```\n")
-    documented = inspect.isclass(thing) or inspect.isroutine(thing) or inspect.ismodule(thing)
-    text = (inspect.getdoc(thing) or "") if documented else ""
-    text = re.sub(r":\w+:`~?", "`", text.replace("``", "`"))  # roles of reStructuredText
-    body, _, examples = text.partition("\nExamples\n--------\n")
-    if body:
-        parts.append(f"````text\n{body.strip()}\n````\n")
-    inner = members(thing) if isinstance(thing, type) else ""
-    if inner:
-        parts.append(f"````text\n{inner}\n````\n")
-    if examples:
-        parts.append(f"````pycon\n{examples.strip()}\n````\n")
-    if not documented:
-        parts.append(f"`{thing}`\n" if len(str(thing)) < 200 else f"A value of type `{type(thing).__name__}`.\n")
-    return "\n".join(parts)
-
-
-def reference() -> str:
-    """Markdown of all rooms; a name that a package lends from another is shown once, in the deepest one."""
-    sections, seen = {}, set[int]()
-    for room in rooms():
-        module = import_module(room)
-        entries = []
-        for name in sorted(public_names(room)):
-            thing = getattr(module, name)
-            if id(thing) not in seen:
-                seen.add(id(thing))
-                entries.append(entry(name, thing))
-        if entries:
-            sections[room] = f"## `{room}`\n\n" + "\n".join(entries)
-    return "\n".join(text for _, text in sorted(sections.items()))
+        return getattr(import_module(room), name)
+    except (ImportError, AttributeError):
+        return import_module(dotted)
 
 
 def kind_of(thing: object) -> str:
@@ -113,13 +63,64 @@ def kind_of(thing: object) -> str:
     return "function" if callable(thing) else "data"
 
 
-def places() -> list[tuple[str, str, list[str], str]]:
-    """Room and name of every entry of `reference`, every dotted name that leads to it, and its kind."""
-    entries: dict[int, tuple[str, str, list[str], str]] = {}
+def places() -> dict[str, list[str]]:
+    """Every public object by its shortest dotted name, with all dotted names that lead to it; modules are left out."""
+    found: dict[int, list[str]] = {}
     for room in rooms():
-        module = import_module(room)
-        for name in sorted(public_names(room)):
-            thing = getattr(module, name)
-            entry_of = entries.setdefault(id(thing), (room, name, [], kind_of(thing)))
-            entry_of[2].append(f"{room}.{name}")
-    return list(entries.values())
+        for name in public_names(room):
+            thing = thing_of(f"{room}.{name}")
+            if not inspect.ismodule(thing):
+                found.setdefault(id(thing), []).append(f"{room}.{name}")
+    return {min(names, key=lambda name: name.count(".")): names for names in found.values()}
+
+
+def shown() -> dict[str, list[str]]:
+    """Names that each page of the reference shows; a name that a page asks for by itself is not shown with its room."""
+    asked = {
+        page.stem: [word for found in MARK.findall(page.read_text("utf-8")) for word in found.split()]
+        for page in sorted((DOCS / "reference").glob("*.md"))
+    }
+    shortest = {name: short for short, names in places().items() for name in names}
+    singles = {shortest.get(word, word) for words in asked.values() for word in words if word not in rooms()}
+    pages: dict[str, list[str]] = {}
+    for page, words in asked.items():
+        for word in words:
+            if word in rooms():
+                of_room = (shortest.get(f"{word}.{name}", "") for name in public_names(word))
+                names = [name for name in of_room if name and name not in singles]
+            else:
+                names = [shortest.get(word, word)]
+            pages.setdefault(page, []).extend(names)
+    return pages
+
+
+def directive(name: str) -> str:
+    """Return what makes Sphinx show a name; a value has no docstring of its own, so its type and it are shown."""
+    thing = thing_of(name)
+    if kind_of(thing) != "data":
+        return f".. auto{kind_of(thing)}:: {name}"
+    value = f"\n   :value: {thing!r}" if len(repr(thing)) < 120 else ""
+    return f".. py:data:: {name}\n   :type: {type(thing).__name__}{value}"
+
+
+def with_docstrings(text: str, page: str) -> str:
+    """Put autodoc's directives where a page of the reference asks for docstrings."""
+    name = page.partition("/")[2]
+    if not MARK.search(text):
+        return text
+    lines = "\n\n".join(directive(each) for each in shown()[name])
+    return MARK.sub(f"```{{eval-rst}}\n{lines}\n```", text, count=1)
+
+
+def index() -> str:
+    """Return a table of all public names by page: each leads to its docstring."""
+    parts = []
+    for page, names in shown().items():
+        title = (DOCS / "reference" / f"{page}.md").read_text("utf-8").partition("\n")[0].removeprefix("# ")
+        rows = []
+        for name in names:
+            documented = kind_of(thing_of(name)) != "data"
+            told = " ".join((inspect.getdoc(thing_of(name)) or "").partition("\n\n")[0].split()) if documented else ""
+            rows.append(f"| {{py:obj}}`{name}` | {told.replace('``', '`').replace('|', chr(92) + '|')} |")
+        parts.append(f"## [{title}]({page}.md)\n\n| name | what |\n|---|---|\n" + "\n".join(rows))
+    return "\n\n".join(parts)

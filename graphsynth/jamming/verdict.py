@@ -18,16 +18,18 @@ class Verdict(Enum):
 
     One vocabulary for both models: one tilted bearing (L0) and joints that share the misalignment (L1).
 
-    ============================= ============================== ==================================================
-    member                        what is proved (theory/jam-arcs 5)
-    ============================= ============================== ==================================================
-    ``CERTIFIED_FREE``            ``NO_JAM_CERTIFIED``           interference < 0 for all angles and parameters
-    ``CERTIFIED_JAMMED``          ``JAM_FOR_ALL``                every parameter vector binds at some angle or input
-    ``CERTIFIED_JAMMED_FOR_SOME`` ``JAM_FOR_SOME``               some parameter vector binds at some angle or input
-    ``UNDECIDED``                 ``TOUCHING``, ``UNDECIDED``    nothing; the reason says what stands in the way
-    ``CANNOT_ASSEMBLE``           (theory/extreme-cases 1)                   interference fit, or no position of the
-    linkage ============================= ==============================
-    ==================================================
+    What is proved (theory/jam-arcs 5, theory/extreme-cases 1), and the names of the theory:
+
+    ``CERTIFIED_FREE``
+        Interference < 0 for all angles and parameters: ``NO_JAM_CERTIFIED``.
+    ``CERTIFIED_JAMMED``
+        Every parameter vector binds at some angle or input: ``JAM_FOR_ALL``.
+    ``CERTIFIED_JAMMED_FOR_SOME``
+        Some parameter vector binds at some angle or input: ``JAM_FOR_SOME``.
+    ``UNDECIDED``
+        Nothing; the reason says what stands in the way: ``TOUCHING``, ``UNDECIDED``.
+    ``CANNOT_ASSEMBLE``
+        An interference fit, or no position of the linkage.
 
     Members whose name ends in ESTIMATED rest on closed forms or samples in floating point: no rounding error is
     included, so none of them is a certificate.
