@@ -193,9 +193,14 @@ def _data(stage: _Stage, seconds: float, driver: int) -> dict[str, Any]:
         for k, (name, (link, at)) in enumerate(mechanism.points.items())
     ]
     return {
-        "count": len(frames.poses), "loop": frames.loops, "seconds": seconds, "poses": poses, "drivers": drivers,
-        "points": points, "grip": _grip_data(stage, driver),
-    }  # fmt: skip
+        "count": len(frames.poses),
+        "loop": frames.loops,
+        "seconds": seconds,
+        "poses": poses,
+        "drivers": drivers,
+        "points": points,
+        "grip": _grip_data(stage, driver),
+    }
 
 
 def _short(stage: _Stage, link: int, at: tuple[float, float]) -> list[float]:

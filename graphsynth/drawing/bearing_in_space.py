@@ -48,27 +48,10 @@ def space_picture(
 ) -> Figure:
     """Draw the bearing in its cut-away hole, one panel for each tilt; what does not fit into the hole is coloured.
 
-    Parameters
-    ----------
-    bearing : Bearing
-    tilts : tuple of float
-        Radians.
-    titles : tuple of str, optional
-        One for each panel.
-    exaggeration : float
-        Factor on radial distances from the wall of the untilted bearing; 1 draws to scale.  Written on the picture.
+    `tilts`: radians. `titles`: one for each panel. `exaggeration`: factor on radial distances from the wall of the
+    untilted bearing; 1 draws to scale.  Written on the picture. Raises `GeometryError` for an exaggeration that is not
+    positive, no tilts, a tilt of a right angle or more, an interference fit.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        For an exaggeration that is not positive, no tilts, a tilt of a right angle or more, an interference fit.
-
-    Examples
-    --------
     >>> from graphsynth.jamming import Bearing
     >>> len(space_picture(Bearing(), (0.003, 0.0133)).axes)
     2
@@ -110,18 +93,34 @@ def _panel(axes: Any, bearing: Bearing, tilt: float, factor: float) -> None:
     behind = np.linspace(view + 0.5 * math.pi, view + 1.5 * math.pi, _AROUND)
     flat = np.array([[-top], [top]])
     axes.plot_surface(
-        hole * np.cos(behind) + 0.0 * flat, hole * np.sin(behind) + 0.0 * flat, flat + 0.0 * behind,
-        color="#d9dee3", linewidth=0, shade=False, antialiased=False, rcount=2, ccount=_AROUND, zorder=1,
-    )  # fmt: skip
+        hole * np.cos(behind) + 0.0 * flat,
+        hole * np.sin(behind) + 0.0 * flat,
+        flat + 0.0 * behind,
+        color="#d9dee3",
+        linewidth=0,
+        shade=False,
+        antialiased=False,
+        rcount=2,
+        ccount=_AROUND,
+        zorder=1,
+    )
     for level in (-top, top):
         axes.plot(hole * np.cos(behind), hole * np.sin(behind), level, color=LIGHT["ink"], lw=1.3, zorder=2)
     phi, z = np.meshgrid(np.linspace(0.0, math.tau, _AROUND), np.linspace(-h, h, _ALONG))
     X, Y, Z, out = wall(bearing, tilt, factor, phi, z)
     out = 0.25 * (out[:-1, :-1] + out[1:, :-1] + out[:-1, 1:] + out[1:, 1:])
     axes.plot_surface(
-        X, Y, Z, facecolors=_shades(out, phi), linewidth=0, shade=False, antialiased=False, rcount=_ALONG,
-        ccount=_AROUND, zorder=3,
-    )  # fmt: skip
+        X,
+        Y,
+        Z,
+        facecolors=_shades(out, phi),
+        linewidth=0,
+        shade=False,
+        antialiased=False,
+        rcount=_ALONG,
+        ccount=_AROUND,
+        zorder=3,
+    )
     lid = [np.stack([np.full(_AROUND, rim.mean()), rim]) for rim in (X[-1], Y[-1], Z[-1])]
     axes.plot_surface(
         *lid, color="#cfe3f2", linewidth=0, shade=False, antialiased=False, rcount=2, ccount=_AROUND, zorder=4

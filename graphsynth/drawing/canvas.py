@@ -22,13 +22,8 @@ DPI = 96.0
 class Canvas:
     """The artists of a sketch on axes; they can be moved to another pose without being made again.
 
-    Parameters
-    ----------
-    sketch : Sketch
-    axes : matplotlib.axes.Axes
-        Its limits and aspect are set to show the whole sketch; data coordinates are those of the mechanism.
-    pose : sequence of (x, y, theta), optional
-        Where every link is; needed if any shape is fixed to a link.
+    `axes`: its limits and aspect are set to show the whole sketch; data coordinates are those of the mechanism. `pose`:
+    where every link is; needed if any shape is fixed to a link.
     """
 
     def __init__(self, sketch: Sketch, axes: Any, pose: Pose | None = None) -> None:
@@ -89,11 +84,19 @@ class Canvas:
         place = {"middle": "center", "start": "left", "end": "right"}[shape.anchor]
         k = self._points
         note = self.axes.annotate(
-            shape.text, (shape.at.real, shape.at.imag), xytext=(shape.offset.real * k, shape.offset.imag * k),
-            textcoords="offset points", ha=place, va="center_baseline" if len(shape.text) > 2 else "center",
-            fontsize=shape.size * k, color=LIGHT[shape.colour], zorder=order, annotation_clip=False,
-            fontweight=shape.weight or "normal", parse_math=False,
-        )  # fmt: skip
+            shape.text,
+            (shape.at.real, shape.at.imag),
+            xytext=(shape.offset.real * k, shape.offset.imag * k),
+            textcoords="offset points",
+            ha=place,
+            va="center_baseline" if len(shape.text) > 2 else "center",
+            fontsize=shape.size * k,
+            color=LIGHT[shape.colour],
+            zorder=order,
+            annotation_clip=False,
+            fontweight=shape.weight or "normal",
+            parse_math=False,
+        )
         note.set_gid(shape.part or None)
         if shape.halo:
             note.set_path_effects([withStroke(linewidth=shape.halo * k, foreground=LIGHT["paper"])])
@@ -150,14 +153,8 @@ def figure_of(
 ) -> tuple[Any, list[Canvas]]:
     """Make a figure with the sketches side by side in their own size; return it and the canvases.
 
-    Parameters
-    ----------
-    sketches, poses
-        A pose for every sketch; None for one that does not move.
-    dpi : float
-        Pixels per inch; 96 gives the sketches their own size.
-    above, below : str, sequence of str
-        A title, and lines of a remark.
+    `sketches`, `poses`: a pose for every sketch; None for one that does not move. `dpi`: pixels per inch; 96 gives the
+    sketches their own size. `above`, `below`: a title, and lines of a remark.
     """
     from matplotlib.figure import Figure
 
@@ -185,10 +182,7 @@ def figure_of(
 def save(path: File, sketches: Sequence[Sketch], poses: Sequence[Pose | None]) -> None:
     """Write sketches side by side as the suffix says: ``.svg`` (own writer), ``.png`` or ``.pdf`` (matplotlib).
 
-    Raises
-    ------
-    GraphsynthError
-        Another suffix.
+    Raises `GraphsynthError`: another suffix.
     """
     suffix = path.suffix.lower()
     if suffix == ".svg":

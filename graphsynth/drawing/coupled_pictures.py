@@ -25,21 +25,10 @@ _HIGH = 4.0
 def clearance_picture(report: CoupledReport) -> Figure:
     """Draw the allowed scale over the inputs, with what is proved, above the use that every joint makes of its limits.
 
-    Parameters
-    ----------
-    report : CoupledReport
-        Of `graphsynth.jamming.joints.assess_coupled`; with a certificate the proved ranges are shaded.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Above: the factor by which all misalignments may grow; below 1 it jams.  Below: ``|tau| / t`` of every limit in
-        the sharing with the least largest value; a dot where the limit is binding.
-
-    Raises
-    ------
-    GeometryError
-        If no sample is assembled, or no joint has a limit.
+    `report`: of `graphsynth.jamming.joints.assess_coupled`; with a certificate the proved ranges are shaded. Above: the
+    factor by which all misalignments may grow; below 1 it jams.  Below: ``|tau| / t`` of every limit in the sharing
+    with the least largest value; a dot where the limit is binding. Raises `GeometryError` if no sample is assembled, or
+    no joint has a limit.
     """
     if not np.isfinite(report.factor).any():
         raise GeometryError("no sample has a finite factor, so there is nothing to draw; see the report's reason")
@@ -92,19 +81,8 @@ def _name(name: tuple[tuple[int, int], str]) -> str:
 def sensitivity_picture(table: SensitivityTable) -> Figure:
     """Draw what loosening each limit alone gains, and what could be had at most.
 
-    Parameters
-    ----------
-    table : SensitivityTable
-        Of `graphsynth.jamming.joints.compare_sensitivities`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        If loosening one limit alone gains nothing.
+    `table`: of `graphsynth.jamming.joints.compare_sensitivities`. Raises `GeometryError` if loosening one limit alone
+    gains nothing.
     """
     useful = [row for row in table.rows if row.gain > 0.0]
     if not useful:

@@ -47,18 +47,8 @@ def _curves(problem: CircleEllipse, count: int = 1441) -> tuple[Array, Array]:
 def crossing_picture(problem: CircleEllipse, boxes: IntersectionBoxes | None = None) -> Figure:
     """Draw the four crossings of a circle and an ellipse with tolerances; one of them enlarged, and unrolled.
 
-    Parameters
-    ----------
-    problem : CircleEllipse
-    boxes : IntersectionBoxes, optional
-        Result of Krawczyk's method to be drawn into the detail.
+    `boxes`: result of Krawczyk's method to be drawn into the detail.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Examples
-    --------
     >>> from graphsynth.jamming.intersection import circle_ellipse
     >>> len(crossing_picture(circle_ellipse(5, 6, 4, "0.1", "0.01")).axes)
     3
@@ -198,24 +188,10 @@ def _frame(axes: Any, hull: Interval) -> None:
 def region_picture(problem: CircleEllipse, exaggeration: float | None = None) -> Figure:
     """Draw both differences of circle and ellipse: the free gap and the interference.
 
-    Parameters
-    ----------
-    problem : CircleEllipse
-    exaggeration : float, optional
-        Factor on the radial distance from the circle in the left picture; by default such that the larger difference of
-        the radii becomes a fifth of the radius.  It is written on the picture.
+    `exaggeration`: factor on the radial distance from the circle in the left picture; by default such that the larger
+    difference of the radii becomes a fifth of the radius.  It is written on the picture. Raises `GeometryError` for an
+    exaggeration that is not positive.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        For an exaggeration that is not positive.
-
-    Examples
-    --------
     >>> from graphsynth.jamming.intersection import circle_ellipse
     >>> len(region_picture(circle_ellipse(5, 6, 4)).axes)
     2

@@ -35,24 +35,8 @@ def panel(axes: Any, title: str, x: str, y: str) -> None:
 def drive_curves(runs: Mapping[str, DriveRun], *, size: tuple[float, float] = (7.2, 5.6)) -> Figure:
     """Motor torque and crank speed over time, one curve for each labelled run (Figures 6 and 7 of the source).
 
-    Parameters
-    ----------
-    runs : mapping of str to DriveRun
-        Label and run, for example two armature resistances.
-    size : tuple of float, optional
-        Inches.
+    `runs`: label and run, for example two armature resistances. `size`: inches. Raises `SpecError` without any run.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    SpecError
-        Without any run.
-
-    Examples
-    --------
     >>> from graphsynth.dynamics.motors import DCMotor
     >>> from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
     >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
@@ -79,12 +63,7 @@ def drive_curves(runs: Mapping[str, DriveRun], *, size: tuple[float, float] = (7
 
 
 def reduction_picture(study: ReductionStudy, *, size: tuple[float, float] = (5.4, 4.2)) -> Figure:
-    """Distance of the full model from the limit L -> 0 over the inductance, with a line of first order.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Distance of the full model from the limit L -> 0 over the inductance, with a line of first order."""
     figure = new_figure(size)
     axes = figure.add_subplot()
     axes.loglog(study.inductance, study.speed, "o-", color=COLOURS[0], lw=1.3, ms=4, label="speed [rad/s]")

@@ -25,8 +25,6 @@ def new_figure(size: tuple[float, float]) -> Figure:
 def legend_place(points: int) -> str:
     """Return where a legend goes: the emptiest corner, or a fixed one where so many points would take long to avoid.
 
-    Examples
-    --------
     >>> legend_place(100), legend_place(100_000)
     ('best', 'upper right')
     """
@@ -39,14 +37,8 @@ def themed_svg(figure: Figure, settings: Mapping[str, Any] | None = None) -> str
     Colours are plain attributes; black is the ink of the palette, matplotlib's grey of grids its soft one.  Ids are
     unique to the picture.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    settings : mapping, optional
-        Of matplotlib, for the time of writing.
+    `settings`: of matplotlib, for the time of writing.
 
-    Examples
-    --------
     >>> svg = themed_svg(new_figure((2.0, 1.0)))
     >>> svg.startswith("<svg class="), "<?xml" in svg
     (True, False)
@@ -90,8 +82,6 @@ _FONT_PARTS = re.compile(r"(?:(italic|oblique) )?(?:(bold|[1-9]00) )?([0-9.]+)px
 def _attributes(style: str) -> str:
     """Write declarations of CSS as attributes, without the typeface: that of the picture is used.
 
-    Examples
-    --------
     >>> _attributes("fill: none; stroke: #1b2733; font: bold 10px 'DejaVu Sans', sans-serif")
     ' fill="none" stroke="#1b2733" font-weight="bold" font-size="10px"'
     """

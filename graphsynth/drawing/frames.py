@@ -27,17 +27,10 @@ FRAMES_MAX = 2000
 class Frames:
     """Poses to be shown one after the other.
 
-    Attributes
-    ----------
-    mechanism : Mechanism
-    poses : ndarray, shape (n, links, 3)
-        Assembled; angles without jumps.  If ``loops``, the last is the first again.
-    coordinates : ndarray, shape (n, drivers)
-        Driver coordinates: radians or lengths.
-    loops : bool
-        The motion closes, so it goes round; otherwise it goes to and fro.
-    note : str
-        Why it does not go round; empty if it does.
+    * `poses` (shape (n, links, 3)): assembled; angles without jumps.  If ``loops``, the last is the first again.
+    * `coordinates` (shape (n, drivers)): driver coordinates: radians or lengths.
+    * `loops`: the motion closes, so it goes round; otherwise it goes to and fro.
+    * `note`: why it does not go round; empty if it does.
     """
 
     mechanism: Mechanism
@@ -64,20 +57,8 @@ def check_frames(count: int) -> None:
 def frames_of(motion: Motion, count: int = 120) -> Frames:
     """Choose about ``count`` frames of the part of a motion that is reached.
 
-    Parameters
-    ----------
-    motion : Motion
-    count : int
-        Frames of the whole range; a motion with fewer samples gives all it has.
-
-    Returns
-    -------
-    Frames
-
-    Raises
-    ------
-    GeometryError
-        If ``count`` is out of 2..2000, or nothing of the motion is assembled.
+    `count`: frames of the whole range; a motion with fewer samples gives all it has. Raises `GeometryError` if
+    ``count`` is out of 2..2000, or nothing of the motion is assembled.
     """
     check_frames(count)
     reached = np.flatnonzero(~np.isfinite(motion.poses).all(axis=(1, 2)))
@@ -104,16 +85,8 @@ def _note(motion: Motion) -> str:
 def with_trace_points(motion: Motion, most: int = 1) -> Motion:
     """Name a point to be traced if the mechanism has none: the middle of a link that is not jointed to the frame.
 
-    Parameters
-    ----------
-    motion : Motion
-    most : int
-        Largest number of points; links with the most joints first.
-
-    Returns
-    -------
-    Motion
-        The same motion, if it has points already or no such link.
+    `most`: largest number of points; links with the most joints first. The same motion, if it has points already or no
+    such link.
     """
     mechanism = motion.mechanism
     if mechanism.points:

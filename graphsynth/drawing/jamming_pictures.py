@@ -44,27 +44,10 @@ def section_picture(
 ) -> Figure:
     """Draw the bearing in its hole, cut by the plane of the tilt, one panel for each tilt.
 
-    Parameters
-    ----------
-    bearing : Bearing
-    tilts : tuple of float
-        Radians.
-    titles : tuple of str, optional
-        One for each panel.
-    exaggeration : float
-        Factor on radial distances from the wall of the untilted bearing; heights are to scale.  Written on the picture.
+    `tilts`: radians. `titles`: one for each panel. `exaggeration`: factor on radial distances from the wall of the
+    untilted bearing; heights are to scale.  Written on the picture. Raises `GeometryError` for an exaggeration that is
+    not positive, or no tilts.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        For an exaggeration that is not positive, or no tilts.
-
-    Examples
-    --------
     >>> from graphsynth.jamming import Bearing
     >>> len(section_picture(Bearing(), (0.003, 0.0133)).axes)
     2
@@ -123,10 +106,14 @@ def _overlap(axes: Any, ends: list[tuple[float, float]], hole: float, side: floa
     corner = beyond[0]
     axes.fill([hole, corner[0], hole], [z, corner[1], corner[1]], color=LIGHT["jam"], alpha=0.9, lw=0, zorder=5)
     axes.annotate(
-        "overlap", corner, textcoords="offset points", xytext=(-4 * side, 14 if corner[1] > 0 else -18),
+        "overlap",
+        corner,
+        textcoords="offset points",
+        xytext=(-4 * side, 14 if corner[1] > 0 else -18),
         ha="left" if side > 0.0 else "right",
-        fontsize=8, color=LIGHT["jam"],
-    )  # fmt: skip
+        fontsize=8,
+        color=LIGHT["jam"],
+    )
 
 
 # -- areas over a turn -------------------------------------------------------------------------------------------------
@@ -135,18 +122,8 @@ def _overlap(axes: Any, ends: list[tuple[float, float]], hole: float, side: floa
 def area_picture(curve: AreaCurve, zooms: tuple[tuple[float, float], ...] | None = None) -> Figure:
     """Draw the areas over the crank angle with details, and say what the ordinate of the source is.
 
-    Parameters
-    ----------
-    curve : AreaCurve
-    zooms : tuple of pairs, optional
-        Windows in degrees; the two of the source by default.
+    `zooms`: windows in degrees; the two of the source by default.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Examples
-    --------
     >>> from graphsynth.jamming.bearing.area_curve import area_curve
     >>> len(area_picture(area_curve()).axes)
     3
@@ -189,19 +166,9 @@ def _areas(axes: Any, curve: AreaCurve, f: Array) -> None:
 def area_chart(curve: AreaCurve, window: tuple[float, float] | None = None) -> Chart:
     """Return the areas over the crank angle as a `Chart`, for themed SVG.
 
-    Parameters
-    ----------
-    curve : AreaCurve
-    window : pair of float, optional
-        Degrees; only the angles inside are drawn.
+    `window`: degrees; only the angles inside are drawn. Raises `GeometryError` for a window without an angle of the
+    curve.
 
-    Raises
-    ------
-    GeometryError
-        For a window without an angle of the curve.
-
-    Examples
-    --------
     >>> from graphsynth.jamming.bearing.area_curve import area_curve
     >>> area_chart(area_curve(), (90.0, 115.5)).svg()[:15]
     '<svg class="gs"'
@@ -229,16 +196,6 @@ def report_picture(report: JammingReport) -> Figure:
     The curves are the sampled table of the report (nominal dimensions), the bands come from its certificate and hold
     for all tolerances; without a certificate there are no bands.
 
-    Parameters
-    ----------
-    report : JammingReport
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Examples
-    --------
     >>> from graphsynth.jamming import ToleranceBox, assess_jamming
     >>> len(report_picture(assess_jamming(ToleranceBox(alpha="1/30"))).axes)
     2
@@ -250,8 +207,14 @@ def report_picture(report: JammingReport) -> Figure:
     if report.critical_tilt is not None:
         for sign in (1.0, -1.0):
             tilts.axhline(sign * 1e3 * report.critical_tilt, color=LIGHT["soft"], lw=1.0, ls=(0, (4, 2)))
-        tilts.annotate("critical tilt", (f[0], 1e3 * report.critical_tilt), xytext=(4, 3), fontsize=8,
-                       textcoords="offset points", color=LIGHT["note"])  # fmt: skip
+        tilts.annotate(
+            "critical tilt",
+            (f[0], 1e3 * report.critical_tilt),
+            xytext=(4, 3),
+            fontsize=8,
+            textcoords="offset points",
+            color=LIGHT["note"],
+        )
     gaps.plot(f, report.table.interference, color=LIGHT["ink"], lw=1.5)
     gaps.axhline(0.0, color=LIGHT["soft"], lw=1.0)
     if report.certificate is not None:

@@ -17,12 +17,7 @@ def level_order(graph: MechanismGraph, sweeps: int = 12) -> tuple[tuple[int, ...
     neighbours, down and up, and the order with the fewest crossings of all passes is kept. Ties go to link numbers, so
     the result depends on the graph alone.
 
-    Parameters
-    ----------
-    graph : MechanismGraph
-        With a frame.
-    sweeps : int
-        Passes down and up.
+    `graph`: with a frame. `sweeps`: passes down and up.
     """
     levels = [list(level) for level in graph.levels]
     edges = [(joint.a, joint.b) for joint in graph.joints]
@@ -86,18 +81,8 @@ def levels_sketch(graph: MechanismGraph, width: float = 420.0, title: str = "") 
     The frame is the filled vertex on hatched ground; a joint of mobility 1 is a line, of mobility 2 a dashed line, of
     higher mobility a dotted one; joints inside a level are arcs.
 
-    Parameters
-    ----------
-    graph : MechanismGraph
-        With a frame.
-    width : float
-        Width in pixels; below 260 the vertices and their numbers are drawn smaller.
-    title : str
-        Read out by screen readers.
-
-    Returns
-    -------
-    Sketch
+    `graph`: with a frame. `width`: width in pixels; below 260 the vertices and their numbers are drawn smaller.
+    `title`: read out by screen readers.
     """
     order = level_order(graph)
     widest = max(map(len, order))

@@ -39,28 +39,12 @@ def linkage_animation(
 ) -> str:
     """Return one ``<svg>`` in which a linkage moves; it needs nothing else and no script.
 
-    Parameters
-    ----------
-    background : Sketch
-        The part of the plane shown, and what does not move.
-    tracks : mapping of str to array_like of complex
-        Places of every named joint, one for each frame, in the units of the sketch; a single place for a joint at rest.
-    bars, plates, joints, dots
-        Links with two joints, links with more (names of their corners), open circles, filled dots.
-    notes : mapping of str to sequence of bool, optional
-        Words written at the top left in those frames that are true.
-    seconds : float
-        Time of one pass.
-    title : str
-        Read out by screen readers.
+    `background`: the part of the plane shown, and what does not move. `tracks`: places of every named joint, one for
+    each frame, in the units of the sketch; a single place for a joint at rest. `bars`, `plates`, `joints`, `dots`:
+    links with two joints, links with more (names of their corners), open circles, filled dots. `notes`: words written
+    at the top left in those frames that are true. `seconds`: time of one pass. `title`: read out by screen readers.
+    Raises `ValueError` if tracks differ in length or a place is not finite.
 
-    Raises
-    ------
-    ValueError
-        If tracks differ in length or a place is not finite.
-
-    Examples
-    --------
     >>> crank = np.exp(1j * np.linspace(0.0, 6.28, 5))
     >>> svg = linkage_animation(Sketch(-1 - 1j, 1 + 1j), {"O": 0j, "A": crank}, bars=[Bar("O", "A")], joints=["O", "A"])
     >>> svg.startswith("<svg"), svg.count("<path") > 0

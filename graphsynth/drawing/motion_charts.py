@@ -33,22 +33,8 @@ _PASSES = ("soft", ":")
 def coupler_curves(motion: Motion, names: Sequence[str] | None = None, *, unit: str = "length") -> Chart:
     """Paths of named points, on equal scales.
 
-    Parameters
-    ----------
-    motion : Motion
-    names : sequence of str, optional
-        All named points of the mechanism by default.
-    unit : str
-        Unit of length written at the axes, for example "m".
-
-    Returns
-    -------
-    Chart
-
-    Raises
-    ------
-    GeometryError
-        A name that is not defined, or no point at all.
+    `names`: all named points of the mechanism by default. `unit`: unit of length written at the axes, for example "m".
+    Raises `GeometryError`: a name that is not defined, or no point at all.
     """
     chosen = list(motion.mechanism.points) if names is None else list(names)
     if not chosen:
@@ -65,27 +51,11 @@ def motion_chart(
 ) -> Chart:
     """Displacement, velocity or acceleration over the input.
 
-    Parameters
-    ----------
-    motion : Motion
-    of : str or int, optional
-        A named point (its x and y), or a link: its angle, or its displacement if it slides on the frame.  By default
-        all undriven links jointed to the frame.
-    order : {0, 1, 2}
-        0 displacement, 1 and 2 its first and second derivative by the input.
-    events : bool
-        Mark dead centres, folds and the end of the motion.
-    unit : str
-        Unit of length written at the axes.
-
-    Returns
-    -------
-    Chart
-
-    Raises
-    ------
-    GeometryError
-        Another order, an unknown point or link, or links that both turn and slide in one chart.
+    `of`: a named point (its x and y), or a link: its angle, or its displacement if it slides on the frame.  By default
+    all undriven links jointed to the frame. `order` (one of {0, 1, 2}): 0 displacement, 1 and 2 its first and second
+    derivative by the input. `events`: mark dead centres, folds and the end of the motion. `unit`: unit of length
+    written at the axes. Raises `GeometryError`: another order, an unknown point or link, or links that both turn and
+    slide in one chart.
     """
     if order not in (0, 1, 2):
         raise GeometryError(f"order = {order} must be 0, 1 or 2: displacement, velocity or acceleration")
@@ -174,16 +144,8 @@ def event_marks(motion: Motion) -> list[Mark]:
 def transmission_chart(motion: Motion, least: float | None = None) -> Chart:
     """Transmission angle of every dyad over the input.
 
-    Parameters
-    ----------
-    motion : Motion
-    least : float, optional
-        A bound to be drawn, radians.
-
-    Raises
-    ------
-    GeometryError
-        If no group of the mechanism has a transmission angle (no dyads with two modes).
+    `least`: a bound to be drawn, radians. Raises `GeometryError` if no group of the mechanism has a transmission angle
+    (no dyads with two modes).
     """
     angles = motion.transmission_angle()
     if not angles:

@@ -20,16 +20,8 @@ Points = NDArray[np.float64]
 class Moving:
     """A drawing on a page of ``width`` by ``height`` pixels, y down, some shapes of which move.
 
-    Parameters
-    ----------
-    width, height : float
-    seconds : float
-        Time of one pass.
-    still : int
-        Frame shown to readers who ask for reduced motion.
+    `seconds`: time of one pass. `still`: frame shown to readers who ask for reduced motion.
 
-    Examples
-    --------
     >>> from graphsynth.drawing.svg import painted
     >>> drawing = Moving(100.0, 50.0, 2.0)
     >>> drawing.circle([[10.0, 20.0], [90.0, 30.0]], 4.0, painted("a"))
@@ -71,14 +63,8 @@ class Moving:
     def carried(self, track: Points, markup: str, more: str = "") -> None:
         """Add a group that is shifted and turned as a whole.
 
-        Parameters
-        ----------
-        track : ndarray, shape (frames, 2) or (frames, 3)
-            Place of its origin in pixels, and its turn in degrees clockwise.
-        markup : str
-            What is carried, drawn about the origin.
-        more : str
-            Attributes of the group.
+        `track` (shape (frames, 2) or (frames, 3)): place of its origin in pixels, and its turn in degrees clockwise.
+        `markup`: what is carried, drawn about the origin. `more`: attributes of the group.
         """
         moving = resting = markup
         for kind, columns, digits, extra in (("rotate", track[:, 2:], 2, ""), ("translate", track[:, :2], 1, more)):

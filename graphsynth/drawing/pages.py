@@ -13,8 +13,6 @@ def policy(scripts: Iterable[str] = ()) -> str:
 
     Pictures may be in the page itself, and style sheets: those of pictures from elsewhere too.
 
-    Examples
-    --------
     >>> policy()[:74]
     '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; st'
     """
@@ -34,12 +32,7 @@ def policy(scripts: Iterable[str] = ()) -> str:
 def whole_page(title: str, css: str, body: str) -> str:
     """Return a page that needs no other file: no scripts, one style sheet, readable on a phone.
 
-    Parameters
-    ----------
-    title : str
-        Escaped here.
-    css, body : str
-        The style sheet, and the inside of ``<main>``.
+    `title`: escaped here. `css`, `body`: the style sheet, and the inside of ``<main>``.
     """
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">{policy()}'

@@ -4,16 +4,36 @@ from __future__ import annotations
 
 #: Values on a light page, and of pictures without pages (PNG, PDF, GIF).  SVG elements carry them as plain attributes.
 LIGHT = {
-    "ink": "#1b2733", "soft": "#8794a1", "note": "#55626f", "paper": "#ffffff", "link": "#1b2733", "fill": "#dbe4ee",
-    "a": "#0072b2", "b": "#d55e00", "c": "#009e73", "d": "#aa4499", "jam": "#d55e00",
-    "pale": "#e3e7ec", "bad": "#aa0044",
-}  # fmt: skip
+    "ink": "#1b2733",
+    "soft": "#8794a1",
+    "note": "#55626f",
+    "paper": "#ffffff",
+    "link": "#1b2733",
+    "fill": "#dbe4ee",
+    "a": "#0072b2",
+    "b": "#d55e00",
+    "c": "#009e73",
+    "d": "#aa4499",
+    "jam": "#d55e00",
+    "pale": "#e3e7ec",
+    "bad": "#aa0044",
+}
 #: Values on a dark page; names that share a value of `LIGHT` share it here.
 DARK = {
-    "ink": "#e6edf3", "soft": "#8b98a5", "note": "#a5b1bd", "paper": "#12181f", "link": "#e6edf3", "fill": "#2b3a49",
-    "a": "#56b4e9", "b": "#f0a060", "c": "#3ecf9f", "d": "#dd88cc", "jam": "#f0a060",
-    "pale": "#28333e", "bad": "#ff7096",
-}  # fmt: skip
+    "ink": "#e6edf3",
+    "soft": "#8b98a5",
+    "note": "#a5b1bd",
+    "paper": "#12181f",
+    "link": "#e6edf3",
+    "fill": "#2b3a49",
+    "a": "#56b4e9",
+    "b": "#f0a060",
+    "c": "#3ecf9f",
+    "d": "#dd88cc",
+    "jam": "#f0a060",
+    "pale": "#28333e",
+    "bad": "#ff7096",
+}
 #: White that stays white on dark pages: lines and letters on a coloured map.
 WHITE = "#fefefe"
 #: Colours of paths, in order of use.

@@ -101,6 +101,10 @@ def _joined(backward: Motion, forward: Motion) -> Motion:
     parts["poses"][:, :, 2] = np.unwrap(parts["poses"][:, :, 2], axis=0)
     reasons = dict.fromkeys(motion.reason for motion in (forward, backward) if motion.reason)
     return replace(
-        forward, **parts, completed=not reasons, reason="; at the other end ".join(reasons),
-        events=tuple(reversed(backward.events)) + forward.events, seconds=forward.seconds + backward.seconds,
-    )  # fmt: skip
+        forward,
+        **parts,
+        completed=not reasons,
+        reason="; at the other end ".join(reasons),
+        events=tuple(reversed(backward.events)) + forward.events,
+        seconds=forward.seconds + backward.seconds,
+    )

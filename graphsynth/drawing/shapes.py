@@ -82,8 +82,6 @@ Placement = Callable[[int, Point], Point]
 def placement(pose: Sequence[Sequence[float]] | None) -> Placement:
     """Return the function that carries a point of a link to the plane, for one pose ``(x, y, theta)`` per link.
 
-    Examples
-    --------
     >>> place = placement([(0, 0, 0), (1, 0, cmath.pi / 2)])
     >>> z = place(1, 2 + 0j)
     >>> round(z.real, 12), round(z.imag, 12)

@@ -199,10 +199,8 @@ class Sketch:
     ) -> None:
         """Write text at a point, moved by `offset` pixels (y upwards); a halo keeps it readable over lines."""
         self.shapes.append(
-            Text(
-                point, text, offset, anchor, colour, size, link=self._link, layer=self._layer, part=self._part
-            )
-        )  # fmt: skip
+            Text(point, text, offset, anchor, colour, size, link=self._link, layer=self._layer, part=self._part)
+        )
 
     def curve(
         self,
@@ -223,10 +221,16 @@ class Sketch:
         self._disc(point, radius, Style("ink", 1.6, fill))
         self.shapes.append(
             Text(
-                point, text, colour=ink, size=radius * 1.1, halo=0.0, link=self._link, layer=self._layer,
+                point,
+                text,
+                colour=ink,
+                size=radius * 1.1,
+                halo=0.0,
+                link=self._link,
+                layer=self._layer,
                 part=self._part,
             )
-        )  # fmt: skip
+        )
 
     def ordered(self) -> list[Shape]:
         """Return the shapes from back to front; inside a layer in the order they were drawn."""
@@ -257,8 +261,6 @@ def _unit(vector: Point) -> Point:
 def degrees(angle: float) -> str:
     """Write an angle in radians as whole degrees within one turn.
 
-    Examples
-    --------
     >>> degrees(-math.pi / 2)
     '270°'
     """

@@ -33,8 +33,6 @@ def sound(text: str) -> str:
 def number(value: float) -> str:
     """Write a coordinate with at most two decimals and no trailing zeros.
 
-    Examples
-    --------
     >>> number(1.0), number(-0.001), number(2.346)
     ('1', '0', '2.35')
     """
@@ -45,17 +43,8 @@ def number(value: float) -> str:
 def element(shape: Shape, xy: ToPage, scale: float, symbol: float = 1.0, upright: str = "") -> str:
     """Write one shape.
 
-    Parameters
-    ----------
-    shape : Shape
-    xy : callable
-        Carries a point of the shape to the page.
-    scale : float
-        Pixels per unit of length, for radii.
-    symbol : float
-        Scale of line widths.
-    upright : str
-        Attributes of a group around the letters that undoes the turn of their link.
+    `xy`: carries a point of the shape to the page. `scale`: pixels per unit of length, for radii. `symbol`: scale of
+    line widths. `upright`: attributes of a group around the letters that undoes the turn of their link.
     """
     part = f' data-part="{escape(shape.part)}"' if shape.part else ""
     if isinstance(shape, Text):
@@ -92,8 +81,6 @@ def _paint(style: Style, symbol: float) -> str:
 def painted(fill: str = "", stroke: str = "", width: float = 1.0, *, opacity: float = 1.0) -> str:
     """Write fill and stroke as plain attributes; colours are names of the palette, none if empty.
 
-    Examples
-    --------
     >>> painted("a"), painted(stroke="b", width=2.5)
     ('fill="#0072b2"', 'fill="none" stroke="#d55e00" stroke-width="2.5"')
     """

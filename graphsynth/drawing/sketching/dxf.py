@@ -21,18 +21,8 @@ _CURVE = 12  # straight pieces of a curve
 def dxf(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None, *, unit: float = 40.0) -> Any:
     """Return a sketch as an ``ezdxf`` drawing (DXF R2010, millimetres).
 
-    Parameters
-    ----------
-    sketch : Sketch
-    pose : sequence of (x, y, theta), optional
-        Where every link is; needed if any shape is fixed to a link.
-    unit : float
-        Millimetres per unit of the mechanism; 1000 for a mechanism in metres at full size.
-
-    Raises
-    ------
-    MissingExtraError
-        If ezdxf is not installed.
+    `pose`: where every link is; needed if any shape is fixed to a link. `unit`: millimetres per unit of the mechanism;
+    1000 for a mechanism in metres at full size. Raises `MissingExtraError` if ezdxf is not installed.
     """
     ezdxf = need("ezdxf", "dxf", "DXF")
     drawing = ezdxf.new("R2010", setup=True, units=4)

@@ -21,16 +21,8 @@ def save(path: str | Path, sketches: Sequence[Sketch], poses: Sequence[Pose | No
     ``.svg``, ``.tikz`` (a picture to be read into a paper) and ``.tex`` (a document) need no other package; ``.png``
     and ``.pdf`` use matplotlib, ``.dxf`` ezdxf.
 
-    Parameters
-    ----------
-    path : path
-    sketches, poses
-        A pose for every sketch; None for one that does not move.
-
-    Raises
-    ------
-    GraphsynthError
-        Another suffix, several sketches in one DXF, a package that is not installed.
+    `sketches`, `poses`: a pose for every sketch; None for one that does not move. Raises `GraphsynthError`: another
+    suffix, several sketches in one DXF, a package that is not installed.
     """
     path = Path(path)
     suffix = path.suffix.lower()

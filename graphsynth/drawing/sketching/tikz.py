@@ -22,35 +22,28 @@ _ANCHOR = {"middle": "center", "start": "west", "end": "east"}
 #: Characters that TeX reads otherwise.
 _ESCAPE = str.maketrans(
     {
-        "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_",
-        "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "°": r"\textdegree{}",
+        "\\": r"\textbackslash{}",
+        "{": r"\{",
+        "}": r"\}",
+        "$": r"\$",
+        "&": r"\&",
+        "%": r"\%",
+        "#": r"\#",
+        "_": r"\_",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "°": r"\textdegree{}",
     }
-)  # fmt: skip
+)
 
 
 def tikz(sketch: Sketch, pose: Sequence[Sequence[float]] | None = None, *, max_width: float | None = MAX_WIDTH) -> str:
     r"""Write a sketch as a ``tikzpicture``.
 
-    Parameters
-    ----------
-    sketch : Sketch
-    pose : sequence of (x, y, theta), optional
-        Where every link is; needed if any shape is fixed to a link.
-    max_width : float, optional
-        Centimetres; a wider sketch is made so wide, a narrower one keeps its size.  None: no bound.
+    `pose`: where every link is; needed if any shape is fixed to a link. `max_width`: centimetres; a wider sketch is
+    made so wide, a narrower one keeps its size.  None: no bound. Needs nothing but ``\usepackage{tikz}``. Raises
+    `GraphsynthError` for a width that is not positive and finite.
 
-    Returns
-    -------
-    str
-        Needs nothing but ``\usepackage{tikz}``.
-
-    Raises
-    ------
-    GraphsynthError
-        For a width that is not positive and finite.
-
-    Examples
-    --------
     >>> s = Sketch(0j, 2 + 1j, width=200)
     >>> s.joint(1 + 0.5j)
     >>> tikz(s).count("circle")

@@ -41,25 +41,10 @@ def lambda_sketch(
 ) -> Sketch:
     """Build the picture of a lambda linkage in its plane at one crank angle, with the path of the tracing point M.
 
-    Parameters
-    ----------
-    linkage : TiltedFourBar
-        With a tilted motor axis its projection on the plane is drawn.
-    f : float
-        Crank angle, radians.
-    width : float
-        Pixels.
-    labels : bool
-        Name the points O, A, B, C, M.
-    ring : bool
-        Put a coloured ring around the bearing at B.
-    stroke : (float, float), optional
-        Crank angles of the working stroke, drawn thick; None for none.
-
-    Returns
-    -------
-    Sketch
-        An angle at which the linkage cannot be assembled shows the frame, the path and a word.
+    `linkage`: with a tilted motor axis its projection on the plane is drawn. `f`: crank angle, radians. `width`:
+    pixels. `labels`: name the points O, A, B, C, M. `ring`: put a coloured ring around the bearing at B. `stroke`:
+    crank angles of the working stroke, drawn thick; None for none. An angle at which the linkage cannot be assembled
+    shows the frame, the path and a word.
     """
     here = linkage.positions(f)
     sketch, lower, upper = _background(
@@ -116,22 +101,9 @@ def lambda_animation(
 ) -> str:
     """Return a turn of the crank as one ``<svg>`` that moves by itself; it says where the bearing at B jams.
 
-    Parameters
-    ----------
-    linkage : TiltedFourBar
-    jams : callable, optional
-        Tells of a crank angle whether the bearing jams there.
-    frames : int
-        Crank angles shown; of a linkage without a full turn those at which it is assembled.
-    width : float
-        Pixels.
-    seconds : float
-        Time of a turn.
-
-    Raises
-    ------
-    GeometryError
-        If the linkage cannot be assembled at any of them.
+    `jams`: tells of a crank angle whether the bearing jams there. `frames`: crank angles shown; of a linkage without a
+    full turn those at which it is assembled. `width`: pixels. `seconds`: time of a turn. Raises `GeometryError` if the
+    linkage cannot be assembled at any of them.
     """
     from graphsynth.drawing.linkage_animation import Bar, linkage_animation
 
@@ -177,26 +149,10 @@ def lambda_sketch_3d(
 ) -> Sketch:
     """Build a picture of the linkage in space: the tilted motor axis, the crank's circle, the rod out of the plane.
 
-    Parameters
-    ----------
-    linkage : TiltedFourBar
-    f : float
-        Crank angle, radians, at which the linkage can be assembled.
-    exaggeration : float, optional
-        Factor of all heights above the plane; by default one of 1, 2, 5, 10, ... that makes the tilt visible.  It is
-        written in the picture.
-    width : float
-        Pixels.
-
-    Returns
-    -------
-    Sketch
-        An orthographic projection; dashed lines drop from A and M to the plane of the frame.
-
-    Raises
-    ------
-    GeometryError
-        A factor that is not positive, or an angle at which the linkage cannot be assembled.
+    `f`: crank angle, radians, at which the linkage can be assembled. `exaggeration`: factor of all heights above the
+    plane; by default one of 1, 2, 5, 10, ... that makes the tilt visible.  It is written in the picture. `width`:
+    pixels. An orthographic projection; dashed lines drop from A and M to the plane of the frame. Raises
+    `GeometryError`: a factor that is not positive, or an angle at which the linkage cannot be assembled.
     """
     k = _exaggeration(linkage) if exaggeration is None else exaggeration
     if not (math.isfinite(k) and k > 0.0):
@@ -285,17 +241,7 @@ def _ground_plane(points: Array) -> Array:
 def lambda_tilt_chart(linkage: TiltedFourBar, *, bands: Sequence[Band] = (), levels: Sequence[Line] = ()) -> Chart:
     """Tilt of the coupler at the bearing B over a turn of the crank, in milliradians; a gap where not assembled.
 
-    Parameters
-    ----------
-    linkage : TiltedFourBar
-    bands : sequence of Band
-        Shaded ranges of crank angle, for example jam arcs.
-    levels : sequence of Line
-        Thresholds.
-
-    Returns
-    -------
-    Chart
+    `bands`: shaded ranges of crank angle, for example jam arcs. `levels`: thresholds.
     """
     from graphsynth.drawing.plots import Chart, Line
 

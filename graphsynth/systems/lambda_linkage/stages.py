@@ -29,14 +29,10 @@ _C = Literal["A", "B"]
 class LambdaMotion:
     """One turn of the crank.
 
-    Attributes
-    ----------
-    linkage : TiltedFourBar
-        With the tilted motor axis.
-    planar, tilted : FourBarPositions
-        Motion without and with the tilt at the same crank angles, from 0 to 2 pi.
-    residual : float
-        Largest relative error of the rod length in `tilted`, as recomputed from the positions (estimated error).
+    * `linkage`: with the tilted motor axis.
+    * `planar`, `tilted`: motion without and with the tilt at the same crank angles, from 0 to 2 pi.
+    * `residual`: largest relative error of the rod length in `tilted`, as recomputed from the positions (estimated
+      error).
     """
 
     linkage: TiltedFourBar
@@ -346,10 +342,8 @@ def tolerance_box(context: Context, tolerances: bool = True) -> ToleranceBox:
     Numbers of the file are taken as the decimals that stand there, not as the doubles nearest to them; a dimension that
     was changed after reading is taken as the double it is.
 
-    Raises
-    ------
-    SceneError
-        For a tolerance with an unknown name, one that is no number, or one so large that a dimension may vanish.
+    Raises `SceneError` for a tolerance with an unknown name, one that is no number, or one so large that a dimension
+    may vanish.
     """
     from graphsynth.core.errors import GeometryError
     from graphsynth.jamming.bearing.parameters import Range, ToleranceBox, spread

@@ -31,18 +31,11 @@ class Aspect(NamedTuple):
 class Aspects:
     """Aspects of one working mode on a grid, the largest first (estimated: parts narrower than a cell may be missed).
 
-    Attributes
-    ----------
-    sigma : tuple of int
-    alpha : float
-        The orientation, or NaN if all orientations were examined.
-    parts : tuple of Aspect
-    unresolved : int
-        Cells in parts of fewer than ``LEAST`` cells, which the grid does not resolve; such parts are not listed.
-    labels : ndarray of int
-        Number of the aspect (from 1, in the order of ``parts``) at every grid node; 0 outside.
-    x, y, angles : ndarray
-        The grid.
+    * `alpha`: the orientation, or NaN if all orientations were examined.
+    * `unresolved`: cells in parts of fewer than ``LEAST`` cells, which the grid does not resolve; such parts are not
+      listed.
+    * `labels`: number of the aspect (from 1, in the order of ``parts``) at every grid node; 0 outside.
+    * `x`, `y`, `angles`: the grid.
     """
 
     sigma: tuple[int, ...]
@@ -69,34 +62,11 @@ def aspects(
 ) -> Aspects:
     """Singularity-free components of a working mode, at one orientation or over all of them.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    sigma : tuple of 3 of {+1, -1}
-        Working mode.
-    alpha : float, optional
-        Orientation, radians; all orientations (a closed circle) if omitted.
-    nodes : int, optional
-        Grid nodes along x and y: 200 for one orientation, 64 for all.
-    angles : int, optional
-        Grid nodes over all orientations.
+    `sigma` (of {+1, -1}): working mode. `alpha`: orientation, radians; all orientations (a closed circle) if omitted.
+    `nodes`: grid nodes along x and y: 200 for one orientation, 64 for all. `angles`: grid nodes over all orientations.
+    Estimated on the grid. Raises `GeometryError`: fewer than 4 nodes along an axis, or a working mode that is none. See
+    theory/platform-workspace 1.  Nodes are connected along the axes of the grid.
 
-    Returns
-    -------
-    Aspects
-        Estimated on the grid.
-
-    Raises
-    ------
-    GeometryError
-        Fewer than 4 nodes along an axis, or a working mode that is none.
-
-    Notes
-    -----
-    See theory/platform-workspace 1.  Nodes are connected along the axes of the grid.
-
-    Examples
-    --------
     >>> found = aspects(ParallelPlatform.mock(), (-1, -1, -1), 0.0)
     >>> [part.sign for part in found.parts]
     [-1]
@@ -145,9 +115,14 @@ def _wrapped(part: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], in
 
 
 def _sorted(
-    sigma: tuple[int, ...], alpha: float, labels: NDArray[np.int64], signs: list[int],
-    X: NDArray[np.float64], values: NDArray[np.float64], cell: float,
-) -> Aspects:  # fmt: skip
+    sigma: tuple[int, ...],
+    alpha: float,
+    labels: NDArray[np.int64],
+    signs: list[int],
+    X: NDArray[np.float64],
+    values: NDArray[np.float64],
+    cell: float,
+) -> Aspects:
     cells = np.bincount(labels.ravel(), minlength=len(signs) + 1)[1:]
     order = np.argsort(-cells, kind="stable")
     rank = np.zeros(len(signs) + 1, dtype=np.int64)

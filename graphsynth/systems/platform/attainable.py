@@ -24,18 +24,12 @@ Complex = NDArray[np.complex128]
 class Attainable:
     """How well real signed crank lengths approach a straight motion, to first order in the cranks.
 
-    Attributes
-    ----------
-    off_direction : float
-        Smallest share of the energy ``|Xi|^2`` (with ``Lc``) off the wanted direction: 0 if it is attainable.
-    lengths : ndarray, shape (3,)
-        Signed crank lengths of the best motion, scaled to a largest length of 1; a negative sign means keying
-        by 180 degrees.
-    phasor : ndarray of complex, shape (3,)
-        First harmonic of these lengths.
-    ellipticity : float
-        Ratio of its semi-axes in pose space: 0 for a straight motion.
-    Lc : float
+    * `off_direction`: smallest share of the energy ``|Xi|^2`` (with ``Lc``) off the wanted direction: 0 if it is
+      attainable.
+    * `lengths` (shape (3,)): signed crank lengths of the best motion, scaled to a largest length of 1; a negative sign
+      means keying by 180 degrees.
+    * `phasor` (shape (3,), complex): first harmonic of these lengths.
+    * `ellipticity`: ratio of its semi-axes in pose space: 0 for a straight motion.
     """
 
     off_direction: float
@@ -49,8 +43,6 @@ class Attainable:
 def ellipticity(phasor: ArrayLike, Lc: float) -> float:
     """Ratio of the semi-axes of the ellipse ``Re(Xi exp(i psi))`` in pose space: 0 straight, 1 circular.
 
-    Examples
-    --------
     >>> ellipticity([1.0, 1j, 0.0], 45.0), ellipticity([1.0, 2.0, 0.0], 45.0)
     (1.0, 0.0)
     """
@@ -70,30 +62,11 @@ def _gains(mechanism: SingleMotorPlatform) -> Complex:
 def attainable(mechanism: SingleMotorPlatform, direction: ArrayLike) -> Attainable:
     """Best straight motion along a direction in pose space with the phases of the mechanism, lengths free.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-        Its phases are kept, its crank lengths ignored.
-    direction : array_like, shape (3,)
-        Real direction ``(x, y, alpha)``: lengths, lengths, radians.
+    `mechanism`: its phases are kept, its crank lengths ignored. `direction` (shape (3,)): real direction ``(x, y,
+    alpha)``: lengths, lengths, radians. Floating point, first order in the cranks. Raises `GeometryError`: a direction
+    without three numbers, or of zeros. See theory/inverse-design 4: ``1 - mu`` with mu the largest eigenvalue of the
+    pencil ``(Re(g g^H), Re(G^H G))``, ``g = G^H t``.
 
-    Returns
-    -------
-    Attainable
-        Floating point, first order in the cranks.
-
-    Raises
-    ------
-    GeometryError
-        A direction without three numbers, or of zeros.
-
-    Notes
-    -----
-    See theory/inverse-design 4: ``1 - mu`` with mu the largest eigenvalue of the pencil
-    ``(Re(g g^H), Re(G^H G))``, ``g = G^H t``.
-
-    Examples
-    --------
     With equal global phases no translation is straight; with phases equal in each leg's own frame every motion is.
 
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
@@ -132,23 +105,11 @@ def lengths_only_design(
 ) -> Design:
     """Least-squares crank lengths for a wanted first harmonic with the given phases, verified over the whole turn.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-        Its phases are kept (modulo 180 degrees: a negative length is keyed the other way round).
-    wanted : array_like of complex, shape (3,)
-    free_phase : bool, optional
-        The motion may begin at any wheel angle: ``wanted`` is multiplied by the best ``exp(i chi)``, and
-        ``Design.wanted`` is that product.
-    samples : int, optional
+    `mechanism`: its phases are kept (modulo 180 degrees: a negative length is keyed the other way round). `wanted`:
+    shape (3,), complex. `free_phase`: the motion may begin at any wheel angle: ``wanted`` is multiplied by the best
+    ``exp(i chi)``, and ``Design.wanted`` is that product. ``error`` tells how far the result is from what was asked;
+    `attainable` tells why.
 
-    Returns
-    -------
-    Design
-        ``error`` tells how far the result is from what was asked; `attainable` tells why.
-
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> legs = SingleMotorPlatform(phase=SingleMotorPlatform().frame_angle)
     >>> lengths_only_design(legs, [2.0, 1.0, 0.0]).error < 1e-3

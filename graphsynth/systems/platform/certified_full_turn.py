@@ -58,11 +58,13 @@ class PlatformSystem:
     def __init__(self, platform: SingleMotorPlatform) -> None:
         self.platform = platform
         turn = unit(_near(platform.frame_angle))
-        self.O, self.D, self.b = (exact(np.array(v, dtype=np.complex128)) * turn
-                                  for v in (platform.axis, platform.pivot, platform.vertex))  # fmt: skip
+        self.O, self.D, self.b = (
+            exact(np.array(v, dtype=np.complex128)) * turn for v in (platform.axis, platform.pivot, platform.vertex)
+        )
         self.bell = unit(_near(platform.delta))
-        self.lengths = {name: exact(np.array(getattr(platform, name)))
-                        for name in ("crank", "coupler", "rocker", "l1", "l2")}  # fmt: skip
+        self.lengths = {
+            name: exact(np.array(getattr(platform, name))) for name in ("crank", "coupler", "rocker", "l1", "l2")
+        }
 
     @property
     def weights(self) -> Array:

@@ -188,9 +188,13 @@ def _batch(
 
 
 def _one_by_one(
-    left: Index, A: Balls, b: NDArray[np.complex128], l2: Array, given: tuple[ParallelPlatform, Array] | None,
+    left: Index,
+    A: Balls,
+    b: NDArray[np.complex128],
+    l2: Array,
+    given: tuple[ParallelPlatform, Array] | None,
     counts: Index,
-) -> list[NDArray[np.generic]]:  # fmt: skip
+) -> list[NDArray[np.generic]]:
     """Decide the rest with more digits; ``counts`` is filled in."""
     from graphsynth.systems.platform.certified_assembly_modes import certify_assembly_modes, certify_direct
 

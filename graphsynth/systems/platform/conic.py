@@ -92,15 +92,10 @@ def meet(a: BoundaryCircle, b: BoundaryCircle, tolerance: float) -> Meeting:
 class SingularConic:
     """``det JX = a x^2 + b x y + c y^2 + d x + e y + f`` for fixed anchors and orientation.
 
-    Attributes
-    ----------
-    coefficients : tuple of 6 floats
-        ``(a, b, c, d, e, f)``; ``det JX`` in length^4 for x, y in the fixed frame.
-    discriminant : float
-        ``b^2 - 4 a c``.
-    kind : str
-        "ellipse", "hyperbola", "parabola", "line", "nowhere" (constant, not zero) or "everywhere"; degenerate conics
-        keep the name that the discriminant gives.  Floating point: a parabola is recognised to 1e-12.
+    * `coefficients`: ``(a, b, c, d, e, f)``; ``det JX`` in length^4 for x, y in the fixed frame.
+    * `discriminant`: ``b^2 - 4 a c``.
+    * `kind`: "ellipse", "hyperbola", "parabola", "line", "nowhere" (constant, not zero) or "everywhere"; degenerate
+      conics keep the name that the discriminant gives.  Floating point: a parabola is recognised to 1e-12.
     """
 
     coefficients: tuple[float, float, float, float, float, float]
@@ -119,26 +114,11 @@ class SingularConic:
 def singular_conic(anchors: ArrayLike, vertices: ArrayLike, alpha: float) -> SingularConic:
     """Locus of ``det JX = 0`` over the position for fixed anchors A_k and orientation.
 
-    Parameters
-    ----------
-    anchors, vertices : array_like of complex, shape (3,)
-        Joints A_k in the fixed frame, platform vertices b_k in the platform frame.
-    alpha : float
-        Orientation, radians.
+    `anchors`, `vertices` (shape (3,), complex): joints A_k in the fixed frame, platform vertices b_k in the platform
+    frame. `alpha`: orientation, radians. Exact but for rounding. With ``q = p - g_1``, ``g_k = A_k - z b_k``, ``u_k =
+    g_1 - g_k`` and ``t_k`` the third entries, the rows minus the first give ``det JX / 8 = t_1 cross(u_2, u_3) - t_2
+    cross(q, u_3) + t_3 cross(q, u_2)``: products of functions linear in p (theory/platform-workspace 2).
 
-    Returns
-    -------
-    SingularConic
-        Exact but for rounding.
-
-    Notes
-    -----
-    With ``q = p - g_1``, ``g_k = A_k - z b_k``, ``u_k = g_1 - g_k`` and ``t_k`` the third entries, the rows minus the
-    first give ``det JX / 8 = t_1 cross(u_2, u_3) - t_2 cross(q, u_3) + t_3 cross(q, u_2)``: products of functions
-    linear in p (theory/platform-workspace 2).
-
-    Examples
-    --------
     >>> singular_conic([0, 4, 2 + 3j], [0, 1, 0.5 + 0.5j], 0.3).kind
     'ellipse'
     """
@@ -181,6 +161,12 @@ def _turned(u: complex, g: complex) -> NDArray[np.float64]:
 def _product(s: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
     """Product of two linear functions as coefficients of (xx, xy, yy, x, y, 1)."""
     return np.array(
-        [s[0] * t[0], s[0] * t[1] + s[1] * t[0], s[1] * t[1], s[0] * t[2] + s[2] * t[0], s[1] * t[2] + s[2] * t[1],
-         s[2] * t[2]]
-    )  # fmt: skip
+        [
+            s[0] * t[0],
+            s[0] * t[1] + s[1] * t[0],
+            s[1] * t[1],
+            s[0] * t[2] + s[2] * t[0],
+            s[1] * t[2] + s[2] * t[1],
+            s[2] * t[2],
+        ]
+    )

@@ -32,24 +32,15 @@ class NearestSingularity(NamedTuple):
 class SingularityDistance:
     """Distances in the norm ``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2)`` (theory/platform-workspace 3).
 
-    Attributes
-    ----------
-    determinant : float
-        ``det JX`` with its sign, length^4.
-    smallest : float
-        Smallest singular value of ``JX diag(1, 1, 1/Lc)``, length.
-    sines : tuple of 3 floats
-        ``S_k / (2 l1_k l2_k)``.
-    other_mode : float
-        Distance to the nearest other assembly mode for the same rocker angles; infinite if there is none.
-    other_pose : tuple of 3 floats or None
-    type_one : NearestSingularity
-        Nearest pose at which a leg is stretched or folded: a minimum over one angle per circle, found on a grid and
-        refined (estimated, error about 1e-9 Lc).
-    type_two : NearestSingularity or None
-        Nearest pose with ``det JX = 0`` in the same working mode inside the ball of radius ``type_one.distance``, by
-        constrained minimisation from the sign changes on rays (estimated); None if none was found there.
-    Lc : float
+    * `determinant`: ``det JX`` with its sign, length^4.
+    * `smallest`: smallest singular value of ``JX diag(1, 1, 1/Lc)``, length.
+    * `sines`: ``S_k / (2 l1_k l2_k)``.
+    * `other_mode`: distance to the nearest other assembly mode for the same rocker angles; infinite if there is none.
+    * `type_one`: nearest pose at which a leg is stretched or folded: a minimum over one angle per circle, found on a
+      grid and refined (estimated, error about 1e-9 Lc).
+    * `type_two`: nearest pose with ``det JX = 0`` in the same working mode inside the ball of radius
+      ``type_one.distance``, by constrained minimisation from the sign changes on rays (estimated); None if none was
+      found there.
     """
 
     determinant: float
@@ -75,33 +66,12 @@ def singularity_distance(
 ) -> SingularityDistance:
     """Measure the distance of a pose from the singularities of its working mode.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    pose : array_like, shape (3,)
-    sigma : sequence of 3 of {+1, -1}
-        Working mode.
-    Lc : float, optional
-        Characteristic length; the largest distance of a vertex from the reference point by default.
-    rays : int, optional
-        Directions searched for type II.
+    `pose`: shape (3,). `sigma` (of {+1, -1}): working mode. `Lc`: characteristic length; the largest distance of a
+    vertex from the reference point by default. `rays`: directions searched for type II. Raises `GeometryError`: a pose
+    out of reach, or a leg with a link of length zero. The nearest pose beyond the reach of *some* leg is also the
+    nearest end of the workspace, so type I needs one leg at a time.  Compare [Kapilavai & Nawratil 2023] for 3-RPR
+    platforms.
 
-    Returns
-    -------
-    SingularityDistance
-
-    Raises
-    ------
-    GeometryError
-        A pose out of reach, or a leg with a link of length zero.
-
-    Notes
-    -----
-    The nearest pose beyond the reach of *some* leg is also the nearest end of the workspace, so type I needs one
-    leg at a time.  Compare [Kapilavai & Nawratil 2023] for 3-RPR platforms.
-
-    Examples
-    --------
     >>> found = singularity_distance(ParallelPlatform.mock(), [0.0, 0.0, 0.0], (-1, -1, -1))
     >>> found.nearest.kind, found.nearest.distance > 15.0
     ('I', True)
@@ -120,10 +90,15 @@ def singularity_distance(
     gap, other = _other_mode(platform, X, theta, length)
     first = _type_one(platform, X, length)
     return SingularityDistance(
-        float(determinant(JX)), float(np.linalg.svd(scaled_rows(JX, length), compute_uv=False)[-1]),
-        (float(sines[0]), float(sines[1]), float(sines[2])), gap, other, first,
-        _type_two(platform, X, mode, length, first.distance, rays), length,
-    )  # fmt: skip
+        float(determinant(JX)),
+        float(np.linalg.svd(scaled_rows(JX, length), compute_uv=False)[-1]),
+        (float(sines[0]), float(sines[1]), float(sines[2])),
+        gap,
+        other,
+        first,
+        _type_two(platform, X, mode, length, first.distance, rays),
+        length,
+    )
 
 
 def _other_mode(
@@ -226,10 +201,13 @@ def _minimise(
 
     first = np.concatenate([(start - X) / scale, theta])
     found = minimize(
-        lambda v: 0.5 * float(v[:3] @ v[:3]), first, jac=lambda v: np.concatenate([v[:3], np.zeros(3)]), method="SLSQP",
+        lambda v: 0.5 * float(v[:3] @ v[:3]),
+        first,
+        jac=lambda v: np.concatenate([v[:3], np.zeros(3)]),
+        method="SLSQP",
         constraints=[{"type": "eq", "fun": equations}, {"type": "ineq", "fun": margins}],
         options={"ftol": 1e-14, "maxiter": 200},
-    )  # fmt: skip
+    )
     v = np.asarray(found.x, dtype=np.float64)
     if np.abs(equations(v)).max() > 1e-7 or margins(v).min() < -1e-7:
         return None

@@ -28,13 +28,8 @@ class GearTrain:
 
     Source: theory/platform-drive 2.
 
-    Raises
-    ------
-    GeometryError
-        Numbers of teeth that are not positive integers.
+    Raises `GeometryError`: numbers of teeth that are not positive integers.
 
-    Examples
-    --------
     >>> train = GearTrain(30, 60)
     >>> train.ratio, train.same_in_fixed_frame, train.same_in_leg_frame
     (-0.5, True, True)
@@ -123,28 +118,11 @@ class DriveTurn(NamedTuple):
 class FourBarDrive:
     """Crank on a wheel axis, coupler, rocker arm; all in the frame of the leg.
 
-    Parameters
-    ----------
-    axis, pivot : complex
-        Wheel axis O and rocker pivot D in the frame of the leg.
-    crank, coupler, rocker : float
-        l_B (zero or more), l_BC, l_CD.
-    phase : float
-        Crank angle minus psi, measured in the frame of the leg, radians.
-    tau : {+1, -1}
-        Assembly branch of the four-bar.
+    `axis`, `pivot`: wheel axis O and rocker pivot D in the frame of the leg. `crank`, `coupler`, `rocker`: l_B (zero or
+    more), l_BC, l_CD. `phase`: crank angle minus psi, measured in the frame of the leg, radians. `tau` (one of {+1,
+    -1}): assembly branch of the four-bar. Raises `GeometryError`: lengths that are not positive, or both fixed points
+    at one place; sizes beyond 1e60 or between 0 and 1e-60. See theory/platform-drive 3 to 5.
 
-    Raises
-    ------
-    GeometryError
-        Lengths that are not positive, or both fixed points at one place; sizes beyond 1e60 or between 0 and 1e-60.
-
-    Notes
-    -----
-    See theory/platform-drive 3 to 5.
-
-    Examples
-    --------
     >>> drive = FourBarDrive(45, 105 + 45j, 12.0, 45.0, 60.0)
     >>> round(float(drive.motion(0.7).phi), 12), drive.turn().kind
     (-1.761428034867, 'full turn')

@@ -115,10 +115,7 @@ def precise_branch(mechanism: SingleMotorPlatform, psi: Array, near: Array) -> A
     The rocker angles come from the drives' circles intersected with 50 digits; of all assembly modes the one nearest to
     ``near`` (n, 3) is taken.
 
-    Raises
-    ------
-    GeometryError
-        A drive that cannot be assembled.
+    Raises `GeometryError`: a drive that cannot be assembled.
     """
     import mpmath
 
@@ -162,16 +159,7 @@ def _apart(poses: Array, guess: Array, Lc: float) -> Array:
 def turn_problem(mechanism: SingleMotorPlatform, effort: Effort | None = None) -> Problem:
     """Compare continuation, the full turn with all modes, the modes alone and the certificate.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-        That turns fully.
-    effort : Effort, optional
-
-    Raises
-    ------
-    GeometryError
-        If the branch ends within the turn.
+    `mechanism`: that turns fully. Raises `GeometryError` if the branch ends within the turn.
     """
     effort = effort or Effort()
     psi = np.linspace(0.0, math.tau, _NODES + 1)

@@ -82,17 +82,8 @@ def mode_problem(
 ) -> Problem:
     """Compare every way to all assembly modes at rocker angles ``theta`` (n, 3), radians.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    theta : ndarray, shape (n, 3)
-    size : float
-        Characteristic length that scales positions.
-    name : str
-    effort : Effort, optional
+    `theta`: shape (n, 3). `size`: characteristic length that scales positions.
 
-    Examples
-    --------
     >>> from graphsynth import ParallelPlatform
     >>> problem = mode_problem(ParallelPlatform.g1(), np.zeros((2, 3)), 0.5, "G1", Effort(rounds=1, quick=True))
     >>> problem.rows[0].error < 1e-14
@@ -273,14 +264,6 @@ def precise_modes(anchors: Sequence[Any], vertices: Sequence[complex], lengths: 
     the third they give a trigonometric polynomial of degree three, sampled at eight angles and interpolated.  Its roots
     on the unit circle are the modes.
 
-    Parameters
-    ----------
-    anchors : sequence of 3 complex or mpmath numbers
-    vertices : sequence of 3 complex
-    lengths : sequence of 3 floats
-
-    Examples
-    --------
     >>> corner = [complex(np.exp(2j * np.pi * k / 3)) for k in range(3)]
     >>> precise_modes([2 * c for c in corner], corner, [1.5] * 3)[:, 2].round(6).tolist()
     [-0.812756, 0.812756]
@@ -338,19 +321,9 @@ def eigenvalue_modes(
 ) -> list[Array]:
     """Modes by eigenvalues of companion matrices, the textbook way; for comparison.
 
-    Parameters
-    ----------
-    anchors : ndarray of complex, shape (n, 3)
-    vertices, lengths : ndarray, shape (3,)
-    polish : int
-        Steps of Newton's method on the closure equations afterwards.
-    band : float
-        Roots whose modulus differs from one by less count as real modes.
-
-    Returns
-    -------
-    list of ndarray, shape (m, 3)
-        ``(x, y, alpha)`` by alpha, for each problem; estimated, and a mode may be missing or too many.
+    `anchors`: shape (n, 3), complex. `vertices`, `lengths`: shape (3,). `polish`: steps of Newton's method on the
+    closure equations afterwards. `band`: roots whose modulus differs from one by less count as real modes. Returns
+    shape (m, 3): ``(x, y, alpha)`` by alpha, for each problem; estimated, and a mode may be missing or too many.
     """
     from graphsynth.kinematics.triad.assembly_modes import sextic
 

@@ -24,24 +24,16 @@ Array = NDArray[np.float64]
 class TwoPoseDesign:
     """Drives that put every rocker at a dead point in the first pose.
 
-    Attributes
-    ----------
-    mechanism : SingleMotorPlatform or None
-        None if the closed form has no solution.
-    accepted : bool
-        Branches, full turn and first pose were verified.
-    reason : str
-        Why not.
-    notes : tuple of str
-        Legs that need not move, identical poses.
-    other_dead_point : ndarray, shape (3,)
-        Wheel angle of the second dead point of each leg, radians; pi if crank axis and both rocker ends are in line.
-    first_error, second_error : float
-        Distance of the pose at psi = 0 from X+ and at psi = pi from X- (length, with ``Lc``).
-    off_line : float
-        Largest distance of the path from the segment's line between the two poses (length, with ``Lc``).
-    motion : Motion or None
-        The whole turn.
+    * `mechanism`: none if the closed form has no solution.
+    * `accepted`: branches, full turn and first pose were verified.
+    * `reason`: why not.
+    * `notes`: legs that need not move, identical poses.
+    * `other_dead_point` (shape (3,)): wheel angle of the second dead point of each leg, radians; pi if crank axis and
+      both rocker ends are in line.
+    * `first_error`, `second_error`: distance of the pose at psi = 0 from X+ and at psi = pi from X- (length, with
+      ``Lc``).
+    * `off_line`: largest distance of the path from the segment's line between the two poses (length, with ``Lc``).
+    * `motion`: the whole turn.
     """
 
     mechanism: SingleMotorPlatform | None
@@ -61,32 +53,12 @@ def two_pose_design(
 ) -> TwoPoseDesign:
     """Crank lengths, phases and coupler lengths such that all rockers reverse at psi = 0 exactly in the pose ``first``.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-        Gives everything else; its home pose selects the working mode.
-    first, second : array_like, shape (3,)
-        The poses X+ and X-.
-    samples : int, optional
-        Samples of the verification.
+    `mechanism`: gives everything else; its home pose selects the working mode. `first`, `second` (shape (3,)): the
+    poses X+ and X-. `samples`: samples of the verification. The error of the second pose is of second order in
+    ``other_dead_point - pi``. Raises `GeometryError`: poses that are not three finite numbers. See
+    theory/inverse-design 3: with the distances d+ and d- of the rocker ends from the wheel axis, ``l_B = |d+ - d-| /
+    2`` and ``l_BC = (d+ + d-) / 2``.
 
-    Returns
-    -------
-    TwoPoseDesign
-        The error of the second pose is of second order in ``other_dead_point - pi``.
-
-    Raises
-    ------
-    GeometryError
-        Poses that are not three finite numbers.
-
-    Notes
-    -----
-    See theory/inverse-design 3: with the distances d+ and d- of the rocker ends from the wheel axis,
-    ``l_B = |d+ - d-| / 2`` and ``l_BC = (d+ + d-) / 2``.
-
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> found = two_pose_design(SingleMotorPlatform(), [2.4, 1.8, 0.05], [-2.4, -1.8, -0.05])
     >>> found.accepted, [round(length, 6) for length in found.mechanism.coupler], found.first_error < 1e-12
@@ -142,16 +114,22 @@ def _drives(
     if not any(crank):
         notes.append("both poses need the same rocker distances: all cranks are zero (trivial)")
     built = replace(
-        mechanism, crank=(crank[0], crank[1], crank[2]), coupler=(coupler[0], coupler[1], coupler[2]),
+        mechanism,
+        crank=(crank[0], crank[1], crank[2]),
+        coupler=(coupler[0], coupler[1], coupler[2]),
         phase=(phase[0], phase[1], phase[2]),
-    )  # fmt: skip
+    )
     return built, tuple(notes), np.array(other)
 
 
 def _verified(
-    designed: SingleMotorPlatform, sigma: tuple[int, ...], poses: list[Array], notes: tuple[str, ...], other: Array,
+    designed: SingleMotorPlatform,
+    sigma: tuple[int, ...],
+    poses: list[Array],
+    notes: tuple[str, ...],
+    other: Array,
     samples: int,
-) -> TwoPoseDesign:  # fmt: skip
+) -> TwoPoseDesign:
     weight = np.array([1.0, 1.0, designed.Lc])
     for number, turn in enumerate(designed.drive_turns(), start=1):
         if turn.kind != "full turn":
@@ -173,6 +151,13 @@ def _verified(
     unit = line / size if size > 0.0 else line
     off = float(np.linalg.norm(path - (path @ unit)[:, None] * unit, axis=1).max())
     return TwoPoseDesign(
-        designed, not reason, reason, notes, other, float(np.linalg.norm(path[0])),
-        float(np.linalg.norm((motion.pose[samples // 2] - poses[1]) * weight)), off, motion,
-    )  # fmt: skip
+        designed,
+        not reason,
+        reason,
+        notes,
+        other,
+        float(np.linalg.norm(path[0])),
+        float(np.linalg.norm((motion.pose[samples // 2] - poses[1]) * weight)),
+        off,
+        motion,
+    )

@@ -27,33 +27,20 @@ _ITERATIONS = 12
 class Design:
     """A designed mechanism and what it does over a whole turn.
 
-    Attributes
-    ----------
-    mechanism : SingleMotorPlatform
-        Also for a rejected design, to look at.
-    accepted : bool
-        The whole turn was followed on one branch (and the refinement converged, if there was one).
-    reason : str
-        Why the design is rejected; empty if accepted.
-    wanted, achieved : ndarray of complex, shape (3,)
-        First harmonic of ``(x, y, alpha)``; ``achieved`` is NaN if the turn is not complete.
-    mean : ndarray, shape (3,)
-        Mean of the pose minus the home pose of the mechanism given.
-    error : float
-        ``|achieved - wanted| / |wanted|`` with ``Lc``.
-    drift : float
-        ``|mean| / |wanted|`` with ``Lc``.
-    distortion : float
-        All harmonics above the first over the first, with ``Lc``.
-    off_line : float
-        Largest distance in pose space (length, with ``Lc``) from the line through home along a real ``wanted``; NaN if
-        ``wanted`` is not real up to one phase.
-    iterations : int
-    amplitude_reached : float
-        Fraction of the wanted amplitude that was reached: 1 if accepted; NaN if not searched for.  The mechanism is
-        then the one with that amplitude.
-    motion : Motion or None
-        The verification over the whole turn, compared with all assembly modes.
+    * `mechanism`: also for a rejected design, to look at.
+    * `accepted`: the whole turn was followed on one branch (and the refinement converged, if there was one).
+    * `reason`: why the design is rejected; empty if accepted.
+    * `wanted`, `achieved` (shape (3,), complex): first harmonic of ``(x, y, alpha)``; ``achieved`` is NaN if the turn
+      is not complete.
+    * `mean` (shape (3,)): mean of the pose minus the home pose of the mechanism given.
+    * `error`: ``|achieved - wanted| / |wanted|`` with ``Lc``.
+    * `drift`: ``|mean| / |wanted|`` with ``Lc``.
+    * `distortion`: all harmonics above the first over the first, with ``Lc``.
+    * `off_line`: largest distance in pose space (length, with ``Lc``) from the line through home along a real
+      ``wanted``; NaN if ``wanted`` is not real up to one phase.
+    * `amplitude_reached`: fraction of the wanted amplitude that was reached: 1 if accepted; NaN if not searched for.
+      The mechanism is then the one with that amplitude.
+    * `motion`: the verification over the whole turn, compared with all assembly modes.
     """
 
     mechanism: SingleMotorPlatform
@@ -111,27 +98,12 @@ def _linear(mechanism: SingleMotorPlatform, theory: SmallCrank, wanted: Complex)
 def linear_design(mechanism: SingleMotorPlatform, wanted: ArrayLike, *, samples: int = 96) -> Design:
     """Crank lengths and phases for a wanted first harmonic, from the small-crank theory.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-        Everything but cranks and phases is taken from it.
-    wanted : array_like of complex, shape (3,)
-        ``Xi``: ``X(psi) = X_home + Re(Xi exp(i psi))``; lengths, lengths, radians.  A real vector asks for a straight
-        (or screw) motion; see `translation_along` and `rotation_about`.
-    samples : int, optional
-        Samples of the verification.
+    `mechanism`: everything but cranks and phases is taken from it. `wanted` (shape (3,), complex): ``Xi``: ``X(psi) =
+    X_home + Re(Xi exp(i psi))``; lengths, lengths, radians.  A real vector asks for a straight (or screw) motion; see
+    `translation_along` and `rotation_about`. `samples`: samples of the verification. Verified over the whole turn.  The
+    relative error is of second order in the amplitude, the drift of first. See theory/inverse-design 1: ``kappa = J^-1
+    Xi``; every ellipse in pose space has one design.
 
-    Returns
-    -------
-    Design
-        Verified over the whole turn.  The relative error is of second order in the amplitude, the drift of first.
-
-    Notes
-    -----
-    See theory/inverse-design 1: ``kappa = J^-1 Xi``; every ellipse in pose space has one design.
-
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> found = linear_design(SingleMotorPlatform(), translation_along(4.0, 0.645771823237902))
     >>> [round(length, 6) for length in found.mechanism.crank], found.error < 2e-3
@@ -153,30 +125,13 @@ def refine_design(
 ) -> Design:
     """Design whose first harmonic is exactly the wanted one on the nonlinear model.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-    wanted : array_like of complex, shape (3,)
-    couplers : bool, optional
-        Also choose the coupler lengths so that the mean of the pose is the home pose (nine unknowns instead of six).
-    samples : int, optional
-        Samples of every sweep, 48 to 128.
-    tolerance : float, optional
-        Largest residual over the amplitude, with ``Lc``.
+    `wanted`: shape (3,), complex. `couplers`: also choose the coupler lengths so that the mean of the pose is the home
+    pose (nine unknowns instead of six). `samples`: samples of every sweep, 48 to 128. `tolerance`: largest residual
+    over the amplitude, with ``Lc``. Every sweep of the iteration keeps the branch label, and the result is verified
+    over the whole turn.  Otherwise ``accepted`` is False with the reason, ``amplitude_reached`` is the largest fraction
+    of the wanted amplitude that is reached by growing the amplitude from zero (steps down to 0.5 %), and ``mechanism``
+    the design there. See theory/inverse-design 2; analytic derivatives.
 
-    Returns
-    -------
-    Design
-        Every sweep of the iteration keeps the branch label, and the result is verified over the whole turn.  Otherwise
-        ``accepted`` is False with the reason, ``amplitude_reached`` is the largest fraction of the wanted amplitude
-        that is reached by growing the amplitude from zero (steps down to 0.5 %), and ``mechanism`` the design there.
-
-    Notes
-    -----
-    See theory/inverse-design 2; analytic derivatives.
-
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> found = refine_design(SingleMotorPlatform(), translation_along(4.0, 0.645771823237902), couplers=True)
     >>> found.accepted, found.error < 1e-13, [round(length, 6) for length in found.mechanism.coupler]
@@ -233,9 +188,14 @@ def _grow(
 
 
 def _refine(
-    mechanism: SingleMotorPlatform, theory: SmallCrank, target: Complex, couplers: bool, samples: int,
-    tolerance: float, start: Sweep | None = None,
-) -> tuple[Sweep | None, str, int]:  # fmt: skip
+    mechanism: SingleMotorPlatform,
+    theory: SmallCrank,
+    target: Complex,
+    couplers: bool,
+    samples: int,
+    tolerance: float,
+    start: Sweep | None = None,
+) -> tuple[Sweep | None, str, int]:
     """Newton iteration from ``start`` or the linear design; the sweep of the solution, or None with the reason."""
     weight = np.array([1.0, 1.0, mechanism.Lc])
     size = float(np.linalg.norm(weight * target))
@@ -287,18 +247,38 @@ def assess_design(
     if sweep.reason:
         nothing = np.full(3, np.nan)
         return Design(
-            mechanism, False, sweep.reason, target, nothing + 0j, nothing, math.nan, math.nan, math.nan, math.nan,
-            iterations, math.nan, None,
-        )  # fmt: skip
+            mechanism,
+            False,
+            sweep.reason,
+            target,
+            nothing + 0j,
+            nothing,
+            math.nan,
+            math.nan,
+            math.nan,
+            math.nan,
+            iterations,
+            math.nan,
+            None,
+        )
     measured: Harmonics = harmonics(sweep.pose)
     size = float(np.linalg.norm(weight * target)) or math.nan
     achieved, mean = measured.order(1), measured.mean - start
     return Design(
-        mechanism, True, "", target, achieved, mean,
-        float(np.linalg.norm(weight * (achieved - target))) / size, float(np.linalg.norm(weight * mean)) / size,
-        measured.total_distortion(mechanism.Lc), _off_line(weight * (sweep.pose - start), weight * target),
-        iterations, 1.0, mechanism.full_turn(np.linspace(0.0, math.tau, samples + 1)),
-    )  # fmt: skip
+        mechanism,
+        True,
+        "",
+        target,
+        achieved,
+        mean,
+        float(np.linalg.norm(weight * (achieved - target))) / size,
+        float(np.linalg.norm(weight * mean)) / size,
+        measured.total_distortion(mechanism.Lc),
+        _off_line(weight * (sweep.pose - start), weight * target),
+        iterations,
+        1.0,
+        mechanism.full_turn(np.linspace(0.0, math.tau, samples + 1)),
+    )
 
 
 def _off_line(path: Array, wanted: Complex) -> float:

@@ -101,20 +101,8 @@ def _frame(axes: Any, work: Workspace) -> None:
 def workspace_picture(work: Workspace, *, unit: str = "mm", size: tuple[float, float] = (6.4, 4.8)) -> Figure:
     """Draw a constant-orientation workspace: area, arcs by leg and side, area and perimeter in the title.
 
-    Parameters
-    ----------
-    work : Workspace
-    unit : str, optional
-        Name of the length unit.
-    size : tuple of float, optional
-        Inches.
+    `unit`: name of the length unit. `size`: inches.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Examples
-    --------
     >>> from graphsynth.systems.platform.parallel_platform import ParallelPlatform
     >>> from graphsynth.systems.platform.workspace import constant_orientation_workspace
     >>> figure = workspace_picture(constant_orientation_workspace(ParallelPlatform.mock(), 0.5))
@@ -148,17 +136,7 @@ def loci_picture(
 
     Regions with ``det JX > 0`` and ``det JX < 0`` are tinted differently.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    loci : SingularLoci
-        From `graphsynth.systems.platform.singular_loci.singular_loci`.
-    unit : str, optional
-    size : tuple of float, optional
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `loci`: from `graphsynth.systems.platform.singular_loci.singular_loci`.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -220,22 +198,7 @@ def map_picture(
 ) -> Figure:
     """Draw one quantity of a map over the workspace.
 
-    Parameters
-    ----------
-    found : PlatformMap
-    quantity : str, optional
-        A field of `graphsynth.systems.platform.maps.Quality`.
-    unit : str, optional
-    size : tuple of float, optional
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        An unknown quantity.
+    `quantity`: a field of `graphsynth.systems.platform.maps.Quality`. Raises `GeometryError`: an unknown quantity.
     """
     from graphsynth.systems.platform.workspace import constant_orientation_workspace
 
@@ -278,16 +241,7 @@ def harmonics_picture(
 
     Dashed lines have the predicted slopes 1 and 2.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-    scales : sequence of float, optional
-        Factors of its crank lengths.
-    size : tuple of float, optional
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `scales`: factors of its crank lengths.
     """
     from graphsynth.systems.platform.small_crank import crank_scaling
 

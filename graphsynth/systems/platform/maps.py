@@ -23,25 +23,16 @@ class Quality:
 
     With ``J_s = diag(1/Lc, 1/Lc, 1) J`` (platform speed over rocker speed) and its singular values:
 
-    Attributes
-    ----------
-    determinant : ndarray
-        ``det JX``, length^4; its sign names the side of the type-II curves.
-    smallest : ndarray
-        Smallest singular value of ``JX diag(1, 1, 1/Lc)``, length: zero at type II.
-    dexterity : ndarray
-        ``1 / condition number`` of J_s, 1 at best, 0 at a singularity of type I or II.
-    velocity_min, velocity_max : ndarray
-        Slowest and fastest platform speed (1/Lc-scaled) for a unit vector of rocker speeds.
-    force_min, force_max : ndarray
-        Smallest and largest wrench (force times Lc, moment) that a unit vector of rocker torques holds:
-        ``1 / velocity_max``, ``1 / velocity_min``.
-    link_force : ndarray
-        Largest norm of the three axial link forces for a unit wrench (force, moment / Lc).
-    reach : ndarray
-        Smallest ``S_k / (2 l1 l2)``: sine of the angle between rocker and link, zero at type I.
-    Lc : float
-        Characteristic length.
+    * `determinant`: ``det JX``, length^4; its sign names the side of the type-II curves.
+    * `smallest`: smallest singular value of ``JX diag(1, 1, 1/Lc)``, length: zero at type II.
+    * `dexterity`: ``1 / condition number`` of J_s, 1 at best, 0 at a singularity of type I or II.
+    * `velocity_min`, `velocity_max`: slowest and fastest platform speed (1/Lc-scaled) for a unit vector of rocker
+      speeds.
+    * `force_min`, `force_max`: smallest and largest wrench (force times Lc, moment) that a unit vector of rocker
+      torques holds: ``1 / velocity_max``, ``1 / velocity_min``.
+    * `link_force`: largest norm of the three axial link forces for a unit wrench (force, moment / Lc).
+    * `reach`: smallest ``S_k / (2 l1 l2)``: sine of the angle between rocker and link, zero at type I.
+    * `Lc`: characteristic length.
     """
 
     determinant: Array
@@ -88,30 +79,11 @@ class PlatformMap:
 def quality(platform: ParallelPlatform, poses: ArrayLike, sigma: Sequence[int], *, Lc: float | None = None) -> Quality:
     """Dexterity, force and velocity transmission at poses (..., 3) of one working mode.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    poses : array_like, shape (..., 3)
-    sigma : sequence of 3 of {+1, -1}
-    Lc : float, optional
-        Characteristic length; the largest distance of a vertex from the reference point by default.
+    `poses`: shape (..., 3). `sigma`: of {+1, -1}. `Lc`: characteristic length; the largest distance of a vertex from
+    the reference point by default. Floating point.  Singular poses give zeros and infinities, poses out of reach NaN.
+    Raises `GeometryError`: poses without three coordinates, or not finite. See theory/platform-jacobians 3 and
+    theory/platform-workspace 3.
 
-    Returns
-    -------
-    Quality
-        Floating point.  Singular poses give zeros and infinities, poses out of reach NaN.
-
-    Raises
-    ------
-    GeometryError
-        Poses without three coordinates, or not finite.
-
-    Notes
-    -----
-    See theory/platform-jacobians 3 and theory/platform-workspace 3.
-
-    Examples
-    --------
     >>> home = quality(ParallelPlatform.mock(), [0.0, 0.0, 0.0], (-1, -1, -1), Lc=45.0)
     >>> round(float(home.condition), 12)  # 0.96 sqrt(2)
     1.357645019878
@@ -168,22 +140,8 @@ def platform_map(
 ) -> PlatformMap:
     """`quality` over a rectangle that holds the workspace at orientation ``alpha``.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    alpha : float
-        Orientation, radians.
-    sigma : sequence of 3 of {+1, -1}
-    nodes : int, optional
-        Nodes along x and along y.
-    Lc : float, optional
+    `alpha`: orientation, radians. `sigma`: of {+1, -1}. `nodes`: nodes along x and along y.
 
-    Returns
-    -------
-    PlatformMap
-
-    Examples
-    --------
     >>> found = platform_map(ParallelPlatform.mock(), 0.0, (-1, -1, -1), nodes=50)
     >>> bool(0.7 < found.quality.dexterity[~np.isnan(found.quality.dexterity)].max() <= 1.0)
     True

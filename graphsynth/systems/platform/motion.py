@@ -44,16 +44,10 @@ class BranchLabel(NamedTuple):
 class Monodromy:
     """What the assembly modes become after one turn of the wheels.
 
-    Attributes
-    ----------
-    modes : ndarray, shape (m, 3)
-        Poses at the start, sorted by alpha.
-    permutation : tuple of int
-        Number of the mode that each mode has become; -1 where its branch ends.
-    ends : tuple of float
-        Wheel angle at which a branch ends, radians; NaN where it does not.
-    reasons : tuple of str
-        Why a branch ends; empty where it does not.
+    * `modes` (shape (m, 3)): poses at the start, sorted by alpha.
+    * `permutation`: number of the mode that each mode has become; -1 where its branch ends.
+    * `ends`: wheel angle at which a branch ends, radians; NaN where it does not.
+    * `reasons`: why a branch ends; empty where it does not.
     """
 
     modes: Array
@@ -81,26 +75,15 @@ class Monodromy:
 class Sweep:
     """One branch over many wheel angles, positions and derivatives only.
 
-    Attributes
-    ----------
-    psi : ndarray, shape (n,)
-        Wheel angles asked for, radians.
-    pose, velocity : ndarray, shape (n, 3)
-        ``(x, y, alpha)`` and d/dpsi; NaN from ``reached`` on.
-    theta, theta_velocity : ndarray, shape (n, 3)
-        Rocker angles, continuous along the motion, and d/dpsi.
-    determinant : ndarray, shape (n,)
-        ``det JX``.
-    acceleration, theta_acceleration : ndarray, shape (n, 3), or None
-        Second derivatives by psi, if asked for.
-    reached : int
-        Number of wheel angles reached on the branch.
-    complete : bool
-        All of them were.
-    end : tuple of 4 floats
-        Wheel angle and pose at which the branch ended.
-    reason : str
-        Why it ended early; empty if it is complete.
+    * `psi` (shape (n,)): wheel angles asked for, radians.
+    * `pose`, `velocity` (shape (n, 3)): ``(x, y, alpha)`` and d/dpsi; NaN from ``reached`` on.
+    * `theta`, `theta_velocity` (shape (n, 3)): rocker angles, continuous along the motion, and d/dpsi.
+    * `determinant` (shape (n,)): ``det JX``.
+    * `acceleration`, `theta_acceleration` (shape (n, 3)): second derivatives by psi, if asked for.
+    * `reached`: number of wheel angles reached on the branch.
+    * `complete`: all of them were.
+    * `end`: wheel angle and pose at which the branch ended.
+    * `reason`: why it ended early; empty if it is complete.
     """
 
     psi: Array
@@ -121,24 +104,14 @@ class Sweep:
 class TurnBatch:
     """Home branches of N dimension sets over the same n wheel angles.
 
-    Attributes
-    ----------
-    psi : ndarray, shape (n,)
-        Wheel angles, radians.
-    pose, velocity, theta, theta_velocity : ndarray, shape (N, n, 3)
-        As in `Sweep`; NaN from ``reached`` on.
-    determinant : ndarray, shape (N, n)
-        ``det JX``.
-    acceleration, theta_acceleration : ndarray, shape (N, n, 3), or None
-        Second derivatives by psi, if asked for.
-    status : ndarray of int8, shape (N,)
-        ``graphsynth.systems.platform.tracking.BranchEnd``: how each branch ended.
-    reached : ndarray of int, shape (N,)
-        Number of wheel angles reached.
-    end : ndarray, shape (N, 4)
-        Wheel angle (for HOME_ENDS the scale of the cranks) and pose where the branch ended.
-    closure_error : ndarray, shape (N,)
-        Scaled distance of the last pose from the first; NaN if not complete.
+    * `psi` (shape (n,)): wheel angles, radians.
+    * `pose`, `velocity`, `theta`, `theta_velocity` (shape (N, n, 3)): as in `Sweep`; NaN from ``reached`` on.
+    * `determinant` (shape (N, n)): ``det JX``.
+    * `acceleration`, `theta_acceleration` (shape (N, n, 3)): second derivatives by psi, if asked for.
+    * `status` (shape (N,)): ``graphsynth.systems.platform.tracking.BranchEnd``: how each branch ended.
+    * `reached` (shape (N,)): number of wheel angles reached.
+    * `end` (shape (N, 4)): wheel angle (for HOME_ENDS the scale of the cranks) and pose where the branch ended.
+    * `closure_error` (shape (N,)): scaled distance of the last pose from the first; NaN if not complete.
     """
 
     psi: Array
@@ -164,44 +137,26 @@ class TurnBatch:
 class Motion:
     """One tracked branch over the wheel angle.
 
-    Attributes
-    ----------
-    psi : ndarray, shape (n,)
-        Wheel angles that were reached, radians; fewer than asked for if the motion stops.
-    pose, velocity, acceleration : ndarray, shape (n, 3)
-        ``(x, y, alpha)`` and its first and second derivatives with respect to psi.
-    theta : ndarray, shape (n, 3)
-        Rocker angles, continuous along the motion.
-    determinant : ndarray, shape (n,)
-        ``det JX``.
-    leg : ndarray, shape (n, 3)
-        ``JT_kk = sigma_k S_k`` of the legs.
-    drive : ndarray, shape (n, 3)
-        ``h_phi = tau_k S_B,k`` of the drives.
-    gap : ndarray, shape (n,)
-        Scaled distance to the nearest other assembly mode; infinite if there is none.
-    residual : float
-        Largest closure error over the turn relative to the square of the largest length.
-    complete : bool
-        The whole asked range was reached on one branch.
-    closed : bool
-        After ``period`` turns the pose returns to the start.
-    closure_error : float
-        Scaled distance of the end pose from the start pose after one turn; NaN if the turn is not complete.
-    period : int
-        Number of turns until closure; 0 if not closed.
-    events : tuple of Event
-        In order of psi.
-    label : BranchLabel
-        Of the start pose.
-    Lc : float
-        Characteristic length of the scaled distances.
-    method : str
-        How the branch was followed.
-    seconds : float
-        Run time.
-    monodromy : Monodromy, optional
-        What all assembly modes become after the turn; None if the range is not one turn or the branch ends.
+    * `psi` (shape (n,)): wheel angles that were reached, radians; fewer than asked for if the motion stops.
+    * `pose`, `velocity`, `acceleration` (shape (n, 3)): ``(x, y, alpha)`` and its first and second derivatives with
+      respect to psi.
+    * `theta` (shape (n, 3)): rocker angles, continuous along the motion.
+    * `determinant` (shape (n,)): ``det JX``.
+    * `leg` (shape (n, 3)): ``JT_kk = sigma_k S_k`` of the legs.
+    * `drive` (shape (n, 3)): ``h_phi = tau_k S_B,k`` of the drives.
+    * `gap` (shape (n,)): scaled distance to the nearest other assembly mode; infinite if there is none.
+    * `residual`: largest closure error over the turn relative to the square of the largest length.
+    * `complete`: the whole asked range was reached on one branch.
+    * `closed`: after ``period`` turns the pose returns to the start.
+    * `closure_error`: scaled distance of the end pose from the start pose after one turn; NaN if the turn is not
+      complete.
+    * `period`: number of turns until closure; 0 if not closed.
+    * `events`: in order of psi.
+    * `label`: of the start pose.
+    * `Lc`: characteristic length of the scaled distances.
+    * `method`: how the branch was followed.
+    * `seconds`: run time.
+    * `monodromy`: what all assembly modes become after the turn; None if the range is not one turn or the branch ends.
     """
 
     psi: Array

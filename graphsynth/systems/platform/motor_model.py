@@ -94,11 +94,21 @@ class MotorDrivenPlatform:
 
     @classmethod
     def of_machine(
-        cls, machine: SingleMotorPlatform, motor: Motor | IdealSpeed, *, mass: float, gyration: float,
-        mass_centre: complex = 0.0, rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0), wheel_inertia: float = 0.0,
-        pinion_inertia: float = 0.0, efficiency: float = 1.0, friction: float = 0.0, load: float = 0.0,
+        cls,
+        machine: SingleMotorPlatform,
+        motor: Motor | IdealSpeed,
+        *,
+        mass: float,
+        gyration: float,
+        mass_centre: complex = 0.0,
+        rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0),
+        wheel_inertia: float = 0.0,
+        pinion_inertia: float = 0.0,
+        efficiency: float = 1.0,
+        friction: float = 0.0,
+        load: float = 0.0,
         length: float = 1e-3,
-    ) -> MotorDrivenPlatform:  # fmt: skip
+    ) -> MotorDrivenPlatform:
         """Real geometry: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of the gears."""
         series = platform_inertia(machine, mass, gyration, mass_centre, rocker_inertia=rocker_inertia, length=length)
         ratio = machine.gears.z2 / machine.gears.z1
@@ -115,15 +125,27 @@ class MotorDrivenPlatform:
         """Mechanism as the integrator sees it (load torques with the sign of driving)."""
         series = None if self.load_series is None else -np.asarray(self.load_series, dtype=np.float64)
         return Plant(
-            self.inertia.rows, self.base_inertia, self.friction, -self.load, series,
+            self.inertia.rows,
+            self.base_inertia,
+            self.friction,
+            -self.load,
+            series,
             dead_centres=self.inertia.dead_centres,
-        )  # fmt: skip
+        )
 
     def simulate(
-        self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0, currents: tuple[float, ...] | None = None,
-        model: str = "auto", reduce: bool | str = "auto", rtol: float = 1e-10, estimate: bool = True,
+        self,
+        times: ArrayLike,
+        *,
+        angle: float = 0.0,
+        speed: float = 0.0,
+        currents: tuple[float, ...] | None = None,
+        model: str = "auto",
+        reduce: bool | str = "auto",
+        rtol: float = 1e-10,
+        estimate: bool = True,
         max_steps: int = 200_000,
-    ) -> DriveRun:  # fmt: skip
+    ) -> DriveRun:
         """Motion from ``times[0]``.
 
         Parameters
@@ -163,18 +185,33 @@ class MotorDrivenPlatform:
         if note:
             currents, notes = None, (*notes, note)
         return run(
-            self.plant(), motor, self.train, times, angle=angle, speed=speed, currents=currents, regular=regular,
-            rtol=rtol, estimate=estimate, max_steps=max_steps, notes=notes,
-        )  # fmt: skip
+            self.plant(),
+            motor,
+            self.train,
+            times,
+            angle=angle,
+            speed=speed,
+            currents=currents,
+            regular=regular,
+            rtol=rtol,
+            estimate=estimate,
+            max_steps=max_steps,
+            notes=notes,
+        )
 
     def reduction_error(self, times: ArrayLike, *, angle: float = 0.0, speed: float = 0.0) -> float:
         """Largest error of the angle (rad) of the limit L -> 0 after the electrical transient; see `reduction`."""
         return reduction_error(self.plant(), self._driving(), self.train, times, angle=angle, speed=speed)
 
     def inductance_study(
-        self, times: ArrayLike, inductances: Sequence[float], *, angle: float = 0.0, speed: float = 0.0,
+        self,
+        times: ArrayLike,
+        inductances: Sequence[float],
+        *,
+        angle: float = 0.0,
+        speed: float = 0.0,
         after: float | None = None,
-    ) -> ReductionStudy:  # fmt: skip
+    ) -> ReductionStudy:
         """Compare the full model at several inductances (H) with the limit L -> 0; see `reduction`."""
         return inductance_study(
             self.plant(), self._driving(), self.train, times, inductances, angle=angle, speed=speed, after=after
@@ -206,33 +243,22 @@ class MotorDrivenPlatform:
 
 
 def platform_inertia(
-    machine: SingleMotorPlatform, mass: float, gyration: float, mass_centre: complex = 0.0, *,
-    rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0), length: float = 1e-3, tolerance: float = 1e-12,
-) -> EffectiveInertia:  # fmt: skip
+    machine: SingleMotorPlatform,
+    mass: float,
+    gyration: float,
+    mass_centre: complex = 0.0,
+    *,
+    rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0),
+    length: float = 1e-3,
+    tolerance: float = 1e-12,
+) -> EffectiveInertia:
     """Effective inertia of the platform, and of the rockers, of a single-motor mechanism over a closed turn.
 
-    Parameters
-    ----------
-    machine : SingleMotorPlatform
-    mass : float
-        Of the platform, kg.
-    gyration : float
-        Radius of gyration about the mass centre, m.
-    mass_centre : complex
-        In the frame of the platform, m.
-    rocker_inertia : sequence of 3 floats
-        About the pivots D_k, kg m^2.
-    length : float
-        Metres per length unit of the machine (1e-3 for the millimetres of the mock-up).
-    tolerance : float
-        Largest relative truncation of the series.
-
-    Raises
-    ------
-    SpecError
-        Negative masses, or a motion that 4096 samples do not resolve.
-    GeometryError
-        If the home branch does not make a whole turn.
+    `mass`: of the platform, kg. `gyration`: radius of gyration about the mass centre, m. `mass_centre`: in the frame of
+    the platform, m. `rocker_inertia`: about the pivots D_k, kg m^2. `length`: metres per length unit of the machine
+    (1e-3 for the millimetres of the mock-up). `tolerance`: largest relative truncation of the series. Raises
+    `SpecError`: negative masses, or a motion that 4096 samples do not resolve. Raises `GeometryError` if the home
+    branch does not make a whole turn.
     """
     m = number("mass", mass, least=0.0)
     radius = number("gyration", gyration, least=0.0)

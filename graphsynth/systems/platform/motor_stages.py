@@ -89,9 +89,12 @@ def drive_of(
     moved = table.platform
     motor = dc_motor(table.motor, resistance, inductance, speed)
     return MotorDrivenPlatform(
-        EffectiveInertia.of_slider(moved.mass, moved.amplitude), motor, base_inertia=moved.inertia,
-        friction=moved.friction, load=moved.load,
-    )  # fmt: skip
+        EffectiveInertia.of_slider(moved.mass, moved.amplitude),
+        motor,
+        base_inertia=moved.inertia,
+        friction=moved.friction,
+        load=moved.load,
+    )
 
 
 def _refuse(context: Context, error: SpecError, *place: str) -> Exception:
@@ -155,9 +158,7 @@ def claim(context: Context) -> Claim:
             for L, speed in c.cases
         }
         values = np.geomspace(first, last, c.map_resistances)
-        mapped = ripple_map(
-            drive_of(context, first), values.tolist(), c.map_inductances, revolutions=c.revolutions
-        )  # fmt: skip
+        mapped = ripple_map(drive_of(context, first), values.tolist(), c.map_inductances, revolutions=c.revolutions)
     except SpecError as error:
         raise _refuse(context, error, "claim") from error
     return Claim(effects, mapped)
@@ -252,7 +253,7 @@ def _margins(item: LabelledRun) -> tuple[Quantity, ...]:
         Quantity("speed at the end", float(run.speed[-1]), "rad/s", "estimated", w_error),
         Quantity("torque at the end", float(run.motor_torque[-1]), "N m", "estimated", i_error),
         Quantity("turns made", float(np.floor(run.angle[-1] / math.tau)), "", "exact", 0.0),
-    )  # fmt: skip
+    )
 
 
 def run_tables(runs: tuple[LabelledRun, ...], *, headline: bool = False) -> tuple[Table, ...]:
@@ -271,14 +272,28 @@ def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
     rows = []
     for label, effect in found.effects.items():
         for k, r in enumerate(effect.resistance):
-            rows.append((
-                label if k == 0 else "", f"{effect.frequency_ratio:.3f}" if k == 0 else "", f"{r:g}",
-                f"{effect.damping[k]:.3f}", f"{effect.speed[k]:.4g}", f"{effect.simulated_speed[k]:.4g}",
-                f"{effect.current[k]:.4g}", f"{effect.simulated_current[k]:.4g}",
-            ))  # fmt: skip
+            rows.append(
+                (
+                    label if k == 0 else "",
+                    f"{effect.frequency_ratio:.3f}" if k == 0 else "",
+                    f"{r:g}",
+                    f"{effect.damping[k]:.3f}",
+                    f"{effect.speed[k]:.4g}",
+                    f"{effect.simulated_speed[k]:.4g}",
+                    f"{effect.current[k]:.4g}",
+                    f"{effect.simulated_current[k]:.4g}",
+                )
+            )
     columns = (
-        "case", "Om/w_n", "r [ohm]", "zeta", "speed, linear [rad/s]", "simulated", "current, linear [A]", "simulated",
-    )  # fmt: skip
+        "case",
+        "Om/w_n",
+        "r [ohm]",
+        "zeta",
+        "speed, linear [rad/s]",
+        "simulated",
+        "current, linear [A]",
+        "simulated",
+    )
     note = (
         "Ripples peak to peak in steady motion. Linear, exact for small ripples: the torque ripple always falls with "
         "r, the speed ripple if and only if Om/w_n > 0.7071. Simulated: estimated, the full model over the second half "
@@ -287,15 +302,26 @@ def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
     said = []
     for label, effect in found.effects.items():
         first, last = effect.simulated_speed[0], effect.simulated_speed[-1]
-        said.append((
-            label, f"{effect.frequency_ratio:.3f}", "falls" if effect.speed_falls else "rises",
-            _trend(effect.simulated_speed), f"{last / first:.3g}",
-            _trend(effect.simulated_current), f"{effect.simulated_current[-1] / effect.simulated_current[0]:.3g}",
-        ))  # fmt: skip
+        said.append(
+            (
+                label,
+                f"{effect.frequency_ratio:.3f}",
+                "falls" if effect.speed_falls else "rises",
+                _trend(effect.simulated_speed),
+                f"{last / first:.3g}",
+                _trend(effect.simulated_current),
+                f"{effect.simulated_current[-1] / effect.simulated_current[0]:.3g}",
+            )
+        )
     heads = (
-        "case", "Om/w_n", "speed ripple, linear", "speed ripple, simulated", "last/first", "current ripple, simulated",
+        "case",
+        "Om/w_n",
+        "speed ripple, linear",
+        "speed ripple, simulated",
         "last/first",
-    )  # fmt: skip
+        "current ripple, simulated",
+        "last/first",
+    )
     truth = (
         "The claim is that a larger armature resistance calms both. On the map the linear condition tells the sign of "
         f"the simulated trend of the speed on {100 * found.map.agreement:.0f} % of the cells; the rest have ripples "
@@ -352,27 +378,36 @@ def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
     reach = moved.amplitude * root
     rows = tuple(
         (
-            e.kind, f"{e.angle / math.pi:.12g}", f"{e.time:.14g}", f"{e.fictitious_time * reach:.14g}",
-            f"{e.motion / root:.13g}", ", ".join(f"{i:.13g}" for i in e.currents),
+            e.kind,
+            f"{e.angle / math.pi:.12g}",
+            f"{e.time:.14g}",
+            f"{e.fictitious_time * reach:.14g}",
+            f"{e.motion / root:.13g}",
+            ", ".join(f"{i:.13g}" for i in e.currents),
         )
         for e in bare.source.events[:20]
-    )  # fmt: skip
+    )
     columns = ("event", "angle/pi", "time t [s]", "fictitious time s [s]", "speed of the platform [m/s]", "current [A]")
     more = len(bare.source.events) - len(rows)
     note = "Regularised by dt = |cos q| ds: the crank speed is unbounded there, the speed of the platform is not."
     note += f" {more} more events are left out." if more > 0 else ""
     limit = tuple(
         (
-            f"{inertia:.0e}", f"{run.angle[-1]:.12g}" if run.complete else run.reason,
-            f"{abs(run.angle[-1] - bare.source.angle[-1]):.2e}", f"{float(abs(run.speed).max()):.5g}",
+            f"{inertia:.0e}",
+            f"{run.angle[-1]:.12g}" if run.complete else run.reason,
+            f"{abs(run.angle[-1] - bare.source.angle[-1]):.2e}",
+            f"{float(abs(run.speed).max()):.5g}",
             f"{run.energy_error:.1e}",
         )
         for inertia, run in zip(bare.inertias, bare.runs)
-    )  # fmt: skip
+    )
     last = (
-        "none", f"{bare.source.angle[-1]:.12g}" if bare.source.complete else bare.source.reason, "",
-        "unbounded", f"{bare.source.energy_error:.1e}",
-    )  # fmt: skip
+        "none",
+        f"{bare.source.angle[-1]:.12g}" if bare.source.complete else bare.source.reason,
+        "",
+        "unbounded",
+        f"{bare.source.energy_error:.1e}",
+    )
     heads = (
         "J_0 [kg m²]",
         f"angle at {bare.source.time[-1]:g} s [rad]",

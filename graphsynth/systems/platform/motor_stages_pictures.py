@@ -180,11 +180,13 @@ def _bare_pictures(context: Context, bare: WithoutInertia) -> list[Picture]:
     speeds = Chart(lines, "time [s]", "crank speed [rad/s]", marks=marks[:0])
     return [
         Picture(
-            "Without inertia: speed of the platform", moving.svg(),
+            "Without inertia: speed of the platform",
+            moving.svg(),
             "The regularised model of the source passes its dead centres (upright lines); this speed stays finite.",
         ),
         Picture(
-            "Without and with ever smaller inertia", speeds.svg(),
+            "Without and with ever smaller inertia",
+            speeds.svg(),
             f"J_0 in kg m². The spikes of the crank speed at the dead centres are cut off at {spike:.3g} rad/s.",
         ),
-    ]  # fmt: skip
+    ]

@@ -27,18 +27,11 @@ Test = Callable[[Complex, float], NDArray[np.bool_]]
 class RegionArea:
     """Area of a region of positions, enclosed.
 
-    Attributes
-    ----------
-    area : float
-        Estimate: decided cells and the undecided ones whose centre belongs to the region, length^2.
-    low, high : float
-        Bounds: area of the cells wholly inside; that and the undecided ones (rigorous but for rounding).
-    inside, undecided : ndarray of complex
-        Centres of the cells.
-    inside_half, undecided_half : ndarray
-        Half sides of the cells.
-    statement : str
-        What the region is.
+    * `area`: estimate: decided cells and the undecided ones whose centre belongs to the region, length^2.
+    * `low`, `high`: bounds: area of the cells wholly inside; that and the undecided ones (rigorous but for rounding).
+    * `inside`, `undecided`: centres of the cells.
+    * `inside_half`, `undecided_half`: half sides of the cells.
+    * `statement`: what the region is.
     """
 
     area: float
@@ -57,8 +50,6 @@ def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[floa
 
     Exact but for rounding.  ``(0, 2 pi)`` stands for every orientation.
 
-    Examples
-    --------
     >>> [tuple(round(a, 6) for a in pair) for pair in orientations(ParallelPlatform.mock(), 0j)]
     [(5.522173, 7.853982)]
     """
@@ -86,20 +77,8 @@ def orientations(platform: ParallelPlatform, point: complex) -> tuple[tuple[floa
 def reachable_workspace(platform: ParallelPlatform, resolution: float = 2e-3) -> RegionArea:
     """Positions that the platform reaches at one orientation or more.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    resolution : float, optional
-        Side of the smallest cells over the width of the region looked at.
-
-    Returns
-    -------
-    RegionArea
-        With bounds; the gap between them shrinks in proportion to ``resolution``.
-
-    Notes
-    -----
-    See theory/platform-workspace 1 (union over alpha).
+    `resolution`: side of the smallest cells over the width of the region looked at. With bounds; the gap between them
+    shrinks in proportion to ``resolution``. See theory/platform-workspace 1 (union over alpha).
     """
 
     def test(p: Complex, extra: float) -> NDArray[np.bool_]:
@@ -122,10 +101,7 @@ def total_orientation_workspace(
     The legs reach each orientation; whether one working mode passes from end to end without a singularity is another
     question (see `graphsynth.systems.platform.aspects`).
 
-    Raises
-    ------
-    GeometryError
-        If ``stop < start``.
+    Raises `GeometryError` if ``stop < start``.
     """
     start, stop = finite("start", start), finite("stop", stop)
     if stop < start:
@@ -193,6 +169,12 @@ def _cover(platform: ParallelPlatform, test: Test, resolution: float, statement:
         centres = centres[~sure]
     area = low + float(test(centres, 0.0).sum()) * 4.0 * side * side
     return RegionArea(
-        area, low, low + len(centres) * 4.0 * side * side, np.concatenate(inside), np.concatenate(inside_half),
-        centres, np.full(len(centres), side), statement,
-    )  # fmt: skip
+        area,
+        low,
+        low + len(centres) * 4.0 * side * side,
+        np.concatenate(inside),
+        np.concatenate(inside_half),
+        centres,
+        np.full(len(centres), side),
+        statement,
+    )

@@ -35,17 +35,11 @@ WORKING_MODES: NDArray[np.int64] = np.array([[a, b, c] for a in (1, -1) for b in
 class InverseSolution:
     """Rocker angles of every leg and their reach.
 
-    Attributes
-    ----------
-    theta : ndarray, shape (..., 8, 3) or (..., 3)
-        Rocker angles in (-pi, pi]: all eight working modes in the order of ``WORKING_MODES``, or the one asked for.
-        NaN for a leg out of reach or free; see ``status``.
-    status : ndarray of int8, shape (..., 3)
-        `LegStatus` of every leg.
-    pose : ndarray, shape (..., 3)
-        The poses asked for.
-    platform : ParallelPlatform
-        The platform asked.
+    * `theta` (shape (..., 8, 3) or (..., 3)): rocker angles in (-pi, pi]: all eight working modes in the order of
+      ``WORKING_MODES``, or the one asked for. NaN for a leg out of reach or free; see ``status``.
+    * `status` (shape (..., 3)): `LegStatus` of every leg.
+    * `pose` (shape (..., 3)): the poses asked for.
+    * `platform`: the platform asked.
     """
 
     theta: Array

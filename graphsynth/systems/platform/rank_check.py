@@ -31,19 +31,13 @@ TOLERANCE = 1e-9
 class LoopClosure:
     """Loop-closure matrix at one configuration (estimated: floating point, rank by singular values).
 
-    Attributes
-    ----------
-    matrix : ndarray, shape (3 loops, freedoms)
-        Rows in rad/s, length/s over ``Lc``; sliding columns are scaled with ``Lc``.
-    columns : tuple of str
-        ``"R 0-1"``; a gear pair has ``"roll 1-2"`` and ``"slide 1-2"``, a pin in a slot ``"turn"`` and ``"slide"``.
-    singular_values : ndarray
-        Descending.
-    rank : int
-        Singular values above ``tolerance`` times the largest.
-    motions : ndarray, shape (freedoms - rank, freedoms)
-        Orthonormal null vectors: joint speeds of the instantaneous motions (sliding speeds over ``Lc``).
-    tolerance, Lc : float
+    * `matrix` (shape (3 loops, freedoms)): rows in rad/s, length/s over ``Lc``; sliding columns are scaled with ``Lc``.
+    * `columns`: ``"R 0-1"``; a gear pair has ``"roll 1-2"`` and ``"slide 1-2"``, a pin in a slot ``"turn"`` and
+      ``"slide"``.
+    * `singular_values`: descending.
+    * `rank`: singular values above ``tolerance`` times the largest.
+    * `motions` (shape (freedoms - rank, freedoms)): orthonormal null vectors: joint speeds of the instantaneous motions
+      (sliding speeds over ``Lc``).
     """
 
     matrix: Array
@@ -62,10 +56,7 @@ class LoopClosure:
     def component(self, column: str) -> Array:
         """Speeds of one joint freedom in every instantaneous motion.
 
-        Raises
-        ------
-        GeometryError
-            A column that does not exist.
+        Raises `GeometryError`: a column that does not exist.
         """
         if column not in self.columns:
             raise GeometryError(f"column {column!r} is unknown; use one of {', '.join(self.columns)}")
@@ -99,27 +90,11 @@ def link_poses(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> Ar
 def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLike | None = None) -> Mechanism:
     """Build the 15-link mechanism with 19 turning pairs and 3 gear pairs.
 
-    Parameters
-    ----------
-    platform : SingleMotorPlatform
-    psi : float, optional
-        Wheel angle at which the links' poses are given, radians.
-    pose : array_like, shape (3,), optional
-        Platform pose there; the home branch by default.
+    `psi`: wheel angle at which the links' poses are given, radians. `pose` (shape (3,)): platform pose there; the home
+    branch by default. Driven at the pinion with the common wheel angle psi as input; the named point "P" is the
+    platform's reference point. Raises `GeometryError`: a wheel on the axis of the pinion, or a drive that is not
+    assembled at ``psi``.
 
-    Returns
-    -------
-    Mechanism
-        Driven at the pinion with the common wheel angle psi as input; the named point "P" is the platform's reference
-        point.
-
-    Raises
-    ------
-    GeometryError
-        A wheel on the axis of the pinion, or a drive that is not assembled at ``psi``.
-
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> mechanism = as_mechanism(SingleMotorPlatform())
     >>> mechanism.graph.links, mechanism.mobility().count, mechanism.mobility().by_rank
@@ -137,9 +112,12 @@ def as_mechanism(platform: SingleMotorPlatform, psi: float = 0.0, pose: ArrayLik
         joints += _leg(platform, k)
     driver = Driver(0, 1, Linear(1.0 / platform.gears.ratio))
     return Mechanism(
-        platform.graph(), tuple(joints), (driver,), {"P": TracePoint(14, (0.0, 0.0))},
+        platform.graph(),
+        tuple(joints),
+        (driver,),
+        {"P": TracePoint(14, (0.0, 0.0))},
         tuple((float(x), float(y), float(a)) for x, y, a in poses),
-    )  # fmt: skip
+    )
 
 
 def _leg(platform: SingleMotorPlatform, k: int) -> list[JointGeometry]:
@@ -173,26 +151,9 @@ def _pair(z: complex) -> tuple[float, float]:
 def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, tolerance: float = TOLERANCE) -> LoopClosure:
     """Loop-closure matrix of any planar mechanism at a configuration, with rank and instantaneous motions.
 
-    Parameters
-    ----------
-    mechanism : Mechanism
-    pose : array_like, shape (links, 3), optional
-        Link poses; the mechanism's own by default.
-    tolerance : float, optional
-
-    Returns
-    -------
-    LoopClosure
-
-    Raises
-    ------
-    GeometryError
-        No configuration, or one of another shape.
-
-    Notes
-    -----
-    Loops are the fundamental cycles of a breadth-first spanning tree from the frame.  A gear pair has two freedoms:
-    rolling about the pitch point and sliding along the line of centres (theory/platform-drive 7).
+    `pose` (shape (links, 3)): link poses; the mechanism's own by default. Raises `GeometryError`: no configuration, or
+    one of another shape. Loops are the fundamental cycles of a breadth-first spanning tree from the frame.  A gear pair
+    has two freedoms: rolling about the pitch point and sliding along the line of centres (theory/platform-drive 7).
     """
     from graphsynth.mechanism.rank import characteristic_length
 
@@ -223,8 +184,6 @@ def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, toleran
 def platform_loop_closure(platform: SingleMotorPlatform, psi: float, pose: ArrayLike) -> LoopClosure:
     """Loop-closure matrix (24 x 25) of the single-motor mechanism at one configuration.
 
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> mechanism = SingleMotorPlatform(crank=(10, 5, 1), phase=(0, 0.5, 1))
     >>> found = platform_loop_closure(mechanism, 0.3, mechanism.home_pose(0.3))

@@ -50,13 +50,9 @@ def ripple_gain(ratio: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
 
     ``|dw| sqrt(J_m K_c / L) / F`` and ``|dM| / F`` for a torque disturbance of amplitude F; arrays broadcast.
 
-    Notes
-    -----
     With ``nu = Om/w_n``: ``(4 zeta^2 + nu^2) / ((1 - nu^2)^2 + 4 zeta^2 nu^2)`` and ``1`` over the same denominator.
     The derivative of the first by zeta^2 has the sign of ``1 - 2 nu^2``: theory/motor-drive 5.
 
-    Examples
-    --------
     >>> speed, torque = ripple_gain(2**-0.5, [0.1, 1.0, 10.0])
     >>> speed.round(12).tolist()
     [1.414213562373, 1.414213562373, 1.414213562373]
@@ -132,10 +128,20 @@ def resistance_effect(
         for k, value in enumerate(values):
             found[k] = steady_ripple(replace(drive, motor=replace(motor, resistance=float(value))), revolutions)
     return ResistanceEffect(
-        values, w, inertia, natural, forcing, harmonic, damping, forcing > natural / math.sqrt(2.0), True,
-        np.asarray(size * speed), np.asarray(2.0 * force * torque / (ratio * motor.torque_constant)),
-        found[:, 0], found[:, 1],
-    )  # fmt: skip
+        values,
+        w,
+        inertia,
+        natural,
+        forcing,
+        harmonic,
+        damping,
+        forcing > natural / math.sqrt(2.0),
+        True,
+        np.asarray(size * speed),
+        np.asarray(2.0 * force * torque / (ratio * motor.torque_constant)),
+        found[:, 0],
+        found[:, 1],
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,13 +179,8 @@ def ripple_map(
 ) -> RippleMap:
     """Simulate the steady ripples over resistances (ohm) and inductances (H): the claim's true condition as a map.
 
-    Raises
-    ------
-    SpecError
-        As `resistance_effect`; fewer than two resistances, or not in increasing order.
+    Raises `SpecError`: as `resistance_effect`; fewer than two resistances, or not in increasing order.
 
-    Examples
-    --------
     >>> drive = MotorDrivenPlatform.source(DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
     >>> (ripple_map(drive, [5.0, 20.0], [0.2, 0.01]).speed_slope < 0.0).tolist()
     [[True], [False]]
@@ -191,10 +192,14 @@ def ripple_map(
     if not isinstance(motor, DCMotor):
         raise SpecError(f"{type(motor).__name__} has no armature; give a DCMotor")
     effects = [
-        resistance_effect(replace(drive, motor=replace(motor, inductance=float(x))), r.tolist(), simulate=True,
-                          revolutions=revolutions)
+        resistance_effect(
+            replace(drive, motor=replace(motor, inductance=float(x))),
+            r.tolist(),
+            simulate=True,
+            revolutions=revolutions,
+        )
         for x in L
-    ]  # fmt: skip
+    ]
     speed, current = (
         np.array([getattr(e, name) for e in effects]) for name in ("simulated_speed", "simulated_current")
     )
@@ -220,10 +225,7 @@ def steady_ripple(drive: MotorDrivenPlatform, revolutions: int = 40, rtol: float
 
     Estimated: 240 samples per mean revolution, the extremes through parabolas.  NaN if the run fails.
 
-    Raises
-    ------
-    SpecError
-        For a motor that is no DCMotor.
+    Raises `SpecError` for a motor that is no DCMotor.
     """
     motor = drive.motor
     if not isinstance(motor, DCMotor):

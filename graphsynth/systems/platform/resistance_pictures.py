@@ -19,29 +19,14 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.resistance import ResistanceEffect, RippleMap
 
 
-def resistance_picture(
-    effects: Mapping[str, ResistanceEffect], *, size: tuple[float, float] = (10.0, 4.4)
-) -> Figure:  # fmt: skip
+def resistance_picture(effects: Mapping[str, ResistanceEffect], *, size: tuple[float, float] = (10.0, 4.4)) -> Figure:
     """Draw the resistance claim as a map, and ripples over the resistance: linear (lines) and simulated (dots).
 
     The map shows the linear speed gain over ``Om/w_n`` and ``zeta``; left of the bar at 1/sqrt(2) a larger resistance
     raises the speed ripple, right of it the ripple falls.
 
-    Parameters
-    ----------
-    effects : mapping of str to ResistanceEffect
-        Label and effect, for example one for each inductance.
-    size : tuple of float, optional
-        Inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    SpecError
-        Without any effect.
+    `effects`: label and effect, for example one for each inductance. `size`: inches. Raises `SpecError` without any
+    effect.
     """
     if not effects:
         raise SpecError("there is no effect to draw; give at least one result of resistance_effect")
@@ -50,21 +35,24 @@ def resistance_picture(
     _gain_map(figure, chart)
     for label, effect in effects.items():
         chart.plot(np.full(effect.damping.size, effect.frequency_ratio), effect.damping, "o-", ms=3, lw=0.8, color="k")
-        chart.annotate(label, (effect.frequency_ratio, effect.damping.max()), xytext=(3, 3), fontsize=7,
-                       color=WHITE, textcoords="offset points")  # fmt: skip
+        chart.annotate(
+            label,
+            (effect.frequency_ratio, effect.damping.max()),
+            xytext=(3, 3),
+            fontsize=7,
+            color=WHITE,
+            textcoords="offset points",
+        )
     _ripples(ripples, effects, "speed")
     return figure
 
 
 def ripple_picture(
     effects: Mapping[str, ResistanceEffect], of: str = "speed", *, size: tuple[float, float] = (5.4, 3.4)
-) -> Figure:  # fmt: skip
+) -> Figure:
     """Ripples of the speed or the current over the resistance: linear (lines) and simulated (dots).
 
-    Raises
-    ------
-    SpecError
-        Without any effect, or for another quantity.
+    Raises `SpecError` without any effect, or for another quantity.
     """
     if not effects or of not in ("speed", "current"):
         raise SpecError(f"there is nothing to draw of {of!r}; give effects, and 'speed' or 'current'")
@@ -88,10 +76,6 @@ def ripple_map_picture(found: RippleMap, *, size: tuple[float, float] = (5.4, 4.
     """Draw the simulated truth of the claim: slope of the speed ripple over the resistance; bar: the linear condition.
 
     Blue: the ripple falls with a larger resistance; red: it rises; grey: no result.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     figure = new_figure(size)
     axes = figure.add_subplot()
@@ -99,9 +83,14 @@ def ripple_map_picture(found: RippleMap, *, size: tuple[float, float] = (5.4, 4.
     order = np.argsort(found.frequency_ratio)
     axes.set_facecolor("#999999")
     drawn = axes.pcolormesh(
-        _edges(middle), _edges(found.frequency_ratio[order]), found.speed_slope[order], cmap="RdBu_r", vmin=-1.0,
-        vmax=1.0, rasterized=True,
-    )  # fmt: skip
+        _edges(middle),
+        _edges(found.frequency_ratio[order]),
+        found.speed_slope[order],
+        cmap="RdBu_r",
+        vmin=-1.0,
+        vmax=1.0,
+        rasterized=True,
+    )
     bar = figure.colorbar(drawn, ax=axes, extend="both")
     bar.set_label("d ln(speed ripple) / d ln r")
     axes.axhline(1.0 / math.sqrt(2.0), color="#111111", lw=2.0)

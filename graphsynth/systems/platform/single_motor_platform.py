@@ -147,11 +147,16 @@ class SingleMotorPlatform:
         """The three four-bar drives, each in the frame of its leg."""
         first, second, third = (
             FourBarDrive(
-                self.axis[k], self.pivot[k], self.crank[k], self.coupler[k], self.rocker[k],
-                self.phase[k] - self.frame_angle[k], self.tau[k],
+                self.axis[k],
+                self.pivot[k],
+                self.crank[k],
+                self.coupler[k],
+                self.rocker[k],
+                self.phase[k] - self.frame_angle[k],
+                self.tau[k],
             )
             for k in range(3)
-        )  # fmt: skip
+        )
         return (first, second, third)
 
     @cached_property
@@ -185,11 +190,16 @@ class SingleMotorPlatform:
 
     @cached_property
     def _machine(self) -> Array:
-        return machine_rows(self, directions((
-            self.frame_angle[0] + self.delta[0],
-            self.frame_angle[1] + self.delta[1],
-            self.frame_angle[2] + self.delta[2],
-        )))  # fmt: skip
+        return machine_rows(
+            self,
+            directions(
+                (
+                    self.frame_angle[0] + self.delta[0],
+                    self.frame_angle[1] + self.delta[1],
+                    self.frame_angle[2] + self.delta[2],
+                )
+            ),
+        )
 
     def follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
         """Track the home branch, or the one of ``start``, through wheel angles psi (n,) up to ``stop`` (radians).
@@ -201,9 +211,14 @@ class SingleMotorPlatform:
         """
         guess = np.array(self.home) if start is None else triple("start", start)
         tracked = track(
-            self._machine[None], psi, np.array([stop]), guess[None], self.Lc,
-            grown=start is None, accelerations=accelerations,
-        )  # fmt: skip
+            self._machine[None],
+            psi,
+            np.array([stop]),
+            guess[None],
+            self.Lc,
+            grown=start is None,
+            accelerations=accelerations,
+        )
         self._require_start(BranchEnd(int(tracked.status[0])), float(psi[0]), float(tracked.end[0, 0]))
         return tracked
 
@@ -256,13 +271,19 @@ class SingleMotorPlatform:
         status = BranchEnd(int(tracked.status[0]))
         reason = {BranchEnd.SINGULAR: SINGULAR, BranchEnd.DRIVE_ENDS: barrier.statement if barrier else ""}
         return Sweep(
-            psi=angles, pose=tracked.pose[0], velocity=tracked.velocity[0], theta=tracked.theta[0],
-            theta_velocity=tracked.theta1[0], determinant=tracked.determinant[0],
+            psi=angles,
+            pose=tracked.pose[0],
+            velocity=tracked.velocity[0],
+            theta=tracked.theta[0],
+            theta_velocity=tracked.theta1[0],
+            determinant=tracked.determinant[0],
             acceleration=tracked.acceleration[0] if accelerations else None,
             theta_acceleration=tracked.theta2[0] if accelerations else None,
-            reached=int(tracked.reached[0]), complete=status is BranchEnd.COMPLETE,
-            end=(float(tracked.end[0, 0]), *map(float, tracked.end[0, 1:])), reason=reason.get(status, ""),
-        )  # fmt: skip
+            reached=int(tracked.reached[0]),
+            complete=status is BranchEnd.COMPLETE,
+            end=(float(tracked.end[0, 0]), *map(float, tracked.end[0, 1:])),
+            reason=reason.get(status, ""),
+        )
 
     def full_turn_batch(
         self,
@@ -354,15 +375,27 @@ class SingleMotorPlatform:
         sigma = (int(np.sign(leg[0, 0])), int(np.sign(leg[0, 1])), int(np.sign(leg[0, 2])))
         scale = max(*self.platform.l1, *self.platform.l2) ** 2
         return Motion(
-            psi=psi[:reached], pose=pose, velocity=tracked.velocity[0, :reached],
-            acceleration=tracked.acceleration[0, :reached], theta=theta,
-            determinant=determinant, leg=leg, drive=self.drive(psi[:reached]).h_phi, gap=gap,
+            psi=psi[:reached],
+            pose=pose,
+            velocity=tracked.velocity[0, :reached],
+            acceleration=tracked.acceleration[0, :reached],
+            theta=theta,
+            determinant=determinant,
+            leg=leg,
+            drive=self.drive(psi[:reached]).h_phi,
+            gap=gap,
             residual=float(np.abs(self.platform.closure(pose, theta)).max()) / scale,
-            complete=complete and not mismatch.any(), closed=period > 0, closure_error=error, period=period,
+            complete=complete and not mismatch.any(),
+            closed=period > 0,
+            closure_error=error,
+            period=period,
             events=tuple(events(self, psi, tracked, barrier, leg, mismatch)),
             label=BranchLabel(self.tau, sigma, int(np.sign(determinant[0])), rank, 0),
-            Lc=self.Lc, method=_METHOD, seconds=perf_counter() - begin, monodromy=monodromy,
-        )  # fmt: skip
+            Lc=self.Lc,
+            method=_METHOD,
+            seconds=perf_counter() - begin,
+            monodromy=monodromy,
+        )
 
     def all_poses(self, psi: float) -> Array:
         """All assembly modes for the drive branches of this mechanism at ``psi``, shape (m, 3)."""

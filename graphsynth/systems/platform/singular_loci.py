@@ -26,19 +26,13 @@ _ARC_SAMPLES = 400
 class SingularCurve:
     """One curve ``det JX = 0`` of one working mode.
 
-    Attributes
-    ----------
-    sigma : tuple of int
-        Working mode.
-    points : ndarray of complex, shape (n,)
-        Positions of the platform, in order; the first is repeated at the end of a closed curve.
-    theta : ndarray, shape (n, 3)
-        Rocker angles, continuous along the curve.
-    ends : tuple of int
-        Legs (1 to 3) on whose type-I circles the curve begins and ends; empty if it is closed.  0 marks an end that
-        was lost (the step became too small); see ``complete``.
-    residual : float
-        Largest closure error and ``|det JX|``, relative to powers of the characteristic length.
+    * `sigma`: working mode.
+    * `points` (shape (n,), complex): positions of the platform, in order; the first is repeated at the end of a closed
+      curve.
+    * `theta` (shape (n, 3)): rocker angles, continuous along the curve.
+    * `ends`: legs (1 to 3) on whose type-I circles the curve begins and ends; empty if it is closed.  0 marks an end
+      that was lost (the step became too small); see ``complete``.
+    * `residual`: largest closure error and ``|det JX|``, relative to powers of the characteristic length.
     """
 
     sigma: tuple[int, int, int]
@@ -62,17 +56,10 @@ class SingularCurve:
 class SingularLoci:
     """Loci at one orientation.
 
-    Attributes
-    ----------
-    alpha : float
-    circles : tuple of BoundaryCircle
-        Type I, the same for all working modes; exact.
-    curves : tuple of SingularCurve
-        Type II; estimated, see `type_two_curves`.
-    points : tuple of (sigma, complex)
-        Isolated points of type II, where a loop has shrunk to a point; see `isolated_singular_points`.
-    nodes : int
-        Of the grid.
+    * `circles`: type I, the same for all working modes; exact.
+    * `curves`: type II; estimated, see `type_two_curves`.
+    * `points`: isolated points of type II, where a loop has shrunk to a point; see `isolated_singular_points`.
+    * `nodes`: of the grid.
     """
 
     alpha: float
@@ -96,8 +83,6 @@ def type_one_circles(platform: ParallelPlatform, alpha: float) -> tuple[Boundary
 def singular_loci(platform: ParallelPlatform, alpha: float, *, nodes: int = 120) -> SingularLoci:
     """Type-I circles and the type-II curves of all eight working modes at orientation ``alpha`` (radians).
 
-    Examples
-    --------
     >>> loci = singular_loci(ParallelPlatform.mock(), 0.0, nodes=60)
     >>> len(loci.circles), all(curve.residual < 1e-12 for curve in loci.curves)
     (6, True)
@@ -114,30 +99,11 @@ def type_two_curves(
 ) -> tuple[SingularCurve, ...]:
     """Curves ``det JX = 0`` of a working mode at a fixed orientation.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    alpha : float
-        Orientation, radians.
-    sigma : tuple of 3 of {+1, -1}
-    nodes : int, optional
-        Grid nodes along x and y.
-
-    Returns
-    -------
-    tuple of SingularCurve
-        Every point satisfies the equations to rounding.  That no curve is missing is estimated: those that end on the
-        boundary of the workspace are found by sign changes along it (400 samples per arc), closed loops by sign changes
-        on the grid, so a loop smaller than a cell can be missed.
-
-    Raises
-    ------
-    GeometryError
-        A leg with a link of length zero (its working modes coincide), or fewer than 8 nodes.
-
-    Notes
-    -----
-    See theory/platform-workspace 2; pseudo-arclength continuation: [Allgower & Georg 1990].
+    `alpha`: orientation, radians. `sigma`: of {+1, -1}. `nodes`: grid nodes along x and y. Every point satisfies the
+    equations to rounding.  That no curve is missing is estimated: those that end on the boundary of the workspace are
+    found by sign changes along it (400 samples per arc), closed loops by sign changes on the grid, so a loop smaller
+    than a cell can be missed. Raises `GeometryError`: a leg with a link of length zero (its working modes coincide), or
+    fewer than 8 nodes. See theory/platform-workspace 2; pseudo-arclength continuation: [Allgower & Georg 1990].
     """
     mode = working_mode(sigma)
     alpha = finite("alpha", alpha)
@@ -188,8 +154,6 @@ def isolated_singular_points(
     Local minima of ``|det JX|`` on the grid are refined on smaller grids; kept if the value is below 1e-10 of the
     product of the rows of JX (estimated; such points exist at single orientations only).
 
-    Examples
-    --------
     >>> import numpy as np
     >>> points = isolated_singular_points(ParallelPlatform.mock(), 2.0 * np.arctan(3.0 / 7.0), (-1, -1, -1))
     >>> len(points), abs(points[0]) < 1e-3

@@ -23,32 +23,20 @@ TOLERANCE = 1e-9
 class Singularity:
     """Type of a pose and its margins (estimated: floating point; the decision depends on ``tolerance``).
 
-    Attributes
-    ----------
-    kind : str
-        "regular", "I", "II" or "III".
-    legs : tuple of int
-        Legs (1 to 3) that are stretched or folded (type I).
-    uncontrolled : ndarray, shape (m, 3)
-        Motions ``(dx, dy, dalpha)`` possible with all rockers held (type II), each of scaled norm
-        ``sqrt((dx^2 + dy^2) / Lc^2 + dalpha^2) = 1``; m = 0 if the platform is held.
-    centre : complex
-        Centre of the uncontrolled rotation; NaN for a translation, or if there is none or more than one motion.
-    self_stress : ndarray, shape (m, 3)
-        Axial forces of the links that are in balance without any load (type II), each of norm 1.
-    lost : ndarray, shape (n, 3)
-        For every leg of type I the wrench direction ``(d_x, d_y, cross(F - p, d))`` in which its rocker cannot move the
-        platform: admissible velocities do no work on it.
-    determinant : float
-        ``det JX``, length^4.
-    smallest : float
-        Smallest singular value of ``JX diag(1, 1, 1/Lc)``, length.
-    ratio : float
-        The smallest over the largest singular value.
-    sines : tuple of 3 floats
-        ``sigma_k S_k / (2 l1 l2)``: sine of the angle between rocker and link, signed by the working mode.
-    Lc, tolerance : float
-        Characteristic length; bound of ``ratio`` and of ``|sines|``.
+    * `kind`: "regular", "I", "II" or "III".
+    * `legs`: legs (1 to 3) that are stretched or folded (type I).
+    * `uncontrolled` (shape (m, 3)): motions ``(dx, dy, dalpha)`` possible with all rockers held (type II), each of
+      scaled norm ``sqrt((dx^2 + dy^2) / Lc^2 + dalpha^2) = 1``; m = 0 if the platform is held.
+    * `centre`: centre of the uncontrolled rotation; NaN for a translation, or if there is none or more than one motion.
+    * `self_stress` (shape (m, 3)): axial forces of the links that are in balance without any load (type II), each of
+      norm 1.
+    * `lost` (shape (n, 3)): for every leg of type I the wrench direction ``(d_x, d_y, cross(F - p, d))`` in which its
+      rocker cannot move the platform: admissible velocities do no work on it.
+    * `determinant`: ``det JX``, length^4.
+    * `smallest`: smallest singular value of ``JX diag(1, 1, 1/Lc)``, length.
+    * `ratio`: the smallest over the largest singular value.
+    * `sines`: ``sigma_k S_k / (2 l1 l2)``: sine of the angle between rocker and link, signed by the working mode.
+    * `Lc`, `tolerance`: characteristic length; bound of ``ratio`` and of ``|sines|``.
     """
 
     kind: str
@@ -69,10 +57,7 @@ class Singularity:
 def closed_pose(platform: ParallelPlatform, pose: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
     """Check one pose with its rocker angles: finite, and closed to 1e-6 of the longest link.
 
-    Raises
-    ------
-    GeometryError
-        Not three numbers each, or legs that do not close.
+    Raises `GeometryError`: not three numbers each, or legs that do not close.
     """
     X, t = finite_array("pose", pose).reshape(-1), finite_array("theta", theta).reshape(-1)
     if X.shape != (3,) or t.shape != (3,):
@@ -98,30 +83,10 @@ def singularity(
 ) -> Singularity:
     """Classify a pose and give the motions and forces that are not determined there.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    pose, theta : array_like, shape (3,)
-        A closed pose.
-    Lc : float, optional
-        Characteristic length; the largest distance of a vertex from the reference point by default.
-    tolerance : float, optional
+    `pose`, `theta` (shape (3,)): a closed pose. `Lc`: characteristic length; the largest distance of a vertex from the
+    reference point by default. Raises `GeometryError` if the legs are not closed. [Gosselin & Angeles 1990];
+    theory/platform-jacobians 3.
 
-    Returns
-    -------
-    Singularity
-
-    Raises
-    ------
-    GeometryError
-        If the legs are not closed.
-
-    Notes
-    -----
-    [Gosselin & Angeles 1990]; theory/platform-jacobians 3.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> mock = ParallelPlatform.mock()
     >>> pose = [0.0, 0.0, 2.0 * np.arctan(3.0 / 7.0)]
@@ -146,9 +111,19 @@ def singularity(
     lost = np.array([0.5 * JX[k - 1] for k in legs]).reshape(-1, 3)
     kind = ("regular", "I", "II", "III")[bool(legs) + 2 * bool(free.any())]
     return Singularity(
-        kind, legs, uncontrolled, _centre(X, uncontrolled), stress, lost, float(np.linalg.det(JX)), float(values[-1]),
-        float(values[-1]) / largest, (float(sines[0]), float(sines[1]), float(sines[2])), length, tolerance,
-    )  # fmt: skip
+        kind,
+        legs,
+        uncontrolled,
+        _centre(X, uncontrolled),
+        stress,
+        lost,
+        float(np.linalg.det(JX)),
+        float(values[-1]),
+        float(values[-1]) / largest,
+        (float(sines[0]), float(sines[1]), float(sines[2])),
+        length,
+        tolerance,
+    )
 
 
 def _oriented(row: Array) -> Array:

@@ -23,13 +23,10 @@ Array = NDArray[np.float64]
 class Harmonics:
     """Harmonics ``X(psi) = mean + Re sum_m amplitudes[m - 1] exp(i m psi)`` of every coordinate.
 
-    Attributes
-    ----------
-    mean : ndarray, shape (d,)
-    amplitudes : ndarray of complex, shape (M, d)
-        ``c_m = (2/N) sum X exp(-i m psi)`` for m = 1 to M, M below N/2.
-    tail : ndarray, shape (d,)
-        Largest magnitude among the last quarter of the harmonics: an estimate of the truncation error.
+    * `mean`: shape (d,).
+    * `amplitudes` (shape (M, d), complex): ``c_m = (2/N) sum X exp(-i m psi)`` for m = 1 to M, M below N/2.
+    * `tail` (shape (d,)): largest magnitude among the last quarter of the harmonics: an estimate of the truncation
+      error.
     """
 
     mean: Array
@@ -39,10 +36,7 @@ class Harmonics:
     def order(self, m: int) -> NDArray[np.complex128]:
         """Amplitudes of harmonic m (from 1), shape (d,).
 
-        Raises
-        ------
-        GeometryError
-            A harmonic that the samples do not resolve.
+        Raises `GeometryError`: a harmonic that the samples do not resolve.
         """
         if not 1 <= m <= len(self.amplitudes):
             raise GeometryError(f"harmonic {m} is not resolved; choose 1 to {len(self.amplitudes)} or more samples")
@@ -60,10 +54,7 @@ class Harmonics:
     def total_distortion(self, Lc: float) -> float:
         """Return the distortion of the whole pose (x, y, alpha), angles multiplied by ``Lc``.
 
-        Raises
-        ------
-        GeometryError
-            Harmonics of something that is no pose.
+        Raises `GeometryError`: harmonics of something that is no pose.
         """
         weight = np.array([1.0, 1.0, positive("Lc", Lc)])
         if self.mean.shape != (3,):
@@ -77,24 +68,10 @@ class Harmonics:
 def harmonics(samples: ArrayLike) -> Harmonics:
     """Analyse samples at ``psi = 2 pi j / N``, j = 0 to N - 1 (the end of the turn left out).
 
-    Parameters
-    ----------
-    samples : array_like, shape (N,) or (N, d)
-        N at least 4.
+    `samples` (shape (N,) or (N, d)): n at least 4. Exact for trigonometric polynomials of degree below N/2; for
+    analytic motions the error falls faster than any power of N. Raises `GeometryError`: fewer than 4 samples, or
+    samples that are not finite.
 
-    Returns
-    -------
-    Harmonics
-        Exact for trigonometric polynomials of degree below N/2; for analytic motions the error falls faster than any
-        power of N.
-
-    Raises
-    ------
-    GeometryError
-        Fewer than 4 samples, or samples that are not finite.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> psi = 2.0 * np.pi * np.arange(16) / 16
     >>> found = harmonics(1.0 + 2.0 * np.cos(psi) + 0.1 * np.sin(2 * psi))
@@ -120,20 +97,12 @@ Complex = NDArray[np.complex128]
 class SmallCrank:
     """The mechanism at zero crank length and its first and second order in the cranks.
 
-    Attributes
-    ----------
-    home : ndarray, shape (3,)
-        Pose for zero cranks.
-    theta, phi : ndarray, shape (3,)
-        Rocker angles there, towards platform and drive, fixed frame.
-    J : ndarray, shape (3, 3)
-        Velocity matrix there.
-    coupler_direction : ndarray, shape (3,)
-        ``beta_u``, angle of the coupler from crank to rocker, fixed frame.
-    sine, cosine : ndarray, shape (3,)
-        ``s``, ``c`` of ``gamma = beta_u - phi``; transmission is good for s near +1 or -1.
-    crank, phase, coupler, rocker : ndarray, shape (3,)
-        Dimensions of the drives.
+    * `home` (shape (3,)): pose for zero cranks.
+    * `theta`, `phi` (shape (3,)): rocker angles there, towards platform and drive, fixed frame.
+    * `J` (shape (3, 3)): velocity matrix there.
+    * `coupler_direction` (shape (3,)): ``beta_u``, angle of the coupler from crank to rocker, fixed frame.
+    * `sine`, `cosine` (shape (3,)): ``s``, ``c`` of ``gamma = beta_u - phi``; transmission is good for s near +1 or -1.
+    * `crank`, `phase`, `coupler`, `rocker` (shape (3,)): dimensions of the drives.
     """
 
     home: Array
@@ -208,17 +177,9 @@ class CrankScale(NamedTuple):
 def small_crank(mechanism: SingleMotorPlatform) -> SmallCrank:
     """Evaluate the small-crank theory at the home pose.
 
-    Raises
-    ------
-    GeometryError
-        If the mechanism has no regular home pose: a drive that locks there, or a singular platform.
-
-    Notes
-    -----
+    Raises `GeometryError` if the mechanism has no regular home pose: a drive that locks there, or a singular platform.
     See theory/small-crank.
 
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> theory = small_crank(SingleMotorPlatform(crank=(9.0, 9.0, 9.0)))
     >>> theory.second_over_first.round(12).tolist()  # l_B / (4 l_BC)
@@ -241,9 +202,18 @@ def small_crank(mechanism: SingleMotorPlatform) -> SmallCrank:
                 f"drive {k + 1} locks at home: coupler and rocker in line; change the coupler or the distance of axes"
             )
     return SmallCrank(
-        home, state.theta, phi, mechanism.platform.velocity_matrix(home, state.theta), direction, sine, np.cos(gamma),
-        np.array(mechanism.crank), np.array(mechanism.phase), np.array(mechanism.coupler), np.array(mechanism.rocker),
-    )  # fmt: skip
+        home,
+        state.theta,
+        phi,
+        mechanism.platform.velocity_matrix(home, state.theta),
+        direction,
+        sine,
+        np.cos(gamma),
+        np.array(mechanism.crank),
+        np.array(mechanism.phase),
+        np.array(mechanism.coupler),
+        np.array(mechanism.rocker),
+    )
 
 
 @checked
@@ -254,13 +224,8 @@ def crank_scaling(
 
     Distortion and mean fall in proportion to the scale, the error of the first harmonic with its square.
 
-    Raises
-    ------
-    GeometryError
-        If a turn is not complete at some scale.
+    Raises `GeometryError` if a turn is not complete at some scale.
 
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> large, small = crank_scaling(SingleMotorPlatform(crank=(4.0, 4.0, 4.0)), (1.0, 0.5))
     >>> round(large.second / small.second, 1), round(large.first_error / small.first_error, 1)

@@ -24,17 +24,11 @@ if TYPE_CHECKING:
 class PlatformMotion:
     """One turn of the wheels, with every joint for the pictures.
 
-    Attributes
-    ----------
-    mechanism : SingleMotorPlatform
-    motion : Motion
-        What the module computed; shorter than asked for if the branch ends.
-    O, D : ndarray of complex, shape (3,)
-        Wheel axes and rocker pivots, fixed frame, millimetres.
-    B, C, A, F : ndarray of complex, shape (n, 3)
-        Crank pins, drive joints of the rockers, platform joints of the rockers, platform corners.
-    wheel_radius : float
-        Pitch radius, millimetres.
+    * `motion`: what the module computed; shorter than asked for if the branch ends.
+    * `O`, `D` (shape (3,), complex): wheel axes and rocker pivots, fixed frame, millimetres.
+    * `B`, `C`, `A`, `F` (shape (n, 3), complex): crank pins, drive joints of the rockers, platform joints of the
+      rockers, platform corners.
+    * `wheel_radius`: pitch radius, millimetres.
     """
 
     mechanism: SingleMotorPlatform
@@ -70,10 +64,7 @@ def kinematics(context: Context, recognised: tuple[Recognised, ...]) -> tuple[At
 def platform_of(context: Context) -> SingleMotorPlatform:
     """Return the platform with the dimensions of the scene, not moved yet.
 
-    Raises
-    ------
-    GeometryError
-        For dimensions that no platform can have.
+    Raises `GeometryError` for dimensions that no platform can have.
     """
     return _mechanism(_table(context))
 

@@ -23,20 +23,13 @@ Array = NDArray[np.float64]
 class Statics:
     """Forces that hold the platform against a wrench (massless, frictionless links; estimated: floating point).
 
-    Attributes
-    ----------
-    status : str
-        "balanced"; "cannot be balanced" (type II, the wrench does work on the uncontrolled motion: all forces NaN);
-        "indeterminate" (type II, it does none: the forces of least norm, any multiple of ``singularity.self_stress``
-        may be added).
-    rocker_torque : ndarray, shape (3,)
-        Torques at the rockers, force x length.
-    link_force : ndarray, shape (3,)
-        Axial forces of the intermediate links, positive when the link pushes.
-    unbalanced_power : ndarray, shape (m,)
-        Work of the wrench on each uncontrolled motion of ``singularity.uncontrolled``.
-    singularity : Singularity
-        Type of the pose, with the uncontrolled motion.
+    * `status`: "balanced"; "cannot be balanced" (type II, the wrench does work on the uncontrolled motion: all forces
+      NaN); "indeterminate" (type II, it does none: the forces of least norm, any multiple of
+      ``singularity.self_stress`` may be added).
+    * `rocker_torque` (shape (3,)): torques at the rockers, force x length.
+    * `link_force` (shape (3,)): axial forces of the intermediate links, positive when the link pushes.
+    * `unbalanced_power` (shape (m,)): work of the wrench on each uncontrolled motion of ``singularity.uncontrolled``.
+    * `singularity`: type of the pose, with the uncontrolled motion.
     """
 
     status: str
@@ -50,19 +43,11 @@ class Statics:
 class CrankStatics:
     """Forces through the single-motor mechanism.
 
-    Attributes
-    ----------
-    status : str
-        As in `Statics`; also "drive k locked", where no crank torque gives a rocker torque, with NaN.
-    crank_torque : float
-        Torque at the common wheel axis (sum over the three wheels), ``(dX/dpsi)^T W``.
-    motor_torque : float
-        Torque at the pinion for lossless gears, with the sign of its own rotation.
-    coupler_force : ndarray, shape (3,)
-        Axial forces of the couplers, positive when the coupler pushes.
-    shares : ndarray, shape (3,)
-        Crank torque of each drive.
-    platform : Statics
+    * `status`: as in `Statics`; also "drive k locked", where no crank torque gives a rocker torque, with NaN.
+    * `crank_torque`: torque at the common wheel axis (sum over the three wheels), ``(dX/dpsi)^T W``.
+    * `motor_torque`: torque at the pinion for lossless gears, with the sign of its own rotation.
+    * `coupler_force` (shape (3,)): axial forces of the couplers, positive when the coupler pushes.
+    * `shares` (shape (3,)): crank torque of each drive.
     """
 
     status: str
@@ -85,32 +70,11 @@ def statics(
 ) -> Statics:
     """Rocker torques and link forces for the wrench that the platform exerts on its surroundings.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    pose, theta : array_like, shape (3,)
-        A closed pose.
-    wrench : array_like, shape (3,)
-        ``(W_x, W_y, W_alpha)``: force and moment about the reference point.
-    Lc, tolerance : float, optional
-        See `graphsynth.systems.platform.singularity.singularity`.
+    `pose`, `theta` (shape (3,)): a closed pose. `wrench` (shape (3,)): ``(W_x, W_y, W_alpha)``: force and moment about
+    the reference point. `Lc`, `tolerance`: see `graphsynth.systems.platform.singularity.singularity`. Raises
+    `GeometryError`: a wrench without three components, or legs that do not close. See theory/platform-jacobians 4:
+    ``JX^T lambda = W``, ``tau_k = -JT_kk lambda_k``, axial force ``2 l2_k lambda_k``.
 
-    Returns
-    -------
-    Statics
-
-    Raises
-    ------
-    GeometryError
-        A wrench without three components, or legs that do not close.
-
-    Notes
-    -----
-    See theory/platform-jacobians 4: ``JX^T lambda = W``, ``tau_k = -JT_kk lambda_k``, axial force
-    ``2 l2_k lambda_k``.
-
-    Examples
-    --------
     >>> mock = ParallelPlatform.mock()
     >>> theta = mock.inverse([0.0, 0.0, 0.0], (-1, -1, -1)).theta
     >>> statics(mock, [0.0, 0.0, 0.0], theta, [0.0, 0.0, 72.0]).rocker_torque.round(9).tolist()
@@ -139,32 +103,11 @@ def crank_statics(
 ) -> CrankStatics:
     """Crank torque, motor torque and coupler forces of the single-motor mechanism at one configuration.
 
-    Parameters
-    ----------
-    mechanism : SingleMotorPlatform
-    psi : float
-        Wheel angle, radians.
-    pose : array_like, shape (3,)
-        Platform pose that belongs to it (a row of ``full_turn().pose``).
-    wrench : array_like, shape (3,)
-        Wrench that the platform exerts on its surroundings.
+    `psi`: wheel angle, radians. `pose` (shape (3,)): platform pose that belongs to it (a row of ``full_turn().pose``).
+    `wrench` (shape (3,)): wrench that the platform exerts on its surroundings. Raises `GeometryError`: an angle at
+    which a drive cannot be assembled, or a wrench without three components. See theory/platform-jacobians 4 and
+    theory/platform-drive 3.  At a dead point of a rocker its share of the crank torque is zero whatever the load.
 
-    Returns
-    -------
-    CrankStatics
-
-    Raises
-    ------
-    GeometryError
-        An angle at which a drive cannot be assembled, or a wrench without three components.
-
-    Notes
-    -----
-    See theory/platform-jacobians 4 and theory/platform-drive 3.  At a dead point of a rocker its share of the crank
-    torque is zero whatever the load.
-
-    Examples
-    --------
     >>> from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
     >>> mechanism = SingleMotorPlatform()
     >>> held = crank_statics(mechanism, 0.0, mechanism.home_pose(0.0), [1.0, 0.0, 0.0])

@@ -61,9 +61,15 @@ def cold_sweep(mechanism: SingleMotorPlatform, samples: int) -> Sweep:
     if not motion.working_mode_constant:
         return _failed(mechanism, "a leg passes its boundary: the working mode changes during the turn")
     return Sweep(
-        mechanism, motion.psi[:-1], motion.pose[:-1], motion.theta[:-1], motion.drive[:-1], motion.label.sigma,
-        motion.label.sign, "",
-    )  # fmt: skip
+        mechanism,
+        motion.psi[:-1],
+        motion.pose[:-1],
+        motion.theta[:-1],
+        motion.drive[:-1],
+        motion.label.sigma,
+        motion.label.sign,
+        "",
+    )
 
 
 def _drives(mechanism: SingleMotorPlatform) -> str:

@@ -30,10 +30,7 @@ Array = NDArray[np.float64]
 def wheel_angles(samples: int | ArrayLike) -> Array:
     """Return increasing wheel angles (radians): those given, or so many over one turn.
 
-    Raises
-    ------
-    GeometryError
-        Fewer than two samples, angles that are not finite or do not increase.
+    Raises `GeometryError`: fewer than two samples, angles that are not finite or do not increase.
     """
     if isinstance(samples, int | np.integer):
         if samples < 2:
@@ -46,24 +43,18 @@ def wheel_angles(samples: int | ArrayLike) -> Array:
 
 
 def events(
-    machine: SingleMotorPlatform, psi: Array, tracked: Tracked, barrier: Event | None, leg: Array,
+    machine: SingleMotorPlatform,
+    psi: Array,
+    tracked: Tracked,
+    barrier: Event | None,
+    leg: Array,
     mismatch: NDArray[np.bool_],
-) -> list[Event]:  # fmt: skip
+) -> list[Event]:
     """Events of one tracked branch in order: its end, dead points, boundaries of the legs, modes not found.
 
-    Parameters
-    ----------
-    machine : SingleMotorPlatform
-    psi : ndarray, shape (n,)
-        Wheel angles asked for, radians.
-    tracked : Tracked
-        One branch.
-    barrier : Event, optional
-        First end of a drive in the range.
-    leg : ndarray, shape (reached, 3)
-        ``JT_kk`` at the samples reached.
-    mismatch : ndarray of bool, shape (reached,)
-        Samples whose pose is not among the computed assembly modes.
+    `psi` (shape (n,)): wheel angles asked for, radians. `tracked`: one branch. `barrier`: first end of a drive in the
+    range. `leg` (shape (reached, 3)): ``JT_kk`` at the samples reached. `mismatch` (shape (reached,)): samples whose
+    pose is not among the computed assembly modes.
     """
     found: list[Event] = []
     end, status = float(psi[-1]), BranchEnd(int(tracked.status[0]))
@@ -165,8 +156,24 @@ def machine_rows(mechanism: SingleMotorPlatform, bell: NDArray[np.complex128]) -
     for k, drive in enumerate(mechanism.drives):
         w, D, b = drive.axis - drive.pivot, P.D[k], P.b[k]
         fixed = (bell[k].real, bell[k].imag, mechanism.frame_angle[k] + mechanism.delta[k])
-        rows.append([w.real, w.imag, drive.crank, drive.phase, drive.rocker, drive.tau, *constants[k, :6], *fixed,
-                     D.real, D.imag, P.l1[k], b.real, b.imag, P.l2[k]])  # fmt: skip
+        rows.append(
+            [
+                w.real,
+                w.imag,
+                drive.crank,
+                drive.phase,
+                drive.rocker,
+                drive.tau,
+                *constants[k, :6],
+                *fixed,
+                D.real,
+                D.imag,
+                P.l1[k],
+                b.real,
+                b.imag,
+                P.l2[k],
+            ]
+        )
     return np.array(rows)
 
 
@@ -189,12 +196,19 @@ def turn_batch(
     guess = np.repeat(np.array(mechanism.home)[None], len(l_B), axis=0)
     tracked = track(machines, psi, stops, guess, mechanism.Lc, grown=True, accelerations=accelerations)
     return TurnBatch(
-        psi=psi, pose=tracked.pose, velocity=tracked.velocity, theta=tracked.theta, theta_velocity=tracked.theta1,
-        determinant=tracked.determinant, acceleration=tracked.acceleration if accelerations else None,
-        theta_acceleration=tracked.theta2 if accelerations else None, status=tracked.status.astype(np.int8),
-        reached=tracked.reached, end=tracked.end,
+        psi=psi,
+        pose=tracked.pose,
+        velocity=tracked.velocity,
+        theta=tracked.theta,
+        theta_velocity=tracked.theta1,
+        determinant=tracked.determinant,
+        acceleration=tracked.acceleration if accelerations else None,
+        theta_acceleration=tracked.theta2 if accelerations else None,
+        status=tracked.status.astype(np.int8),
+        reached=tracked.reached,
+        end=tracked.end,
         closure_error=np.asarray(distance(tracked.pose[:, -1], tracked.pose[:, 0], mechanism.Lc)),
-    )  # fmt: skip
+    )
 
 
 def _sets(
@@ -233,9 +247,14 @@ def monodromy(mechanism: SingleMotorPlatform, psi: Array) -> Monodromy:
     barrier = first_barrier(mechanism.drives, float(psi[0]), float(psi[-1]))
     stop = np.inf if barrier is None else barrier.psi
     tracked = track(
-        np.repeat(mechanism._machine[None], len(modes), axis=0), psi, np.full(len(modes), stop), modes, mechanism.Lc,
-        grown=False, accelerations=False,
-    )  # fmt: skip
+        np.repeat(mechanism._machine[None], len(modes), axis=0),
+        psi,
+        np.full(len(modes), stop),
+        modes,
+        mechanism.Lc,
+        grown=False,
+        accelerations=False,
+    )
     permutation, reasons = [], []
     for i in range(len(modes)):
         status, reason, target = BranchEnd(int(tracked.status[i])), "", -1

@@ -66,30 +66,17 @@ class Workspace:
 
     Exact but for rounding, unless ``contacts`` reports circles that touch: there the arcs depend on the last digits.
 
-    Attributes
-    ----------
-    platform : ParallelPlatform
-    alpha : float
-        Orientation, radians.
-    sigma : tuple of int or None
-        Working mode of the joint limits; None without limits (the workspace is then the same for all modes).
-    limits : tuple of 3
-        Range of each rocker angle, or None.
-    arcs : tuple of Arc
-        The boundary, with leg and side of every piece.
-    area, perimeter : float
-        Length^2 and length.  A workspace that has shrunk to a curve has area 0 and its length as perimeter.
-    loops : tuple of tuple of int
-        Arcs (indices) in order around each closed boundary.
-    components, holes : int
-        Connected parts and holes.
-    isolated : tuple of complex
-        Single points that belong to the workspace but to no arc.
-    contacts : tuple of Contact
-    dimension : int
-        2, or 1 for a curve, 0 for single points, -1 if the workspace is empty.
-    tolerance : float
-        Distance below which circles count as touching, length.
+    * `alpha`: orientation, radians.
+    * `sigma`: working mode of the joint limits; None without limits (the workspace is then the same for all modes).
+    * `limits`: range of each rocker angle, or None.
+    * `arcs`: the boundary, with leg and side of every piece.
+    * `area`, `perimeter`: length^2 and length.  A workspace that has shrunk to a curve has area 0 and its length as
+      perimeter.
+    * `loops`: arcs (indices) in order around each closed boundary.
+    * `components`, `holes`: connected parts and holes.
+    * `isolated`: single points that belong to the workspace but to no arc.
+    * `dimension`: 2, or 1 for a curve, 0 for single points, -1 if the workspace is empty.
+    * `tolerance`: distance below which circles count as touching, length.
     """
 
     platform: ParallelPlatform
@@ -150,33 +137,12 @@ def constant_orientation_workspace(
 ) -> Workspace:
     """Workspace at a fixed orientation: the intersection of three annuli, as circular arcs.
 
-    Parameters
-    ----------
-    platform : ParallelPlatform
-    alpha : float
-        Orientation, radians.
-    sigma : sequence of 3 of {+1, -1}, optional
-        Working mode; needed with ``limits``, without effect otherwise.
-    limits : sequence of 3 of (low, high) or None, optional
-        Ranges of the rocker angles theta_k, radians, ``low < high < low + 2 pi``.  The boundary stays made of arcs.
-    tolerance : float, optional
-        Circles closer to touching than this fraction of the largest length are reported as contacts.
+    `alpha`: orientation, radians. `sigma` (of {+1, -1}): working mode; needed with ``limits``, without effect
+    otherwise. `limits`: ranges of the rocker angles theta_k, radians, ``low < high < low + 2 pi``.  The boundary stays
+    made of arcs. `tolerance`: circles closer to touching than this fraction of the largest length are reported as
+    contacts. Raises `GeometryError`: limits without a working mode, an empty range, or limits on a leg with a link of
+    length zero. See theory/platform-workspace 1; a rocker at its limit adds the circle of radius l2 about its end.
 
-    Returns
-    -------
-    Workspace
-
-    Raises
-    ------
-    GeometryError
-        Limits without a working mode, an empty range, or limits on a leg with a link of length zero.
-
-    Notes
-    -----
-    See theory/platform-workspace 1; a rocker at its limit adds the circle of radius l2 about its end.
-
-    Examples
-    --------
     >>> work = constant_orientation_workspace(ParallelPlatform.mock(), 0.0)
     >>> round(work.area, 6), round(work.perimeter, 9), sorted({arc.circle.side for arc in work.arcs})
     (3808.301448, 239.558260217, ['outer'])
@@ -193,10 +159,21 @@ def constant_orientation_workspace(
     signed = [sum(_sector(arcs[i], circles[0].centre) for i in loop) for loop in loops]
     dimension = (2 if thin is None else 1) if arcs else (0 if isolated else -1)
     return Workspace(
-        platform, alpha, mode, bounds, tuple(arcs), math.fsum(signed), math.fsum(arc.length for arc in arcs),
-        loops, sum(part > 0.0 for part in signed) if thin is None else 0, sum(part < 0.0 for part in signed),
-        tuple(isolated), tuple(problem.contacts), dimension, problem.tolerance,
-    )  # fmt: skip
+        platform,
+        alpha,
+        mode,
+        bounds,
+        tuple(arcs),
+        math.fsum(signed),
+        math.fsum(arc.length for arc in arcs),
+        loops,
+        sum(part > 0.0 for part in signed) if thin is None else 0,
+        sum(part < 0.0 for part in signed),
+        tuple(isolated),
+        tuple(problem.contacts),
+        dimension,
+        problem.tolerance,
+    )
 
 
 def _checked(

@@ -82,9 +82,19 @@ def drive_at(p, scaled, psi, parameter, e):
         bx, by = (ax, ay) if scaled else (-ay, ax)
         f = parameter if scaled else 1.0
         _y, _x, c, t, rate, _lx, _ly, _half = rocker(
-            p[k, 0] + f * ax, p[k, 1] + f * ay, bx, by, p[k, 4], p[k, 5],
-            p[k, 6], p[k, 7], p[k, 8], p[k, 9], p[k, 10], p[k, 11],
-        )  # fmt: skip
+            p[k, 0] + f * ax,
+            p[k, 1] + f * ay,
+            bx,
+            by,
+            p[k, 4],
+            p[k, 5],
+            p[k, 6],
+            p[k, 7],
+            p[k, 8],
+            p[k, 9],
+            p[k, 10],
+            p[k, 11],
+        )
         arm(p, k, c * p[k, 12] - t * p[k, 13], c * p[k, 13] + t * p[k, 12], rate, e)
 
 
@@ -229,15 +239,9 @@ def finish(p, m, weight, cs, sn, e1, e2, e3, w):
     for i in range(m):
         x, y, cz, sz = w[PX + i], w[PY + i], cs[i], sn[i]
         a1, a2, a3 = e1[2 * BLOCK + i], e2[2 * BLOCK + i], e3[2 * BLOCK + i]
-        dx1, dy1, m1, f1, r1x, r1y, z1x, z1y = leg_row(
-            x, y, cz, sz, d1x, d1y, q1, b1x, b1y, l1, e1[i], e1[BLOCK + i]
-        )  # fmt: skip
-        dx2, dy2, m2, f2, r2x, r2y, z2x, z2y = leg_row(
-            x, y, cz, sz, d2x, d2y, q2, b2x, b2y, l2, e2[i], e2[BLOCK + i]
-        )  # fmt: skip
-        dx3, dy3, m3, f3, r3x, r3y, z3x, z3y = leg_row(
-            x, y, cz, sz, d3x, d3y, q3, b3x, b3y, l3, e3[i], e3[BLOCK + i]
-        )  # fmt: skip
+        dx1, dy1, m1, f1, r1x, r1y, z1x, z1y = leg_row(x, y, cz, sz, d1x, d1y, q1, b1x, b1y, l1, e1[i], e1[BLOCK + i])
+        dx2, dy2, m2, f2, r2x, r2y, z2x, z2y = leg_row(x, y, cz, sz, d2x, d2y, q2, b2x, b2y, l2, e2[i], e2[BLOCK + i])
+        dx3, dy3, m3, f3, r3x, r3y, z3x, z3y = leg_row(x, y, cz, sz, d3x, d3y, q3, b3x, b3y, l3, e3[i], e3[BLOCK + i])
         k1, k2, k3 = dx2 * dy3 - dx3 * dy2, dx3 * dy1 - dx1 * dy3, dx1 * dy2 - dx2 * dy1
         u1, u2, u3 = dy2 * m3 - dy3 * m2, dy3 * m1 - dy1 * m3, dy1 * m2 - dy2 * m1
         v1, v2, v3 = dx3 * m2 - dx2 * m3, dx1 * m3 - dx3 * m1, dx2 * m1 - dx1 * m2
