@@ -203,13 +203,7 @@ class Sketch:
         )
 
     def curve(
-        self,
-        p: Point,
-        q: Point,
-        bend: float = 0.0,
-        colour: str = "ink",
-        width: float = 1.8,
-        dash: Sequence[float] = (),
+        self, p: Point, q: Point, bend: float = 0.0, colour: str = "ink", width: float = 1.8, dash: Sequence[float] = ()
     ) -> None:
         """Draw an edge p-q as a quadratic curve bent aside by `bend` units (to the right of p-q if positive)."""
         middle = (p + q) / 2 - 1j * _unit(q - p) * bend * 2

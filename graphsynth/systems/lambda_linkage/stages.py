@@ -299,11 +299,7 @@ def _motion_table(motion: LambdaMotion) -> Table:
     rows = (
         ("full turn", turn.statement, turn.method),
         ("crank positions computed", str(len(motion.tilted.f)), "exact"),
-        (
-            "straight stroke of M, crank 90° to 270°",
-            _stroke(motion.linkage),
-            "estimated",
-        ),
+        ("straight stroke of M, crank 90° to 270°", _stroke(motion.linkage), "estimated"),
         ("M leaves the plane by at most", f"{away:.8g}", "estimated, largest sample"),
         ("the tilt moves M in the plane by at most", f"{shift:.6g}", "estimated, largest sample"),
         ("relative error of the rod length", f"{motion.residual:.1e}", "estimated, largest sample"),

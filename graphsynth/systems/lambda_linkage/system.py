@@ -48,10 +48,7 @@ SYSTEM = System(
         Stage("jamming", f"{_HERE}.stages:jamming", ("motions",), ("assessments",)),
         Stage("assess", f"{_HERE}.stages:assess", ("recognised", "motions", "assessments"), ("records", "tables")),
         Stage(
-            "sketch mechanism",
-            f"{_HERE}.stages_pictures:sketches",
-            ("motions", "assessments"),
-            ("mechanism_pictures",),
+            "sketch mechanism", f"{_HERE}.stages_pictures:sketches", ("motions", "assessments"), ("mechanism_pictures",)
         ),
         Stage("animate", f"{_HERE}.stages_pictures:animations", ("motions", "assessments"), ("animations",)),
         Stage("plot", f"{_HERE}.stages_pictures:plots", ("motions", "assessments"), ("plots",)),

@@ -224,11 +224,7 @@ class FullTurnCertificate:
 
 
 def certify_full_turn(
-    mechanism: SingleMotorPlatform,
-    *,
-    start: ArrayLike | None = None,
-    max_boxes: int = 100_000,
-    seconds: float = 60.0,
+    mechanism: SingleMotorPlatform, *, start: ArrayLike | None = None, max_boxes: int = 100_000, seconds: float = 60.0
 ) -> FullTurnCertificate:
     """Prove or disprove a full turn of the wheels on the branch through a pose.
 

@@ -19,7 +19,6 @@ from graphsynth.core.checks import check_fields, check_sizes, finite, positive, 
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.triad.leg import solve_leg
 from graphsynth.mechanism.rotatability import FourBarRotation, four_bar_rotation
-from graphsynth.systems.platform.motion import Event
 
 
 @dataclass(frozen=True)
@@ -82,6 +81,22 @@ class GearTrain:
 
 
 Array = NDArray[np.float64]
+
+
+class Event(NamedTuple):
+    """Something that happens at one input angle.
+
+    ``kind`` is "drive lock", "change point", "rocker dead point", "platform singular", "leg boundary" or
+    "mode mismatch"; ``psi`` in radians; ``leg`` is 1 to 3, or 0 for the platform; ``ends_motion`` tells whether the
+    motion stops there; ``pose`` is the last pose reached before a platform singularity.
+    """
+
+    kind: str
+    psi: float
+    leg: int
+    ends_motion: bool
+    statement: str
+    pose: tuple[float, float, float] | None = None
 
 
 _BARRIERS = {

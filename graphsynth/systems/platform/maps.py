@@ -131,12 +131,7 @@ def _values(platform: ParallelPlatform, rows: Array, JT: Array, Lc: float) -> li
 
 @checked
 def platform_map(
-    platform: ParallelPlatform,
-    alpha: float,
-    sigma: Sequence[int],
-    *,
-    nodes: int = 200,
-    Lc: float | None = None,
+    platform: ParallelPlatform, alpha: float, sigma: Sequence[int], *, nodes: int = 200, Lc: float | None = None
 ) -> PlatformMap:
     """`quality` over a rectangle that holds the workspace at orientation ``alpha``.
 

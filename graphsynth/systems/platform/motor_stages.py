@@ -196,11 +196,7 @@ def solvers(context: Context) -> tuple[Table, ...]:
 
 
 def assess(
-    context: Context,
-    runs: tuple[LabelledRun, ...],
-    bare: WithoutInertia,
-    found: Claim,
-    study: ReductionStudy | None,
+    context: Context, runs: tuple[LabelledRun, ...], bare: WithoutInertia, found: Claim, study: ReductionStudy | None
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record for each resistance and the tables."""
     records = tuple(_record(k, item) for k, item in enumerate(runs, 1))

@@ -100,11 +100,7 @@ def animations(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture
 
 
 def plots(
-    context: Context,
-    runs: tuple[LabelledRun, ...],
-    bare: WithoutInertia,
-    found: Claim,
-    study: ReductionStudy | None,
+    context: Context, runs: tuple[LabelledRun, ...], bare: WithoutInertia, found: Claim, study: ReductionStudy | None
 ) -> tuple[Picture, ...]:
     """Torque, speed and phase portraits; the model without inertia; the claim; the limit L -> 0."""
     from graphsynth.drawing.drive_pictures import reduction_picture

@@ -171,11 +171,7 @@ class RippleMap:
 
 
 def ripple_map(
-    drive: MotorDrivenPlatform,
-    resistances: Sequence[float],
-    inductances: Sequence[float],
-    *,
-    revolutions: int = 40,
+    drive: MotorDrivenPlatform, resistances: Sequence[float], inductances: Sequence[float], *, revolutions: int = 40
 ) -> RippleMap:
     """Simulate the steady ripples over resistances (ohm) and inductances (H): the claim's true condition as a map.
 

@@ -6,7 +6,7 @@ Default dimensions: MOCK-RECT (millimetres), all rational in the frame of a leg.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,23 +16,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite, finite_array, positive, sign, three, three_points, triple
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.drive import DriveTurn, FourBarDrive, GearTrain, first_barrier
-from graphsynth.systems.platform.motion import BranchLabel, Monodromy, Motion, Sweep, TurnBatch
-from graphsynth.systems.platform.parallel_platform import ParallelPlatform
-from graphsynth.systems.platform.plane import directions
-from graphsynth.systems.platform.tracking import (
+from graphsynth.kinematics.triad.leg import length_constants
+from graphsynth.systems.platform.drive import DriveTurn, Event, FourBarDrive, GearTrain, first_barrier
+from graphsynth.systems.platform.motion import (
+    SAME,
     SINGULAR,
     BranchEnd,
+    BranchLabel,
+    Monodromy,
+    Motion,
+    Sweep,
     Tracked,
+    TurnBatch,
     compare,
+    dimension_sets,
     distance,
     events,
-    machine_rows,
-    monodromy,
     track,
-    turn_batch,
     wheel_angles,
 )
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.plane import directions
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -145,18 +149,9 @@ class SingleMotorPlatform:
     @cached_property
     def drives(self) -> tuple[FourBarDrive, FourBarDrive, FourBarDrive]:
         """The three four-bar drives, each in the frame of its leg."""
-        first, second, third = (
-            FourBarDrive(
-                self.axis[k],
-                self.pivot[k],
-                self.crank[k],
-                self.coupler[k],
-                self.rocker[k],
-                self.phase[k] - self.frame_angle[k],
-                self.tau[k],
-            )
-            for k in range(3)
-        )
+        phase = (psi0 - beta for psi0, beta in zip(self.phase, self.frame_angle))
+        rows = zip(self.axis, self.pivot, self.crank, self.coupler, self.rocker, phase, self.tau)
+        first, second, third = (FourBarDrive(*row) for row in rows)
         return (first, second, third)
 
     @cached_property
@@ -190,16 +185,16 @@ class SingleMotorPlatform:
 
     @cached_property
     def _machine(self) -> Array:
-        return machine_rows(
-            self,
-            directions(
-                (
-                    self.frame_angle[0] + self.delta[0],
-                    self.frame_angle[1] + self.delta[1],
-                    self.frame_angle[2] + self.delta[2],
-                )
-            ),
-        )
+        """The row per leg that `graphsynth.systems.platform.kernels` describes."""
+        constants, P = length_constants(np.array(self.rocker), np.array(self.coupler)), self.platform
+        first, second, third = angles = [beta + delta for beta, delta in zip(self.frame_angle, self.delta)]
+        bell, rows = directions((first, second, third)), []
+        for k, drive in enumerate(self.drives):
+            w, D, b = drive.axis - drive.pivot, P.D[k], P.b[k]
+            crank = (w.real, w.imag, drive.crank, drive.phase, drive.rocker, drive.tau)
+            platform = (D.real, D.imag, P.l1[k], b.real, b.imag, P.l2[k])
+            rows.append([*crank, *constants[k, :6], bell[k].real, bell[k].imag, angles[k], *platform])
+        return np.array(rows)
 
     def follow(self, psi: Array, start: ArrayLike | None, stop: float, *, accelerations: bool) -> Tracked:
         """Track the home branch, or the one of ``start``, through wheel angles psi (n,) up to ``stop`` (radians).
@@ -321,7 +316,31 @@ class SingleMotorPlatform:
         >>> [BranchEnd(status).name for status in batch.status.tolist()]
         ['COMPLETE', 'DRIVE_ENDS']
         """
-        return turn_batch(self, crank, phase, coupler, wheel_angles(samples), accelerations=accelerations)
+        psi = wheel_angles(samples)
+        l_B, psi0, l_BC = dimension_sets(
+            crank, self.phase if phase is None else phase, self.coupler if coupler is None else coupler
+        )
+        machines = np.repeat(self._machine[None], len(l_B), axis=0)
+        machines[:, :, 2], machines[:, :, 3] = l_B, psi0 - np.array(self.frame_angle)
+        if coupler is not None:
+            machines[:, :, 6:12] = length_constants(np.broadcast_to(np.array(self.rocker), l_BC.shape), l_BC)[..., :6]
+        stops = _stops(self, l_B, psi0, l_BC, psi)
+        guess = np.repeat(np.array(self.home)[None], len(l_B), axis=0)
+        tracked = track(machines, psi, stops, guess, self.Lc, grown=True, accelerations=accelerations)
+        return TurnBatch(
+            psi=psi,
+            pose=tracked.pose,
+            velocity=tracked.velocity,
+            theta=tracked.theta,
+            theta_velocity=tracked.theta1,
+            determinant=tracked.determinant,
+            acceleration=tracked.acceleration if accelerations else None,
+            theta_acceleration=tracked.theta2 if accelerations else None,
+            status=tracked.status.astype(np.int8),
+            reached=tracked.reached,
+            end=tracked.end,
+            closure_error=np.asarray(distance(tracked.pose[:, -1], tracked.pose[:, 0], self.Lc)),
+        )
 
     def monodromy(self, samples: int | ArrayLike = 361) -> Monodromy:
         """Follow all assembly modes over one turn and say which mode becomes which.
@@ -336,7 +355,35 @@ class SingleMotorPlatform:
         >>> SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1)).monodromy().permutation
         (0, 1)
         """
-        return monodromy(self, wheel_angles(samples))
+        psi = wheel_angles(samples)
+        modes = self.all_poses(float(psi[0]))
+        barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
+        stop = np.inf if barrier is None else barrier.psi
+        tracked = track(
+            np.repeat(self._machine[None], len(modes), axis=0),
+            psi,
+            np.full(len(modes), stop),
+            modes,
+            self.Lc,
+            grown=False,
+            accelerations=False,
+        )
+        permutation, reasons = [], []
+        for i in range(len(modes)):
+            status, reason, target = BranchEnd(int(tracked.status[i])), "", -1
+            if status is BranchEnd.COMPLETE:
+                apart = distance(modes, tracked.pose[i, -1], self.Lc)
+                nearest = int(np.argmin(apart))
+                target = nearest if apart[nearest] <= SAME else -1
+                reason = "" if target >= 0 else "the pose at the end is none of the modes at the start"
+            elif status is BranchEnd.DRIVE_ENDS and barrier is not None:
+                reason = barrier.statement
+            else:
+                reason = SINGULAR
+            permutation.append(target)
+            reasons.append(reason)
+        ends = tuple(math.nan if target >= 0 else float(at) for target, at in zip(permutation, tracked.end[:, 0]))
+        return Monodromy(modes, tuple(permutation), ends, tuple(reasons))
 
     def full_turn(self, samples: int | ArrayLike = 361, start: ArrayLike | None = None) -> Motion:
         """Follow one branch over a turn of the wheels, with events and a closure test.
@@ -359,11 +406,7 @@ class SingleMotorPlatform:
         barrier = first_barrier(self.drives, float(psi[0]), float(psi[-1]))
         tracked = self.follow(psi, start, np.inf if barrier is None else barrier.psi, accelerations=True)
         reached = int(tracked.reached[0])
-        pose, theta, determinant = (
-            tracked.pose[0, :reached],
-            tracked.theta[0, :reached],
-            tracked.determinant[0, :reached],
-        )
+        pose, theta, determinant = (a[0, :reached] for a in (tracked.pose, tracked.theta, tracked.determinant))
         _, leg = self.platform.jacobians(pose, theta)
         gap, rank, mismatch = compare(self.platform, pose, theta, self.Lc)
         complete = int(tracked.status[0]) == BranchEnd.COMPLETE
@@ -389,13 +432,40 @@ class SingleMotorPlatform:
             closed=period > 0,
             closure_error=error,
             period=period,
-            events=tuple(events(self, psi, tracked, barrier, leg, mismatch)),
+            events=self._events(psi, tracked, barrier, leg, mismatch),
             label=BranchLabel(self.tau, sigma, int(np.sign(determinant[0])), rank, 0),
             Lc=self.Lc,
             method=_METHOD,
             seconds=perf_counter() - begin,
             monodromy=monodromy,
         )
+
+    def _events(
+        self, psi: Array, tracked: Tracked, barrier: Event | None, leg: Array, mismatch: NDArray[np.bool_]
+    ) -> tuple[Event, ...]:
+        """Events of one tracked branch in order, its end included; ``leg`` is ``JT_kk`` at the samples reached."""
+        end, found = float(psi[-1]), []
+        if BranchEnd(int(tracked.status[0])) is BranchEnd.SINGULAR:
+            end, x, y, alpha = (float(value) for value in tracked.end[0])
+            found.append(Event("platform singular", end, 0, True, SINGULAR, (x, y, alpha)))
+        elif barrier is not None:
+            end = barrier.psi
+            found.append(barrier)
+        changes = zip(*np.nonzero(np.sign(leg[1:]) != np.sign(leg[:-1])))
+        crossings = [(self._crossing(psi[i : i + 2], tracked.pose[0, i], int(k)), int(k) + 1) for i, k in changes]
+        found += events(self.drives, float(psi[0]), end, crossings, psi[: len(mismatch)][mismatch])
+        return tuple(sorted(found, key=lambda event: (event.psi, event.ends_motion)))
+
+    def _crossing(self, psi: Array, pose: Array, leg: int) -> float:
+        """Wheel angle at which ``JT`` of a leg vanishes between two samples, by refinement of the sampling."""
+        low, high = float(psi[0]), float(psi[1])
+        for _ in range(4):
+            fine = self.follow(np.linspace(low, high, 33), pose, np.inf, accelerations=False)
+            values = self.platform.jacobians(fine.pose[0], fine.theta[0])[1][:, leg]
+            change = int(np.argmax(np.sign(values[1:]) != np.sign(values[:-1])))
+            low, high = low + (high - low) * change / 32.0, low + (high - low) * (change + 1) / 32.0
+            pose = fine.pose[0, change]
+        return low + (high - low) * float(values[change] / (values[change] - values[change + 1]))
 
     def all_poses(self, psi: float) -> Array:
         """All assembly modes for the drive branches of this mechanism at ``psi``, shape (m, 3)."""
@@ -411,3 +481,16 @@ class SingleMotorPlatform:
             for pair in text.split()
         ]
         return MechanismGraph(15, [(a, b, f) for a, b, f in joints], frame=0)
+
+
+def _stops(mechanism: SingleMotorPlatform, l_B: Array, psi0: Array, l_BC: Array, psi: Array) -> Array:
+    """First wheel angle that each set cannot pass: infinite where all its cranks turn fully."""
+    distance, l_CD = np.abs(np.array(mechanism.axis) - np.array(mechanism.pivot)), np.array(mechanism.rocker)
+    slack = 1e-12 * (l_CD + l_BC + l_B)
+    free = (distance + l_B < l_CD + l_BC - slack) & (np.abs(distance - l_B) > np.abs(l_CD - l_BC) + slack)
+    stops = np.full(len(l_B), np.inf)
+    for i in np.flatnonzero(~free.all(axis=1)):  # decided exactly, one by one
+        one = replace(mechanism, crank=tuple(l_B[i]), phase=tuple(psi0[i]), coupler=tuple(l_BC[i]))
+        barrier = first_barrier(one.drives, float(psi[0]), float(psi[-1]))
+        stops[i] = np.inf if barrier is None else barrier.psi
+    return stops

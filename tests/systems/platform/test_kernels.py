@@ -20,7 +20,7 @@ from graphsynth.kinematics.triad.leg import LegStatus, solve_leg
 from graphsynth.systems.platform.drive import FourBarDrive
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-from graphsynth.systems.platform.tracking import BranchEnd
+from graphsynth.systems.platform.motion import BranchEnd
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
 REFERENCE = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))

@@ -142,13 +142,13 @@ def advance(p, e, goal, q, Lc, check, quick):
         if not travelled <= 0.1:
             return False
         x, y, turn = predict(q, goal)
-        d2 = turn * turn
+        d2 = turn * turn  # the rotation by a small turn as a polynomial
         dc = 1.0 - d2 * (0.5 - d2 * (1.0 / 24.0 - d2 / 720.0))
         ds = turn * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0)))
         c, s = c * dc - s * ds, s * dc + c * ds
-    first, last, rate = 0.0, 0.0, 0.0
-    settled, accurate = False, False
+    first, last, rate, settled = 0.0, 0.0, 0.0, False
     for it in range(10):
+        # platform arms and legs; half of the closure of each leg, f, and of its row of JX, (dx, dy, m)
         rx1, ry1 = c * p[0, 18] - s * p[0, 19], c * p[0, 19] + s * p[0, 18]
         rx2, ry2 = c * p[1, 18] - s * p[1, 19], c * p[1, 19] + s * p[1, 18]
         rx3, ry3 = c * p[2, 18] - s * p[2, 19], c * p[2, 19] + s * p[2, 18]
@@ -161,7 +161,7 @@ def advance(p, e, goal, q, Lc, check, quick):
         m1, m2, m3 = rx1 * dy1 - ry1 * dx1, rx2 * dy2 - ry2 * dx2, rx3 * dy3 - ry3 * dx3
         k1, k2, k3 = dx2 * dy3 - dx3 * dy2, dx3 * dy1 - dx1 * dy3, dx1 * dy2 - dx2 * dy1
         det = m1 * k1 + m2 * k2 + m3 * k3
-        inv = 1.0 / det
+        inv = 1.0 / det  # Newton's step by the adjugate (u, w, k)
         u1, u2, u3 = dy2 * m3 - dy3 * m2, dy3 * m1 - dy1 * m3, dy1 * m2 - dy2 * m1
         w1, w2, w3 = dx3 * m2 - dx2 * m3, dx1 * m3 - dx3 * m1, dx2 * m1 - dx1 * m2
         px, py = (f1 * u1 + f2 * u2 + f3 * u3) * inv, (f1 * w1 + f2 * w2 + f3 * w3) * inv
@@ -179,21 +179,20 @@ def advance(p, e, goal, q, Lc, check, quick):
             rate = size / first
         # the matrix of this pass serves the velocity: it must belong to the final pose
         if size <= 1e-14 or settled or (quick and it == 0 and size <= QUICK):
-            accurate = True
             break
         if it > 0:
             if size > 1e-13 and size >= 0.5 * last and not size <= 1e-11:
                 return False
             settled = size <= 1e-11 and (size <= 1e-3 * last or it > 1)
         last = size
-    if not accurate:
+    else:
         return False
     det *= 8.0
     same = (det > 0.0) == (q[DET] > 0.0)  # a product of two determinants, length^8, would underflow
-    if check and not (first <= 0.1 * travelled + 1e-9 and rate <= 0.1 and same and abs(det) > 0.5 * abs(q[DET])):
+    fits = first <= 0.1 * travelled + 1e-9 and rate <= 0.1 and same and abs(det) > 0.5 * abs(q[DET])
+    if not (fits if check else first <= 0.1):
         return False
-    if not check and not first <= 0.1:
-        return False
+    # velocity of the platform from the rates of the rockers, with the same adjugate
     g1 = (e[0, 2] * dy1 - e[0, 3] * dx1) * e[0, 4]
     g2 = (e[1, 2] * dy2 - e[1, 3] * dx2) * e[1, 4]
     g3 = (e[2, 2] * dy3 - e[2, 3] * dx3) * e[2, 4]
@@ -265,36 +264,34 @@ def finish(p, m, weight, cs, sn, e1, e2, e3, w):
 
 
 @kernel
-def turns(
-    machines,
-    psi,
-    stops,
-    guess,
-    grown,
-    Lc,
-    theta,
-    theta1,
-    pose,
-    velocity,
-    det,
-    theta2,
-    acceleration,
-    status,
-    reached,
-    end,
-):
-    """Branches of many machines over the same increasing wheel angles.
+def turns(machines, psi, stops, guess, grown, Lc, found):
+    """Branches of many machines over the same increasing wheel angles, into the arrays of a ``Tracked``.
 
     ``guess`` is a pose near the branch at psi[0], or with ``grown`` at zero crank length, from where the cranks then
     grow.  Angles from ``stops`` on are not entered.  Rows beyond ``reached`` are left alone.  ``end`` (N, 4) is the
     parameter (a scale of the cranks for HOME_ENDS) and the pose where the branch ended.  ``theta2`` and
     ``acceleration`` are (N, n, 3), or (N, 0, 3) if not wanted.
     """
+    theta, theta1, pose, velocity, determinant = (
+        found.theta,
+        found.theta1,
+        found.pose,
+        found.velocity,
+        found.determinant,
+    )
+    theta2, acceleration, status, reached, end = (
+        found.theta2,
+        found.acceleration,
+        found.status,
+        found.reached,
+        found.end,
+    )
     n, second = psi.size, theta2.shape[1] > 0
     q, saved, e, w = np.empty(18), np.empty(18), np.empty((3, 5)), np.empty(10 * BLOCK)
     cs, sn, legs = np.empty(BLOCK), np.empty(BLOCK), (np.empty(LEG), np.empty(LEG), np.empty(LEG))
     for i in range(machines.shape[0]):
         p, state, done = machines[i], COMPLETE, 0
+        # the state of a guess: at rest, no determinant to be kept
         q[VX], q[VY], q[VA], q[DET] = 0.0, 0.0, 0.0, 0.0
         q[X], q[Y], q[A], q[C], q[S] = (
             guess[i, 0],
@@ -303,6 +300,7 @@ def turns(
             math.cos(guess[i, 2]),
             math.sin(guess[i, 2]),
         )
+        # phase 0: the cranks grow from scale 0, at the home pose, to 1; phase 1: over the wheel angles, in blocks
         for phase in range(0 if grown else 1, 2):
             growing = phase == 0
             count = 2 if growing else n
@@ -315,6 +313,7 @@ def turns(
                         drives(p, k, m, cs, sn, legs[k])
                 for k in range(18):
                     saved[k] = q[k]
+                # quick steps first; a block that `finish` refuses is done once more, every step to the end
                 for attempt in range(2):
                     for slot in range(m):
                         j = start + slot
@@ -325,6 +324,7 @@ def turns(
                         if j == 0:
                             q[AT], q[OLD] = target, 0.0
                         step, sampled, arrived = target - q[AT], not growing, False
+                        # longer steps after every success, halved where `advance` does not trust one
                         while not arrived:
                             whole = step >= target - q[AT]
                             goal = target if whole else q[AT] + step
@@ -340,7 +340,7 @@ def turns(
                                 step = 0.5 * (goal - q[AT])
                                 if j == 0 or step < SMALLEST * total:
                                     break
-                            sampled = False
+                            sampled = False  # what lies between two samples is computed there
                         if not arrived:
                             state = (
                                 (NO_HOME if j == 0 else HOME_ENDS) if growing else (NO_START if j == 0 else SINGULAR)
@@ -356,9 +356,10 @@ def turns(
                     bad = finish(p, done - start, 1.0 / (Lc * Lc), cs, sn, legs[0], legs[1], legs[2], w)
                     if bad == 0 or attempt == 1:
                         break
-                    state, done = COMPLETE, start  # once more, every step to the end
+                    state, done = COMPLETE, start
                     for k in range(18):
                         q[k] = saved[k]
+                # rocker angles are made continuous along the branch
                 if not growing:
                     for j in range(start, done):
                         s = j - start
@@ -367,7 +368,7 @@ def turns(
                             raw = legs[k][4 * BLOCK + s]
                             theta[i, j, k] = raw if j == 0 else near(raw, theta[i, j - 1, k])
                             theta1[i, j, k] = legs[k][2 * BLOCK + s]
-                        det[i, j] = w[SPEED + 3 * BLOCK + s]
+                        determinant[i, j] = w[SPEED + 3 * BLOCK + s]
                         if second:
                             for k in range(3):
                                 acceleration[i, j, k] = w[PUSH + k * BLOCK + s]
