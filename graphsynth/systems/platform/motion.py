@@ -250,15 +250,10 @@ def track(
 
     count, n = len(machines), len(psi)
     vectors, second = (count, n, 3), (count, n if accelerations else 0, 3)
-    found = Tracked(
-        *(np.empty(vectors) for _ in range(4)),  # type: ignore[call-arg]  # the fields of three numbers
-        determinant=np.empty(vectors[:2]),
-        theta2=np.empty(second),
-        acceleration=np.empty(second),
-        status=np.empty(count, dtype=np.int64),
-        reached=np.empty(count, dtype=np.int64),
-        end=np.empty((count, 4)),
-    )
+    pose, velocity, theta, theta1 = np.empty(vectors), np.empty(vectors), np.empty(vectors), np.empty(vectors)
+    theta2, acceleration, determinant = np.empty(second), np.empty(second), np.empty(vectors[:2])
+    status, reached, end = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64), np.empty((count, 4))
+    found = Tracked(pose, velocity, theta, theta1, determinant, theta2, acceleration, status, reached, end)
     given = (np.require(a, dtype=np.float64, requirements=["C", "W"]) for a in (machines, psi, stops, guess))
     turns(*given, grown, Lc, found)
     for i in np.flatnonzero(found.reached < n):
