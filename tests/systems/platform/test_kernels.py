@@ -18,9 +18,9 @@ from graphsynth.kinematics.triad.assembly_modes import assembly_modes, assembly_
 from graphsynth.kinematics.triad.kernels.leg import cross_sum
 from graphsynth.kinematics.triad.leg import LegStatus, solve_leg
 from graphsynth.systems.platform.drive import FourBarDrive
+from graphsynth.systems.platform.motion import BranchEnd
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-from graphsynth.systems.platform.motion import BranchEnd
 
 G1, MOCK = ParallelPlatform.g1(), ParallelPlatform.mock()
 REFERENCE = SingleMotorPlatform(crank=(10, 5, 0), phase=(0, 0.5, 1))
