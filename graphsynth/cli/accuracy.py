@@ -14,8 +14,7 @@ from graphsynth.core.errors import SceneError
 
 def run(options: argparse.Namespace) -> int:
     """Measure error against run time of every method of a scene; print what to choose."""
-    from graphsynth.evidence.page import write_report
-    from graphsynth.evidence.report import measure, summary
+    from graphsynth.evidence.report import measure, summary, write_report
     from graphsynth.evidence.rows import Effort
     from graphsynth.pipeline.scene import load_scene
     from graphsynth.pipeline.stages import Context

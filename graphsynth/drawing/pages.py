@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cache
 from hashlib import sha256
 from html import escape
+from typing import TYPE_CHECKING, Any
+
+from graphsynth.drawing.svg import bare
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 
 def policy(scripts: Iterable[str] = ()) -> str:
@@ -39,3 +46,14 @@ def whole_page(title: str, css: str, body: str) -> str:
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
         f"<title>{escape(title)}</title><style>{css}</style></head><body><main>{body}</main></body></html>\n"
     )
+
+
+@cache
+def template(text: str, **filters: Callable[..., Any]) -> Template:
+    """Return a template of HTML that escapes every value; ``| drawing`` puts in an SVG of our own making as it is."""
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    own = Environment(autoescape=True, undefined=StrictUndefined)
+    own.filters |= {"drawing": lambda svg: Markup(bare(svg)), **filters}
+    return own.from_string(text)

@@ -7,7 +7,7 @@ narrow.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from inspect import signature
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.evidence.rows import Effort, Problem, Row, best_of
 
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
@@ -29,13 +29,7 @@ _NO_SHARE = "the enclosure is wider than the area itself, {:.3g} mm²"
 
 
 def precise_crossing(problem: CircleEllipse) -> tuple[Any, Any]:
-    """Crossing in the first quadrant with 50 digits, from the radii as they are (exact point data).
-
-    Raises
-    ------
-    GeometryError
-        If the curves do not cross.
-    """
+    """Crossing in the first quadrant with 50 digits, from the radii as they are; `GeometryError` if there is none."""
     import mpmath
 
     with mpmath.workdps(_DIGITS):
@@ -84,21 +78,16 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
     limit = signature(krawczyk_boxes).parameters["max_boxes"].default
     whole = krawczyk_boxes(given).tested
     for boxes in effort.some((*(max(1, round(part * whole)) for part in _PARTS), limit)):
-        found, seconds, rounds = best_of(lambda n=boxes: krawczyk_boxes(given, max_boxes=n), effort)  # type: ignore[misc]
+        found, *timed = best_of(partial(krawczyk_boxes, given, max_boxes=boxes), effort)
         # a search that ends by itself is what the default limit gives
         ended = bool(found.finished) or boxes == limit
-        rows.append(
-            _enclosed(
-                "Krawczyk boxes", f"{found.tested} boxes", found.outer, hull, truth, (seconds, rounds), default=ended
-            )
-        )
+        setting = f"{found.tested} boxes"
+        rows.append(_enclosed("Krawczyk boxes", setting, found.outer, hull, truth, timed, default=ended))
         if found.finished:
             break
     for boxes in () if effort.quick else (100, 300, 3000):
-        once = Effort(1)
-        paved, seconds, rounds = best_of(partial(_paved, given, boxes), once, warm=False)
-        setting = f"up to {boxes} boxes"
-        rows.append(_enclosed("general solver", setting, paved, hull, truth, (seconds, rounds)))
+        paved, *timed = best_of(partial(_paved, given, boxes), Effort(1), warm=False)
+        rows.append(_enclosed("general solver", f"up to {boxes} boxes", paved, hull, truth, timed))
     question = f"Where circle and ellipse of the bearing cross at the tilt asin({float(sine):.6g})"
     note = "A limit on the number of boxes stops the search early; the enclosure is then valid, but wider."
     return Problem("crossing", question, "mm", tuple(rows), note=note)
@@ -108,27 +97,17 @@ def _hull_row(problem: CircleEllipse, truth: tuple[Any, Any], effort: Effort) ->
     """Exact hull against 50 digits: its width, and whether it holds the crossing."""
     from graphsynth.jamming.intersection import exact_hull
 
-    found, seconds, rounds = best_of(lambda: exact_hull(problem), effort)
-    held = _holds(found.hull, truth)
-    status, why = (RowStatus.OK, "") if held else (RowStatus.FAILED, "the hull does not hold the crossing")
-    return found.hull, Row(
-        "exact hull",
-        "",
-        float(found.hull.width.max()),
-        seconds,
-        rounds,
-        "width of the enclosure",
-        f"closed form with {_DIGITS} digits",
-        status,
-        why,
-        proved=True,
-    )
+    found, *timed = best_of(lambda: exact_hull(problem), effort)
+    why = "" if _holds(found.hull, *truth) else "the hull does not hold the crossing"
+    more = {"kind": "width of the enclosure", "reference": f"closed form with {_DIGITS} digits", "proved": True}
+    return found.hull, Row.of("exact hull", "", float(found.hull.width.max()), timed, why, **more)
 
 
-def _holds(found: Interval, truth: tuple[Any, Any]) -> bool:
-    """Whether an enclosure (2,) holds the crossing; numbers of any precision are compared exactly."""
+def _holds(found: Interval, *truth: Any) -> bool:
+    """Whether an enclosure holds the numbers, of any precision: compared exactly; of one number, every enclosure."""
     low, high = np.atleast_1d(found.lo), np.atleast_1d(found.hi)
-    return all(float(a) <= value <= float(b) for a, b, value in zip(low, high, truth, strict=True))
+    values = truth if len(truth) > 1 else truth * len(low)
+    return all(float(a) <= value <= float(b) for a, b, value in zip(low, high, values, strict=True))
 
 
 def _enclosed(
@@ -137,9 +116,8 @@ def _enclosed(
     found: Interval,
     hull: Interval,
     truth: tuple[Any, Any],
-    timed: tuple[float, int],
-    *,
-    default: bool = False,
+    timed: Sequence[float],
+    **more: Any,
 ) -> Row:
     """Row of an enclosure of the crossing: how much wider than the exact hull, and whether it holds the crossing."""
     # two roundings outward for each coordinate: more than the hull can be too wide
@@ -148,20 +126,10 @@ def _enclosed(
     # the search begins with a square over the quarter circle: an enclosure of its size is no result
     radius = float(np.hypot(*hull.hi))
     why = f"{setting} leave the whole start box" if float(found.width.max()) > 0.99 * radius else ""
-    why = why if _holds(found, truth) else "the enclosure does not hold the crossing"
-    status = RowStatus.FAILED if why else RowStatus.OK
-    return Row(
-        method,
-        setting,
-        excess,
-        *timed,
-        "width of the enclosure beyond the exact hull",
-        f"exact hull, rational arithmetic; checked to hold the crossing with {_DIGITS} digits",
-        status,
-        why,
-        default,
-        True,
-    )
+    why = why if _holds(found, *truth) else "the enclosure does not hold the crossing"
+    more["kind"] = "width of the enclosure beyond the exact hull"
+    more["reference"] = f"exact hull, rational arithmetic; checked to hold the crossing with {_DIGITS} digits"
+    return Row.of(method, setting, excess, timed, why, proved=True, **more)
 
 
 def _paved(problem: CircleEllipse, boxes: int) -> Interval:
@@ -182,12 +150,7 @@ def precise_area(bearing: Bearing, sine: str) -> Any:
     """Part of the ellipse outside the circle, mm², with 50 digits: quadrature in polar coordinates, no area formula.
 
     Between the crossings the radius of the ellipse is ``r(t)^2 = a^2 b^2 / (b^2 cos^2 t + a^2 sin^2 t)``, and the area
-    is ``2 int (r^2 - R^2) dt`` up to the crossing.
-
-    Raises
-    ------
-    GeometryError
-        If the curves do not cross.
+    is ``2 int (r^2 - R^2) dt`` up to the crossing; without one a `GeometryError` is raised.
 
     Examples
     --------
@@ -284,32 +247,21 @@ def _polygon(R: float, a: float, b: float, count: int) -> float:
 
 
 def _doubles_row(method: str, setting: str, run: Callable[[], Any], many: int, truth: Any, effort: Effort) -> Row:
-    found, seconds, rounds = best_of(run, effort)
+    found, *timed = best_of(run, effort)
     error = max(float(abs(truth - value)) for value in {float(v) for v in np.atleast_1d(found)})
-    kind = "distance from the reference"
-    return Row(method, setting, max(error, math.ulp(float(truth)) / 2), seconds / many, rounds, kind, _AREA_REFERENCE)
+    error = max(error, math.ulp(float(truth)) / 2)
+    return Row.of(method, setting, error, timed, many=many, reference=_AREA_REFERENCE)
 
 
-def _area_row(method: str, setting: str, found: Interval, many: int, truth: Any, seconds: float, rounds: int) -> Row:
+def _area_row(method: str, setting: str, run: Callable[[], Interval], many: int, truth: Any, effort: Effort) -> Row:
     """Row of an enclosure of the area: it must hold the reference, and say more than that there is an area."""
+    found, *timed = best_of(run, effort)
     width = float(np.max(found.width))
-    low, high = np.atleast_1d(found.lo), np.atleast_1d(found.hi)
     why = "" if width < float(truth) else _NO_SHARE.format(float(truth))
-    if not all(float(a) <= truth <= float(b) for a, b in zip(low, high, strict=True)):
-        why = "the enclosure does not hold the area"
-    status = RowStatus.FAILED if why else RowStatus.OK
-    return Row(
-        method,
-        setting,
-        width,
-        seconds / many,
-        rounds,
-        "width of the enclosure",
-        f"none needed; checked to hold the {_AREA_REFERENCE}",
-        status,
-        why,
-        proved=True,
-    )
+    why = why if _holds(found, truth) else "the enclosure does not hold the area"
+    against = f"none needed; checked to hold the {_AREA_REFERENCE}"
+    more = {"many": many, "kind": "width of the enclosure", "reference": against, "proved": True}
+    return Row.of(method, setting, width, timed, why, **more)
 
 
 def _enclosed_area(bearing: Bearing, sine: str, many: int, truth: Any, effort: Effort) -> Row:
@@ -319,12 +271,14 @@ def _enclosed_area(bearing: Bearing, sine: str, many: int, truth: Any, effort: E
     R, c, h = repr(bearing.Rb), repr(bearing.clearance), repr(bearing.h)
     one = Interval(sine)
     given: Any = sine if many == 1 else Interval.from_bounds(np.full(many, float(one.lo)), np.full(many, float(one.hi)))
-    found, seconds, rounds = best_of(lambda: enclose_surrogate_areas(R, c, h, given).ellipse_only, effort)
-    return _area_row("closed form, enclosed", f"{many} at once", found, many, truth, seconds, rounds)
+    run = partial(enclose_surrogate_areas, R, c, h, given)
+    return _area_row("closed form, enclosed", f"{many} at once", lambda: run().ellipse_only, many, truth, effort)
 
 
 def _shoelace_row(R: float, a: float, b: float, boxes: int, truth: Any, effort: Effort) -> Row:
     from graphsynth.jamming.bearing.area_curve import crescent_boxes, interval_shoelace
 
-    found, seconds, rounds = best_of(lambda: interval_shoelace(crescent_boxes(R, a, b, boxes)) * 2, effort)
-    return _area_row("interval shoelace sum", f"{boxes} boxes", found, 1, truth, seconds, rounds)
+    def run() -> Interval:
+        return interval_shoelace(crescent_boxes(R, a, b, boxes)) * 2
+
+    return _area_row("interval shoelace sum", f"{boxes} boxes", run, 1, truth, effort)

@@ -37,17 +37,7 @@ def precise_arc_ends(box: ToleranceBox, condition: Condition = "A") -> tuple[flo
 
     The contact condition as it stands in theory/bearing-contact 2 and 3, solved by bisection; the height of
     the crank pin from the rotation of the motor axis (Rodrigues).
-
-    Parameters
-    ----------
-    box : ToleranceBox
-        Without tolerances, rigid rod.
-    condition : {"A", "B"}
-
-    Returns
-    -------
-    tuple of float
-        Rounded once; empty if it never jams.
+    Rounded once; empty if it never jams.  For a box without tolerances and a rigid rod.
 
     Examples
     --------
@@ -143,50 +133,33 @@ def arc_problem(box: ToleranceBox, condition: Condition = "A", effort: Effort | 
     ends = precise_arc_ends(box, condition)
     if not ends:
         raise GeometryError("the bearing jams nowhere during the turn, so there are no arc ends to compare")
-    found, seconds, rounds = best_of(lambda: certify_jamming(box, condition), effort)
-    rows = [_proved_row("closed form, enclosed", "", found.arcs.undecided, ends, (seconds, rounds))]
+    found, *timed = best_of(lambda: certify_jamming(box, condition), effort)
+    rows = [_proved_row("closed form, enclosed", "", found.arcs.undecided, ends, timed)]
     default = signature(sweep_linkage).parameters["resolution"].default
     for resolution in sorted({*effort.some((1e-1, 1e-2, 1e-4, 1e-6, 1e-9, 1e-12)), default}, reverse=True):
-        swept, seconds, rounds = best_of(partial(sweep_linkage, box, condition, resolution=resolution), effort)
-        row = _proved_row("interval sweep", f"{resolution:g} rad", swept.undecided, ends, (seconds, rounds))
+        swept, *timed = best_of(partial(sweep_linkage, box, condition, resolution=resolution), effort)
+        row = _proved_row("interval sweep", f"{resolution:g} rad", swept.undecided, ends, timed)
         rows.append(replace(row, error=math.tau * swept.undecided_part, default=resolution == default))
+    given = {"kind": "length of the steps in which the sign changes", "status": RowStatus.UNRELIABLE}
+    given["reference"] = f"ends with {_DIGITS} digits lie in these steps"
     for count in (100, 300, 1000) if effort.quick else (100, 1000, 10_000, 100_000):
-        changes, seconds, rounds = best_of(partial(_sign_changes, box, condition, count), effort)
+        changes, *timed = best_of(partial(_sign_changes, box, condition, count), effort)
         # ends that share a step hide each other
         seen = changes == len({math.floor(end * count / math.tau) for end in ends}) == len(ends)
-        rows.append(
-            Row(
-                "samples, doubles",
-                f"{count} angles",
-                changes * math.tau / count,
-                seconds,
-                rounds,
-                "length of the steps in which the sign changes",
-                f"ends with {_DIGITS} digits lie in these steps",
-                RowStatus.OK if seen else RowStatus.UNRELIABLE,
-                "" if seen else "an arc lies between two samples and is not seen",
-            )
-        )
+        why = "" if seen else "an arc lies between two samples and is not seen"
+        rows.append(Row.of("samples, doubles", f"{count} angles", changes * math.tau / count, timed, why, **given))
     question = f"At which crank angles the bearing begins and ceases to jam (condition {condition}, {len(ends)} ends)"
     return Problem("arc-ends", question, "rad", tuple(rows))
 
 
-def _proved_row(method: str, setting: str, left: Any, ends: Sequence[float], timed: tuple[float, int]) -> Row:
+def _proved_row(method: str, setting: str, left: Any, ends: Sequence[float], timed: Sequence[float]) -> Row:
     """Row of a proof: the length of the angles left undecided, which must hold the ends."""
     from graphsynth.jamming.bearing.arcs import total_length
 
-    held = all(_held(left, end) for end in ends)
-    return Row(
-        method,
-        setting,
-        total_length(left),
-        *timed,
-        "length of the angles left undecided",
-        f"none needed; checked to hold the ends with {_DIGITS} digits",
-        RowStatus.OK if held else RowStatus.FAILED,
-        "" if held else "an end lies outside the angles left undecided",
-        proved=True,
-    )
+    why = "" if all(_held(left, end) for end in ends) else "an end lies outside the angles left undecided"
+    against = f"none needed; checked to hold the ends with {_DIGITS} digits"
+    more = {"kind": "length of the angles left undecided", "reference": against, "proved": True}
+    return Row.of(method, setting, total_length(left), timed, why, **more)
 
 
 def _sign_changes(box: ToleranceBox, condition: Condition, count: int) -> int:
@@ -309,40 +282,29 @@ def coupled_problem(
     middle = (low + high) / 2
     rows = []
     for count in (8, 14, 26) if effort.quick else (8, 26, 74, 362):
-        report, seconds, done = best_of(partial(assessed, count), rounds)
+        report, *timed = best_of(partial(assessed, count), rounds)
         error = float(abs(report.smallest_scale / middle - 1))
-        kind = "distance from the reference"
-        rows.append(Row("samples", f"{count} positions", error, seconds, done, kind, reference))
+        rows.append(Row.of("samples", f"{count} positions", error, timed, reference=reference))
     default = signature(largest_scale).parameters["relative_gap"].default
     gaps = sorted({1e-1, 1e-2, default} if effort.quick else {1e-1, 1e-2, 1e-3, default}, reverse=True)
     for gap in gaps:
-        found, seconds, done = best_of(partial(prove, relative_gap=gap), rounds, warm=gap == gaps[0])
-        rows.append(_gap_row(found, gap, (low, high, reference), (seconds, done), default=gap == default))
+        found, *timed = best_of(partial(prove, relative_gap=gap), rounds, warm=gap == gaps[0])
+        rows.append(_gap_row(found, gap, (low, high, reference), timed, default=gap == default))
     question = f"Largest misalignment of {name} whose bearings share it"
     note = "Samples overestimate the misalignment allowed, because they miss the worst input itself."
     return Problem("coupled-joints", question, "relative", tuple(rows), note=note)
 
 
 def _gap_row(
-    found: ScaleCertificate, gap: float, truth: tuple[Any, Any, str], timed: tuple[float, int], *, default: bool
+    found: ScaleCertificate, gap: float, truth: tuple[Any, Any, str], timed: Sequence[float], *, default: bool
 ) -> Row:
     """Row of a certificate: its gap, and whether it holds the reference and is as narrow as was asked."""
     low, high, reference = truth
     why = "" if found.low <= high and low <= found.high else "the reference lies outside of what is proved"
     why = why or (found.reason if found.relative_gap > gap else "")
-    return Row(
-        "certified gap",
-        f"gap {gap:g}, {found.evaluated} pieces",
-        found.relative_gap,
-        *timed,
-        "gap between the proved bounds",
-        f"none needed; checked to hold the {reference}",
-        RowStatus.FAILED if why else RowStatus.OK,
-        why,
-        default,
-        True,
-        value=gap,
-    )
+    setting, against = f"gap {gap:g}, {found.evaluated} pieces", f"none needed; checked to hold the {reference}"
+    more = {"kind": "gap between the proved bounds", "reference": against, "proved": True, "value": gap}
+    return Row.of("certified gap", setting, found.relative_gap, timed, why, default=default, **more)
 
 
 def _reference(prove: Any, tilt: Misalignment, exact: Any) -> tuple[Any, Any, str]:

@@ -1,7 +1,7 @@
 """Positions of a mechanism over its input: closed form, engine, proof and a general solver against 50 digits.
 
-The reference is Newton's method in 50 digits on the equations of the joints as stated, nothing eliminated: it shares no
-formula with the closed forms or the engine, which tell it the branch only.
+The reference is Newton's method in 50 digits on the equations of the joints as they state them, nothing eliminated: it
+shares no formula with the closed forms or the kernels of the engine, which tell it the branch only.
 """
 
 from __future__ import annotations
@@ -16,77 +16,58 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.equations import Pairs, derivatives, seen
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Mechanism
 
 if TYPE_CHECKING:
-    from graphsynth.mechanism.four_bar import TiltedFourBar
-    from graphsynth.mechanism.model import Mechanism
+    from graphsynth.kinematics.engine.result import Motion
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 #: Name of a closed form, and what it gives at inputs (n,): the position (n,) of the watched point, complex.
-Closed = tuple[str, Callable[[Array], NDArray[np.complex128]]]
+Closed = tuple[str, Callable[[Array], Complex]]
 _DIGITS = 50
 NODES = 12  # the reference is computed at these intervals of the range
 _REFERENCE = f"Newton's method with {_DIGITS} digits on the joint equations"
-_KIND = "distance from the reference"
-Complex = NDArray[np.complex128]
 _Made = tuple[Mechanism, Closed]
-_POSITIONS = 6 * NODES + 1
-_SETS_KIND = "largest distance from the reference over the longest link"
+_PROVED = "proved radius about every link's origin"
+_STEP = 6
+_POSITIONS = _STEP * NODES + 1
 
 
 def four_bar(linkage: TiltedFourBar) -> tuple[Mechanism, Closed]:
-    """Return a planar four-bar linkage as a mechanism, with its closed form for joint B (the origin of link 2's end).
-
-    The mechanism's link frames: crank at O, coupler at A, rocker at C; all along the bars.
+    """Return a planar four-bar linkage as a mechanism, with its closed form for joint B, the end of the rocker.
 
     Examples
     --------
-    >>> from graphsynth import TiltedFourBar
     >>> mechanism, closed = four_bar(TiltedFourBar())
     >>> mechanism.graph.links, closed[1](np.array([0.0])).round(9).tolist()
     (4, [(1.5+2.449489743j)])
     """
-    from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.laws import Driver
-    from graphsynth.mechanism.model import Mechanism
-    from graphsynth.structure.graph import MechanismGraph
-
     if linkage.alpha:
         raise GeometryError(f"alpha = {linkage.alpha}: a planar mechanism has no tilt; set it to zero")
-    l1, l2, l3, l4 = linkage.l1, linkage.l2, linkage.l3, linkage.l4
-    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    joints = (
-        Revolute(0, 1),
-        Revolute(1, 2, (l2, 0.0)),
-        Revolute(2, 3, (l3, 0.0), (l4, 0.0)),
-        Revolute(0, 3, (l1, 0.0)),
-    )
-    first = linkage.positions([0.0])
-    A, B = complex(first.A[0, 0], first.A[0, 1]), complex(first.B[0, 0], first.B[0, 1])
-    coupler, rocker = (A.real, A.imag, float(np.angle(B - A))), (l1, 0.0, float(np.angle(B - l1)))
-    pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), coupler, rocker)
+    sizes = (linkage.l1, linkage.l2, linkage.l3, linkage.l4)
+    mechanism = Mechanism.four_bar(*sizes, crank_angle=0.0, branch=linkage.sgn)
 
-    def closed(f: Array) -> NDArray[np.complex128]:
+    def closed(f: Array) -> Complex:
         found = linkage.positions(f).B
         return np.asarray(found[..., 0] + 1j * found[..., 1])
 
-    return Mechanism(graph, joints, (Driver(0, 1),), pose=pose), ("closed form", closed)
+    return mechanism, ("closed form", closed)
 
 
 def _watched(mechanism: Mechanism) -> tuple[int, tuple[float, float]]:
-    """Return link and point that are compared: the last turning joint between moving links, else a link's origin."""
-    from graphsynth.mechanism.joints import Revolute
-
+    """Return link and point that are compared: the last revolute joint between moving links, else a link's origin."""
     for joint in reversed(mechanism.joints):
         if isinstance(joint, Revolute) and mechanism.frame not in joint.pair:
             return joint.b, joint.at_b
     return mechanism.graph.links - 1, (0.0, 0.0)
 
 
-def _point(poses: Array, watched: tuple[int, tuple[float, float]]) -> NDArray[np.complex128]:
+def _point(poses: Array, watched: tuple[int, tuple[float, float]]) -> Complex:
     link, at = watched
     place = poses[..., link, :]
     return np.asarray(place[..., 0] + 1j * place[..., 1] + np.exp(1j * place[..., 2]) * complex(*at))
@@ -98,7 +79,7 @@ def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any
     Parameters
     ----------
     mechanism : Mechanism
-        With turning and sliding pairs and pins in slots, and one driver of a turning pair that follows the input.
+        With one driver of a revolute joint that follows the input.
     u : float
         Input, taken as the double it is.
     guess : ndarray, shape (links, 3)
@@ -111,7 +92,7 @@ def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any
     Raises
     ------
     GeometryError
-        Another joint or driver, or no convergence from this guess.
+        Another driver, or no convergence from this guess.
     """
     import mpmath
 
@@ -132,55 +113,35 @@ def precise_poses(mechanism: Mechanism, u: float, guess: Array) -> list[list[Any
 
 def _equations(mechanism: Mechanism, u: Any, pose: list[list[Any]]) -> tuple[list[Any], list[dict[Any, Any]]]:
     """Values and derivatives of all joint equations and of the driver; derivatives by (link, axis)."""
-    import mpmath
-
-    from graphsynth.mechanism.joints import Cam, Gear, Prismatic, Revolute
-
-    values: list[Any] = []
-    rows: list[dict[Any, Any]] = []
-
-    def arm(link: int, at: tuple[float, float]) -> Any:
-        return mpmath.expj(pose[link][2]) * mpmath.mpc(*at)
-
-    for joint in mechanism.joints:
-        if isinstance(joint, Gear | Cam):
-            raise GeometryError("the 50-digit reference knows turning and sliding pairs and pins in slots only")
-        a, b = joint.a, joint.b
-        p, q = arm(a, joint.at_a), arm(b, joint.at_b)
-        d = mpmath.mpc(pose[b][0], pose[b][1]) + q - mpmath.mpc(pose[a][0], pose[a][1]) - p
-        slope = {(a, 0): -1, (a, 1): -1j, (a, 2): -1j * p, (b, 0): 1, (b, 1): 1j, (b, 2): 1j * q}
-        if isinstance(joint, Revolute):
-            values += [d.real, d.imag]
-            rows += [{k: mpmath.re(v) for k, v in slope.items()}, {k: mpmath.im(v) for k, v in slope.items()}]
-            continue
-        turn = mpmath.expj(-(pose[a][2] + mpmath.mpf(joint.angle_a)))
-        values.append((turn * d).imag)
-        row = {k: mpmath.im(turn * v) for k, v in slope.items()}
-        row[a, 2] += mpmath.im(-1j * turn * d)
-        rows.append(row)
-        if isinstance(joint, Prismatic):
-            angle = pose[b][2] + mpmath.mpf(joint.angle_b) - pose[a][2] - mpmath.mpf(joint.angle_a)
-            values.append(angle - 2 * mpmath.pi * mpmath.nint(angle / (2 * mpmath.pi)))
-            rows.append({(a, 2): mpmath.mpf(-1), (b, 2): mpmath.mpf(1)})
-    value, row = _driven(mechanism, u, pose)
-    return [*values, value], [*rows, row]
-
-
-def _driven(mechanism: Mechanism, u: Any, pose: list[list[Any]]) -> tuple[Any, dict[Any, Any]]:
-    import mpmath
+    from mpmath import mp
 
     from graphsynth.mechanism.laws import Linear
 
+    plane = Pairs(mp.sin, mp.cos, mp.sqrt, mp.atan2)
     driver = mechanism.drivers[0]
     joint = next((j for j in mechanism.joints if j.pair == driver.pair), None)
-    if len(mechanism.drivers) != 1 or not isinstance(driver.law, Linear) or joint is None or joint.kind != "R":
-        raise GeometryError(
-            "the 50-digit reference needs one driver, of a turning pair, that follows the input linearly"
-        )
-    wanted = mpmath.mpf(driver.law.offset) + mpmath.mpf(driver.law.rate) * u
-    angle = pose[driver.link][2] - pose[driver.base][2] - wanted
-    one = mpmath.mpf(1)
-    return angle - 2 * mpmath.pi * mpmath.nint(angle / (2 * mpmath.pi)), {(driver.link, 2): one, (driver.base, 2): -one}
+    if len(mechanism.drivers) != 1 or not isinstance(driver.law, Linear) or not isinstance(joint, Revolute):
+        raise GeometryError("the 50-digit reference needs one driver, of a revolute joint, linear in the input")
+    values: list[Any] = []
+    rows: list[dict[Any, Any]] = []
+    for joint in mechanism.joints:
+        at = seen(plane, joint, (*pose[joint.a],), (*pose[joint.b],))
+        for value, turns, slopes in zip(joint.values(at), joint.turns(), derivatives(at, joint.gradients(at))):
+            values.append(_near(value, abs(sum(turns))) if turns else value)
+            links = zip((joint.a, joint.b), slopes)
+            rows.append({(link, k): slope for link, by in links for k, slope in enumerate(by) if slope is not None})
+    angle = pose[driver.link][2] - pose[driver.base][2]
+    values.append(_near(angle - mp.mpf(driver.law.offset) - mp.mpf(driver.law.rate) * u, 1))
+    rows.append({(driver.link, 2): mp.mpf(1), (driver.base, 2): mp.mpf(-1)})
+    return values, rows
+
+
+def _near(angle: Any, turns: float) -> Any:
+    """Angle less the whole multiple of so many turns that is nearest to it."""
+    from mpmath import mp
+
+    period = 2 * mp.pi * turns
+    return angle - period * mp.nint(angle / period)
 
 
 def position_problem(
@@ -196,11 +157,11 @@ def position_problem(
     Parameters
     ----------
     mechanism : Mechanism
-        That can be moved through the range; joints and driver as for `precise_poses`.
+        That can be moved through the range; its driver as for `precise_poses`.
     name : str
         Of the mechanism, for the picture.
     closed : (str, function), optional
-        A closed form of the watched point: the last turning joint between two moving links.
+        A closed form of the watched point: the last revolute joint between two moving links.
     inputs : (float, float), optional
         Range of the input, radians.
     effort : Effort, optional
@@ -216,8 +177,6 @@ def position_problem(
     GeometryError
         If the motion ends within the range.
     """
-    from graphsynth.kinematics.simulation import simulate
-
     effort = effort or Effort()
     nodes = np.linspace(*inputs, NODES + 1)
     motion = simulate(mechanism, nodes)
@@ -233,15 +192,13 @@ def position_problem(
         if not effort.quick:
             rows.append(_closed_row(closed, np.linspace(*inputs, 120_001), truth, motion.Lc, effort))
     rows += [_engine_row(mechanism, grid, truth, watched, motion.Lc, effort) for grid in grids]
-    rows += [_root_row(mechanism, nodes, truth, watched, motion, tol, effort) for tol in (1e-4, 1e-8, 1e-12)]
+    rows += [_root_row(mechanism, truth, watched, motion, tol, effort) for tol in (1e-4, 1e-8, 1e-12)]
     rows += [_proof_row(mechanism, grid, truth, watched, motion.Lc, effort) for grid in grids[:3]]
     return Problem("positions", f"Positions of {name} over the range of its input", "relative", tuple(rows), "position")
 
 
-def precise_points(mechanism: Mechanism, inputs: Array) -> NDArray[np.complex128]:
+def precise_points(mechanism: Mechanism, inputs: Array) -> Complex:
     """Watched point at inputs (n,) with 50 digits, rounded once, shape (n,); the branch is that of `simulate`."""
-    from graphsynth.kinematics.simulation import simulate
-
     motion, watched = simulate(mechanism, inputs), _watched(mechanism)
     if not motion.completed:
         raise GeometryError(f"the motion ends: {motion.reason}")
@@ -260,55 +217,32 @@ def _precise_point(pose: list[list[Any]], watched: tuple[int, tuple[float, float
         return complex(mpmath.mpc(x, y) + mpmath.expj(theta) * mpmath.mpc(*at))
 
 
-def _gap(found: NDArray[np.complex128], truth: NDArray[np.complex128], Lc: float) -> float:
+def _gap(found: Complex, truth: Complex, Lc: float) -> float:
     """Largest distance at the nodes, which every grid contains."""
     step = (len(found) - 1) // NODES
     return float(np.abs(found[::step] - truth).max()) / Lc
 
 
-def _closed_row(closed: Closed, grid: Array, truth: NDArray[np.complex128], Lc: float, effort: Effort) -> Row:
-    found, seconds, rounds = best_of(lambda: closed[1](grid), effort)
-    setting = f"{len(grid)} at once"
-    return Row(closed[0], setting, _gap(found, truth, Lc), seconds / len(grid), rounds, _KIND, _REFERENCE)
+def _closed_row(closed: Closed, grid: Array, truth: Complex, Lc: float, effort: Effort) -> Row:
+    found, *timed = best_of(lambda: closed[1](grid), effort)
+    n = len(grid)
+    return Row.of(closed[0], f"{n} at once", _gap(found, truth, Lc), timed, many=n, reference=_REFERENCE)
 
 
-def _engine_row(
-    mechanism: Mechanism, grid: Array, truth: NDArray[np.complex128], watched: Any, Lc: float, effort: Effort
-) -> Row:
-    from graphsynth.kinematics.simulation import simulate
-
-    found, seconds, rounds = best_of(lambda: simulate(mechanism, grid), effort)
-    error = _gap(_point(found.poses, watched), truth, Lc)
-    status = RowStatus.OK if found.completed else RowStatus.FAILED
-    return Row(
-        "engine, with events and derivatives",
-        f"{len(grid)} at once",
-        error,
-        seconds / len(grid),
-        rounds,
-        _KIND,
-        _REFERENCE,
-        status,
-        found.reason,
-        more={"residual": found.residual},
-    )
+def _engine_row(mechanism: Mechanism, grid: Array, truth: Complex, watched: Any, Lc: float, effort: Effort) -> Row:
+    found, *timed = best_of(lambda: simulate(mechanism, grid), effort)
+    error, n = _gap(_point(found.poses, watched), truth, Lc), len(grid)
+    more = {"many": n, "reference": _REFERENCE, "more": {"residual": found.residual}}
+    return Row.of("engine, with events and derivatives", f"{n} at once", error, timed, found.reason, **more)
 
 
-def _root_row(
-    mechanism: Mechanism,
-    nodes: Array,
-    truth: NDArray[np.complex128],
-    watched: Any,
-    motion: Any,
-    tol: float,
-    effort: Effort,
-) -> Row:
+def _root_row(mechanism: Mechanism, truth: Complex, watched: Any, motion: Motion, tol: float, effort: Effort) -> Row:
     """Scipy's ``root`` on the same equations, from node to node with steps of five degrees between."""
     from scipy.optimize import root
 
     from graphsynth.mechanism.constraints import residual
 
-    fine = np.linspace(nodes[0], nodes[-1], 6 * NODES + 1)
+    fine = np.linspace(motion.inputs[0], motion.inputs[-1], 6 * NODES + 1)
     free = [k for k in range(mechanism.graph.links) if k != mechanism.frame]
     driver = mechanism.drivers[0]
     size = np.array([motion.Lc, motion.Lc, 1.0])
@@ -337,58 +271,38 @@ def _root_row(
             found.append(full(x))
         return found, ""
 
-    name, setting = "scipy root, pose by pose", f"tol {tol:.0e}"
-    (found, why), seconds, rounds = best_of(run, effort)
-    each = seconds / max(1, len(found))
+    (found, why), *timed = best_of(run, effort)
+    row = partial(Row.of, "scipy root, pose by pose", f"tol {tol:.0e}", many=max(1, len(found)), reference=_REFERENCE)
     if why:
-        return Row(name, setting, math.nan, each, rounds, _KIND, _REFERENCE, RowStatus.FAILED, why)
+        return row(math.nan, timed, why)
     error = _gap(_point(np.array(found), watched), truth, motion.Lc)
-    if error > 1e-2:
-        why = "it converges to another assembly"
-    status = RowStatus.UNRELIABLE if why else RowStatus.OK
-    return Row(name, setting, error, each, rounds, _KIND, _REFERENCE, status, why)
+    why = "it converges to another assembly" if error > 1e-2 else ""
+    return row(error, timed, why, status=RowStatus.UNRELIABLE)
 
 
-def _proof_row(
-    mechanism: Mechanism, grid: Array, truth: NDArray[np.complex128], watched: Any, Lc: float, effort: Effort
-) -> Row:
-    from graphsynth.kinematics.simulation import simulate
-
-    name, setting = "engine and certificate", f"{len(grid)} at once"
-    kind = "proved radius about every link's origin"
+def _proof_row(mechanism: Mechanism, grid: Array, truth: Complex, watched: Any, Lc: float, effort: Effort) -> Row:
+    row = partial(
+        Row.of, "engine and certificate", f"{len(grid)} at once", kind="proved radius about every link's origin"
+    )
     try:
         from graphsynth.kinematics.certify.poses import certify
 
         def run() -> Any:
             return (motion := simulate(mechanism, grid)), certify(motion)
 
-        (motion, proof), seconds, rounds = best_of(run, effort)
+        (motion, proof), *timed = best_of(run, effort)
     except GraphsynthError as error:
-        return Row(name, setting, math.nan, math.nan, 0, kind, "", RowStatus.FAILED, str(error))
-    more = {"boxes": float(proof.boxes)}
+        return row(math.nan, (math.nan, 0), str(error))
+    row = partial(row, many=len(grid), more={"boxes": float(proof.boxes)})
     if not proof.certified:
-        return Row(
-            name, setting, math.nan, seconds / len(grid), rounds, kind, "", RowStatus.FAILED, proof.reason, more=more
-        )
-    radius = float(np.max(proof.position_radius))
+        return row(math.nan, timed, proof.reason)
     # the watched point moves with the angle of its link too
-    reach = radius + float(np.max(proof.angle_radius)) * math.hypot(*watched[1])
+    reach = float(np.max(proof.position_radius)) + float(np.max(proof.angle_radius)) * math.hypot(*watched[1])
     away = _gap(_point(motion.poses, watched), truth, 1.0)
     held = away <= reach + 4.0 * math.ulp(float(np.abs(truth).max()))
     why = "" if held else f"the reference is {away:.1e} away, beyond the proved radius"
-    return Row(
-        name,
-        setting,
-        reach / Lc,
-        seconds / len(grid),
-        rounds,
-        kind,
-        f"none needed; checked to hold the pose with {_DIGITS} digits",
-        RowStatus.OK if held else RowStatus.FAILED,
-        why,
-        proved=True,
-        more=more,
-    )
+    against = f"none needed; checked to hold the pose with {_DIGITS} digits"
+    return row(reach / Lc, timed, why, reference=against, proved=True)
 
 
 def batch_problem(crank: float, largest: float, effort: Effort | None = None) -> Problem:
@@ -410,20 +324,23 @@ def batch_problem(crank: float, largest: float, effort: Effort | None = None) ->
     linkages = _crank_rockers(crank, largest, 4 if effort.quick else 12)
     f = np.linspace(0.0, math.tau, _POSITIONS)
     made = [four_bar(linkage) for linkage in linkages]
-    nodes = f[:: (_POSITIONS - 1) // NODES]
-    truth = np.array([precise_points(mechanism, nodes) for mechanism, _ in made])
+    truth = np.array([precise_points(mechanism, f[::_STEP]) for mechanism, _ in made])
     size = np.array([max(linkage.l1, linkage.l3, linkage.l4) for linkage in linkages])
+
+    def row(method: str, sets: int, run: Callable[[], Complex]) -> Row:
+        found, *timed = best_of(run, effort)
+        gaps = np.abs(found[:, ::_STEP] - truth[: len(found)]) / size[: len(found), None]
+        error = float(gaps.max())
+        why = "" if math.isfinite(error) else "a set stopped"
+        more = {"kind": "largest distance from the reference over the longest link", "reference": _REFERENCE}
+        return Row.of(method, f"{sets} sets", error, timed, why, many=sets * len(f), **more)
+
     rows = []
     for sets in (len(made), 40, 400) if effort.quick else (1, len(made), 240, 2400, 24_000):
-        for rates in (False, True):
-            name = "batch engine" + (" with derivatives" if rates else "")
-            run = partial(_batch, [m for m, _ in made], f, sets, rates)
-            found, seconds, rounds = best_of(run, effort)
-            rows.append(_sets_row(name, f"{sets} sets", found, truth, size, seconds / (sets * len(f)), rounds))
+        for name, rates in (("batch engine", False), ("batch engine with derivatives", True)):
+            rows.append(row(name, sets, partial(_batch, [m for m, _ in made], f, sets, rates)))
     for name, each in (("engine, set by set", _engine), ("closed form, set by set", _closed)):
-        for count in (1, len(made) // 2, len(made)):
-            found, seconds, rounds = best_of(partial(each, made[:count], f), effort)
-            rows.append(_sets_row(name, f"{count} sets", found, truth, size, seconds / (count * len(f)), rounds))
+        rows += [row(name, n, partial(each, made[:n], f)) for n in (1, len(made) // 2, len(made))]
     question = f"Positions of crank-rockers of many dimensions, {len(f)} crank angles each"
     return Problem("many-sets", question, "relative", tuple(rows), "position")
 
@@ -445,47 +362,14 @@ def _batch(mechanisms: list[Mechanism], f: Array, sets: int, rates: bool) -> Com
 
     dimensions = np.stack([mechanisms[k % len(mechanisms)].dimensions for k in range(sets)])
     found = simulate_batch(mechanisms[0], f, dimensions, rates=rates, keep=(3,))
-    # joint B is the end of the rocker, link 3
     x, y, cosine, sine = np.moveaxis(found.frames[: len(mechanisms), :, 0], -1, 0)
-    ends = np.array([_end(mechanism) for mechanism in mechanisms])[: len(x), None]
+    ends = np.array([_watched(mechanism)[1][0] for mechanism in mechanisms])[: len(x), None]
     return np.asarray(x + 1j * y + ends * (cosine + 1j * sine))
 
 
-def _end(mechanism: Mechanism) -> float:
-    """Length of the rocker, link 3."""
-    joint = next(joint for joint in mechanism.joints if joint.pair == (2, 3))
-    assert isinstance(joint, Revolute)
-    return joint.at_b[0]
-
-
 def _engine(made: Sequence[_Made], f: Array) -> Complex:
-    from graphsynth.kinematics.simulation import simulate
-
-    found = []
-    for mechanism, _ in made:
-        pose = simulate(mechanism, f).poses[:, 3]
-        found.append(pose[:, 0] + 1j * pose[:, 1] + _end(mechanism) * np.exp(1j * pose[:, 2]))
-    return np.array(found)
+    return np.array([_point(simulate(mechanism, f).poses, _watched(mechanism)) for mechanism, _ in made])
 
 
 def _closed(made: Sequence[_Made], f: Array) -> Complex:
     return np.array([closed(f) for _, (_, closed) in made])
-
-
-def _sets_row(
-    method: str, setting: str, found: Complex, truth: Complex, size: Array, seconds: float, rounds: int
-) -> Row:
-    nodes = found[:, :: (_POSITIONS - 1) // NODES]
-    error = float((np.abs(nodes - truth[: len(found)]) / size[: len(found), None]).max())
-    lost = not math.isfinite(error)
-    return Row(
-        method,
-        setting,
-        error,
-        seconds,
-        rounds,
-        _SETS_KIND,
-        "Newton's method with 50 digits on the joint equations",
-        RowStatus.FAILED if lost else RowStatus.OK,
-        "a set stopped" if lost else "",
-    )

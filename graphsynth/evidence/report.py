@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import platform
@@ -14,7 +15,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GraphsynthError, SceneError
-from graphsynth.evidence.choice import Knee, advice, knees
+from graphsynth.evidence.choice import Knee, advice, knees, seconds_text
 from graphsynth.evidence.rows import Effort, Plan, Problem, table
 
 if TYPE_CHECKING:
@@ -205,3 +206,103 @@ def summary(report: AccuracyReport) -> Iterable[str]:
         if problem.note:
             yield f"  {problem.note}"
     yield from (f"left out: {name}: {reason}" for name, reason in report.left_out)
+
+
+_CSS = """
+:root{color-scheme:light dark;--ink:#1b2733;--soft:#5b6875;--paper:#fff;--rule:#d5dbe1;--bad:#b34700}
+@media (prefers-color-scheme:dark){:root{--ink:#e6edf3;--soft:#9aa7b4;--paper:#12181f;--rule:#323d48;--bad:#f0883e}}
+body{margin:0;background:var(--paper);color:var(--ink);
+font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+main{max-width:62rem;margin:0 auto;padding:1.2rem 1rem 3rem}
+h1{font-size:1.6rem;line-height:1.2}
+h2{font-size:1.2rem;margin:2.4rem 0 .5rem;border-top:1px solid var(--rule);padding-top:.9rem}
+p,li{max-width:48rem}.soft{color:var(--soft);font-size:.875rem}
+figure{margin:.8rem 0}
+figure svg{display:block;width:100%;height:auto;max-width:56rem;margin:0 auto}
+.scroll{overflow-x:auto}table{border-collapse:collapse;font-size:.85rem;font-variant-numeric:tabular-nums}
+th,td{text-align:left;vertical-align:top;padding:.25rem .9rem .25rem 0;border-bottom:1px solid var(--rule)}
+th{color:var(--soft)}td.num{white-space:nowrap}.bad{color:var(--bad)}
+details{margin:.6rem 0}summary{cursor:pointer;font-weight:600}
+"""
+_PAGE = """<h1>{{ title }}</h1>
+<p class="soft">{{ report.machine }}. Measured in {{ "%.0f" | format(report.seconds) }} s. Times are wall times,
+the best of the rounds, with everything compiled. Every sentence is computed from the rows below it.</p>
+{%- for problem in report.problems -%}
+{%- set defaults = report.knees[problem.name] | selectattr("default") | map(attribute="sentence") | list -%}
+{%- set extra = more(problem) -%}
+<h2>{{ problem.name }}</h2><p>{{ problem.question }}</p>
+<figure>{{ pictures[problem.name] | drawing }}</figure><ul>
+{%- for text in report.advice[problem.name].values() %}<li>{{ text }}</li>{% endfor %}</ul>
+{%- if defaults %}<p class="soft">Defaults:</p><ul>
+{%- for text in defaults %}<li>{{ text }}</li>{% endfor %}</ul>{% endif %}
+{%- if problem.note %}<p class="soft">{{ problem.note }}</p>{% endif -%}
+<details><summary>{{ problem.rows | length }} rows</summary><div class="scroll"><table><thead><tr>
+{%- for name in ["method", "setting", "error, " + problem.unit, "time of one " + problem.per, "status"] + extra
++ ["error is", "against"] %}<th scope="col">{{ name }}</th>{% endfor %}</tr></thead><tbody>
+{%- for row in problem.rows -%}
+<tr{% if row.reason %} class="bad"{% endif %}><td>{{ row.method }}</td>
+<td>{{ row.setting }}{% if row.default %} (default){% endif %}</td><td class="num">{{ row.error | number }}</td>
+<td class="num">{% if row.rounds %}{{ row.seconds | seconds }}, best of {{ row.rounds }}{% endif %}</td>
+<td>{{ row.status.value }}{% if row.reason %}: {{ row.reason }}{% endif %}</td>
+{%- for name in extra %}<td class="num">{{ row.more.get(name, nan) | number }}</td>{% endfor -%}
+<td>{{ row.kind }}</td><td>{{ row.reference }}</td></tr>
+{%- endfor %}</tbody></table></div></details>
+{%- endfor %}
+{%- if report.left_out %}<h2>Left out</h2><ul>
+{%- for name, reason in report.left_out %}<li><b>{{ name }}</b>: {{ reason }}</li>{% endfor %}</ul>{% endif %}"""
+
+
+def page(report: AccuracyReport, pictures: Mapping[str, str]) -> str:
+    """Return ``accuracy.html``: for each problem the picture (SVG by name), a sentence for each method, and all rows.
+
+    One file without outside resources, readable on a phone; values are escaped.
+    """
+    from graphsynth.drawing.pages import template, whole_page
+    from graphsynth.drawing.palette import STYLE
+
+    title = f"Error against run time: {report.scene}"
+
+    def more(problem: Problem) -> list[str]:
+        return list(dict.fromkeys(name for row in problem.rows for name in row.more))
+
+    body = template(_PAGE, number=_number, seconds=seconds_text).render(
+        report=report, title=title, pictures=pictures, more=more, nan=math.nan
+    )
+    return whole_page(title, _CSS + STYLE, body)
+
+
+def _number(value: float) -> str:
+    if math.isnan(value):
+        return ""
+    return f"{value:.0f}" if value == round(value) and abs(value) < 1e6 else f"{value:.2e}"
+
+
+def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
+    """Write ``accuracy.csv``, ``.json``, ``.html`` and a PNG and SVG for each problem; return the files.
+
+    Parameters
+    ----------
+    report : AccuracyReport
+    folder : Path
+        Made if it is missing; files of an earlier run are replaced.
+
+    Returns
+    -------
+    tuple of Path
+    """
+    from graphsynth.drawing.figures import themed_svg
+    from graphsynth.evidence.pictures import work_precision_picture
+
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / "accuracy.csv", folder / "accuracy.json", folder / "accuracy.html"]
+    report.to_pandas().to_csv(files[0], index=False)
+    files[1].write_text(json.dumps(report.document(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    pictures = {}
+    for problem in report.problems:
+        figure = work_precision_picture(problem)
+        pictures[problem.name] = themed_svg(figure)
+        files += [folder / f"{problem.name}.{suffix}" for suffix in ("png", "svg")]
+        figure.savefig(files[-2], dpi=150)
+        files[-1].write_text(pictures[problem.name], encoding="utf-8")
+    files[2].write_text(page(report, pictures), encoding="utf-8")
+    return tuple(files)

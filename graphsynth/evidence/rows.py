@@ -6,7 +6,7 @@ A plan is a string, imported when the problem is measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from importlib import import_module
@@ -76,6 +76,25 @@ class Row:
     proved: bool = False
     more: Mapping[str, float] = field(default_factory=dict)
     value: float = math.nan
+
+    @classmethod
+    def of(cls, method: str, setting: str, error: float, timed: Sequence[float], why: str = "", **more: Any) -> Row:
+        """Return the row of a run that `best_of` has timed.
+
+        Parameters
+        ----------
+        method, setting, error
+            As above.
+        timed : sequence of float
+            Seconds and rounds.
+        why : str
+            Why it failed, or is what ``status`` says; empty if it is ok.
+        more
+            Other attributes, and ``many``: results of one run, which share its seconds.
+        """
+        seconds, status = timed[0] / more.pop("many", 1), more.pop("status", RowStatus.FAILED)
+        more["status"] = status if why else RowStatus.OK
+        return cls(method, setting, error, seconds, int(timed[1]), reason=why, **more)
 
     @property
     def good(self) -> bool:

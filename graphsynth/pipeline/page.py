@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING
 
-from graphsynth.drawing.pages import whole_page
+from graphsynth.drawing.pages import template, whole_page
 from graphsynth.drawing.palette import LIGHT, STYLE
-from graphsynth.drawing.svg import bare
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.summary import facts, sentences, summary_tables
 
 if TYPE_CHECKING:
-    from jinja2 import Template
-
     from graphsynth.pipeline.stages import Report
 
 _CSS = """
@@ -73,7 +69,7 @@ _PAGE = """
 {%- for column in columns %}<th scope="col">{{ column }}</th>{% endfor -%}
 </tr></thead><tbody>
 {%- for row in rows -%}
-<tr>{% for cell in row %}<td{% if cell is number %} class="num"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
+<tr>{% for cell in row %}<td{% if cell | numeric %} class="num"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
 {%- endfor -%}
 </tbody></table></div>
 {%- endmacro -%}
@@ -133,7 +129,7 @@ def report_html(report: Report) -> str:
     order = [*_HEADINGS, *sorted(galleries)]
     records = products.get("records", ())
     candidates = [(str(r.number), r.solution, r.status, r.verdict or r.reason, r.key) for r in records]
-    body = _template().render(
+    body = template(_PAGE, tone=_tone, numeric=_is_number).render(
         scene=scene,
         notes=report.notes,
         first=found[:first],
@@ -149,16 +145,12 @@ def report_html(report: Report) -> str:
     return whole_page(scene.scene.title, _CSS + _PICTURES, body)
 
 
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
+def _tone(good: bool | None) -> str:
+    return "" if good is None else "good" if good else "bad"
 
-    own = Environment(autoescape=True, undefined=StrictUndefined)
-    own.filters["tone"] = {True: "good", False: "bad", None: ""}.__getitem__
-    own.filters["drawing"] = lambda svg: Markup(bare(svg))  # of our own making
-    own.tests["number"] = lambda text: len(text) < 40 and text[:1] in tuple("0123456789-+")
-    return own.from_string(_PAGE)
+
+def _is_number(text: str) -> bool:
+    return len(text) < 40 and text[:1] in tuple("0123456789-+")
 
 
 def _heading(name: str) -> str:
