@@ -16,7 +16,7 @@ __getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)
 _shown.WORK.update(
     {
         "simulate": "graphsynth.kinematics.simulation:simulate",
-        "modes": "graphsynth.kinematics.assembly:assembly_modes",
+        "modes": "graphsynth.kinematics.engine.start:assembly_modes",
         "assess jamming": "graphsynth.jamming.assess:assess_jamming",
         "static forces": "graphsynth.dynamics.static:static_forces",
         "embody": "graphsynth.kinematics.dimensional.api:embody",

@@ -3,12 +3,16 @@ __version__: str
 from .atlas.catalogue import Catalogue as Catalogue
 from .core.angles import degrees as degrees
 from .core.errors import GraphsynthError as GraphsynthError
+from .drawing.methods import Drawing as Drawing
+from .drawing.plots import Chart as Chart
 from .dynamics.elements import Force as Force, Torque as Torque
+from .dynamics.static import StaticForces as StaticForces
+from .intervals.boxes import Status as Status
 from .intervals.interval import Interval as Interval
 from .intervals.paving import pave as pave
 from .intervals.proving import krawczyk as krawczyk
-from .intervals.status import Status as Status
 from .jamming.assess import JammingReport as JammingReport, assess_jamming as assess_jamming
+from .jamming.joints.assess import CoupledReport as CoupledReport
 from .jamming.joints.limits import JointLimits as JointLimits, Misalignment as Misalignment
 from .kinematics.certify.poses import certify as certify
 from .kinematics.dimensional.api import embody as embody
@@ -20,6 +24,8 @@ from .kinematics.dimensional.goals import (
     PosesGoal as PosesGoal,
 )
 from .kinematics.engine.batch import simulate_batch as simulate_batch
+from .kinematics.engine.result import Motion as Motion
+from .kinematics.engine.start import AssemblyMode as AssemblyMode
 from .kinematics.simulation import simulate as simulate
 from .mechanism import gallery as gallery
 from .mechanism.four_bar import TiltedFourBar as TiltedFourBar

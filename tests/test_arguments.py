@@ -26,10 +26,10 @@ from graphsynth.jamming.bearing.sweep import PieceInterference
 from graphsynth.jamming.intersection import Reading, circle_ellipse, krawczyk_boxes, reading_ellipse, surrogate_problem
 from graphsynth.jamming.joints import bearing_limits
 from graphsynth.mechanism import constraints, files, joints, laws
+from graphsynth.mechanism.constraints import mobility_report
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism
-from graphsynth.mechanism.rank import mobility_report
 from graphsynth.structure.graph import MechanismGraph
 
 BAD = {
@@ -78,7 +78,7 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "jacobian": lambda: (intervals.jacobian, {"f": square, "box": LINE, "parameters": [1]}),
     "image": lambda: (intervals.image, {"f": square, "boxes": [LINE], "parameters": [1]}),
     "krawczyk": lambda: (intervals.krawczyk, {"f": square, "box": LINE, "parameters": [2], "rounds": 3}),
-    "pave": lambda: (intervals.pave, PAVED | {"scale": [1.0], "inner": None, "batch": 32, "progress": None}),
+    "pave": lambda: (intervals.pave, PAVED | {"inner": None, "batch": 32}),
     "cells": lambda: (intervals.pave_cells, PAVED | {"smallest": 0.3, "cell_boxes": 10}),
     "load": lambda: (Search(square, LINE, [2]).load, {"path": "no file"}),
     "gauss_seidel": lambda: (intervals.gauss_seidel, {

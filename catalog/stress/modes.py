@@ -21,7 +21,7 @@ def exact_elbows(theta: tuple[str, ...]) -> list[Any]:
     """Anchors of G1 at decimal angles, as balls."""
     import flint
 
-    from graphsynth.intervals.exact import ball, complex_ball, gaussian, precision, rational
+    from graphsynth.intervals.reading import ball, complex_ball, gaussian, precision, rational
 
     with precision(1000):
         found = []

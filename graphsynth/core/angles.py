@@ -21,9 +21,15 @@ _SAMPLES = 361
 
 
 @overload
-def degrees(values: float) -> float: ...
+def degrees(values: float) -> float:  # noqa: D418
+    """Return an angle given in degrees in radians."""
+
+
 @overload
-def degrees(values: ArrayLike) -> NDArray[np.float64]: ...
+def degrees(values: ArrayLike) -> NDArray[np.float64]:  # noqa: D418
+    """Return angles given in degrees in radians, an array of the same shape."""
+
+
 def degrees(values: ArrayLike) -> float | NDArray[np.float64]:
     """Return angles given in degrees as the radians that every function takes.
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.simulation import simulate
+from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.laws import Linear
 from graphsynth.mechanism.model import Mechanism
-from graphsynth.mechanism.rank import characteristic_length
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion

@@ -1,6 +1,11 @@
-from .boxes import Paving as Paving, Progress as Progress
-from .cells import CellPaving as CellPaving, pave_cells as pave_cells
-from .compiled import compiled_system as compiled_system, pave_compiled as pave_compiled
+from .boxes import Paving as Paving, PavingProgress as PavingProgress, Status as Status
+from .cells import (
+    CellPaving as CellPaving,
+    CompiledSystem as CompiledSystem,
+    compiled_system as compiled_system,
+    pave_cells as pave_cells,
+    pave_compiled as pave_compiled,
+)
 from .dual import Dual as Dual, jacobian as jacobian, variables as variables
 from .functions import (
     acos as acos,
@@ -26,4 +31,3 @@ from .linear import LinearResult as LinearResult, gauss_seidel as gauss_seidel, 
 from .paving import Search as Search, pave as pave
 from .proving import Image as Image, KrawczykResult as KrawczykResult, image as image, krawczyk as krawczyk
 from .reading import Decoration as Decoration
-from .status import Status as Status

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GraphsynthError
-from graphsynth.intervals.exact import precision
+from graphsynth.intervals.reading import precision
 
 Array = NDArray[np.float64]
 

@@ -1,20 +1,49 @@
-"""What a paving is: the boxes that a search has kept, and what is proved about them."""
+"""What is proved about boxes: the status of one, and a paving, the boxes that a search has kept."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.intervals.interval import Interval, _make
-from graphsynth.intervals.status import Status
+from graphsynth.core.errors import IntervalError
+from graphsynth.intervals.interval import Interval, _make, interval
 
+Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-class Progress(NamedTuple):
+class Status(IntEnum):
+    """What is proved about a box X, for all parameter values at once (theory/interval-tests 1).
+
+    With K the Krawczyk image of X:
+
+    ========= ===================================================== =========================================
+    member    meaning                                               proof
+    ========= ===================================================== =========================================
+    EMPTY     no solution in X                                      0 not in F(X), or X and K disjoint
+    UNIQUE    exactly one solution in X for every parameter value   K in the interior of X
+    EXISTS    at least one solution in X for every parameter value  K in X, preconditioner proved nonsingular
+    UNDECIDED nothing proved                                        otherwise; an overlap proves nothing
+    ========= ===================================================== =========================================
+    """
+
+    EMPTY = 0
+    UNIQUE = 1
+    EXISTS = 2
+    UNDECIDED = 3
+
+    @property
+    def proves_existence(self) -> bool:
+        """Whether a solution is certain."""
+        return self in (Status.UNIQUE, Status.EXISTS)
+
+
+class PavingProgress(NamedTuple):
     """State of a search after a batch."""
 
     tested: int
@@ -88,3 +117,22 @@ class Paving:
             if ((lo[k + 1 :] <= hi[k]) & (lo[k] <= hi[k + 1 :])).all(axis=1).any():
                 return None
         return len(lo)
+
+
+def posed(box: Any, tolerance: float | Sequence[float]) -> tuple[Interval, Array]:
+    """Read a start box, and the widths at which boxes are not cut further: a part of its own, or one for each unknown.
+
+    Raises
+    ------
+    IntervalError
+        A box that is empty, unbounded or no vector; widths that are not as many positive numbers.
+    """
+    start = interval(box)
+    if start.ndim != 1 or start.size == 0 or not start.is_bounded.all():
+        raise IntervalError(f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)")
+    if isinstance(tolerance, int | float | np.number):
+        return start, tolerance * np.where(start.width > 0.0, start.width, 1.0)
+    widths = np.array(tolerance, dtype=np.float64)
+    if widths.shape != start.shape or not (np.isfinite(widths) & (widths > 0.0)).all():
+        raise IntervalError(f"tolerance {tolerance!r} must be one number, or {start.size} positive widths")
+    return start, widths

@@ -1,31 +1,170 @@
-"""Pavings over wide parameter boxes: the parameters are cut into cells until each cell is decided.
+"""Pavings of compiled systems, at a thousandth of the cost of a box, and pavings over wide parameter boxes.
+
+A compiled system fills bounds of its equations and derivatives; see `compiled_system`.
 
 A status holds for every parameter value at once, so a wide parameter box often proves nothing although every single
-value would.  Here the cells of a subdivision are paved one by one and their statuses combined: what holds in every cell
-holds for every value.  Source: theory/interval-tests 2 (last rule) and 4, item 9.
+value would.  `pave_cells` cuts the parameters into cells until each cell is decided, and combines their statuses: what
+holds in every cell holds for every value.  Source: theory/interval-tests 2 (last rule) and 4, item 9.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Budget, Positive
 from graphsynth.core.errors import IntervalError
-from graphsynth.intervals.boxes import Paving
-from graphsynth.intervals.compiled import pave_compiled
+from graphsynth.intervals.boxes import Paving, Status, posed
 from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
 from graphsynth.intervals.paving import pave
-from graphsynth.intervals.proving import System
-from graphsynth.intervals.status import Status
+from graphsynth.intervals.proving import System, read_parameters
 
+Array = NDArray[np.float64]
+#: Boxes between two looks at the clock; waiting and kept boxes for which there is room at first.
+_AT_ONCE, _DEPTH, _KEPT = 100_000, 256, 64
 #: A cell that is wide is not worth fine boxes: their widths, relative to the start box, next to that of the cell.
 _COARSE = 0.4
+
+
+class CompiledSystem(Protocol):
+    """A system compiled by `compiled_system`."""
+
+    @property
+    def py_func(self) -> Callable[..., bool]:
+        """The function as it is written."""
+        ...
+
+    def __call__(self, *bounds: Any) -> bool:
+        """Write bounds of the equations, and of their derivatives."""
+        ...
+
+
+@checked
+def compiled_system(function: Callable[..., bool]) -> CompiledSystem:
+    """Compile a system for `pave_compiled`; a decorator.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(xl, xh, pl, ph, fl, fh, jl, jh, derivatives) -> bool``: writes enclosures of the n equations into
+        ``fl, fh`` (n,) and, if ``derivatives``, of the Jacobian into ``jl, jh`` (n, n), for unknowns ``xl, xh`` (n,)
+        and parameters ``pl, ph`` (m,), with the scalar functions of ``graphsynth.intervals.kernels``; returns whether
+        everything was defined and continuous on the whole box.  A system that writes wrong bounds proves nothing.
+
+    Returns
+    -------
+    CompiledSystem
+        A dispatcher of numba.
+    """
+    from graphsynth.intervals.kernels.krawczyk import system
+
+    found: CompiledSystem = system(function)  # type: ignore[no-untyped-call]
+    return found
+
+
+@checked
+def pave_compiled(
+    system: CompiledSystem,
+    box: Any,
+    parameters: Any = None,
+    *,
+    tolerance: Positive | Sequence[float] = 1e-6,
+    max_boxes: Budget = 1_000_000,
+    max_seconds: Budget = 60.0,
+) -> Paving:
+    """Find all solutions of a compiled system in a box.
+
+    Parameters
+    ----------
+    system : function decorated with `compiled_system`
+    box : Interval or anything it takes, shape (n,)
+        Start box, bounded.
+    parameters : Interval or anything it takes, shape (m,), optional
+    tolerance : float or sequence of float
+        Boxes whose widths are all below this part of those of the start box, or below widths given, are not cut
+        further.
+    max_boxes, max_seconds : int, float
+        Budget; the clock is read every 100000 boxes.
+
+    Returns
+    -------
+    Paving
+        Certified; the waiting boxes of a search that a budget ended are ``UNDECIDED``.
+
+    Raises
+    ------
+    IntervalError
+        For a box that is empty, unbounded or no vector, budgets and tolerances that are not positive, a system that
+        is not compiled.
+    GraphsynthError
+        If the processor's rounding has been changed.
+
+    Notes
+    -----
+    Depth first, with epsilon-inflation; the decisions are those of `pave`, the order of the boxes is another.  Source:
+    theory/interval-tests 2.
+
+    Examples
+    --------
+    >>> from graphsynth.intervals.kernels import arithmetic as ia
+    >>> @compiled_system
+    ... def root_of_two(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):
+    ...     low, high = ia.square(xl[0], xh[0])
+    ...     fl[0], fh[0] = ia.subtract(low, high, 2.0, 2.0)
+    ...     if derivatives:
+    ...         jl[0, 0], jh[0, 0] = ia.scale(2.0, xl[0], xh[0])
+    ...     return True
+    >>> found = pave_compiled(root_of_two, ["[-4, 4]"])
+    >>> [Status(s).name for s in found.status], found.finished
+    (['UNIQUE', 'UNIQUE'], True)
+    """
+    check_rounding()
+    if not hasattr(system, "py_func"):
+        raise IntervalError(f"the system {system!r} is not compiled; decorate it with compiled_system")
+    from graphsynth.intervals.kernels import krawczyk
+
+    begin = perf_counter()
+    start, widths = posed(box, tolerance)
+    given = read_parameters(parameters)
+    p = np.zeros((2, 0)) if given is None else np.array([given.lo, given.hi])
+    n = start.size
+    stack, kept, domains = np.empty((_DEPTH, 2, n)), np.empty((_KEPT, 2, n)), np.empty((_KEPT, 2, n))
+    status, state = np.empty(_KEPT, dtype=np.int8), np.array([1, 0, 0, 0])
+    stack[0] = start_box = np.array([start.lo, start.hi])
+    while True:
+        limit = min(max_boxes, int(state[krawczyk.TESTED]) + _AT_ONCE)
+        outcome = krawczyk.pave(system, start_box, p, widths, stack, kept, domains, status, state, limit)
+        if outcome == krawczyk.ROOM:
+            stack, kept, domains, status = (
+                np.concatenate([a, np.empty_like(a)]) for a in (stack, kept, domains, status)
+            )
+        elif outcome == krawczyk.DONE or state[krawczyk.TESTED] >= max_boxes or perf_counter() - begin >= max_seconds:
+            break
+    waiting, count, tested, _ = state.tolist()
+    return _collected(stack[:waiting], kept[:count], domains[:count], status[:count], (tested, perf_counter() - begin))
+
+
+def _doubled(rows: NDArray[Any]) -> NDArray[Any]:
+    return np.concatenate([rows, np.empty_like(rows)])
+
+
+def _collected(stack: Array, kept: Array, domains: Array, status: NDArray[np.int8], work: tuple[int, float]) -> Paving:
+    """Make the result; undecided boxes that a proved solution stands for are left out."""
+    found = np.concatenate([status, np.full(len(stack), Status.UNDECIDED, dtype=np.int8)])
+    boxes, own = np.concatenate([kept, stack]), np.concatenate([domains, stack])
+    stays = np.ones(len(found), dtype=np.bool_)
+    for low, high in domains[status == Status.UNIQUE]:
+        stays &= ~((boxes[:, 0] >= low) & (boxes[:, 1] <= high)).all(axis=1) | (found == Status.UNIQUE)
+    lo, hi, dlo, dhi = (part[stays, side] for part in (boxes, own) for side in (0, 1))
+    inner = np.zeros(len(lo), dtype=np.bool_)
+    return Paving(_make(lo, hi), found[stays], _make(dlo, dhi), inner, len(stack) == 0, *work)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +223,16 @@ def _settled(paving: Paving) -> bool:
 
 @checked
 def pave_cells(
-    f: System, box: Any, parameters: Any, *, tolerance: Positive = 1e-6, smallest: Positive = 1e-3,
-    cell_boxes: Budget = 200, max_boxes: Budget = 100_000, max_seconds: Budget = 60.0,
-) -> CellPaving:  # fmt: skip
+    f: System,
+    box: Any,
+    parameters: Any,
+    *,
+    tolerance: Positive = 1e-6,
+    smallest: Positive = 1e-3,
+    cell_boxes: Budget = 200,
+    max_boxes: Budget = 100_000,
+    max_seconds: Budget = 60.0,
+) -> CellPaving:
     """Find all solutions of ``f = 0`` in a box, cutting the parameters where a wide box of them proves nothing.
 
     Parameters
@@ -123,11 +269,9 @@ def pave_cells(
     check_rounding()
     p, start = interval(parameters), interval(box)
     if p.ndim != 1 or p.size == 0 or not p.is_bounded.all():
-        raise IntervalError(
-            f"the parameters {p!r} are not a vector of bounded intervals; give finite bounds, shape (m,)"
-        )
+        raise IntervalError(f"the parameters {p!r} are not a vector of bounded intervals; give finite bounds, (m,)")
     begin, tested, finished = perf_counter(), 0, True
-    scale = np.where(start.width > 0.0, start.width, 1.0).tolist()
+    scale = np.where(start.width > 0.0, start.width, 1.0)
     widths = np.where(p.width > 0.0, p.width, 1.0)
     waiting: deque[tuple[Interval, Interval, Paving | None]] = deque([(p, start, None)])
     done: list[tuple[Interval, Paving]] = []
@@ -135,14 +279,14 @@ def pave_cells(
         cell, inside, before = waiting.popleft()
         left = max_seconds - (perf_counter() - begin)
         if before is not None and (tested >= max_boxes or left <= 0.0):
-            done.append((cell, _unproved(before)))
+            done.append((cell, replace(before, finished=False, tested=0, seconds=0.0)))  # proofs stay proofs
             finished = False
             continue
         sides = cell.width / widths
         wide = float(sides.max())
         fine = max(tolerance, _COARSE * wide) if wide > smallest else tolerance
-        options: dict[str, Any] = {"tolerance": fine, "scale": scale, "max_boxes": min(cell_boxes, max_boxes)}
-        found = _paved(f, inside, cell, options | {"max_seconds": max(left, 1e-9)})
+        limits = {"max_boxes": min(cell_boxes, max_boxes), "max_seconds": max(left, 1e-9)}
+        found = _paved(f, inside, cell, {"tolerance": (fine * scale).tolist(), **limits})
         tested += found.tested
         if _settled(found):
             done.append((cell, found))
@@ -152,10 +296,8 @@ def pave_cells(
         else:
             part = _around(found.outer, inside)
             waiting.extend((half, part, found) for half in _halves(cell, int(sides.argmax())))
-    return CellPaving(
-        Interval.stack([cell for cell, _ in done]), tuple(paving for _, paving in done), finished, tested,
-        perf_counter() - begin,
-    )  # fmt: skip
+    cells, pavings = zip(*done)
+    return CellPaving(Interval.stack(cells), pavings, finished, tested, perf_counter() - begin)
 
 
 def _paved(f: Any, box: Interval, cell: Interval, options: dict[str, Any]) -> Paving:
@@ -174,8 +316,3 @@ def _halves(cell: Interval, side: int) -> tuple[Interval, Interval]:
     lower, upper = cell.hi.copy(), cell.lo.copy()
     lower[side] = upper[side] = cell.mid[side]
     return _make(cell.lo, lower, cell.flags), _make(upper, cell.hi, cell.flags)
-
-
-def _unproved(paving: Paving) -> Paving:
-    """Carry the boxes of a paving over to a part of its cell: proofs stay proofs, and nothing is finished."""
-    return Paving(paving.boxes, paving.status, paving.domains, paving.inner, False, 0, 0.0)

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals.dual import Dual
-from graphsynth.intervals.guard import check_quickly
 from graphsynth.intervals.interval import Interval, _clipped, _make, interval
-from graphsynth.intervals.operations import common_shape, flat_of
+from graphsynth.intervals.operations import common_shape, run
 from graphsynth.intervals.reading import DISCONTINUOUS
 
 Array = NDArray[np.float64]
@@ -26,13 +25,7 @@ Array = NDArray[np.float64]
 
 def _apply(name: str, *arguments: Interval) -> Interval:
     """Run a compiled loop over broadcast arguments; decorations of all are joined."""
-    from graphsynth.intervals.kernels import elementary
-
-    check_quickly()
-    sides = [side for a in arguments for side in (a.lo, a.hi)]
-    shape = common_shape(*sides)
-    lo, hi = np.empty(shape), np.empty(shape)
-    getattr(elementary, name)(*[flat_of(a, shape) for a in sides], lo.reshape(-1), hi.reshape(-1))
+    lo, hi = run(name, *[side for a in arguments for side in (a.lo, a.hi)])
     flags = arguments[0].flags
     for a in arguments[1:]:
         flags = np.asarray(np.bitwise_or(flags, a.flags))

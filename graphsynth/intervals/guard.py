@@ -15,7 +15,7 @@ from graphsynth.core.arguments import checker
 from graphsynth.core.errors import GraphsynthError, IntervalError
 
 #: Lets a function keep what its annotations say; an `IntervalError` names the argument that is something else.
-checked = checker(IntervalError, {"System": "Callable"})
+checked = checker(IntervalError, {"System": "Callable", "CompiledSystem": "Callable"})
 
 
 _U = 2.0**-53

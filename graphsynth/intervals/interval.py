@@ -342,7 +342,7 @@ class Interval(Measures):
         flags = _both(a.flags, b.flags)
         if name == "divide":
             flags = _clipped(flags, (b.lo <= 0.0) & (b.hi >= 0.0))
-        return _make(*operations.binary(name, a.lo, a.hi, b.lo, b.hi), flags)
+        return _make(*operations.run(name, a.lo, a.hi, b.lo, b.hi), flags)
 
     def __add__(self, other: Any) -> Interval:
         return self._binary("add", other)
@@ -373,7 +373,9 @@ class Interval(Measures):
         return self
 
     def __abs__(self) -> Interval:
-        return _make(*operations.unary("absolute", self.lo, self.hi), self.flags)
+        void = self.is_empty
+        lo, hi = np.maximum(np.maximum(self.lo, -self.hi), 0.0), np.maximum(-self.lo, self.hi)
+        return _make(np.where(void, np.inf, lo), np.where(void, -np.inf, hi), self.flags)
 
     def __pow__(self, exponent: int) -> Interval:
         if not isinstance(exponent, int | np.integer):
@@ -383,15 +385,15 @@ class Interval(Measures):
         if exponent == 2:
             return self.sqr()
         flags = _clipped(self.flags, (self.lo <= 0.0) & (self.hi >= 0.0)) if exponent < 0 else self.flags
-        return _make(*operations.power(self.lo, self.hi, int(exponent)), flags)
+        return _make(*operations.run("power", self.lo, self.hi, extra=(int(exponent),)), flags)
 
     def sqr(self) -> Interval:
         """Square: never negative, and tighter than ``x * x``."""
-        return _make(*operations.unary("square", self.lo, self.hi), self.flags)
+        return _make(*operations.run("square", self.lo, self.hi), self.flags)
 
     def sqrt(self) -> Interval:
         """Square root; a negative part of the argument is clipped and recorded."""
-        return _make(*operations.unary("root", self.lo, self.hi), _clipped(self.flags, self.lo < 0.0))
+        return _make(*operations.run("root", self.lo, self.hi), _clipped(self.flags, self.lo < 0.0))
 
     def __eq__(self, other: object) -> Any:
         raise TypeError("intervals have no ==; use equal, certainly_less, possibly_equal or subset")

@@ -17,11 +17,11 @@ import numpy as np
 
 from graphsynth.core.arguments import Count
 from graphsynth.core.errors import IntervalError
+from graphsynth.intervals.boxes import Status
 from graphsynth.intervals.functions import divide_extended
 from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, interval
 from graphsynth.intervals.proving import inverses, points, spectral_radius
-from graphsynth.intervals.status import Status
 
 _ROUNDS = 15
 

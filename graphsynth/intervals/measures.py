@@ -56,8 +56,7 @@ class Measures:
     @property
     def width(self) -> Array:
         """Upper bound of ``hi - lo``; NaN for empty."""
-        with np.errstate(all="ignore"):
-            return np.where(self.is_empty, np.nan, operations.binary("subtract", self.hi, self.hi, self.lo, self.lo)[1])
+        return np.where(self.is_empty, np.nan, operations.run("subtract", self.hi, self.hi, self.lo, self.lo)[1])
 
     @property
     def mid(self) -> Array:
@@ -73,9 +72,8 @@ class Measures:
     def rad(self) -> Array:
         """Smallest float with ``[mid - rad, mid + rad]`` around the interval, rounded up; NaN for empty."""
         mid = self.mid
-        with np.errstate(all="ignore"):
-            above = operations.binary("subtract", self.hi, self.hi, mid, mid)[1]
-            below = operations.binary("subtract", mid, mid, self.lo, self.lo)[1]
+        above = operations.run("subtract", self.hi, self.hi, mid, mid)[1]
+        below = operations.run("subtract", mid, mid, self.lo, self.lo)[1]
         return np.where(self.is_empty, np.nan, np.maximum(above, below))
 
     @property

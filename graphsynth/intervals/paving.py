@@ -8,7 +8,7 @@ start box.  Source: theory/interval-tests 2.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -18,16 +18,15 @@ from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Budget, Count, Positive
 from graphsynth.core.errors import FormatError, IntervalError
-from graphsynth.intervals.boxes import Paving, Progress
+from graphsynth.intervals.boxes import Paving, PavingProgress, Status, posed
 from graphsynth.intervals.guard import check_rounding, checked
-from graphsynth.intervals.interval import Interval, _make, interval
+from graphsynth.intervals.interval import Interval, _make
 from graphsynth.intervals.proving import System, image, read_parameters
-from graphsynth.intervals.status import Status
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_FORMAT = 1
+_FORMAT = 2
 _GAIN = 0.9
 _CONTRACTIONS = 4
 _POLISH = 8
@@ -45,10 +44,9 @@ class Search:
     box : Interval or anything it takes, shape (n,)
         Start box, bounded.
     parameters : Interval or anything it takes, shape (m,), optional
-    tolerance : float
-        Boxes with all widths below ``tolerance * scale`` are not cut further.
-    scale : sequence of float, optional
-        Natural size of each unknown; the widths of the start box for None.
+    tolerance : float or sequence of float
+        Boxes whose widths are all below this part of those of the start box, or below widths given, are not cut
+        further.
     max_boxes, max_seconds : int, float
         Budget of the whole search, resumed parts included.  A batch is never cut short, so that an interrupted search
         gives the same boxes; the budget may be exceeded by one batch.
@@ -58,8 +56,6 @@ class Search:
         the tolerance even where a wide box is proved to hold exactly one solution for every parameter value.
     batch : int
         Boxes tested at once; part of the definition of the result.
-    progress : callable, optional
-        Called with a `Progress` after every batch.
 
     Raises
     ------
@@ -78,23 +74,21 @@ class Search:
 
     @checked
     def __init__(
-        self, f: System, box: Any, parameters: Any = None, *, tolerance: Positive = 1e-6,
-        scale: Sequence[float] | None = None, max_boxes: Budget = 100_000, max_seconds: Budget = 60.0,
-        inner: Sequence[int] | None = None, batch: Count = 2048, progress: Callable[[Progress], None] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        f: System,
+        box: Any,
+        parameters: Any = None,
+        *,
+        tolerance: Positive | Sequence[float] = 1e-6,
+        max_boxes: Budget = 100_000,
+        max_seconds: Budget = 60.0,
+        inner: Sequence[int] | None = None,
+        batch: Count = 2048,
+    ) -> None:
         check_rounding()
-        start = interval(box)
-        if start.ndim != 1 or start.size == 0 or not start.is_bounded.all():
-            raise IntervalError(
-                f"the box {start!r} is not a vector of bounded intervals; give finite bounds, shape (n,)"
-            )
-        self.f, self.start, self.progress = f, start, progress
-        self.parameters = read_parameters(parameters)
-        self.tolerance, self.max_boxes, self.max_seconds, self.batch = tolerance, max_boxes, max_seconds, batch
-        size = np.asarray(start.width if scale is None else scale, dtype=np.float64)
-        if size.shape != start.shape or not np.isfinite(size).all() or (size < 0.0).any():
-            raise IntervalError(f"scale {scale!r} must hold {start.size} positive numbers")
-        self.scale = np.where(size > 0.0, size, 1.0)
+        start, self.widths = posed(box, tolerance)
+        self.f, self.start, self.parameters = f, start, read_parameters(parameters)
+        self.max_boxes, self.max_seconds, self.batch = max_boxes, max_seconds, batch
         self.inner_by = None if inner is None else list(inner)
         given = 0 if self.parameters is None else self.parameters.size
         if self.inner_by is not None and not (
@@ -118,16 +112,13 @@ class Search:
         """Whether a budget is used up."""
         return self.tested >= self.max_boxes or self.seconds >= self.max_seconds
 
-    def __iter__(self) -> Iterator[Progress]:
+    def __iter__(self) -> Iterator[PavingProgress]:
         check_rounding()
         while not self.finished and not self.exhausted:
             begin = perf_counter()
             self._advance()
             self.seconds += perf_counter() - begin
-            state = Progress(self.tested, len(self._state["waiting_lo"]), len(self._state["lo"]), self.seconds)
-            if self.progress is not None:
-                self.progress(state)
-            yield state
+            yield PavingProgress(self.tested, len(self._state["waiting_lo"]), len(self._state["lo"]), self.seconds)
 
     def paving(self) -> Paving:
         """Return what is known now; waiting boxes are UNDECIDED."""
@@ -142,13 +133,13 @@ class Search:
     @checked
     def save(self, path: str | Path) -> None:
         """Write the state to an ``.npz`` file of plain arrays."""
-        meta = np.array([_FORMAT, self.tested, self.batch], dtype=np.int64)
-        numbers = np.array([self.seconds, self.tolerance])
+        meta, own = np.array([_FORMAT, self.tested, self.batch], dtype=np.int64), np.array([self.seconds])
         with Path(path).open("wb") as file:
-            np.savez(
-                file, meta=meta, numbers=numbers, start_lo=self.start.lo, start_hi=self.start.hi, scale=self.scale,
-                **{key: self._state[key] for key in _ARRAYS},  # type: ignore[arg-type]
-            )  # fmt: skip
+            np.savez(file, meta=meta, seconds=own, **self._posed(), **self._state)  # type: ignore[arg-type]
+
+    def _posed(self) -> dict[str, Array]:
+        """Return what is asked."""
+        return {"start_lo": self.start.lo, "start_hi": self.start.hi, "widths": self.widths}
 
     @checked
     def load(self, path: str | Path) -> Search:
@@ -162,13 +153,10 @@ class Search:
         try:
             with np.load(path, allow_pickle=False) as file:
                 data = {key: file[key] for key in file.files}
-            meta, numbers = data["meta"], data["numbers"]
+            meta, seconds = data["meta"], float(data["seconds"][0])
             state = {key: data[key] for key in _ARRAYS}
-            same = (
-                int(meta[0]) == _FORMAT and int(meta[2]) == self.batch and float(numbers[1]) == self.tolerance
-                and np.array_equal(data["start_lo"], self.start.lo) and np.array_equal(data["start_hi"], self.start.hi)
-                and np.array_equal(data["scale"], self.scale)
-            )  # fmt: skip
+            same = int(meta[0]) == _FORMAT and int(meta[2]) == self.batch
+            same = same and all(np.array_equal(data[key], value) for key, value in self._posed().items())
             rows = {len(state[key]) for key in _ARRAYS[2:]}
             sound = len(rows) == 1 and all(state[key].shape[1:] == self.start.shape for key in _ARRAYS[:6])
             sound = sound and not any(np.isnan(state[key]).any() for key in _ARRAYS[:6])
@@ -177,8 +165,8 @@ class Search:
                 f"not a saved search ({type(error).__name__}); give a file written by save", str(path)
             ) from error
         if not same or not sound:
-            raise FormatError("saved by a search of another box, scale, tolerance or batch; start it anew", str(path))
-        self._state, self.tested, self.seconds = state, int(meta[1]), float(numbers[0])
+            raise FormatError("saved by a search of another box, tolerance or batch; start it anew", str(path))
+        self._state, self.tested, self.seconds = state, int(meta[1]), seconds
         return self
 
     # -- one batch ---------------------------------------------------------------------------------------------------
@@ -208,11 +196,11 @@ class Search:
 
     def _cut_or_keep(self, X: Interval) -> None:
         """Keep boxes at the limit of the resolution as undecided, cut the others."""
-        sides = X.width / self.scale
+        sides = X.width / self.widths
         widest = sides.argmax(axis=1) if len(X) else np.zeros(0, dtype=np.int64)
         row = np.arange(len(X))
         middle = X.mid[row, widest]
-        small = sides.max(axis=1, initial=0.0) <= self.tolerance
+        small = sides.max(axis=1, initial=0.0) <= 1.0
         small |= (middle <= X.lo[row, widest]) | (middle >= X.hi[row, widest])
         done = np.full(int(small.sum()), Status.UNDECIDED, dtype=np.int8)
         self._keep(X[small], X[small], done, np.zeros(len(done), dtype=np.bool_))
@@ -252,7 +240,7 @@ class Search:
         if some.size == 0:
             return some
         boxes = X[some]
-        widest = (boxes.width / self.scale).argmax(axis=1)
+        widest = (boxes.width / self.widths).argmax(axis=1)
         lo, hi = _halves(boxes, widest, boxes.mid[np.arange(some.size), widest])
         halves, domain, found, norm = self._contract(_make(lo, hi))
         unique = found == Status.UNIQUE
@@ -364,7 +352,7 @@ def pave(f: System, box: Any, parameters: Any = None, **options: Any) -> Paving:
     ----------
     f, box, parameters : as for `krawczyk`
     **options
-        As for `Search`: tolerance, scale, max_boxes, max_seconds, inner, batch, progress.
+        As for `Search`: tolerance, max_boxes, max_seconds, inner, batch.
 
     Returns
     -------

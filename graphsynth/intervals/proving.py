@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from graphsynth.core.arguments import Count
 from graphsynth.core.errors import IntervalError
+from graphsynth.intervals.boxes import Status
 from graphsynth.intervals.dual import evaluate, jacobian_of, values_of, variables
 from graphsynth.intervals.guard import check_rounding, checked
 from graphsynth.intervals.interval import Interval, _make, interval
-from graphsynth.intervals.status import Status
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -375,9 +375,14 @@ def _inflated(
 
 
 def _report(
-    status: Status, step: Image, X: Interval, rounds: int, reason: str,
-    domain: Interval | None = None, start: Interval | None = None,
-) -> KrawczykResult:  # fmt: skip
+    status: Status,
+    step: Image,
+    X: Interval,
+    rounds: int,
+    reason: str,
+    domain: Interval | None = None,
+    start: Interval | None = None,
+) -> KrawczykResult:
     K = step.image[0]
     domain = X if domain is None else domain
     box = Interval.empty(X.shape) if status is Status.EMPTY else step.box[0]

@@ -1,37 +1,64 @@
-"""Methods of a `Motion` that show it."""
+"""Methods of a `Motion`: its instantaneous kinematics, and what rooms above show and say of it.
+
+Poles, polodes, inflection and Bresse circles and mechanical advantage are computed over all samples.  Derivatives are
+by the input, as in the motion; what is geometry (poles, the inflection circle) does not depend on it.  Estimated:
+float64, NaN where the branch does not reach, infinite where a link does not turn.
+
+References
+----------
+[Bottema & Roth 1979], chapter 8; [Hunt 1978]; [Uicker et al. 2003], chapters 3 and 4.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.checks import link_number
+from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import Shown, work
-from graphsynth.kinematics.instantaneous import (
-    Circles,
-    Polodes,
-    bresse_circle,
-    inflection_circle,
-    instant_centre,
-    mechanical_advantage,
-    polodes,
-    transmission_index,
-)
 from graphsynth.mechanism.joints import Prismatic
 
 if TYPE_CHECKING:
-    from graphsynth.drawing.methods import Drawing
-    from graphsynth.drawing.plots import Chart
-    from graphsynth.dynamics.static import StaticForces
-    from graphsynth.jamming.joints.assess import CoupledReport
-    from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
+    import graphsynth as gs  # what methods give back that is made in rooms above, by its public name
     from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Polodes(NamedTuple):
+    """Fixed polode (in the frame of the base) and moving polode (in the frame of the link), each (n, 2)."""
+
+    fixed: Array
+    moving: Array
+
+
+class Circles(NamedTuple):
+    """A circle at every sample: ``centre`` (n, 2) in the base's frame, ``diameter`` (n,), ``pole`` (n, 2) on it."""
+
+    centre: Array
+    diameter: Array
+    pole: Array
+
+
+def _pole(place: list[Complex], turn: list[Array]) -> Complex:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(turn[1] == 0.0, complex(math.inf, math.inf), place[0] + 1j * place[1] / turn[1])
+
+
+def _points(z: Complex) -> Array:
+    return np.column_stack([z.real, z.imag])
+
+
+def _circles(pole: Complex, across: Complex) -> Circles:
+    return Circles(_points(pole + 0.5 * across), np.abs(across), _points(pole))
 
 
 class MotionMethods(Shown):
@@ -40,14 +67,201 @@ class MotionMethods(Shown):
     if TYPE_CHECKING:
         mechanism: Mechanism
         inputs: Array
-        events: tuple[MotionEvent, ...]
+        poses: Array
+        velocities: Array
+        accelerations: Array
+        events: tuple[Any, ...]
         completed: bool
         reason: str
-        closure: Closure
-
+        closure: Any
         residual: Any
 
-    def plot(self, of: str | int | None = None, order: int = 0, *, ax: Any = None) -> Chart:
+        def transmission_angle(self) -> dict[int, Array]: ...  # noqa: D102
+
+    # --- instantaneous kinematics
+
+    def _relative(self, link: int, base: int | None) -> tuple[list[Complex], list[Array], Complex]:
+        """Place of a link's origin in the frame of the base and its angle, both with two derivatives; its direction."""
+        mechanism = self.mechanism
+        link = link_number("link", link)
+        base = mechanism.frame if base is None else link_number("base", base)
+        if max(link, base) >= mechanism.graph.links or link == base:
+            raise GeometryError(f"links {link} and {base}: give two of the links 0..{mechanism.graph.links - 1}")
+        arrays = (self.poses, self.velocities, self.accelerations)
+        angle, rate, second = (array[:, link, 2] - array[:, base, 2] for array in arrays)
+        d, d1, d2 = (
+            array[:, link, 0] - array[:, base, 0] + 1j * (array[:, link, 1] - array[:, base, 1]) for array in arrays
+        )
+        w, a = self.velocities[:, base, 2], self.accelerations[:, base, 2]
+        back = np.exp(-1j * self.poses[:, base, 2])
+        # derivatives of back * d, with back' = -i w back
+        place = [back * d, back * (d1 - 1j * w * d), back * (d2 - 2j * w * d1 - (1j * a + w * w) * d)]
+        return place, [angle, rate, second], np.exp(1j * angle)
+
+    def instant_centre(self, link: int, base: int | None = None) -> Array:
+        """Return the instant centre (velocity pole) of a link against another one, the frame by default.
+
+        Parameters
+        ----------
+        link, base : int
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            In the frame of ``base``; infinite where the link only translates.
+
+        Raises
+        ------
+        GeometryError
+            Links that do not exist, or are the same.
+
+        Notes
+        -----
+        ``I = r + i r' / theta'`` with the relative place r of the link's origin and its relative angle theta.
+        """
+        place, turn, _ = self._relative(link, base)
+        return _points(_pole(place, turn))
+
+    def polodes(self, link: int, base: int | None = None) -> Polodes:
+        """Return the polodes (centrodes) of a link against another one: its motion is the rolling of one on the other.
+
+        Parameters
+        ----------
+        link, base : int
+            The frame by default.
+
+        Returns
+        -------
+        Polodes
+
+        Raises
+        ------
+        GeometryError
+            Links that do not exist, or are the same.
+        """
+        place, turn, direction = self._relative(link, base)
+        pole = _pole(place, turn)
+        with np.errstate(invalid="ignore"):
+            return Polodes(_points(pole), _points((pole - place[0]) / direction))
+
+    def _acceleration_at_pole(self, link: int, base: int | None) -> tuple[Complex, Complex, list[Array]]:
+        place, turn, _ = self._relative(link, base)
+        pole = _pole(place, turn)
+        with np.errstate(invalid="ignore"):
+            return pole, place[2] + (1j * turn[2] - turn[1] ** 2) * (pole - place[0]), turn
+
+    def inflection_circle(self, link: int, base: int | None = None) -> Circles:
+        """Return the inflection circle of a link: its points pass an inflection of their path, they run straight.
+
+        Parameters
+        ----------
+        link, base : int
+            The frame by default.
+
+        Returns
+        -------
+        Circles
+            Through the instant centre I; the other end of its diameter is the inflection pole ``I + a_I / theta'^2``,
+            with the acceleration a_I of the point of the link that lies at I.
+
+        Raises
+        ------
+        GeometryError
+            Links that do not exist, or are the same.
+
+        References
+        ----------
+        [Bottema & Roth 1979], chapter 8; [Hunt 1978].
+        """
+        pole, a, turn = self._acceleration_at_pole(link, base)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return _circles(pole, a / turn[1] ** 2)
+
+    def bresse_circle(self, link: int, base: int | None = None) -> Circles:
+        """Return the second circle of Bresse of a link: its points have no tangential acceleration.
+
+        Together with the inflection circle, the first circle of Bresse, it passes through the instant centre and the
+        acceleration pole.  It depends on the angular acceleration, so on the input: it is that of a uniform input.
+
+        Parameters
+        ----------
+        link, base : int
+            The frame by default.
+
+        Returns
+        -------
+        Circles
+            Infinite where the angular acceleration is 0.
+
+        Raises
+        ------
+        GeometryError
+            Links that do not exist, or are the same.
+        """
+        pole, a, turn = self._acceleration_at_pole(link, base)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return _circles(pole, 1j * a / turn[2])
+
+    def transmission_index(self) -> dict[int, Array]:
+        """Return the transmission index of every dyad with two modes, by group: the sine of its transmission angle.
+
+        1 where force is handed on best, 0 in a dead-centre position.
+
+        Returns
+        -------
+        dict of int to ndarray, shape (n,)
+
+        References
+        ----------
+        Sutherland & Roth, A transmission index for spatial mechanisms, J. Eng. Ind. 95 (1973) 589-597, for planar
+        linkages.
+        """
+        return {group: np.sin(angle) for group, angle in self.transmission_angle().items()}
+
+    def mechanical_advantage(self, link: int) -> Array:
+        """Return effort on a link of the frame over effort of the driver, without losses.
+
+        Parameters
+        ----------
+        link : int
+            A link that turns about the frame, or slides on it.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            ``q' / s'``, rate of the driver over that of the link (virtual power); angles count in radians, so torque
+            over torque, or force over torque in units of 1 / length.  Infinite where the link rests.
+
+        Raises
+        ------
+        GeometryError
+            Several drivers, or a link that is not jointed to the frame.
+
+        References
+        ----------
+        [Norton 2004], chapter 6.
+        """
+        mechanism = self.mechanism
+        if len(mechanism.drivers) != 1:
+            raise GeometryError(f"the mechanism has {len(mechanism.drivers)} drivers; mechanical advantage needs one")
+        driver = mechanism.drivers[0]
+        with np.errstate(divide="ignore"):
+            return np.asarray(self._rate(driver.base, driver.link) / self._rate(mechanism.frame, link))
+
+    def _rate(self, base: int, link: int) -> Array:
+        """Rate of the coordinate of a joint."""
+        joint = self.mechanism.joint(base, link)
+        place, turn, direction = self._relative(link, base)
+        if not isinstance(joint, Prismatic):
+            return turn[1]
+        first = joint.a == base
+        at = complex(*(joint.at_b if first else joint.at_a))
+        along = np.exp(1j * (joint.angle_a if first else joint.angle_b))
+        return np.asarray(((place[1] + 1j * turn[1] * direction * at) / along).real)
+
+    # --- what is done in rooms above: pictures, binding, forces
+
+    def plot(self, of: str | int | None = None, order: int = 0, *, ax: Any = None) -> gs.Chart:
         """Plot paths of the named points, or coordinates over the input.
 
         Parameters
@@ -70,12 +284,12 @@ class MotionMethods(Shown):
         GeometryError
             An unknown point or link, another order.
         """
-        chart: Chart = work("plot motion")(self, of, order)
+        chart: gs.Chart = work("plot motion")(self, of, order)
         if ax is not None:
             chart.draw(ax)
         return chart
 
-    def animate(self, path: str | Path | None = None, **options: Any) -> Drawing:
+    def animate(self, path: str | Path | None = None, **options: Any) -> gs.Drawing:
         """Animate the motion, and write it to a file if a path is given.
 
         Parameters
@@ -96,56 +310,29 @@ class MotionMethods(Shown):
         GraphsynthError
             Another suffix; nothing of the motion is assembled.
         """
-        found: Drawing = work("animate motion")(self, path, **options)
+        found: gs.Drawing = work("animate motion")(self, path, **options)
         return found
 
-    def draw(self, path: str | Path | None = None, sample: int = 0, **options: Any) -> Drawing:
+    def draw(self, path: str | Path | None = None, sample: int = 0, **options: Any) -> gs.Drawing:
         """Draw the mechanism at one sample with the paths of its named points; see `Mechanism.draw`."""
-        found: Drawing = work("draw motion")(self, path, sample, **options)
+        found: gs.Drawing = work("draw motion")(self, path, sample, **options)
         return found
 
-    def instant_centre(self, link: int, base: int | None = None) -> Array:
-        """Return the instant centre of a link; see :func:`graphsynth.kinematics.instantaneous.instant_centre`."""
-        return instant_centre(cast("Motion", self), link, base)
-
-    def polodes(self, link: int, base: int | None = None) -> Polodes:
-        """Return fixed and moving polode of a link; see :func:`graphsynth.kinematics.instantaneous.polodes`."""
-        return polodes(cast("Motion", self), link, base)
-
-    def inflection_circle(self, link: int, base: int | None = None) -> Circles:
-        """Return the inflection circle of a link; see :func:`graphsynth.kinematics.instantaneous.inflection_circle`."""
-        return inflection_circle(cast("Motion", self), link, base)
-
-    def bresse_circle(self, link: int, base: int | None = None) -> Circles:
-        """Return the second circle of Bresse; see :func:`graphsynth.kinematics.instantaneous.bresse_circle`."""
-        return bresse_circle(cast("Motion", self), link, base)
-
-    def transmission_index(self) -> dict[int, Array]:
-        """Return the sine of every transmission angle, by group of the mechanism."""
-        return transmission_index(cast("Motion", self))
-
-    def mechanical_advantage(self, link: int) -> Array:
-        """Return effort on a link over the driver's, without losses.
-
-        See :func:`graphsynth.kinematics.instantaneous.mechanical_advantage`.
-        """
-        return mechanical_advantage(cast("Motion", self), link)
-
-    def assess_jamming(self, bearing: Any, tilts: Any, **options: Any) -> CoupledReport:
+    def assess_jamming(self, bearing: Any, tilts: Any, **options: Any) -> gs.CoupledReport:
         """Assess whether the joints bind if an axis leans; see :func:`graphsynth.assess_jamming`.
 
         ``motion.assess_jamming("1 deg", tilts="0.5 deg")``: every joint allows a tilt of one degree, and the axis of
         the first driver leans by half a degree.
         """
-        found: CoupledReport = work("assess jamming")(self, bearing, tilts=tilts, **options)
+        found: gs.CoupledReport = work("assess jamming")(self, bearing, tilts=tilts, **options)
         return found
 
-    def forces(self, loads: Mapping[str | int, Any], **options: Any) -> StaticForces:
+    def forces(self, loads: Mapping[str | int, Any], **options: Any) -> gs.StaticForces:
         """Return the static forces in all joints under loads, as in ``motion.forces({"P": (0.0, -100.0)})``.
 
         See :func:`graphsynth.dynamics.static.static_forces`.
         """
-        found: StaticForces = work("static forces")(self, loads, **options)
+        found: gs.StaticForces = work("static forces")(self, loads, **options)
         return found
 
     def _told(self) -> tuple[str, list[tuple[str, str]]]:
@@ -160,9 +347,7 @@ class MotionMethods(Shown):
             rows.append(("motion", closed))
         else:
             rows.append(("motion", f"ends: {self.reason}"))
-        counted: dict[str, int] = {}
-        for event in self.events:
-            counted[event.kind] = counted.get(event.kind, 0) + 1
+        counted = Counter(event.kind for event in self.events)
         if counted:
             rows.append(("events", ", ".join(f"{n} x {kind}" if n > 1 else kind for kind, n in counted.items())))
         rows.append(("joints close to", f"{self.residual:.1e} of the mechanism's size"))

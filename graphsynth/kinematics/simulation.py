@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,21 +13,23 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.angles import angles
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
-from graphsynth.kinematics.assembly import whole_range
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.escapes import pivot_passes, refined
-from graphsynth.kinematics.engine.events import ending, touches
+from graphsynth.kinematics.engine.events import dead_centres, ending, touches
 from graphsynth.kinematics.engine.follow import Stop, Trace, Tracker
-from graphsynth.kinematics.engine.inputs import coordinates, fine_grid, full_turn, monotonic, warn_of_degrees
+from graphsynth.kinematics.engine.inputs import (
+    coordinates,
+    fine_grid,
+    full_turn,
+    monotonic,
+    warn_of_degrees,
+    whole_range,
+)
 from graphsynth.kinematics.engine.program import compile_program
 from graphsynth.kinematics.engine.result import Closure, Motion, MotionEvent
-from graphsynth.kinematics.engine.reversals import dead_centres
 from graphsynth.kinematics.engine.start import initial, started
 from graphsynth.mechanism.joints import Prismatic
 from graphsynth.mechanism.model import Mechanism
-
-if TYPE_CHECKING:
-    from graphsynth.kinematics.dimensional.api import Embodiment
 
 Array = NDArray[np.float64]
 
@@ -37,8 +39,20 @@ _SAMPLES, _EDGE = 361, 1e-3
 _CLOSED = 1e-9
 
 
+class Found(Protocol):
+    """What a search for dimensions returns, as `embody` does."""
+
+    @property
+    def mechanism(self) -> Mechanism | None:
+        """The best found; None if there is none."""
+
+    @property
+    def statement(self) -> str:
+        """What was found, or why nothing."""
+
+
 def simulate(
-    mechanism: Mechanism | Embodiment,
+    mechanism: Mechanism | Found,
     inputs: ArrayLike | str | None = None,
     *,
     modes: Mapping[int, int] | None = None,
@@ -94,13 +108,12 @@ def simulate(
 def _mechanism(given: Any) -> Mechanism:
     if isinstance(given, Mechanism):
         return given
-    from graphsynth.kinematics.dimensional.api import Embodiment
-
-    if not isinstance(given, Embodiment):
-        raise GeometryError(f"{type(given).__name__} is not a Mechanism; give one, or what embody returns")
-    if given.mechanism is None:
+    found = getattr(given, "mechanism", given)
+    if found is None:
         raise GeometryError(f"there is no mechanism to move: {given.statement}")
-    return given.mechanism
+    if not isinstance(found, Mechanism):
+        raise GeometryError(f"{type(given).__name__} is not a Mechanism; give one, or what embody returns")
+    return found
 
 
 def _simulate_whole(
@@ -189,12 +202,23 @@ def _motion(tracker: Tracker, trace: Trace, u: Array, events: list[MotionEvent],
     completed = bool(reached.all()) and last is None
     closure = _closure(tracker, trace, completed, events)
     return Motion(
-        mechanism=program.mechanism, inputs=u, poses=poses[where], velocities=velocities[where],
-        accelerations=accelerations[where], modes=modes[where], margins=margins[where], assembled=reached,
-        steps=program.steps, events=tuple(events), completed=completed, reason="" if last is None else last.statement,
-        stopped_at=math.nan if last is None else last.input, closure=closure, Lc=program.Lc,
+        mechanism=program.mechanism,
+        inputs=u,
+        poses=poses[where],
+        velocities=velocities[where],
+        accelerations=accelerations[where],
+        modes=modes[where],
+        margins=margins[where],
+        assembled=reached,
+        steps=program.steps,
+        events=tuple(events),
+        completed=completed,
+        reason="" if last is None else last.statement,
+        stopped_at=math.nan if last is None else last.input,
+        closure=closure,
+        Lc=program.Lc,
         seconds=perf_counter() - begin,
-    )  # fmt: skip
+    )
 
 
 def _arrays(tracker: Tracker, trace: Trace) -> tuple[Array, Array, Array, Array, NDArray[np.int8]]:

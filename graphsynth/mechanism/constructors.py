@@ -9,12 +9,12 @@ from __future__ import annotations
 import cmath
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, Self
 
 from graphsynth.core.angles import angle
-from graphsynth.core.checks import Point, finite, point, positive, sign
+from graphsynth.core.checks import Point, choice, finite, point, positive, sign
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.shown import work
 from graphsynth.mechanism.joints import JointGeometry, Prismatic, Revolute
@@ -30,14 +30,7 @@ class Constructors:
 
     if TYPE_CHECKING:
 
-        def __init__(
-            self,
-            graph: MechanismGraph,
-            joints: Iterable[JointGeometry],
-            drivers: Iterable[Driver] = (),
-            points: Mapping[str, Any] = ...,
-            pose: Sequence[Pose] | None = None,
-        ) -> None: ...
+        def __init__(self, graph: Any, joints: Any, drivers: Any = (), points: Any = ..., pose: Any = None) -> None: ...
 
     @classmethod
     def four_bar(
@@ -138,15 +131,10 @@ class Constructors:
         if crank_angle is None and not low <= 0.0 <= high:
             phi = 0.5 * (math.asin(low) + math.asin(high))
         A = cmath.rect(crank, phi)
-        reach = rod * rod - (offset - A.imag) ** 2
-        if reach < 0.0:
-            raise GeometryError(
-                f"at crank_angle = {phi:g} rad the rod of {rod:g} does not reach the line; give another"
-            )
+        if (reach := rod * rod - (offset - A.imag) ** 2) < 0.0:
+            raise GeometryError(f"at {phi:g} rad the rod of {rod:g} does not reach the line; give another crank_angle")
         B = complex(A.real + sign("branch", branch) * math.sqrt(reach), offset)
-        joints: list[JointGeometry] = [
-            Revolute(0, 1), Revolute(1, 2, (crank, 0.0)), Revolute(2, 3, (rod, 0.0)), Prismatic(0, 3, (0.0, offset)),
-        ]  # fmt: skip
+        joints = [*_arms(crank, rod), Prismatic(0, 3, (0.0, offset))]
         pose = ((0.0, 0.0, 0.0), (0.0, 0.0, phi), _at(A, B), (B.real, B.imag, 0.0))
         points: dict[str, Any] = {"C": (3, (0.0, 0.0))}
         if rod_point is not None:
@@ -157,18 +145,14 @@ class Constructors:
     def six_bar(
         cls,
         kind: str,
-        ground: float,
-        crank: float,
-        coupler: float,
-        rocker: float,
+        lengths: Sequence[float],
         *,
         joint: Point,
         link: float,
         output: float,
         pivot: Point,
         crank_angle: float | str | None = None,
-        branch: int = 1,
-        second_branch: int = 1,
+        branches: tuple[int, int] = (1, 1),
     ) -> Self:
         """Make a six-bar linkage: a four-bar, and two more links from one of its links to a third pivot.
 
@@ -176,8 +160,8 @@ class Constructors:
         ----------
         kind : {"watt", "stephenson"}
             "watt" (Watt II): the fifth link is jointed to the rocker; "stephenson" (Stephenson III): to the coupler.
-        ground, crank, coupler, rocker, crank_angle, branch
-            The four-bar, as in `four_bar`.
+        lengths : (ground, crank, coupler, rocker)
+            Of the four-bar, as in `four_bar`.
         joint : (x, y)
             Where the fifth link is jointed: on the rocker, x counted from its pivot towards the coupler; or on the
             coupler, x counted from the crank pin towards the rocker.
@@ -185,8 +169,10 @@ class Constructors:
             Lengths of link 4, which begins at ``joint``, and of link 5, which turns about ``pivot``.
         pivot : (x, y)
             Third pivot on the frame.
-        second_branch : {+1, -1}
-            +1: the joint of links 4 and 5 lies left of the way from ``joint`` to ``pivot``.
+        crank_angle : float or str, optional
+            As in `four_bar`.
+        branches : ({+1, -1}, {+1, -1})
+            That of the four-bar; and +1: the joint of links 4 and 5 lies left of the way from ``joint`` to ``pivot``.
 
         Returns
         -------
@@ -201,23 +187,21 @@ class Constructors:
         Examples
         --------
         >>> from graphsynth import Mechanism
-        >>> watt = Mechanism.six_bar("watt", 4, 1, 4, 3, joint=(2, 1), link=3, output=3, pivot=(7, 0))
+        >>> watt = Mechanism.six_bar("watt", (4, 1, 4, 3), joint=(2, 1), link=3, output=3, pivot=(7, 0))
         >>> watt.graph.links, watt.graph.mobility
         (6, 1)
         """
-        carriers = {"watt": 3, "stephenson": 2}
-        if kind not in carriers:
-            raise GeometryError(f"kind = {kind!r} is unknown; use 'watt' or 'stephenson'")
-        carrier = carriers[kind]
-        joints, pose = _four_bar(ground, crank, coupler, rocker, crank_angle, branch)
-        link, output, F = positive("link", link), positive("output", output), complex(*point("pivot", pivot))
+        carrier = {"watt": 3, "stephenson": 2}[choice("kind", kind, ("watt", "stephenson"))]
+        if len(lengths) != 4 or len(branches) != 2:
+            raise GeometryError(f"lengths = {lengths!r}, branches = {branches!r}; give four lengths and two branches")
+        l1, l2, l3, l4 = lengths
+        joints, pose = _four_bar(l1, l2, l3, l4, crank_angle, branches[0])
+        link, output = positive("link", link), positive("output", output)
+        joint, pivot = point("joint", joint), point("pivot", pivot)
         x, y, theta = pose[carrier]
-        E = complex(x, y) + cmath.exp(1j * theta) * complex(*point("joint", joint))
-        G = _meeting(E, link, F, output, second_branch, "link and output")
-        joints += [
-            Revolute(carrier, 4, point("joint", joint)), Revolute(4, 5, (link, 0.0), (output, 0.0)),
-            Revolute(0, 5, point("pivot", pivot)),
-        ]  # fmt: skip
+        E, F = complex(x, y) + cmath.exp(1j * theta) * complex(*joint), complex(*pivot)
+        G = meeting(E, link, F, output, branches[1], "link and output")
+        joints += [Revolute(carrier, 4, joint), Revolute(4, 5, (link, 0.0), (output, 0.0)), Revolute(0, 5, pivot)]
         graph = MechanismGraph(6, [*_LOOP, (carrier, 4), (4, 5), (0, 5)], frame=0)
         return cls(graph, joints, [Driver(0, 1)], {}, (*pose, _at(E, G), _at(F, G)))
 
@@ -373,17 +357,14 @@ class Constructors:
                 raise GeometryError(f"{found.statement}; give places, or another seed")
             made: Self = found.mechanism
             return made
-        if graph.frame is None or len(places) != len(graph.joints):
+        if graph.frame is None or len(places) != (count := len(graph.joints)):
             raise GeometryError(
-                f"{len(places)} places for {len(graph.joints)} joints, frame {graph.frame}; give one place for each "
-                "joint, and a graph with a frame"
+                f"{len(places)} places for {count} joints, frame {graph.frame}; give one for each, and a frame"
             )
         at = [point(f"places[{k}]", place) for k, place in enumerate(places)]
         joints = [Revolute(a, b, p, p) for (a, b, _), p in zip(graph.joints, at)]
-        first = next(
-            (sorted((a, b), key=lambda k: k != graph.frame) for a, b, _ in graph.joints if graph.frame in (a, b))
-        )
-        pairs = [tuple(first)] if driver is None else [driver] if _is_pair(driver) else list(driver)
+        near = next(a + b - graph.frame for a, b, _ in graph.joints if graph.frame in (a, b))
+        pairs = [(graph.frame, near)] if driver is None else [driver] if _is_pair(driver) else list(driver)
         return cls(graph, joints, [Driver(*pair) for pair in pairs], {}, ((0.0, 0.0, 0.0),) * graph.links)
 
 
@@ -392,7 +373,12 @@ def _at(start: complex, end: complex) -> Pose:
     return start.real, start.imag, cmath.phase(end - start)
 
 
-def _meeting(A: complex, a: float, B: complex, b: float, branch: int, what: str) -> complex:
+def _arms(crank: float, coupler: float, last: float = 0.0) -> list[JointGeometry]:
+    """Revolute joints of frame, crank, coupler and link 3."""
+    return [Revolute(0, 1), Revolute(1, 2, (crank, 0.0)), Revolute(2, 3, (coupler, 0.0), (last, 0.0))]
+
+
+def meeting(A: complex, a: float, B: complex, b: float, branch: int = 1, what: str = "sides") -> complex:
     """Return where circles about A and B meet, left (+1) or right (-1) of the way from A to B."""
     d = abs(B - A)
     if not abs(a - b) <= d <= a + b or d == 0.0:
@@ -410,30 +396,26 @@ def _four_bar(
     """Joints of a four-bar and its pose at a crank angle."""
     l1, l2 = positive("ground", ground), positive("crank", crank)
     l3, l4 = positive("coupler", coupler), positive("rocker", rocker)
-    longest = max(l1, l2, l3, l4)
-    if 2.0 * longest > l1 + l2 + l3 + l4:
+    longest, total = max(l1, l2, l3, l4), l1 + l2 + l3 + l4
+    if 2.0 * longest > total:
         raise GeometryError(
-            f"the longest link, {longest:g}, is longer than the other three together, {l1 + l2 + l3 + l4 - longest:g}: "
+            f"the longest link, {longest:g}, is longer than the other three together, {total - longest:g}: "
             "the four-bar cannot be assembled; give other lengths"
         )
     phi = _middle(l1, l2, l3, l4) if crank_angle is None else angle("crank_angle", crank_angle)
     A, D = cmath.rect(l2, phi), complex(l1, 0.0)
-    B = _meeting(A, l3, D, l4, branch, "coupler and rocker")
-    joints: list[JointGeometry] = [
-        Revolute(0, 1), Revolute(1, 2, (l2, 0.0)), Revolute(2, 3, (l3, 0.0), (l4, 0.0)), Revolute(0, 3, (l1, 0.0)),
-    ]  # fmt: skip
+    B = meeting(A, l3, D, l4, branch, "coupler and rocker")
+    joints = [*_arms(l2, l3, l4), Revolute(0, 3, (l1, 0.0))]
     return joints, ((0.0, 0.0, 0.0), (0.0, 0.0, phi), _at(A, B), _at(D, B))
 
 
 def _middle(l1: float, l2: float, l3: float, l4: float) -> float:
     """Crank angle to start from: 0 if it is reached, else the middle of the reached angles in (0, pi)."""
-
-    def at(distance: float) -> float:  # crank angle at which the crank pin is so far from the rocker's pivot
-        return math.acos(min(1.0, max(-1.0, (l1 * l1 + l2 * l2 - distance * distance) / (2.0 * l1 * l2))))
-
     if abs(l3 - l4) < abs(l1 - l2) < l3 + l4:
         return 0.0
-    return 0.5 * (at(abs(l3 - l4)) + at(l3 + l4))
+    # cosines of the angles at which the crank pin is farthest from the rocker's pivot, and nearest to it
+    cosines = ((l1 * l1 + l2 * l2 - reach * reach) / (2.0 * l1 * l2) for reach in (abs(l3 - l4), l3 + l4))
+    return 0.5 * sum(math.acos(min(1.0, max(-1.0, cosine))) for cosine in cosines)
 
 
 def _is_pair(value: Any) -> bool:
@@ -445,11 +427,9 @@ def _names(what: str, given: str | Sequence[str], places: Mapping[str, Point]) -
     found = list(given) if not isinstance(given, str) else given.split() if " " in given else [given]
     if isinstance(given, str) and found == [given] and given not in places:
         found = list(given)
-    for name in found:
-        if name not in places:
-            raise GeometryError(
-                f"{what} {given!r} names the point {name!r}, which has no place; points are {list(places)}"
-            )
+    strange = next((name for name in found if name not in places), None)
+    if strange is not None:
+        raise GeometryError(f"{what} {given!r} names the point {strange!r}, which has no place; points: {list(places)}")
     return found
 
 
@@ -517,6 +497,6 @@ class _Drawn:
             if found == (0, 0) and carriers and names:
                 found = (next((k for k in self.at(names[0]) if k != carriers[0]), 0), carriers[0])
         if (min(found), max(found)) not in known:
-            listed = ", ".join(f"{a}-{b}" for a, b in sorted(known))
-            raise GeometryError(f"driver {given!r} is no joint; name two points of a driven link, or one of {listed}")
+            some = ", ".join(f"{a}-{b}" for a, b in sorted(known))
+            raise GeometryError(f"driver {given!r} is no joint; name two points of a driven link, or one of {some}")
         return found

@@ -1,106 +1,21 @@
 """Joint equations in any arithmetic: floats, balls, intervals, duals, numbers of many digits, formulas.
 
 Every kind of joint states its equations once (`graphsynth.mechanism.joints`), over a `Plane` of numbers and vectors:
-`Floats` (numpy arrays) here, balls in `graphsynth.kinematics.certify`, and `Pairs` for any type of number with
-arithmetic and functions of its own: intervals, duals, mpmath, sympy.
+that of numpy arrays here, of balls in `graphsynth.kinematics.certify`, and of any type of number with functions of its
+own: intervals, duals, mpmath, sympy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 #: A number, and a vector of the plane, of the arithmetic in use.
 Number = Any
 Vector = Any
-
-
-class Plane(Protocol):
-    """Arithmetic of numbers and vectors; sums of vectors, and products with numbers, are written with operators."""
-
-    def vector(self, x: Number, y: Number) -> Vector:
-        """Vector of two numbers, plain floats among them."""
-
-    def parts(self, v: Vector) -> tuple[Number, Number]:
-        """Both components."""
-
-    def unit(self, angle: Number) -> Vector:
-        """Direction of an angle."""
-
-    def turned(self, v: Vector, by: Vector) -> Vector:
-        """``v`` turned by the direction of a unit vector."""
-
-    def left(self, v: Vector) -> Vector:
-        """``v`` turned to the left by a right angle."""
-
-    def dot(self, a: Vector, b: Vector) -> Number:
-        """Scalar product."""
-
-    def cross(self, a: Vector, b: Vector) -> Number:
-        """Component of ``a x b`` across the plane."""
-
-    def length(self, v: Vector) -> Number:
-        """Length of a vector."""
-
-    def argument(self, v: Vector) -> Number:
-        """Angle of a vector, up to whole turns."""
-
-    def cos(self, angle: Number) -> Number:
-        """Cosine."""
-
-    def sin(self, angle: Number) -> Number:
-        """Sine."""
-
-
-class Floats:
-    """Arrays of floats; vectors are complex numbers."""
-
-    def vector(self, x: Number, y: Number) -> Vector:
-        """Vector of two numbers."""
-        return x + 1j * y
-
-    def parts(self, v: Vector) -> tuple[Number, Number]:
-        """Both components."""
-        return v.real, v.imag
-
-    def unit(self, angle: Number) -> Vector:
-        """Direction of an angle."""
-        return np.exp(1j * angle)
-
-    def turned(self, v: Vector, by: Vector) -> Vector:
-        """Product of complex numbers."""
-        return by * v
-
-    def left(self, v: Vector) -> Vector:
-        """``v`` turned to the left by a right angle."""
-        return 1j * v
-
-    def dot(self, a: Vector, b: Vector) -> Number:
-        """Scalar product."""
-        return (np.conj(a) * b).real
-
-    def cross(self, a: Vector, b: Vector) -> Number:
-        """Component of ``a x b`` across the plane."""
-        return (np.conj(a) * b).imag
-
-    def length(self, v: Vector) -> Number:
-        """Length of a vector."""
-        return np.abs(v)
-
-    def argument(self, v: Vector) -> Number:
-        """Angle of a vector in (-pi, pi]."""
-        return np.angle(v)
-
-    def cos(self, angle: Number) -> Number:
-        """Cosine."""
-        return np.cos(angle)
-
-    def sin(self, angle: Number) -> Number:
-        """Sine."""
-        return np.sin(angle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,49 +36,56 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Pairs:
-    """Any type of number, with its sine, cosine, square root and angle ``atan2(y, x)``."""
+class Plane:
+    """Any type of number, with its sine, cosine, distance ``hypot(x, y)`` and angle ``atan2(y, x)``; and vectors of it.
+
+    Sums of vectors, and products with numbers, are written with operators.
+    """
 
     sin: Callable[[Number], Number]
     cos: Callable[[Number], Number]
-    sqrt: Callable[[Number], Number]
+    hypot: Callable[[Number, Number], Number]
     atan2: Callable[[Number, Number], Number]
 
-    def vector(self, x: Number, y: Number) -> Pair:
-        """Vector of two numbers."""
+    def vector(self, x: Number, y: Number) -> Vector:
+        """Vector of two numbers, plain floats among them."""
         return Pair(x, y)
 
-    def parts(self, v: Pair) -> tuple[Number, Number]:
+    def parts(self, v: Vector) -> tuple[Number, Number]:
         """Both components."""
         return v.x, v.y
 
-    def unit(self, angle: Number) -> Pair:
+    def unit(self, angle: Number) -> Vector:
         """Direction of an angle."""
         return Pair(self.cos(angle), self.sin(angle))
 
-    def turned(self, v: Pair, by: Pair) -> Pair:
+    def turned(self, v: Vector, by: Vector) -> Vector:
         """``v`` turned by the direction of a unit vector."""
         return Pair(by.x * v.x - by.y * v.y, by.y * v.x + by.x * v.y)
 
-    def left(self, v: Pair) -> Pair:
+    def left(self, v: Vector) -> Vector:
         """``v`` turned to the left by a right angle."""
         return Pair(-v.y, v.x)
 
-    def dot(self, a: Pair, b: Pair) -> Number:
+    def dot(self, a: Vector, b: Vector) -> Number:
         """Scalar product."""
         return a.x * b.x + a.y * b.y
 
-    def cross(self, a: Pair, b: Pair) -> Number:
+    def cross(self, a: Vector, b: Vector) -> Number:
         """Component of ``a x b`` across the plane."""
         return a.x * b.y - a.y * b.x
 
-    def length(self, v: Pair) -> Number:
+    def length(self, v: Vector) -> Number:
         """Length of a vector."""
-        return self.sqrt(v.x**2 + v.y**2)
+        return self.hypot(v.x, v.y)
 
-    def argument(self, v: Pair) -> Number:
-        """Angle of a vector."""
+    def argument(self, v: Vector) -> Number:
+        """Angle of a vector, up to whole turns."""
         return self.atan2(v.y, v.x)
+
+
+#: Arrays of floats.
+FLOATS = Plane(np.sin, np.cos, np.hypot, np.arctan2)
 
 
 @dataclass(frozen=True)

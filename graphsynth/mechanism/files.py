@@ -21,8 +21,15 @@ from graphsynth.mechanism.model import Mechanism, TracePoint
 from graphsynth.structure.graph import MechanismGraph
 
 __all__ = [
-    "JSON_MAX", "TOML_MAX", "from_dict", "from_json", "from_toml", "to_dict", "to_json", "to_toml",
-]  # fmt: skip
+    "JSON_MAX",
+    "TOML_MAX",
+    "from_dict",
+    "from_json",
+    "from_toml",
+    "to_dict",
+    "to_json",
+    "to_toml",
+]
 
 FORMAT = "graphsynth mechanism"
 VERSION = 1

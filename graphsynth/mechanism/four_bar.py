@@ -10,48 +10,55 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
+from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import check_fields, check_sizes, choice, finite, finite_array, positive, sign, unit_vector
-from graphsynth.mechanism.rotatability import FullTurn, full_turn
+from graphsynth.core.checks import (
+    check_fields,
+    check_sizes,
+    choice,
+    finite,
+    finite_array,
+    positive,
+    sign,
+    unit_vector,
+    whole,
+)
+from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.rotatability import FullTurn, four_bar_rotation
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
 Array = NDArray[np.float64]
 _BESIDE = 1e-140
+#: Crank angles at which the margin of a tilted linkage is looked at.
+_SAMPLES = 1440
 
 
 class AssemblyStatus(IntEnum):
     """Whether the linkage can be assembled at one crank angle, and if not, which inequality fails."""
 
-    OK = 0
-    LIMIT = 1  #: yB = 0: assembled, both branches meet, the velocity of B does not exist
-    TILT_EXCEEDS_ROD = 2  #: |A_z| > l3: the rod is shorter than the height of the crank pin
-    TOO_FAR = 3  #: D > l4 + s3
-    COUPLER_TOO_LONG = 4  #: D < s3 - l4
-    ROCKER_TOO_LONG = 5  #: D < l4 - s3
-    INDETERMINATE = 6  #: D = 0 and s3 = l4: B is any point of a circle
+    OK = 0, "assembled"
+    LIMIT = 1, "assembled in a limit position: both branches meet and the velocity of B is undefined"
+    TILT_EXCEEDS_ROD = 2, "not assembled: |A_z| > l3"
+    TOO_FAR = 3, "not assembled: D > l4 + s3"
+    COUPLER_TOO_LONG = 4, "not assembled: D < s3 - l4"
+    ROCKER_TOO_LONG = 5, "not assembled: D < l4 - s3"
+    INDETERMINATE = 6, "not determined: A coincides with C and the coupler equals the rocker"
 
-    @property
-    def message(self) -> str:
-        """One sentence that says what the status means."""
-        return _MESSAGES[self]
+    message: str
 
-
-_MESSAGES = {
-    AssemblyStatus.OK: "assembled",
-    AssemblyStatus.LIMIT: "assembled in a limit position: both branches meet and the velocity of B is undefined",
-    AssemblyStatus.TILT_EXCEEDS_ROD: "not assembled: |A_z| > l3",
-    AssemblyStatus.TOO_FAR: "not assembled: D > l4 + s3",
-    AssemblyStatus.COUPLER_TOO_LONG: "not assembled: D < s3 - l4",
-    AssemblyStatus.ROCKER_TOO_LONG: "not assembled: D < l4 - s3",
-    AssemblyStatus.INDETERMINATE: "not determined: A coincides with C and the coupler equals the rocker",
-}
+    def __new__(cls, value: int, message: str = "") -> AssemblyStatus:
+        """Make a member; ``message`` is one sentence that says what it means."""
+        member = int.__new__(cls, value)
+        member._value_, member.message = value, message
+        return member
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,12 +333,82 @@ class TiltedFourBar:
     def full_turn(self) -> FullTurn:
         """Say whether the crank can make a full turn, with limit angles or change points if it cannot.
 
-        See theory/four-bar-and-tilt 3.
-
-        Exact (rational arithmetic on the given lengths) when the crank pin stays in the plane; estimated from the sign
-        changes of the discriminants otherwise, and labelled so.
+        See theory/four-bar-and-tilt 3.  Exact (rational arithmetic on the given lengths) when the crank pin stays in
+        the plane; estimated from the sign changes of the discriminants otherwise, and labelled so.
         """
-        return full_turn(self)
+        return self._planar_turn() if self.pin_height == 0.0 else self._tilted_turn()
+
+    def _planar_turn(self) -> FullTurn:
+        """Compare the extremes of D with |l4 - l3| and l3 + l4 in exact arithmetic."""
+        l1, l2, l3, l4 = (Fraction(length) for length in (self.l1, self.l2, self.l3, self.l4))
+        kind, touches, bounds = four_bar_rotation(l1 * l1, l2, l3, l4)
+        if kind == "never assembled":
+            return FullTurn(False, kind, (), (), "exact", "the linkage cannot be assembled at any crank angle")
+        r = self.rotation  # about e_z, or a half turn about an axis in the plane: f is shifted or reversed
+        phase, sense = math.atan2(r[1, 0], r[0, 0]), math.copysign(1.0, r[2, 2])
+        changes = [angle for angle, met in zip((0.0, math.pi), touches) if met]
+        limits: list[float] = []
+        for _, reach in bounds:
+            half = (reach * reach - (l1 - l2) ** 2) / (4 * l1 * l2)  # sin^2(f/2)
+            angle = 2.0 * math.atan2(math.sqrt(half), math.sqrt(1 - half))
+            limits += [angle, -angle] if 0 < half < 1 else [angle]
+        at, met = (tuple(sorted(sense * (angle - phase) % math.tau for angle in part)) for part in (limits, changes))
+        if kind == "immovable":
+            text = f"nothing moves: the linkage can only lie stretched, at {_degrees(at[:1])} degrees"
+            return FullTurn(False, kind, at, (), "exact", text)
+        if at:
+            text = f"the crank cannot make a full turn: dead points at {_degrees(at)} degrees"
+            return FullTurn(False, "limited", at, met, "exact", text)
+        if met:
+            text = f"the crank passes every angle, but the branches meet at the change points {_degrees(met)} degrees"
+            return FullTurn(False, "change point", (), met, "exact", text)
+        text = "the crank makes a full turn without dead points or change points"
+        return FullTurn(True, "full turn", (), (), "exact", text)
+
+    def _margins(self, f: Array) -> Array:
+        """Smallest of the three quantities that must stay positive, relative to the square of the largest length."""
+        A, _, _, near, far, _ = self._closure(f)
+        rod = self.l3**2 - A[:, 2] ** 2 if self.rod == "rigid" else math.inf
+        return np.asarray(np.minimum(np.minimum(near, far), rod) / max(self.l1, self.l2, self.l3, self.l4) ** 2)
+
+    def _margin(self, f: float) -> float:
+        return float(self._margins(np.array([f]))[0])
+
+    def _tilted_turn(self) -> FullTurn:
+        from scipy.optimize import brentq, minimize_scalar
+
+        grid, step = np.linspace(0.0, math.tau, _SAMPLES + 1), math.tau / _SAMPLES
+        values = self._margins(grid)
+        nodes = list(zip(grid, values))
+        for index in range(_SAMPLES):  # a minimum between samples may dip below zero unseen
+            before, here, after = values[index - 1], values[index], values[index + 1]
+            if here <= before and here <= after and not before == here == after:  # flat: the tilt is below rounding
+                ends = (grid[index] - step, grid[index] + step)
+                found = minimize_scalar(self._margin, bounds=ends, method="bounded", options={"xatol": 1e-12})
+                nodes.append((float(found.x) % math.tau, float(found.fun)))
+        nodes.sort()
+        worst, best = min(value for _, value in nodes), max(nodes, key=lambda node: node[1])
+        rounding = 64 * np.finfo(float).eps
+        if abs(best[1]) <= rounding:
+            text = "the largest margin is at the rounding level: immovable or never assembled, not decided"
+            return FullTurn(False, "immovable", (best[0],), (), "estimated", text)
+        if best[1] < 0.0:
+            text = "the linkage cannot be assembled at any sampled crank angle"
+            return FullTurn(False, "never assembled", (), (), "estimated", text)
+        limits = tuple(
+            float(brentq(self._margin, f0, f1, xtol=1e-14)) % math.tau
+            for (f0, v0), (f1, v1) in pairwise(nodes)
+            if v0 * v1 < 0.0
+        )
+        if limits:
+            text = f"the crank cannot make a full turn: dead points near {_degrees(limits)} degrees"
+            return FullTurn(False, "limited", limits, (), "estimated", text)
+        if worst <= rounding:
+            touch = tuple(f for f, value in nodes if value == worst)
+            text = "the smallest margin is at the rounding level: change point or dead point, not decided"
+            return FullTurn(False, "change point", (), touch, "estimated", text)
+        text = f"the crank makes a full turn; smallest relative margin {worst:.3g}"
+        return FullTurn(True, "full turn", (), (), "estimated", text)
 
     def straightness(
         self, start: float = 0.5 * math.pi, stop: float = 1.5 * math.pi, samples: int = 721
@@ -343,12 +420,46 @@ class TiltedFourBar:
         GeometryError
             If the linkage cannot be assembled somewhere on the stroke.
         """
-        from graphsynth.mechanism.rotatability import straightness
+        from scipy.optimize import minimize_scalar
 
-        return straightness(self, start, stop, samples)
+        start, stop = finite("start", start), finite("stop", stop)
+        f = np.linspace(start, stop, whole("samples", samples, 2))
+        path = self.positions(f)
+        if not path.assembled.all():
+            raise GeometryError(
+                f"the stroke from {start} to {stop} rad is not assembled everywhere ({'; '.join(path.reasons())}); "
+                "choose a stroke inside the range of motion"
+            )
+        first, last = path.M[0, :2], path.M[-1, :2]
+        chord = float(np.hypot(*(last - first)))
+        if chord == 0.0:
+            raise GeometryError("both ends of the stroke have the same tracing point; choose another stroke")
+        normal = np.array([first[1] - last[1], last[0] - first[0]]) / chord
+        normal = -normal if normal[1] < 0.0 else normal  # positive means upwards, whichever way M runs
+
+        def offset(angle: float) -> float:
+            return float((self.positions([angle]).M[0, :2] - first) @ normal)
+
+        def extreme(direction: int) -> tuple[float, float]:
+            signed = direction * ((path.M[:, :2] - first) @ normal)
+            k = int(np.argmax(signed))
+            ends = tuple(sorted((f[max(k - 1, 0)], f[min(k + 1, samples - 1)])))
+            found = minimize_scalar(
+                lambda x: -direction * offset(x), bounds=ends, method="bounded", options={"xatol": 1e-12}
+            )
+            if -found.fun > signed[k]:
+                return float(found.x), -direction * float(found.fun)
+            return float(f[k]), direction * float(signed[k])
+
+        (f_low, low), (f_high, high) = extreme(-1), extreme(1)
+        return Straightness(chord, low, high, f_low, f_high, float(np.abs(path.M[:, 2]).max()))
 
     def graph(self) -> MechanismGraph:
         """Structural graph: a four-bar chain with joints 0-1, 1-2, 2-3, 0-3 and link 0 as the frame."""
         from graphsynth.structure.graph import MechanismGraph
 
         return MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+
+
+def _degrees(angles: tuple[float, ...]) -> str:
+    return ", ".join(f"{math.degrees(angle):.6g}" for angle in angles)

@@ -16,32 +16,37 @@ import math
 from cmath import rect
 
 from graphsynth.core.errors import GeometryError
+from graphsynth.mechanism.constructors import meeting
 from graphsynth.mechanism.model import Mechanism
 
 __all__ = [
-    "chebyshev_lambda", "excavator_arm", "jansen", "klann", "pantograph", "peaucellier", "scott_russell",
-    "stephenson_six_bar", "toggle_press", "watt_six_bar", "watt_straight_line", "whitworth_quick_return",
-]  # fmt: skip
+    "chebyshev_lambda",
+    "excavator_arm",
+    "jansen",
+    "klann",
+    "pantograph",
+    "peaucellier",
+    "scott_russell",
+    "stephenson_six_bar",
+    "toggle_press",
+    "watt_six_bar",
+    "watt_straight_line",
+    "whitworth_quick_return",
+]
 
-Places = dict[str, tuple[float, float]]
 
-
-def _xy(z: complex) -> tuple[float, float]:
-    return z.real, z.imag
-
-
-def _beside(P: complex, p: float, Q: complex, q: float) -> complex:
-    """Return the point at distances p from P and q from Q, left of the way from P to Q."""
-    d = abs(Q - P)
-    along = (d * d + p * p - q * q) / (2.0 * d)
-    return P + (Q - P) / d * complex(along, math.sqrt(p * p - along * along))
+def _places(text: str = "", **points: complex) -> dict[str, tuple[float, float]]:
+    """Coordinates of points, from a text of names and numbers, or as complex numbers."""
+    words = text.split()
+    found = {name: (float(x), float(y)) for name, x, y in zip(words[::3], words[1::3], words[2::3])}
+    return found | {name: (z.real, z.imag) for name, z in points.items()}
 
 
 def chebyshev_lambda() -> Mechanism:
     """Chebyshev's lambda linkage 2 : 1 : 2.5 : 2.5; "P" draws a nearly straight line over half a turn, 4 cranks long.
 
-    Source: P. L. Chebyshev, Sur les parallelogrammes (1854) and later; Artobolevsky, volume 1; the proportions as in
-    docs/explanation/lambda-linkage.md.
+    Source: after P. L. Chebyshev (papers from 1854 on, this linkage 1878); Artobolevsky, volume 1; what the proportions
+    give is computed in docs/explanation/lambda-linkage.md.
 
     Returns
     -------
@@ -59,7 +64,7 @@ def watt_straight_line() -> Mechanism:
     -------
     Mechanism
     """
-    places: Places = {"A": (-5.0, 1.0), "B": (0.0, 1.0), "C": (0.0, -1.0), "D": (5.0, -1.0), "P": (0.0, 0.0)}
+    places = _places("A -5 1 B 0 1 C 0 -1 D 5 -1 P 0 0")
     return Mechanism.from_points(places, ["AB", "BPC", "CD"], "AD", "AB")
 
 
@@ -72,7 +77,7 @@ def watt_six_bar() -> Mechanism:
     -------
     Mechanism
     """
-    return Mechanism.six_bar("watt", 4.0, 1.0, 4.0, 3.0, joint=(2.0, 1.0), link=3.0, output=3.0, pivot=(7.0, 0.0))
+    return Mechanism.six_bar("watt", (4.0, 1.0, 4.0, 3.0), joint=(2.0, 1.0), link=3.0, output=3.0, pivot=(7.0, 0.0))
 
 
 def stephenson_six_bar() -> Mechanism:
@@ -85,7 +90,7 @@ def stephenson_six_bar() -> Mechanism:
     Mechanism
     """
     return Mechanism.six_bar(
-        "stephenson", 4.0, 1.0, 3.5, 3.0, joint=(2.0, 1.0), link=4.0, output=3.0, pivot=(6.0, -1.0)
+        "stephenson", (4.0, 1.0, 3.5, 3.0), joint=(2.0, 1.0), link=4.0, output=3.0, pivot=(6.0, -1.0)
     )
 
 
@@ -114,9 +119,8 @@ def peaucellier(long: float = 5.0, short: float = 3.0, crank: float = 1.5) -> Me
             f"sides {long:g} and {short:g} do not fit the crank {crank:g}; long - short < 2 crank < their sum"
         )
     R = complex(2.0 * crank, 0.0)
-    U = _beside(0j, long, R, short)
-    places = {"O": (0.0, 0.0), "Q": (crank, 0.0), "R": _xy(R), "U": _xy(U), "V": _xy(U.conjugate())}
-    places["P"] = _xy(2.0 * U.real - R)
+    U = meeting(0j, long, R, short)
+    places = _places(O=0j, Q=0.5 * R, R=R, U=U, V=U.conjugate(), P=2.0 * U.real - R)
     links = ["OU", "OV", "RU", "RV", "UP", "VP", "QR"]
     return Mechanism.from_points(places, links, "OQ", "QR", trace="P")
 
@@ -124,7 +128,8 @@ def peaucellier(long: float = 5.0, short: float = 3.0, crank: float = 1.5) -> Me
 def scott_russell(length: float = 2.0) -> Mechanism:
     """Scott Russell's linkage: a rod twice as long as the crank, its end "P" on an exact line through the crank's axis.
 
-    Source: named after J. Scott Russell (1808-1882), patented by W. Freemantle (1803); Artobolevsky, volume 1.
+    Source: named after J. Scott Russell (1808-1882), patented by W. Freemantle (1803); Artobolevsky, volume 1.  The
+    crank's pin is as far from both ends of the rod as from the crank's axis, so the angle is right (Thales).
 
     Parameters
     ----------
@@ -135,22 +140,16 @@ def scott_russell(length: float = 2.0) -> Mechanism:
     -------
     Mechanism
     """
-    half = 0.5 * length
-    B = rect(half, math.radians(40.0))
-    places = {
-        "O": (0.0, 0.0),
-        "B": _xy(B),
-        "C": (2.0 * B.real, 0.0),
-        "P": (0.0, 2.0 * B.imag),
-        "E": (3.0 * length, 0.0),
-    }
+    B = rect(0.5 * length, math.radians(40.0))
+    places = _places(O=0j, B=B, C=2.0 * B.real, P=2j * B.imag, E=3.0 * length)
     return Mechanism.from_points(places, ["OB", "PBC"], "OE", "OB", slides={"C": "OE"})
 
 
 def pantograph(scale: float = 2.0) -> Mechanism:
     """Pantograph: "P" draws what the slide on (1, 0)-(1, 2) leads "T" along, ``scale`` times as large from (0, 0).
 
-    Source: C. Scheiner, Pantographice (1631); Artobolevsky, volume 1.
+    Source: after C. Scheiner, Pantographice (1631); Artobolevsky, volume 1.  The bars are a parallelogram, so T divides
+    the way from O to P in the same ratio always.
 
     Parameters
     ----------
@@ -170,23 +169,17 @@ def pantograph(scale: float = 2.0) -> Mechanism:
         raise GeometryError(f"scale = {scale:g} must be above 1 and finite; give how many times larger P draws")
     T = complex(1.0, 0.5)
     P = scale * T
-    B = _beside(0j, 1.2 * scale, P, 1.2 * scale)
-    places = {
-        "O": (0.0, 0.0),
-        "D": _xy(B / scale),
-        "B": _xy(B),
-        "E": _xy(B + (P - B) / scale),
-        "T": _xy(T),
-        "P": _xy(P),
-    }
-    places |= {"U": (1.0, -3.0), "V": (1.0, 3.0)}
+    B = meeting(0j, 1.2 * scale, P, 1.2 * scale)
+    places = _places("U 1 -3 V 1 3", O=0j, D=B / scale, B=B, E=B + (P - B) / scale, T=T, P=P)
     return Mechanism.from_points(places, ["ODB", "BEP", "DT", "TE"], "OUV", (0, 5), slides={"T": "UV"}, trace="T")
 
 
 def whitworth_quick_return(ratio: float = 2.0) -> Mechanism:
     """Whitworth's quick return: the crank drives a slotted link that turns fully, slow half a turn and fast the other.
 
-    Source: J. Whitworth (1849); Norton, chapter 3.  The slotted link turns about (0, 0), the crank 1 about (0, e).
+    Source: after J. Whitworth; Norton, chapter 3.  The slotted link turns about (0, 0), the crank 1 about (0, e): in
+    one half turn of the link, above the ram's line, the crank turns by ``2 arccos(-e)``, in the other by
+    ``2 arccos(e)``.
 
     Parameters
     ----------
@@ -206,15 +199,15 @@ def whitworth_quick_return(ratio: float = 2.0) -> Mechanism:
         raise GeometryError(f"ratio = {ratio:g} must be above 1 and finite; give the time ratio")
     e = math.cos(math.pi / (1.0 + ratio))
     A = complex(1.0, e)
-    places = {"O": (0.0, 0.0), "Q": (0.0, e), "A": _xy(A), "S": _xy(2.5 * A), "C": (5.0, 0.0), "T": (9.0, 0.0)}
-    places |= {"B": _xy(-0.8 * A / abs(A))}
+    places = _places("C 5 0 T 9 0", O=0j, Q=1j * e, A=A, S=2.5 * A, B=-0.8 * A / abs(A))
     return Mechanism.from_points(places, ["QA", "BOS", "BC"], "OQT", "QA", slides={"A": "OS", "C": "OT"})
 
 
 def toggle_press(link: float = 1.0) -> Mechanism:
     """Toggle press: a crank stretches two equal links, and presses the ram "R" with a force that grows without bound.
 
-    Source: Norton, chapter 3; Artobolevsky, volume 2.
+    Source: after Norton, chapter 3, and Artobolevsky, volume 2; own proportions.  With both links at the angle t from
+    the line of the ram its speed is ``2 link sin(t)`` times that of t, which vanishes where they are stretched.
 
     Parameters
     ----------
@@ -227,24 +220,23 @@ def toggle_press(link: float = 1.0) -> Mechanism:
     """
     K = rect(link, math.radians(-80.0))
     Q = complex(1.6 * link, -0.6 * link)
-    places = {"O": (0.0, 0.0), "K": _xy(K), "R": (0.0, 2.0 * K.imag), "G": (0.0, -3.0 * link), "Q": _xy(Q)}
-    places["C"] = _xy(Q + rect(0.25 * link, math.radians(100.0)))
+    C = Q + rect(0.25 * link, math.radians(100.0))
+    places = _places(O=0j, K=K, R=2j * K.imag, G=-3j * link, Q=Q, C=C)
     return Mechanism.from_points(places, ["QC", "CK", "OK", "KR"], "OQG", "QC", slides={"R": "OG"}, trace="R")
 
 
 def klann() -> Mechanism:
     """Klann's walking leg: a six-bar of Stephenson's chain whose foot "P" steps once for a turn of the crank.
 
-    Source: J. C. Klann, US patent 6260862 (2001), table of coordinates.
+    Source: after J. C. Klann, US patent 6260862 (2001).
 
     Returns
     -------
     Mechanism
     """
-    places: Places = {
-        "A": (1.366, 1.366), "B": (1.009, 0.574), "O": (1.599, 0.75), "M": (1.331, 0.75), "E": (0.741, 0.75),
-        "D": (0.232, 0.866), "H": (0.866, 1.366), "P": (0.0, 0.0),
-    }  # fmt: skip
+    places = _places(
+        "A 1.366 1.366 B 1.009 0.574 O 1.599 0.75 M 1.331 0.75 E 0.741 0.75 D 0.232 0.866 H 0.866 1.366 P 0 0"
+    )
     return Mechanism.from_points(places, ["OM", "MED", "BE", "AH", "DHP"], "OAB", "OM")
 
 
@@ -258,17 +250,16 @@ def jansen() -> Mechanism:
     -------
     Mechanism
     """
-    a, b, c, d, e, f, g, h, i, j, k, low, m = (
-        38.0, 41.5, 39.3, 40.1, 55.8, 39.4, 36.7, 65.7, 49.0, 50.0, 61.9, 7.8, 15.0,
-    )  # fmt: skip
+    numbers = "38 41.5 39.3 40.1 55.8 39.4 36.7 65.7 49 50 61.9 7.8 15"
+    a, b, c, d, e, f, g, h, i, j, k, low, m = map(float, numbers.split())
     O, B = complex(a, low), 0j
     A = O + m
-    C = _beside(B, b, A, j)  # above
-    D = _beside(B, d, C, e)
-    E = _beside(A, k, B, c)  # below
-    F = _beside(E, g, D, f)
-    P = _beside(E, i, F, h)
-    places = {name: _xy(z) for name, z in zip("OBACDEFP", (O, B, A, C, D, E, F, P))}
+    C = meeting(B, b, A, j)  # above
+    D = meeting(B, d, C, e)
+    E = meeting(A, k, B, c)  # below
+    F = meeting(E, g, D, f)
+    P = meeting(E, i, F, h)
+    places = _places(O=O, B=B, A=A, C=C, D=D, E=E, F=F, P=P)
     return Mechanism.from_points(places, ["OA", "AC", "BCD", "AE", "BE", "DF", "EFP"], "OB", "OA")
 
 
@@ -282,10 +273,10 @@ def excavator_arm() -> Mechanism:
     -------
     Mechanism
     """
-    places: Places = {
-        "A": (0.0, 1.8), "B": (0.6, 1.4), "C": (2.6, 4.6), "D": (5.4, 5.0), "E": (3.0, 5.3), "F": (5.09, 5.515),
-        "G": (6.6, 3.0), "H": (5.95, 5.0), "K": (6.394, 3.343), "L": (6.85, 3.62), "M": (6.93, 3.12), "P": (6.7, 1.7),
-    }  # fmt: skip
+    places = _places(
+        "A 0 1.8 B 0.6 1.4 C 2.6 4.6 D 5.4 5 E 3 5.3 F 5.09 5.515 G 6.6 3 H 5.95 5 K 6.394 3.343 "
+        "L 6.85 3.62 M 6.93 3.12 P 6.7 1.7"
+    )
     return Mechanism.from_points(
         places, ["ACED", "DFHKG", "KL", "LM", "GMP"], "AB", ["BC", "EF", "HL"], cylinders=["BC", "EF", "HL"]
     )

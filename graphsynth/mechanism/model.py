@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,14 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import Point, finite, link_number, point
 from graphsynth.core.errors import GeometryError
+from graphsynth.core.shown import Shown, work
 from graphsynth.mechanism.constructors import Constructors
 from graphsynth.mechanism.joints import COLUMNS, JointGeometry, PlanarJoint, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
-from graphsynth.mechanism.methods import Methods
 from graphsynth.structure.graph import MechanismGraph
 
 if TYPE_CHECKING:
-    from graphsynth.mechanism.rank import MobilityReport
+    import sympy
+
+    import graphsynth as gs  # what methods give back that is made in rooms above, by its public name
+    from graphsynth.mechanism.constraints import MobilityReport
+    from graphsynth.mechanism.symbolic import CouplerCurve
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
@@ -33,7 +38,7 @@ class TracePoint(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class Mechanism(Constructors, Methods):
+class Mechanism(Constructors, Shown):
     """A dimensioned planar mechanism.
 
     Parameters
@@ -163,9 +168,9 @@ class Mechanism(Constructors, Methods):
     def mobility(self, pose: ArrayLike | None = None) -> MobilityReport:
         """Mobility by count and by rank of the constraint matrix at a pose.
 
-        See :func:`graphsynth.mechanism.rank.mobility_report`.
+        See :func:`graphsynth.mechanism.constraints.mobility_report`.
         """
-        from graphsynth.mechanism.rank import mobility_report
+        from graphsynth.mechanism.constraints import mobility_report
 
         return mobility_report(self, pose)
 
@@ -194,6 +199,67 @@ class Mechanism(Constructors, Methods):
         from graphsynth.mechanism.files import from_toml
 
         return from_toml(text)
+
+    # --- what is done in rooms above: motion, assembly modes, pictures
+
+    def simulate(
+        self,
+        inputs: ArrayLike | str | None = None,
+        *,
+        modes: Mapping[int, int] | None = None,
+        start: ArrayLike | None = None,
+        events: bool = True,
+    ) -> gs.Motion:
+        """Move the mechanism; see :func:`graphsynth.simulate`."""
+        found: gs.Motion = work("simulate")(self, inputs, modes=modes, start=start, events=events)
+        return found
+
+    def modes(self, input: float | str | None = None) -> list[gs.AssemblyMode]:
+        """Return all assembly modes at one input; see :func:`graphsynth.kinematics.engine.start.assembly_modes`."""
+        found: list[gs.AssemblyMode] = work("modes")(self, input)
+        return found
+
+    def draw(self, path: str | Path | None = None, **options: Any) -> gs.Drawing:
+        """Draw the kinematic diagram, and write it to a file (.svg, .png, .pdf, .tikz, .dxf) if a path is given.
+
+        ``width``, ``height``, ``numbers`` and ``title`` are those of
+        :func:`graphsynth.drawing.diagram.mechanism_sketch`.  A mechanism without a pose is drawn where its motion
+        starts.
+        """
+        found: gs.Drawing = work("draw mechanism")(self, path, **options)
+        return found
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the kinematic diagram on matplotlib axes, those of a new figure by default, and return them."""
+        return work("plot mechanism")(self, ax)
+
+    def animate(self, path: str | Path | None = None, **options: Any) -> gs.Drawing:
+        """Animate ``self.simulate()``; see `Motion.animate`."""
+        return self.simulate().animate(path, **options)
+
+    def closure_equations(self) -> list[sympy.Expr]:
+        """Return the equations of all joints as formulas; see :mod:`graphsynth.mechanism.symbolic`."""
+        from graphsynth.mechanism.symbolic import closure_equations
+
+        return closure_equations(self)
+
+    def coupler_curve(self, name_or_link: str | int, at: tuple[float, float] | None = None) -> CouplerCurve:
+        """Return the equation of the curve of a coupler point; see :mod:`graphsynth.mechanism.symbolic`."""
+        from graphsynth.mechanism.symbolic import coupler_curve
+
+        return coupler_curve(self, name_or_link, at)
+
+    def _told(self) -> tuple[str, list[tuple[str, str]]]:
+        kinds = ", ".join(f"{joint.a}-{joint.b} {joint.kind}" for joint in self.joints)
+        drivers = ", ".join(f"{driver.link} against {driver.base}" for driver in self.drivers)
+        rows = [("frame", f"link {self.graph.frame}"), ("joints", kinds), ("driven", drivers or "nothing")]
+        if self.points:
+            rows.append(("points", ", ".join(f"{name} on link {one.link}" for name, one in self.points.items())))
+        return f"Mechanism of {self.graph.links} links, mobility {self.graph.mobility}", rows
+
+    def _picture(self) -> str:
+        picture: str = work("mechanism picture")(self)
+        return picture
 
 
 def _sequence(name: str, values: Any) -> tuple[Any, ...]:

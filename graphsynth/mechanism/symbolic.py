@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from graphsynth.core.checks import point
 from graphsynth.core.errors import GeometryError
-from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.equations import Plane, seen
+from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
     import sympy
@@ -34,18 +36,13 @@ def closure_equations(mechanism: Mechanism) -> list[sympy.Expr]:
     Parameters
     ----------
     mechanism : Mechanism
-        Joints R, P and pin in slot.
 
     Returns
     -------
     list of sympy.Expr
         In the symbols ``x_k``, ``y_k``, ``theta_k`` of the moving links k; two for a joint of mobility 1, one for a pin
-        in a slot, in the order of ``mechanism.joints``.  Numbers are those given, as fractions (exact).
-
-    Raises
-    ------
-    GeometryError
-        Gears or cams, whose equations are not algebraic in the poses.
+        in a slot, a gear pair (up to whole turns of its line of centres) or a cam, in the order of
+        ``mechanism.joints``.  Numbers are those given, as fractions (exact).
 
     Examples
     --------
@@ -55,13 +52,14 @@ def closure_equations(mechanism: Mechanism) -> list[sympy.Expr]:
     """
     import sympy
 
+    plane = Plane(sympy.sin, sympy.cos, lambda x, y: sympy.sqrt(x**2 + y**2), sympy.atan2)
     poses = [
         (sympy.Integer(0),) * 3 if k == mechanism.frame else sympy.symbols(f"x_{k} y_{k} theta_{k}", real=True)
         for k in range(mechanism.graph.links)
     ]
     found: list[sympy.Expr] = []
-    for joint in mechanism.joints:
-        found += _of_joint(joint, poses)
+    for joint in map(_exact, mechanism.joints):
+        found += joint.values(seen(plane, joint, poses[joint.a], poses[joint.b]))
     return found
 
 
@@ -71,26 +69,17 @@ def _number(value: float) -> Any:
     return sympy.Rational(Fraction(value))
 
 
-def _of_joint(joint: JointGeometry, poses: list[Any]) -> list[Any]:
-    import sympy
+def _exact(joint: JointGeometry) -> JointGeometry:
+    """Return a joint with the numbers given as fractions: without the checks, which make floats of them."""
 
-    def place(link: int, at: tuple[float, float]) -> tuple[Any, Any]:
-        (x, y, theta), (p, q) = poses[link], map(_number, at)
-        c, s = sympy.cos(theta), sympy.sin(theta)
-        return x + c * p - s * q, y + s * p + c * q
+    def exact(value: Any) -> Any:
+        return tuple(map(exact, value)) if isinstance(value, tuple) else _number(value)
 
-    if isinstance(joint, Gear | Cam):
-        raise GeometryError(
-            f"the {joint.kind} {joint.a}-{joint.b} has no closure equation here; R, P and pin-slot have"
-        )
-    (ax, ay), (bx, by) = place(joint.a, joint.at_a), place(joint.b, joint.at_b)
-    if isinstance(joint, Revolute):
-        return [bx - ax, by - ay]
-    along = poses[joint.a][2] + _number(joint.angle_a)
-    found = [sympy.cos(along) * (by - ay) - sympy.sin(along) * (bx - ax)]
-    if isinstance(joint, Prismatic):
-        found.append(along - poses[joint.b][2] - _number(joint.angle_b))
-    return found
+    made: JointGeometry = object.__new__(type(joint))
+    for item in fields(joint):
+        value = getattr(joint, item.name)
+        object.__setattr__(made, item.name, value if isinstance(value, int) else exact(value))
+    return made
 
 
 def coupler_curve(mechanism: Mechanism, name_or_link: str | int, at: tuple[float, float] | None = None) -> CouplerCurve:

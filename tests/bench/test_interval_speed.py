@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from graphsynth.intervals import Interval, Status, arrays as numpy_form, image, pave, sin
+from graphsynth.intervals import Interval, Status, image, pave, sin
 
 COUNT = 100_000
 SMALL = 200
@@ -83,9 +83,8 @@ def peers(name, a, b):
     return found
 
 
-@pytest.mark.parametrize("form", ["kernel", "numpy"])
 @pytest.mark.parametrize("name", OPERATIONS)
-def test_operation(benchmark, name, form):
+def test_operation(benchmark, name):
     from graphsynth.intervals.kernels import loops
 
     count = COUNT if benchmark.enabled else 500
@@ -94,12 +93,9 @@ def test_operation(benchmark, name, form):
     lo, hi = np.empty(count), np.empty(count)
     plain = [x[0] for x in ((a,) if len(arguments) == 2 else (a, b))]
     others = {"plain numpy": (lambda: PLAIN[name](*plain, out=np.empty(count)), count)}
-    if benchmark.enabled and form == "kernel":
+    if benchmark.enabled:
         others |= peers(name, a, b)
-    if form == "kernel":
-        timed(benchmark, lambda: getattr(loops, name)(*arguments, lo, hi), count, **others)
-    else:
-        lo, hi = timed(benchmark, lambda: getattr(numpy_form, name)(*arguments), count, **others)
+    timed(benchmark, lambda: getattr(loops, name)(*arguments, lo, hi), count, **others)
     exact = PLAIN[name](*plain)
     assert (lo <= exact).all()
     assert (hi >= exact).all()
@@ -249,9 +245,7 @@ def own_times(count, seconds):
     problem = circle_ellipse("17.5", "17.53", B, eps="0")
     rows = [
         ("add", "kernel", lambda: loops.add(*a, *b, lo, hi), count),
-        ("add", "numpy form", lambda: numpy_form.add(*a, *b), count),
         ("multiply", "kernel", lambda: loops.multiply(*a, *b, lo, hi), count),
-        ("multiply", "numpy form", lambda: numpy_form.multiply(*a, *b), count),
         ("sin", "kernel", lambda: elementary.sin(*a, lo, hi), count),
         ("krawczyk", "kernel", lambda: compiled.krawczyk_boxes(
             crossing, low, high, pl, ph, out_lo, out_hi, status), many),

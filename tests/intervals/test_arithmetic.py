@@ -4,11 +4,12 @@ import math
 from fractions import Fraction
 
 import numpy as np
+import numpy_form
 import pytest
 from hypothesis import example, given, strategies as st
 from interval_samples import SPECIAL, bounds
 
-from graphsynth.intervals import Interval, arrays as numpy_form, divide_extended
+from graphsynth.intervals import Interval, divide_extended
 from graphsynth.testing import finite_numbers
 
 INF = math.inf
@@ -198,25 +199,6 @@ def test_every_pair_of_special_intervals(name):
                     value = operation(Fraction(x), Fraction(y))
                     assert l == -INF or (l < INF and Fraction(l) <= value), (al, ah, bl, bh)
                     assert h == INF or (h > -INF and Fraction(h) >= value), (al, ah, bl, bh)
-
-
-@pytest.mark.parametrize("name", ["add", "subtract", "multiply"])
-def test_long_arrays_in_numpy_equal_short_ones(name):
-    """Blocks of ordinary numbers are done by a quick form, any others by the complete one; no place differs."""
-    from graphsynth.intervals import blocks
-
-    rng = np.random.default_rng(8)
-    count = 2 * blocks.BLOCK + 77
-    lo, other = rng.normal(size=(2, count))
-    a, b = (lo, lo + rng.random(count)), (other, other + rng.random(count))
-    odd = [bounds(rng, 40) for _ in range(2)]
-    for pair, values in zip((a, b), odd):  # special numbers in the first and last block only
-        for end, value in zip(pair, values):
-            end[:20], end[-20:] = value[:20], value[20:]
-    with np.errstate(all="ignore"):
-        long = getattr(numpy_form, name)(*a, *b)
-        short = getattr(numpy_form, f"_{name}")(*a, *b)
-    assert all(np.array_equal(p, q) for p, q in zip(long, short))
 
 
 @pytest.mark.parametrize(

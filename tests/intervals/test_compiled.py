@@ -158,7 +158,7 @@ def test_exhausted_budgets_keep_every_solution():
         (["[1, 2]", "[1, 2]"], {"tolerance": 0.0}, "tolerance"),
         (["[1, 2]", "[1, 2]"], {"max_boxes": 0}, "max_boxes"),
         (["[1, 2]", "[1, 2]"], {"max_seconds": float("nan")}, "max_seconds"),
-        (["[1, 2]", "[1, 2]"], {"scale": [1.0]}, "scale"),
+        (["[1, 2]", "[1, 2]"], {"tolerance": [1.0]}, "tolerance"),
     ],
 )
 def test_bad_questions(box, options, word):

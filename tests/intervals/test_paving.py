@@ -268,7 +268,14 @@ def test_bad_states_and_arguments(tmp_path):
     np.savez(tmp_path / "c.npz", meta=np.array([1, 2], dtype=object))
     with pytest.raises(FormatError, match="not a saved search"):
         search.load(tmp_path / "c.npz")
-    for options in ({"tolerance": 0.0}, {"max_boxes": 0}, {"max_seconds": -1.0}, {"scale": [-1.0]}, {"inner": [0]}):
+    for options in (
+        {"tolerance": 0.0},
+        {"max_boxes": 0},
+        {"max_seconds": -1.0},
+        {"tolerance": [-1.0]},
+        {"tolerance": [1.0, 1.0]},
+        {"inner": [0]},
+    ):
         with pytest.raises(IntervalError):
             Search(f, ["[0, 1]"], **options)
     with pytest.raises(IntervalError, match="bounded"):
@@ -276,8 +283,7 @@ def test_bad_states_and_arguments(tmp_path):
 
 
 def test_progress_is_reported():
-    seen = []
-    pave(lambda x: [sin(x[0] * 20)], ["[0.1, 9]"], progress=seen.append)
+    seen = list(Search(lambda x: [sin(x[0] * 20)], ["[0.1, 9]"]))
     assert seen[-1].waiting == 0
     assert seen[-1].kept == 57  # multiples of pi/20 in [0.1, 9]
     assert all(a.tested < b.tested for a, b in pairwise(seen))

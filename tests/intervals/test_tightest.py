@@ -1,4 +1,4 @@
-"""Every path of + - * / squares and roots gives the tightest bounds, by fractions: kernels, numpy forms, blocks.
+"""Every path of + - * / squares and roots gives the tightest bounds, by fractions: kernels and their reference.
 
 Each path is asked by itself on numbers that belong to it: an interval operation chooses among several, and one that is
 only reached through another might be wrong unseen.
@@ -8,10 +8,11 @@ import math
 from fractions import Fraction
 
 import numpy as np
+import numpy_form as arrays
 import pytest
 from interval_samples import bounds
 
-from graphsynth.intervals import Interval, arrays, blocks, hypot
+from graphsynth.intervals import Interval, hypot
 from graphsynth.intervals.kernels import arithmetic, loops, rounding as compiled
 from graphsynth.intervals.reading import lower_bound, upper_bound
 
@@ -91,27 +92,18 @@ def in_numpy(function):
     return run
 
 
-def no_rest(*operands):
-    """Complete form of a block, which ordinary numbers never need."""
-    raise AssertionError("a block of ordinary numbers asked for the complete form")
-
-
 PLAIN = {
     ("add", "kernel"): in_loop(arithmetic.add),
     ("subtract", "kernel"): in_loop(arithmetic.subtract),
     ("multiply", "plain"): in_loop(arithmetic.multiply_plain),
     ("divide", "plain"): in_loop(arithmetic.divide_plain),
-    ("add", "block"): in_numpy(lambda *v: blocks.add(*v, complete=no_rest)),
-    ("subtract", "block"): in_numpy(lambda *v: blocks.subtract(*v, complete=no_rest)),
-    ("multiply", "block"): in_numpy(lambda *v: blocks.multiply(*v, complete=no_rest)),
 }
 ANY = {
     **{(name, "kernel"): in_loop(getattr(arithmetic, name)) for name in EXACT},
     ("multiply", "any"): in_loop(arithmetic.multiply_any),
     ("divide", "any"): in_loop(arithmetic.divide_any),
     **{(name, "loop"): by_loop(name) for name in EXACT},
-    **{(name, "numpy"): in_numpy(getattr(arrays, f"_{name}")) for name in EXACT},
-    **{(name, "long arrays"): in_numpy(getattr(arrays, name)) for name in EXACT},
+    **{(name, "numpy"): in_numpy(getattr(arrays, name)) for name in EXACT},
 }
 
 

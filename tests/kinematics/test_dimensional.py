@@ -12,12 +12,17 @@ from hypothesis import given, settings, strategies as st
 from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.kinematics import simulate
 from graphsynth.kinematics.dimensional import Embodiment, Goals, embody
-from graphsynth.kinematics.dimensional.choice import choices
-from graphsynth.kinematics.dimensional.design import Design
-from graphsynth.kinematics.dimensional.problem import Problem
+from graphsynth.kinematics.dimensional.design import Design, choices
+from graphsynth.kinematics.dimensional.problem import DimensionProblem
 from graphsynth.kinematics.dimensional.sketch import layout
-from graphsynth.kinematics.dimensional.transmission import GroupForm, group_forms, transmission_sines
-from graphsynth.kinematics.dimensional.verify import length_ratio, smallest_transmission, verify
+from graphsynth.kinematics.dimensional.verify import (
+    GroupForm,
+    group_forms,
+    length_ratio,
+    smallest_transmission,
+    transmission_sines,
+    verify,
+)
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Linear
 from graphsynth.mechanism.model import Mechanism
@@ -369,7 +374,7 @@ def test_driven_links_of_a_sketch_are_shrunk_toward_their_bearing() -> None:
     for graph in (chain for links in (4, 6) for chain in enumerate_chains(links)):
         for inversion, drivers in choices(graph, None)[:2]:
             design = Design(inversion, drivers, ("R",) * len(inversion.joints))
-            problem = object.__new__(Problem)
+            problem = object.__new__(DimensionProblem)
             problem.design = design
             before, after = layout(design.graph).positions, problem._sketch(Still())
             own = np.zeros(len(before), dtype=bool)

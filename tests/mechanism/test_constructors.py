@@ -62,7 +62,7 @@ def test_slider_crank_agrees_with_its_formula(crank, rod, offset, branch):
 
 @pytest.mark.parametrize("kind, ternary", [("watt", {0, 3}), ("stephenson", {0, 2})])
 def test_six_bars_have_the_chain_they_are_named_after(kind, ternary):
-    linkage = gs.Mechanism.six_bar(kind, 4, 1, 4, 3, joint=(2, 1), link=3, output=3, pivot=(7, 0))
+    linkage = gs.Mechanism.six_bar(kind, (4, 1, 4, 3), joint=(2, 1), link=3, output=3, pivot=(7, 0))
     assert closes(linkage)
     assert {k for k, degree in enumerate(linkage.graph.degrees) if degree == 3} == ternary
     adjacent = tuple(sorted(ternary)) in {(a, b) for a, b, _ in linkage.graph.joints}

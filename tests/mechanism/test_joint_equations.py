@@ -11,20 +11,19 @@ import sympy
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, certify, simulate
 from graphsynth.core.checks import positive
-from graphsynth.intervals import Dual, Interval, atan2, cos, sin, sqrt, variables
+from graphsynth.intervals import Dual, Interval, atan2, cos, hypot, sin, variables
 from graphsynth.intervals.balls import Balls
 from graphsynth.kinematics.certify.equations import MechanismSystem
 from graphsynth.kinematics.engine import codes, program
 from graphsynth.mechanism import joints
-from graphsynth.mechanism.constraints import jacobian, residual
-from graphsynth.mechanism.equations import Gradient, Pairs, derivatives, seen
+from graphsynth.mechanism.constraints import jacobian, mobility_report, residual
+from graphsynth.mechanism.equations import Gradient, Plane, derivatives, seen
 from graphsynth.mechanism.files import from_json, to_json
 from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic
-from graphsynth.mechanism.rank import mobility_report
 
-INTERVALS = Pairs(sin, cos, sqrt, atan2)
-MPMATH = Pairs(mpmath.sin, mpmath.cos, mpmath.sqrt, mpmath.atan2)
-SYMBOLS = Pairs(sympy.sin, sympy.cos, sympy.sqrt, sympy.atan2)
+INTERVALS = Plane(sin, cos, hypot, atan2)
+MPMATH = Plane(mpmath.sin, mpmath.cos, mpmath.hypot, mpmath.atan2)
+SYMBOLS = Plane(sympy.sin, sympy.cos, lambda x, y: sympy.sqrt(x**2 + y**2), sympy.atan2)
 
 
 # --- the template of a new kind of joint: what follows would be one class in joints.py and one line in program.py

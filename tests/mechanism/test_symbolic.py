@@ -79,7 +79,7 @@ def test_closure_equations_vanish_where_the_joints_close(linkage):
 
 
 def test_mechanisms_without_a_coupler_curve():
-    six = gs.Mechanism.six_bar("watt", 4, 1, 4, 3, joint=(2, 1), link=3, output=3, pivot=(7, 0))
+    six = gs.Mechanism.six_bar("watt", (4, 1, 4, 3), joint=(2, 1), link=3, output=3, pivot=(7, 0))
     with pytest.raises(GeometryError, match="not held by two joints"):
         six.coupler_curve(3, (1, 1))
     with pytest.raises(GeometryError, match="point 'P' is not defined"):

@@ -8,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from graphsynth.mechanism.four_bar import TiltedFourBar
-from graphsynth.mechanism.rotatability import _margins
 
 CHANGE, STRETCHED = (2.0, 1.0, 2.0, 3.0), (4.0, 1.0, 1.0, 2.0)
 
@@ -41,7 +40,7 @@ def test_margins_to_a_few_roundings(rod):
         tilt = {"alpha": rng.uniform(-3.0, 3.0), "axis": tuple(rng.normal(size=3)), "rod": rod}
         linkage = TiltedFourBar(l1, l2, l3 + l2, l4, **tilt)
         f = rng.uniform(0.0, math.tau, 4)
-        for angle, found in zip(f, _margins(linkage, f)):
+        for angle, found in zip(f, linkage._margins(f)):
             worst = max(worst, abs(float(min(margins(linkage, mp.mpf(angle))) - mp.mpf(found))))
     assert worst < 8 * 2.0**-52
 
@@ -90,7 +89,7 @@ def test_a_dip_between_two_samples_is_seen(depth, rod):
     def lowest(l1):
         linkage = TiltedFourBar(l1, 1.0, 2.0, 3.0, alpha=0.5, axis=(1.0, 2.0, 0.5), rod=rod)
         grid = np.linspace(0.0, math.tau, 2881)
-        f = mp.mpf(float(grid[np.argmin(_margins(linkage, grid))]))
+        f = mp.mpf(float(grid[np.argmin(linkage._margins(grid))]))
         f = mp.findroot(lambda x: mp.diff(lambda y: margins(linkage, y)[0], x), (f, f + 1e-3), tol=1e-20)
         return linkage, f, float(margins(linkage, f)[0])
 

@@ -64,7 +64,7 @@ def choice_of(chain: MechanismGraph, most: int) -> list[tuple[int, list[int]]]:
     >>> choice_of(MechanismGraph.from_key("1BAN4"), 1)
     [(0, [2])]
     """
-    from graphsynth.kinematics.dimensional.choice import choices
+    from graphsynth.kinematics.dimensional.design import choices
 
     found = []
     frames = {chain.with_frame(link): link for link in reversed(range(chain.links))}

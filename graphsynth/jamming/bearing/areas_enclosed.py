@@ -91,8 +91,6 @@ def _segment_difference(difference: Interval, total: Interval) -> Interval:
 
 def _ranges(**values: Any) -> tuple[Interval, ...]:
     """Read the ranges and broadcast them; name what is wrong."""
-    import graphsynth.intervals.kernels.loops  # noqa: F401  # hundreds of operations: the compiled path pays
-
     check_rounding()
     read = []
     for name, value in values.items():

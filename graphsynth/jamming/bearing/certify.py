@@ -234,7 +234,6 @@ def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertifi
     >>> found.verdict.name, found.largest_interference.hi < 0
     ('CERTIFIED_FREE', True)
     """
-    import graphsynth.intervals.kernels.loops  # noqa: F401  # few intervals, many operations: the compiled path pays
     from graphsynth.intervals import check_rounding
     from graphsynth.jamming.bearing.corners import check_condition
 

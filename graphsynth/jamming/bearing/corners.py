@@ -405,8 +405,6 @@ def pose(box: ToleranceBox, f: Interval) -> Pose:
     >>> bool(found.assembled.all()), bool(found.missing.any())
     (True, False)
     """
-    import graphsynth.intervals.kernels.loops  # noqa: F401  # long arrays take the compiled path, once it is loaded
-
     # one shape for all, so that every operation takes it
     l1, l2, l3, l4, turn = (_spread(box.outer(name), f) for name in ("l1", "l2", "l3", "l4", "azimuth"))
     n1, n2, n3, alpha = (_spread(value, f) for value in _direction(box))

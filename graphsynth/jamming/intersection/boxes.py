@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from graphsynth.core.arguments import Real
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import IntervalError
+from graphsynth.intervals.boxes import Status
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
-from graphsynth.intervals.status import Status
 from graphsynth.jamming.intersection.hull import IntersectionHull, exact_hull, mirrored, spectral_radius
 from graphsynth.jamming.intersection.problem import CircleEllipse, Reason
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graphsynth.core.checks import checked
+from graphsynth.intervals.boxes import Status
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
-from graphsynth.intervals.status import Status
 from graphsynth.jamming.intersection.problem import CircleEllipse, Exact, Reason, outward, root_bounds
 
 if TYPE_CHECKING:

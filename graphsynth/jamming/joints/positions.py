@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.intervals import Interval, atan2, cos, pi, sin
+from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.joints import Cam, Gear, JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Harmonic, Law, Linear, Polynomial
-from graphsynth.mechanism.rank import characteristic_length
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism

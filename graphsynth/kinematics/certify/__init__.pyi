@@ -4,4 +4,4 @@ from .four_bar import (
     certify_inverted_slider_crank as certify_inverted_slider_crank,
     certify_slider_crank as certify_slider_crank,
 )
-from .poses import MotionCertificate as MotionCertificate, Verdict as Verdict, certify as certify
+from .poses import MotionCertificate as MotionCertificate, certify as certify

@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.balls import Balls, argument, exact, root, stack, tau_times, unit
-from graphsynth.mechanism.equations import Gradient, Number, Seen, derivatives
+from graphsynth.mechanism.constraints import characteristic_length
+from graphsynth.mechanism.equations import Gradient, Number, Plane, Seen, derivatives
 from graphsynth.mechanism.joints import Cam, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Harmonic, Law, Linear, Polynomial
 from graphsynth.mechanism.model import Mechanism
-from graphsynth.mechanism.rank import characteristic_length
 
 Array = NDArray[np.float64]
 
 
-class _BallPlane:
+class _BallPlane(Plane):
     """Arithmetic of balls; vectors are complex balls."""
 
     def vector(self, x: Number, y: Number) -> Balls:
@@ -58,14 +58,13 @@ class _BallPlane:
     def argument(self, v: Balls) -> Balls:
         return argument(v)
 
-    def cos(self, angle: Balls) -> Balls:
-        return unit(angle).real
 
-    def sin(self, angle: Balls) -> Balls:
-        return unit(angle).imag
-
-
-_PLANE = _BallPlane()
+_PLANE = _BallPlane(
+    lambda angle: unit(angle).imag,
+    lambda angle: unit(angle).real,
+    lambda x, y: root(x * x + y * y),
+    lambda y, x: argument(Balls(x.mid + 1j * y.mid, x.rad + y.rad).wider(0.0)),
+)
 #: Direction of the frame: nothing is turned, and nothing rounded.
 _FRAME = exact(1.0 + 0.0j)
 

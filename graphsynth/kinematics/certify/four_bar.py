@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import flint
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.intervals.exact import ball, precision, rational
+from graphsynth.intervals.reading import ball, precision, rational
 from graphsynth.mechanism.rotatability import KINDS, four_bar_rotation, rotation_kind, type_of
 
 _BITS = 80

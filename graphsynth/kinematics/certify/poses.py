@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 from fractions import Fraction
 from time import perf_counter
 
@@ -24,22 +23,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-class Verdict(StrEnum):
-    """Outcome of a certificate: proved, or not decided for a stated reason."""
-
-    CERTIFIED = "certified"
-    UNDECIDED = "undecided"
-
-
 @dataclass(frozen=True, eq=False)
 class MotionCertificate:
     """What is proved about a simulated motion.
 
     Attributes
     ----------
-    verdict : Verdict
-        CERTIFIED: every sample has its exact assembly, and (with ``between``) all samples lie on one branch that is
-        continuous and regular over the whole range of inputs.
+    certified : bool
+        Every sample has its exact assembly, and (with ``between``) all samples lie on one branch that is continuous and
+        regular over the whole range of inputs; else it is undecided.
     poses : ndarray of bool, shape (n,)
         Samples for which exactly one exact assembly within the stated radii is proved.
     position_radius, angle_radius : ndarray, shape (n,)
@@ -56,7 +48,7 @@ class MotionCertificate:
     undecided : tuple of (float, float)
         Intervals of the input, of the smallest size tried, where nothing is proved.
     reason : str
-        Why the verdict is UNDECIDED; empty if it is not.
+        Why it is undecided; empty if it is not.
     boxes : int
         Moving boxes tested.
     Lc : float
@@ -67,7 +59,7 @@ class MotionCertificate:
         The result in one sentence.
     """
 
-    verdict: Verdict
+    certified: bool
     poses: Mask
     position_radius: Array
     angle_radius: Array
@@ -80,11 +72,6 @@ class MotionCertificate:
     Lc: float
     seconds: float
     statement: str
-
-    @property
-    def certified(self) -> bool:
-        """Whether the verdict is CERTIFIED."""
-        return self.verdict is Verdict.CERTIFIED
 
 
 def certify(
@@ -100,7 +87,7 @@ def certify(
     between : bool, optional
         Prove the branch between the samples as well, and its closing after a full turn.
     max_boxes, seconds : optional
-        Limits of the work; what is not proved within them is UNDECIDED.
+        Limits of the work; what is not proved within them is undecided.
 
     Returns
     -------
@@ -230,9 +217,15 @@ def _meshes_again(joint: Gear, nodes: Nodes, gear: int, angle: dict[int, int]) -
 
 
 def _certificate(
-    motion: Motion, between: bool, asked: NDArray[np.intp], radii: tuple[Array, Array, Array],
-    found: Cover, closed: bool, turns: Fraction | None, begin: float,
-) -> MotionCertificate:  # fmt: skip
+    motion: Motion,
+    between: bool,
+    asked: NDArray[np.intp],
+    radii: tuple[Array, Array, Array],
+    found: Cover,
+    closed: bool,
+    turns: Fraction | None,
+    begin: float,
+) -> MotionCertificate:
     n = len(motion.inputs)
     position, angle, room = (np.full(n, np.nan) for _ in range(3))
     poses, intervals = np.zeros(n, dtype=bool), np.zeros(max(n - 1, 0), dtype=bool)
@@ -242,14 +235,21 @@ def _certificate(
     poses[asked] = proved
     intervals[: len(found.covered)] = found.covered & proved[:-1] & proved[1:]
     reason = _reason(motion, between, poses, intervals, found)
-    verdict = Verdict.UNDECIDED if reason else Verdict.CERTIFIED
-    seconds = perf_counter() - begin
     return MotionCertificate(
-        verdict=verdict, poses=poses, position_radius=position, angle_radius=angle, unique_within=room,
-        intervals=intervals, closed=bool(closed and not reason), undecided=tuple(sorted(found.undecided)),
-        reason=reason, boxes=found.tested, Lc=motion.Lc, seconds=seconds,
+        certified=not reason,
+        poses=poses,
+        position_radius=position,
+        angle_radius=angle,
+        unique_within=room,
+        intervals=intervals,
+        closed=bool(closed and not reason),
+        undecided=tuple(sorted(found.undecided)),
+        reason=reason,
+        boxes=found.tested,
+        Lc=motion.Lc,
+        seconds=perf_counter() - begin,
         statement=_statement(reason, between, poses, intervals, closed, turns),
-    )  # fmt: skip
+    )
 
 
 def _reason(motion: Motion, between: bool, poses: Mask, intervals: Mask, found: Cover) -> str:

@@ -197,9 +197,19 @@ class _Drawing:
 
         x, y = self.z.real.copy(), self.z.imag.copy()
         kernels.even_out(
-            x, y, self.joints, self.springs.sides, self.springs.stiffness, self.triangles, self.sense,
-            self.corners, self.turned, steps, crowded, _STRENGTHS,
-        )  # fmt: skip
+            x,
+            y,
+            self.joints,
+            self.springs.sides,
+            self.springs.stiffness,
+            self.triangles,
+            self.sense,
+            self.corners,
+            self.turned,
+            steps,
+            crowded,
+            _STRENGTHS,
+        )
         self.z = x + 1j * y
 
     def closest(self) -> float:

@@ -59,7 +59,7 @@ def target_link(design: Design, target: Target) -> int:
     return link
 
 
-class Fit(ABC):
+class TargetFit(ABC):
     """Base: where to sample, how many more unknowns, and the errors."""
 
     #: Inputs at which the target is sampled, relative to the first.
@@ -80,7 +80,7 @@ class Fit(ABC):
         """Errors (sets, m) whose largest size is in the unit of the tolerance, and the placement."""
 
 
-class PathFit(Fit):
+class PathFit(TargetFit):
     """Points, timed or not, and poses."""
 
     placed = True
@@ -124,7 +124,7 @@ class PathFit(Fit):
         return found, Placed(c[:, 0, 0], c[:, 1, 0], c[:, 2, 0])
 
 
-class FunctionFit(Fit):
+class FunctionFit(TargetFit):
     """Angle of a link as a function of the input."""
 
     def __init__(self, target: FunctionGoal) -> None:
@@ -138,7 +138,7 @@ class FunctionFit(Fit):
         return e.astype(np.complex128), Placed(one, 0.0 * one, 0.0 * one)
 
 
-class LineFit(Fit):
+class LineFit(TargetFit):
     """A straight stroke: its two ends are set exactly the wanted length apart, the strip is measured."""
 
     smooth = angular = False
@@ -182,7 +182,7 @@ def _on_bar(dz: Complex, dw: Complex, length: Array) -> tuple[Complex, Array]:
     return k.astype(np.complex128), np.sqrt(np.maximum(-inside, 0.0)) / (a * length)
 
 
-def make_fit(target: Target | None) -> Fit | None:
+def make_fit(target: Target | None) -> TargetFit | None:
     """Return the fit of a target."""
     if target is None:
         return None

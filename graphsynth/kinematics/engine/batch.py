@@ -236,9 +236,15 @@ def _one_set(program: Program, b: int) -> Program:
 
 
 def _run(
-    program: Program, signs: Array, u: Array, poses: Array, centres: Array, found: NDArray[np.bool_], rates: bool,
+    program: Program,
+    signs: Array,
+    u: Array,
+    poses: Array,
+    centres: Array,
+    found: NDArray[np.bool_],
+    rates: bool,
     kept: list[int],
-) -> BatchMotion:  # fmt: skip
+) -> BatchMotion:
     sets, n = len(poses), len(u)
     poses[:, program.mechanism.frame] = 0.0
     needed = rates or any(step.iterative for step in program.steps)
@@ -246,10 +252,15 @@ def _run(
     width = n if rates else 0
     links = kept or [program.mechanism.frame]  # the kernel delivers margins with links only
     out = Delivery(
-        poses, centres, np.array(links, dtype=np.int64), groups, np.empty((sets, len(links), 4, n)),
-        np.empty((sets, len(links), 3, width)), np.empty((sets, len(links), 3, width)),
+        poses,
+        centres,
+        np.array(links, dtype=np.int64),
+        groups,
+        np.empty((sets, len(links), 4, n)),
+        np.empty((sets, len(links), 3, width)),
+        np.empty((sets, len(links), 3, width)),
         np.empty((sets, len(groups), n)),
-    )  # fmt: skip
+    )
     q, memory = Tracker(program, signs).values(u), workspace(program, n, needed)
     done, why = run_program(program, signs, u, q, memory, 0, needed, _wanted(program, kept), out)
     done[~found], why[~found, 0] = 0, codes.UNREACHABLE

@@ -271,15 +271,28 @@ class Delivery:
 
 _NOWHERE = np.empty((0, 0, 0, 0))
 _NOTHING = Delivery(
-    np.empty((0, 0, 0)), np.empty((0, 0)), np.empty(0, np.int64), np.empty(0, np.int64), _NOWHERE, _NOWHERE, _NOWHERE,
     np.empty((0, 0, 0)),
-)  # fmt: skip
+    np.empty((0, 0)),
+    np.empty(0, np.int64),
+    np.empty(0, np.int64),
+    _NOWHERE,
+    _NOWHERE,
+    _NOWHERE,
+    np.empty((0, 0, 0)),
+)
 
 
 def run_program(
-    program: Program, modes: Array, u: Array, q: Array, memory: tuple[Array, ...], first: int, derivs: bool,
-    wanted: NDArray[np.bool_] | None = None, delivery: Delivery = _NOTHING,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:  # fmt: skip
+    program: Program,
+    modes: Array,
+    u: Array,
+    q: Array,
+    memory: tuple[Array, ...],
+    first: int,
+    derivs: bool,
+    wanted: NDArray[np.bool_] | None = None,
+    delivery: Delivery = _NOTHING,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Run the kernel for every dimension set; returns samples reached, and code and step of the stop."""
     from graphsynth.kinematics.engine import kernels
 
@@ -289,9 +302,34 @@ def run_program(
         wanted = np.ones(program.mechanism.graph.links, dtype=np.bool_)
     out = delivery
     kernels.run(
-        program.step_table, program.touched, program.rows, program.row_table, program.core, program.eliminated,
-        program.eliminated_table, program.drives, program.drive_table, program.need_angle, wanted, q, u, modes,
-        out.poses, out.centres, *memory, out.links, out.steps, out.frames, out.velocities, out.accelerations,
-        out.margins, done, why, first, program.Lc, program.far, derivs,
-    )  # fmt: skip
+        program.step_table,
+        program.touched,
+        program.rows,
+        program.row_table,
+        program.core,
+        program.eliminated,
+        program.eliminated_table,
+        program.drives,
+        program.drive_table,
+        program.need_angle,
+        wanted,
+        q,
+        u,
+        modes,
+        out.poses,
+        out.centres,
+        *memory,
+        out.links,
+        out.steps,
+        out.frames,
+        out.velocities,
+        out.accelerations,
+        out.margins,
+        done,
+        why,
+        first,
+        program.Lc,
+        program.far,
+        derivs,
+    )
     return done, why

@@ -1,4 +1,4 @@
-"""Inputs of a motion: their check, the coordinates of the drivers, the internal grid, full turns."""
+"""Inputs of a motion: their check, the coordinates of the drivers, the internal grid, full turns, the whole range."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import called, finite_array
 from graphsynth.core.errors import GeometryError, UnitWarning
+from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.joints import Prismatic
-from graphsynth.mechanism.laws import LAWS, Linear
+from graphsynth.mechanism.laws import LAWS, Harmonic, Linear, Table
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.laws import Driver
@@ -161,3 +162,43 @@ def full_turn(mechanism: Mechanism, u: Array) -> bool:
             return False
         moved = moved or turns != 0 or abs(change) <= slack
     return moved
+
+
+def first_input(mechanism: Mechanism) -> float:
+    """Return the input at which the first driver has the coordinate of the mechanism's pose; 0 without a pose."""
+    driver = mechanism.drivers[0] if mechanism.drivers else None
+    if driver is None or mechanism.pose is None or not isinstance(driver.law, Linear) or driver.law.rate == 0.0:
+        return 0.0
+    base, link = mechanism.pose[driver.base], mechanism.pose[driver.link]
+    joint = mechanism.joint(*driver.pair)
+    if isinstance(joint, Prismatic):
+        (ax, ay, at), (bx, by, bt) = mechanism.pose[joint.a], mechanism.pose[joint.b]
+        P = complex(ax, ay) + np.exp(1j * at) * complex(*joint.at_a)
+        Q = complex(bx, by) + np.exp(1j * bt) * complex(*joint.at_b)
+        along = float(((Q - P) * np.exp(-1j * (at + joint.angle_a))).real)
+        q = along if driver.base == joint.a else -along
+    else:
+        q = link[2] - base[2]
+    return (q - driver.law.offset) / driver.law.rate
+
+
+def whole_range(mechanism: Mechanism) -> tuple[float, float]:
+    """Return the inputs to be tried where none are given: a full rotation, a period, a table.
+
+    Raises
+    ------
+    GeometryError
+        No driver, or a law whose range is not known.
+    """
+    if not mechanism.drivers:
+        raise GeometryError("the mechanism has no driver, so nothing moves it; give drivers")
+    driver, u0 = mechanism.drivers[0], first_input(mechanism)
+    law, slides = driver.law, isinstance(mechanism.joint(*driver.pair), Prismatic)
+    if isinstance(law, Linear) and law.rate:
+        size = 4.0 * characteristic_length(mechanism) if slides else math.tau
+        return u0, u0 + size / abs(law.rate)
+    if isinstance(law, Harmonic) and law.order:
+        return 0.0, math.tau / abs(law.order)
+    if isinstance(law, Table):
+        return law.inputs[0], law.inputs[-1]
+    raise GeometryError(f"the range of the law {law!r} is not known; give inputs")

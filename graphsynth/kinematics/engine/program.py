@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import check_largest
 from graphsynth.core.errors import GeometryError, GraphError
 from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.constraints import characteristic_length
 from graphsynth.mechanism.joints import COLUMNS, Cam, Gear, JointGeometry, Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
-from graphsynth.mechanism.rank import characteristic_length
 from graphsynth.structure.assur import Decomposition, decompose
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ ROWS: dict[str, Callable[[Array], KernelRows]] = {
 }
 
 
-class Row(NamedTuple):
+class KernelRow(NamedTuple):
     """One equation between links a and b with its parameters."""
 
     kind: int
@@ -184,15 +184,23 @@ class _Compiler:
                 need[[joint.a, joint.b]] = True
         Lc, drawn = characteristic_length(self.mechanism), np.abs(self.mechanism.dimensions[:, _LENGTHS])
         return Program(
-            mechanism=self.mechanism, decomposition=self.found, steps=tuple(self.steps),
-            step_table=_ints(self.table, 10), touched=np.array(self.touched or [0], dtype=np.int64),
+            mechanism=self.mechanism,
+            decomposition=self.found,
+            steps=tuple(self.steps),
+            step_table=_ints(self.table, 10),
+            touched=np.array(self.touched or [0], dtype=np.int64),
             rows=_ints(self.rows, 5),
             row_table=self._floats(self.row_parameters, codes.ROW_WIDTH),
-            core=np.array(self.core or [0], dtype=np.int64), eliminated=_ints(self.eliminated, 4),
-            eliminated_table=self._floats(self.eliminated_parameters, codes.ELIM_WIDTH), drives=_ints(self.drives, 4),
-            drive_table=self._floats(self.drive_parameters, codes.DRIVE_WIDTH), need_angle=need,
-            gears=np.array(self.gears, dtype=np.int64), Lc=Lc, far=links * Lc + 4.0 * float(drawn.max(initial=0.0)),
-        )  # fmt: skip
+            core=np.array(self.core or [0], dtype=np.int64),
+            eliminated=_ints(self.eliminated, 4),
+            eliminated_table=self._floats(self.eliminated_parameters, codes.ELIM_WIDTH),
+            drives=_ints(self.drives, 4),
+            drive_table=self._floats(self.drive_parameters, codes.DRIVE_WIDTH),
+            need_angle=need,
+            gears=np.array(self.gears, dtype=np.int64),
+            Lc=Lc,
+            far=links * Lc + 4.0 * float(drawn.max(initial=0.0)),
+        )
 
     def _place_driven(self, placed: set[int]) -> None:
         """Place the links that drivers hang on the frame, one after another."""
@@ -218,9 +226,10 @@ class _Compiler:
     def _group(self, index: int, links: tuple[int, ...], placed: set[int]) -> None:
         inside = set(links)
         own = [
-            joint for joint in self.mechanism.joints
+            joint
+            for joint in self.mechanism.joints
             if (joint.a in inside or joint.b in inside) and {joint.a, joint.b} <= inside | placed
-        ]  # fmt: skip
+        ]
         gone = self._choose(links, own)
         rows = [row for joint in own if not gone & {joint.a, joint.b} for row in self._rows(joint)]
         first_eliminated = len(self.eliminated)
@@ -231,10 +240,20 @@ class _Compiler:
         code, rows = _closed(core, rows)
         place = {link: k for k, link in enumerate(core)}
         outside = sorted({link for joint in own for link in joint.pair} - inside)
-        self.table.append([
-            code, len(self.rows), len(rows), len(self.core), len(core), first_eliminated, len(gone), len(self.touched),
-            len(outside), index,
-        ])  # fmt: skip
+        self.table.append(
+            [
+                code,
+                len(self.rows),
+                len(rows),
+                len(self.core),
+                len(core),
+                first_eliminated,
+                len(gone),
+                len(self.touched),
+                len(outside),
+                index,
+            ]
+        )
         self.steps.append(Step(code, index, links, _describe(code, links, own), core))
         for kind, a, b, parameters in rows:
             if kind == codes.GEAR:
@@ -256,7 +275,7 @@ class _Compiler:
                 gone.add(link)
         return gone
 
-    def _rows(self, joint: JointGeometry) -> list[Row]:
+    def _rows(self, joint: JointGeometry) -> list[KernelRow]:
         """Return the equations of a joint, the driven coordinate included."""
         a, b = joint.a, joint.b
         size = self.sizes[joint.pair].T
@@ -267,15 +286,15 @@ class _Compiler:
             for column, value in own.items():
                 parameters[column] = value
             harmonics = joint.harmonics if isinstance(joint, Cam) else ()
-            found.append(Row(code, a, b, [*parameters, *(part for pair in harmonics for part in pair)]))
+            found.append(KernelRow(code, a, b, [*parameters, *(part for pair in harmonics for part in pair)]))
         if joint.pair in self.driven:
             index, driver = self.driven[joint.pair]
             base[codes.TX], base[codes.TY] = np.cos(size[2]), np.sin(size[2])
             base[codes.SIGN], base[codes.SLOT] = (1.0 if driver.base == a else -1.0), float(index)
-            found.append(Row(codes.DRIVE_ANGLE if isinstance(joint, Revolute) else codes.DRIVE_SLIDE, a, b, base))
+            found.append(KernelRow(codes.DRIVE_ANGLE if isinstance(joint, Revolute) else codes.DRIVE_SLIDE, a, b, base))
         return found
 
-    def _eliminate(self, link: int, first: JointGeometry, second: JointGeometry) -> Row:
+    def _eliminate(self, link: int, first: JointGeometry, second: JointGeometry) -> KernelRow:
         """Record an eliminated link and return the equation that replaces it."""
         if isinstance(first, Prismatic) and isinstance(second, Revolute):
             first, second = second, first
@@ -289,17 +308,17 @@ class _Compiler:
         self.eliminated_parameters.append([*_parts(pa, ea, pb, eb, ta, tb), turn])
         if kind == codes.E_RP:  # the pin of a runs on a line of b
             offset = (np.exp(-1j * deb) * (ea - eb)).imag
-            return Row(codes.LINE, b, a, [*_parts(pb, pa, tb), offset, *[0.0] * 5])
+            return KernelRow(codes.LINE, b, a, [*_parts(pb, pa, tb), offset, *[0.0] * 5])
         if kind == codes.E_RR:
             length = np.abs(eb - ea)
             if not (length > 0.0).all():
                 raise GeometryError(f"link {link} has length 0 between its two joints; give it a positive length")
-            return Row(codes.DIST, a, b, [*_parts(pa, pb), 1.0, 0.0, length, *[0.0] * 4, 1.0 / length])
+            return KernelRow(codes.DIST, a, b, [*_parts(pa, pb), 1.0, 0.0, length, *[0.0] * 4, 1.0 / length])
         if (np.abs(np.sin(dea - deb)) <= _WIDE).any():
             raise GeometryError(
                 f"link {link} slides along two parallel lines, so its place is not defined; turn one direction"
             )
-        return Row(codes.ANGLE, a, b, [*_parts(pa, pb), 1.0, 0.0, da - dea + deb - db, *[0.0] * 5])
+        return KernelRow(codes.ANGLE, a, b, [*_parts(pa, pb), 1.0, 0.0, da - dea + deb - db, *[0.0] * 5])
 
     def _seen(self, joint: JointGeometry, link: int) -> tuple[int, Complex, Complex, Array, Array]:
         """Other link, its point, the link's point, and the directions there (0 for a turning pair)."""
@@ -324,7 +343,7 @@ def _parts(*points: Complex) -> list[Number]:
     return [part for z in points for part in (z.real, z.imag)]
 
 
-def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
+def _closed(core: tuple[int, ...], rows: list[KernelRow]) -> tuple[int, list[KernelRow]]:
     """Choose the closed form of a group, with its rows in the order that the form expects."""
     if len(core) != 1:
         return codes.NEWTON, rows
@@ -333,7 +352,7 @@ def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
     if kinds == [codes.DIST] * 3:
         return codes.PLATFORM, rows
 
-    def order(*wanted: int) -> list[Row]:
+    def order(*wanted: int) -> list[KernelRow]:
         left = list(rows)
         return [left.pop(next(k for k, row in enumerate(left) if row.kind == kind)) for kind in wanted]
 
@@ -357,7 +376,7 @@ def _closed(core: tuple[int, ...], rows: list[Row]) -> tuple[int, list[Row]]:
     return codes.NEWTON, rows
 
 
-def _same_point(first: Row, second: Row, link: int) -> bool:
+def _same_point(first: KernelRow, second: KernelRow, link: int) -> bool:
     """Whether two rows hold the same point of a link, in every dimension set."""
     ends = [row.parameters[2:4] if row.b == link else row.parameters[0:2] for row in (first, second)]
     return all(np.array_equal(p, q) for p, q in zip(*ends))

@@ -1,19 +1,24 @@
-"""Where a branch starts: assembly modes of the groups at one input."""
+"""Where a branch starts: assembly modes of the groups at one input, and all those of a mechanism."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.core.angles import angles
 from graphsynth.core.errors import GeometryError
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.follow import Trace, Tracker
-from graphsynth.kinematics.engine.program import Program
+from graphsynth.kinematics.engine.inputs import first_input
+from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.triads import conditions, triad_modes
+from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -206,9 +211,24 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
             where = centre + random.uniform(-size, size, 2)
             state[link, :5] = (*where, np.cos(angle), np.sin(angle), angle)
         code = kernels.newton(
-            p.rows, p.row_table[0], row0, count, p.core, core0, cores, state, phi, q, J, f, g, G,
-            pivots, p.Lc, out,
-        )  # fmt: skip
+            p.rows,
+            p.row_table[0],
+            row0,
+            count,
+            p.core,
+            core0,
+            cores,
+            state,
+            phi,
+            q,
+            J,
+            f,
+            g,
+            G,
+            pivots,
+            p.Lc,
+            out,
+        )
         if code:
             continue
         core = state[list(step.core), :4]
@@ -216,3 +236,75 @@ def _searched_modes(tracker: Tracker, trace: Trace, k: int) -> Array:
             found.append(core)
     poses = [np.column_stack([core[:, 0], core[:, 1], np.arctan2(core[:, 3], core[:, 2])]) for core in found]
     return np.array(sorted(poses, key=lambda pose: tuple(pose[:, 2]))).reshape(-1, cores, 3)
+
+
+# --- all assembly modes of a mechanism
+
+
+class AssemblyMode(NamedTuple):
+    """One way to assemble a mechanism: the mode of every group, as `simulate` takes them, and the pose (links, 3)."""
+
+    modes: dict[int, int]
+    pose: Array
+
+
+def assembly_modes(mechanism: Mechanism, input: float | str | None = None) -> list[AssemblyMode]:
+    """Find all assembly modes of a mechanism at one input.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With as many drivers as its mobility.
+    input : float or str, optional
+        Input u, or an angle such as "30 deg"; by default that of the mechanism's pose, else 0.
+
+    Returns
+    -------
+    list of AssemblyMode
+        Poses and the modes of all groups: +1 or -1 for dyads, the rank for larger groups.  Empty if there is none.
+        Complete for dyads and for triads of binary outer links (closed forms and eliminants, float64); for larger
+        groups they are searched for by Newton's method from many starts, and some may be missing.
+
+    Raises
+    ------
+    GeometryError
+        Drivers that do not fit the mobility, an input that is no number, a group with a continuum of poses.
+
+    Examples
+    --------
+    >>> from graphsynth import Mechanism
+    >>> [mode.modes for mode in Mechanism.four_bar(2, 1, 2.5, 2.5).modes("30 deg")]
+    [{0: 1}, {0: -1}]
+    """
+    u = first_input(mechanism) if input is None else float(angles("input", [input])[0])
+    program = compile_program(mechanism)
+    dyads = [step.group for step in program.steps if step.has_two_modes]
+    found: list[AssemblyMode] = []
+    for signs in product((1, -1), repeat=len(dyads)):
+        chosen = dict(zip(dyads, signs))
+        tracker = started(program, u, chosen, None)
+        trace = tracker.blank(np.array([u]))
+        found += _assembled(tracker, trace, np.zeros((mechanism.graph.links, 3)), chosen, 0)
+    return found
+
+
+def _assembled(tracker: Tracker, trace: Trace, poses: Array, chosen: dict[int, int], first: int) -> list[AssemblyMode]:
+    """Complete a choice of modes by those of the larger groups from step ``first`` on."""
+    steps = tracker.program.steps
+    k = next((k for k in range(first, len(steps)) if steps[k].iterative), len(steps))
+    tracker.seed(trace, poses)
+    done, _, where = tracker.run(trace, 0)
+    if k == len(steps):
+        pose = np.column_stack([trace.X[0, :, :2], trace.angles(tracker.program, 0)])
+        return [AssemblyMode(dict(sorted(chosen.items())), pose)] if done else []
+    if not done and where < k:
+        return []
+    modes = group_modes(tracker, trace, k)
+    if modes is None:
+        raise GeometryError(f"group {steps[k].group} has a continuum of poses at this input; give another input")
+    found: list[AssemblyMode] = []
+    for rank, core in enumerate(modes):
+        own = poses.copy()
+        own[list(steps[k].core)] = core
+        found += _assembled(tracker, trace, own, {**chosen, steps[k].group: rank}, k + 1)
+    return found

@@ -10,29 +10,18 @@ degree three, so nothing special happens at alpha = pi.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import LARGEST, SMALLEST, check_largest, positive
 from graphsynth.core.errors import GeometryError
+from graphsynth.kinematics.triad.escalation import Arms, Sextic, coefficients, escalate
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
-
-class Sextic(NamedTuple):
-    """Coefficients of G, of ``N(z)`` and of ``Delta(z)`` (theory/platform-direct 1); arrays of one shape.
-
-    ``n = (n2, n1, n0, nm)``, ``d = (d0, de)``, ``g = (g0, g1, g2, g3)``.
-    """
-
-    g: tuple[Array, Complex, Complex, Complex]
-    n: tuple[Complex, Complex, Complex, Complex]
-    d: tuple[Complex, Complex]
 
 
 def sextic(anchors: Complex, vertices: Complex, lengths: Array) -> Sextic:
@@ -47,38 +36,8 @@ def sextic(anchors: Complex, vertices: Complex, lengths: Array) -> Sextic:
     >>> bool(abs(s.g[3] - b2 * b3 * (b3 - b2) * np.conj(a2 * a3 * (a2 - a3))) < 1e-14)
     True
     """
-    A, b = np.asarray(anchors, dtype=np.complex128), np.asarray(vertices, dtype=np.complex128)
-    l2 = np.asarray(lengths, dtype=np.float64)
-    conj = np.conj
-    a2, a3 = A[..., 1] - A[..., 0], A[..., 2] - A[..., 0]
-    b2, b3 = b[..., 1] - b[..., 0], b[..., 2] - b[..., 0]
-    L: Array = np.asarray(l2[..., 0] ** 2)
-
-    def offset(k: int, a: Complex, c: Complex) -> Array:
-        legs = (l2[..., k] - l2[..., 0]) * (l2[..., k] + l2[..., 0])
-        return np.asarray(legs - _square(a) - _square(c))
-
-    w20, w30, w21, w31 = offset(1, a2, b2), offset(2, a3, b3), b2 * conj(a2), b3 * conj(a3)
-    n2 = w21 * b3 - w31 * b2
-    n1 = w20 * b3 - w21 * a3 - w30 * b2 + w31 * a2
-    n0 = -w20 * a3 + conj(w21) * b3 + w30 * a2 - conj(w31) * b2
-    nm = -conj(w21) * a3 + conj(w31) * a2
-    d0: Complex = np.asarray(2j * (conj(b2) * b3 + conj(a2) * a3).imag, dtype=np.complex128)
-    de = b2 * conj(a3) - conj(a2) * b3
-    g3 = n2 * conj(nm)
-    g2 = n2 * conj(n0) + n1 * conj(nm) + L * de * de
-    g1 = n2 * conj(n1) + n1 * conj(n0) + n0 * conj(nm) + 2.0 * L * d0 * de
-    squares: Array = _square(n2) + _square(n1) + _square(n0) + _square(nm)
-    g0 = squares - L * (_square(d0) + 2.0 * _square(de))
-    return Sextic((g0, g1, g2, g3), (n2, n1, n0, nm), (d0, de))
-
-
-def _square(z: Complex) -> Array:
-    return np.asarray(z.real * z.real + z.imag * z.imag)
-
-
-#: (pivots, arms, angles): lets the anchors be recomputed at higher precision
-Arms = tuple[tuple[complex, complex, complex], tuple[float, float, float], Sequence[float]]
+    A, b, legs = ([np.asarray(rows)[..., k] for k in range(3)] for rows in (anchors, vertices, lengths))
+    return coefficients([a + 0j for a in A], [v + 0j for v in b], legs, np.conj)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +65,7 @@ class AssemblyModes:
     note : str
         Remark, for instance on a drop of the degree.
     method : str
-        How the count was had.
+        How the modes were counted.
     """
 
     poses: Array
@@ -329,8 +288,6 @@ def _three(values: ArrayLike, dtype: type) -> Any:
 
 
 def _at_fifty_digits(A: Complex, b: Complex, l2: Array, arms: Arms | None, flagged: bool) -> AssemblyModes:
-    from graphsynth.kinematics.triad.escalation import escalate
-
     poses, double, self_motion = escalate(A, b, l2, arms)
     return _described(A, b, l2, poses, double, self_motion, flagged, "isolated by bounds on derivatives at 50 digits")
 
@@ -352,9 +309,17 @@ def _described(
     single = np.sign(determinants[~double])
     consistent = bool(single.size % 2 == 0 and single.sum() == 0) and not self_motion
     return AssemblyModes(
-        poses, determinants, residuals, flagged, "digits" in method, double, self_motion, consistent,
-        _degree_note(A, b), method,
-    )  # fmt: skip
+        poses,
+        determinants,
+        residuals,
+        flagged,
+        "digits" in method,
+        double,
+        self_motion,
+        consistent,
+        _degree_note(A, b),
+        method,
+    )
 
 
 def assembly_modes(

@@ -6,14 +6,15 @@ brings along).  Slow (milliseconds per problem) and only used where the fast sol
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.kinematics.triad.assembly_modes import Arms
-
 Array = NDArray[np.float64]
+#: (pivots, arms, angles): lets the anchors be recomputed at higher precision
+Arms = tuple[tuple[complex, complex, complex], tuple[float, float, float], Sequence[float]]
 
 _DIGITS = 50
 _COINCIDENT = 1e-12  # relative; the given numbers are rounded at 1e-16
@@ -39,7 +40,7 @@ def escalate(
         A = [value / unit for value in A]
         b = [mp.mpc(value) / unit for value in vertices]
         l2 = [mp.mpf(value) / unit for value in lengths]
-        g, n, d = _coefficients(mp, A, b, l2)
+        g, n, d = coefficients(A, b, l2, mp.conj)
         if max(abs(c) for c in g) < mp.mpf(10) ** -14:  # below the resolution of the given numbers
             return np.zeros((0, 3)), np.zeros(0, dtype=bool), "the sextic vanishes: a continuous family of poses"
         family = _congruent(A, b, l2)
@@ -64,25 +65,40 @@ def escalate(
         return np.array(poses).reshape(-1, 3), np.array([merged for *_, merged in found], dtype=bool), ""
 
 
-def _coefficients(mp: Any, A: list[Any], b: list[Any], l2: list[Any]) -> tuple[list[Any], list[Any], list[Any]]:
-    """g, n and d of theory/platform-direct 1."""
-    c = mp.conj
-    a2, a3, b2, b3, L = A[1] - A[0], A[2] - A[0], b[1] - b[0], b[2] - b[0], l2[0] ** 2
-    w20 = l2[1] ** 2 - L - abs(a2) ** 2 - abs(b2) ** 2
-    w30 = l2[2] ** 2 - L - abs(a3) ** 2 - abs(b3) ** 2
-    w21, w31 = b2 * c(a2), b3 * c(a3)
+class Sextic(NamedTuple):
+    """Coefficients of G, of ``N(z)`` and of ``Delta(z)`` (theory/platform-direct 1), in any arithmetic.
+
+    ``g = (g0, g1, g2, g3)``, ``n = (n2, n1, n0, nm)``, ``d = (d0, de)``.
+    """
+
+    g: tuple[Any, Any, Any, Any]
+    n: tuple[Any, Any, Any, Any]
+    d: tuple[Any, Any]
+
+
+def coefficients(A: Sequence[Any], b: Sequence[Any], lengths: Sequence[Any], c: Callable[[Any], Any]) -> Sextic:
+    """Coefficients for three anchors, vertices and leg lengths; c is the complex conjugate in their arithmetic."""
+
+    def square(z: Any) -> Any:
+        return z.real * z.real + z.imag * z.imag
+
+    def offset(k: int, a: Any, v: Any) -> Any:
+        return (lengths[k] - lengths[0]) * (lengths[k] + lengths[0]) - square(a) - square(v)
+
+    a2, a3, b2, b3, L = A[1] - A[0], A[2] - A[0], b[1] - b[0], b[2] - b[0], lengths[0] ** 2
+    w20, w30, w21, w31 = offset(1, a2, b2), offset(2, a3, b3), b2 * c(a2), b3 * c(a3)
     n2 = w21 * b3 - w31 * b2
     n1 = w20 * b3 - w21 * a3 - w30 * b2 + w31 * a2
     n0 = -w20 * a3 + c(w21) * b3 + w30 * a2 - c(w31) * b2
     nm = -c(w21) * a3 + c(w31) * a2
     d0, de = 2j * (c(b2) * b3 + c(a2) * a3).imag, b2 * c(a3) - c(a2) * b3
-    g0 = sum(abs(v) ** 2 for v in (n2, n1, n0, nm)) - L * (abs(d0) ** 2 + 2 * abs(de) ** 2)
+    g0 = square(n2) + square(n1) + square(n0) + square(nm) - L * (square(d0) + 2 * square(de))
     g1 = n2 * c(n1) + n1 * c(n0) + n0 * c(nm) + 2 * L * d0 * de
-    g2 = n2 * c(n0) + n1 * c(nm) + L * de**2
-    return [g0, g1, g2, n2 * c(nm)], [n2, n1, n0, nm], [d0, de]
+    g2 = n2 * c(n0) + n1 * c(nm) + L * de * de
+    return Sextic((g0, g1, g2, n2 * c(nm)), (n2, n1, n0, nm), (d0, de))
 
 
-def _roots(mp: Any, g: list[Any]) -> list[tuple[Any, bool]] | None:
+def _roots(mp: Any, g: Sequence[Any]) -> list[tuple[Any, bool]] | None:
     """Real roots of G, sorted, with a mark on those that stay merged at this precision; None if undecided.
 
     G'' is bounded on each interval through its Taylor expansion to the fourth derivative, so that the work stays small

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GraphError
-from graphsynth.mechanism.constraints import jacobian
-from graphsynth.mechanism.rank import TOLERANCE, mobility_report
+from graphsynth.mechanism.constraints import TOLERANCE, jacobian, mobility_report
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import three
 from graphsynth.core.errors import GeometryError
-from graphsynth.intervals.exact import Gaussian, ball, complex_ball, gaussian, precision, rational
+from graphsynth.intervals.reading import Gaussian, ball, complex_ball, gaussian, precision, rational
 from graphsynth.systems.platform.certified_exact_modes import (
     SexticBalls,
     exact_roots,

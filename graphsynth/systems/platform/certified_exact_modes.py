@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import flint
 
-from graphsynth.intervals.exact import Gaussian, ball, complex_ball
+from graphsynth.intervals.reading import Gaussian, ball, complex_ball
 
 _NODES = 32
 #: Nodes are shifted by 1/997 of a turn over the number of nodes: no simple fraction of a turn is a node.

@@ -155,7 +155,7 @@ def loop_closure(mechanism: Mechanism, pose: ArrayLike | None = None, *, toleran
     one of another shape. Loops are the fundamental cycles of a breadth-first spanning tree from the frame.  A gear pair
     has two freedoms: rolling about the pitch point and sliding along the line of centres (theory/platform-drive 7).
     """
-    from graphsynth.mechanism.rank import characteristic_length
+    from graphsynth.mechanism.constraints import characteristic_length
 
     given = mechanism.pose if pose is None else pose
     if given is None:

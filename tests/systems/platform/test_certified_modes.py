@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.intervals.exact import ball, complex_ball, gaussian, precision, rational
+from graphsynth.intervals.reading import ball, complex_ball, gaussian, precision, rational
 from graphsynth.systems.platform import (
     AssemblyCertificate,
     AssemblyVerdict,
