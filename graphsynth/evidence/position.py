@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 from graphsynth.kinematics.simulation import simulate
-from graphsynth.mechanism.equations import Pairs, derivatives, seen
+from graphsynth.mechanism.equations import Plane, derivatives, seen
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Mechanism
@@ -117,7 +117,7 @@ def _equations(mechanism: Mechanism, u: Any, pose: list[list[Any]]) -> tuple[lis
 
     from graphsynth.mechanism.laws import Linear
 
-    plane = Pairs(mp.sin, mp.cos, mp.sqrt, mp.atan2)
+    plane = Plane(mp.sin, mp.cos, mp.hypot, mp.atan2)
     driver = mechanism.drivers[0]
     joint = next((j for j in mechanism.joints if j.pair == driver.pair), None)
     if len(mechanism.drivers) != 1 or not isinstance(driver.law, Linear) or not isinstance(joint, Revolute):
