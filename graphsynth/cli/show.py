@@ -13,7 +13,7 @@ from graphsynth.core.wholefiles import replacing
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
 
-#: Suffixes of pictures; see graphsynth.drawing.sketching.pictures.
+#: Suffixes of pictures; see graphsynth.drawing.export.
 PICTURES = (".svg", ".png", ".pdf", ".tikz", ".tex", ".dxf")
 
 
@@ -162,10 +162,9 @@ def _plain(value: Any) -> str:
 
 def _draw(graph: MechanismGraph, path: Path, view: str | None, driver: int | None) -> None:
     """Draw the kinematic diagram, the graph by levels, or both side by side."""
-    from graphsynth.drawing.graphs import graph_sketch
-    from graphsynth.drawing.levels import levels_sketch
+    from graphsynth.drawing.export import save
+    from graphsynth.drawing.graphs import graph_sketch, levels_sketch
     from graphsynth.drawing.sketch import Sketch
-    from graphsynth.drawing.sketching.pictures import save
 
     sketches: list[Sketch] = []
     poses: list[list[tuple[float, float, float]] | None] = []

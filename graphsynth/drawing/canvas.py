@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path as File
 from typing import Any
 
 import numpy as np
@@ -177,37 +176,3 @@ def figure_of(
     for k, line in enumerate(below):
         figure.text(12.0 / width, (foot - 14.0 - 17.0 * k) / height, line, fontsize=9.0, color=LIGHT["b"])
     return figure, canvases
-
-
-def save(path: File, sketches: Sequence[Sketch], poses: Sequence[Pose | None]) -> None:
-    """Write sketches side by side as the suffix says: ``.svg`` (own writer), ``.png`` or ``.pdf`` (matplotlib).
-
-    Raises `GraphsynthError`: another suffix.
-    """
-    suffix = path.suffix.lower()
-    if suffix == ".svg":
-        path.write_text(beside([sketch.svg(pose) for sketch, pose in zip(sketches, poses)], sketches), "utf-8")
-        return
-    if suffix not in (".png", ".pdf"):
-        raise GraphsynthError(f"{path} must end in .svg, .png or .pdf")
-    from matplotlib import rc_context
-
-    with rc_context({"font.family": "sans-serif", "pdf.fonttype": 42}):
-        figure, _ = figure_of(sketches, poses)
-        metadata: dict[str, Any] = {"CreationDate": None} if suffix == ".pdf" else {}
-        figure.savefig(path, dpi=2 * DPI, metadata=metadata)
-
-
-def beside(pictures: Sequence[str], sketches: Sequence[Sketch]) -> str:
-    """Put SVG pictures side by side in one."""
-    if len(pictures) == 1:
-        return pictures[0]
-    from graphsynth.drawing.svg import bare, number, picture
-
-    width, height = sum(s.width for s in sketches), max(s.height for s in sketches)
-    body, left = [], 0.0
-    for text, sketch in zip(pictures, sketches):
-        top = (height - sketch.height) / 2
-        body.append(bare(text).replace("<svg ", f'<svg x="{number(left)}" y="{number(top)}" ', 1))
-        left += sketch.width
-    return picture(body, width, height)

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import bodies, bounds
-from graphsynth.drawing.lettering import place_letters
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.drawing.symbols import (
     BLOCK,
@@ -25,6 +24,7 @@ from graphsynth.drawing.symbols import (
     draw_points,
     draw_slider,
     draw_traces,
+    place_letters,
 )
 from graphsynth.mechanism.joints import PinSlot, Prismatic
 from graphsynth.mechanism.model import Mechanism

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.core.errors import SpecError
-from graphsynth.drawing.figures import legend_place, new_figure
+from graphsynth.drawing.plots import legend_place, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,4 +1,7 @@
-"""The kinematic diagram of a graph that has no dimensions: joints where the automatic sketch puts them."""
+"""Drawings of graphs without dimensions: a diagram with joints where the automatic sketch puts them, or by levels.
+
+By its adjacency levels the frame is on top, then come the links jointed to it, and so on down.
+"""
 
 from __future__ import annotations
 
@@ -91,3 +94,112 @@ def graph_svg(graph: MechanismGraph, *, driver: int | None = None, width: float 
     """
     sketch, pose = graph_sketch(graph, driver=driver, width=width, title=title)
     return sketch.svg(pose)
+
+
+def level_order(graph: MechanismGraph, sweeps: int = 12) -> tuple[tuple[int, ...], ...]:
+    """Order the links inside each adjacency level so that edges cross little.
+
+    The barycentre heuristic [Sugiyama et al. 1981]: each level in turn is sorted by the mean position of its
+    neighbours, down and up, and the order with the fewest crossings of all passes is kept. Ties go to link numbers, so
+    the result depends on the graph alone.
+
+    `graph`: with a frame. `sweeps`: passes down and up.
+    """
+    levels = [list(level) for level in graph.levels]
+    edges = [(joint.a, joint.b) for joint in graph.joints]
+    neighbours: dict[int, list[int]] = {link: [] for link in range(graph.links)}
+    for a, b in edges:
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    place: dict[int, float] = {}
+    for level in levels:
+        _spread(level, place)
+    best, fewest = tuple(map(tuple, levels)), _tangle(edges, graph, place)
+    for sweep in range(sweeps):
+        for level in levels[1:] if sweep % 2 == 0 else reversed(levels[1:]):
+            _sort_level(level, neighbours, place)
+        tangle = _tangle(edges, graph, place)
+        if tangle < fewest:
+            best, fewest = tuple(map(tuple, levels)), tangle
+    return best
+
+
+def _spread(level: list[int], place: dict[int, float]) -> None:
+    """Give the links of a level evenly spaced positions around 0."""
+    for i, link in enumerate(level):
+        place[link] = i - (len(level) - 1) / 2
+
+
+def _sort_level(level: list[int], neighbours: dict[int, list[int]], place: dict[int, float]) -> None:
+    """Sort a level by the mean position of each link's neighbours, its own level included."""
+    mean = {link: round(sum(place[n] for n in neighbours[link]) / len(neighbours[link]), 9) for link in level}
+    level.sort(key=lambda link: (mean[link], link))
+    _spread(level, place)
+
+
+def _tangle(edges: list[tuple[int, int]], graph: MechanismGraph, place: dict[int, float]) -> float:
+    """Count crossings of edges between levels; an edge inside a level costs half of each link it passes over."""
+    depth = {link: k for k, level in enumerate(graph.levels) for link in level}
+    between: dict[int, list[tuple[float, float]]] = {}
+    cost = 0.0
+    for a, b in edges:
+        if depth[a] == depth[b]:
+            cost += 0.5 * (abs(place[a] - place[b]) - 1)
+        else:
+            upper, lower = sorted((a, b), key=depth.__getitem__)
+            between.setdefault(depth[upper], []).append((place[upper], place[lower]))
+    for pairs in between.values():
+        pairs.sort()
+        cost += sum(
+            low > later for i, (up, low) in enumerate(pairs) for next_up, later in pairs[i + 1 :] if next_up > up
+        )
+    return cost
+
+
+def draw_levels(graph: MechanismGraph, width: float = 420.0, title: str = "") -> str:
+    """Draw a graph by adjacency levels, as one ``<svg>`` element; see :func:`levels_sketch`."""
+    return levels_sketch(graph, width, title).svg()
+
+
+def levels_sketch(graph: MechanismGraph, width: float = 420.0, title: str = "") -> Sketch:
+    """Build the drawing of a graph by adjacency levels.
+
+    The frame is the filled vertex on hatched ground; a joint of mobility 1 is a line, of mobility 2 a dashed line, of
+    higher mobility a dotted one; joints inside a level are arcs.
+
+    `graph`: with a frame. `width`: width in pixels; below 260 the vertices and their numbers are drawn smaller.
+    `title`: read out by screen readers.
+    """
+    order = level_order(graph)
+    widest = max(map(len, order))
+    row = 1.5 if widest > 4 else 1.2
+    where = {
+        link: complex((i - (len(level) - 1) / 2) * (widest / len(level)) ** 0.5, -row * depth)
+        for depth, level in enumerate(order)
+        for i, link in enumerate(level)
+    }
+    half = max(1.2, *(abs(p.real) for p in where.values())) + 0.1
+    radius = 10.0 if width >= 260 else 6.5
+    width = min(width, 2 * half * 7 * radius + 4.4 * radius)  # a small graph does not need the whole width
+    arcs_below = any(joint.a in order[-1] and joint.b in order[-1] for joint in graph.joints)
+    bottom = -row * (len(order) - 1) - (0.6 if arcs_below else 0.1)
+    sketch = Sketch(complex(-half, bottom), complex(half, 0.1), width, margin=2.2 * radius, title=title)
+    for joint in graph.joints:
+        p, q = where[joint.a], where[joint.b]
+        dash = {1: (), 2: (5.0, 4.0)}.get(joint.mobility, (1.5, 4.0))
+        sketch.curve(p, q, _bend(p, q), colour="b" if joint.mobility > 1 else "ink", dash=dash)
+    for level in order:
+        for link in level:
+            sketch.node(where[link], str(link), radius, filled=link == graph.frame)
+    if graph.frame is not None:
+        sketch.hatch_over(where[graph.frame], radius)
+    return sketch
+
+
+def _bend(p: complex, q: complex) -> float:
+    """How far an edge inside a level bends down to pass the vertices between its ends."""
+    if p.imag != q.imag:
+        return 0.0
+    span = abs(q.real - p.real)
+    depth = min(0.55, 0.18 * span) if span > 1.01 else 0.0
+    return depth if q.real > p.real else -depth

@@ -58,7 +58,7 @@ class Drawing:
 
 
 def _drawing(sketch: Sketch, pose: Any, path: str | Path | None) -> Drawing:
-    from graphsynth.drawing.sketching.pictures import save
+    from graphsynth.drawing.export import save
 
     drawing = Drawing(sketch.svg(pose), lambda file: save(file, [sketch], [pose]))
     if path is not None:
@@ -75,7 +75,7 @@ def draw_graph(graph: MechanismGraph, path: str | Path | None, **options: Any) -
 
 def graph_picture(graph: MechanismGraph) -> str:
     """Work of `MechanismGraph._repr_svg_`: the sketch, or the adjacency levels of what has none."""
-    from graphsynth.drawing.levels import draw_levels
+    from graphsynth.drawing.graphs import draw_levels
 
     try:
         return draw_graph(graph, None, width=300.0, height=260.0).svg

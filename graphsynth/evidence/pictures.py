@@ -47,7 +47,7 @@ def work_precision_picture(problem: Problem) -> Figure:
     """
     if not problem.rows:
         raise SpecError(f"problem {problem.name!r} has no rows, so there is nothing to draw")
-    from graphsynth.drawing.figures import new_figure
+    from graphsynth.drawing.plots import new_figure
 
     figure = new_figure((7.2, 5.8))
     axes = figure.subplots()

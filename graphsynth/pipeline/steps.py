@@ -306,7 +306,7 @@ def pictures(
 
 
 def _picture(item: Recognised) -> Picture:
-    from graphsynth.drawing.levels import draw_levels
+    from graphsynth.drawing.graphs import draw_levels
 
     graph, known = item.candidate.graph, item.module is not None
     title = f"No. {item.candidate.number}"

@@ -11,15 +11,20 @@ import pytest
 
 from graphsynth.core.errors import SpecError
 from graphsynth.drawing.drive_pictures import drive_curves, reduction_picture
-from graphsynth.drawing.figures import themed_svg
 from graphsynth.drawing.palette import DARK, LIGHT
+from graphsynth.drawing.plots import themed_svg
 from graphsynth.dynamics.motors import DCMotor
 from graphsynth.systems.braider.model import Braider
 from graphsynth.systems.braider.pictures import sensor_picture, start_up_picture
 from graphsynth.systems.braider.reactions import reactions
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
-from graphsynth.systems.platform.resistance import resistance_effect, ripple_map
-from graphsynth.systems.platform.resistance_pictures import resistance_picture, ripple_map_picture, ripple_picture
+from graphsynth.systems.platform.resistance import (
+    resistance_effect,
+    resistance_picture,
+    ripple_map,
+    ripple_map_picture,
+    ripple_picture,
+)
 
 DRIVE = MotorDrivenPlatform.source(DCMotor(5.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0))
 

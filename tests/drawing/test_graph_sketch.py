@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from graphsynth.core.errors import GraphError, GraphsynthError
-from graphsynth.drawing.canvas import save
-from graphsynth.drawing.graphs import graph_sketch, graph_svg
-from graphsynth.drawing.levels import levels_sketch
+from graphsynth.drawing.export import save
+from graphsynth.drawing.graphs import graph_sketch, graph_svg, levels_sketch
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.synthesis import enumerate_chains
 
@@ -68,14 +67,14 @@ def test_two_views_side_by_side_in_every_kind_of_file(tmp_path: Path) -> None:
     inner = root.findall("{http://www.w3.org/2000/svg}svg")
     assert [float(e.get("x")) for e in inner] == pytest.approx([0, sketch.width], abs=0.01)
     assert float(root.get("width")) == pytest.approx(sketch.width + levels.width, abs=0.01)
-    with pytest.raises(GraphsynthError, match=r"must end in \.svg, \.png or \.pdf"):
+    with pytest.raises(GraphsynthError, match=r"must end in \.svg, \.png, \.pdf, \.tikz, \.tex or \.dxf"):
         save(tmp_path / "x.bmp", [sketch], [pose])
 
 
 def test_svg_pictures_load_no_matplotlib() -> None:
     """The writers of SVG and HTML stay with numpy."""
     code = (
-        "import sys, graphsynth.drawing.animation, graphsynth.drawing.levels\n"
+        "import sys, graphsynth.drawing.animation, graphsynth.drawing.graphs\n"
         "import graphsynth.systems.lambda_linkage.pictures\n"
         "import graphsynth.drawing.motion_charts, graphsynth.drawing.gif, graphsynth.drawing.canvas\n"
         "import graphsynth.drawing.graphs\n"

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.bearing_in_space import space_picture
 from graphsynth.drawing.crossing_pictures import crossing_picture, region_picture
-from graphsynth.drawing.jamming_pictures import area_chart, area_picture, report_picture, section_picture
+from graphsynth.drawing.jamming_pictures import area_chart, area_picture, report_picture, section_picture, space_picture
 from graphsynth.jamming import Bearing, ToleranceBox, assess_jamming
 from graphsynth.jamming.bearing.area_curve import area_curve
 from graphsynth.jamming.intersection import circle_ellipse, exact_hull, krawczyk_boxes
@@ -88,7 +87,7 @@ def test_section_without_and_with_jamming():
 def test_cylinders_in_space_without_and_with_jamming():
     from matplotlib.colors import to_rgb
 
-    from graphsynth.drawing.bearing_in_space import wall
+    from graphsynth.drawing.jamming_pictures import wall
     from graphsynth.drawing.palette import LIGHT
 
     figure = drawn(space_picture(Bearing(), (0.0023, 0.0133312592), ("free", "jammed"), 60.0))

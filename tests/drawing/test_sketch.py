@@ -9,7 +9,7 @@ import xml.etree.ElementTree as ET
 import pytest
 from hypothesis import given, strategies as st
 
-from graphsynth.drawing.levels import draw_levels, level_order
+from graphsynth.drawing.graphs import draw_levels, level_order
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.drawing.svg import number
 from graphsynth.structure.graph import MechanismGraph

@@ -9,12 +9,10 @@ from pathlib import Path
 import pytest
 
 from graphsynth.core.errors import GraphsynthError
-from graphsynth.drawing.graphs import graph_sketch
-from graphsynth.drawing.levels import levels_sketch
+from graphsynth.drawing.export import SUFFIXES, save, tikz
+from graphsynth.drawing.graphs import graph_sketch, levels_sketch
 from graphsynth.drawing.shapes import Circle
 from graphsynth.drawing.sketch import Sketch
-from graphsynth.drawing.sketching.pictures import SUFFIXES, save
-from graphsynth.drawing.sketching.tikz import tikz
 from graphsynth.structure.graph import MechanismGraph
 
 GRAPH = MechanismGraph(

@@ -18,12 +18,10 @@ from graphsynth import LambdaLinkage
 from graphsynth.cli import main
 from graphsynth.drawing.animation import animated_svg
 from graphsynth.drawing.diagram import mechanism_svg
-from graphsynth.drawing.figures import new_figure, themed_svg
-from graphsynth.drawing.graphs import graph_svg
-from graphsynth.drawing.levels import draw_levels
+from graphsynth.drawing.graphs import draw_levels, graph_svg
 from graphsynth.drawing.pages import whole_page
 from graphsynth.drawing.palette import DARK, LIGHT, STYLE
-from graphsynth.drawing.plots import Band, Chart, Line, Mark
+from graphsynth.drawing.plots import Band, Chart, Line, Mark, new_figure, themed_svg
 from graphsynth.kinematics import simulate
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.antenna import PointingMechanism

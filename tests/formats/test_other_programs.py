@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from graphsynth.drawing.graphs import graph_sketch
-from graphsynth.drawing.levels import levels_sketch
-from graphsynth.drawing.sketching.tikz import tikz
+from graphsynth.drawing.export import tikz
+from graphsynth.drawing.graphs import graph_sketch, levels_sketch
 from graphsynth.formats import write
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.model import Mechanism

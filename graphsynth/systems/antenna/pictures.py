@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT, WHITE
+from graphsynth.drawing.plots import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

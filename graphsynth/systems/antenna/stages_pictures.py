@@ -16,7 +16,7 @@ _FRAMES = 97
 
 
 def _svg(figure: Any) -> str:
-    from graphsynth.drawing.figures import themed_svg
+    from graphsynth.drawing.plots import themed_svg
 
     return themed_svg(figure)
 

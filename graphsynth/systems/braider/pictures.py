@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graphsynth.drawing.drive_pictures import COLOURS, STYLES, panel
-from graphsynth.drawing.figures import legend_place, new_figure
 from graphsynth.drawing.palette import LIGHT
+from graphsynth.drawing.plots import legend_place, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

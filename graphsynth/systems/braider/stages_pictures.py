@@ -228,7 +228,7 @@ def _turn_pictures(context: Context, braider: Braider, turn: Reactions) -> list[
 
 def _inductance_picture(study: ReductionStudy) -> Picture:
     from graphsynth.drawing.drive_pictures import reduction_picture
-    from graphsynth.drawing.figures import themed_svg
+    from graphsynth.drawing.plots import themed_svg
 
     svg = themed_svg(reduction_picture(study, size=(5.4, 3.4)))
     caption = (

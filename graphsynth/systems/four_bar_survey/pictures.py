@@ -40,13 +40,13 @@ def maps(context: Context, survey: Survey) -> tuple[Picture, ...]:
 
 
 def _figure(width: float, height: float) -> Figure:
-    from graphsynth.drawing.figures import new_figure
+    from graphsynth.drawing.plots import new_figure
 
     return new_figure((width, height))
 
 
 def _svg(figure: Figure) -> str:
-    from graphsynth.drawing.figures import themed_svg
+    from graphsynth.drawing.plots import themed_svg
 
     return themed_svg(figure)
 

@@ -10,8 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, plane_point, three
-from graphsynth.systems.platform.small_crank import Harmonics, SmallCrank, harmonics, small_crank
-from graphsynth.systems.platform.sweep import Sweep, cold_sweep, pose_derivatives, warm_sweep
+from graphsynth.systems.platform.small_crank import (
+    Harmonics,
+    SmallCrank,
+    Sweep,
+    cold_sweep,
+    harmonics,
+    pose_derivatives,
+    small_crank,
+    warm_sweep,
+)
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.motion import Motion

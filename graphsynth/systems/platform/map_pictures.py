@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.figures import new_figure
 from graphsynth.drawing.palette import LIGHT, WHITE
+from graphsynth.drawing.plots import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

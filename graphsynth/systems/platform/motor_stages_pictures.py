@@ -104,8 +104,8 @@ def plots(
 ) -> tuple[Picture, ...]:
     """Torque, speed and phase portraits; the model without inertia; the claim; the limit L -> 0."""
     from graphsynth.drawing.drive_pictures import reduction_picture
-    from graphsynth.drawing.figures import themed_svg
-    from graphsynth.systems.platform.resistance_pictures import ripple_map_picture, ripple_picture
+    from graphsynth.drawing.plots import themed_svg
+    from graphsynth.systems.platform.resistance import ripple_map_picture, ripple_picture
 
     pictures = [*run_pictures(runs), *_bare_pictures(context, bare)]
     map_caption = (

@@ -99,7 +99,7 @@ def total_orientation_workspace(
     """Positions at which every orientation from ``start`` to ``stop`` (radians) is reached by all legs.
 
     The legs reach each orientation; whether one working mode passes from end to end without a singularity is another
-    question (see `graphsynth.systems.platform.aspects`).
+    question (see `graphsynth.systems.platform.maps`).
 
     Raises `GeometryError` if ``stop < start``.
     """

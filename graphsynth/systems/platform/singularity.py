@@ -1,17 +1,20 @@
-"""Singular poses by type, with the motion that is not held, instead of large numbers."""
+"""Singular poses by type, with the motion that is not held; how far a pose is from them and from other modes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import checked, finite_array, positive
+from graphsynth.core.checks import checked, finite_array, positive, triple, whole
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.field import characteristic_length, scaled_rows
+from graphsynth.systems.platform.field import characteristic_length, determinant, scaled_rows, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.singular_loci import CurveEquations
 
 Array = NDArray[np.float64]
 
@@ -136,3 +139,199 @@ def _centre(X: Array, motions: Array) -> complex:
         return complex(math.nan, math.nan)
     dx, dy, turn = (float(value) for value in motions[0])
     return complex(float(X[0]), float(X[1])) + 1j * complex(dx, dy) / turn
+
+
+class NearestSingularity(NamedTuple):
+    """Nearest singular pose found: ``kind`` "I" or "II", leg (0 for type II), pose, distance (length)."""
+
+    kind: str
+    leg: int
+    pose: tuple[float, float, float]
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class SingularityDistance:
+    """Distances in the norm ``sqrt(dx^2 + dy^2 + Lc^2 dalpha^2)`` (theory/platform-workspace 3).
+
+    * `determinant`: ``det JX`` with its sign, length^4.
+    * `smallest`: smallest singular value of ``JX diag(1, 1, 1/Lc)``, length.
+    * `sines`: ``S_k / (2 l1_k l2_k)``.
+    * `other_mode`: distance to the nearest other assembly mode for the same rocker angles; infinite if there is none.
+    * `type_one`: nearest pose at which a leg is stretched or folded: a minimum over one angle per circle, found on a
+      grid and refined (estimated, error about 1e-9 Lc).
+    * `type_two`: nearest pose with ``det JX = 0`` in the same working mode inside the ball of radius
+      ``type_one.distance``, by constrained minimisation from the sign changes on rays (estimated); None if none was
+      found there.
+    """
+
+    determinant: float
+    smallest: float
+    sines: tuple[float, float, float]
+    other_mode: float
+    other_pose: tuple[float, float, float] | None
+    type_one: NearestSingularity
+    type_two: NearestSingularity | None
+    Lc: float
+
+    @property
+    def nearest(self) -> NearestSingularity:
+        """The nearer of the two."""
+        if self.type_two is not None and self.type_two.distance < self.type_one.distance:
+            return self.type_two
+        return self.type_one
+
+
+@checked
+def singularity_distance(
+    platform: ParallelPlatform, pose: ArrayLike, sigma: Sequence[int], *, Lc: float | None = None, rays: int = 400
+) -> SingularityDistance:
+    """Measure the distance of a pose from the singularities of its working mode.
+
+    `pose`: shape (3,). `sigma` (of {+1, -1}): working mode. `Lc`: characteristic length; the largest distance of a
+    vertex from the reference point by default. `rays`: directions searched for type II. Raises `GeometryError`: a pose
+    out of reach, or a leg with a link of length zero. The nearest pose beyond the reach of *some* leg is also the
+    nearest end of the workspace, so type I needs one leg at a time.  Compare [Kapilavai & Nawratil 2023] for 3-RPR
+    platforms.
+
+    >>> found = singularity_distance(ParallelPlatform.mock(), [0.0, 0.0, 0.0], (-1, -1, -1))
+    >>> found.nearest.kind, found.nearest.distance > 15.0
+    ('I', True)
+    """
+    mode, rays = working_mode(sigma), whole("rays", rays, 1)
+    length = characteristic_length(platform) if Lc is None else positive("Lc", Lc)
+    X = triple("pose", pose)
+    theta = platform.inverse(X, mode).theta
+    for leg in range(3):
+        if min(platform.l1[leg], platform.l2[leg]) == 0.0:
+            raise GeometryError(f"leg {leg + 1} has a link of length zero, so every pose is singular; give l1, l2 > 0")
+        if not math.isfinite(theta[leg]):
+            raise GeometryError(f"leg {leg + 1} does not reach the pose {X.tolist()}; choose a pose in the workspace")
+    JX, JT = platform.jacobians(X, theta)
+    sines = np.abs(JT) / (2.0 * np.array(platform.l1) * np.array(platform.l2))
+    gap, other = _other_mode(platform, X, theta, length)
+    first = _type_one(platform, X, length)
+    return SingularityDistance(
+        float(determinant(JX)),
+        float(np.linalg.svd(scaled_rows(JX, length), compute_uv=False)[-1]),
+        (float(sines[0]), float(sines[1]), float(sines[2])),
+        gap,
+        other,
+        first,
+        _type_two(platform, X, mode, length, first.distance, rays),
+        length,
+    )
+
+
+def _other_mode(
+    platform: ParallelPlatform, X: Array, theta: Array, Lc: float
+) -> tuple[float, tuple[float, float, float] | None]:
+    modes = platform.direct(theta).poses
+    distance = _norm(modes - X, Lc)
+    order = np.argsort(distance)
+    if len(order) < 2:
+        return math.inf, None
+    x, y, alpha = (float(value) for value in modes[order[1]])
+    return float(distance[order[1]]), (x, y, alpha)
+
+
+def _norm(d: Array, Lc: float) -> Array:
+    turn = np.mod(d[..., 2] + math.pi, math.tau) - math.pi
+    return np.asarray(np.sqrt(d[..., 0] ** 2 + d[..., 1] ** 2 + (Lc * turn) ** 2))
+
+
+def _type_one(platform: ParallelPlatform, X: Array, Lc: float) -> NearestSingularity:
+    """At each orientation the nearest point of a circle is known; minimise over the orientation."""
+    from scipy.optimize import minimize_scalar
+
+    p = complex(X[0], X[1])
+    best: NearestSingularity | None = None
+    turn = np.linspace(-math.pi, math.pi, 721)
+    for k in range(3):
+        l1, l2 = platform.l1[k], platform.l2[k]
+        for radius in {l1 + l2, abs(l1 - l2)}:
+
+            def square(a: Any, k: int = k, radius: float = radius) -> Any:
+                centre = platform.D[k] - np.exp(1j * (X[2] + a)) * platform.b[k]
+                return (np.abs(p - centre) - radius) ** 2 + (Lc * a) ** 2
+
+            i = int(np.argmin(square(turn)))
+            low, high = turn[max(i - 1, 0)], turn[min(i + 1, 720)]
+            a = float(minimize_scalar(square, bounds=(low, high), method="bounded", options={"xatol": 1e-13}).x)
+            distance = math.sqrt(float(square(a)))
+            if best is None or distance < best.distance:
+                centre = platform.D[k] - complex(np.exp(1j * (X[2] + a))) * platform.b[k]
+                away = p - centre
+                q = centre + radius * (away / abs(away) if away else 1.0)
+                best = NearestSingularity("I", k + 1, (q.real, q.imag, float(X[2] + a)), distance)
+    assert best is not None  # three legs were looked at
+    return best
+
+
+def _type_two(
+    platform: ParallelPlatform, X: Array, mode: tuple[int, int, int], Lc: float, radius: float, rays: int
+) -> NearestSingularity | None:
+    """Sign changes of ``det JX`` along rays inside the ball give starts for a constrained minimisation."""
+    if radius <= 0.0:
+        return None
+    shares = (np.arange(1, 33) - 0.5) / 32.0
+    unit = _directions(rays) * np.array([1.0, 1.0, 1.0 / Lc])
+    poses = X + radius * shares[None, :, None] * unit[:, None, :]
+    here = float(determinant(platform.jacobians(X, platform.inverse(X, mode).theta)[0]))
+    values = determinant(platform.jacobians(poses, platform.inverse(poses, mode).theta)[0])
+    changed = values * here <= 0.0
+    rows = np.flatnonzero(changed.any(axis=1))
+    first = np.argmax(changed[rows], axis=1)
+    starts = poses[rows, first][np.argsort(first, kind="stable")][:24:3]
+    best: NearestSingularity | None = None
+    for start in starts:
+        found = _minimise(platform, X, mode, Lc, start)
+        if found is not None and found.distance <= radius and (best is None or found.distance < best.distance):
+            best = found
+    return best
+
+
+def _directions(count: int) -> Array:
+    """Return unit vectors spread over the sphere (golden spiral)."""
+    k = np.arange(count) + 0.5
+    height = 1.0 - 2.0 * k / count
+    turn = math.pi * (1.0 + math.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - height**2)
+    return np.column_stack([ring * np.cos(turn), ring * np.sin(turn), height])
+
+
+def _minimise(
+    platform: ParallelPlatform, X: Array, mode: tuple[int, int, int], Lc: float, start: Array
+) -> NearestSingularity | None:
+    """Smallest distance from X subject to closure and ``det JX = 0``, in (x, y, alpha, theta): smooth at type I too."""
+    from scipy.optimize import minimize
+
+    theta = platform.inverse(start, mode).theta
+    scale = np.array([Lc, Lc, 1.0])
+    size = np.array(mode, dtype=np.float64)
+
+    def split(v: Array) -> tuple[CurveEquations, Array]:
+        return CurveEquations(platform, float(v[2] + X[2]), Lc), np.concatenate([v[:2] + X[:2] / Lc, v[3:]])
+
+    def equations(v: Array) -> Array:
+        curve, state = split(v)
+        return curve.evaluate(state)[0]
+
+    def margins(v: Array) -> Array:
+        curve, state = split(v)
+        return np.asarray(size * curve.reach(state))
+
+    first = np.concatenate([(start - X) / scale, theta])
+    found = minimize(
+        lambda v: 0.5 * float(v[:3] @ v[:3]),
+        first,
+        jac=lambda v: np.concatenate([v[:3], np.zeros(3)]),
+        method="SLSQP",
+        constraints=[{"type": "eq", "fun": equations}, {"type": "ineq", "fun": margins}],
+        options={"ftol": 1e-14, "maxiter": 200},
+    )
+    v = np.asarray(found.x, dtype=np.float64)
+    if np.abs(equations(v)).max() > 1e-7 or margins(v).min() < -1e-7:
+        return None
+    x, y, alpha = (float(value) for value in X + v[:3] * scale)
+    return NearestSingularity("II", 0, (x, y, alpha), Lc * float(np.linalg.norm(v[:3])))

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.drawing.figures import legend_place, new_figure, themed_svg
 from graphsynth.drawing.palette import LIGHT
+from graphsynth.drawing.plots import legend_place, new_figure, themed_svg
 from graphsynth.pipeline.display import chart
 from graphsynth.pipeline.products import Picture
 

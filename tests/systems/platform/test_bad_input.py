@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.aspects import aspects
 from graphsynth.systems.platform.attainable import ellipticity
 from graphsynth.systems.platform.conic import singular_conic
-from graphsynth.systems.platform.distance import singularity_distance
 from graphsynth.systems.platform.inverse_design import linear_design, rotation_about, translation_along
-from graphsynth.systems.platform.maps import platform_map, quality
+from graphsynth.systems.platform.maps import aspects, platform_map, quality
 from graphsynth.systems.platform.orientations import orientations, reachable_workspace
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 from graphsynth.systems.platform.singular_loci import singular_loci
+from graphsynth.systems.platform.singularity import singularity_distance
 from graphsynth.systems.platform.workspace import constant_orientation_workspace
 
 G1, POSE, UP = ParallelPlatform.g1(), [1.2, 0.9, 0.15], (1, 1, 1)

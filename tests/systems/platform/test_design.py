@@ -13,12 +13,17 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.attainable import attainable, ellipticity, lengths_only_design
-from graphsynth.systems.platform.extreme_poses import two_pose_design
+from graphsynth.systems.platform.attainable import attainable, ellipticity, lengths_only_design, two_pose_design
 from graphsynth.systems.platform.inverse_design import linear_design, refine_design, rotation_about, translation_along
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
-from graphsynth.systems.platform.small_crank import crank_scaling, harmonics, small_crank
-from graphsynth.systems.platform.sweep import cold_sweep, pose_derivatives, warm_sweep
+from graphsynth.systems.platform.small_crank import (
+    cold_sweep,
+    crank_scaling,
+    harmonics,
+    pose_derivatives,
+    small_crank,
+    warm_sweep,
+)
 
 MOCK = SingleMotorPlatform()
 BETA = MOCK.frame_angle

@@ -9,12 +9,11 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.distance import singularity_distance
 from graphsynth.systems.platform.maps import platform_map, quality
 from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 from graphsynth.systems.platform.singular_loci import type_two_curves
-from graphsynth.systems.platform.singularity import singularity
+from graphsynth.systems.platform.singularity import singularity, singularity_distance
 from graphsynth.systems.platform.statics import crank_statics, statics
 from graphsynth.systems.platform.workspace import constant_orientation_workspace
 
