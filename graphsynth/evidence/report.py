@@ -290,7 +290,7 @@ def write_report(report: AccuracyReport, folder: Path) -> tuple[Path, ...]:
     -------
     tuple of Path
     """
-    from graphsynth.drawing.figures import themed_svg
+    from graphsynth.drawing.plots import themed_svg
     from graphsynth.evidence.pictures import work_precision_picture
 
     folder.mkdir(parents=True, exist_ok=True)
