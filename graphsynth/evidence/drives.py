@@ -132,7 +132,7 @@ def _reference(drive: _Drive) -> _Truth:
     from scipy.integrate import solve_ivp
 
     own, out = drive.run(1e-13), drive.times
-    states = np.column_stack([own.angle, own.speed, own.currents])
+    states = _states(own)
     constants = float(out[-1] - out[0]) / getattr(drive.motor, "electrical_time", math.inf)
     if constants < _STIFF:
         rhs, start = drive.equations()
@@ -149,12 +149,16 @@ def _reference(drive: _Drive) -> _Truth:
 
 
 def _own_row(drive: _Drive, rtol: float, truth: _Truth, effort: Effort) -> Row:
-    found, seconds, rounds = best_of(lambda: drive.run(rtol), effort)
-    error = truth.error(np.column_stack([found.angle, found.speed, found.currents])) if found.complete else math.nan
-    row = Row(_OWN, f"rtol {rtol:.0e}", error, seconds, rounds, _KIND, truth.name, value=rtol)
+    found, *timed = best_of(lambda: drive.run(rtol), effort)
+    error = truth.error(_states(found)) if found.complete else math.nan
     status = RowStatus.UNRELIABLE if found.complete else RowStatus.FAILED
-    more = {_WORK: float(found.steps + found.rejected)}
-    return replace(row, status=status if found.reason else RowStatus.OK, reason=found.reason, more=more)
+    more = {"value": rtol, "kind": _KIND, "reference": truth.name, "more": {_WORK: float(found.steps + found.rejected)}}
+    return Row.of(_OWN, f"rtol {rtol:.0e}", error, timed, found.reason, status=status, **more)
+
+
+def _states(found: Any) -> Array:
+    """Angle, speed and currents of a run, a column each."""
+    return np.column_stack([found.angle, found.speed, found.currents])
 
 
 class _TooManyCallsError(Exception):
@@ -185,39 +189,12 @@ def _scipy_row(name: str, drive: _Drive, rtol: float, truth: _Truth, effort: Eff
                 calls = most_calls
                 return None
 
-    found, seconds, rounds = best_of(solve, effort, warm=False)
+    found, *timed = best_of(solve, effort, warm=False)
     why = f"more than {most_calls} calls" if found is None else "" if found.success else str(found.message)
-    same = " (the same method)" if name in truth.name else ""
-    return Row(
-        f"scipy {name}",
-        f"rtol {rtol:.0e}",
-        math.nan if why else truth.error(found.y.T),
-        seconds,
-        rounds,
-        _KIND,
-        truth.name + same,
-        RowStatus.FAILED if why else RowStatus.OK,
-        why,
-        more={_WORK: float(calls)},
-        value=rtol,
-    )
-
-
-def rows_as_text(found: Problem) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...], str]:
-    """Columns, rows and note of `work_precision`, ready to print."""
-    columns = ("method", "tolerance", "error", "time [ms]", _WORK, "status")
-    rows = tuple(
-        (
-            row.method,
-            f"{row.value:.0e}",
-            "" if math.isnan(row.error) else f"{row.error:.1e}",
-            f"{1e3 * row.seconds:.2f}",
-            f"{row.more[_WORK]:.0f}",
-            row.reason or "done",
-        )
-        for row in found.rows
-    )
-    return columns, rows, found.note
+    against = truth.name + (" (the same method)" if name in truth.name else "")
+    more = {"value": rtol, "kind": _KIND, "reference": against, "more": {_WORK: float(calls)}}
+    error = math.nan if why else truth.error(found.y.T)
+    return Row.of(f"scipy {name}", f"rtol {rtol:.0e}", error, timed, why, **more)
 
 
 def drive_problem(
@@ -225,20 +202,8 @@ def drive_problem(
 ) -> Problem:
     """Run a drive up from rest with every integrator and several tolerances.
 
-    Parameters
-    ----------
-    plant, motor, train
-        As for `work_precision`; without events on the way.
-    end : float
-        Final time, s.
-    effort : Effort, optional
-    shape : Shape, optional
-        Inertia and load as `graphsynth.evidence.precise_drive` takes them; by default those of the plant's series.
-
-    Raises
-    ------
-    SpecError
-        A motor with events (ideal speed, voltage limit) or a train that loses power.
+    `plant`, `motor` and `train` as for `work_precision`; `end` in seconds; `shape`: inertia and load as
+    `graphsynth.evidence.precise_drive` takes them, by default those of the plant's series.
 
     Examples
     --------
@@ -301,7 +266,7 @@ def _against(row: Row, truth: _Truth, drive: _Drive) -> Row:
     if row.method != _OWN or not row.good:
         return row
     found = drive.run(row.value)
-    error = truth.error(np.column_stack([found.angle, found.speed, found.currents]))
+    error = truth.error(_states(found))
     return replace(row, error=error, reference=truth.name, more={**row.more, "distance from scipy DOP853": row.error})
 
 
@@ -310,8 +275,8 @@ def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], ef
 
     Parameters
     ----------
-    machine : MotorDrivenPlatform or Braider
-        Has ``inductance_study``.
+    machine : object
+        Has ``inductance_study``, a motor, and ``simulate``: a motor-driven platform, a braider.
     times : array_like
         Output times, s.
     inductances : sequence of float
@@ -323,39 +288,32 @@ def reduction_problem(machine: Any, times: Any, inductances: Sequence[float], ef
     found = machine.inductance_study(times, chosen)
     least = replace(machine, motor=replace(machine.motor, inductance=float(found.inductance.min())))
     limit, _, rounds = best_of(lambda: least.simulate(times, reduce=True), effort)
-    rows = []
-    for k, L in enumerate(found.inductance.tolist()):
-        wrong = float(found.speed[k])
-        rows.append(
-            Row(
-                "model without inductance",
-                f"L = {L:g} H",
-                wrong,
-                limit.seconds,
-                rounds,
-                "largest error of the speed behind the electrical transient",
-                "run with the inductance",
-                more={"steps": float(limit.steps), _L: L},
-                value=L,
-            )
+    study = {
+        "kind": "largest error of the speed behind the electrical transient",
+        "reference": "run with the inductance",
+    }
+    kept = {"kind": "estimated error of the speed", "reference": "the same integrator at a tighter tolerance"}
+    rows = [
+        Row.of(
+            "model without inductance",
+            f"L = {L:g} H",
+            wrong,
+            (limit.seconds, rounds),
+            value=L,
+            **study,
+            more={"steps": float(limit.steps), _L: L},
         )
+        for L, wrong in zip(found.inductance.tolist(), found.speed.tolist())
+    ]
     for L in found.inductance.tolist():
         full = replace(machine, motor=replace(machine.motor, inductance=L))
-        kept, _, rounds = best_of(partial(full.simulate, times, reduce=False), effort)
+        run, _, rounds = best_of(partial(full.simulate, times, reduce=False), effort)
+        error = float(run.error[1]) if run.complete else math.nan
+        more = {"steps": float(run.steps), _L: L}
+        why = "" if run.complete else run.reason
+        setting = f"L = {L:g} H"
         rows.append(
-            Row(
-                "model with inductance",
-                f"L = {L:g} H",
-                float(kept.error[1]) if kept.complete else math.nan,
-                kept.seconds,
-                rounds,
-                "estimated error of the speed",
-                "the same integrator at a tighter tolerance",
-                RowStatus.OK if kept.complete else RowStatus.FAILED,
-                kept.reason,
-                more={"steps": float(kept.steps), _L: L},
-                value=L,
-            )
+            Row.of("model with inductance", setting, error, (run.seconds, rounds), why, value=L, more=more, **kept)
         )
     question = "The motor without its inductance: error of the speed after the electrical transient"
     note = (

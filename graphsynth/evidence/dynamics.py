@@ -152,24 +152,11 @@ def dynamics_problem(
     *,
     truth: Truth | None = None,
 ) -> Problem:
-    """Integrate a mechanism in every form with several integrators and tolerances.
+    """Integrate a mechanism in every form with several integrators and tolerances, up to `end` seconds.
 
-    Parameters
-    ----------
-    model : DynamicModel
-    start : StartReport
-    end : float
-        Final time, s.
-    name : str
-    effort : Effort, optional
-    truth : Truth, optional
-        By default the reference is another formulation of the same model, by the same integrator at 2.3e-14.
-
-    Returns
-    -------
-    Problem
-        Error: largest of all coordinates at eight times, lengths over the characteristic length; further columns:
-        drift of positions and velocities, error of the energy.
+    Error: largest of all coordinates at eight times, lengths over the characteristic length; further columns: drift of
+    positions and velocities, error of the energy.  Without a `truth` of its own the reference is another formulation of
+    the same model, by the same integrator at 2.3e-14.
     """
     effort = effort or Effort()
     times = np.linspace(0.0, end, 8)

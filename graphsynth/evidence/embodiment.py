@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus
+from graphsynth.evidence.rows import Effort, Problem, Row
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.dimensional.goals import Goals
@@ -66,22 +66,11 @@ def _rows(
             errors.append(error(found) if found.accepted else math.inf)
             lost = lost if found.accepted else found.statement
         middle = median(errors)
-        missed = not math.isfinite(middle)
-        rows.append(
-            Row(
-                "search",
-                f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}",
-                math.nan if missed else middle,
-                median(times),
-                seeds,
-                kind,
-                reference,
-                RowStatus.FAILED if missed else RowStatus.OK,
-                lost if missed else "",
-                default=(effort, tries) == default,
-                more={"seeds accepted": float(sum(map(math.isfinite, errors)))},
-            )
-        )
+        more = {"kind": kind, "reference": reference, "default": (effort, tries) == default}
+        more["more"] = {"seeds accepted": float(sum(map(math.isfinite, errors)))}
+        setting = f"effort {effort:g}, {tries} tr{'y' if tries == 1 else 'ies'}"
+        wrong, why = (middle, "") if math.isfinite(middle) else (math.nan, lost)
+        rows.append(Row.of("search", setting, wrong, (median(times), seeds), why, **more))
     return tuple(rows)
 
 
@@ -129,13 +118,8 @@ def path_problem(effort: Effort | None = None) -> Problem:
     own = signature(embody).parameters
     efforts, seeds = ((0.02, 0.05, 0.1), 1) if effort.quick else ((0.02, 0.1, 0.3, own["effort"].default), 3)
     settings = tuple((share, own["tries"].default) for share in efforts)  # a target that is met ends the tries
-    rows = _rows(
-        goals,
-        settings,
-        seeds,
-        lambda found: found.figures.goal_error,
-        f"largest distance from a point over the size of the set, median of {seeds} seeds",
-        "exact: the points are those of a linkage",
-    )
+    kind = f"largest distance from a point over the size of the set, median of {seeds} seeds"
+    reference = "exact: the points are those of a linkage"
+    rows = _rows(goals, settings, seeds, lambda found: found.figures.goal_error, kind, reference)
     question = "Dimensions of a four-bar linkage that passes eight points of another one at given inputs"
     return Problem("path-dimensions", question, "relative", rows, "search", _NOTE)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from graphsynth.evidence.choice import seconds_text
-from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
+from graphsynth.evidence.rows import Effort, Problem, Row, best_of
 
 #: Planar kinematic chains of mobility 1 by links: The On-Line Encyclopedia of Integer Sequences, A233288.
 PUBLISHED: Mapping[int, int] = {4: 1, 6: 2, 8: 16, 10: 230, 12: 6856, 14: 318_162, 16: 19_819_281, 18: 1_535_380_884}
@@ -77,13 +77,13 @@ def enumeration_problem(effort: Effort | None = None) -> Problem:
     from graphsynth.synthesis import count_chains, enumerate_chains
 
     effort = effort or Effort()
+    counted, listed = (
+        (6, 8, 10, 12) if effort.quick else (8, 10, 12, 14, 16),
+        (6, 8, 10) if effort.quick else (8, 10, 12, 14),
+    )
     runs: list[tuple[str, Callable[[int], int], tuple[int, ...]]] = [
-        ("count", count_chains, (6, 8, 10, 12) if effort.quick else (8, 10, 12, 14, 16)),
-        (
-            "list as graphs",
-            lambda n: sum(1 for _ in enumerate_chains(n)),
-            (6, 8, 10) if effort.quick else (8, 10, 12, 14),
-        ),
+        ("count", count_chains, counted),
+        ("list as graphs", lambda n: sum(1 for _ in enumerate_chains(n)), listed),
     ]
     rows: list[Row] = []
     laws = {}
@@ -91,35 +91,18 @@ def enumeration_problem(effort: Effort | None = None) -> Problem:
         own = [_row(method, run, n, effort) for n in links]
         rows += own
         laws[method] = _law(method, own)
-    return Problem(
-        "enumeration",
-        "Kinematic chains of mobility 1: time against their number",
-        "graphs",
-        tuple(rows),
-        "enumeration",
-        _NOTE,
-        _GRAPHS,
-        sentences=laws,
-    )
+    question = "Kinematic chains of mobility 1: time against their number"
+    found = Problem("enumeration", question, "graphs", tuple(rows), "enumeration", _NOTE, _GRAPHS)
+    return replace(found, sentences=laws)
 
 
 def _row(method: str, run: Callable[[int], int], links: int, effort: Effort) -> Row:
-    found, seconds, rounds = best_of(lambda: run(links), effort, warm=links < 14)  # the small ones have compiled it all
+    found, *timed = best_of(lambda: run(links), effort, warm=links < 14)  # the small ones have compiled it all
     wrong = float(abs(found - PUBLISHED[links]))
-    status, why = (RowStatus.OK, "") if not wrong else (RowStatus.FAILED, f"{found} instead of {PUBLISHED[links]}")
-    more: dict[str, Any] = {_GRAPHS: float(found), "graphs per second": found / seconds}
-    return Row(
-        method,
-        f"{links} links",
-        wrong,
-        seconds,
-        rounds,
-        "difference from the published number",
-        "OEIS A233288",
-        status,
-        why,
-        more=more,
-    )
+    why = f"{found} instead of {PUBLISHED[links]}" if wrong else ""
+    more: dict[str, Any] = {"kind": "difference from the published number", "reference": "OEIS A233288"}
+    more["more"] = {_GRAPHS: float(found), "graphs per second": found / timed[0]}
+    return Row.of(method, f"{links} links", wrong, timed, why, **more)
 
 
 def _law(method: str, rows: Sequence[Row]) -> str:

@@ -90,15 +90,8 @@ def _law(axes: Any, rows: tuple[Row, ...], count: str, colour: str) -> None:
     largest = max(row.more[count] for row in good)
     ends = [min(row.more[count] for row in good if row.more[count] >= 100.0), 100.0 * largest]
     axes.plot(ends, [law.seconds(n) for n in ends], "--", color=colour, lw=0.9, alpha=0.7)
-    axes.annotate(
-        f"time ~ {count}^{law.exponent:.2f}",
-        (ends[1], law.seconds(ends[1])),
-        textcoords="offset points",
-        xytext=(-4, 4),
-        ha="right",
-        fontsize=7,
-        color=colour,
-    )
+    text, at = f"time ~ {count}^{law.exponent:.2f}", (ends[1], law.seconds(ends[1]))
+    axes.annotate(text, at, (-4, 4), textcoords="offset points", ha="right", fontsize=7, color=colour)
 
 
 def _top(problem: Problem) -> float:
@@ -118,32 +111,20 @@ def _place(problem: Problem, row: Row, top: float) -> tuple[float, float]:
 
 
 def _method(
-    axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, style: dict[str, str], names: list[Any]
+    axes: Any, problem: Problem, rows: tuple[Row, ...], top: float, style: dict[str, Any], names: list[Any]
 ) -> None:
     good = [row for row in rows if row.good]
     places = [_place(problem, row, top) for row in good]
     colour = style["color"]
+    style = {**style, "ms": 6, "lw": 1.3}
     if places:
         filled = all(row.proved for row in good)
-        axes.plot(
-            *zip(*places),
-            **style,
-            ms=6,
-            lw=1.3,
-            mfc=colour if filled else "white",
-            mew=1.4,
-            label=rows[0].method + (" (proved)" if filled else ""),
-        )
-        axes.plot(
-            *(zip(*[p for p, row in zip(places, good) if row.default]) if any(r.default for r in good) else ((), ())),
-            "o",
-            ms=12,
-            mfc="none",
-            mec=colour,
-            mew=1.0,
-        )
+        label = rows[0].method + (" (proved)" if filled else "")
+        axes.plot(*zip(*places), **style, mfc=colour if filled else "white", mew=1.4, label=label)
+        default = [place for place, row in zip(places, good) if row.default]
+        axes.plot(*(zip(*default) if default else ((), ())), "o", ms=12, mfc="none", mec=colour, mew=1.0)
     else:
-        axes.plot([], [], **style, ms=6, lw=1.3, mfc="white", label=rows[0].method)
+        axes.plot([], [], **style, mfc="white", label=rows[0].method)
     times = [row.seconds for row in problem.rows if math.isfinite(row.seconds)]
     for row in rows:
         if row.status is not RowStatus.OK:
@@ -160,30 +141,14 @@ def _name_ends(
         if not good[k].setting:
             continue
         below = k > 0 or len(rows) == 1
-        text = axes.annotate(
-            good[k].setting,
-            places[k],
-            textcoords="offset points",
-            xytext=(5, -10 if below else 6),
-            fontsize=7,
-            color=colour,
-            ha="left",
-        )
-        taken.append(text)
+        spot = {"textcoords": "offset points", "fontsize": 7, "color": colour, "ha": "left"}
+        taken.append(axes.annotate(good[k].setting, places[k], (5, -10 if below else 6), **spot))
 
 
 #: Where the name of a setting may stand beside its marker, in points: offset and alignment, the best first.
-_SPOTS = (
-    ((6, 6), "left"),
-    ((6, -11), "left"),
-    ((-6, 6), "right"),
-    ((-6, -11), "right"),
-    ((6, 15), "left"),
-    ((6, -20), "left"),
-    ((-6, 15), "right"),
-    ((-6, -20), "right"),
-    ((6, 24), "left"),
-    ((6, -29), "left"),
+_SPOTS = tuple(
+    ((x, y), "left" if x > 0 else "right")
+    for x, y in ((6, 6), (6, -11), (-6, 6), (-6, -11), (6, 15), (6, -20), (-6, 15), (-6, -20), (6, 24), (6, -29))
 )
 
 

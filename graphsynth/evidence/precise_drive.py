@@ -61,7 +61,10 @@ def precise_drive(
     angle: float = 0.0,
     speed: float = 0.0,
 ) -> Vector:
-    """Angle, speed and currents at times.
+    """Angle, speed and currents at times: a row for each, shape (n, 2 + currents).
+
+    Estimated: the two finest extrapolations of each step agree to 300 roundings.  A `SpecError` refuses another
+    motor, and more than 20 000 steps: too stiff for an explicit method.
 
     Parameters
     ----------
@@ -77,17 +80,6 @@ def precise_drive(
         Increasing, the first is the start, s.
     angle, speed : float
         Of the crank at the start; currents begin at zero.
-
-    Returns
-    -------
-    ndarray of long double, shape (n, 2 + currents)
-        A row ``angle, speed, currents`` for each time.  Estimated: the two finest extrapolations of each step agree to
-        300 roundings.
-
-    Raises
-    ------
-    SpecError
-        Another motor, or more than 20 000 steps: too stiff for an explicit method.
 
     Examples
     --------

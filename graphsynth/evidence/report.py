@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GraphsynthError, SceneError
 from graphsynth.evidence.choice import Knee, advice, knees, seconds_text
-from graphsynth.evidence.rows import Effort, Plan, Problem, table
+from graphsynth.evidence.rows import Effort, Plan, Problem, frame_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,13 +65,13 @@ class AccuracyReport:
 
     def to_pandas(self) -> pd.DataFrame:
         """Return all rows as one table."""
-        return table(self.problems)
+        return frame_of(self.problems)
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain data for JSON; numbers that do not exist are null."""
         problems = []
         for problem in self.problems:
-            rows = table([problem]).to_dict("records")
+            rows = problem.to_pandas().to_dict("records")
             problems.append(
                 {
                     "name": problem.name,

@@ -163,8 +163,16 @@ class Problem:
         return math.log(good[0].error / good[-1].error) / math.log(good[0].value / good[-1].value)
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return the rows as a table."""
-        return table([self])
+        """Return the rows as a table: errors in the unit of the column ``unit``, times in seconds.
+
+        Examples
+        --------
+        >>> row = Row("sweep", "0.1 rad", 0.1, 0.002, 3, "proved width", "", more={"pieces": 12.0})
+        >>> frame = Problem("arcs", "where it jams", "rad", (row,)).to_pandas()
+        >>> frame[["problem", "method", "error", "unit", "pieces"]].values.tolist()
+        [['arcs', 'sweep', 0.1, 'rad', 12.0]]
+        """
+        return frame_of([self])
 
 
 @dataclass(frozen=True)
@@ -231,24 +239,10 @@ def best_of(run: Callable[[], T], effort: Effort, *, warm: bool = True) -> tuple
             return result, min(times), len(times)
 
 
-def table(problems: Iterable[Problem]) -> pd.DataFrame:
+def frame_of(problems: Iterable[Problem]) -> pd.DataFrame:
     """Return all rows as one table; what only some problems have (events, drift, ...) is NaN elsewhere.
 
-    Parameters
-    ----------
-    problems : iterable of Problem
-
-    Returns
-    -------
-    pandas.DataFrame
-        Errors in the unit of the column ``unit``, times in seconds.
-
-    Examples
-    --------
-    >>> row = Row("sweep", "0.1 rad", 0.1, 0.002, 3, "proved width", "", more={"pieces": 12.0})
-    >>> frame = table([Problem("arcs", "where it jams", "rad", (row,))])
-    >>> frame[["problem", "method", "error", "unit", "pieces"]].values.tolist()
-    [['arcs', 'sweep', 0.1, 'rad', 12.0]]
+    Errors are in the unit of the column ``unit``, times in seconds.
     """
     import pandas as pd
 

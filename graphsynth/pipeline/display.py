@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from graphsynth.drawing.plots import Line
     from graphsynth.dynamics.driven.reduction import ReductionStudy
     from graphsynth.dynamics.driven.run import DriveRun
+    from graphsynth.evidence.rows import Problem
     from graphsynth.kinematics.engine.result import Motion
 
 _COLUMN = re.compile(r"(.*?)(?: \| (?:(\d+) )?(\S+))?")
@@ -155,6 +156,16 @@ def balance_rows(run: DriveRun) -> tuple[tuple[str, str], ...]:
         ("time of the run", f"{run.seconds * 1e3:.1f} ms, measured once"),
         *(("note", note) for note in run.notes),
     )
+
+
+def work_table(found: Problem) -> Table:
+    """Error against run time where the settings are tolerances."""
+    columns = ("method", "tolerance | .0e", "error | .1e", "time [ms] | .2f", "steps or calls | .0f", "status")
+    rows = []
+    for row in found.rows:
+        error = None if math.isnan(row.error) else row.error
+        rows.append((row.method, row.value, error, row.seconds, row.more["steps or calls"], row.reason or "done"))
+    return table("Error against run time", columns, rows, found.note)
 
 
 def limit_table(study: ReductionStudy) -> Table:

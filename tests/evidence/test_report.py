@@ -14,8 +14,8 @@ import pytest
 
 from graphsynth.cli import main
 from graphsynth.core.errors import GeometryError, SceneError, SpecError
-from graphsynth.evidence import Effort, Problem, Row, RowStatus, measure, table, work_precision_picture, write_report
-from graphsynth.evidence.rows import Plan, best_of
+from graphsynth.evidence import Effort, Problem, Row, RowStatus, measure, work_precision_picture, write_report
+from graphsynth.evidence.rows import Plan, best_of, frame_of
 from graphsynth.pipeline.scene import available_scenes, load_scene
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.system import plans_of, system_names
@@ -137,7 +137,7 @@ def test_table_holds_every_row_and_column(folder):
     assert wanted <= set(read.columns)
     assert read.status.tolist() == ["ok", "ok", "ok", "failed", "failed", "unreliable"]
     assert np.isnan(read.calls[0]) and read.calls[1] == 7.0
-    assert list(table([]).columns)[:2] == ["problem", "method"]
+    assert list(frame_of([]).columns)[:2] == ["problem", "method"]
 
 
 def test_document_is_json_without_nan(folder):

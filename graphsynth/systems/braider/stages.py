@@ -259,7 +259,8 @@ def solvers(context: Context) -> tuple[Table, ...]:
     """Error against run time of the integrator and of scipy's; not part of the shipped outputs."""
     import numpy as np
 
-    from graphsynth.evidence.drives import drive_work_precision, rows_as_text
+    from graphsynth.evidence.drives import drive_work_precision
+    from graphsynth.pipeline.display import work_table
 
     found = drive_work_precision(braider_of(context), np.linspace(0.0, table_of(context).start.end_s, 11))
-    return (Table("Error against run time", *rows_as_text(found)),)
+    return (work_table(found),)

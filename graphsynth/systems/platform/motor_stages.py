@@ -184,7 +184,8 @@ def solvers(context: Context) -> tuple[Table, ...]:
     """Error against run time beside scipy; not part of the shipped outputs."""
     import numpy as np
 
-    from graphsynth.evidence.drives import drive_work_precision, rows_as_text
+    from graphsynth.evidence.drives import drive_work_precision
+    from graphsynth.pipeline.display import work_table
 
     table = table_of(context)
     model = drive_of(context, table.resistances[0])
@@ -192,7 +193,7 @@ def solvers(context: Context) -> tuple[Table, ...]:
         found = drive_work_precision(model, np.linspace(0.0, table.end, 11))
     except SpecError as error:
         raise _refuse(context, error) from error
-    return (Table("Error against run time", *rows_as_text(found)),)
+    return (work_table(found),)
 
 
 def assess(

@@ -9,8 +9,9 @@ import pytest
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.closed_form import linear_response
 from graphsynth.dynamics.motors import DCMotor, IdealSpeed
-from graphsynth.evidence.drives import drive_work_precision, rows_as_text
+from graphsynth.evidence.drives import drive_work_precision
 from graphsynth.evidence.rows import RowStatus
+from graphsynth.pipeline.display import work_table
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
 SOURCE = MotorDrivenPlatform.source
@@ -52,7 +53,7 @@ def test_stiff_motor_and_a_solver_that_gives_up():
     assert all("too stiff" in row.reference for row in study.rows)
     assert [row.reason for row in study.rows] == ["", "", "more than 2000 calls"]
     assert [row.status.value for row in study.rows] == ["ok", "ok", "failed"]
-    assert math.isnan(study.rows[2].error) and rows_as_text(study)[1][2][2] == ""
+    assert math.isnan(study.rows[2].error) and work_table(study).rows[2][2] == ""
 
 
 def test_what_has_events_is_refused():
