@@ -127,15 +127,20 @@ def inverse_dynamics(
     power_error = float(np.fmax.reduce(found.error, initial=0.0) / np.fmax.reduce(found.size, initial=1e-300))
     reactions = reactions_from_multipliers(compiled, q, v, lam, instants)
     efforts, power = _efforts(compiled, reactions, motion, rates)
-    good = np.flatnonzero(np.isfinite(lam).all(axis=1))
-    chosen = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good
+    second = _second_way(compiled, instants, (q, v, a, lam))
     return InverseDynamics(
         motion.inputs, instants, efforts, reactions, power, power_error,
-        newton_euler_difference(
-            compiled, instants[chosen], q[chosen], v[chosen], a[chosen], lam[chosen], np.zeros((len(chosen), 0))
-        ),
+        second,
         _motors(model, motion, efforts, rates),
     )  # fmt: skip
+
+
+def _second_way(compiled: Compiled, times: Array, states: tuple[Array, Array, Array, Array]) -> float:
+    """Difference to body-by-body equilibrium at up to 40 samples: coordinates, rates, accelerations, multipliers."""
+    good = np.flatnonzero(np.isfinite(states[3]).all(axis=1))
+    some = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good
+    q, v, a, lam = (part[some] for part in states)
+    return newton_euler_difference(compiled, times[some], q, v, a, lam, np.zeros((len(some), 0)))
 
 
 def _check(model: DynamicModel, motion: Motion) -> None:

@@ -90,10 +90,10 @@ def jacobians(compiled: Compiled, q: Array, v: Array) -> Array:
 
     T, still = compiled.tables, np.zeros((max(1, len(compiled.laws) + len(compiled.held)), 3))
     found = np.zeros((len(q), len(compiled.info), compiled.n))
+    rolling, slots = bool((T.slots >= 0).any()), np.zeros(1)
     for k in range(len(q)):
-        found[k] = kernels.constraint_system(
-            T, kernels.state_rows(T, q[k], v[k]), initial_slots(compiled, q[k]), still
-        )[1]
+        slots = initial_slots(compiled, q[k]) if rolling else slots
+        found[k] = kernels.constraint_system(T, kernels.state_rows(T, q[k], v[k]), slots, still)[1]
     return found
 
 

@@ -8,8 +8,7 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.piston import FloatingPiston
-from graphsynth.systems.piston.gas import CompressorCycle
-from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
+from graphsynth.systems.piston.loads import CompressorCycle, PistonFriction, PistonMasses
 from graphsynth.systems.piston.machine import PistonMachine
 from graphsynth.systems.piston.pictures import (
     indicator_chart,

@@ -163,9 +163,7 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "linkage of a braider": lambda: (braider.FourBar, {"crank": 0.02, "branch": 1}),
     "inductances": lambda: (BRAIDER.inductance_study, {"inductances": (1e-4,), "times": [0.0, 0.1]}),
     "piston": lambda: (MACHINE.loads, {"angle": [0.1]}),
-    "piston by multipliers": lambda: (import_module("graphsynth.systems.piston.dynamic_model").check_by_multipliers, {
-        "machine": MACHINE, "angle": [0.1, 0.2],
-    }),
+    "inverse dynamics of a piston": lambda: (MACHINE.inverse_dynamics, {"angle": [0.1, 0.2], "slot": "sliding"}),
     "limit force": lambda: (SLIDER.limit_force, {"times": [0.0]}),
     "motion of a drive": lambda: (SLIDER.drive.motion, {"t": [0.0]}),
     "adjacency": lambda: (formats.adjacency_matrix, {"graph": ARM.graph}),

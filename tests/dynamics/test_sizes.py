@@ -18,10 +18,8 @@ from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
 from graphsynth.systems.braider import FourBar
 from graphsynth.systems.braider.model import Braider, Thread
-from graphsynth.systems.piston.drives import CrankSlider, ScotchYoke
-from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce
-from graphsynth.systems.piston.group import FloatingGroup
-from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
+from graphsynth.systems.piston.loads import CompressorCycle, ConstantForce, PistonFriction, PistonMasses
+from graphsynth.systems.piston.model import CrankSlider, FloatingGroup, ScotchYoke
 from graphsynth.systems.tribometer.model import Tribometer
 from graphsynth.systems.tribometer.platforms import BeltDrive, CrankDrive, HarmonicDrive, StribeckLaw, TwoCoefficientLaw
 

@@ -12,7 +12,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.evidence.rows import Effort, Problem, Row, best_of
 
 if TYPE_CHECKING:
-    from graphsynth.systems.piston.gas import CompressorCycle
+    from graphsynth.systems.piston.loads import CompressorCycle
     from graphsynth.systems.piston.machine import PistonMachine
 
 
@@ -44,7 +44,7 @@ def work(context: Any, effort: Effort) -> Problem:
 
 
 def load_problem(machine: PistonMachine, name: str, effort: Effort | None = None) -> Problem:
-    """Compare the loads of a piston machine by closed form with those by multipliers, and the energy balance.
+    """Compare the forces of a piston machine with a crowned slot, and with a sliding one that is redundant.
 
     Parameters
     ----------
@@ -52,32 +52,19 @@ def load_problem(machine: PistonMachine, name: str, effort: Effort | None = None
     name : str
     effort : Effort, optional
     """
-    from graphsynth.systems.piston.dynamic_model import check_by_multipliers
-
     effort = effort or Effort()
     rows = []
-    counts = (6, 12, 24) if effort.quick else (12, 24, 96)
-    for count in counts:
+    kind, methods = "largest difference of a force over the largest force", ("crowned slot", "sliding slot")
+    for count in (6, 12, 24) if effort.quick else (12, 24, 96):
         angles = (np.arange(count) + 0.5) * math.tau / count
-        loads, seconds, rounds = best_of(lambda a=angles: machine.loads(a), effort)  # type: ignore[misc]
-        check, slow, slow_rounds = best_of(lambda a=angles: check_by_multipliers(machine, a), effort)  # type: ignore[misc]
-        kind, unit = "largest difference of a force over the largest force", f"{count} positions"
-        more = {"power error": float(loads.power_error)}
-        rows.append(
-            Row(
-                "closed form",
-                unit,
-                float(check.difference),
-                seconds / count,
-                rounds,
-                kind,
-                "multipliers of all bodies at once",
-                more=more,
-            )
-        )
-        rows.append(Row("multipliers", unit, float(check.difference), slow / count, slow_rounds, kind, "closed form"))
+        ways = [best_of(partial(machine.inverse_dynamics, angles, slot), effort) for slot in ("crowned", "sliding")]
+        forces = [np.array([joint.force for joint in way[0].reactions.joints]) for way in ways]
+        error = float(np.abs(forces[0] - forces[1]).max() / np.abs(forces).max())
+        more = {"power error": float(machine.loads(angles).power_error)}
+        for own, other, way in zip(methods, methods[::-1], ways):
+            rows.append(Row(own, f"{count} positions", error, way[1] / count, way[2], kind, other, more=more))
     rows.sort(key=lambda row: row.method)
-    note = "Each of the two ways is the other's reference: an error of the forces that both share is not seen."
+    note = "Each of the two is the other's reference: an error of the forces that both share is not seen."
     return Problem("loads", f"Side loads of {name} over a turn", "relative", tuple(rows), "position", note)
 
 
@@ -125,7 +112,7 @@ def _work_row(
 
 def _exact_work(machine: PistonMachine) -> tuple[float, str]:
     """Work of the gas over a turn, and where it is from."""
-    from graphsynth.systems.piston.gas import CompressorCycle
+    from graphsynth.systems.piston.loads import CompressorCycle
 
     stroke = machine.mechanism.stroke
     if isinstance(machine.gas, CompressorCycle):
@@ -141,7 +128,7 @@ def precise_work(gas: CompressorCycle, stroke: float) -> Any:
 
     Examples
     --------
-    >>> from graphsynth.systems.piston.gas import CompressorCycle
+    >>> from graphsynth.systems.piston.loads import CompressorCycle
     >>> gas = CompressorCycle(0.1, suction=1e5, discharge=6e5)
     >>> abs(float(precise_work(gas, 0.1)) / gas.work(0.1) - 1.0) < 1e-15
     True

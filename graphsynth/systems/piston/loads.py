@@ -1,14 +1,19 @@
-"""Data of a crank drive with a piston: masses, friction, and the loads found."""
+"""What acts on a crank drive with a piston: masses, friction, and the force of the gas.
+
+Every law of the gas gives the force (N) that pushes the piston away from the cylinder's head.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.core.checks import check_fields, finite, positive
+from graphsynth.core.checks import called, check_fields, finite, finite_array, positive
+from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import not_negative
 
 Array = NDArray[np.float64]
@@ -64,90 +69,168 @@ class PistonFriction:
     smoothing_velocity: float = 1e-3
 
     def __post_init__(self) -> None:
-        for name in ("guide", "cylinder", "slot", "yoke", "rings"):
+        names = ("guide", "cylinder", "slot", "yoke", "rings")
+        for name in names:
             object.__setattr__(self, name, not_negative(f"friction {name}", getattr(self, name)))
         object.__setattr__(self, "smoothing_velocity", positive("smoothing_velocity", self.smoothing_velocity))
-        check_fields(self, ("smoothing_velocity",), small=("guide", "cylinder", "slot", "yoke", "rings"))
+        check_fields(self, ("smoothing_velocity",), small=names)
 
 
-@dataclass(frozen=True, eq=False)
-class PistonLoads:
-    """Reactions and powers over the crank angle (closed form, a few roundings; NaN where friction jams).
+class GasLaw(Protocol):
+    """A law of the gas force: smooth, and of unknown work, unless it says otherwise."""
 
-    Forces are on the body with the higher number, in N, world coordinates; couples on it at its reference point, N m.
+    def force(self, angle: Array, gap: Array, towards_head: NDArray[np.bool_], stroke: float) -> Array:
+        """Force away from the head, N, at a distance ``gap`` (m) of the piston from its outer dead centre."""
 
-    Attributes
-    ----------
-    angle : ndarray, shape (n,)
-    gas : ndarray, shape (n,)
-        Force of the gas away from the head.
-    wall : ndarray, shape (n,)
-        Side load of the cylinder on the piston, along its normal.
-    guide : ndarray, shape (n,)
-        Normal force of the guide on the crosshead; the wall force if there is no second group.
-    slot : ndarray, shape (n,)
-        Normal force of the crosshead's slot on the piston; 0 without a second group.
-    yoke : ndarray, shape (n,)
-        Normal force of the block on the yoke; 0 for a crank-slider.
-    guide_couple, wall_couple : ndarray, shape (n,)
-        With a slot that carries no couple.  One couple may circulate on top of it, see `self_stress`.
-    crank_pin, crosshead_pin, bearing : ndarray, shape (n, 2)
-        Of crank on rod or block, of rod on crosshead (0 for a yoke), of frame on crank.
-    torque : ndarray, shape (n,)
-        Of the motor on the crank, N m.
-    driving, gas_power, friction_power, kinetic_power, weight_power : ndarray, shape (n,)
-        W: of the motor, taken by the gas, lost in friction, into kinetic energy, of the weights.
-    held : ndarray, shape (n,)
-        Where the slot does not slide: the force across the cylinder that its friction can hold, ``mu |slot|``; the wall
-        may carry up to so much more or less than `wall`.  0 where it slides.
+    def kinks(self, stroke: float) -> tuple[tuple[float, bool], ...]:
+        """Gaps at which the force is not smooth, and whether the piston moves towards the head there."""
+        return ()
+
+    def work(self, stroke: float) -> float:
+        """Work that the gas takes from the piston over a turn, J (closed form); NaN if it is not known."""
+        return float("nan")
+
+
+@dataclass(frozen=True)
+class ConstantForce(GasLaw):
+    """A force that does not change, N; over a turn it takes no work.
+
+    >>> ConstantForce(100.0).work(0.1)
+    0.0
     """
 
-    angle: Array
-    gas: Array
-    wall: Array
-    guide: Array
-    slot: Array
-    yoke: Array
-    guide_couple: Array
-    wall_couple: Array
-    crank_pin: Array
-    crosshead_pin: Array
-    bearing: Array
-    torque: Array
-    driving: Array
-    gas_power: Array
-    friction_power: Array
-    kinetic_power: Array
-    weight_power: Array
-    held: Array
+    size: float = 0.0
 
-    #: Couples on crosshead (guide), piston (slot) and piston (wall) that balance each other in every pose.
-    self_stress = (1.0, 1.0, -1.0)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", finite("size of the gas force", self.size))
+        check_fields(self, (), small=("size",))
+
+    def force(self, angle: Array, gap: Array, towards_head: NDArray[np.bool_], stroke: float) -> Array:
+        """See :class:`GasLaw`."""
+        return np.full_like(gap, self.size)
+
+    def work(self, stroke: float) -> float:
+        """See :class:`GasLaw`."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class GivenForce(GasLaw):
+    """A force given as a smooth function ``(crank angle, gap, towards the head) -> N`` of arrays.
+
+    Raises
+    ------
+    GeometryError
+        A law that cannot be called.
+    """
+
+    law: Callable[[Array, Array, NDArray[np.bool_]], Array]
+
+    def __post_init__(self) -> None:
+        if not callable(self.law):
+            raise GeometryError(f"law = {self.law!r} of the gas force is not callable; give a function, or a force")
+
+    def force(self, angle: Array, gap: Array, towards_head: NDArray[np.bool_], stroke: float) -> Array:
+        """See :class:`GasLaw`; `GeometryError` if the function gives no finite force at every angle."""
+        found = finite_array(
+            "the gas force", called("the law of the gas", self.law, angle, gap, towards_head), nan=True
+        )
+        if found.shape not in ((), np.shape(gap)) or not np.isfinite(found).all():
+            raise GeometryError("the gas force must be one finite number for every crank angle; correct the function")
+        return np.broadcast_to(found, np.shape(gap)).copy()
+
+
+@dataclass(frozen=True)
+class CompressorCycle(GasLaw):
+    """Ideal single-acting compressor: valves without losses, polytropic compression and re-expansion.
+
+    Parameters
+    ----------
+    bore : float
+        Diameter of the cylinder, m.
+    suction, discharge : float
+        Absolute pressures, Pa.
+    back : float
+        Absolute pressure behind the piston, Pa; the suction pressure by default.
+    clearance : float
+        Gap that is left at the outer dead centre, over the stroke.
+    exponent : float
+        Of compression and re-expansion.
+
+    Raises
+    ------
+    GeometryError
+        Values that are not positive; a discharge pressure below the suction pressure.
+
+    Examples
+    --------
+    At the outer dead centre the discharge pressure acts, at the inner one suction and back pressure cancel.
+
+    >>> cycle = CompressorCycle(0.1, suction=1e5, discharge=6e5)
+    >>> cycle.force(np.zeros(2), np.array([0.0, 0.1]), np.array([True, True]), 0.1).round(3).tolist()
+    [3926.991, 0.0]
+    """
+
+    bore: float
+    suction: float
+    discharge: float
+    back: float | None = None
+    clearance: float = 0.05
+    exponent: float = 1.3
+
+    def __post_init__(self) -> None:
+        for name in ("bore", "suction", "discharge", "clearance", "exponent"):
+            object.__setattr__(self, name, positive(f"{name} of the compressor", getattr(self, name)))
+        back = self.suction if self.back is None else not_negative("back pressure of the compressor", self.back)
+        object.__setattr__(self, "back", back)
+        check_fields(self, ("bore", "suction", "discharge", "back", "clearance", "exponent"))
+        if self.discharge < self.suction:
+            raise GeometryError(
+                f"discharge = {self.discharge:.6g} Pa is below suction = {self.suction:.6g} Pa; exchange them"
+            )
 
     @property
-    def power_error(self) -> float:
-        """Largest error of the power balance over the largest power in play; NaN if nothing is determined."""
-        parts = np.array([self.driving, -self.gas_power, -self.friction_power, -self.kinetic_power, self.weight_power])
-        good = np.isfinite(parts).all(axis=0)
-        if not good.any():
-            return float("nan")
-        return float(np.abs(parts[:, good].sum(axis=0)).max() / max(np.abs(parts[:, good]).max(), 1e-300))
+    def area(self) -> float:
+        """Of the piston, m^2."""
+        return 0.25 * np.pi * self.bore**2
 
-    def edges(self, length: float, of: Literal["wall", "guide"] = "wall") -> tuple[Array, Array]:
-        """Return the forces at the two ends of a piston (or of the crosshead's shoe) that give side load and couple.
+    def _top(self) -> float:
+        """Pressure at the outer dead centre: the valve may never open."""
+        return float(min(self.discharge, self.suction * ((1.0 + self.clearance) / self.clearance) ** self.exponent))
 
-        Parameters
-        ----------
-        length : float
-            m; the reference point is in its middle.
-        of : {"wall", "guide"}
-            Of the cylinder on the piston, or of the guide on the crosshead.
+    def pressure(self, gap: Array, towards_head: NDArray[np.bool_], stroke: float) -> Array:
+        """Absolute pressure over the piston, Pa."""
+        left = np.maximum(gap, 0.0) / stroke + self.clearance  # a gap may be -1e-17 by rounding
+        closing = self.suction * ((1.0 + self.clearance) / left) ** self.exponent
+        opening = self._top() * (self.clearance / left) ** self.exponent
+        return np.asarray(
+            np.where(towards_head, np.minimum(closing, self.discharge), np.maximum(opening, self.suction))
+        )
 
-        Returns
-        -------
-        near, far : ndarray, shape (n,)
-            N; ``far`` at the end towards the head.
-        """
-        force, couple = (self.wall, self.wall_couple) if of == "wall" else (self.guide, self.guide_couple)
-        lever = couple / positive("length of the piston", length)
-        return 0.5 * force - lever, 0.5 * force + lever
+    def force(self, angle: Array, gap: Array, towards_head: NDArray[np.bool_], stroke: float) -> Array:
+        """See :class:`GasLaw`."""
+        assert self.back is not None
+        return np.asarray((self.pressure(gap, towards_head, stroke) - self.back) * self.area)
+
+    def kinks(self, stroke: float) -> tuple[tuple[float, bool], ...]:
+        """Where the valves open."""
+        delivers = (1.0 + self.clearance) * (self.suction / self.discharge) ** (1.0 / self.exponent) - self.clearance
+        draws = self.clearance * ((self._top() / self.suction) ** (1.0 / self.exponent) - 1.0)
+        found = ((delivers, True), (draws, False))
+        return tuple((place * stroke, closing) for place, closing in found if 0.0 < place < 1.0)
+
+    def work(self, stroke: float) -> float:
+        """Return the indicated work of a turn, J: the area of the pressure-volume diagram (closed form)."""
+        c, top, low = self.clearance, self._top(), self.suction
+        delivers = max(0.0, (1.0 + c) * (low / self.discharge) ** (1.0 / self.exponent) - c)
+        draws = min(1.0, c * ((top / low) ** (1.0 / self.exponent) - 1.0))
+        compression = self._polytrope(low, 1.0 + c, delivers + c) + self.discharge * delivers
+        expansion = low * (1.0 - draws) - self._polytrope(top, c, c + draws)
+        return float((compression - expansion) * self.area * stroke)
+
+    def _polytrope(self, pressure: float, start: float, stop: float) -> float:
+        """Work to bring a volume of that pressure from ``start`` to ``stop``."""
+        n = self.exponent
+        if n == 1.0:
+            return float(pressure * start * np.log(start / stop))
+        return float(pressure * start * ((start / stop) ** (n - 1.0) - 1.0) / (n - 1.0))

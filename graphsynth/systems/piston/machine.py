@@ -1,28 +1,116 @@
-"""Side load on the cylinder of a crank drive with and without a floating piston: inverse dynamics in closed form.
-
-Every reaction follows from the balance of one body after the other, without any system larger than two by two.
-Signs of normal forces are guessed and checked, so Coulomb friction needs no iteration.
-"""
+"""Loads of a crank drive with and without a floating piston, from the general dynamics."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from graphsynth.core.checks import Point, check_fields, check_sizes, finite, finite_array, point
+from graphsynth.core.checks import Point, check_fields, check_sizes, checked, finite, finite_array, point, positive
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.piston.drives import CrankSlider
-from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce, GasLaw, GivenForce
-from graphsynth.systems.piston.loads import PistonFriction, PistonLoads, PistonMasses
-from graphsynth.systems.piston.model import FloatingPiston, PistonMotion
-from graphsynth.systems.piston.solving import Reaction, cross, one_contact, two_contacts, wedge
+from graphsynth.dynamics.elements import Element, Force, ForceLaw, JointFriction
+from graphsynth.dynamics.inverse import InverseDynamics, inverse_dynamics
+from graphsynth.dynamics.model import Body, DynamicModel
+from graphsynth.systems.piston.loads import (
+    CompressorCycle,
+    ConstantForce,
+    GasLaw,
+    GivenForce,
+    PistonFriction,
+    PistonMasses,
+)
+from graphsynth.systems.piston.model import CrankSlider, FloatingPiston
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complexfloating[Any, Any]]
+#: Kind of the slot.
+Slot = Literal["sliding", "crowned"]
+
+
+@dataclass(frozen=True, eq=False)
+class PistonLoads:
+    """Reactions and powers over the crank angle (estimated: a few roundings; NaN where friction jams).
+
+    Forces are on the body with the higher number, in N, world coordinates; couples on it at its reference point, N m.
+
+    Attributes
+    ----------
+    angle : ndarray, shape (n,)
+    gas : ndarray, shape (n,)
+        Force of the gas away from the head.
+    wall : ndarray, shape (n,)
+        Side load of the cylinder on the piston, along its normal.
+    guide : ndarray, shape (n,)
+        Normal force of the guide on the crosshead; the wall force if there is no second group.
+    slot : ndarray, shape (n,)
+        Normal force of the crosshead's slot on the piston; 0 without a second group.
+    yoke : ndarray, shape (n,)
+        Normal force of the block on the yoke; 0 for a crank-slider.
+    guide_couple, wall_couple : ndarray, shape (n,)
+        With a crowned slot, which carries no couple.  One couple may circulate on top of it in a sliding one, see
+        `self_stress`.
+    crank_pin, crosshead_pin, bearing : ndarray, shape (n, 2)
+        Of crank on rod or block, of rod on crosshead (0 for a yoke), of frame on crank.
+    torque : ndarray, shape (n,)
+        Of the motor on the crank, N m.
+    driving, gas_power, friction_power, kinetic_power, weight_power : ndarray, shape (n,)
+        W: of the motor, taken by the gas, lost in friction, into kinetic energy, of the weights.
+    held : ndarray, shape (n,)
+        Where the slot does not slide: the force across the cylinder that its friction can hold, ``mu |slot|``; the wall
+        may carry up to so much more or less than `wall`.  0 where it slides.
+    """
+
+    angle: Array
+    gas: Array
+    wall: Array
+    guide: Array
+    slot: Array
+    yoke: Array
+    guide_couple: Array
+    wall_couple: Array
+    crank_pin: Array
+    crosshead_pin: Array
+    bearing: Array
+    torque: Array
+    driving: Array
+    gas_power: Array
+    friction_power: Array
+    kinetic_power: Array
+    weight_power: Array
+    held: Array
+
+    #: Couples on crosshead (guide), piston (slot) and piston (wall) that balance each other in every pose.
+    self_stress = (1.0, 1.0, -1.0)
+
+    @property
+    def power_error(self) -> float:
+        """Largest error of the power balance over the largest power in play; NaN if nothing is determined."""
+        parts = np.array([self.driving, -self.gas_power, -self.friction_power, -self.kinetic_power, self.weight_power])
+        good = np.isfinite(parts).all(axis=0)
+        if not good.any():
+            return float("nan")
+        return float(np.abs(parts[:, good].sum(axis=0)).max() / max(np.abs(parts[:, good]).max(), 1e-300))
+
+    def edges(self, length: float, of: Literal["wall", "guide"] = "wall") -> tuple[Array, Array]:
+        """Return the forces at the two ends of a piston (or of the crosshead's shoe) that give side load and couple.
+
+        Parameters
+        ----------
+        length : float
+            m; the reference point is in its middle.
+        of : {"wall", "guide"}
+            Of the cylinder on the piston, or of the guide on the crosshead.
+
+        Returns
+        -------
+        near, far : ndarray, shape (n,)
+            N; ``far`` at the end towards the head.
+        """
+        force, couple = (self.wall, self.wall_couple) if of == "wall" else (self.guide, self.guide_couple)
+        lever = couple / positive("length of the piston", length)
+        return 0.5 * force - lever, 0.5 * force + lever
 
 
 @dataclass(frozen=True)
@@ -50,7 +138,7 @@ class PistonMachine:
     With 1 kN on the piston the connecting rod presses a plain piston to the wall; the floating piston is free.
 
     >>> machine = PistonMachine(FloatingPiston.crank_slider(0.05, 0.2), gas=ConstantForce(1000.0))
-    >>> round(machine.without_group().loads(np.pi / 2).wall.item(), 3), machine.loads(np.pi / 2).wall.round(12) + 0.0
+    >>> round(machine.without_group().loads(np.pi / 2).wall.item(), 3), machine.loads(np.pi / 2).wall.round(9) + 0.0
     (258.199, array([0.]))
     """
 
@@ -91,6 +179,82 @@ class PistonMachine:
         closing = np.asarray(motion.piston.first * (self.speed or 1.0) > 0.0)
         return self.gas.force(motion.angle, outer.piston - motion.piston.value, closing, self.mechanism.stroke)
 
+    @checked
+    def dynamic_model(self, slot: Slot = "crowned") -> DynamicModel:
+        """Return the machine with bodies, gas, rings and friction as elements: for simulation, springs, motors.
+
+        Parameters
+        ----------
+        slot : {"sliding", "crowned"}
+            See :meth:`FloatingPiston.mechanism`.
+
+        Examples
+        --------
+        >>> sorted(PistonMachine(FloatingPiston.crank_slider(0.05, 0.2)).dynamic_model().bodies)
+        [1, 2, 3, 4]
+        """
+        outer, stroke = self.mechanism.dead_centres()[0], self.mechanism.stroke
+        turn, base = self.mechanism.cylinder
+        along = np.exp(1j * turn)
+
+        def law(t: float, place: Point, velocity: Point) -> Point:
+            gap = outer.piston - (along.conj() * (complex(*place) - base)).real
+            rate = (along.conj() * complex(*velocity)).real
+            given = self.gas.force(np.array([t]), np.array([gap]), np.array([rate > 0.0]), stroke)
+            force = -along * (
+                float(given[0]) + self.friction.rings * math.tanh(rate / self.friction.smoothing_velocity)
+            )
+            return force.real, force.imag
+
+        return self._model(law, slot)
+
+    def _model(self, force: ForceLaw, slot: Slot) -> DynamicModel:
+        masses, friction, group = self.masses, self.friction, self.mechanism.group
+        slider = isinstance(self.mechanism.drive, CrankSlider)
+        bodies = {
+            1: Body(masses.crank, masses.crank_inertia, (masses.crank_centre, 0.0)),
+            2: Body(masses.follower, masses.rod_inertia * slider, (masses.rod_centre * slider, 0.0)),
+            3: Body(masses.crosshead, 0.0),
+            **({} if group is None else {4: Body(masses.piston, 0.0)}),
+        }
+        elements: list[Element] = [
+            JointFriction(*pair, getattr(friction, name), smoothing_velocity=friction.smoothing_velocity)
+            for name, (pair, _) in self._contacts().items()
+            if getattr(friction, name) > 0.0
+        ]
+        elements.append(Force(max(bodies), force))
+        return DynamicModel(self.mechanism.mechanism(slot), bodies, elements, self.gravity)
+
+    def _contacts(self) -> dict[str, tuple[tuple[int, int], float]]:
+        """Links of every sliding contact, the body that is loaded last, and its direction."""
+        drive, group = self.mechanism.drive, self.mechanism.group
+        found = {"cylinder" if group is None else "guide": ((0, 3), 0.0)}
+        if group is not None:
+            found |= {"cylinder": ((0, 4), group.cylinder_angle), "slot": ((3, 4), group.slot_angle)}
+        return found if isinstance(drive, CrankSlider) else found | {"yoke": ((2, 3), drive.yoke_angle)}
+
+    @checked
+    def inverse_dynamics(self, angle: ArrayLike, slot: Slot = "crowned", refuse: bool = True) -> InverseDynamics:
+        """Find torque and reactions of all joints by the general dynamics, at crank angles of shape (n,).
+
+        Parameters
+        ----------
+        angle : array_like, shape (n,)
+            Radians.
+        slot : {"sliding", "crowned"}
+            With a sliding slot the couples of guide, slot and wall are found undetermined.
+        refuse : bool
+            False: NaN where friction leaves no loads, or several.
+        """
+        motion = self.mechanism.run(angle, slot)
+        rate = self.mechanism.motion(motion.inputs).piston.first * self.speed
+        rings = self.friction.rings * np.tanh(rate / self.friction.smoothing_velocity)
+        forces = -np.exp(1j * self.mechanism.cylinder[0]) * (self.gas_force(motion.inputs) + rings)
+        given = list(zip(forces.real.tolist(), forces.imag.tolist()))
+        model = self._model(lambda k, place, velocity: given[int(k)], slot)
+        count = np.arange(len(given))
+        return inverse_dynamics(model, motion, self.speed, self.acceleration, times=count, refuse=refuse)
+
     def loads(self, angle: ArrayLike) -> PistonLoads:
         """Find all reactions at crank angles.
 
@@ -109,167 +273,59 @@ class PistonMachine:
         GeometryError
             Angles that are not one list of numbers.
         """
-        given = np.atleast_1d(finite_array("angle", angle, nan=True))
-        if given.ndim != 1:
-            raise GeometryError(f"angle has shape {given.shape}; give one list of crank angles")
-        motion = self.mechanism.motion(given)
-        return _Balance(self, motion).loads()
-
-
-class _Balance:
-    """Balance of piston, crosshead, follower and crank, one after the other."""
-
-    def __init__(self, machine: PistonMachine, motion: PistonMotion) -> None:
-        self.machine, self.motion = machine, motion
-        drive, group = machine.mechanism.drive, machine.mechanism.group
-        w, a = machine.speed, machine.acceleration
-        self.weight = complex(*machine.gravity)
-
-        def rates(of: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            return of[1] * w, of[2] * w**2 + of[1] * a
-
-        phi = motion.angle
-        self.turning = np.exp(1j * phi)
-        self.pin = drive.crank * self.turning  # of the crank
-        self.pin_rates = 1j * w * self.pin, (1j * a - w**2) * self.pin
-        self.at = motion.crosshead.value + 1j * drive.offset
-        self.crosshead, self.follower = rates(motion.crosshead), rates(motion.follower)
-        self.piston, self.slot = rates(motion.piston), rates(motion.slot)
-        self.cylinder = complex(1.0) if group is None else complex(np.exp(1j * group.cylinder_angle))
-        self.gas = machine.gas_force(phi)
-
-    def _mu(self, name: str, speed: Array) -> Array:
-        friction = self.machine.friction
-        return np.asarray(getattr(friction, name) * np.tanh(speed / friction.smoothing_velocity))
-
-    def _own_forces(self) -> Complex:
-        """Force that gas and rings put on the piston."""
-        return -self.cylinder * (self.gas + self._mu("rings", self.piston[0]))
-
-    def loads(self) -> PistonLoads:
-        """Assemble everything."""
-        zero = np.zeros(len(self.motion.angle))
-        slot, wall = Reaction.none(zero), Reaction.none(zero)
-        if self.machine.mechanism.group is not None:
-            slot, wall = self._piston()
-        pin, guide, yoke = self._crosshead(slot.force)
-        if self.machine.mechanism.group is None:
-            wall = guide
-        crank_pin, bearing, torque = self._crank(pin)
-        arm = self._slot_place() - self.at
-        guide_couple = cross(arm, slot.force) - cross(self.pin - self.at, yoke.force)
-        plain = self.machine.mechanism.group is None
-        friction = guide.loss + slot.loss + yoke.loss + (0.0 if plain else wall.loss)
-        friction = friction + self._mu("rings", self.piston[0]) * self.piston[0]
+        phi = np.atleast_1d(finite_array("angle", angle))
+        found = self.inverse_dynamics(phi, refuse=False)
+        motion, zero = self.mechanism.motion(phi), np.zeros(len(phi))
+        pins = {pair: found.reactions.between(*pair).on(pair[1])[0] for pair in ((0, 1), (1, 2), (2, 3))}
+        speeds = {
+            "guide": motion.crosshead, "cylinder": motion.piston, "slot": motion.slot, "yoke": motion.follower,
+        }  # fmt: skip
+        normal, lost = dict.fromkeys(speeds, zero), self.friction.rings * self._sliding(motion.piston.first)
+        for name, (pair, turn) in self._contacts().items():
+            force = found.reactions.between(*pair).on(pair[1])[0]
+            normal[name] = force @ np.array([-math.sin(turn), math.cos(turn)])
+            lost = lost + getattr(self.friction, name) * np.abs(normal[name]) * self._sliding(speeds[name].first)
+        plain, slider = self.mechanism.group is None, isinstance(self.mechanism.drive, CrankSlider)
+        couple, torque, gas = found.reactions.between(0, 3).on(3)[1], found.efforts[:, 0], self.gas_force(phi)
+        kinetic, weights = self._powers(phi)
+        stands = self.mechanism.group is not None and math.sin(self.mechanism.group.cylinder_angle) == 0.0
         return PistonLoads(
-            angle=self.motion.angle, gas=self.gas, wall=wall.normal, guide=guide.normal, slot=slot.normal,
-            yoke=yoke.normal, guide_couple=guide_couple, wall_couple=guide_couple if plain else zero.copy(),
-            crank_pin=_pairs(crank_pin), crosshead_pin=_pairs(pin if self._is_slider else zero + 0j),
-            bearing=_pairs(bearing), torque=torque, driving=torque * self.machine.speed,
-            gas_power=self.gas * self.piston[0], friction_power=friction, kinetic_power=self._kinetic_power(),
-            weight_power=self._weight_power(), held=self._held(slot),
-        )  # fmt: skip
-
-    @property
-    def _is_slider(self) -> bool:
-        return isinstance(self.machine.mechanism.drive, CrankSlider)
-
-    def _slot_place(self) -> Complex:
-        """Where the piston's reference point is."""
-        group = self.machine.mechanism.group
-        if group is None:
-            return self.at
-        base = 1j * (self.machine.mechanism.drive.offset + group.cylinder_offset)
-        return base + self.motion.piston.value * self.cylinder
-
-    def _piston(self) -> tuple[Reaction, Reaction]:
-        """Slot on piston, cylinder on piston: ``slot + wall = m a - other forces``."""
-        group = self.machine.mechanism.group
-        assert group is not None
-        wanted = self.machine.masses.piston * (self.piston[1] * self.cylinder - self.weight) - self._own_forces()
-        along = complex(np.exp(1j * group.slot_angle))
-        return two_contacts(
-            wanted,
-            wedge(along, self._mu("slot", self.slot[0]), self.slot[0]),
-            wedge(self.cylinder, self._mu("cylinder", self.piston[0]), self.piston[0]),
+            angle=phi,
+            gas=gas,
+            wall=normal["cylinder"],
+            guide=normal["cylinder" if plain else "guide"],
+            slot=normal["slot"],
+            yoke=normal["yoke"],
+            guide_couple=couple,
+            wall_couple=couple if plain else zero,
+            crank_pin=pins[1, 2],
+            crosshead_pin=pins[2, 3] if slider else np.zeros_like(pins[2, 3]),
+            bearing=pins[0, 1],
+            torque=torque,
+            driving=torque * self.speed,
+            gas_power=gas * motion.piston.first * self.speed,
+            friction_power=lost,
+            kinetic_power=kinetic,
+            weight_power=weights,
+            held=self.friction.slot * np.abs(normal["slot"]) if stands else zero,
         )
 
-    def _crosshead(self, slot: Complex) -> tuple[Complex, Reaction, Reaction]:
-        """Force of the follower on the crosshead, guide on crosshead, block on yoke."""
-        machine = self.machine
-        plain = machine.mechanism.group is None
-        wanted = machine.masses.crosshead * (self.crosshead[1] - self.weight) + slot
-        wanted = wanted - (self._own_forces() if plain else 0.0)
-        name = "cylinder" if plain else "guide"
-        guide_wedge = wedge(1.0 + 0j, self._mu(name, self.crosshead[0]), self.crosshead[0])
-        drive = machine.mechanism.drive
-        zero = np.zeros(len(self.motion.angle))
-        if isinstance(drive, CrankSlider):
-            rod = np.exp(1j * self.motion.follower.value)
-            guide = one_contact(cross(rod, wanted) - self._rod_moment() / drive.rod, rod, guide_wedge)
-            return wanted - guide.force, guide, Reaction.none(zero)
-        along = complex(np.exp(1j * drive.yoke_angle))
-        # the yoke slides against the block with the opposite speed
-        yoke, guide = two_contacts(
-            wanted, wedge(along, self._mu("yoke", -self.follower[0]), -self.follower[0]), guide_wedge
-        )
-        return yoke.force, guide, yoke
+    def _sliding(self, first: Array) -> Array:
+        """Speed of a contact times the part of its friction that the smooth law leaves, from its rate by the angle."""
+        return np.asarray(first * self.speed * np.tanh(first * self.speed / self.friction.smoothing_velocity))
 
-    def _rod_motion(self) -> tuple[Complex, Complex, Complex]:
-        """Lever from crank pin to the rod's centre of mass, velocity and acceleration of the latter."""
-        lever = self.machine.masses.rod_centre * np.exp(1j * self.motion.follower.value)
-        w, a = self.follower
-        return lever, self.pin_rates[0] + 1j * w * lever, self.pin_rates[1] + (1j * a - w**2) * lever
-
-    def _rod_moment(self) -> Array:
-        """Moment about the crank pin that the force of the rod on the crosshead must have, N m."""
-        masses = self.machine.masses
-        lever, _, acceleration = self._rod_motion()
-        moment = cross(lever, masses.follower * (self.weight - acceleration))
-        return np.asarray(moment - masses.rod_inertia * self.follower[1])
-
-    def _crank(self, pin: Complex) -> tuple[Complex, Complex, Array]:
-        """Force of crank on follower, of frame on crank, torque of the motor."""
-        machine = self.machine
-        masses = machine.masses
-        acceleration = self._rod_motion()[2] if self._is_slider else self.pin_rates[1]
-        crank_pin = masses.follower * (acceleration - self.weight) + pin
-        lever = masses.crank_centre * self.turning
-        own = (1j * machine.acceleration - machine.speed**2) * lever
-        inertia = masses.crank_inertia + masses.crank * masses.crank_centre**2
-        torque = inertia * machine.acceleration + cross(self.pin, crank_pin) - cross(lever, masses.crank * self.weight)
-        return crank_pin, masses.crank * (own - self.weight) + crank_pin, np.asarray(torque)
-
-    def _centres(self) -> list[tuple[float, Complex, Complex]]:
-        """Mass, velocity and acceleration of every centre of mass."""
-        machine = self.machine
-        masses = machine.masses
-        lever = masses.crank_centre * self.turning
-        w, a = machine.speed, machine.acceleration
-        follower = self._rod_motion()[1:] if self._is_slider else self.pin_rates
-        return [
-            (masses.crank, 1j * w * lever, (1j * a - w**2) * lever),
-            (masses.follower, *follower),
-            (masses.crosshead, self.crosshead[0] + 0j, self.crosshead[1] + 0j),
-            (masses.piston, self.piston[0] * self.cylinder, self.piston[1] * self.cylinder),
-        ]
-
-    def _kinetic_power(self) -> Array:
-        machine = self.machine
-        turning = np.full(len(self.motion.angle), machine.masses.crank_inertia * machine.acceleration * machine.speed)
-        if self._is_slider:
-            turning = turning + machine.masses.rod_inertia * self.follower[0] * self.follower[1]
-        return np.asarray(turning + sum(m * (np.conj(v) * a).real for m, v, a in self._centres()))
-
-    def _weight_power(self) -> Array:
-        return np.asarray(sum(m * (np.conj(v) * self.weight).real for m, v, _ in self._centres()))
-
-    def _held(self, slot: Reaction) -> Array:
-        group = self.machine.mechanism.group
-        if group is None or math.sin(group.cylinder_angle) != 0.0:
-            return np.zeros(len(self.motion.angle))
-        return np.asarray(self.machine.friction.slot * np.abs(slot.normal))
-
-
-def _pairs(values: Complex) -> Array:
-    return np.column_stack([values.real, values.imag])
+    def _powers(self, phi: Array) -> tuple[Array, Array]:
+        """Power into kinetic energy, and that of the weights."""
+        motion, w, a = self.mechanism.run(phi), self.speed, self.acceleration
+        kinetic = weights = np.zeros(len(phi))
+        for link, body in self.dynamic_model().bodies.items():
+            path, turn, second = (
+                motion.point(link, body.centre),
+                motion.velocities[:, link, 2],
+                motion.accelerations[:, link, 2],
+            )
+            velocity, acceleration = path.velocity * w, path.acceleration * w**2 + path.velocity * a
+            kinetic = kinetic + body.mass * (velocity * acceleration).sum(axis=1)
+            kinetic = kinetic + body.inertia * turn * w * (second * w**2 + turn * a)
+            weights = weights + body.mass * velocity @ np.array(self.gravity)
+        return kinetic, weights

@@ -342,19 +342,16 @@ def piston_animation(machine: FloatingPiston, *, title: str = "", note: str = ""
     """Return one HTML page with the moving mechanism (see :func:`graphsynth.drawing.animation.animation_html`)."""
     from graphsynth.drawing.animation import animation_html
 
-    return animation_html(_run(machine), frames=frames, title=title, note=note, width=720.0)
+    return animation_html(_shown(machine), frames=frames, title=title, note=note, width=720.0)
 
 
 def piston_animated_svg(machine: FloatingPiston, *, title: str = "", frames: int = 90) -> str:
     """Return one SVG that moves by itself (see :func:`graphsynth.drawing.animation.animated_svg`)."""
     from graphsynth.drawing.animation import animated_svg
 
-    return animated_svg(_run(machine), frames=frames, title=title, width=720.0, height=320.0)
+    return animated_svg(_shown(machine), frames=frames, title=title, width=720.0, height=320.0)
 
 
-def _run(machine: FloatingPiston) -> Motion:
-    from graphsynth.kinematics.simulation import simulate
-
-    plain = replace(machine.mechanism("crowned", at=0.0), points={})
-    run = simulate(plain, np.linspace(0.0, 2.0 * math.pi, 181), events=False)
-    return replace(run, mechanism=replace(machine.mechanism("sliding", at=0.0), points={}))
+def _shown(machine: FloatingPiston) -> Motion:
+    motion = machine.run(np.linspace(0.0, 2.0 * math.pi, 181), "sliding")
+    return replace(motion, mechanism=replace(motion.mechanism, points={}))

@@ -1,24 +1,27 @@
-"""The floating piston of a scene: loops and their spaces, a turn with and without the second group, what is said."""
+"""The floating piston of a scene: loops and their spaces, a turn with and without the second group; what is shown."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.pipeline.products import Candidate, Quantity, Recognised, Record, Table, exact
+from graphsynth.pipeline.display import table
+from graphsynth.pipeline.products import Candidate, Picture, Quantity, Recognised, Record, Table, exact
 from graphsynth.pipeline.stages import Context
 from graphsynth.pipeline.steps import recognise_by_key
-from graphsynth.systems.piston.system import PistonTable
 
 if TYPE_CHECKING:
-    from graphsynth.systems.piston.assignments import Assignment
     from graphsynth.systems.piston.machine import PistonMachine
-    from graphsynth.systems.piston.spaces import LoopSpaces
-    from graphsynth.systems.piston.turn import PistonComparison
+    from graphsynth.systems.piston.spaces import Assignment, LoopSpaces
+    from graphsynth.systems.piston.turn import PistonComparison, PistonTurn
+
+    Loops = tuple[tuple[tuple[str, LoopSpaces], ...], tuple[Assignment, ...]]
 
 _KINDS = {"crank_slider": "crank-slider", "scotch_yoke": "Scotch yoke"}
+_POSES = (1.0, 4.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,9 +34,11 @@ class Turn:
     machine : PistonMachine
     found : PistonComparison
     difference : float
-        Between the closed form and the multipliers, relative to the largest force; the larger of both machines.
+        Of the forces with a crowned and with a sliding slot, relative to the largest.
+    power : float
+        Error of the power balance over the largest power in play, with or without the second group.
     redundant : bool
-        Whether the multipliers found the couple of the second loop undetermined.
+        Whether the couples are found undetermined with a sliding slot.
     square : tuple of (float, PistonComparison)
         The same with the slot out of square to the cylinder by an angle, radians.
     """
@@ -42,20 +47,14 @@ class Turn:
     machine: PistonMachine
     found: PistonComparison
     difference: float
+    power: float
     redundant: bool
     square: tuple[tuple[float, PistonComparison], ...]
 
-
-def table_of(context: Context) -> PistonTable:
-    """Return ``[mechanism]`` of the scene."""
-    table = context.scene.mechanism
-    assert isinstance(table, PistonTable)
-    return table
-
-
-def words_of(kind: str) -> str:
-    """Return the name of a kind for readers."""
-    return _KINDS[kind]
+    @property
+    def name(self) -> str:
+        """Of the drive, for readers."""
+        return _KINDS[self.kind]
 
 
 def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Recognised, ...]:
@@ -68,62 +67,47 @@ def recognise(context: Context, candidates: tuple[Candidate, ...]) -> tuple[Reco
 
 def machines_of(context: Context) -> tuple[tuple[str, PistonMachine], ...]:
     """Build the machines of the scene; a number that makes no sense is an error of the scene."""
-    table = table_of(context)
+    own: Any = context.scene.mechanism
     try:
-        return tuple((kind, _machine(table, kind)) for kind in table.kinds)
+        return tuple((kind, _machine(own, kind)) for kind in own.kinds)
     except GeometryError as error:
         raise (context.scene.place / "mechanism").error(f"cannot be built: {error}") from error
 
 
-def _machine(table: PistonTable, kind: str) -> PistonMachine:
-    from graphsynth.systems.piston.drives import CrankSlider, ScotchYoke
-    from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce
-    from graphsynth.systems.piston.group import FloatingGroup
-    from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
+def _machine(own: Any, kind: str) -> PistonMachine:
+    from graphsynth.systems.piston.loads import CompressorCycle, ConstantForce, PistonFriction, PistonMasses
     from graphsynth.systems.piston.machine import PistonMachine
-    from graphsynth.systems.piston.model import FloatingPiston
+    from graphsynth.systems.piston.model import CrankSlider, FloatingGroup, FloatingPiston, ScotchYoke
 
-    drive, group, gas, masses, friction = table.drive, table.group, table.gas, table.masses, table.friction
-    crank, offset = drive.crank_mm / 1e3, drive.offset_mm / 1e3
+    def values(part: Any, **changed: float) -> dict[str, Any]:
+        return {item.name: getattr(part, item.name) for item in fields(part)} | changed
+
+    drive, slider = own.drive, kind == "crank_slider"
     first = (
-        CrankSlider(crank, drive.rod_mm / 1e3, offset)
-        if kind == "crank_slider"
-        else ScotchYoke(crank, offset, math.radians(drive.yoke_angle_deg))
+        CrankSlider(drive.crank, drive.rod, drive.offset)
+        if slider
+        else ScotchYoke(drive.crank, drive.offset, drive.yoke_angle)
     )
-    second = FloatingGroup(
-        math.radians(group.cylinder_angle_deg), math.radians(group.slot_angle_deg), group.cylinder_offset_mm / 1e3,
-        group.lead_mm / 1e3,
-    )  # fmt: skip
-    back = None if gas is None or gas.back_MPa is None else gas.back_MPa * 1e6
     return PistonMachine(
-        FloatingPiston(first, second),
-        PistonMasses(
-            masses.crank_kg, masses.follower_kg, masses.crosshead_kg, masses.piston_kg, masses.crank_inertia_kg_m2,
-            masses.rod_inertia_kg_m2 if kind == "crank_slider" else 0.0, masses.crank_centre_mm / 1e3,
-            masses.rod_centre_mm / 1e3 if kind == "crank_slider" else 0.0,
-        ),
-        ConstantForce(table.force_N) if gas is None else CompressorCycle(
-            gas.bore_mm / 1e3, gas.suction_MPa * 1e6, gas.discharge_MPa * 1e6, back, gas.clearance, gas.exponent
-        ),
-        PistonFriction(
-            friction.guide, friction.cylinder, friction.slot, friction.yoke if kind == "scotch_yoke" else 0.0,
-            friction.rings_N, friction.smoothing_velocity_m_s,
-        ),
-        table.speed_rad_s, 0.0, table.gravity_m_s2,
-    )  # fmt: skip
+        FloatingPiston(first, FloatingGroup(**values(own.group))),
+        PistonMasses(**values(own.masses, **({} if slider else {"rod_inertia": 0.0, "rod_centre": 0.0}))),
+        ConstantForce(own.force) if own.gas is None else CompressorCycle(**values(own.gas)),
+        PistonFriction(**values(own.friction, **({"yoke": 0.0} if slider else {}))),
+        own.speed,
+        gravity=own.gravity,
+    )
 
 
-def loops(context: Context) -> tuple[tuple[tuple[str, LoopSpaces], ...], tuple[Assignment, ...]]:
+def loops(context: Context) -> Loops:
     """Find the spaces of the loops of every machine, and all kinds of joints with such loops."""
-    from graphsynth.systems.piston.assignments import rotary_assignments
-    from graphsynth.systems.piston.spaces import loop_spaces
+    from graphsynth.systems.piston.spaces import loop_spaces, rotary_assignments
 
     found = tuple((kind, loop_spaces(machine.mechanism.mechanism())) for kind, machine in machines_of(context))
     return found, tuple(rotary_assignments(context.scene.scene.seed))
 
 
 def turn(context: Context) -> tuple[Turn, ...]:
-    """Turn every machine once, with and without the second group; compute the loads a second way."""
+    """Turn every machine once, with and without the second group; find the forces of a sliding slot too."""
     try:
         return tuple(_turn(context, kind, machine) for kind, machine in machines_of(context))
     except GeometryError as error:
@@ -131,37 +115,34 @@ def turn(context: Context) -> tuple[Turn, ...]:
 
 
 def _turn(context: Context, kind: str, machine: PistonMachine) -> Turn:
-    from dataclasses import replace
-
     import numpy as np
 
-    from graphsynth.systems.piston.dynamic_model import check_by_multipliers
     from graphsynth.systems.piston.turn import compare_pistons
 
-    table = table_of(context)
-    length = None if table.piston_length_mm is None else table.piston_length_mm / 1e3
-    step = math.tau / table.positions
-    angles = (np.arange(table.positions) + 0.5) * step
-    checks = [check_by_multipliers(own, angles) for own in (machine, machine.without_group())]
+    own: Any = context.scene.mechanism
+    angles = (np.arange(own.positions) + 0.5) * math.tau / own.positions
+    crowned, sliding = (machine.inverse_dynamics(angles, slot).reactions for slot in ("crowned", "sliding"))
+    forces = [np.array([joint.force for joint in reactions.joints[:-1]]) for reactions in (crowned, sliding)]
+    couples = [sliding.between(*pair).determined[:, 2] for pair in ((0, 3), (3, 4), (0, 4))]
     group = machine.mechanism.group
     assert group is not None
     square = []
-    for degrees in table.square_errors_deg:
-        error = math.radians(degrees)
+    for error in own.square_errors:
         turned = replace(group, slot_angle=group.cylinder_angle + 0.5 * math.pi + error)
         other = replace(machine, mechanism=replace(machine.mechanism, group=turned))
-        square.append((error, compare_pistons(other, length)))
+        square.append((error, compare_pistons(other, own.piston_length)))
     return Turn(
-        kind, machine, compare_pistons(machine, length), max(check.difference for check in checks),
-        checks[0].redundant_couples, tuple(square),
-    )  # fmt: skip
+        kind,
+        machine,
+        compare_pistons(machine, own.piston_length),
+        float(np.abs(forces[0] - forces[1]).max() / np.abs(forces).max()),
+        max(one.loads(angles).power_error for one in (machine, machine.without_group())),
+        not np.any(couples),
+        tuple(square),
+    )
 
 
-def judge(
-    context: Context,
-    found: tuple[tuple[tuple[str, LoopSpaces], ...], tuple[Assignment, ...]],
-    turns: tuple[Turn, ...],
-) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
+def assess(context: Context, found: Loops, turns: tuple[Turn, ...]) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record for each machine, and the tables."""
     spaces, assignments = found
     by_kind = dict(spaces)
@@ -178,60 +159,47 @@ def judge(
 
 
 def _record(number: int, own: Turn, spaces: LoopSpaces) -> Record:
-    found, stroke = own.found, own.machine.mechanism.stroke
-    name = words_of(own.kind)
-    words, good = _verdict(found)
-    words = f"{name}: {words}"
+    floating, plain, stroke = own.found.floating, own.found.plain, own.machine.mechanism.stroke
+    words, good = _verdict(own.found)
     margins = (
         exact("mobility W", spaces.mobility),
         exact("redundant constraints", spaces.redundant),
         Quantity("stroke", 1e3 * stroke, "mm", "exact", 4e3 * math.ulp(stroke)),
-        Quantity("largest side load on the cylinder", found.floating.peak_wall, "N"),
-        Quantity("the same of the plain piston", found.plain.peak_wall, "N"),
-        Quantity("largest force at an end of the piston", found.floating.peak_edge, "N"),
-        Quantity("the same of the plain piston's end", found.plain.peak_edge, "N"),
-        Quantity("largest load on the crosshead's guide", found.floating.peak_guide, "N"),
-        Quantity("static friction of the slot", found.floating.peak_held, "N"),
-        Quantity("friction loss over that of the plain piston", found.friction_ratio),
-        Quantity("balance of energy over a turn", max(found.floating.balance_error, found.plain.balance_error)),
-        Quantity("difference to the multipliers", own.difference),
+        Quantity("largest side load on the cylinder", floating.peak_wall, "N"),
+        Quantity("largest side load of the plain piston", plain.peak_wall, "N"),
+        Quantity("largest force at an end of the piston", floating.peak_edge, "N"),
+        Quantity("largest force at an end of the plain piston", plain.peak_edge, "N"),
+        Quantity("largest load on the crosshead's guide", floating.peak_guide, "N"),
+        Quantity("static friction of the slot", floating.peak_held, "N"),
+        Quantity("friction loss over that of the plain piston", own.found.friction_ratio),
+        Quantity("balance of energy over a turn", max(floating.balance_error, plain.balance_error)),
+        Quantity("difference of the forces to a sliding slot", own.difference),
     )
-    return Record(
-        number=number, recognised_as=f"floating piston on a {name}", verdict=words, good=good, margins=margins
-    )  # fmt: skip
+    name = f"floating piston on a {own.name}"
+    return Record(number=number, recognised_as=name, verdict=f"{own.name}: {words}", good=good, margins=margins)
 
 
 def _verdict(found: PistonComparison) -> tuple[str, bool | None]:
-    """Say what the ends of the piston keep; static friction in the slot presses on both ends alike."""
-    ratio = found.edge_ratio
+    """Say what the ends of the piston carry; static friction in the slot presses on both ends alike."""
+    ratio, held = found.edge_ratio, found.floating.peak_held
     if math.isnan(ratio):
         return "the plain piston has no side load, so there is nothing to gain", None
-    worst = ratio + 0.5 * found.floating.peak_held / found.plain.peak_edge
-    words = f"with a crowned slot the ends of the piston keep {_percent(ratio)} of the plain one's largest force"
-    if found.floating.peak_held > 0.0:
-        words += f", at most {_percent(worst)} with what static friction in the slot may hold"
+    worst = ratio + 0.5 * held / found.plain.peak_edge
+    words = "with a crowned slot the ends of the piston carry "
+    words += "no side load" if abs(ratio) < 1e-11 else f"at most {100 * ratio:.3g} % of what the plain piston's carry"
+    if held > 0.0:
+        words += f"; static friction in the slot may raise this to {100 * worst:.3g} % of what the plain piston's carry"
     return f"{words} (estimated)", worst < 1.0
 
 
-def _percent(value: float) -> str:
-    return "0 %" if abs(value) < 1e-11 else f"{100 * value:.3g} %"
-
-
 def _loop_table(spaces: tuple[tuple[str, LoopSpaces], ...]) -> Table:
-    rows = []
+    rows: list[tuple[object, ...]] = []
     for kind, own in spaces:
         for k, loop in enumerate(own.loops):
             joints = " ".join(f"{a}-{b}" for a, b in loop.fresh)
             added = f"{loop.sub_edges} - {loop.space} = {loop.mobility}"
             rows.append(
-                (
-                    words_of(kind) if k == 0 else "",
-                    "-".join(map(str, loop.links)),
-                    joints,
-                    str(loop.own),
-                    str(loop.space),
-                    added,
-                )
+                ("" if k else _KINDS[kind], "-".join(map(str, loop.links)), joints, loop.own, loop.space, added)
             )
         checked = "agrees" if own.agrees else "does NOT agree"
         rows.append(("", own.statement, f"rank of the constraints: W = {own.by_constraints}, {checked}", "", "", ""))
@@ -240,48 +208,65 @@ def _loop_table(spaces: tuple[tuple[str, LoopSpaces], ...]) -> Table:
         "mobility: it is a structural group of a space of mobility 2. The redundant constraint is a couple."
     )
     columns = ("mechanism", "loop", "new joints", "span", "Pi_j", "sub-edges - Pi_j")
-    return Table("Loops and the spaces they move in", columns, tuple(rows), note)
+    return table("Loops and the spaces they move in", columns, rows, note)
 
 
 def _assignment_table(assignments: tuple[Assignment, ...]) -> Table:
-    rows = tuple((" ".join(own.kinds), "yes" if own.full_turn else "no", own.remark) for own in assignments)
+    rows = ((" ".join(own.kinds), own.full_turn, own.remark) for own in assignments)
     note = (
-        "All 64 choices of turning (R) and sliding (P) pairs were tried at random geometry; these have loops in spaces "
-        "3 and 2, W = 1, a crank and a piston that move. The joints are 0-1, 1-2, 2-3, 0-3, 3-4, 0-4."
+        "All 64 choices of revolute (R) and prismatic (P) joints were tried at random geometry; these have loops in "
+        "spaces 3 and 2, W = 1, a crank and a piston that move. The joints are 0-1, 1-2, 2-3, 0-3, 3-4, 0-4."
     )
-    return Table("Which joints make such a mechanism", ("joints", "full turn", "what it is"), rows, note)
+    return table("Which joints make such a mechanism", ("joints", "full turn", "what it is"), rows, note)
 
 
 def _motion_table(turns: tuple[Turn, ...]) -> Table:
     rows = []
     for own in turns:
         mechanism = own.machine.mechanism
-        outer, inner = mechanism.dead_centres()
-        rows.append(
-            (
-                words_of(own.kind), f"{1e3 * mechanism.stroke:.10g}", f"{math.degrees(outer.angle):.8g}",
-                f"{math.degrees(inner.angle):.8g}", f"{mechanism.time_ratio:.8g}",
-            )
-        )  # fmt: skip
-    columns = ("mechanism", "stroke [mm]", "outer dead centre [°]", "inner dead centre [°]", "time ratio")
-    return Table("Motion", columns, tuple(rows), "Closed form; exact but for rounding.")
+        angles = [dead.angle for dead in mechanism.dead_centres()]
+        rows.append((own.name, mechanism.stroke, *angles, mechanism.time_ratio))
+    columns = (
+        "mechanism",
+        "stroke [mm] | .10g",
+        "outer dead centre [°] | .8g",
+        "inner dead centre [°] | .8g",
+        "time ratio | .8g",
+    )
+    return table("Motion", columns, rows, "Closed form; exact but for rounding.")
+
+
+def _both(turns: Iterable[Turn]) -> Iterable[tuple[Turn, bool, PistonTurn]]:
+    """Every machine with and without its second group."""
+    return ((own, k == 0, one) for own in turns for k, one in enumerate((own.found.floating, own.found.plain)))
 
 
 def _load_table(turns: tuple[Turn, ...]) -> Table:
-    rows = []
-    for own in turns:
-        for k, (name, one) in enumerate((("floating", own.found.floating), ("plain", own.found.plain))):
-            guide = (f"{one.peak_guide:.5g}", f"{one.peak_guide_edge:.5g}") if name == "floating" else ("", "")
-            rows.append(
-                (
-                    words_of(own.kind) if k == 0 else "", name, _force(one.peak_wall), _force(one.mean_wall),
-                    _force(one.peak_edge), *guide, f"{one.gas:.6g}", f"{one.friction:.5g}",
-                )
-            )  # fmt: skip
+    rows = [
+        (
+            own.name if floats else "",
+            "floating" if floats else "plain",
+            one.peak_wall,
+            one.mean_wall,
+            one.peak_edge,
+            one.peak_guide if floats else None,
+            one.peak_guide_edge if floats else None,
+            one.gas,
+            one.friction,
+        )
+        for own, floats, one in _both(turns)
+    ]
     columns = (
-        "mechanism", "piston", "wall, peak [N]", "wall, mean [N]", "end of piston [N]", "guide, peak [N]",
-        "end of shoe [N]", "gas work [J]", "friction loss [J]",
-    )  # fmt: skip
+        "mechanism",
+        "piston",
+        "wall, peak [N] | 9 .5g",
+        "wall, mean [N] | 9 .5g",
+        "end of piston [N] | 9 .5g",
+        "guide, peak [N] | .5g",
+        "end of shoe [N] | .5g",
+        "gas work [J] | .6g",
+        "friction loss [J] | .5g",
+    )
     held = max(own.found.floating.peak_held for own in turns)
     note = (
         "Forces at the ends are those of a crowned slot, which carries no couple. A sliding pair may send back to the "
@@ -292,49 +277,111 @@ def _load_table(turns: tuple[Turn, ...]) -> Table:
             f" Where the slot does not slide, its static friction can hold up to {held:.4g} N across the cylinder, and "
             "the wall may carry so much more."
         )
-    return Table("Side loads over a turn", columns, tuple(rows), note)
-
-
-def _force(value: float) -> str:
-    return "0" if value < 1e-9 else f"{value:.5g}"
+    return table("Side loads over a turn", columns, rows, note)
 
 
 def _square_table(turns: tuple[Turn, ...]) -> Table:
-    rows = []
+    rows: list[tuple[object, ...]] = []
     for own in turns:
         for k, (error, found) in enumerate(own.square):
-            share = found.edge_ratio
-            rows.append(
-                (
-                    words_of(own.kind) if k == 0 else "", f"{math.degrees(error):g}", _force(found.floating.peak_wall),
-                    "" if math.isnan(share) else _percent(share),
-                )
-            )  # fmt: skip
+            share = None if math.isnan(found.edge_ratio) else found.edge_ratio
+            rows.append(("" if k else own.name, error, found.floating.peak_wall, share))
         if not math.isnan(own.found.squareness):
-            text = f"{math.degrees(own.found.squareness):.4g}"
-            rows.append(("", text, "nothing is gained beyond, whatever the load", ""))
-    columns = ("mechanism", "slot out of square [°]", "wall, peak [N]", "end of piston, of the plain one")
+            angle = f"{math.degrees(own.found.squareness):.4g}"
+            rows.append(("", angle, "nothing is gained beyond, whatever the load", ""))
+    columns = (
+        "mechanism",
+        "slot out of square [°] | g",
+        "wall, peak [N] | 9 .5g",
+        "end of piston, share of the plain one [%] | 9 .3g",
+    )
     note = (
         "An axial force F becomes the side load F tan(error); the rod of a plain piston makes it F tan(slope). The "
         "last angle is the steepest slope; where in the turn the load is large decides how much earlier the gain ends."
     )
-    return Table("What the slot must keep", columns, tuple(rows), note)
+    return table("What the slot must keep", columns, rows, note)
 
 
 def _trust_table(turns: tuple[Turn, ...]) -> Table:
     rows = []
-    for own in turns:
-        for name, one in (("floating", own.found.floating), ("plain", own.found.plain)):
-            gas = abs(one.gas - one.gas_closed_form) / max(abs(one.gas_closed_form), 1e-300)
-            warned = "" if one.balance_error <= 1e-9 else " (WARNING)"
-            rows.append(
-                (
-                    f"{words_of(own.kind)}, {name}", f"{one.balance_error:.1e}{warned}",
-                    f"{gas:.1e}" if one.gas_closed_form else "0", f"{own.difference:.1e}",
-                    ("undetermined, as the structure says" if own.redundant else "DETERMINED") if name == "floating"
-                    else "",
-                )
-            )  # fmt: skip
-    columns = ("machine", "energy over a turn", "gas work against p-V area", "forces against multipliers", "couples")
-    note = "All relative. The multipliers solve all bodies at once; the closed form goes from body to body."
-    return Table("How far it can be trusted", columns, tuple(rows), note)
+    for own, floats, one in _both(turns):
+        gas = abs(one.gas - one.gas_closed_form) / max(abs(one.gas_closed_form), 1e-300)
+        warned = "" if one.balance_error <= 1e-9 else " (WARNING)"
+        couples = "undetermined, as the structure says" if own.redundant else "DETERMINED"
+        rows.append(
+            (
+                f"{own.name}, {'floating' if floats else 'plain'}",
+                f"{one.balance_error:.1e}{warned}",
+                f"{gas:.1e}" if one.gas_closed_form else "0",
+                own.power,
+                own.difference if floats else None,
+                couples if floats else "",
+            )
+        )
+    columns = (
+        "machine",
+        "energy over a turn",
+        "gas work against p-V area",
+        "power, at every angle | .1e",
+        "forces against a sliding slot | .1e",
+        "couples of a sliding slot",
+    )
+    note = (
+        "All relative. The reactions are the multipliers of all bodies at once; with the sliding slot of the source "
+        "one constraint is redundant, and the same forces must come out."
+    )
+    return table("How far it can be trusted", columns, rows, note)
+
+
+def sketches(context: Context) -> tuple[Picture, ...]:
+    """Draw every machine in two poses, and its plain form."""
+    from graphsynth.drawing.sketch import degrees
+    from graphsynth.systems.piston.pictures import piston_sketch
+
+    caption = (
+        "Links: 1 crank, 2 rod or block, 3 crosshead or yoke on its guide, 4 piston. The piston is held by the "
+        "cylinder and by the slot of the crosshead, nothing else."
+    )
+    pictures = []
+    for kind, machine in machines_of(context):
+        name = _KINDS[kind][0].upper() + _KINDS[kind][1:]
+        for angle in _POSES:
+            svg = piston_sketch(machine.mechanism, angle, width=620.0).svg()
+            title = f"{name} with floating piston, crank at {degrees(angle)}"
+            pictures.append(Picture(title, svg, caption if angle == _POSES[0] else ""))
+        plain = piston_sketch(machine.mechanism.without_group(), _POSES[0], width=620.0).svg()
+        pictures.append(Picture(f"{name} with plain piston", plain, "For comparison."))
+    return tuple(pictures)
+
+
+def animations(context: Context) -> tuple[Picture, ...]:
+    """Let every machine turn in the page."""
+    from graphsynth.systems.piston.pictures import piston_animated_svg
+
+    caption = "Symbols of ISO 3952; the small slider on the piston is its slot in the crosshead."
+    return tuple(
+        Picture(f"One turn: {_KINDS[kind]}", piston_animated_svg(machine.mechanism), caption)
+        for kind, machine in machines_of(context)
+    )
+
+
+def plots(context: Context) -> tuple[Picture, ...]:
+    """Motion, side loads, torque, reactions, gas force."""
+    from graphsynth.systems.piston import pictures as charts
+
+    pictures = []
+    for kind, machine in machines_of(context):
+        loads = "Dashed: the plain piston. The floating one's crosshead takes over what the cylinder loses."
+        side = charts.side_load_chart(machine, context.scene.mechanism.piston_length)
+        moved = [charts.piston_motion_chart(machine.mechanism, order) for order in range(3)]
+        pictures += [
+            Picture(f"{title}, {_KINDS[kind]}", chart.svg(), caption)
+            for title, chart, caption in (
+                ("Side load", side, loads),
+                ("Reactions", charts.reaction_chart(machine), "Path of the tip of every force."),
+                *zip(("Displacement", "Velocity", "Acceleration"), moved, ("", "", "")),
+                ("Torque of the motor", charts.torque_chart(machine), ""),
+                ("Gas force", charts.indicator_chart(machine), "Its area is the work of a turn."),
+            )
+        ]
+    return tuple(pictures)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import positive
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.piston.drives import CrankSlider
-from graphsynth.systems.piston.loads import PistonLoads
-from graphsynth.systems.piston.machine import PistonMachine
+from graphsynth.systems.piston.machine import PistonLoads, PistonMachine
+from graphsynth.systems.piston.model import CrankSlider
 
 Array = NDArray[np.float64]
 
+_TURN = 2.0 * math.pi
 _NODES = 16
 _WIDEST = math.pi / 8
 #: Panels shrink towards a reversal of the sliding down to this fraction of the zone in which friction changes sides.
@@ -130,42 +130,47 @@ def piston_turn(machine: PistonMachine, length: float | None = None) -> PistonTu
 
     Examples
     --------
-    >>> from graphsynth.systems.piston.gas import CompressorCycle
+    >>> from graphsynth.systems.piston.loads import CompressorCycle
     >>> from graphsynth.systems.piston import FloatingPiston
     >>> gas = CompressorCycle(0.1, suction=1e5, discharge=6e5)
     >>> turn = piston_turn(PistonMachine(FloatingPiston.crank_slider(0.05, 0.2), gas=gas, speed=50.0))
     >>> turn.balance_error < 1e-12, abs(turn.gas / turn.gas_closed_form - 1.0) < 1e-12, turn.peak_wall < 1e-9
     (True, True, True)
     """
+    size = machine.mechanism.stroke if length is None else positive("length of the piston", length)
+    return _turn(machine, size)
+
+
+@lru_cache(maxsize=32)  # the plain machine is the same for every error of the slot's angle
+def _turn(machine: PistonMachine, size: float) -> PistonTurn:
     if machine.speed == 0.0 or machine.acceleration != 0.0:
         raise GeometryError(
             f"a turn needs a constant speed other than 0; speed = {machine.speed:g} rad/s and acceleration = "
             f"{machine.acceleration:g} rad/s^2; change them"
         )
-    size = machine.mechanism.stroke if length is None else positive("length of the piston", length)
     nodes, weights = _nodes(machine)
     loads = machine.loads(nodes)
     _check(loads)
-    step = weights / abs(machine.speed)
-
-    def work(power: Array) -> float:
-        return float(step @ power)
-
-    motor, gas, friction = work(loads.driving), work(loads.gas_power), work(loads.friction_power)
-    moved = max(work(np.abs(p)) for p in (loads.driving, loads.gas_power, loads.friction_power, loads.kinetic_power))
-    turn = float(weights.sum())
+    powers = (loads.driving, loads.gas_power, loads.friction_power, loads.kinetic_power, loads.weight_power)
+    motor, gas, friction, kinetic, lifted = (float(weights @ p) / abs(machine.speed) for p in powers)
+    moved = max(float(weights @ np.abs(p)) / abs(machine.speed) for p in powers[:4])
+    wall, guide, edge, guide_edge = _peaks(machine, size, loads)
     return PistonTurn(
-        motor=motor, gas=gas, friction=friction, kinetic=work(loads.kinetic_power), weights=work(loads.weight_power),
+        motor=motor,
+        gas=gas,
+        friction=friction,
+        kinetic=kinetic,
+        weights=lifted,
         gas_closed_form=machine.gas.work(machine.mechanism.stroke),
         balance_error=abs(motor - gas - friction) / max(moved, 1e-300),
-        peak_wall=_peak(machine, lambda found: np.abs(found.wall), loads),
-        mean_wall=float(weights @ np.abs(loads.wall)) / turn,
-        peak_guide=_peak(machine, lambda found: np.abs(found.guide), loads),
-        mean_guide=float(weights @ np.abs(loads.guide)) / turn,
-        peak_edge=_peak(machine, lambda found: np.maximum(*map(np.abs, found.edges(size))), loads),
-        peak_guide_edge=_peak(machine, lambda found: np.maximum(*map(np.abs, found.edges(size, "guide"))), loads),
+        peak_wall=wall,
+        mean_wall=float(weights @ np.abs(loads.wall) / weights.sum()),
+        peak_guide=guide,
+        mean_guide=float(weights @ np.abs(loads.guide) / weights.sum()),
+        peak_edge=edge,
+        peak_guide_edge=guide_edge,
         peak_held=float(loads.held.max()),
-    )  # fmt: skip
+    )
 
 
 def compare_pistons(machine: PistonMachine, length: float | None = None) -> PistonComparison:
@@ -190,7 +195,7 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
 
     Examples
     --------
-    >>> from graphsynth.systems.piston.gas import ConstantForce
+    >>> from graphsynth.systems.piston.loads import ConstantForce
     >>> from graphsynth.systems.piston import FloatingPiston
     >>> machine = PistonMachine(FloatingPiston.crank_slider(0.05, 0.2), gas=ConstantForce(1000.0))
     >>> found = compare_pistons(machine)
@@ -212,6 +217,11 @@ def compare_pistons(machine: PistonMachine, length: float | None = None) -> Pist
     )  # fmt: skip
 
 
+def _rounding(machine: PistonMachine) -> float:
+    """Force below which one is nothing but rounding, N."""
+    return 1e-10 * float(np.nanmax(np.abs(machine.loads(np.linspace(0.0, _TURN, 91)).crank_pin)))
+
+
 def _ratio(one: float, other: float, least: float) -> float:
     """NaN where the other is 0, or not more than rounding."""
     return one / other if other > least else math.nan
@@ -220,7 +230,7 @@ def _ratio(one: float, other: float, least: float) -> float:
 def _check(loads: PistonLoads) -> None:
     bad = np.flatnonzero(~np.isfinite(loads.torque))
     if len(bad):
-        at = loads.angle[bad[0]] % (2.0 * math.pi)
+        at = loads.angle[bad[0]] % (_TURN)
         raise GeometryError(
             f"friction leaves no single solution at the crank angle {at:.6g} rad: the machine jams there, or may; "
             "reduce the friction coefficients, or make slot and cylinder square"
@@ -231,12 +241,12 @@ def _nodes(machine: PistonMachine) -> tuple[Array, Array]:
     """Nodes and weights of a turn: panels end at kinks and shrink towards places where loads change fast."""
     start = machine.mechanism.dead_centres()[0].angle
     narrow = _narrow(machine)
-    edges = {start, start + 2.0 * math.pi}
+    edges = {start, start + _TURN}
     for at in (*(place for place, _ in narrow), *_valves(machine), *_sign_changes(machine)):
-        edges.add(start + (at - start) % (2.0 * math.pi))
+        edges.add(start + (at - start) % (_TURN))
     for at, offset in narrow:
         while offset < _WIDEST:
-            edges |= {start + (at + side * offset - start) % (2.0 * math.pi) for side in (1.0, -1.0)}
+            edges |= {start + (at + side * offset - start) % (_TURN) for side in (1.0, -1.0)}
             offset *= 2.0
     ends = np.array(sorted(edges))
     pieces = [np.linspace(a, b, max(1, math.ceil((b - a) / _WIDEST)) + 1)[:-1] for a, b in pairwise(ends) if b > a]
@@ -289,32 +299,41 @@ def _valves(machine: PistonMachine) -> list[float]:
 
 def _sign_changes(machine: PistonMachine) -> list[float]:
     """Crank angles where a normal force changes sign, so that its friction has a kink."""
-    from scipy.optimize import brentq
+    from scipy.optimize.elementwise import find_root
 
-    phi = np.linspace(0.0, 2.0 * math.pi, _SAMPLES + 1)
-    loads = machine.loads(phi)
-    found = []
-    for name in ("wall", "guide", "slot", "yoke"):
-        values = getattr(loads, name)
+    def normals(angle: Array) -> Array:
+        loads = machine.loads(angle)
+        return np.array([loads.wall, loads.guide, loads.slot, loads.yoke])
 
-        def normal(angle: float, name: str = name) -> float:
-            return float(getattr(machine.loads(angle), name)[0])
+    phi = np.linspace(0.0, _TURN, _SAMPLES + 1)
+    values = normals(phi)
+    loaded = np.abs(values).max(axis=1, keepdims=True) > _rounding(machine)
+    contact, place = np.nonzero((values[:, :-1] * values[:, 1:] < 0.0) & loaded)
+    if not len(place):
+        return []
+    found = find_root(
+        lambda angle, own: normals(angle)[own.astype(int), np.arange(len(own))],
+        (phi[place], phi[place + 1]),
+        args=(contact,),
+        tolerances={"xatol": 1e-13},
+    )
+    return [float(x) for x in found.x]
 
-        places = np.flatnonzero(values[:-1] * values[1:] < 0.0)
-        found += [float(brentq(normal, phi[k], phi[k + 1], xtol=1e-13)) for k in places]
-    return found
 
+def _peaks(machine: PistonMachine, size: float, loads: PistonLoads) -> list[float]:
+    """Largest wall and guide force, and largest force at an end of piston and shoe: at the nodes, and between."""
 
-def _peak(machine: PistonMachine, of: Callable[[PistonLoads], Array], loads: PistonLoads) -> float:
-    """Largest value over the turn: at the nodes, and between those next to the largest one."""
-    values = of(loads)
-    best = int(np.argmax(values))
-    peak, phi = float(values[best]), loads.angle
-    low, high = phi[max(best - 1, 0)], phi[min(best + 1, len(phi) - 1)]
-    for _ in range(4):
-        fine = np.linspace(low, high, 33)
-        inner = of(machine.loads(fine))
-        k = int(np.nanargmax(inner))
-        peak = max(peak, float(inner[k]))
-        low, high = fine[max(k - 1, 0)], fine[min(k + 1, 32)]
-    return peak
+    def measures(own: PistonLoads) -> Array:
+        ends = [np.maximum(*map(np.abs, own.edges(size, of))) for of in ("wall", "guide")]
+        return np.array([np.abs(own.wall), np.abs(own.guide), *ends])
+
+    rows, phi, values = np.arange(4), loads.angle, measures(loads)
+    best, peaks = values.argmax(axis=1), values.max(axis=1)
+    low, high = phi[np.maximum(best - 1, 0)], phi[np.minimum(best + 1, len(phi) - 1)]
+    for _ in range(4):  # next to the largest node, ever finer
+        fine = np.linspace(low, high, 33, axis=1)
+        inner = measures(machine.loads(fine.ravel())).reshape(4, 4, 33)[rows, rows]
+        k = np.nanargmax(inner, axis=1)
+        peaks = np.maximum(peaks, inner[rows, k])
+        low, high = fine[rows, np.maximum(k - 1, 0)], fine[rows, np.minimum(k + 1, 32)]
+    return [float(peak) for peak in peaks]

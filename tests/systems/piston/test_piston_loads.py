@@ -10,11 +10,10 @@ from scipy.integrate import quad
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.piston import CrankSlider, FloatingGroup, FloatingPiston, ScotchYoke
-from graphsynth.systems.piston.dynamic_model import check_by_multipliers, dynamic_model
-from graphsynth.systems.piston.gas import CompressorCycle, ConstantForce, GivenForce
-from graphsynth.systems.piston.loads import PistonFriction, PistonMasses
+from graphsynth.systems.piston.loads import CompressorCycle, ConstantForce, GivenForce, PistonFriction, PistonMasses
 from graphsynth.systems.piston.machine import PistonMachine
 from graphsynth.systems.piston.turn import compare_pistons, piston_turn
+from tests.systems.piston import closed_form
 
 MASSES = PistonMasses(2.0, 1.5, 3.0, 1.0, 0.01, 0.02, 0.01, 0.07)
 AIR = CompressorCycle(0.1, suction=1e5, discharge=6e5)
@@ -39,30 +38,32 @@ MACHINES = {
 
 @pytest.mark.parametrize("plain", [False, True], ids=["floating", "plain"])
 @pytest.mark.parametrize("machine", MACHINES.values(), ids=MACHINES)
-def test_closed_form_is_what_the_multipliers_give(machine, plain):
+def test_general_dynamics_gives_the_closed_form(machine, plain):
     machine = machine.without_group() if plain else machine
-    found = check_by_multipliers(machine, np.linspace(0.1, 6.1, 9))
-    assert found.difference < 1e-12
-    assert found.redundant_couples is not plain
-    assert found.closed_form.power_error < 1e-13
-    assert np.abs(found.closed_form.wall).max() > 1.0 or not plain
-
-
-def test_determinate_slot_gives_the_couples():
-    """With a crowned slot nothing is redundant: the general dynamics then determines the couples too."""
-    from graphsynth.dynamics import inverse_dynamics
-    from graphsynth.kinematics import simulate
-
-    machine = MACHINES["askew"]
-    model = dynamic_model(machine)
     phi = np.linspace(0.1, 6.1, 9)
-    general = inverse_dynamics(model, simulate(model.mechanism, phi, events=False), machine.speed)
-    loads = machine.loads(phi)
-    assert general.reactions.between(0, 3).determined.all()
-    stroke = machine.mechanism.stroke
-    size = np.abs(loads.slot).max()
-    for own, link in ((loads.guide_couple, 3), (loads.wall_couple, 4)):
-        assert np.abs(own - general.reactions.between(0, link).on(link)[1]).max() < 1e-12 * size * stroke
+    found, exact, stroke = machine.loads(phi), closed_form.loads(machine, phi), machine.mechanism.stroke
+    size = np.abs(exact["crank_pin"]).max()
+    for name, values in exact.items():
+        own = getattr(found, name)
+        own = own[:, 0] + 1j * own[:, 1] if own.ndim > 1 else own / (stroke if "couple" in name else 1.0)
+        own = own / stroke if name == "torque" else own
+        values = values / (stroke if name in ("torque", "guide_couple") else 1.0)
+        assert np.abs(own - values).max() < 1e-12 * size, name
+    assert found.power_error < 1e-13
+    assert np.abs(found.wall).max() > 1.0 or not plain
+
+
+@pytest.mark.parametrize("machine", MACHINES.values(), ids=MACHINES)
+def test_a_sliding_slot_leaves_the_couples_open(machine):
+    """The source's sliding pair: the same forces; which couple goes where, nobody can tell."""
+    phi = np.linspace(0.1, 6.1, 9)
+    own, other = machine.inverse_dynamics(phi), machine.inverse_dynamics(phi, "sliding")
+    for pair in ((0, 1), (1, 2), (2, 3), (0, 3), (3, 4), (0, 4)):
+        forces = (found.reactions.between(*pair).force for found in (own, other))
+        assert np.abs(np.subtract(*forces)).max() < 1e-12 * np.abs(own.reactions.between(1, 2).force).max()
+        assert own.reactions.between(*pair).determined.all()
+    assert np.abs(own.efforts - other.efforts).max() < 1e-12 * np.abs(own.efforts).max()
+    assert not any(other.reactions.between(*pair).determined[:, 2].any() for pair in ((0, 3), (3, 4), (0, 4)))
 
 
 def brute_force(machine, phi):
@@ -246,26 +247,6 @@ def test_where_friction_jams_there_is_no_number():
         piston_turn(machine)
 
 
-def test_contacts_against_all_signs():
-    """Brute force over a grid: the friction law itself, checked for every solution found."""
-    from graphsynth.systems.piston.solving import two_contacts, wedge
-
-    rng = np.random.default_rng(5)
-    wanted = rng.normal(size=400) + 1j * rng.normal(size=400)
-    a, b = np.exp(1j * np.array([1.5, 0.1]))
-    first, second = (wedge(t, np.full(400, mu), np.ones(400)) for t, mu in ((a, 0.1), (b, -0.3)))
-    one, other = two_contacts(wanted, first, second)
-    assert np.isfinite(one.normal).all()
-    assert np.abs(one.force + other.force - wanted).max() < 1e-14
-    for found, tangent, mu in ((one, a, 0.1), (other, b, -0.3)):
-        along = (np.conj(tangent) * found.force).real
-        across = (np.conj(1j * tangent) * found.force).real
-        assert np.abs(along + mu * np.abs(across)).max() < 1e-14
-    # parallel contacts carry nothing else: no number, and no warning
-    none, _ = two_contacts(wanted[:3], *(wedge(1.0 + 0j, np.zeros(3), np.ones(3)) for _ in range(2)))
-    assert np.isnan(none.normal).all()
-
-
 def test_static_friction_in_a_slot_that_stands_still():
     square, askew = MACHINES["square"], MACHINES["askew"]
     loads = square.loads(np.linspace(0, 6, 20))
@@ -356,7 +337,7 @@ def test_given_force():
     turn = piston_turn(machine)
     assert abs(turn.gas) < 1e-13  # conservative
     assert math.isnan(turn.gas_closed_form)
-    assert check_by_multipliers(machine, [1.0, 2.0]).difference < 1e-12
+    assert machine.loads([1.0, 2.0]).power_error < 1e-12
 
 
 def test_free_motion_of_the_model():
@@ -366,7 +347,7 @@ def test_free_motion_of_the_model():
     machine = PistonMachine(FloatingPiston.crank_slider(0.05, 0.2, cylinder_angle=0.05), MASSES, ConstantForce(300.0),
                             speed=20.0)  # fmt: skip
     motor = Torque(0, 1, lambda t, angle, speed: float(machine.loads(angle).torque[0]))
-    model = dynamic_model(machine)
+    model = machine.dynamic_model()
     model = replace(model, elements=(*model.elements, motor), bodies={
         link: replace(body, inertia=max(body.inertia, 1e-9)) for link, body in model.bodies.items()
     })  # fmt: skip

@@ -11,7 +11,7 @@ from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism, MechanismGraph
 from graphsynth.systems.piston import FloatingPiston, ScotchYoke, loop_spaces, rotary_assignments
-from graphsynth.systems.piston.group import FloatingGroup
+from graphsynth.systems.piston.model import FloatingGroup
 
 BOTH = {
     "crank-slider": FloatingPiston.crank_slider(0.05, 0.2, 0.01, cylinder_angle=0.1, lead=0.05),
