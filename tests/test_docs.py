@@ -77,7 +77,7 @@ def run_session(source, page, line, namespace):
 #: Pages whose examples search or sweep for seconds.
 SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
-    *("certificates", "stick-slip"),
+    *("certificates", "stick-slip", "gallery"),
 )
 
 
@@ -96,6 +96,22 @@ def test_examples_run(page, tmp_path, monkeypatch):
     for language, body, line in fences(page):
         if is_example(language, body):
             (run_session if ">>> " in body else run_plain)(body, page, line, namespace)
+
+
+def test_every_page_of_the_theory_has_a_drawing():
+    pages = sorted((ROOT / "docs" / "theory").glob("*.md"))
+    assert len(pages) > 20
+    assert [page.name for page in pages if "](../pictures/" not in page.read_text(encoding="utf-8")] == []
+
+
+def test_pictures_of_the_gallery_are_made_by_ten_lines_at_most():
+    page = ROOT / "docs" / "gallery.md"
+    codes = [body for language, body, _ in fences(page) if language == "python"]
+    assert [body for body in codes if len(body.strip().splitlines()) > 10] == []
+    shown = re.findall(r"pictures/gallery-([\w-]+)\.", page.read_text(encoding="utf-8"))
+    written = re.findall(r"\"gallery-([\w-]+)\.", "".join(codes))
+    loops = {"chain-0", "chain-123", "chain-229", *API.public_names("graphsynth.mechanism.gallery")}
+    assert set(shown) == {*written, *loops}
 
 
 def slug(heading):

@@ -1,11 +1,12 @@
 """Draw the pictures of the README and of the pages anew: ``python docs/pictures/make.py [FOLDER]``.
 
-Those of the pages are taken from the reports of shipped scenes, three minutes in all; tribometer-error-time.svg is
-measured on a quiet machine, by ``graphsynth accuracy tribometer``.
+The gallery's own examples write its pictures.  Those of other pages are taken from the reports of shipped scenes,
+three minutes in all; tribometer-error-time.svg is measured on a quiet machine, by ``graphsynth accuracy tribometer``.
 """
 
 from __future__ import annotations
 
+import contextlib
 import re
 import sys
 from pathlib import Path
@@ -85,8 +86,18 @@ def scene_pictures(scene: str, wanted: dict[str, str]) -> dict[str, str]:
     return {f"{name}.svg": found[title] + "\n" for name, title in wanted.items()}
 
 
+def gallery_pictures(folder: Path) -> None:
+    """Run the examples of the gallery in the folder; what they write are its pictures."""
+    page = (Path(__file__).parents[1] / "gallery.md").read_text("utf-8")
+    names: dict[str, object] = {}
+    with contextlib.chdir(folder):
+        for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+            exec(code, names)
+
+
 def make(folder: Path) -> list[Path]:
     """Write the pictures; return their paths."""
+    gallery_pictures(folder)
     chains = list(gs.enumerate_chains(8))
     found = gs.embody(chains[CHOSEN], seed=0)
     assert found.accepted, found.statement

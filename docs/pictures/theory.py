@@ -13,7 +13,9 @@ from pathlib import Path
 
 from graphsynth.drawing.svg import number, painted, picture, words
 from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.systems.antenna.mechanism import PointingMechanism
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
+from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 Points = Iterable[complex]
 
@@ -530,13 +532,189 @@ def body() -> str:
     return board.svg("A body with its centre of mass, a joint at s from it, and the forces on it")
 
 
+def conventions() -> str:
+    """Draw the turned vector of a cross product, and the three signs of interference."""
+    board = Board(680, 270, 60 + 190j, 60.0)
+    r = 1.6 + 0.8j
+    for tip, text, colour in ((r, "r", "a"), (-1j * r, "J(r)", "b")):
+        board.arrow(0.9j, 0.9j + tip, colour=colour, width=2.2)
+        board.text(0.9j + 1.14 * tip, text, colour=colour)
+    board.line(0.9j + 0.12 * r, 0.9j + (0.12 - 0.12j) * r, 0.9j - 0.12j * r, colour="note", width=1.2)
+    for k, (gap, text) in enumerate(((0.18, "g < 0: free"), (0.0, "g = 0: touching"), (-0.16, "g > 0: overlap"))):
+        centre = complex(4.4 + 2.3 * k, 1.6)
+        board.circle(centre, 0.85, width=2)
+        board.circle(centre - 0.85 + 0.6 + gap, 0.6, colour="a", width=2)
+        board.line(centre - 0.85, centre - 0.85 + gap, colour="b", width=4)
+        board.text(centre - 1.35j, text)
+    return board.svg("J(r) is r turned clockwise by a right angle; the sign of the interference g of a shaft in a hole")
+
+
+def small_crank() -> str:
+    """Draw the path of the platform over its crank length, for three cranks, beside the circle of the limit."""
+    board = Board(620, 400, 200 + 200j, 170.0)
+    psi = [2 * math.pi * k / 180 for k in range(181)]
+    board.circle(0j, 0.75, colour="note", width=1.2, dash="4 4")
+    for crank, colour, y in ((2.0, "c", 0.8), (10.0, "a", 0.6), (20.0, "b", 0.4)):
+        pose = SingleMotorPlatform(crank=(crank, crank, crank)).sweep(psi).pose
+        board.curve([complex(x, y) / crank for x, y, _ in pose.tolist()], colour=colour, width=2)
+        board.line(1.25 + 1j * y, 1.4 + 1j * y, colour=colour, width=3)
+        board.text(1.45 + 1j * y, f"crank {crank:g} mm", anchor="start")
+    board.line(1.25 + 0.2j, 1.4 + 0.2j, colour="note", dash="4 4")
+    board.text(1.45 + 0.2j, "limit: a circle", anchor="start")
+    board.arrow(-1.1 + 0j, 1.1 + 0j, colour="note", width=1)
+    board.arrow(-1.1j, 1.1j, colour="note", width=1)
+    board.text(1.1 - 0.1j, "x / crank", colour="note", size=12)
+    board.text(0.22 + 1.08j, "y / crank", colour="note", size=12)
+    return board.svg("Path of the platform over the crank length: the shorter the cranks, the rounder")
+
+
+def inverse_design() -> str:
+    """Draw one leg of the drive in both extreme poses: crank and coupler in one line, folded and stretched."""
+    board = Board(640, 340, 95 + 255j, 3.9)
+    axis, pivot, rocker = 0j, 105 + 8j, 52.0
+    ends = [pivot + rocker * cmath.exp(1j * math.radians(angle)) for angle in (112, 158)]
+    far, near = sorted(ends, key=abs, reverse=True)
+    crank = (abs(far) - abs(near)) / 2
+    board.circle(axis, crank, colour="note", dash="4 3")
+    board.arc(pivot, rocker, math.radians(158), math.radians(112), colour="note")
+    for end, sign, dash in ((far, 1, ""), (near, -1, "6 4")):
+        pin = sign * crank * end / abs(end)
+        board.line(axis, pin, colour="b", width=3)
+        board.line(pin, end, colour="a", width=2.4, dash=dash)
+        board.line(end, pivot, width=2.4, dash=dash)
+        board.joint(pin, end)
+    board.ground(axis, pivot)
+    for at, text in (
+        (far + 2 + 6j, "C+"),
+        (near - 3 + 6j, "C−"),
+        (3 - 8j, "O"),
+        (pivot + 6 + 4j, "D"),
+    ):
+        board.text(at, text)
+    board.text(34 + 56j, "lB = (d+ − d−) / 2", colour="b", anchor="end")
+    board.text(34 + 49j, "lBC = (d+ + d−) / 2", colour="a", anchor="end")
+    return board.svg("Both dead centres of a drive: crank and coupler in one line, d = |C - O|")
+
+
+def extreme_cases() -> str:
+    """Draw what degenerates: a leg out of reach, a change point, a double crossing, a fold of two modes."""
+    board = Board(700, 220, 30 + 130j, 55.0)
+    board.line(0j, 1.2 + 0.5j, 2.4 + 1j, width=3)
+    board.ground(0j)
+    board.joint(1.2 + 0.5j, 2.4 + 1j)
+    board.circle(0j, 0.0, width=0)
+    reach = [2.6 * cmath.exp(1j * math.radians(a)) for a in range(-8, 50, 2)]
+    board.curve(reach, colour="b", dash="5 4")
+    board.text(1.2 - 1.15j, "edge of reach", size=13)
+    left, right = 3.5 + 0j, 5.6 + 0j
+    board.ground(left, right)
+    board.line(left, left + 0.9, width=3)
+    board.line(left + 0.9, right + 0.9, colour="a", width=3)
+    board.line(right, right + 0.9, width=3)
+    turned = 0.9 * cmath.exp(0.8j)
+    diagonal = (right - left - turned) / abs(right - left - turned)
+    for other, dash, colour in (
+        (right + turned, "5 4", "c"),
+        (left + turned + (right - left).conjugate() * diagonal**2, "2 3", "b"),
+    ):
+        board.line(left, left + turned, other, right, colour=colour, width=1.4, dash=dash)
+    board.joint(left + 0.9, right + 0.9)
+    board.text(5 - 1.15j, "change point", size=13)
+    centre = 8.2 + 0.4j
+    board.curve(_ring(0.75, 1.05, centre), colour="a", width=2)
+    board.circle(centre, 0.75, colour="b", width=2)
+    board.text(centre - 1.55j, "tangent curves", size=13)
+    start = 9.9 - 0.5j
+    board.curve([start + complex(1.5 - s * s * 1.2, 0.95 + 0.95 * s) for s in (k / 20 - 1 for k in range(41))], width=2)
+    board.arrow(start - 0.2j, start + 1.9 - 0.2j, colour="note", width=1)
+    board.joint(start + 1.5 + 0.95j)
+    board.text(start + 0.8 - 0.65j, "fold of two modes", size=13)
+    return board.svg("Four ways to degenerate: edge of reach, change point, tangent curves, fold of two assembly modes")
+
+
+def tabled_positions() -> str:
+    """Draw the lambda linkage at the crank angles of the table."""
+    linkage = TiltedFourBar()
+    board = Board(620, 440, 190 + 300j, 92.0)
+    angles = (0, 30, 45, 90, 120, 180, 225, 270, 300)
+    table = linkage.positions([math.radians(f) for f in range(0, 361, 3)])
+    board.curve([complex(*point[:2]) for point in table.B], colour="b", width=1.4)
+    board.circle(0j, 1.0, colour="note", width=1, dash="4 4")
+    for f in angles:
+        a, b = complex(*table.A[f // 3][:2]), complex(*table.B[f // 3][:2])
+        board.line(0j, a, width=1.6)
+        board.line(a, b, colour="a", width=1.6)
+        board.joint(a, b)
+        board.text(1.2 * a, f"{f}°", colour="note", size=12)
+    board.ground(0j, 2 + 0j)
+    return board.svg("The lambda linkage at the crank angles of the table: O A, A B and the path of B")
+
+
+def both_modes_of_legs() -> str:
+    """Draw G1 in the tabled pose with both rocker angles of every leg."""
+    g1 = ParallelPlatform.g1()
+    board = Board(560, 420, 120 + 330j, 112.0)
+    corners = [1.2 + 0.9j + cmath.exp(0.15j) * vertex for vertex in g1.b]
+    for sign, colour in ((-1, "note"), (1, "ink")):
+        angles = g1.inverse([[1.2, 0.9, 0.15]], (sign, sign, sign)).theta[0]
+        for k, (pivot, arm, angle, corner) in enumerate(zip(g1.D, g1.l1, angles, corners, strict=True), 1):
+            elbow = pivot + arm * cmath.exp(1j * float(angle))
+            board.line(pivot, elbow, corner, colour=colour, width=2.4, dash="" if sign > 0 else "6 4")
+            board.joint(elbow)
+            board.text(elbow + 0.2 * (elbow - pivot) / arm, f"θ{k}({'+' if sign > 0 else '−'})", colour=colour, size=13)
+    board.line(*corners, fill="a", colour="a", width=2)
+    board.joint(*corners)
+    for pivot in g1.D:
+        board.ground(pivot)
+    return board.svg("G1 in the pose of section 1: both rocker angles of every leg")
+
+
+def tabled_antenna() -> str:
+    """Draw the reflector's angles over equal crank angles, with the values of the table."""
+    board = Board(640, 340, 70 + 290j, 1.0)
+    sweep = PointingMechanism().sweep([math.radians(f) for f in range(41)])
+    across, up = 12.5, 10.0
+    board.arrow(0j, 530 + 0j, colour="note", width=1)
+    board.arrow(0j, 275j, colour="note", width=1)
+    board.line(0j, complex(40 * across, 0) + 0j, colour="note", width=1)
+    for name, values, colour in (("a", sweep.poses.a, "a"), ("b", sweep.poses.b, "b")):
+        points = [complex(across * f, up * math.degrees(v)) for f, v in enumerate(values)]
+        board.curve(points, colour=colour, width=2)
+        for f in (5, 10, 15, 20, 30, 40):
+            x, y = board.xy(points[f])
+            board.parts.append(f'<circle cx="{x}" cy="{y}" r="4" {painted(colour)}/>')
+        board.text(points[40] + 16, name, colour=colour)
+    for f in (10, 20, 30, 40):
+        board.text(complex(across * f, -14), f"{f}°", colour="note", size=12)
+        board.text(complex(-22, up * f * 0.6), f"{f * 0.6:g}°", colour="note", size=12)
+    board.text(530 - 14j, "φ", colour="note")
+    return board.svg("Angles a and b of the reflector over equal crank angles; dots are values of the table")
+
+
 DRAWINGS = {
-    "theory-bearing": tilted_bearing, "theory-linkage": lambda_linkage, "theory-ellipse": circle_and_ellipse,
-    "theory-arcs": jam_arcs, "theory-whitney": whitney, "theory-shared-tilt": shared_tilt, "theory-platform": platform,
-    "theory-workspace": workspace, "theory-drive": drive, "theory-krawczyk": krawczyk,
-    "theory-modes": modes, "theory-singular": singular,
-    "theory-levels": levels, "theory-cuts": cuts, "theory-body": body,
-}  # fmt: skip
+    "theory-arcs": jam_arcs,
+    "theory-bearing": tilted_bearing,
+    "theory-body": body,
+    "theory-conventions": conventions,
+    "theory-cuts": cuts,
+    "theory-drive": drive,
+    "theory-ellipse": circle_and_ellipse,
+    "theory-extreme": extreme_cases,
+    "theory-inverse-design": inverse_design,
+    "theory-krawczyk": krawczyk,
+    "theory-levels": levels,
+    "theory-linkage": lambda_linkage,
+    "theory-modes": modes,
+    "theory-platform": platform,
+    "theory-shared-tilt": shared_tilt,
+    "theory-singular": singular,
+    "theory-small-crank": small_crank,
+    "theory-values-antenna": tabled_antenna,
+    "theory-values-bearings": tabled_positions,
+    "theory-values-platform": both_modes_of_legs,
+    "theory-whitney": whitney,
+    "theory-workspace": workspace,
+}
 
 
 def make(folder: Path) -> None:

@@ -11,6 +11,7 @@ doubles).
 from __future__ import annotations
 
 import math
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -222,8 +223,8 @@ def report_picture(report: JammingReport) -> Figure:
     gaps.axhline(0.0, color=LIGHT["soft"], lw=1.0)
     if report.certificate is not None:
         _bands((tilts, gaps), report, (float(f.min()), float(f.max())))
-    dress(tilts, report.statement, "", "tilt of the coupler, mrad")
-    dress(gaps, "", "crank angle, degrees", f"gap function (condition {report.condition}), mm")
+    dress(tilts, fill(report.statement, 110), "", "tilt of the coupler, mrad")
+    dress(gaps, "", "crank angle, degrees", f"interference (condition {report.condition}), mm")
     for axes in (tilts, gaps):
         axes.margins(x=0)
     handles, labels = gaps.get_legend_handles_labels()
