@@ -54,7 +54,7 @@ SYSTEM = System(
         Stage("plot", f"{_HERE}.stages_pictures:plots", ("motions", "assessments"), ("plots",)),
     ),
     evidence=plans(
-        "graphsynth.systems.lambda_linkage.evidence",
+        f"{_HERE}.evidence",
         "crossing",
         "areas",
         "arc-ends",

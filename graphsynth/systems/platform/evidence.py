@@ -60,26 +60,12 @@ def turn(context: Any, effort: Effort) -> Problem:
 def drive(context: Any, effort: Effort) -> Problem:
     """Measure the motor that runs the platform up from rest, with the inertia of the real motion."""
     from graphsynth.evidence.drives import drive_problem
-    from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
+    from graphsynth.systems.platform.motor_stages import machine_drive
 
     table = getattr(context.scene.mechanism, "drive", None)
     if table is None:
         raise GeometryError("the scene has no table [mechanism.drive], so no motor")
-    from graphsynth.systems.platform.motor_stages import dc_motor
-
-    motor = dc_motor(table.motor, table.resistances[0])
-    model = MotorDrivenPlatform.of_machine(
-        _mechanism(context),
-        motor,
-        mass=table.mass,
-        gyration=table.gyration,
-        mass_centre=complex(*table.mass_centre),
-        wheel_inertia=table.wheel_inertia,
-        pinion_inertia=table.pinion_inertia,
-        efficiency=table.efficiency,
-        friction=table.friction,
-        load=table.load,
-    )
+    model = machine_drive(_mechanism(context), table, table.resistances[0])
     return drive_problem(model.plant(), model.motor, model.train, table.end, effort)
 
 

@@ -101,20 +101,19 @@ class MotorDrivenPlatform:
         mass: float,
         gyration: float,
         mass_centre: complex = 0.0,
-        rocker_inertia: Sequence[float] = (0.0, 0.0, 0.0),
         wheel_inertia: float = 0.0,
         pinion_inertia: float = 0.0,
         efficiency: float = 1.0,
-        friction: float = 0.0,
-        load: float = 0.0,
-        length: float = 1e-3,
     ) -> MotorDrivenPlatform:
-        """Real geometry: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of the gears."""
-        series = platform_inertia(machine, mass, gyration, mass_centre, rocker_inertia=rocker_inertia, length=length)
+        """Real geometry in millimetres: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of gears.
+
+        Inertia of the rockers or another unit of length: `platform_inertia`; friction and load: `dataclasses.replace`.
+        """
+        series = platform_inertia(machine, mass, gyration, mass_centre)
         ratio = machine.gears.z2 / machine.gears.z1
         own = ratio**2 * number("pinion_inertia", pinion_inertia, least=0.0)
         own += 3.0 * number("wheel_inertia", wheel_inertia, least=0.0)
-        return cls(series, motor, Train(ratio, efficiency, own), 0.0, friction, load)
+        return cls(series, motor, Train(ratio, efficiency, own))
 
     @property
     def constant_inertia(self) -> float:

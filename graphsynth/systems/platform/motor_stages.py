@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.core.errors import GeometryError, SceneError, SpecError
-from graphsynth.pipeline.display import balance_rows, limit_table, quantity_table
-from graphsynth.pipeline.products import Attempt, Finding, Picture, Quantity, Record, Table
+from graphsynth.pipeline.display import balance_rows, limit_table, quantity_table, table
+from graphsynth.pipeline.products import Attempt, Finding, Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.platform.motor_system import DCMotorTable, MachineDriveTable, PlatformDriveTable
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.driven.inertia import EffectiveInertia
     from graphsynth.dynamics.driven.reduction import ReductionStudy
     from graphsynth.dynamics.driven.run import DriveRun
     from graphsynth.dynamics.motors import DCMotor
     from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
     from graphsynth.systems.platform.resistance import ResistanceEffect, RippleMap
+    from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +67,13 @@ def dc_motor(
     """Build the motor of a table for an armature resistance (ohm); another inductance or demanded speed if given."""
     from graphsynth.dynamics.motors import DCMotor
 
+    shared = ("torque_constant", "emf_constant", "gain", "rotor_inertia", "friction")
     return DCMotor(
         resistance=resistance,
         inductance=m.inductance if inductance is None else inductance,
-        torque_constant=m.torque_constant,
-        emf_constant=m.emf_constant,
-        gain=m.gain,
         speed=m.speed if speed is None else speed,
         voltage_limit=math.inf if m.voltage_limit is None else m.voltage_limit,
-        rotor_inertia=m.rotor_inertia,
-        friction=m.friction,
+        **{name: getattr(m, name) for name in shared},
     )
 
 
@@ -85,60 +84,53 @@ def drive_of(
     from graphsynth.dynamics.driven.inertia import EffectiveInertia
     from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
-    table = table_of(context)
-    moved = table.platform
-    motor = dc_motor(table.motor, resistance, inductance, speed)
-    return MotorDrivenPlatform(
-        EffectiveInertia.of_slider(moved.mass, moved.amplitude),
-        motor,
-        base_inertia=moved.inertia,
-        friction=moved.friction,
-        load=moved.load,
-    )
+    moved = table_of(context).platform
+    motor = dc_motor(table_of(context).motor, resistance, inductance, speed)
+    inertia = EffectiveInertia.of_slider(moved.mass, moved.amplitude)
+    return MotorDrivenPlatform(inertia, motor, base_inertia=moved.inertia, friction=moved.friction, load=moved.load)
 
 
-def _refuse(context: Context, error: SpecError, *place: str) -> Exception:
-    at = context.scene.place / "mechanism"
-    for key in place:
-        at = at / key
-    return at.error(f"cannot be computed: {error}")
+@contextmanager
+def _refused(context: Context, *place: str) -> Iterator[None]:
+    """Add the place in the scene to what the numbers there make impossible."""
+    try:
+        yield
+    except (SpecError, GeometryError) as error:
+        at = context.scene.place / "mechanism"
+        for key in place:
+            at = at / key
+        raise at.error(f"cannot be computed: {error}") from error
 
 
 def drive(context: Context) -> tuple[LabelledRun, ...]:
     """Integrate from rest for each armature resistance."""
+    table = table_of(context)
+    with _refused(context):
+        return _runs(table, (drive_of(context, resistance) for resistance in table.resistances))
+
+
+def _runs(
+    table: PlatformDriveTable | MachineDriveTable, drives: Iterable[MotorDrivenPlatform]
+) -> tuple[LabelledRun, ...]:
     import numpy as np
 
-    table = table_of(context)
     times = np.linspace(0.0, table.end, table.samples)
-    found = []
-    try:
-        for resistance in table.resistances:
-            model = drive_of(context, resistance)
-            found.append(LabelledRun(resistance, model, model.simulate(times, rtol=table.tolerance)))
-    except SpecError as error:
-        raise _refuse(context, error) from error
-    return tuple(found)
+    pairs = zip(table.resistances, drives)
+    return tuple(LabelledRun(r, model, model.simulate(times, rtol=table.tolerance)) for r, model in pairs)
 
 
 def without_inertia(context: Context) -> WithoutInertia:
     """Run the regularised model of the source, then the model with ever smaller inertia."""
-    from dataclasses import replace
-
     import numpy as np
 
-    table = table_of(context)
-    w = table.without_inertia
+    w = table_of(context).without_inertia
     times = np.linspace(0.0, w.end, 501)
-    try:
+    with _refused(context, "without_inertia"):
         full = drive_of(context, w.resistance, w.inductance)
-        motor = replace(full.motor, rotor_inertia=0.0)
-        bare = replace(full, motor=motor, base_inertia=0.0)
+        bare = replace(full, motor=replace(full.motor, rotor_inertia=0.0), base_inertia=0.0)
         source = bare.simulate(times, speed=w.start_speed, rtol=1e-12)
-        runs = tuple(
-            replace(bare, base_inertia=value).simulate(times, speed=w.start_speed, rtol=1e-11) for value in w.inertias
-        )
-    except SpecError as error:
-        raise _refuse(context, error, "without_inertia") from error
+        drives = (replace(bare, base_inertia=value) for value in w.inertias)
+        runs = tuple(model.simulate(times, speed=w.start_speed, rtol=1e-11) for model in drives)
     return WithoutInertia(source, w.inertias, runs)
 
 
@@ -150,17 +142,15 @@ def claim(context: Context) -> Claim:
 
     c = table_of(context).claim
     first, last = c.resistances[0], c.resistances[-1]
-    try:
+    with _refused(context, "claim"):
         effects = {
             f"L = {L:g} H, w_d = {speed:g} rad/s": resistance_effect(
                 drive_of(context, first, L, speed), c.resistances, simulate=True, revolutions=c.revolutions
             )
             for L, speed in c.cases
         }
-        values = np.geomspace(first, last, c.map_resistances)
-        mapped = ripple_map(drive_of(context, first), values.tolist(), c.map_inductances, revolutions=c.revolutions)
-    except SpecError as error:
-        raise _refuse(context, error, "claim") from error
+        values = np.geomspace(first, last, c.map_resistances).tolist()
+        mapped = ripple_map(drive_of(context, first), values, c.map_inductances, revolutions=c.revolutions)
     return Claim(effects, mapped)
 
 
@@ -173,11 +163,9 @@ def limit(context: Context) -> ReductionStudy | None:
         return None
     times = np.linspace(0.0, t.end, 26)
     transient = 20.0 * max(t.inductances) / t.resistance if t.resistance > 0.0 else 0.0
-    try:  # the same times for every inductance
-        after = min(transient, 0.5 * t.end)
+    after = min(transient, 0.5 * t.end)  # the same times for every inductance
+    with _refused(context, "limit"):
         return drive_of(context, t.resistance).inductance_study(times, t.inductances, after=after)
-    except SpecError as error:
-        raise _refuse(context, error, "limit") from error
 
 
 def solvers(context: Context) -> tuple[Table, ...]:
@@ -188,11 +176,8 @@ def solvers(context: Context) -> tuple[Table, ...]:
     from graphsynth.pipeline.display import work_table
 
     table = table_of(context)
-    model = drive_of(context, table.resistances[0])
-    try:
-        found = drive_work_precision(model, np.linspace(0.0, table.end, 11))
-    except SpecError as error:
-        raise _refuse(context, error) from error
+    with _refused(context):
+        found = drive_work_precision(drive_of(context, table.resistances[0]), np.linspace(0.0, table.end, 11))
     return (work_table(found),)
 
 
@@ -266,68 +251,50 @@ def run_tables(runs: tuple[LabelledRun, ...], *, headline: bool = False) -> tupl
 
 
 def _claim_tables(context: Context, found: Claim) -> tuple[Table, ...]:
-    rows = []
+    trends, rows = [], []
     for label, effect in found.effects.items():
-        for k, r in enumerate(effect.resistance):
-            rows.append(
-                (
-                    label if k == 0 else "",
-                    f"{effect.frequency_ratio:.3f}" if k == 0 else "",
-                    f"{r:g}",
-                    f"{effect.damping[k]:.3f}",
-                    f"{effect.speed[k]:.4g}",
-                    f"{effect.simulated_speed[k]:.4g}",
-                    f"{effect.current[k]:.4g}",
-                    f"{effect.simulated_current[k]:.4g}",
-                )
-            )
-    columns = (
-        "case",
-        "Om/w_n",
-        "r [ohm]",
-        "zeta",
-        "speed, linear [rad/s]",
-        "simulated",
-        "current, linear [A]",
-        "simulated",
+        speed, current = effect.simulated_speed, effect.simulated_current
+        linear = "falls" if effect.speed_falls else "rises"
+        ratios = (speed[-1] / speed[0], current[-1] / current[0])
+        trends.append((label, effect.frequency_ratio, linear, _trend(speed), ratios[0], _trend(current), ratios[1]))
+        series = (effect.resistance, effect.damping, effect.speed, speed, effect.current, current)
+        rows += [(*(("", None) if k else (label, effect.frequency_ratio)), *row) for k, row in enumerate(zip(*series))]
+    truth = (
+        "The claim is that a larger armature resistance calms both. On the map the linear condition tells the sign of "
+        f"the simulated trend of the speed on {100 * found.map.agreement:.0f} % of the cells; the rest have ripples "
+        "that are not small."
     )
     note = (
         "Ripples peak to peak in steady motion. Linear, exact for small ripples: the torque ripple always falls with "
         "r, the speed ripple if and only if Om/w_n > 0.7071. Simulated: estimated, the full model over the second half "
         f"of {table_of(context).claim.revolutions} mean revolutions."
     )
-    said = []
-    for label, effect in found.effects.items():
-        first, last = effect.simulated_speed[0], effect.simulated_speed[-1]
-        said.append(
-            (
-                label,
-                f"{effect.frequency_ratio:.3f}",
-                "falls" if effect.speed_falls else "rises",
-                _trend(effect.simulated_speed),
-                f"{last / first:.3g}",
-                _trend(effect.simulated_current),
-                f"{effect.simulated_current[-1] / effect.simulated_current[0]:.3g}",
-            )
-        )
-    heads = (
-        "case",
-        "Om/w_n",
-        "speed ripple, linear",
-        "speed ripple, simulated",
-        "last/first",
-        "current ripple, simulated",
-        "last/first",
-    )
-    truth = (
-        "The claim is that a larger armature resistance calms both. On the map the linear condition tells the sign of "
-        f"the simulated trend of the speed on {100 * found.map.agreement:.0f} % of the cells; the rest have ripples "
-        "that are not small."
-    )
+    finding = _claim_finding(found)
     return (
-        Table("Does a larger resistance calm the machine?", heads, tuple(said), truth, (_claim_finding(found),)),
-        Table("Ripples over the resistance", columns, tuple(rows), note),
+        table("Does a larger resistance calm the machine?", _TREND_COLUMNS, trends, truth, finding),
+        table("Ripples over the resistance", _RIPPLE_COLUMNS, rows, note),
     )
+
+
+_TREND_COLUMNS = (
+    "case",
+    "Om/w_n | .3f",
+    "speed ripple, linear",
+    "speed ripple, simulated",
+    "last/first | .3g",
+    "current ripple, simulated",
+    "last/first | .3g",
+)
+_RIPPLE_COLUMNS = (
+    "case",
+    "Om/w_n | .3f",
+    "r [ohm] | g",
+    "zeta | .3f",
+    "speed, linear [rad/s] | .4g",
+    "simulated | .4g",
+    "current, linear [A] | .4g",
+    "simulated | .4g",
+)
 
 
 def _claim_finding(found: Claim) -> Finding:
@@ -370,61 +337,64 @@ def _trend(values: object) -> str:
 
 
 def _bare_tables(context: Context, bare: WithoutInertia) -> tuple[Table, ...]:
-    moved = table_of(context).platform
+    moved, source = table_of(context).platform, bare.source
     root = math.sqrt(moved.mass)
-    reach = moved.amplitude * root
-    rows = tuple(
+    events = [
         (
             e.kind,
-            f"{e.angle / math.pi:.12g}",
-            f"{e.time:.14g}",
-            f"{e.fictitious_time * reach:.14g}",
-            f"{e.motion / root:.13g}",
+            e.angle / math.pi,
+            e.time,
+            e.fictitious_time * moved.amplitude * root,
+            e.motion / root,
             ", ".join(f"{i:.13g}" for i in e.currents),
         )
-        for e in bare.source.events[:20]
-    )
-    columns = ("event", "angle/pi", "time t [s]", "fictitious time s [s]", "speed of the platform [m/s]", "current [A]")
-    more = len(bare.source.events) - len(rows)
+        for e in source.events[:20]
+    ]
+    more = len(source.events) - len(events)
     note = "Regularised by dt = |cos q| ds: the crank speed is unbounded there, the speed of the platform is not."
     note += f" {more} more events are left out." if more > 0 else ""
-    limit = tuple(
+
+    def end(run: DriveRun) -> float | str:
+        return float(run.angle[-1]) if run.complete else run.reason
+
+    rows: list[tuple[object, ...]] = [
         (
             f"{inertia:.0e}",
-            f"{run.angle[-1]:.12g}" if run.complete else run.reason,
-            f"{abs(run.angle[-1] - bare.source.angle[-1]):.2e}",
-            f"{float(abs(run.speed).max()):.5g}",
-            f"{run.energy_error:.1e}",
+            end(run),
+            abs(run.angle[-1] - source.angle[-1]),
+            float(abs(run.speed).max()),
+            run.energy_error,
         )
         for inertia, run in zip(bare.inertias, bare.runs)
-    )
-    last = (
-        "none",
-        f"{bare.source.angle[-1]:.12g}" if bare.source.complete else bare.source.reason,
-        "",
-        "unbounded",
-        f"{bare.source.energy_error:.1e}",
-    )
-    heads = (
+    ]
+    rows.append(("none", end(source), None, "unbounded", source.energy_error))
+    columns = (
         "J_0 [kg m²]",
-        f"angle at {bare.source.time[-1]:g} s [rad]",
-        "difference",
-        "largest speed [rad/s]",
-        "energy",
+        f"angle at {source.time[-1]:g} s [rad] | .12g",
+        "difference | .2e",
+        "largest speed [rad/s] | .5g",
+        "energy | .1e",
     )
+    found = _bare_findings(bare, root)
     return (
-        Table("Without inertia: dead centres and reversals", columns, rows, note, _bare_findings(bare, root)),
-        Table(
-            "The model without inertia is a limit",
-            heads,
-            (*limit, last),
-            "Estimated; the largest speed at the samples.",
-        ),
-        Table("Method and errors of the run without inertia", ("", ""), balance_rows(bare.source)),
+        table("Without inertia: dead centres and reversals", _EVENT_COLUMNS, events, note, *found),
+        table("The model without inertia is a limit", columns, rows, "Estimated; the largest speed at the samples."),
+        Table("Method and errors of the run without inertia", ("", ""), balance_rows(source)),
     )
 
 
-def _machine_table(context: Context) -> MachineDriveTable:
+_EVENT_COLUMNS = (
+    "event",
+    "angle/pi | .12g",
+    "time t [s] | .14g",
+    "fictitious time s [s] | .14g",
+    "speed of the platform [m/s] | .13g",
+    "current [A]",
+)
+
+
+def machine_table(context: Context) -> MachineDriveTable:
+    """Return ``[mechanism.drive]`` of the scene."""
     table = getattr(context.scene.mechanism, "drive", None)
     if not isinstance(table, MachineDriveTable):
         raise SceneError(
@@ -434,36 +404,31 @@ def _machine_table(context: Context) -> MachineDriveTable:
     return table
 
 
-def drive_machine(context: Context, motions: tuple[Attempt, ...]) -> tuple[LabelledRun, ...]:
-    """Drive the first candidate that moved from rest, for each armature resistance; nothing if none moved."""
-    import numpy as np
-
+def machine_drive(machine: SingleMotorPlatform, table: MachineDriveTable, resistance: float) -> MotorDrivenPlatform:
+    """Build the drive of the real machine for an armature resistance (ohm)."""
     from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
-    table = _machine_table(context)
+    model = MotorDrivenPlatform.of_machine(
+        machine,
+        dc_motor(table.motor, resistance),
+        mass=table.mass,
+        gyration=table.gyration,
+        mass_centre=complex(*table.mass_centre),
+        wheel_inertia=table.wheel_inertia,
+        pinion_inertia=table.pinion_inertia,
+        efficiency=table.efficiency,
+    )
+    return replace(model, friction=table.friction, load=table.load)
+
+
+def drive_machine(context: Context, motions: tuple[Attempt, ...]) -> tuple[LabelledRun, ...]:
+    """Drive the first candidate that moved from rest, for each armature resistance; nothing if none moved."""
+    table = machine_table(context)
     moved: Any = next((a.value for a in motions if not a.failed), None)
     if moved is None:
         return ()
-    times = np.linspace(0.0, table.end, table.samples)
-    found = []
-    try:
-        for resistance in table.resistances:
-            model = MotorDrivenPlatform.of_machine(
-                moved.mechanism,
-                dc_motor(table.motor, resistance),
-                mass=table.mass,
-                gyration=table.gyration,
-                mass_centre=complex(*table.mass_centre),
-                wheel_inertia=table.wheel_inertia,
-                pinion_inertia=table.pinion_inertia,
-                efficiency=table.efficiency,
-                friction=table.friction,
-                load=table.load,
-            )
-            found.append(LabelledRun(resistance, model, model.simulate(times, rtol=table.tolerance)))
-    except (SpecError, GeometryError) as error:
-        raise (context.scene.place / "mechanism" / "drive").error(f"cannot be computed: {error}") from error
-    return tuple(found)
+    with _refused(context, "drive"):
+        return _runs(table, (machine_drive(moved.mechanism, table, r) for r in table.resistances))
 
 
 def tables(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Table, ...]:
@@ -477,38 +442,9 @@ def tables(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Table, ...]
         Quantity(f"{name} inertia of the platform at the crank", value, "kg m^2", "estimated", rounding)
         for name, value in (("least", low), ("largest", high), ("mean", mean))
     ]
-    quantities.append(
-        Quantity("constant inertia of rotor, pinion and wheels", model.constant_inertia, "kg m^2", "exact")
-    )
-    quantities.append(
-        Quantity("dead centres of the platform in a turn", len(model.inertia.dead_centres), "", "estimated")
-    )
+    quantities += [
+        Quantity("constant inertia of rotor, pinion and wheels", model.constant_inertia, "kg m^2", "exact"),
+        Quantity("dead centres of the platform in a turn", len(model.inertia.dead_centres), "", "estimated"),
+    ]
     note = "Series of the real motion over a turn; its truncation is the error."
     return (quantity_table("What the motor feels", quantities, note), *run_tables(runs, headline=True))
-
-
-def curves(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ...]:
-    """Torque, speed and phase portraits, the inertia over a turn, the torque at constant speed."""
-    if not runs:
-        return ()
-    import numpy as np
-
-    from graphsynth.drawing.plots import Line
-    from graphsynth.pipeline.display import TURN, chart
-    from graphsynth.systems.platform.motor_stages_pictures import run_pictures
-
-    model, table = runs[0].drive, _machine_table(context)
-    inertia: EffectiveInertia = model.inertia
-    q = np.linspace(0.0, math.tau, 361)
-    own = Line((), model.constant_inertia, "rotor, pinion, wheels", "soft", "--")
-    felt = [Line(q, inertia.value(q) + model.constant_inertia)]
-    w = table.motor.speed / model.train.ratio
-    held = [Line(q, model.torque_at_speed(q, w))]
-    words = "Of the real geometry: velocities of the platform per crank speed, squared."
-    even = f"At the crank, at {w:g} rad/s: inverse dynamics."
-    x = "wheel angle [°]"
-    return (
-        chart("Inertia at the crank", felt, x, "inertia [kg mm²]", words, xticks=TURN, levels=[own]),
-        chart("Torque that would keep the speed even", held, x, "torque [mN m]", even, xticks=TURN),
-        *run_pictures(runs),
-    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from graphsynth.pipeline.display import TURN, chart, shown_motion
 from graphsynth.pipeline.products import Picture
 from graphsynth.pipeline.stages import Context
-from graphsynth.systems.platform.motor_stages import Claim, LabelledRun, WithoutInertia, table_of
+from graphsynth.systems.platform.motor_stages import Claim, LabelledRun, WithoutInertia, machine_table, table_of
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.driven.reduction import ReductionStudy
@@ -186,3 +186,27 @@ def _bare_pictures(context: Context, bare: WithoutInertia) -> list[Picture]:
             f"J_0 in kg m². The spikes of the crank speed at the dead centres are cut off at {spike:.3g} rad/s.",
         ),
     ]
+
+
+def curves(context: Context, runs: tuple[LabelledRun, ...]) -> tuple[Picture, ...]:
+    """Torque, speed and phase portraits, the inertia over a turn, the torque at constant speed."""
+    if not runs:
+        return ()
+    import numpy as np
+
+    from graphsynth.drawing.plots import Line
+
+    model, table = runs[0].drive, machine_table(context)
+    q = np.linspace(0.0, math.tau, 361)
+    own = Line((), model.constant_inertia, "rotor, pinion, wheels", "soft", "--")
+    felt = [Line(q, model.inertia.value(q) + model.constant_inertia)]
+    w = table.motor.speed / model.train.ratio
+    held = [Line(q, model.torque_at_speed(q, w))]
+    words = "Of the real geometry: velocities of the platform per crank speed, squared."
+    even = f"At the crank, at {w:g} rad/s: inverse dynamics."
+    x = "wheel angle [°]"
+    return (
+        chart("Inertia at the crank", felt, x, "inertia [kg mm²]", words, xticks=TURN, levels=[own]),
+        chart("Torque that would keep the speed even", held, x, "torque [mN m]", even, xticks=TURN),
+        *run_pictures(runs),
+    )

@@ -137,7 +137,8 @@ def _check_resistances(resistances: tuple[float, ...]) -> None:
     require(1 <= len(resistances) <= 4, f"has {len(resistances)} resistances_ohm; give one to four, in ohm")
 
 
-_STEPS = "graphsynth.systems.platform.motor_stages"
+_HERE = "graphsynth.systems.platform"
+_STEPS = f"{_HERE}.motor_stages"
 SYSTEM = System(
     table=PlatformDriveTable,
     cases=("platform-14.8", *(f"platform-12.{k}" for k in range(24, 31))),
@@ -154,7 +155,7 @@ SYSTEM = System(
         Stage("compare solvers", f"{_STEPS}:solvers", (), ("solvers",)),
     ),
     evidence=(
-        Plan("drive", "graphsynth.systems.platform.evidence:motor_drive"),
-        *plans("graphsynth.systems.platform.evidence", "small-inductance"),
+        Plan("drive", f"{_HERE}.evidence:motor_drive"),
+        *plans(f"{_HERE}.evidence", "small-inductance"),
     ),
 )

@@ -55,7 +55,7 @@ SYSTEM = System(
         Stage("plot", f"{_HERE}.stages_pictures:plots", ("motions",), ("plots",)),
         Stage("drive", f"{_HERE}.motor_stages:drive_machine", ("motions",), ("drive",)),
         Stage("report the drive", f"{_HERE}.motor_stages:tables", ("drive",), ("drive_tables",)),
-        Stage("plot the drive", f"{_HERE}.motor_stages:curves", ("drive",), ("drive_curves",)),
+        Stage("plot the drive", f"{_HERE}.motor_stages_pictures:curves", ("drive",), ("drive_curves",)),
     ),
-    evidence=plans("graphsynth.systems.platform.evidence", "assembly-modes", "double-root", "turn", "drive"),
+    evidence=plans(f"{_HERE}.evidence", "assembly-modes", "double-root", "turn", "drive"),
 )
