@@ -144,7 +144,7 @@ def test_report_shows_what_is_proved():
     report = assess_jamming(ToleranceBox(alpha="1/30", azimuth="0 +- 0.05"), samples=91)
     figure = drawn(report_picture(report))
     tilts, gaps = figure.axes
-    assert report.statement == tilts.get_title()
+    assert report.statement == " ".join(tilts.get_title().split())  # set in several lines
     turn = np.linspace(0.05, 359.95, 700)
     shown = {f: [c for a, b, c in bands(gaps) if a < f < b] for f in turn}
     assert all(len(colours) == 1 for colours in shown.values())  # the bands cover the turn once
