@@ -23,7 +23,9 @@ from graphsynth.jamming import Bearing, Fit, ToleranceBox
 from graphsynth.jamming.bearing import areas as circle_areas
 from graphsynth.jamming.bearing.parameters import Range
 from graphsynth.jamming.bearing.sweep import PieceInterference
-from graphsynth.jamming.intersection import Reading, circle_ellipse, krawczyk_boxes, reading_ellipse, surrogate_problem
+from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+from graphsynth.jamming.intersection.hull import circle_ellipse, surrogate_problem
+from graphsynth.jamming.intersection.readings import Reading, reading_ellipse
 from graphsynth.jamming.joints import bearing_limits
 from graphsynth.mechanism import constraints, files, joints, laws
 from graphsynth.mechanism.constraints import mobility_report

@@ -125,7 +125,7 @@ def gap_width(t):
 
 def test_interval_shoelace():
     printed("`[-443, 444]`")
-    from graphsynth.jamming.bearing.area_curve import crescent_boxes, interval_shoelace
+    from graphsynth.jamming.intersection.readings import crescent_boxes, interval_shoelace
 
     b = RH * math.cos(TILT) - HALF * math.sin(TILT)
     for count in (60, 1000):

@@ -104,7 +104,7 @@ def make(folder: Path) -> list[Path]:
     motion = with_trace_points(gs.simulate(found.mechanism, np.linspace(0.0, 2.0 * np.pi, 181)), 2)
     driver = found.mechanism.drivers[0]
     tilt = Misalignment(driver.base, driver.link, alpha=0.01)
-    report = gs.assess_jamming(motion, JointLimits(0.004), tilts=tilt)
+    report = gs.assess_jamming(motion, tilt=tilt, joints=JointLimits(0.004))
     pictures = {
         "readme-chains.svg": chains_picture(chains),
         "readme-motion.svg": animated_svg(motion, frames=60, title="One of them, with dimensions, turning"),

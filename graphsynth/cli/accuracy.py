@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from graphsynth.cli import console
@@ -30,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
     folder = options.out or Path("graphsynth-out") / f"{scene.name}-accuracy"
     _check_writable(folder)
     effort = Effort(rounds=options.rounds, quick=options.quick)
-    with _progress() as progress:
+    with console.counting() as progress:
         report = measure(Context(scene), plans, effort, progress)
     files = write_report(report, folder)
     if options.json:
@@ -54,18 +51,3 @@ def _check_writable(folder: Path) -> None:
         TemporaryFile(dir=folder).close()
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(folder)) from error
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], None] | None]:
-    """Show the problem under way while standard error is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=None)
-        yield lambda name, done, total: bar.update(task, description=name, completed=done, total=total)

@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         console.put_json(facts)
     else:
-        console.put(f"{found.statement}; {_closure(found.motion)}")
+        console.put(console.wrapped(f"{found.statement}; {_closure(found.motion)}"))
         console.put(f"{options.output}, {options.output.stat().st_size / 1000:.0f} kB")
     return 0
 
@@ -93,7 +93,7 @@ def _from_graph(options: argparse.Namespace) -> _Found:
     from graphsynth.kinematics.dimensional import embody
 
     if options.range is not None:
-        raise SpecError("--range belongs to a dimensioned mechanism: dimensions of a graph are sought for a full turn")
+        raise SpecError("--range belongs to a dimensioned mechanism; a graph gets dimensions for a full rotation")
     graph = read_graph(options.mechanism, options.line)
     found = embody(graph, seed=options.seed, driver=_on_frame(graph, options.driver))
     if found.motion is None or found.mechanism is None:
@@ -166,7 +166,7 @@ def _drivers(mechanism: Mechanism) -> str:
 
 
 def _closure(motion: Motion) -> str:
-    return motion.closure.statement if motion.completed else f"not a whole turn: {motion.reason}"
+    return motion.closure.statement if motion.completed else f"not a full rotation: {motion.reason}"
 
 
 def _number(value: float) -> float | None:

@@ -1,17 +1,18 @@
-"""``graphsynth catalog``: build, query, verify, export, merge; `evaluate` and `site` have modules of their own."""
+"""``graphsynth catalog``: build, evaluate, query, verify, export, merge, site."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
-from graphsynth.cli.workers import workers_for
+from graphsynth.cli.catalog_options import JOINT_LIMIT
+from graphsynth.core import wording
 from graphsynth.core.errors import SpecError
-from graphsynth.core.wording import plain
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -22,12 +23,14 @@ if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
 
 DIFFERENT = 1
+#: Chains from which all cores draw the atlas page.
+_MANY = 1000
 
 
 def run(options: argparse.Namespace) -> int:
     """Do one action of the verb."""
-    actions = {"build": _build, "query": _query, "verify": _verify, "export": _export, "merge": _merge}
-    return actions[options.action](options)
+    actions = (_build, _query, _verify, _export, _merge, _evaluate, _site)
+    return {action.__name__[1:]: action for action in actions}[options.action](options)
 
 
 def _build(options: argparse.Namespace) -> int:
@@ -42,9 +45,14 @@ def _build(options: argparse.Namespace) -> int:
         with _executor(options) as executor, _progress() as watch:
             for mobility in options.mobility:
                 Catalogue.build(
-                    options.output, options.links, mobility, fractionated=options.fractionated, executor=executor,
-                    shard=options.shard, watch=watch,
-                ).close()  # fmt: skip
+                    options.output,
+                    options.links,
+                    mobility,
+                    fractionated=options.fractionated,
+                    executor=executor,
+                    shard=options.shard,
+                    watch=watch,
+                ).close()
     except KeyboardInterrupt:
         console.note(f"{options.output} keeps what is written: give the same command to go on")
         raise
@@ -59,7 +67,7 @@ def _executor(options: argparse.Namespace) -> AbstractContextManager[Executor | 
         return dask_executor(options.scheduler)
     from graphsynth.atlas.making import processes
 
-    return processes(workers_for(options.workers, max(options.links) > 10 + min(options.mobility)))
+    return processes(console.workers_for(options.workers, max(options.links) > 10 + min(options.mobility)))
 
 
 @contextmanager
@@ -82,9 +90,14 @@ def _summary(options: argparse.Namespace, begin: float) -> int:
         size = options.output.stat().st_size
     if options.json:
         console.put_json(
-            {"file": str(options.output), "chains": chains, "bytes": size, "seconds": seconds,
-             "families": _records(families)}
-        )  # fmt: skip
+            {
+                "file": str(options.output),
+                "chains": chains,
+                "bytes": size,
+                "seconds": seconds,
+                "families": _records(families),
+            }
+        )
         return 0
     _put_frame(families)
     part = "" if getattr(options, "shard", None) is None else ", part {}/{}: merge all parts".format(*options.shard)
@@ -126,9 +139,7 @@ def _put_entry(catalogue: Catalogue, options: argparse.Namespace) -> None:
     plain["contracted graph"] = entry["contracted"]["edges"] or "none (a ring)"
     for relation in ("parents", "children"):
         plain[relation] = " ".join(entry[relation]) or "none in this catalogue"
-    width = max(map(len, plain))
-    for name, value in plain.items():
-        _put(f"{name:{width}}  {value}")
+    console.facts((name, wording.plain(str(value))) for name, value in plain.items())
     for inversion in entry["inversions"]:
         _put(f"frame {inversion['frame']}: {inversion['frame_joints']} joints, levels {inversion['levels']}")
         for own in entry["mechanisms"]:
@@ -153,9 +164,13 @@ def _verify(options: argparse.Namespace) -> int:
         found = catalogue.verify(chains=options.chains, seed=options.seed, quick=options.quick)
     if options.json:
         console.put_json(
-            {"passed": found.passed, "compared": found.compared, "differences": list(found.differences),
-             "seconds": round(found.seconds, 3)}
-        )  # fmt: skip
+            {
+                "passed": found.passed,
+                "compared": found.compared,
+                "differences": list(found.differences),
+                "seconds": round(found.seconds, 3),
+            }
+        )
     else:
         for difference in found.differences:
             _put(difference)
@@ -187,9 +202,102 @@ def _merge(options: argparse.Namespace) -> int:
     return _summary(options, begin)
 
 
+def _evaluate(options: argparse.Namespace) -> int:
+    """Evaluate, and say what the catalogue now holds."""
+    from graphsynth.atlas.catalogue import Catalogue
+    from graphsynth.core.ordered import processes
+
+    if options.joint_limit is not None and options.tilt is None:
+        raise SpecError("--joint-limit goes with --tilt; give both, or neither")
+    jamming = None
+    if options.tilt is not None:
+        limit = JOINT_LIMIT if options.joint_limit is None else options.joint_limit
+        jamming = math.radians(options.tilt), math.radians(limit)
+    begin = time.perf_counter()
+    with Catalogue(options.file) as catalogue:
+        try:
+            with processes(console.workers_for(options.workers, False)) as executor, console.counting() as bar:
+                watch = bar and (lambda step: bar("evaluating", step.done, step.total))
+                done = catalogue.evaluate(
+                    options.links,
+                    options.mobility,
+                    per_chain=options.per_chain,
+                    limit=options.limit or None,
+                    seed=options.seed,
+                    tries=options.tries,
+                    jamming=jamming,
+                    executor=executor,
+                    watch=watch,
+                )
+        except KeyboardInterrupt:
+            console.note(f"{options.file} keeps what is evaluated: give the same command to go on")
+            raise
+        held = _held(catalogue)
+    seconds = round(time.perf_counter() - begin, 3)
+    if options.json:
+        console.put_json({"file": str(options.file), "evaluated": done, "held": held, "seconds": seconds})
+        return 0
+    for row in held:
+        sure = f" ({row['guarantee']})" if row["guarantee"] else ""
+        console.put(f"{row['kind']:12}  {row['status']}{sure}: {row['count']}{_spread(row)}")
+    console.put(f"{options.file}: {done} evaluated now ({seconds:.1f} s)")
+    return 0
+
+
+def _held(catalogue: Catalogue) -> list[dict[str, Any]]:
+    """Count what is stored, by kind, status and guarantee."""
+    rows: list[dict[str, Any]] = catalogue.sql(
+        "SELECT kind, status, COALESCE(guarantee, '') AS guarantee, COUNT(*) AS count, MIN(value) AS least, "
+        "MAX(value) AS most FROM evaluations GROUP BY kind, status, guarantee ORDER BY kind, status, guarantee"
+    ).to_dict("records")
+    return [
+        {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
+        for row in rows
+    ]
+
+
+def _spread(row: dict[str, Any]) -> str:
+    if row["kind"] != "transmission" or row["least"] is None:
+        return ""
+    return f", {math.degrees(row['least']):.1f} to {math.degrees(row['most']):.1f} degrees"
+
+
+def _site(options: argparse.Namespace) -> int:
+    """Write the page and say what it holds."""
+    from graphsynth.atlas.catalogue import Catalogue
+    from graphsynth.atlas.site.building import build_site
+    from graphsynth.core.ordered import processes
+
+    begin = time.perf_counter()
+    with Catalogue(options.file) as catalogue:
+        count = console.workers_for(options.workers, len(catalogue) > _MANY)
+        with processes(count) as executor, console.counting() as watch:
+            report = build_site(
+                catalogue, options.output, motion_links=options.motion_links, executor=executor, watch=watch
+            )
+    seconds = round(time.perf_counter() - begin, 3)
+    facts = {
+        "page": str(report.page),
+        "chains": report.chains,
+        "motions": report.motions,
+        "files": report.files,
+        "bytes": report.size,
+        "first_load": report.first_load,
+        "seconds": seconds,
+    }
+    if options.json:
+        console.put_json(facts)
+    else:
+        console.put(
+            f"{report.page}: {report.chains} chains, {report.motions} in motion, {report.files} files, "
+            f"{report.size / 1e6:.1f} MB, {report.first_load / 1000:.0f} kB to begin with ({seconds:.1f} s)"
+        )
+    return 0
+
+
 def _put(text: str) -> None:
     """Print a line that may come from a file: nothing in it steers the terminal."""
-    console.put(plain(text))
+    console.put(console.wrapped(wording.plain(text), 4))
 
 
 def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
@@ -208,7 +316,8 @@ def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _put_frame(frame: pd.DataFrame) -> None:
-    """Print a table as text that scripts can cut, whatever the width of the terminal."""
+    """Print a table as text that scripts can cut; on a terminal too narrow for it, some columns below the others."""
     if len(frame.columns) and len(frame):
-        shown = frame.map(lambda value: plain(value) if isinstance(value, str) else value)
-        console.put(shown.rename(columns=plain).to_string(index=False, max_colwidth=60))
+        shown = frame.map(lambda value: wording.plain(value) if isinstance(value, str) else value)
+        text = shown.rename(columns=wording.plain)
+        console.put(text.to_string(index=False, max_colwidth=60, line_width=console.columns()))

@@ -6,11 +6,10 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from graphsynth.cli.catalog_evaluate import add_evaluate
-from graphsynth.cli.catalog_site import add_site
-
 Parsers = argparse._SubParsersAction  # argparse has no public name for it
 _MOST_NUMBERS = 300
+#: Tilt that every joint takes up by default, degrees.
+JOINT_LIMIT = 0.3
 
 
 def add_catalog(
@@ -27,8 +26,8 @@ def add_catalog(
     _add_verify(own)
     _add_export(own)
     _add_merge(own)
-    add_evaluate(own, _numbers, _limit, workers)
-    add_site(own, workers)
+    _add_evaluate(own, workers)
+    _add_site(own, workers)
 
 
 def _action(own: Parsers[argparse.ArgumentParser], name: str, summary: str) -> argparse.ArgumentParser:
@@ -50,9 +49,13 @@ def _add_build(
         "--fractionated", action="store_true", help="for W >= 2: include chains that fall apart at a link or a joint"
     )
     parser.add_argument(
-        "-o", "--output", type=Path, default=Path("catalogue.sqlite"), metavar="FILE",
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("catalogue.sqlite"),
+        metavar="FILE",
         help="the catalogue (default catalogue.sqlite)",
-    )  # fmt: skip
+    )
     parser.add_argument("--shard", type=shard, metavar="I/M", help="do only shard I of M (1 <= I <= M)")
     parser.add_argument("--workers", type=workers, metavar="K", help="worker processes (default: all cores)")
     parser.add_argument(
@@ -101,6 +104,55 @@ def _add_merge(own: Parsers[argparse.ArgumentParser]) -> None:
     parser = _action(own, "merge", "Make one catalogue of its shards.")
     parser.add_argument("parts", type=Path, nargs="+", metavar="PART", help="files built with --shard I/M, all of them")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="the catalogue")
+
+
+def _add_evaluate(own: Parsers[argparse.ArgumentParser], workers: Callable[[str], int]) -> None:
+    summary = "Find dimensions for a full rotation; store them with transmission and, if asked, a jamming verdict."
+    parser = _action(own, "evaluate", summary)
+    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
+    parser.add_argument("--links", type=_numbers, metavar="N..M", help="numbers of links (default all)")
+    parser.add_argument("--mobility", type=_numbers, metavar="W..V", help="mobilities (default all)")
+    parser.add_argument(
+        "--per-chain",
+        type=_limit,
+        default=1,
+        metavar="N",
+        help="mechanisms of each chain, those of the smallest groups first (default 1; 0: all)",
+    )
+    parser.add_argument(
+        "--limit", type=_limit, metavar="N", default=0, help="evaluate at most N mechanisms now (default 0: all)"
+    )
+    parser.add_argument("--seed", type=_limit, default=0, metavar="S", help="of the search for dimensions (default 0)")
+    parser.add_argument("--tries", type=_limit, default=4, metavar="N", help="searches for each mechanism (default 4)")
+    parser.add_argument(
+        "--tilt",
+        type=float,
+        metavar="DEGREES",
+        help="prove whether it binds when the axis of the first driver is tilted by at most this, in any direction",
+    )
+    parser.add_argument(
+        "--joint-limit",
+        type=float,
+        metavar="DEGREES",
+        help=f"tilt that every joint takes up, with --tilt (default {JOINT_LIMIT})",
+    )
+    parser.add_argument("--workers", type=workers, metavar="K", help="worker processes (default one)")
+
+
+def _add_site(own: Parsers[argparse.ArgumentParser], workers: Callable[[str], int]) -> None:
+    parser = _action(own, "site", "Write the atlas page: a static site that opens from a file.")
+    parser.add_argument("file", type=Path, metavar="FILE", help="the catalogue")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder of the page")
+    parser.add_argument(
+        "--motion-links",
+        type=int,
+        default=10,
+        metavar="N",
+        help="show chains of at most N links in motion (default 10; 0: none)",
+    )
+    parser.add_argument(
+        "--workers", type=workers, metavar="K", help="worker processes (default: one; all for big work)"
+    )
 
 
 def _numbers(text: str) -> list[int]:

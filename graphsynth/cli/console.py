@@ -1,17 +1,20 @@
-"""What the verbs print: results on standard output, progress and notes on standard error."""
+"""What the verbs share: results on standard output, progress and notes on standard error, how many processes."""
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
-from collections.abc import Callable, Iterator
+import textwrap
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, ProgressColumn
 
     from graphsynth.synthesis.writing import Step
 
@@ -26,10 +29,31 @@ def put_json(document: Any) -> None:
     put("".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in json.dumps(document, ensure_ascii=False)))
 
 
+def columns() -> int | None:
+    """Return the width of the terminal; None if there is none, and lines may have any length."""
+    return shutil.get_terminal_size((0, 0)).columns or None
+
+
+def wrapped(text: str, indent: int = 0) -> str:
+    """Break a line between words where the terminal ends; what follows is indented."""
+    width = columns()
+    if width is None or len(text) <= width:
+        return text
+    return textwrap.fill(text, width, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
+
+
+def facts(rows: Iterable[tuple[str, str]]) -> None:
+    """Print names and values in two columns; a name that is empty goes on with the one before."""
+    rows = list(rows)
+    wide = max((len(name) for name, _ in rows), default=0) + 2
+    for name, value in rows:
+        put(wrapped(f"{name:{wide}}{value}", wide))
+
+
 def note(text: str) -> None:
     """Print a remark for people; nobody need be there to read it."""
     with suppress(OSError):
-        sys.stderr.write(text + "\n")
+        sys.stderr.write("\n".join(map(wrapped, text.split("\n"))) + "\n")
     settle(sys.stderr)
 
 
@@ -65,24 +89,23 @@ def table(title: str, header: list[str], rows: list[list[str]]) -> None:
     screen().print(shown)
 
 
+def workers_for(asked: int | None, big: bool) -> int:
+    """Return the number of worker processes: as asked, else all cores for big work and one for small."""
+    if asked is not None:
+        return asked
+    return (os.cpu_count() or 1) if big else 1
+
+
 @contextmanager
 def progress(what: str) -> Iterator[Callable[[Step], None] | None]:
     """Show count, rate and remaining time while standard error is a terminal."""
     if not sys.stderr.isatty():
         yield None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import TextColumn, TimeRemainingColumn
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[graphs]:,} graphs, {task.fields[rate]:,.0f}/s"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    graphs = TextColumn("{task.fields[graphs]:,} graphs, {task.fields[rate]:,.0f}/s")
+    with _bar(graphs, TextColumn("left"), TimeRemainingColumn()) as bar:
         task = bar.add_task(what, total=1.0, graphs=0, rate=0.0)
 
         def watch(step: Step) -> None:
@@ -91,3 +114,24 @@ def progress(what: str) -> Iterator[Callable[[Step], None] | None]:
             bar.update(task, completed=step.done, graphs=step.graphs, rate=rate)
 
         yield watch
+
+
+@contextmanager
+def counting() -> Iterator[Callable[[str, int, int | None], None] | None]:
+    """Show what is under way, how many are done and of how many, while standard error is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.progress import MofNCompleteColumn
+
+    with _bar(MofNCompleteColumn()) as bar:
+        task = bar.add_task("starting", total=None)
+        yield lambda name, done, total: bar.update(task, description=name, completed=done, total=total)
+
+
+def _bar(counted: ProgressColumn, *after: ProgressColumn) -> Progress:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), counted, TimeElapsedColumn(), *after)
+    return Progress(*columns, console=Console(stderr=True), transient=True)

@@ -26,8 +26,9 @@ def run(options: argparse.Namespace) -> int:
     for name in (options.source_format, options.target_format):
         format_of("", name or next(iter(FORMATS)))
     for place, name, option in (
-        (options.source, options.source_format, "--from"), (options.output, options.target_format, "--to")
-    ):  # fmt: skip
+        (options.source, options.source_format, "--from"),
+        (options.output, options.target_format, "--to"),
+    ):
         if place == PIPE and name is None:
             raise SpecError(f"a pipe has no suffix: give its format with {option}, one of {', '.join(FORMATS)}")
     if options.source == PIPE:

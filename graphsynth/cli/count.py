@@ -7,7 +7,6 @@ import time
 
 from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
-from graphsynth.cli.workers import workers_for
 
 
 def run(options: argparse.Namespace) -> int:
@@ -21,7 +20,10 @@ def run(options: argparse.Namespace) -> int:
         console.note(f"nothing to count: {problem.reason}")
     size = sum(len(family.graphs) for family in problem.families)
     try:
-        with processes(workers_for(options.workers, size > 100_000)) as executor, console.progress("counting") as watch:
+        with (
+            processes(console.workers_for(options.workers, size > 100_000)) as executor,
+            console.progress("counting") as watch,
+        ):
             count = count_with_checkpoint(
                 problem, shard=options.shard, checkpoint=options.checkpoint, executor=executor, watch=watch
             )

@@ -1,4 +1,4 @@
-"""``graphsynth doctor``."""
+"""``graphsynth doctor`` and ``graphsynth schema``: what the program knows of itself."""
 
 from __future__ import annotations
 
@@ -8,6 +8,16 @@ from graphsynth.cli import console
 
 
 def run(options: argparse.Namespace) -> int:
+    """Print the JSON Schema of scene files, or where the machine code of the kernels comes from."""
+    if options.verb == "schema":
+        from graphsynth.pipeline.schema import schema_text
+
+        console.put(schema_text().rstrip("\n"))
+        return 0
+    return _doctor(options)
+
+
+def _doctor(options: argparse.Namespace) -> int:
     """Print where the machine code of the kernels comes from, and why."""
     from graphsynth.core.native import doctor, library
 

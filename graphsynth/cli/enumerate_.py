@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from graphsynth.cli import console
 from graphsynth.cli.question import problem_of
-from graphsynth.cli.workers import workers_for
 from graphsynth.core.errors import GraphsynthError, SpecError, TooLargeError
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     if problem.reason:
         console.note(f"nothing to list: {problem.reason}")
     weight = sum(piece.weight for piece in problem.pieces(listing=True))
-    with processes(workers_for(options.workers, weight > BIG)) as executor:
+    with processes(console.workers_for(options.workers, weight > BIG)) as executor:
         if options.output is None:
             from graphsynth.synthesis.problem import texts
             from graphsynth.synthesis.shards import shard_of

@@ -257,9 +257,13 @@ def _add_animate(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     )
     parser.add_argument("--line", type=int, default=1, metavar="N", help="line of a file of graphs (default 1)")
     parser.add_argument(
-        "-o", "--output", type=Path, default=Path("mechanism.html"), metavar="FILE",
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("mechanism.html"),
+        metavar="FILE",
         help="FILE.html (default mechanism.html), .gif or .svg",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--driver", type=int, action="append", metavar="LINK", help="driven link on the frame (once for each driver)"
     )
@@ -291,7 +295,7 @@ def _add_accuracy(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def _add_schema(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    _verb(verbs, "schema", "schema", "Print the JSON Schema of scene files, for editors.")
+    _verb(verbs, "schema", "doctor", "Print the JSON Schema of scene files, for editors.")
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graphsynth.cli import console
-from graphsynth.cli.workers import workers_for
 
 if TYPE_CHECKING:
-    from graphsynth.pipeline.stages import Progress, Report
+    from graphsynth.pipeline.stages import Report
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,7 +43,7 @@ def _run(scene: Any, folder: Path, options: argparse.Namespace) -> Report:
     from graphsynth.core.ordered import processes
     from graphsynth.pipeline.runner import has_stream, run as run_scene
 
-    with _progress() as progress, processes(workers_for(options.workers, has_stream(scene))) as executor:
+    with console.counting() as progress, processes(console.workers_for(options.workers, has_stream(scene))) as executor:
         return run_scene(scene, folder, executor, progress, options.fresh)
 
 
@@ -64,22 +60,3 @@ def _document(report: Report, explained: bool) -> dict[str, Any]:
 
         document["explain"] = explain_json(report)
     return document
-
-
-@contextmanager
-def _progress() -> Iterator[Progress | None]:
-    """Show the stage under way while standard error is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=None)
-
-        def show(stage: str, done: int, total: int) -> None:
-            bar.update(task, description=stage, completed=done, total=total)
-
-        yield show

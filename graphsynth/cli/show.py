@@ -26,11 +26,11 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         console.put_json(facts)
     else:
-        width = max(map(len, facts))
+        rows = []
         for name, value in facts.items():
             lines = value if isinstance(value, list) and value and isinstance(value[0], str) else [value]
-            for i, line in enumerate(lines):
-                console.put(f"{name if i == 0 else '':{width}}  {_plain(line)}")
+            rows += [(name if i == 0 else "", _plain(line)) for i, line in enumerate(lines)]
+        console.facts(rows)
     if options.output and options.output.suffix.lower() in PICTURES:
         _draw(graph, options.output, options.view, options.driver)
     elif options.output:
@@ -92,11 +92,11 @@ def read_graph(text: str, line: int = 1) -> MechanismGraph:
 
 
 def _one(text: str, place: str) -> MechanismGraph:
-    from graphsynth.formats.graph_json import parse_line
+    from graphsynth.formats.graph_json import parse_lines
     from graphsynth.structure.graph import MechanismGraph
 
     if text.startswith("{"):
-        return parse_line(text, place)
+        return parse_lines(text, place)
     try:
         return MechanismGraph.from_key(text) if text.startswith("1") else MechanismGraph.from_text(text)
     except FormatError as error:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from graphsynth.cli import console
 
 if TYPE_CHECKING:
-    from graphsynth.evidence.stress import Case, StressReport
+    from graphsynth.evidence.stress import StressReport
 
 WRONG = 1
 INTERRUPTED = 130
@@ -48,8 +47,9 @@ def run(options: argparse.Namespace) -> int:
         return _list(options)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
-    with _progress() as progress:
-        report = run_stress(_names(options), slow=not options.fast, files=options.cases, progress=progress)
+    with console.counting() as bar:
+        told = bar and (lambda case, number, total: bar(f"{case.name} {case.title}", number, total))
+        report = run_stress(_names(options), slow=not options.fast, files=options.cases, progress=told)
     if options.out:
         from graphsynth.evidence.stress.page import write_report
 
@@ -84,7 +84,7 @@ def _list(options: argparse.Namespace) -> int:
         console.put_json([{"name": case.name, "title": case.title, "slow": case.slow} for case in chosen])
         return 0
     for case in chosen:
-        console.put(f"{case.name:17} {case.title}{' (slow)' if case.slow else ''}")
+        console.put(console.wrapped(f"{case.name:17} {case.title}{' (slow)' if case.slow else ''}", 18))
     return 0
 
 
@@ -118,27 +118,3 @@ def _show(report: StressReport) -> None:
             if check.status.value == "WRONG":
                 console.put(f"{outcome.case.name}: {check.what}: right is {check.right}, given is {check.given}")
     console.put(report.statement)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[Case, int, int], None] | None]:
-    """Show the case under way while standard error is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns: tuple[Any, ...] = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=None)
-
-        def show(case: Case, number: int, total: int) -> None:
-            bar.update(task, description=f"{case.name} {case.title}", completed=number, total=total)
-
-        yield show

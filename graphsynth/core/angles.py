@@ -21,12 +21,12 @@ _SAMPLES = 361
 
 
 @overload
-def degrees(values: float) -> float:  # noqa: D418
+def degrees(values: float) -> float:
     """Return an angle given in degrees in radians."""
 
 
 @overload
-def degrees(values: ArrayLike) -> NDArray[np.float64]:  # noqa: D418
+def degrees(values: ArrayLike) -> NDArray[np.float64]:
     """Return angles given in degrees in radians, an array of the same shape."""
 
 

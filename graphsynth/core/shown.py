@@ -49,15 +49,6 @@ class Shown:
         return f"<figure>{self._picture()}<figcaption>{escape(title)}{table(rows)}</figcaption></figure>"
 
 
-class Printed:
-    """Shows itself in a notebook as it prints itself."""
-
-    def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<figure><pre>{escape(repr(self))}</pre></figure>"
-
-
 def table(rows: list[tuple[str, str]]) -> str:
     """Write rows of a name and a value as a small HTML table."""
     from html import escape

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from graphsynth.intervals.interval import Interval
-    from graphsynth.jamming.intersection import CircleEllipse, IntersectionBoxes
+    from graphsynth.jamming.intersection.boxes import IntersectionBoxes
+    from graphsynth.jamming.intersection.hull import CircleEllipse
 
 Array = NDArray[np.float64]
 
@@ -49,11 +50,11 @@ def crossing_picture(problem: CircleEllipse, boxes: IntersectionBoxes | None = N
 
     `boxes`: result of Krawczyk's method to be drawn into the detail.
 
-    >>> from graphsynth.jamming.intersection import circle_ellipse
+    >>> from graphsynth.jamming.intersection.hull import circle_ellipse
     >>> len(crossing_picture(circle_ellipse(5, 6, 4, "0.1", "0.01")).axes)
     3
     """
-    from graphsynth.jamming.intersection import exact_hull
+    from graphsynth.jamming.intersection.hull import exact_hull
 
     found = exact_hull(problem)
     figure = new_figure((13.5, 4.6))
@@ -192,7 +193,7 @@ def region_picture(problem: CircleEllipse, exaggeration: float | None = None) ->
     difference of the radii becomes a fifth of the radius.  It is written on the picture. Raises `GeometryError` for an
     exaggeration that is not positive.
 
-    >>> from graphsynth.jamming.intersection import circle_ellipse
+    >>> from graphsynth.jamming.intersection.hull import circle_ellipse
     >>> len(region_picture(circle_ellipse(5, 6, 4)).axes)
     2
     """

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from graphsynth.drawing.plots import Chart
     from graphsynth.jamming.assess import JammingReport
-    from graphsynth.jamming.bearing.area_curve import AreaCurve
+    from graphsynth.jamming.bearing.areas_enclosed import AreaCurve
     from graphsynth.jamming.bearing.bearing import Bearing
 
 Array = NDArray[np.float64]
@@ -128,11 +128,11 @@ def area_picture(curve: AreaCurve, zooms: tuple[tuple[float, float], ...] | None
 
     `zooms`: windows in degrees; the two of the source by default.
 
-    >>> from graphsynth.jamming.bearing.area_curve import area_curve
+    >>> from graphsynth.jamming.bearing.areas_enclosed import area_curve
     >>> len(area_picture(area_curve()).axes)
     3
     """
-    from graphsynth.jamming.bearing.area_curve import ZOOMS
+    from graphsynth.jamming.bearing.areas_enclosed import ZOOMS
 
     windows = ZOOMS if zooms is None else zooms
     figure = new_figure((10.5, 7.0))
@@ -173,7 +173,7 @@ def area_chart(curve: AreaCurve, window: tuple[float, float] | None = None) -> C
     `window`: degrees; only the angles inside are drawn. Raises `GeometryError` for a window without an angle of the
     curve.
 
-    >>> from graphsynth.jamming.bearing.area_curve import area_curve
+    >>> from graphsynth.jamming.bearing.areas_enclosed import area_curve
     >>> area_chart(area_curve(), (90.0, 115.5)).svg()[:15]
     '<svg class="gs"'
     """

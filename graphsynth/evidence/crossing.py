@@ -20,7 +20,7 @@ from graphsynth.evidence.rows import Effort, Problem, Row, best_of
 if TYPE_CHECKING:
     from graphsynth.intervals import Interval
     from graphsynth.jamming.bearing.bearing import Bearing
-    from graphsynth.jamming.intersection import CircleEllipse
+    from graphsynth.jamming.intersection.hull import CircleEllipse
 
 _DIGITS = 50
 #: Parts of the search by boxes after which it is stopped.
@@ -68,7 +68,8 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
     >>> problem.methods, problem.rows[0].status.value
     (('exact hull', 'Krawczyk boxes'), 'ok')
     """
-    from graphsynth.jamming.intersection import krawczyk_boxes, surrogate_problem
+    from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+    from graphsynth.jamming.intersection.hull import surrogate_problem
 
     effort = effort or Effort()
     given = surrogate_problem(bearing, sine)
@@ -95,7 +96,7 @@ def crossing_problem(bearing: Bearing, sine: str, effort: Effort | None = None) 
 
 def _hull_row(problem: CircleEllipse, truth: tuple[Any, Any], effort: Effort) -> tuple[Interval, Row]:
     """Exact hull against 50 digits: its width, and whether it holds the crossing."""
-    from graphsynth.jamming.intersection import exact_hull
+    from graphsynth.jamming.intersection.hull import exact_hull
 
     found, *timed = best_of(lambda: exact_hull(problem), effort)
     why = "" if _holds(found.hull, *truth) else "the hull does not hold the crossing"
@@ -161,7 +162,7 @@ def precise_area(bearing: Bearing, sine: str) -> Any:
     """
     import mpmath
 
-    from graphsynth.jamming.intersection import surrogate_problem
+    from graphsynth.jamming.intersection.hull import surrogate_problem
 
     with mpmath.workdps(_DIGITS):
         R, S = mpmath.mpf(repr(bearing.Rb)), mpmath.mpf(sine)
@@ -240,7 +241,7 @@ def _direct_areas(R: Any, a: Any, b: Any) -> Any:
 
 def _polygon(R: float, a: float, b: float, count: int) -> float:
     """Shoelace sum of points on both crescents of the ellipse outside the circle."""
-    from graphsynth.jamming.bearing.area_curve import crescent_points
+    from graphsynth.jamming.intersection.readings import crescent_points
 
     x, y = crescent_points(R, a, b, count).T
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
@@ -276,7 +277,7 @@ def _enclosed_area(bearing: Bearing, sine: str, many: int, truth: Any, effort: E
 
 
 def _shoelace_row(R: float, a: float, b: float, boxes: int, truth: Any, effort: Effort) -> Row:
-    from graphsynth.jamming.bearing.area_curve import crescent_boxes, interval_shoelace
+    from graphsynth.jamming.intersection.readings import crescent_boxes, interval_shoelace
 
     def run() -> Interval:
         return interval_shoelace(crescent_boxes(R, a, b, boxes)) * 2

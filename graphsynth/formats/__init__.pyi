@@ -1,5 +1,5 @@
-from .engine_run import EngineRun as EngineRun
 from .export_certificate import ExportCertificate as ExportCertificate, Trial as Trial, certify_export as certify_export
+from .exporting import EngineRun as EngineRun, SpanningTree as SpanningTree, spanning_tree as spanning_tree
 from .exudyn_model import (
     ExudynModel as ExudynModel,
     ExudynSettings as ExudynSettings,
@@ -27,4 +27,3 @@ from .registry import (
     write as write,
     write_text as write_text,
 )
-from .trees import SpanningTree as SpanningTree, spanning_tree as spanning_tree

@@ -17,7 +17,7 @@ from graphsynth.dynamics.elements import Spring, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.result import DynamicMotion
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.formats.engine_run import EngineRun
+from graphsynth.formats.exporting import EngineRun
 from graphsynth.formats.exudyn_model import ExudynSettings
 from graphsynth.formats.mjcf import MujocoSettings, to_mjcf
 
@@ -206,16 +206,28 @@ def certify_export(
     if not version:
         empty = tuple(_nothing(s, "not run", "the engine is not installed", math.nan) for s in trials)
         return ExportCertificate(
-            **common, length=math.nan, reference="", reference_error=math.nan, trials=empty, verdict="not run",
-            limit=math.nan, statement=f"{names['engine']} is not installed, so nothing was measured.",
-        )  # fmt: skip
+            **common,
+            length=math.nan,
+            reference="",
+            reference_error=math.nan,
+            trials=empty,
+            verdict="not run",
+            limit=math.nan,
+            statement=f"{names['engine']} is not installed, so nothing was measured.",
+        )
     reference, method, estimate = _reference(model, start, grid, rtol)
     measured = _with_orders([_measure(model, start, grid, s, reference) for s in trials])
     verdict, limit, statement = _judge(measured, float(tolerance), estimate)
     return ExportCertificate(
-        **common, length=float(reference.compiled.tables.size), reference=method, reference_error=estimate,
-        trials=tuple(measured), verdict=verdict, limit=limit, statement=statement,
-    )  # fmt: skip
+        **common,
+        length=float(reference.compiled.tables.size),
+        reference=method,
+        reference_error=estimate,
+        trials=tuple(measured),
+        verdict=verdict,
+        limit=limit,
+        statement=statement,
+    )
 
 
 def _nothing(settings: Settings, status: str, message: str, seconds: float) -> Trial:
@@ -264,12 +276,17 @@ def _names(model: DynamicModel, start: StartReport, settings: Settings) -> dict[
     else:
         coordinates = tuple(f"node of link {link} = centre of mass and angle of {link}" for link in model.bodies)
     return {
-        "key": str(mechanism.graph.key), "toolkit": __version__,
+        "key": str(mechanism.graph.key),
+        "toolkit": __version__,
         "engine": "MuJoCo" if isinstance(settings, MujocoSettings) else "exudyn",
-        "tree": tree, "cuts": cuts, "coordinates": coordinates,
-        "start_q": tuple(start.q.tolist()), "start_v": tuple(start.v.tolist()),
-        "closure": float(np.abs(closure).max(initial=0.0)), "velocity_residual": float(np.abs(speed).max(initial=0.0)),
-    }  # fmt: skip
+        "tree": tree,
+        "cuts": cuts,
+        "coordinates": coordinates,
+        "start_q": tuple(start.q.tolist()),
+        "start_v": tuple(start.v.tolist()),
+        "closure": float(np.abs(closure).max(initial=0.0)),
+        "velocity_residual": float(np.abs(speed).max(initial=0.0)),
+    }
 
 
 def _reference(model: DynamicModel, start: StartReport, grid: Array, rtol: float) -> tuple[DynamicMotion, str, float]:
@@ -318,12 +335,18 @@ def _measure(
     kinetic, total = mechanical_energy(model, reference.poses, reference.velocities)
     energy = mechanical_energy(model, run.poses, run.velocities)[1]
     return Trial(
-        settings.family, run.settings, run.step, run.status, run.message,
+        settings.family,
+        run.settings,
+        run.step,
+        run.status,
+        run.message,
         float(np.abs(residual(model.mechanism.joints, run.poses)).max(initial=0.0)),
         _distance(run.poses, reference.poses, size),
         _distance(run.velocities, reference.velocities, size) / speed,
-        float(np.abs(energy - total).max() / (kinetic.max() or 1.0)), math.nan, run.seconds,
-    )  # fmt: skip
+        float(np.abs(energy - total).max() / (kinetic.max() or 1.0)),
+        math.nan,
+        run.seconds,
+    )
 
 
 def mechanical_energy(model: DynamicModel, poses: Array, rates: Array) -> tuple[Array, Array]:

@@ -1,15 +1,26 @@
-"""What every export shares: refusals, carriers of gear pairs, constant torques."""
+"""What exports to other engines share: refusals, gear pairs, torques, the spanning tree, what a run gives back.
+
+The spanning tree and the joints that are cut are what an engine of joint coordinates needs, see theory/exports 2.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import deque
+from dataclasses import dataclass
 from typing import Any
 
-from graphsynth.core.errors import GeometryError
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graphsynth.core.checks import checked, finite_array
+from graphsynth.core.errors import GeometryError, GraphError
+from graphsynth.core.extras import need
 from graphsynth.dynamics.elements import Torque, TorqueSource
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.mechanism.joints import Gear, Revolute
+from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
+from graphsynth.mechanism.model import Mechanism
 
 Point = tuple[float, float]
 
@@ -80,3 +91,192 @@ def constant_torque(element: Torque | TorqueSource) -> tuple[float, float]:
             "train must have efficiency 1"
         )
     return torque * element.ratio, element.ratio**2 * element.rotor_damping
+
+
+@dataclass(frozen=True)
+class SpanningTree:
+    """A tree rooted at the frame.
+
+    Attributes
+    ----------
+    edges : tuple of (parent, link, joint)
+        Joints as indices into ``mechanism.joints``; parents come before their children.
+    cuts : tuple of int
+        The other joints, ascending; gears and cams are always among them.
+    """
+
+    edges: tuple[tuple[int, int, int], ...]
+    cuts: tuple[int, ...]
+
+    def children(self, link: int) -> tuple[tuple[int, int], ...]:
+        """(link, joint) of the links that hang on ``link``."""
+        return tuple((child, joint) for parent, child, joint in self.edges if parent == link)
+
+
+@checked
+def spanning_tree(mechanism: Mechanism) -> SpanningTree:
+    """Choose the tree: sliding pairs and slots stay in it, turning pairs are cut, the depth is small (exact).
+
+    A cut turning pair is one pair of points that coincide, which every engine knows; a cut sliding pair is not.  So
+    the tree holds as many sliding pairs and slots as it can, and the rest is filled breadth first from the frame.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+
+    Returns
+    -------
+    SpanningTree
+
+    Raises
+    ------
+    GraphError
+        A link held by gears or cams alone.
+
+    References
+    ----------
+    See theory/exports 2.
+
+    Examples
+    --------
+    >>> from graphsynth.mechanism.model import MechanismGraph
+    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
+    >>> slider_crank = Mechanism(graph, [
+    ...     Revolute(0, 1), Revolute(1, 2, (0.1, 0.0)), Revolute(2, 3, (0.3, 0.0)), Prismatic(0, 3)])
+    >>> spanning_tree(slider_crank)
+    SpanningTree(edges=((0, 3, 1), (0, 1, 0), (3, 2, 3)), cuts=(2,))
+    """
+    joints = mechanism.joints
+    slides = _forest(mechanism)
+    edges: list[tuple[int, int, int]] = []
+    seen = {mechanism.frame}
+    layer = deque(_component(joints, slides, mechanism.frame, seen, edges))
+    while layer:
+        link = layer.popleft()
+        for index, joint in enumerate(joints):
+            other = _across(joint, link)
+            if not isinstance(joint, Revolute) or other is None or other in seen:
+                continue
+            seen.add(other)
+            edges.append((link, other, index))
+            layer.extend(_component(joints, slides, other, seen, edges))
+    missing = sorted(set(range(mechanism.graph.links)) - seen)
+    if missing:
+        raise GraphError(f"links {missing} hang on gears or cams alone; give each a turning or sliding pair")
+    used = {index for *_, index in edges}
+    return SpanningTree(tuple(edges), tuple(k for k in range(len(joints)) if k not in used))
+
+
+def _across(joint: JointGeometry, link: int) -> int | None:
+    """Return the other link of a joint, None if the joint is elsewhere."""
+    return joint.b if joint.a == link else joint.a if joint.b == link else None
+
+
+def _forest(mechanism: Mechanism) -> set[int]:
+    """Sliding pairs, then slots, without a cycle (Kruskal)."""
+    root = list(range(mechanism.graph.links))
+
+    def find(link: int) -> int:
+        while root[link] != link:
+            link = root[link]
+        return link
+
+    chosen: set[int] = set()
+    for kind in (Prismatic, PinSlot):
+        for index, joint in enumerate(mechanism.joints):
+            if isinstance(joint, kind) and find(joint.a) != find(joint.b):
+                root[find(joint.a)] = find(joint.b)
+                chosen.add(index)
+    return chosen
+
+
+def _component(
+    joints: tuple[JointGeometry, ...],
+    slides: set[int],
+    start: int,
+    seen: set[int],
+    edges: list[tuple[int, int, int]],
+) -> list[int]:
+    """Walk the chosen sliding joints from ``start``; return the links reached, ``start`` first."""
+    reached = [start]
+    for link in reached:
+        for index in sorted(slides):
+            other = _across(joints[index], link)
+            if other is not None and other not in seen:
+                seen.add(other)
+                edges.append((link, other, index))
+                reached.append(other)
+    return reached
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class EngineRun:
+    """The motion that an engine computed (estimated; nothing is known of its error until it is compared).
+
+    Attributes
+    ----------
+    engine, version : str
+    settings : str
+        Integrator, constraint parameters.
+    step : float
+        Seconds.
+    times : ndarray, shape (n,)
+    poses, velocities : ndarray, shape (n, links, 3)
+        ``(x, y, theta)`` of the link frames, m and rad; NaN from where the engine failed.
+    status : str
+        "completed" or "failed".
+    message : str
+        One sentence.
+    steps : int
+    seconds : float
+        Wall time of the integration alone.
+    """
+
+    engine: str
+    version: str
+    settings: str
+    step: float
+    times: Array
+    poses: Array
+    velocities: Array
+    status: str
+    message: str
+    steps: int
+    seconds: float
+
+    @property
+    def completed(self) -> bool:
+        """Whether the last output time was reached with finite numbers."""
+        return self.status == "completed"
+
+
+def load_engine(name: str) -> Any:
+    """Import an engine; `MissingExtraError` if it is not installed."""
+    return need(name, "crosscheck", "a run in another engine")
+
+
+def steps_between(times: ArrayLike, step: float) -> tuple[Array, list[int]]:
+    """Return the times and the whole numbers of steps from the first to each of them.
+
+    >>> steps_between([0.0, 0.5, 2.0], 0.25)[1]
+    [0, 2, 8]
+    """
+    grid = finite_array("times", times, nan=True)
+    if grid.ndim != 1 or grid.size < 2 or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
+        raise GeometryError("times must be a list of two or more finite numbers that increase; sort them")
+    if not (np.isfinite(step) and step > 0.0):
+        raise GeometryError(f"step = {step} s must be positive; give the step of the engine")
+    counts = (grid - grid[0]) / step
+    whole = np.rint(counts)
+    if (np.abs(counts - whole) > 1e-6 * np.maximum(1.0, whole)).any() or (np.diff(whole) < 1.0).any():
+        raise GeometryError(f"step = {step} s does not divide the output times; give a step that does")
+    return grid, [int(n) for n in whole]
+
+
+def turn(angle: float, place: tuple[float, float]) -> tuple[float, float]:
+    """Turn a point or vector by an angle (rad)."""
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    return c * place[0] - s * place[1], s * place[0] + c * place[1]

@@ -19,8 +19,16 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.formats.engine_run import EngineRun, load_engine, steps_between, turn
-from graphsynth.formats.exporting import check_common, check_settings, constant_torque, gear_weights
+from graphsynth.formats.exporting import (
+    EngineRun,
+    check_common,
+    check_settings,
+    constant_torque,
+    gear_weights,
+    load_engine,
+    steps_between,
+    turn,
+)
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 
@@ -179,9 +187,10 @@ def _add_bodies(work: _Work) -> None:
         node = system.AddNode(
             items.NodeRigidBody2D(
                 referenceCoordinates=[float(place[0]), float(place[1]), work.angle(link)],
-                initialCoordinates=[0.0, 0.0, 0.0], initialVelocities=[float(v) for v in rate],
+                initialCoordinates=[0.0, 0.0, 0.0],
+                initialVelocities=[float(v) for v in rate],
             )
-        )  # fmt: skip
+        )
         inertia = body.inertia + _rotor(work.model, link)
         export.nodes[link] = node
         export.bodies[link] = system.AddObject(
@@ -224,10 +233,11 @@ def _add_joint(work: _Work, joint: Any) -> None:
         system.AddObject(
             items.ObjectJointPrismatic2D(  # the line belongs to the second marker
                 markerNumbers=[work.spot(joint.b, joint.at_b), work.spot(joint.a, joint.at_a)],
-                axisMarker0=[*along, 0.0], normalMarker1=[*turn(joint.angle_a, (0.0, 1.0)), 0.0],
+                axisMarker0=[*along, 0.0],
+                normalMarker1=[*turn(joint.angle_a, (0.0, 1.0)), 0.0],
                 constrainRotation=isinstance(joint, Prismatic),
             )
-        )  # fmt: skip
+        )
     elif isinstance(joint, Gear):
         _add_gear(work, joint)
     else:
@@ -251,9 +261,11 @@ def _add_element(work: _Work, element: Element) -> None:
         system.AddObject(
             items.ObjectConnectorSpringDamper(
                 markerNumbers=[work.spot(element.a, element.at_a), work.spot(element.b, element.at_b)],
-                referenceLength=element.free_length, stiffness=element.stiffness, damping=element.damping,
+                referenceLength=element.free_length,
+                stiffness=element.stiffness,
+                damping=element.damping,
             )
-        )  # fmt: skip
+        )
     elif isinstance(element, TorsionSpring):
         rest = element.free_angle - (work.angle(element.b) - work.angle(element.a))
         _torsion(work, element.a, element.b, element.stiffness, element.damping, rest)
@@ -264,10 +276,11 @@ def _add_element(work: _Work, element: Element) -> None:
             raise GeometryError(f"force on link {element.link} is a function; an exported one must be constant")
         system.AddLoad(
             items.LoadForceVector(
-                markerNumber=work.spot(element.link, element.at), loadVector=[*element.force, 0.0],
+                markerNumber=work.spot(element.link, element.at),
+                loadVector=[*element.force, 0.0],
                 bodyFixed=element.frame == "body",
             )
-        )  # fmt: skip
+        )
     else:
         raise GeometryError(f"{type(element).__name__} is not exported to exudyn; leave it out")
 
@@ -353,9 +366,18 @@ def run_exudyn(
     if not message and not np.isfinite(poses).all():
         message = "the solver ended before the last output time"
     return EngineRun(
-        "exudyn", exu.config.Version(), settings.text, settings.step, grid, poses, rates,
-        "failed" if message else "completed", message or "reached the last output time", counts[-1], seconds,
-    )  # fmt: skip
+        "exudyn",
+        exu.config.Version(),
+        settings.text,
+        settings.step,
+        grid,
+        poses,
+        rates,
+        "failed" if message else "completed",
+        message or "reached the last output time",
+        counts[-1],
+        seconds,
+    )
 
 
 def _options(exu: Any, start: StartReport, settings: ExudynSettings, steps: int, every: int) -> Any:

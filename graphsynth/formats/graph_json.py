@@ -78,7 +78,7 @@ def parse(text: str) -> Iterator[MechanismGraph | Mechanism]:
     return iter([graph_of(data)])
 
 
-def parse_line(line: str, place: str) -> MechanismGraph:
+def parse_lines(line: str, place: str) -> MechanismGraph:
     """Read one JSON line."""
     return graph_of(json_value(line, place), place)
 

@@ -1,30 +1,165 @@
 """A dynamic model as MuJoCo XML (MJCF): a tree of bodies, loops closed by equality constraints (theory/exports 2).
 
 The model is written in its start pose, and ``ref`` of every joint is the joint coordinate there, so that ``qpos`` are
-the joint coordinates of graphsynth: ``theta_b - theta_a`` of a turning pair, the displacement of a sliding pair.
+the joint coordinates of graphsynth: ``theta_b - theta_a`` of a revolute joint, the displacement of a prismatic one.
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.checks import finite, point, positive, three
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics.elements import Element, Force, Spring, Torque, TorqueSource, TorsionSpring
 from graphsynth.dynamics.model import DynamicModel, Rigid
 from graphsynth.dynamics.start import StartReport
-from graphsynth.formats.engine_run import turn
-from graphsynth.formats.exporting import check_common, check_settings, gear_weights
-from graphsynth.formats.mjcf_parts import Work, combine, fixed, site, text, write_load
-from graphsynth.formats.trees import SpanningTree, spanning_tree
+from graphsynth.formats.exporting import (
+    SpanningTree,
+    check_common,
+    check_settings,
+    constant_torque,
+    gear_weights,
+    spanning_tree,
+    turn,
+)
 from graphsynth.mechanism.joints import Gear, JointGeometry, PinSlot, Prismatic, Revolute
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
+
+
+@dataclass
+class Work:
+    """Workspace of one export."""
+
+    model: DynamicModel
+    start: StartReport
+    tree: SpanningTree
+    names: list[tuple[str, int, int]] = field(default_factory=list)
+    hinge: list[bool] = field(default_factory=list)
+    qpos: list[float] = field(default_factory=list)
+    qvel: list[float] = field(default_factory=list)
+    chain: dict[int, dict[int, int]] = field(default_factory=dict)  # link -> coordinate -> sign of its hinge
+    bodies: dict[int, ET.Element] = field(default_factory=dict)
+    sites: int = 0
+
+    def angle(self, link: int) -> float:
+        """Angle of a link at the start."""
+        return float(self.start.poses[link, 2])
+
+
+def text(*values: float) -> str:
+    """Shortest decimals that read back as the same doubles; -0 is written 0."""
+    return " ".join(repr(float(v) + 0.0) for v in values)
+
+
+def add(parent: ET.Element, tag: str, **attributes: str | float | tuple[float, ...]) -> ET.Element:
+    """Add an element; numbers are written by `text`."""
+    written = {
+        name: value if isinstance(value, str) else text(*value) if isinstance(value, tuple) else text(value)
+        for name, value in attributes.items()
+    }
+    return ET.SubElement(parent, tag, written)
+
+
+def site(work: Work, link: int, at: Point) -> str:
+    """Add a site to a link and return its name."""
+    name, work.sites = f"s{work.sites}", work.sites + 1
+    add(work.bodies[link], "site", name=name, pos=(*at, 0.0))
+    return name
+
+
+def combine(work: Work, weights: dict[int, float]) -> dict[int, float]:
+    """Return the combination of coordinates equal to a combination of link angles, but for a constant."""
+    total: dict[int, float] = {}
+    for link, weight in weights.items():
+        for k, sign in work.chain[link].items():
+            total[k] = total.get(k, 0.0) + weight * sign
+    return {k: w for k, w in sorted(total.items()) if abs(w) > 1e-14}
+
+
+def fixed(work: Work, tendon: ET.Element, name: str, combined: dict[int, float], **attributes: float) -> None:
+    """Add a tendon whose length is a combination of coordinates."""
+    element = add(tendon, "fixed", name=name, **attributes)
+    for k, weight in combined.items():
+        add(element, "joint", joint=work.names[k][0], coef=weight)
+
+
+def write_load(work: Work, element: Element, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
+    """Write one spring, damper, torque or force."""
+    if isinstance(element, Spring):
+        spatial = add(
+            tendon,
+            "spatial",
+            name=name,
+            stiffness=element.stiffness,
+            damping=element.damping,
+            springlength=element.free_length,
+        )
+        for link, at in ((element.a, element.at_a), (element.b, element.at_b)):
+            add(spatial, "site", site=site(work, link, at))
+    elif isinstance(element, TorsionSpring):
+        _torsion(work, element, name, tendon)
+    elif isinstance(element, Torque | TorqueSource):
+        _torque(work, element, name, tendon, actuator)
+    elif isinstance(element, Force):
+        _force(work, element, name, actuator)
+    else:
+        raise GeometryError(f"{type(element).__name__}: MuJoCo's dry friction is another law; leave the element out")
+
+
+def _torsion(work: Work, spring: TorsionSpring, name: str, tendon: ET.Element) -> None:
+    combined = combine(work, {spring.a: -1.0, spring.b: 1.0})
+    if not combined:
+        return  # the two links cannot turn against each other
+    constant = work.angle(spring.b) - work.angle(spring.a) - sum(w * work.qpos[k] for k, w in combined.items())
+    free = spring.free_angle - constant
+    if free < 0.0:  # a rest length must not be negative
+        free, combined = -free, {k: -w for k, w in combined.items()}
+    fixed(work, tendon, name, combined, stiffness=spring.stiffness, damping=spring.damping, springlength=free)
+
+
+def _torque(work: Work, element: Torque | TorqueSource, name: str, tendon: ET.Element, actuator: ET.Element) -> None:
+    torque, damping = constant_torque(element)
+    rotor = element.ratio**2 * element.rotor_inertia if isinstance(element, TorqueSource) else 0.0
+    combined = combine(work, {element.a: -1.0, element.b: 1.0})
+    if not combined:
+        return
+    if rotor and not any(combined.keys() <= work.chain[link].keys() for link in (element.a, element.b)):
+        raise GeometryError(
+            f"the rotor of torque source {element.a}-{element.b}, {rotor:g} kg m^2 at its output, couples links on "
+            "different branches of the tree, for which MuJoCo's inertia matrix has no entries: leave it out, or make "
+            "the rotor a link of its own with a gear pair"
+        )
+    fixed(work, tendon, name, combined, damping=damping, armature=rotor)
+    if torque:
+        _constant(actuator, torque, tendon=name)
+
+
+def _constant(actuator: ET.Element, size: float, **where: str) -> None:
+    """Add an actuator that pushes with a constant force, without control."""
+    bias = (size, 0.0, 0.0)
+    add(actuator, "general", **where, gaintype="fixed", gainprm="0", biastype="affine", biasprm=bias)
+
+
+def _force(work: Work, force: Force, name: str, actuator: ET.Element) -> None:
+    if callable(force.force):
+        raise GeometryError(f"force on link {force.link} is a function; an exported one must be constant")
+    size = math.hypot(*force.force)
+    if size == 0.0:
+        return
+    unit = (force.force[0] / size, force.force[1] / size)
+    where = {"site": site(work, force.link, force.at), "gear": text(*unit, 0.0, 0.0, 0.0, 0.0)}
+    if force.frame == "world":
+        where["refsite"] = site(work, work.model.mechanism.frame, (0.0, 0.0))
+    _constant(actuator, size, name=name, **where)
+
+
+Array = NDArray[np.float64]
 #: MuJoCo's own bound of masses and inertias.
 _LEAST = 1e-15
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
@@ -156,21 +291,12 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     """
     settings = MujocoSettings() if settings is None else settings
     check_settings(settings, MujocoSettings)
-    check_common(model, start, "MuJoCo")
-    for link, body in model.bodies.items():
-        if min(body.mass, body.inertia) <= _LEAST:
-            raise GeometryError(
-                f"mass = {body.mass:g} kg and inertia = {body.inertia:g} kg m^2 of link {link}: MuJoCo takes none "
-                f"below {_LEAST:g}; change the units, or leave out what hardly weighs"
-            )
-    if model.prescribed:
-        pair = model.prescribed[0].pair
-        raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
+    _check(model, start)
     work = Work(model, start, spanning_tree(model.mechanism))
     root = ET.Element("mujoco", model="graphsynth")
-    ET.SubElement(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
+    add(root, "compiler", angle="radian", autolimits="true", inertiafromgeom="false")
     _options(root, model, settings)
-    world = ET.SubElement(root, "worldbody")
+    world = add(root, "worldbody")
     work.bodies[model.mechanism.frame], work.chain[model.mechanism.frame] = world, {}
     _hang(work, model.mechanism.frame)
     tendon, equality, actuator = (ET.Element(tag) for tag in ("tendon", "equality", "actuator"))
@@ -184,25 +310,52 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
         constraint.set("solref", text(*settings.constraint))
         constraint.set("solimp", text(*settings.solimp))
     root.extend(part for part in (tendon, equality, actuator) if len(part))
-    key = ET.SubElement(root, "keyframe")
-    ET.SubElement(key, "key", name="start", time=text(start.time), qpos=text(*work.qpos), qvel=text(*work.qvel))
+    key = add(root, "keyframe")
+    add(key, "key", name="start", time=start.time, qpos=tuple(work.qpos), qvel=tuple(work.qvel))
     ET.indent(root)
     angles = np.zeros((model.mechanism.graph.links, len(work.names)))
     for link, signs in work.chain.items():
         for k, sign in signs.items():
             angles[link, k] = sign
     return MjcfModel(
-        ET.tostring(root, encoding="unicode") + "\n", work.tree, tuple(work.names), np.array(work.qpos),
-        np.array(work.qvel), angles, start, settings,
-    )  # fmt: skip
+        ET.tostring(root, encoding="unicode") + "\n",
+        work.tree,
+        tuple(work.names),
+        np.array(work.qpos),
+        np.array(work.qvel),
+        angles,
+        start,
+        settings,
+    )
+
+
+def _check(model: DynamicModel, start: StartReport) -> None:
+    """Refuse what MuJoCo cannot run."""
+    check_common(model, start, "MuJoCo")
+    for link, body in model.bodies.items():
+        if min(body.mass, body.inertia) <= _LEAST:
+            raise GeometryError(
+                f"mass = {body.mass:g} kg and inertia = {body.inertia:g} kg m^2 of link {link}: MuJoCo takes none "
+                f"below {_LEAST:g}; change the units, or leave out what hardly weighs"
+            )
+    if model.prescribed:
+        pair = model.prescribed[0].pair
+        raise GeometryError(f"prescribed motion of joint {pair[0]}-{pair[1]}: MuJoCo has none; use exudyn or a torque")
 
 
 def _options(root: ET.Element, model: DynamicModel, settings: MujocoSettings) -> None:
-    option = ET.SubElement(
-        root, "option", timestep=text(settings.step), integrator=settings.integrator, solver="Newton",
-        jacobian="dense", tolerance="1e-14", iterations="100", gravity=text(*model.gravity, 0.0),
-    )  # fmt: skip
-    ET.SubElement(option, "flag", contact="disable", refsafe="disable")
+    option = add(
+        root,
+        "option",
+        timestep=settings.step,
+        integrator=settings.integrator,
+        solver="Newton",
+        jacobian="dense",
+        tolerance="1e-14",
+        iterations="100",
+        gravity=(*model.gravity, 0.0),
+    )
+    add(option, "flag", contact="disable", refsafe="disable")
 
 
 def _hang(work: Work, link: int) -> None:
@@ -212,14 +365,14 @@ def _hang(work: Work, link: int) -> None:
         x, y, theta = (float(v) for v in work.start.poses[child])
         px, py, parent = (float(v) for v in work.start.poses[link])
         place, half = turn(-parent, (x - px, y - py)), 0.5 * (theta - parent)
-        element = ET.SubElement(
-            work.bodies[link], "body", name=f"link{child}", pos=text(*place, 0.0),
-            quat=text(math.cos(half), 0.0, 0.0, math.sin(half)),
-        )  # fmt: skip
-        ET.SubElement(
-            element, "inertial", pos=text(*body.centre, 0.0), mass=text(body.mass),
-            diaginertia=text(body.inertia, body.inertia, body.inertia),
-        )  # fmt: skip
+        element = add(
+            work.bodies[link],
+            "body",
+            name=f"link{child}",
+            pos=(*place, 0.0),
+            quat=(math.cos(half), 0.0, 0.0, math.sin(half)),
+        )
+        add(element, "inertial", pos=(*body.centre, 0.0), mass=body.mass, diaginertia=(body.inertia,) * 3)
         work.bodies[child], work.chain[child] = element, dict(work.chain[link])
         _joint(work, element, work.model.mechanism.joints[index], child)
         _hang(work, child)
@@ -260,15 +413,14 @@ def _hinge(work: Work, body: ET.Element, joint: JointGeometry, child: int, at: P
     rate = float(work.start.velocities[joint.b, 2] - work.start.velocities[joint.a, 2])
     suffix = "_turn" if isinstance(joint, PinSlot) else ""
     name = f"j{joint.a}_{joint.b}{suffix}"
-    attributes = {"type": "hinge", "pos": text(*at, 0.0), "axis": text(0.0, 0.0, sign), "ref": text(q)}
-    ET.SubElement(body, "joint", {"name": name, **attributes})
+    add(body, "joint", name=name, type="hinge", pos=(*at, 0.0), axis=(0.0, 0.0, sign), ref=q)
     work.chain[child][len(work.names)] = sign
     _count(work, name, joint, q, rate, True)
 
 
 def _slide(work: Work, body: ET.Element, joint: JointGeometry, axis: Point, d: float, rate: float) -> None:
     name = f"j{joint.a}_{joint.b}"
-    ET.SubElement(body, "joint", name=name, type="slide", axis=text(*axis, 0.0), ref=text(d))
+    add(body, "joint", name=name, type="slide", axis=(*axis, 0.0), ref=d)
     _count(work, name, joint, d, rate, False)
 
 
@@ -284,7 +436,7 @@ def _close(work: Work, joint: JointGeometry, tendon: ET.Element, equality: ET.El
     name = f"j{joint.a}_{joint.b}"
     if isinstance(joint, Revolute):
         sites = site(work, joint.a, joint.at_a), site(work, joint.b, joint.at_b)
-        ET.SubElement(equality, "connect", name=name, site1=sites[0], site2=sites[1])
+        add(equality, "connect", name=name, site1=sites[0], site2=sites[1])
     elif isinstance(joint, Gear):
         _gear(work, joint, name, tendon, equality)
     elif isinstance(joint, Prismatic | PinSlot):
@@ -296,9 +448,9 @@ def _close(work: Work, joint: JointGeometry, tendon: ET.Element, equality: ET.El
 def _close_extra(work: Work, extra: object, equality: ET.Element) -> None:
     if isinstance(extra, Revolute):
         sites = site(work, extra.a, extra.at_a), site(work, extra.b, extra.at_b)
-        ET.SubElement(equality, "connect", site1=sites[0], site2=sites[1])
+        add(equality, "connect", site1=sites[0], site2=sites[1])
     elif isinstance(extra, Rigid):
-        ET.SubElement(equality, "weld", body1=_body(work, extra.b), body2=_body(work, extra.a))
+        add(equality, "weld", body1=_body(work, extra.b), body2=_body(work, extra.a))
     else:
         raise GeometryError(f"additional {type(extra).__name__}: MuJoCo has no such constraint; leave it out")
 
@@ -311,10 +463,14 @@ def _gear(work: Work, gear: Gear, name: str, tendon: ET.Element, equality: ET.El
     combined = combine(work, gear_weights(work.model, gear))
     if len(combined) == 2:
         (k, wk), (m, wm) = combined.items()
-        ET.SubElement(
-            equality, "joint", name=name, joint1=work.names[k][0], joint2=work.names[m][0],
-            polycoef=text(0.0, -wm / wk, 0.0, 0.0, 0.0),
-        )  # fmt: skip
+        add(
+            equality,
+            "joint",
+            name=name,
+            joint1=work.names[k][0],
+            joint2=work.names[m][0],
+            polycoef=(0.0, -wm / wk, 0.0, 0.0, 0.0),
+        )
         return
     fixed(work, tendon, f"t_{name}", combined)
-    ET.SubElement(equality, "tendon", name=name, tendon1=f"t_{name}", polycoef="0 0 0 0 0")
+    add(equality, "tendon", name=name, tendon1=f"t_{name}", polycoef="0 0 0 0 0")

@@ -45,14 +45,15 @@ class Format:
         File names that mean it.
     about : str
         One line for people.
+    place : str
+        Module of this package that reads and writes it, by functions ``parse`` and ``compose``; ``module:end`` by
+        ``parse_end`` and ``compose_end``.
     many : bool
         Whether one file holds several graphs.
     mechanisms : bool
         Whether it holds dimensioned mechanisms too.
     limit : int
         Longest text that is read at once, in bytes.
-    parse, compose : str
-        Functions of a module of this package, ``module:function``.
     feed : {"whole", "lines", "rows", "blocks"}
         How it is read: at once, or as it is asked for.
     piece : int
@@ -62,13 +63,19 @@ class Format:
     name: str
     suffixes: tuple[str, ...]
     about: str
-    many: bool
-    mechanisms: bool
-    limit: int
-    parse: str
-    compose: str
+    place: str
+    many: bool = False
+    mechanisms: bool = False
+    limit: int = TEXT_MAX
     feed: str = "whole"
-    piece: int = 0
+    piece: int = LINE_MAX
+
+    def function(self, verb: str) -> Callable[..., Any]:
+        """Return the function that does "parse" or "compose"."""
+        module, _, end = self.place.partition(":")
+        name = f"{verb}_{end}" if end else verb
+        found: Callable[..., Any] = getattr(import_module(f"graphsynth.formats.{module}"), name)
+        return found
 
     @property
     def line(self) -> bool:
@@ -88,51 +95,23 @@ def _size(count: int) -> str:
 
 
 _MATRIX = 4_000_000
+_LISTED: tuple[tuple[str, str, str, str, dict[str, Any]], ...] = (
+    ("text", ".g6 .txt", "graph6 with frame and joint mobilities, one graph a line", "plain:text", {"feed": "lines"}),
+    ("graph6", "", "graph6 alone: chains of revolute joints, one a line", "plain:graph6", {"feed": "lines"}),
+    ("jsonl", ".jsonl .ndjson", "JSON lines, one graph a line", "graph_json:lines", {"feed": "lines"}),
+    ("json", ".json", "JSON: a graph, a list of graphs, or a mechanism", "graph_json", {"mechanisms": True}),
+    ("toml", ".toml", "TOML: a mechanism", "plain:toml", {"many": False, "mechanisms": True, "limit": 400_000}),
+    ("graphml", ".graphml", "GraphML", "graphml", {"mechanisms": True, "feed": "blocks", "piece": 3_000_000}),
+    ("dot", ".dot .gv", "DOT of Graphviz", "dot", {"mechanisms": True, "limit": 2_000_000}),
+    ("csv", ".csv", "table, a row for each graph", "plain:csv", {"feed": "rows"}),
+    ("edges", ".edges .edgelist", "edge list", "matrices:edges", {"many": False, "limit": _MATRIX}),
+    ("adjacency", ".adj", "adjacency matrix", "matrices:adjacency", {"many": False, "limit": _MATRIX}),
+    ("incidence", ".inc", "incidence matrix", "matrices:incidence", {"many": False, "limit": _MATRIX}),
+)
 FORMATS: dict[str, Format] = {
-    entry.name: entry
-    for entry in (
-        Format(
-            "text", (".g6", ".txt"), "graph6 with frame and joint mobilities, one graph a line", True, False, TEXT_MAX,
-            "plain:parse_text", "plain:compose_text", "lines", LINE_MAX,
-        ),
-        Format(
-            "graph6", (), "graph6 alone: chains of turning pairs, one a line", True, False, TEXT_MAX,
-            "plain:parse_graph6", "plain:compose_graph6", "lines", LINE_MAX,
-        ),
-        Format(
-            "jsonl", (".jsonl", ".ndjson"), "JSON lines, one graph a line", True, False, TEXT_MAX,
-            "graph_json:parse_line", "graph_json:compose_lines", "lines", LINE_MAX,
-        ),
-        Format(
-            "json", (".json",), "JSON: a graph, a list of graphs, or a mechanism", True, True, TEXT_MAX,
-            "graph_json:parse", "graph_json:compose",
-        ),
-        Format(
-            "toml", (".toml",), "TOML: a mechanism", False, True, 400_000, "plain:parse_toml", "plain:compose_toml",
-        ),
-        Format(
-            "graphml", (".graphml",), "GraphML", True, True, TEXT_MAX,
-            "graphml:parse", "graphml:compose", "blocks", 3_000_000,
-        ),
-        Format("dot", (".dot", ".gv"), "DOT of Graphviz", True, True, 2_000_000, "dot:parse", "dot:compose"),
-        Format(
-            "csv", (".csv",), "table, a row for each graph", True, False, TEXT_MAX,
-            "tables:parse", "tables:compose", "rows", 1_000_000,
-        ),
-        Format(
-            "edges", (".edges", ".edgelist"), "edge list", False, False, _MATRIX,
-            "edge_list:parse", "edge_list:compose",
-        ),
-        Format(
-            "adjacency", (".adj",), "adjacency matrix", False, False, _MATRIX,
-            "matrices:parse_adjacency", "matrices:compose_adjacency",
-        ),
-        Format(
-            "incidence", (".inc",), "incidence matrix", False, False, _MATRIX,
-            "matrices:parse_incidence", "matrices:compose_incidence",
-        ),
-    )
-}  # fmt: skip
+    name: Format(name, tuple(suffixes.split()), about, place, **{"many": True, **options})
+    for name, suffixes, about, place, options in _LISTED
+}
 
 
 def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
@@ -169,12 +148,6 @@ def format_of(path: str | os.PathLike[str], name: str | None = None) -> Format:
             return entry
     known = ", ".join(suffix for entry in FORMATS.values() for suffix in entry.suffixes)
     raise SpecError(f"{Path(path).name}: the suffix {suffix!r} names no format; use one of {known}, or give format=")
-
-
-def _function(place: str) -> Callable[..., Any]:
-    module, _, name = place.partition(":")
-    found: Callable[..., Any] = getattr(import_module(f"graphsynth.formats.{module}"), name)
-    return found
 
 
 def read_text(text: str | bytes, format: str) -> list[Item]:
@@ -256,7 +229,7 @@ def _sentences(name: str) -> Iterator[None]:
 
 def _fed(file: io.BufferedIOBase, entry: Format) -> Iterator[Item]:
     """Read the items of an open file as its format wants it."""
-    parse = _function(entry.parse)
+    parse = entry.function("parse")
     if entry.feed == "lines":
         return _lines(file, entry)
     if entry.feed == "rows":
@@ -276,7 +249,7 @@ def _decoded(text: bytes) -> str:
 
 
 def _lines(file: io.BufferedIOBase, entry: Format) -> Iterator[Item]:
-    one, number = _function(entry.parse), 0
+    one, number = entry.function("parse"), 0
     while line := file.readline(entry.piece + 2):
         number += 1
         place = f"line {number}"
@@ -437,7 +410,7 @@ def write_text(items: Item | Iterable[Item], format: str) -> str:
 
 def _pieces(items: Item | Iterable[Item], entry: Format) -> Iterator[str]:
     given: Iterable[Item] = (items,) if isinstance(items, MechanismGraph | Mechanism) else items
-    pieces: Iterator[str] = _function(entry.compose)(_checked(given, entry))
+    pieces: Iterator[str] = entry.function("compose")(_checked(given, entry))
     return pieces
 
 

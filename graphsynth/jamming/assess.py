@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.angles import angle
 from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
-from graphsynth.core.shown import Printed
 from graphsynth.jamming.bearing.arcs import JamArcs, jam_arcs, strictly_inside
 from graphsynth.jamming.bearing.areas import CrescentAreas, lid_area, rim_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing, Condition
 from graphsynth.jamming.bearing.limits import Limit, largest_misalignment, smallest_clearance
 from graphsynth.jamming.bearing.parameters import ToleranceBox
-from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Verdict
+from graphsynth.jamming.verdict import METHOD_CERTIFIED, METHOD_CLOSED_FORM, Assessment, Verdict
 from graphsynth.mechanism.four_bar import TiltedFourBar
 from graphsynth.mechanism.rotatability import FullTurn
 
@@ -96,15 +95,15 @@ _MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JammingReport(Printed):
-    """Result of `assess_jamming`.
+class JammingReport(Assessment):
+    """Result of `assess_jamming` for one tilted bearing.
 
     Attributes
     ----------
     verdict : Verdict
-        Over the whole turn: that of the certificate, or an estimate if none was asked for; see ``method``.
+        Over the full rotation: that of the certificate, or an estimate if none was asked for; see ``method``.
     method : str
-        How the verdict was had.
+        How the verdict is known.
     condition : str
         Contact condition used.
     arcs : JamArcs
@@ -115,7 +114,7 @@ class JammingReport(Printed):
     largest_tilt, critical_tilt : float or None
         Radians; None if there is no critical tilt, with the sentence in ``arcs.reason``.
     full_turn : FullTurn
-        Whether the crank makes a full turn at all.
+        Whether the crank makes a full rotation at all.
     table : JammingTable
         Values over the sampled crank angles.
     smallest_clearance, largest_misalignment : Limit
@@ -146,26 +145,21 @@ class JammingReport(Printed):
     seconds: float = field(default=0.0, compare=False)
     certificate: JamCertificate | None = None
 
-    def __repr__(self) -> str:
-        limits = [
-            f"{text}: {limit.value:.6g} {unit}"
-            for text, limit, unit in (
-                ("smallest clearance", self.smallest_clearance, "mm"),
-                ("largest misalignment", self.largest_misalignment, "rad"),
-            )
-            if limit is not None and limit.value is not None
-        ]
+    def _figures(self) -> list[tuple[str, str]]:
         critical = "none" if self.critical_tilt is None else f"{self.critical_tilt:.6g} rad"
-        arcs = ", ".join(f"{math.degrees(a.start):.2f} to {math.degrees(a.stop):.2f} deg" for a in self.arcs.arcs)
-        lines = [
-            self.statement,
-            f"  interference at worst: {self.worst_interference:.6g} mm at {math.degrees(self.worst_angle):.2f} deg",
-            f"  largest tilt: {self.largest_tilt:.6g} rad; critical tilt: {critical}",
-            f"  binds at crank angles: {arcs or 'none'} (nominal dimensions)",
-            *(f"  {text}" for text in limits),
-            "  more: .table, .arcs, .certificate, .summary(), .to_pandas()",
+        arcs = ", ".join(f"{math.degrees(a.start):.2f}° to {math.degrees(a.stop):.2f}°" for a in self.arcs.arcs)
+        rows = [
+            ("interference", f"{self.worst_interference:.6g} mm at most, at {math.degrees(self.worst_angle):.2f}°"),
+            ("tilt", f"{self.largest_tilt:.6g} rad at most, critical {critical}"),
+            ("binds", f"{arcs or 'at no crank angle'} (nominal dimensions)"),
         ]
-        return "\n".join(lines)
+        for name, limit, unit in (
+            ("smallest clearance", self.smallest_clearance, "mm"),
+            ("largest misalignment", self.largest_misalignment, "rad"),
+        ):
+            if limit is not None and limit.value is not None:
+                rows.append((name, f"{limit.value:.6g} {unit}"))
+        return rows
 
     @property
     def statement(self) -> str:
@@ -213,7 +207,6 @@ class JammingReport(Printed):
         }
 
 
-# one tilted bearing of a four-bar (model L0)
 @overload
 def assess_jamming(
     subject: TiltedFourBar | ToleranceBox,
@@ -222,64 +215,63 @@ def assess_jamming(
     samples: int | ArrayLike = 361,
     *,
     certify: bool = True,
-) -> JammingReport: ...
+) -> JammingReport:
+    """Assess the tilted bearing at B of a four-bar over a full rotation of the crank (model L0)."""
 
 
-# all joints of any mechanism over its motion (model L1)
 @overload
 def assess_jamming(
     subject: Motion,
-    bearing: Bearings | float | str,
-    condition: Condition = "A",
     *,
-    tilts: Misalignment | Iterable[Misalignment] | float | str,
+    tilt: Misalignment | Iterable[Misalignment] | float | str,
+    joints: Bearings | float | str,
+    condition: Condition = "A",
     certify: bool = True,
     length_tolerance: float = 0.0,
     seconds: float = 20.0,
-) -> CoupledReport: ...
+) -> CoupledReport:
+    """Assess all joints of a mechanism over its motion (model L1)."""
 
 
 @checked
 def assess_jamming(
     subject: Motion | TiltedFourBar | ToleranceBox | None = None,
-    bearing: Bearings | float | str | None = None,
+    bearing: Bearing | None = None,
     condition: Condition = "A",
     samples: int | ArrayLike | None = None,
     *,
-    tilts: Misalignment | Iterable[Misalignment] | float | str | None = None,
     certify: bool = True,
-    length_tolerance: float = 0.0,
-    seconds: float = 20.0,
+    **of_a_motion: Any,
 ) -> JammingReport | CoupledReport:
-    """Assess whether bearings bind: all of a mechanism over its motion, or the one at B of a four-bar.
+    """Assess whether joints bind if an axis is tilted: all of a mechanism over its motion, or one of a four-bar.
 
     Parameters
     ----------
     subject : Motion, TiltedFourBar or ToleranceBox
-        A `Motion` of `graphsynth.simulate` is assessed with all its joints (model L1, needs ``tilts``); a
-        `TiltedFourBar` with its tilted motor axis by the model of the source (L0).  With a `ToleranceBox` the verdict
-        of L0 holds for the whole box; table and closed-form arcs are those of its middle.
-    bearing : Bearing, float or str, optional
-        L0: the bearing at B, by default that of the box, else of the source (17.5 mm, 10 mm, 0.03 mm).  L1: limits for
-        all joints, or a mapping of pairs of links to limits, see `graphsynth.jamming.joints.assess_coupled`; or the
-        tilt that every joint allows, radians or "0.5 deg".
+        A `Motion` of `graphsynth.simulate` is assessed with all its joints (model L1), and needs ``tilt`` and
+        ``joints``; a `TiltedFourBar` with its tilted motor axis by the model of the source (L0).  With a `ToleranceBox`
+        the verdict of L0 holds for the whole box; table and closed-form arcs are those of its middle.
+    bearing : Bearing, optional
+        L0: the bearing at B, by default that of the box, else of the source (17.5 mm, 10 mm, 0.03 mm).
     condition : {"A", "B", "general"}
         Contact condition; "A" (short bearing in a long hole) is what the source means.
     samples : int or array_like, optional
         L0: number of crank angles of the table over [0, 2 pi] (361), or the angles themselves (radians).
-    tilts : Misalignment or several, float or str, optional
-        L1: the axes that are tilted; or the tilt of the first driver's axis, radians or "0.5 deg".
     certify : bool
         If False the verdict is an estimate in double precision, and says so.
-    length_tolerance, seconds : float
-        L1: relative tolerance of all lengths, and the time that the proof may take.
+    **of_a_motion
+        L1: ``tilt``, the misaligned axes (`Misalignment` or several), or the tilt of the first driver's axis in radians
+        or as text, "0.5 deg".  ``joints``, what the joints allow: a `Bearing`, `JointLimits` or `SlideLimits` for all,
+        a mapping of pairs of links to these, or the tilt that every joint allows, radians or text.
+        ``length_tolerance``, relative tolerance of all lengths (0); ``seconds``, the time of the proof (20).
 
     Returns
     -------
     JammingReport or CoupledReport
-        Both have ``verdict`` (`Verdict`), ``statement``, ``method``, ``condition``, ``certificate``, ``notes``,
-        ``seconds``, ``summary()`` and ``to_pandas()``.  The verdict is certified by default: for all tolerances, or for
-        the doubles given, which it says.  It never comes from the samples.
+        Both print one sentence and a table; ``details()`` tells all.  Both have ``verdict`` (`Verdict`), ``statement``,
+        ``method``, ``condition``, ``certificate``, ``notes``, ``seconds``, ``summary()`` and ``to_pandas()``.  The
+        verdict is certified by default: for all tolerances, or for the doubles given, which it says.  It never comes
+        from the samples.
 
     Raises
     ------
@@ -292,75 +284,55 @@ def assess_jamming(
     >>> report.verdict.name, round(report.worst_interference, 12)
     ('CERTIFIED_JAMMED', 0.035099273074)
 
-    The same dimensions with three bearings of that kind, at A, B and C, over half a turn:
+    The same dimensions with three bearings of that kind, at A, B and C, over half a rotation:
 
-    >>> from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, simulate
-    >>> from graphsynth.jamming.joints import Misalignment
-    >>> graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    >>> linkage = Mechanism(graph, [
-    ...     Revolute(0, 1), Revolute(1, 2, (1.0, 0.0)), Revolute(2, 3, (2.5, 0.0), (2.5, 0.0)),
-    ...     Revolute(0, 3, (2.0, 0.0)),
-    ... ], [Driver(0, 1)])
-    >>> motion = simulate(linkage, np.linspace(0.0, np.pi, 19))
-    >>> assess_jamming(motion, Bearing(), tilts=Misalignment(0, 1, 0.011)).verdict.name
+    >>> from graphsynth import Mechanism
+    >>> motion = Mechanism.four_bar(2, 1, 2.5, 2.5).simulate("0..180 deg")
+    >>> assess_jamming(motion, tilt=0.011, joints=Bearing()).verdict.name
     'CERTIFIED_FREE'
     """
     if isinstance(subject, TiltedFourBar | ToleranceBox):
-        _refuse("a TiltedFourBar or a ToleranceBox", "the motion of a mechanism (simulate)",
-                tilts=tilts is not None, length_tolerance=length_tolerance != 0.0)  # fmt: skip
-        return _one_bearing(subject, bearing, condition, 361 if samples is None else samples, certify)
-    _refuse("a motion", "a TiltedFourBar or a ToleranceBox", samples=samples is not None)
-    from graphsynth.jamming.joints.assess import assess_coupled
-
-    subject, bearing, tilts = _of_a_motion(subject, bearing, tilts)
-    return assess_coupled(
-        subject, bearing, tilts, condition=condition, certify=certify, length_tolerance=length_tolerance,
-        seconds=seconds,
-    )  # fmt: skip
+        for name in of_a_motion:
+            raise GeometryError(f"{name} does not go with a TiltedFourBar or a ToleranceBox; it belongs to a motion")
+        samples = 361 if samples is None else samples
+        if isinstance(subject, TiltedFourBar):
+            return assess_bearing(subject, bearing or Bearing(), condition, samples, None, certify)
+        linkage, own = subject.nominal()
+        return assess_bearing(linkage, bearing or own, condition, samples, subject, certify)
+    for name, given in (("samples", samples), ("bearing", bearing)):
+        if given is not None:
+            remedy = "give joints=..." if name == "bearing" else "it belongs to a TiltedFourBar or a ToleranceBox"
+            raise GeometryError(f"{name} does not go with a motion; {remedy}")
+    return _of_a_motion(subject, condition=condition, certify=certify, **of_a_motion)
 
 
 def _of_a_motion(
-    subject: Any,
-    bearing: Bearings | float | str | None,
-    tilts: Misalignment | Iterable[Misalignment] | float | str | None,
-) -> tuple[Motion, Bearings, Misalignment | Iterable[Misalignment]]:
-    """Refuse what is no motion, and a motion without bearings or tilts."""
+    motion: Any,
+    tilt: Misalignment | Iterable[Misalignment] | float | str | None = None,
+    joints: Bearings | float | str | None = None,
+    **options: Any,
+) -> CoupledReport:
+    """Assess a motion; refuse what is none, and one without limits of its joints or tilted axes."""
+    from graphsynth.jamming.joints.assess import assess_coupled
     from graphsynth.jamming.joints.limits import JointLimits, Misalignment
     from graphsynth.kinematics.engine.result import Motion
 
-    if not isinstance(subject, Motion):
+    if not isinstance(motion, Motion):
         raise GeometryError(
-            f"subject = {subject!r} is neither a Motion (simulate) nor a TiltedFourBar or ToleranceBox; give one"
+            f"subject = {motion!r} is neither a Motion (simulate) nor a TiltedFourBar or ToleranceBox; give one"
         )
-    if isinstance(tilts, float | int | str):
-        driver = subject.mechanism.drivers[0]
-        tilts = Misalignment(driver.base, driver.link, angle("tilts", tilts))
-    if isinstance(bearing, float | int | str):
-        bearing = JointLimits(angle("bearing", bearing))
-    if tilts is None:
-        raise GeometryError("no axis is misaligned; give tilts=Misalignment(base, link, alpha)")
-    if bearing is None:
-        raise GeometryError("the joints have no bearings; give a Bearing or JointLimits, or {(link, link): ...}")
-    return subject, bearing, tilts
-
-
-def _one_bearing(
-    subject: TiltedFourBar | ToleranceBox, bearing: Any, condition: Condition, samples: int | ArrayLike, certify: bool
-) -> JammingReport:
-    """Assess the models, or the box with the models in its middle."""
-    if bearing is not None and not isinstance(bearing, Bearing):
-        raise GeometryError(f"bearing = {bearing!r} does not fit a TiltedFourBar; give one Bearing(...)")
-    if isinstance(subject, TiltedFourBar):
-        return assess_bearing(subject, bearing or Bearing(), condition, samples, None, certify)
-    linkage, own = subject.nominal()
-    return assess_bearing(linkage, bearing or own, condition, samples, subject, certify)
-
-
-def _refuse(subject: str, other: str, **given: bool) -> None:
-    """Refuse arguments of the other model."""
-    for name, there in given.items():
-        if there:
-            raise GeometryError(f"{name} does not go with {subject}; it belongs to {other}")
+    if unknown := set(options) - {"condition", "certify", "length_tolerance", "seconds"}:
+        raise GeometryError(f"{unknown.pop()} is no argument of an assessment; give tilt, joints, length_tolerance")
+    if tilt is None:
+        raise GeometryError('no axis is misaligned; give tilt="0.5 deg" or tilt=Misalignment(base, link, alpha)')
+    if joints is None:
+        raise GeometryError('the joints have no limits; give joints="1 deg", a Bearing or JointLimits, or a mapping')
+    if isinstance(tilt, float | int | str):
+        driver = motion.mechanism.drivers[0]
+        tilt = Misalignment(driver.base, driver.link, angle("tilt", tilt))
+    if isinstance(joints, float | int | str):
+        joints = JointLimits(angle("joints", joints))
+    return assess_coupled(motion, joints, tilt, **options)
 
 
 def assess_bearing(
@@ -429,7 +401,7 @@ def _angles(samples: int | ArrayLike) -> Array:
 def _worst(linkage: TiltedFourBar, bearing: Bearing, condition: Condition, turn: FullTurn) -> tuple[float, float]:
     """Largest interference over the assembled part of the turn, and a crank angle of it.
 
-    That is a quarter turn before or after the phase, or a dead point if neither can be reached.
+    That is a quarter turn before or after the phase, or a dead-centre position if neither can be reached.
     """
     if turn.kind == "never assembled":
         return math.nan, math.nan

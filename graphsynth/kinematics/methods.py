@@ -318,13 +318,13 @@ class MotionMethods(Shown):
         found: gs.Drawing = work("draw motion")(self, path, sample, **options)
         return found
 
-    def assess_jamming(self, bearing: Any, tilts: Any, **options: Any) -> gs.CoupledReport:
-        """Assess whether the joints bind if an axis leans; see :func:`graphsynth.assess_jamming`.
+    def assess_jamming(self, *, tilt: Any, joints: Any, **options: Any) -> gs.CoupledReport:
+        """Assess whether the joints bind if an axis is tilted; see :func:`graphsynth.assess_jamming`.
 
-        ``motion.assess_jamming("1 deg", tilts="0.5 deg")``: every joint allows a tilt of one degree, and the axis of
-        the first driver leans by half a degree.
+        ``motion.assess_jamming(tilt="0.5 deg", joints="1 deg")``: the axis of the first driver is tilted by half a
+        degree, and every joint allows a tilt of one degree.
         """
-        found: gs.CoupledReport = work("assess jamming")(self, bearing, tilts=tilts, **options)
+        found: gs.CoupledReport = work("assess jamming")(self, tilt=tilt, joints=joints, **options)
         return found
 
     def forces(self, loads: Mapping[str | int, Any], **options: Any) -> gs.StaticForces:

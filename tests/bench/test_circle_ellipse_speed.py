@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from graphsynth.intervals import Interval, Status, pave
-from graphsynth.jamming.bearing.area_curve import area_curve
-from graphsynth.jamming.bearing.areas_enclosed import enclose_lid_area
-from graphsynth.jamming.intersection import circle_ellipse, exact_hull, kernels, krawczyk_boxes
-from graphsynth.jamming.intersection.boxes import krawczyk_data
+from graphsynth.jamming.bearing.areas_enclosed import area_curve, enclose_lid_area
+from graphsynth.jamming.intersection import kernels
+from graphsynth.jamming.intersection.boxes import krawczyk_boxes, krawczyk_data
+from graphsynth.jamming.intersection.hull import circle_ellipse, exact_hull
 
 B = "17.4617879639289313590283215334"
 X0, Y0 = 13.11490802879096276551727, 11.58659515976778845911871

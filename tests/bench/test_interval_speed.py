@@ -212,7 +212,8 @@ def own_times(count, seconds):
 
     from graphsynth.intervals import krawczyk, pave_compiled
     from graphsynth.intervals.kernels import arithmetic as ia, elementary, krawczyk as compiled, loops
-    from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes
+    from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+    from graphsynth.jamming.intersection.hull import circle_ellipse
 
     @compiled.system
     def crossing(xl, xh, pl, ph, fl, fh, jl, jh, derivatives):

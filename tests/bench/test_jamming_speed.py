@@ -16,7 +16,8 @@ from graphsynth.jamming import (
     sweep_linkage,
 )
 from graphsynth.jamming.assess import assess_jamming
-from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes
+from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+from graphsynth.jamming.intersection.hull import circle_ellipse
 from graphsynth.mechanism.four_bar import TiltedFourBar
 
 DECK = ToleranceBox(alpha="1/30")

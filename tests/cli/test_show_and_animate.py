@@ -151,7 +151,7 @@ def test_animate_a_part_of_a_turn_says_why(tmp_path: Path, capsys: pytest.Captur
         path = tmp_path / f"x.{suffix}"
         assert main(["animate", str(file), "-o", str(path), "--frames", "10"]) == 0
         out = capsys.readouterr().out
-        assert "not a whole turn" in out and "stretched or folded" in out and path.stat().st_size > 1000
+        assert "not a full rotation" in out and "stretched or folded" in out and path.stat().st_size > 1000
     assert "at the other end" in (tmp_path / "x.html").read_text()
     assert main(["animate", str(file), "--range", "0", "1", "-o", str(path), "--frames", "10", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["completed"] is True

@@ -10,8 +10,9 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.crossing_pictures import crossing_picture, region_picture
 from graphsynth.drawing.jamming_pictures import area_chart, area_picture, report_picture, section_picture, space_picture
 from graphsynth.jamming import Bearing, ToleranceBox, assess_jamming
-from graphsynth.jamming.bearing.area_curve import area_curve
-from graphsynth.jamming.intersection import circle_ellipse, exact_hull, krawczyk_boxes
+from graphsynth.jamming.bearing.areas_enclosed import area_curve
+from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+from graphsynth.jamming.intersection.hull import circle_ellipse, exact_hull
 
 
 def drawn(figure):

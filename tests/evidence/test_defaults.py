@@ -13,7 +13,7 @@ def _functions():
     from graphsynth.dynamics.driven.run import run
     from graphsynth.dynamics.integrate import simulate_dynamics
     from graphsynth.jamming.bearing.sweep import sweep_linkage
-    from graphsynth.jamming.intersection import krawczyk_boxes
+    from graphsynth.jamming.intersection.boxes import krawczyk_boxes
     from graphsynth.jamming.joints.scale import largest_scale
     from graphsynth.kinematics.dimensional.api import embody
     from graphsynth.systems.platform import certify_full_turn

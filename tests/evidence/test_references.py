@@ -13,7 +13,7 @@ from graphsynth.evidence.embodiment import precise_strip
 from graphsynth.evidence.jamming import precise_arc_ends, precise_critical_tilt
 from graphsynth.evidence.position import four_bar, precise_points, precise_poses
 from graphsynth.jamming import Bearing, ToleranceBox
-from graphsynth.jamming.intersection import surrogate_problem
+from graphsynth.jamming.intersection.hull import surrogate_problem
 from graphsynth.systems.platform.evidence import precise_branch
 from graphsynth.systems.platform.evidence_direct import eigenvalue_modes, precise_anchors, precise_modes
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 from graphsynth import formats
 from graphsynth.core.errors import FormatError, GeometryError, GraphError
-from graphsynth.formats import dot, graphml, tables
+from graphsynth.formats import dot, graphml, plain
 from graphsynth.mechanism.files import JSON_MAX, TOML_MAX
 from graphsynth.mechanism.joints import Cam, Revolute
 from graphsynth.mechanism.model import Mechanism
@@ -61,7 +61,7 @@ def test_the_table_of_the_page_is_true(name: str) -> None:
 def test_one_number_is_said_once() -> None:
     assert formats.FORMATS["json"].limit == JSON_MAX and formats.FORMATS["toml"].limit == TOML_MAX
     assert formats.FORMATS["graphml"].piece == graphml.LENGTH_MAX and formats.FORMATS["dot"].limit == dot.LENGTH_MAX
-    assert formats.FORMATS["csv"].piece == tables.ROW_MAX
+    assert formats.FORMATS["csv"].piece == plain.ROW_MAX
     page = PAGE.read_text().replace(" 000", "000")
     for number in (formats.GRAPHS_MAX, formats.JOINTS_MAX, dot.TOKENS_MAX):
         assert str(number) in page

@@ -9,9 +9,15 @@ import pytest
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval
 from graphsynth.jamming import Bearing, assess_jamming
-from graphsynth.jamming.bearing.area_curve import area_curve, crescent_boxes, enclose_tilt_sine, interval_shoelace
-from graphsynth.jamming.bearing.areas_enclosed import enclose_surrogate_areas
-from graphsynth.jamming.intersection import Reading, reading_areas, reading_ellipse, reading_problem
+from graphsynth.jamming.bearing.areas_enclosed import area_curve, enclose_surrogate_areas, enclose_tilt_sine
+from graphsynth.jamming.intersection.readings import (
+    Reading,
+    crescent_boxes,
+    interval_shoelace,
+    reading_areas,
+    reading_ellipse,
+    reading_problem,
+)
 from graphsynth.mechanism.four_bar import TiltedFourBar
 
 DECK = TiltedFourBar(alpha=1 / 30)

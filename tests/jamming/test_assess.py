@@ -298,14 +298,14 @@ def test_a_motion_is_assessed_with_all_its_joints():
     motion = simulate(mechanism, np.linspace(0.0, 2.0 * math.pi, 13))
     for factor, expected in ((0.99, Verdict.CERTIFIED_FREE), (1.01, Verdict.CERTIFIED_JAMMED)):
         tilt = Misalignment(0, 1, factor * 0.012128793118312840)
-        report = assess_jamming(motion, Bearing(), tilts=tilt)
+        report = assess_jamming(motion, tilt=tilt, joints=Bearing())
         assert report.verdict is expected and report.method == METHOD_CERTIFIED and report.certificate is not None
         assert report.summary()["verdict"] == expected.name and report.statement == report.certificate.reason
         assert list(report.to_pandas().columns)[:2] == ["input", "factor"]
-        estimate = assess_jamming(motion, Bearing(), tilts=tilt, certify=False)
+        estimate = assess_jamming(motion, tilt=tilt, joints=Bearing(), certify=False)
         assert not estimate.verdict.is_certified and "not certified" in estimate.method
         assert estimate.verdict.is_free is expected.is_free
-    single = assess_jamming(simulate(mechanism, [0.3]), Bearing(), tilts=tilt)
+    single = assess_jamming(simulate(mechanism, [0.3]), tilt=tilt, joints=Bearing())
     assert single.verdict is Verdict.UNDECIDED and "one assembled sample" in single.statement
 
 
@@ -320,14 +320,16 @@ def test_arguments_of_the_other_model_are_refused():
     motion = simulate(Mechanism(graph, joints, [Driver(0, 1)]), [0.0, 0.1])
     tilt = Misalignment(0, 1, 0.01)
     for text, arguments, options in [
-        ("samples does not go", (motion, Bearing(), "A", 5), {"tilts": tilt}),
-        ("neither a Motion", (None, Bearing()), {"tilts": tilt}),
-        ("no axis is misaligned", (motion, Bearing()), {}),
-        ("have no bearings", (motion,), {"tilts": tilt}),
-        ("tilts does not go", (DECK,), {"tilts": tilt}),
+        ("samples does not go", (motion,), {"tilt": tilt, "joints": Bearing(), "samples": 5}),
+        ("bearing does not go", (motion, Bearing()), {"tilt": tilt}),
+        ("neither a Motion", (None,), {"tilt": tilt, "joints": Bearing()}),
+        ("no axis is misaligned", (motion,), {"joints": Bearing()}),
+        ("have no limits", (motion,), {"tilt": tilt}),
+        ("pieces is no argument", (motion,), {"tilt": tilt, "joints": Bearing(), "pieces": 5}),
+        ("tilt does not go", (DECK,), {"tilt": tilt}),
         ("length_tolerance does not go", (DECK,), {"length_tolerance": 1e-3}),
-        ("does not fit a TiltedFourBar", (DECK, {(0, 1): Bearing()}), {}),
-        ("neither a Motion", ("shutter",), {"tilts": tilt}),
+        ("no Bearing", (DECK, {(0, 1): Bearing()}), {}),
+        ("neither a Motion", ("shutter",), {"tilt": tilt, "joints": Bearing()}),
         ("neither a Motion", (math.nan,), {}),
     ]:
         with pytest.raises(GeometryError, match=text):

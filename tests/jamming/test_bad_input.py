@@ -27,10 +27,10 @@ from graphsynth.jamming import (
     sweep_linkage,
     wedging,
 )
-from graphsynth.jamming.bearing.area_curve import area_curve
 from graphsynth.jamming.bearing.areas import lid_area, rim_area, surrogate_areas
-from graphsynth.jamming.bearing.areas_enclosed import enclose_lid_area
-from graphsynth.jamming.intersection import circle_ellipse, krawczyk_boxes, surrogate_problem
+from graphsynth.jamming.bearing.areas_enclosed import area_curve, enclose_lid_area
+from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+from graphsynth.jamming.intersection.hull import circle_ellipse, surrogate_problem
 from graphsynth.mechanism.four_bar import TiltedFourBar
 
 DECK = TiltedFourBar(alpha=1 / 30)

@@ -12,7 +12,8 @@ from graphsynth.evidence import Effort, arc_problem, area_problem, crossing_prob
 from graphsynth.evidence.jamming import lambda_problem
 from graphsynth.jamming import Bearing, ToleranceBox, certify_jamming, spread, sweep_linkage
 from graphsynth.jamming.bearing.arcs import total_length
-from graphsynth.jamming.intersection import circle_ellipse, exact_hull, krawczyk_boxes
+from graphsynth.jamming.intersection.boxes import krawczyk_boxes
+from graphsynth.jamming.intersection.hull import circle_ellipse, exact_hull
 from graphsynth.mechanism.four_bar import TiltedFourBar
 
 ONCE = Effort(rounds=1)

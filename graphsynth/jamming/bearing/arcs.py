@@ -191,7 +191,7 @@ class ArcEnclosure(NamedTuple):
 
 @dataclass(frozen=True)
 class CertifiedArcs:
-    """Where the bearing jams during a turn, with proof.
+    """Where the bearing binds during a turn, with proof.
 
     Attributes
     ----------
@@ -199,9 +199,9 @@ class CertifiedArcs:
         The two arcs (one per lid) with their ends enclosed over the whole box; empty unless they exist for every
         parameter vector.
     inner : tuple of Span
-        Crank angles at which every parameter vector jams.
+        Crank angles at which every parameter vector binds.
     outer : tuple of Span
-        Crank angles outside of which no parameter vector jams.
+        Crank angles outside of which no parameter vector binds.
     undecided : tuple of Span
         Outer without inner: some jam, some may not, or rounding does not decide.
     free : tuple of Span
@@ -229,7 +229,7 @@ class CertifiedArcs:
 
     @property
     def jammed_part(self) -> Enclosure:
-        """Part of the turn that jams, between its proved bounds; rounded outward."""
+        """Part of the turn that binds, between its proved bounds; rounded outward."""
         low, high = total_length(self.inner) / math.tau, total_length(self.outer) / math.tau
         # at most two spans: differences, a sum and a quotient to nearest are off by less than 5e-16
         return Enclosure(max(0.0, low - 2e-15), min(1.0, high + 2e-15 if self.outer else 0.0))
@@ -241,7 +241,7 @@ def no_arcs(kappa: Enclosure, phase: Enclosure, reason: str) -> CertifiedArcs:
 
 
 def whole_turn(kappa: Enclosure, phase: Enclosure, reason: str, proved: bool) -> CertifiedArcs:
-    """Return the result for a turn that jams everywhere, or that is undecided everywhere."""
+    """Return the result for a turn that binds everywhere, or that is undecided everywhere."""
     inner, undecided = ((FULL_TURN,), ()) if proved else ((), (FULL_TURN,))
     return CertifiedArcs((), inner, (FULL_TURN,), undecided, (), kappa, phase, reason)
 
@@ -319,7 +319,7 @@ class JamArc:
 
 @dataclass(frozen=True)
 class JamArcs:
-    """Where the bearing jams during a turn.
+    """Where the bearing binds during a turn.
 
     Attributes
     ----------

@@ -1,37 +1,52 @@
-"""Areas of interference enclosed: the closed forms of `graphsynth.jamming.bearing.areas` in interval arithmetic.
+"""Areas of interference enclosed: over ranges of the parameters, and against the crank angle.
 
-Each area is evaluated at the two corners of the ranges at which it is smallest and largest, so that wide ranges of
-tilt, height and clearance give their exact range up to rounding; the radius of the bearing is carried as it is.  Why
-the areas are monotone: ``docs/explanation/circle-and-ellipse.md``.  See theory/circle-and-ellipse 2 to 5.
+The closed forms of `graphsynth.jamming.bearing.areas` in interval arithmetic.  Each area is evaluated at the two
+corners of the ranges at which it is smallest and largest, so that wide ranges of tilt, height and clearance give their
+exact range up to rounding; the radius of the bearing is carried as it is.  Why the areas are monotone:
+``docs/explanation/circle-and-ellipse.md``.  See theory/circle-and-ellipse 2 to 5, theory/jam-arcs 2.
+
+The source plots "the part of the ellipse not crossed by the circle" over [90, 450] degrees.  That is the free gap of
+the surrogate ellipse, zero where there is no intersection: it jumps at the onset and falls towards the worst pose.  The
+true interference, `AreaCurve.lid` and `AreaCurve.rim`, does the opposite.
 """
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval, _make
+from graphsynth.jamming.bearing.areas import (
+    COEFFICIENTS,
+    CrescentAreas,
+    Numbers,
+    Tilt,
+    crescents,
+    lid_crescent,
+    rim_crescent,
+    series,
+)
+from graphsynth.jamming.bearing.bearing import Bearing
+from graphsynth.mechanism.four_bar import TiltedFourBar
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-#: Series of x - sin x for |x| <= 1; what is left out is below 1e-30 of the first term.
-_COEFFICIENTS = [(-1) ** k / math.factorial(2 * k + 3) for k in range(13)]
-#: Relative error of the series in double precision is below 6 units of 2^-53: each partial sum is dominated 19 to 1 by
-#: its first term, so that errors of later ones fade (proof in docs/explanation/circle-and-ellipse.md).
+#: Detail windows of the source, degrees.
+ZOOMS = ((90.0, 115.5), (414.0, 450.0))
+#: With 13 terms of the series what is left out is below 1e-30 of the first for |x| <= 1, and the relative error in
+#: double precision below 6 units of 2^-53: each partial sum is dominated 19 to 1 by its first term, so that errors of
+#: later ones fade (proof in docs/explanation/circle-and-ellipse.md).
 _SERIES_ERROR = 8.0 * 2.0**-53
-
-
-class EnclosedCrescents(NamedTuple):
-    """``ellipse_only``: ellipse minus circle; ``circle_only``: circle minus ellipse; both `Interval`, mm^2."""
-
-    ellipse_only: Interval
-    circle_only: Interval
 
 
 def _bounds(lo: Array | float, hi: Array | float) -> Interval:
@@ -57,17 +72,13 @@ def _limited(x: Interval, top: Interval) -> Interval:
     return _bounds(np.clip(x.lo, 0.0, top.hi), np.clip(x.hi, 0.0, top.hi))
 
 
-def _xms(x: Interval) -> Interval:
+def _xms_enclosed(x: Interval) -> Interval:
     """Enclose ``x - sin x``, which never falls: at both ends, by its series or directly."""
     from graphsynth.intervals import functions
 
     ends = np.stack([x.lo, x.hi])
     small = np.abs(ends) <= 1.0
-    t = np.where(small, ends, 0.0)
-    square, series = t * t, np.zeros_like(t)
-    for coefficient in reversed(_COEFFICIENTS):
-        series = series * square + coefficient
-    value = series * square * t
+    value = series(np.where(small, ends, 0.0), len(COEFFICIENTS))
     margin = _SERIES_ERROR * np.abs(value) + 1e-300
     lo, hi = value - margin, value + margin
     if not small.all():
@@ -76,17 +87,6 @@ def _xms(x: Interval) -> Interval:
         lo, hi = np.where(small, lo, direct.lo), np.where(small, hi, direct.hi)
     zero = ends == 0.0
     return _bounds(np.where(zero, 0.0, lo)[0], np.where(zero, 0.0, hi)[1])
-
-
-def _segment(s: Interval) -> Interval:
-    return _xms(2 * s) / 2
-
-
-def _segment_difference(difference: Interval, total: Interval) -> Interval:
-    from graphsynth.intervals import functions
-
-    turned: Interval = 2 * functions.sin(difference) * functions.sin(total / 2).sqr()
-    return _xms(difference) + turned
 
 
 def _ranges(**values: Any) -> tuple[Interval, ...]:
@@ -102,12 +102,23 @@ def _ranges(**values: Any) -> tuple[Interval, ...]:
     return tuple(_bounds(np.broadcast_to(item.lo, shape), np.broadcast_to(item.hi, shape)) for item in read)
 
 
-def _angle(y: Interval, x: Interval) -> Interval:
-    """Enclose the angle of the points (x, y); [-pi, pi] at the origin alone, where nothing is known."""
+@cache
+def _intervals() -> Numbers:
     from graphsynth.intervals import functions
 
-    angle = functions.atan2(y, x)
-    return _choose(angle.is_empty, _pi().hull(-_pi()), angle)
+    def angle(y: Interval, x: Interval) -> Interval:
+        """Enclose the angle of the points (x, y); [-pi, pi] at the origin alone, where nothing is known."""
+        found = functions.atan2(y, x)
+        return _choose(found.is_empty, _pi().hull(-_pi()), found)
+
+    def within(x: Interval, top: Interval) -> Interval:
+        return _limited(_choose(x.is_empty, _bounds(0.0, np.inf), x), top)
+
+    return Numbers(functions.sin, Interval.sqr, _root, angle, _xms_enclosed, within)
+
+
+def _root(x: Interval) -> Interval:
+    return _nonnegative(x).sqrt()
 
 
 def _pi() -> Interval:
@@ -116,21 +127,10 @@ def _pi() -> Interval:
     return _bounds(*PI)
 
 
-# -- centred ellipse and circle ----------------------------------------------------------------------------------------
+def enclose_crescents(R1: Any, pa: Any, qb: Any) -> CrescentAreas:
+    """Enclose the areas between a circle and a centred ellipse from ``pa = a - R1`` and ``qb = R1 - b`` (certified).
 
-
-def enclose_crescents(R1: Any, pa: Any, qb: Any) -> EnclosedCrescents:
-    """Enclose the areas between a circle and a centred ellipse from ``pa = a - R1`` and ``qb = R1 - b``.
-
-    Parameters
-    ----------
-    R1, pa, qb : Interval or anything it takes, shape (...)
-        Radius of the circle and differences of the radii; broadcast against each other.
-
-    Returns
-    -------
-    EnclosedCrescents
-        Certified.  Exact up to rounding for a point R1; for a range of R1 an enclosure.
+    Exact up to rounding for a point R1; for a range of R1 an enclosure.
 
     Raises
     ------
@@ -147,36 +147,25 @@ def enclose_crescents(R1: Any, pa: Any, qb: Any) -> EnclosedCrescents:
     if not bool(((R1.lo > 0.0) & (qb.hi < R1.lo) & ((pa + qb).hi >= 0.0)).all()):
         raise GeometryError("an ellipse needs semi-axes a >= b > 0: qb < R1 and pa + qb >= 0 with R1 > 0")
     ell, cir = _crescents_at(_twice(R1), _point(np.stack([pa.lo, pa.hi])), _point(np.stack([qb.hi, qb.lo])))
-    return EnclosedCrescents(_bounds(ell.lo[0], ell.hi[1]), _bounds(cir.lo[1], cir.hi[0]))
+    return CrescentAreas(_bounds(ell.lo[0], ell.hi[1]), _bounds(cir.lo[1], cir.hi[0]))
 
 
-def _crescents_at(R1: Interval, pa: Interval, qb: Interval) -> EnclosedCrescents:
+def _crescents_at(R1: Interval, pa: Interval, qb: Interval) -> CrescentAreas:
     """theory/circle-and-ellipse 3 with its branches; ``pa`` is a point, ``qb`` a point or narrow."""
     ex = R1 * (qb - pa) + pa * qb
-    crossing = (pa.hi > 0.0) & (qb.hi > 0.0)
+    intersecting = (pa.hi > 0.0) & (qb.hi > 0.0)
     one = Interval(1)
-    p, q = _choose(crossing, pa, one), _choose(crossing, _nonnegative(qb), one)
-    a, b = R1 + p, R1 - _choose(crossing, q, qb)
-    b = _choose(b.lo > 0.0, b, one)
-    x0 = a * (q * (R1 + b) / ((p + q) * (a + b))).sqrt()
-    y0 = b * (p * (a + R1) / ((p + q) * (a + b))).sqrt()
-    dl = _angle((p + q) * x0 * y0, b * x0.sqr() + a * y0.sqr())
-    sc, se = _angle(y0, x0), _angle(a * y0, b * x0)
-    tc, te = _angle(x0, y0), _angle(b * x0, a * y0)
-    mixed = R1 * (q - p) + p * q
-    ell = 2 * (a * b * _segment_difference(dl, sc + se) - mixed * _segment(sc))
-    cir = 2 * (mixed * _segment(tc) + a * b * _segment_difference(dl, tc + te))
+    p, q = _choose(intersecting, pa, one), _choose(intersecting, _nonnegative(qb), one)
+    b = R1 - _choose(intersecting, q, qb)
+    ell, cir, _ = crescents(_intervals(), R1, R1 + p, _choose(b.lo > 0.0, b, one), p, q)
     nothing, inside = Interval.zeros(ell.shape), pa.hi <= 0.0
     whole = _pi() * ex
-    maybe = crossing & (qb.lo <= 0.0)  # touching cannot be excluded: both branches
+    maybe = intersecting & (qb.lo <= 0.0)  # touching cannot be excluded: both branches
     ell = _choose(maybe, ell.hull(-whole), ell)
     cir = _choose(maybe, cir.hull(nothing), cir)
-    ell = _choose(crossing, _nonnegative(ell), _choose(inside, nothing, _nonnegative(-whole)))
-    cir = _choose(crossing, _nonnegative(cir), _choose(inside, _nonnegative(whole), nothing))
-    return EnclosedCrescents(ell, cir)
-
-
-# -- the tilted bearing ------------------------------------------------------------------------------------------------
+    ell = _choose(intersecting, _nonnegative(ell), _choose(inside, nothing, _nonnegative(-whole)))
+    cir = _choose(intersecting, _nonnegative(cir), _choose(inside, _nonnegative(whole), nothing))
+    return CrescentAreas(ell, cir)
 
 
 def _bearing_ranges(R: Any, c: Any, h: Any, sine: Any) -> tuple[Interval, Interval, Interval, Interval]:
@@ -195,39 +184,16 @@ def _bearing_ranges(R: Any, c: Any, h: Any, sine: Any) -> tuple[Interval, Interv
     return R, c, h, S
 
 
-class _Tilt(NamedTuple):
-    """A tilt at points of S: cosine, ``1 - C``, and the shape of things in the section."""
-
-    S: Interval
-    C: Interval
-    bend: Interval
+def _tilt(S: Interval) -> Tilt:
+    C = _root((1 - S) * (1 + S))
+    return Tilt(S, C, S.sqr() / (1 + C))
 
 
-def _tilt(S: Interval) -> _Tilt:
-    C = _nonnegative((1 - S) * (1 + S)).sqrt()
-    return _Tilt(S, C, S.sqr() / (1 + C))
+def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> CrescentAreas:
+    """Enclose the free gap and the interference of the surrogate ellipse E4 over ranges of the parameters (certified).
 
-
-def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> EnclosedCrescents:
-    """Enclose the free gap and the interference of the surrogate ellipse E4 over ranges of the parameters.
-
-    Parameters
-    ----------
-    R, clearance, h : Interval or anything it takes, shape (...)
-        Radius of the bearing, radial clearance, half height; mm.
-    sine : the same
-        Sine of the tilt.
-
-    Returns
-    -------
-    EnclosedCrescents
-        Certified; empty where the ellipse does not exist for any value (``b <= 0``), [0, inf] where it may not.
-
-    Examples
-    --------
-    >>> gap, jam = enclose_surrogate_areas("17.5", "0.03", 5, "0.01333086429801")
-    >>> bool(jam.width < 1e-11)
-    True
+    R, clearance and half height h in mm, sine of the tilt.  Empty where the ellipse does not exist for any value (``b
+    <= 0``), [0, inf] where it may not.
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
     pairs = ((c.lo, c.hi), (h.hi, h.lo), (S.hi, S.lo))  # the tight corner, the free corner
@@ -238,10 +204,10 @@ def enclose_surrogate_areas(R: Any, clearance: Any, h: Any, sine: Any) -> Enclos
     for area, low, high in ((areas.ellipse_only, 0, 1), (areas.circle_only, 1, 0)):
         found = _bounds(np.minimum(area.lo[low], area.hi[high]), area.hi[high])
         both.append(_choose(never, Interval.empty(), _choose(maybe, any_area, found)))
-    return EnclosedCrescents(*both)
+    return CrescentAreas(*both)
 
 
-def _surrogate_at(R: Interval, c: Interval, h: Interval, S: Interval) -> tuple[EnclosedCrescents, Interval]:
+def _surrogate_at(R: Interval, c: Interval, h: Interval, S: Interval) -> tuple[CrescentAreas, Interval]:
     tilt = _tilt(S)
     depth = h * S - c + (R + c) * tilt.bend
     defined = _choose(depth.hi < R.lo, depth, Interval(0))
@@ -249,23 +215,9 @@ def _surrogate_at(R: Interval, c: Interval, h: Interval, S: Interval) -> tuple[E
 
 
 def enclose_lid_area(R: Any, clearance: Any, h: Any, sine: Any) -> Interval:
-    """Enclose A_lid, the disc of radius R outside one lid of the tilted hole (condition B), mm^2.
+    """Enclose A_lid, the disc of radius R outside one lid of the tilted hole (condition B), mm^2 (certified).
 
-    Parameters
-    ----------
-    R, clearance, h, sine : Interval or anything it takes, shape (...)
-        As for `enclose_surrogate_areas`; the clearance must not be negative.
-
-    Returns
-    -------
-    Interval
-        Certified; the exact range up to rounding: the area grows with R, h and the tilt, and falls with the clearance.
-
-    Examples
-    --------
-    >>> area = enclose_lid_area("17.5", "0.03", 5, "[0.0133, 0.0134]")
-    >>> bool(area.lo > 0.95), bool(area.hi < 0.98)
-    (True, True)
+    The exact range up to rounding: the area grows with R, h and the tilt, and falls with the clearance.
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
     corners = (np.stack(pair) for pair in ((R.lo, R.hi), (c.hi, c.lo), (h.lo, h.hi), (S.lo, S.hi)))
@@ -288,44 +240,24 @@ def _lid_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     return _limited(_choose(p.lo > 0.0, area, _choose(near.lo > 0.0, disc, disc.hull(Interval(0)))), disc)
 
 
-def _lid_side(R: Interval, c: Interval, h: Interval, tilt: _Tilt, depth: Interval) -> Interval:
+def _lid_side(R: Interval, c: Interval, h: Interval, tilt: Tilt, depth: Interval) -> Interval:
     """One crescent; zero where ``depth <= 0``."""
-    one = Interval(1)
-    S, C, bend = (_choose((tilt.S.lo > 0.0) & (tilt.C.lo > 0.0), part, one) for part in tilt)
-    q = R + c
-    p, d, thin, ring = q * C, h * S, q * bend, c * (2 * R + c)
-    m = _nonnegative(depth) * (R + d + p) / (S * (R * S + h + C * (h.sqr() + ring).sqrt()))
-    m = _choose(m.is_empty, _bounds(0.0, np.inf), m)
-    m = _limited(m, 2 * R)
-    X, y = R - m, _nonnegative(m * (2 * R - m)).sqrt()
-    s1, s2 = _angle(y, X), _angle(y / q, (d + X) / p)
-    dl = _angle((y / R) * (d / p + X * thin / (p * q)), X * (d + X) / (p * R) + y.sqr() / (q * R))
-    area = (q * thin - ring) * _segment(s1) + p * q * _segment_difference(dl, s1 + s2)
+    q, ring = R + c, c * (2 * R + c)
+    S, C, bend = (_choose((tilt.S.lo > 0.0) & (tilt.C.lo > 0.0), part, Interval(1)) for part in tilt)
+    return _known(lid_crescent(_intervals(), R, q, h, ring, Tilt(S, C, q * bend), _nonnegative(depth)), depth)
+
+
+def _known(area: Interval, depth: Interval) -> Interval:
+    """Zero where ``depth <= 0``; at least the hull with it where that may be."""
     area = _bounds(np.where(depth.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
     return _choose(depth.hi > 0.0, area, Interval.zeros(area.shape))
 
 
 def enclose_rim_area(R: Any, clearance: Any, h: Any, sine: Any) -> tuple[Interval, Mask]:
-    """Enclose A_rim, the rim of the tilted bearing outside the disc of radius Rh (condition A), mm^2.
+    """Enclose A_rim, the rim of the tilted bearing outside the disc of radius Rh (condition A), mm^2 (certified).
 
-    Parameters
-    ----------
-    R, clearance, h, sine : Interval or anything it takes, shape (...)
-        As for `enclose_surrogate_areas`; the clearance must not be negative.
-
-    Returns
-    -------
-    area : Interval
-        Certified; exact up to rounding for a point R while ``(h S)^2 <= c (2 R + c)``.
-    closed_form : ndarray of bool
-        False where ``R S > h C`` is possible: the closed form does not hold there, and the area is only enclosed by the
-        whole rim.
-
-    Examples
-    --------
-    >>> area, closed = enclose_rim_area("17.5", "0.03", 5, "[0.0133, 0.0134]")
-    >>> bool(area.lo > 0.87), bool(area.hi < 0.9), bool(closed)
-    (True, True, True)
+    Exact up to rounding for a point R while ``(h S)^2 <= c (2 R + c)``.  False where ``R S > h C`` is possible: the
+    closed form does not hold there, and the area is only enclosed by the whole rim.
     """
     R, c, h, S = _bearing_ranges(R, clearance, h, sine)
     pairs = ((c.hi, c.lo), (h.lo, h.hi), (S.lo, S.hi))
@@ -356,19 +288,126 @@ def _rim_at(R: Interval, c: Interval, h: Interval, S: Interval) -> Interval:
     one, full = Interval(1), _tilt(S)
     usable = (full.S.lo > 0.0) & (full.C.lo > 0.0)
     depth = h * S - c - R * full.bend
-    S, C, bend = (_choose(usable, part, one) for part in full)
-    Rh, ring = R + c, c * (2 * R + c)
-    p, d = R * C, h * S
-    m = _nonnegative(depth) * (p + Rh - d) / (S * (h - Rh * S + C * _nonnegative(h.sqr() - ring).sqrt()))
-    m = _limited(_choose(m.is_empty, _bounds(0.0, np.inf), m), 2 * Rh)
-    x, y = Rh - m, _nonnegative(m * (2 * Rh - m)).sqrt()
-    s1, s2 = _angle(y, x), _angle(y / R, (x - d) / p)
-    dl = _angle(y * (d - x * bend) / (p * Rh), (x - d) * x / (p * Rh) + y.sqr() / (R * Rh))
-    area = p * R * _segment_difference(dl, s1 + s2) - (R.sqr() * bend + ring) * _segment(s1)
+    tilt = Tilt(*(_choose(usable, part, one) for part in full))
+    Rh, ring, p, d = R + c, c * (2 * R + c), R * tilt.C, h * tilt.S
+    area = rim_crescent(_intervals(), R, Rh, h, ring, tilt, _nonnegative(depth))
     whole = _pi() * p * R
     beyond = d - p - Rh
     area = _choose(beyond.lo >= 0.0, whole, _choose(beyond.hi >= 0.0, area.hull(whole), area))
-    area = _bounds(np.where(depth.lo > 0.0, area.lo, np.minimum(area.lo, 0.0)), area.hi)
-    area = _choose(depth.hi > 0.0, area, Interval.zeros(area.shape))
-    possible = _choose(usable, area, (_pi() * R.sqr()).hull(Interval(0)))
+    possible = _choose(usable, _known(area, depth), (_pi() * R.sqr()).hull(Interval(0)))
     return _choose(depth.hi > 0.0, possible, Interval.zeros(area.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class AreaCurve:
+    """Areas over crank angles ``f`` (radians); every array and `Interval` has the shape of ``f``.
+
+    ``sine``: of the tilt of the coupler, signed (the sign tells the lid).  ``lid`` and ``rim``: true one-lid
+    interference for conditions B and A, mm^2; certified for the numbers given.  ``surrogate_gap`` and
+    ``surrogate_jam``: ellipse minus circle and circle minus ellipse of the surrogate E4, mm^2; empty where E4 does not
+    exist.  ``intersecting``: where circle and ellipse E4 certainly intersect.  ``rim_closed``: where ``rim`` is the
+    closed form; elsewhere it is a coarse enclosure (``R S > h C``).
+    """
+
+    f: Array
+    sine: Interval
+    lid: Interval
+    rim: Interval
+    surrogate_gap: Interval
+    surrogate_jam: Interval
+    intersecting: Mask
+    rim_closed: Mask
+
+    @property
+    def source_ordinate(self) -> Array:
+        """What the source plots, as far as it can be told: the free gap of E4, 0 without an intersection, mm^2."""
+        return np.where(self.intersecting, self.surrogate_gap.mid, 0.0)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return bounds of every area as a `pandas.DataFrame` (pandas is imported here); angles in radians."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"f": self.f}
+        for name in ("sine", "lid", "rim", "surrogate_gap", "surrogate_jam"):
+            bounds: Interval = getattr(self, name)
+            columns |= {f"{name}_lo": bounds.lo, f"{name}_hi": bounds.hi}
+        columns |= {
+            "source_ordinate": self.source_ordinate,
+            "intersecting": self.intersecting,
+            "rim_closed": self.rim_closed,
+        }
+        return pd.DataFrame(columns)
+
+
+@checked
+def enclose_tilt_sine(linkage: TiltedFourBar, f: ArrayLike | Interval) -> Interval:
+    """Enclose the sine of the tilt of the coupler, ``A_z / l3``, at crank angles (radians) or over intervals of them.
+
+    The numbers of the linkage are taken as the doubles that they are; a pin that rises above l3 gives a sine beyond 1.
+    See theory/four-bar-and-tilt 5 to 8.
+
+    Raises
+    ------
+    GeometryError
+        For ``rod="deck"``, which is no rigid body.
+    """
+    from graphsynth.intervals import functions
+
+    if linkage.rod != "rigid":
+        raise GeometryError('enclose_tilt_sine holds for rod="rigid" only; the deck rod is not a rigid body')
+    check_rounding()
+    angle = f if isinstance(f, Interval) else _points(f)
+    axis = [Interval.from_bounds(n, n) for n in linkage.axis]  # of length 1 up to rounding only
+    length = (axis[0].sqr() + axis[1].sqr() + axis[2].sqr()).sqrt()
+    n1, n2, n3 = (part / length for part in axis)
+    alpha = Interval.from_bounds(linkage._angle, linkage._angle)
+    s, v = functions.sin(alpha), 2 * functions.sin(alpha / 2).sqr()
+    height = (n1 * n3 * v - n2 * s) * functions.cos(angle) + (n2 * n3 * v + n1 * s) * functions.sin(angle)
+    ratio = Interval.from_bounds(linkage.l2, linkage.l2) / Interval.from_bounds(linkage.l3, linkage.l3)
+    sine: Interval = height * ratio
+    return sine
+
+
+def _points(f: ArrayLike) -> Interval:
+    angles = finite_array("f", f)
+    return Interval.from_bounds(angles, angles)
+
+
+@checked
+def area_curve(
+    linkage: TiltedFourBar | None = None, bearing: Bearing | None = None, f: ArrayLike | None = None
+) -> AreaCurve:
+    """Enclose all areas over crank angles (certified); without arguments those of the source in half degrees.
+
+    The dimensions of the bearing are read as the decimals they print as.
+
+    Raises
+    ------
+    GeometryError
+        For an interference fit, the non-rigid rod, and angles at which the crank pin rises above l3.
+
+    Examples
+    --------
+    >>> curve = area_curve(f=np.radians([90.0, 180.0]))
+    >>> np.round(curve.lid.mid, 9).tolist(), np.round(curve.source_ordinate, 9).tolist()
+    ([0.966036031, 0.0], [0.974968365, 0.0])
+    """
+    linkage = TiltedFourBar(alpha=1 / 30) if linkage is None else linkage
+    bearing = Bearing() if bearing is None else bearing
+    angles = np.radians(np.linspace(90.0, 450.0, 721)) if f is None else np.atleast_1d(finite_array("f", f))
+    sine = enclose_tilt_sine(linkage, angles)
+    if bool((abs(sine).hi > 1.0).any()):
+        place = np.degrees(angles.ravel()[abs(sine).hi.ravel().argmax()])
+        raise GeometryError(
+            f"the crank pin rises above l3 at {place:.6g} degrees: the linkage cannot be assembled there; "
+            "reduce alpha or leave the angle out"
+        )
+    R, c, height = (Interval(repr(v)) for v in (bearing.Rb, bearing.clearance, bearing.Hb))
+    h = height / 2
+    rim, closed = enclose_rim_area(R, c, h, sine)
+    gap, jam = enclose_surrogate_areas(R, c, h, sine)
+    size = abs(sine)
+    cosine = ((1 - size) * (1 + size)).sqrt()
+    used = h * size - c + (R + c) * size.sqr() / (1 + cosine)
+    intersecting = (used.lo > 0.0) & (c.lo > 0.0) & ~gap.is_empty
+    return AreaCurve(angles, sine, enclose_lid_area(R, c, h, sine), rim, gap, jam, np.asarray(intersecting), closed)

@@ -115,17 +115,10 @@ class Bearing:
         return 0.5 * self.hole_length
 
     def interference(self, sine: ArrayLike, cosine: ArrayLike, condition: Condition = "A") -> Array:
-        """Interference g (millimetres) for the sine and cosine of the tilt: free < 0, touching = 0, jam > 0.
+        """Interference g (millimetres) for sine and cosine of the tilt: free < 0, touching = 0, binding > 0.
 
         Stable forms of theory/bearing-contact 6; relative error of a few units in the last place of the largest term,
         so that interferences of a micrometre keep ten digits.  Only ``|sine|`` and a non-negative cosine matter.
-
-        Parameters
-        ----------
-        sine, cosine : array_like, shape (...)
-            Of the relative tilt, -pi/2 <= tilt <= pi/2.
-        condition : {"A", "B", "general"}
-            Short bearing in a long hole, long shaft in a short hole, pin of height Hb in a hole of ``hole_length``.
         """
         half = self._hole_half(condition)
         S, C = np.abs(finite_array("sine", sine, nan=True)), finite_array("cosine", cosine, nan=True)

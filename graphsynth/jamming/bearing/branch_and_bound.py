@@ -237,7 +237,7 @@ class _Search:
         self.bound = np.concatenate([self.bound, bound, bound])
 
 
-#: Parameters of the interference over a full turn, in the order of the variables of `interference_function`.
+#: Parameters of the interference over a full rotation, in the order of the variables of `interference_function`.
 INTERFERENCE_VARIABLES = ("l2", "l3", "alpha", "Rb", "Hb", "clearance", "hole_length")
 
 
@@ -349,7 +349,7 @@ class Samples:
         Part of the samples with a positive interference: the share of crank positions, over all parameter vectors.
     jamming_mechanisms : float
         Part of the parameter vectors that have a positive interference somewhere in the turn: the probability that a
-        mechanism drawn from the box jams (estimated), whether that position can be assembled or not.
+        mechanism drawn from the box binds (estimated), whether that position can be assembled or not.
     jamming_mechanisms_range : (float, float)
         Confidence interval of that probability, 95 %, exact for the binomial distribution [Clopper & Pearson 1934].
     corner_interference : float
@@ -434,9 +434,17 @@ def sample_interference(
         outside += int((interference > bound).sum())
     corner, tried = _corners(box, condition)
     return Samples(
-        count, best, jams / count, ever / count, _binomial_range(ever, count), corner, tried, bound, outside,
+        count,
+        best,
+        jams / count,
+        ever / count,
+        _binomial_range(ever, count),
+        corner,
+        tried,
+        bound,
+        outside,
         perf_counter() - begin,
-    )  # fmt: skip
+    )
 
 
 def _binomial_range(hits: int, count: int) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""`certify_jamming`: a proved verdict on one tilted bearing over a whole turn and a whole tolerance box (model L0)."""
+"""`certify_jamming`: a proved verdict on one tilted bearing over a full rotation and a tolerance box (model L0)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MODEL = "L0 with exact tilts: the bearing at B takes the whole misalignment, the
 class Witness:
     """A jam that is proved: exact parameters, a crank angle, and a positive lower bound of the interference there.
 
-    ``parameters`` are exact numbers as text; ranges ``[a, b]`` where every parameter vector jams.  ``f`` (radians)
+    ``parameters`` are exact numbers as text; ranges ``[a, b]`` where every parameter vector binds.  ``f`` (radians)
     encloses the crank angle (one for each vector, after its own phase), ``interference`` (mm) holds a positive lower
     bound.
     """
@@ -58,7 +58,7 @@ class JamCertificate:
         a negative upper end proves that all is free.
     smallest_worst_interference : Enclosure
         Of the smallest value over the box of the largest interference over the turn, mm; a positive lower end proves
-        that every parameter vector jams if ``assembles`` is "always" (else ``witness`` does).
+        that every parameter vector binds if ``assembles`` is "always" (else ``witness`` does).
     largest_tilt, critical_tilt : Enclosure
         Range over the box of the largest tilt of a turn and of the critical tilt, radians; infinite: none.
     arcs : CertifiedArcs
@@ -112,7 +112,7 @@ class JamCertificate:
     def over(self, start: float, stop: float) -> Verdict:
         """Return what is proved about a part of the turn: from ``start`` counter-clockwise to ``stop``, radians.
 
-        ``stop`` below ``start`` runs across the full turn; a turn or more is the whole turn.
+        ``stop`` below ``start`` runs across the full rotation; a turn or more is the full rotation.
 
         Raises
         ------
@@ -202,7 +202,7 @@ _PIECES = 256  # pieces of the turn on which assembly is proved
 
 @checked
 def certify_jamming(box: ToleranceBox, condition: Condition = "A") -> JamCertificate:
-    """Prove whether the bearing at B jams while the crank makes a turn, for all parameters of a box.
+    """Prove whether the bearing at B binds while the crank makes a turn, for all parameters of a box.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ class _Proof:
         return self._jam_on_grid(self.box)
 
     def _jam_of_worst(self) -> Witness | None:
-        """Find a position in which the worst parameter vector jams."""
+        """Find a position in which the worst parameter vector binds."""
         from graphsynth.jamming.bearing import corners
 
         worst = corners.worst_corner(self.box, self.condition)
@@ -395,7 +395,7 @@ def _witness(box: ToleranceBox, angle: Enclosure, interference: Enclosure) -> Wi
 
 
 def _text(value: Range) -> str:
-    """Write a parameter exactly; a range, where every value of it jams, by both ends."""
+    """Write a parameter exactly; a range, where every value of it binds, by both ends."""
     if value.is_point:
         return exact_text(value.lower)
     return f"[{exact_text(value.lower)}, {exact_text(value.upper)}]"
@@ -429,9 +429,21 @@ def _interference(box: ToleranceBox, condition: Condition, begin: float) -> JamC
     reason = "interference fit: the clearance is negative, the parts overlap at every tilt"
     arcs = whole_turn(nothing, Enclosure(-math.pi, math.pi), reason, True)
     return JamCertificate(
-        Verdict.CANNOT_ASSEMBLE, reason, condition, box, _pair(depths, 1), _pair(depths, 0),
-        _angles(tilt.sine), nothing, arcs, "never", None, box.exact_input, 2, perf_counter() - begin,
-    )  # fmt: skip
+        Verdict.CANNOT_ASSEMBLE,
+        reason,
+        condition,
+        box,
+        _pair(depths, 1),
+        _pair(depths, 0),
+        _angles(tilt.sine),
+        nothing,
+        arcs,
+        "never",
+        None,
+        box.exact_input,
+        2,
+        perf_counter() - begin,
+    )
 
 
 def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) -> JamCertificate:
@@ -452,6 +464,11 @@ def _partly_interference(box: ToleranceBox, condition: Condition, begin: float) 
     # of all clearances, the negative ones included
     depths = corners.interference_corners(box, corners.sines(box).sine, condition)
     return replace(
-        found, verdict=verdict, reason=reason, box=box, largest_interference=_pair(depths, 1),
-        smallest_worst_interference=_pair(depths, 0), seconds=perf_counter() - begin,
-    )  # fmt: skip
+        found,
+        verdict=verdict,
+        reason=reason,
+        box=box,
+        largest_interference=_pair(depths, 1),
+        smallest_worst_interference=_pair(depths, 0),
+        seconds=perf_counter() - begin,
+    )

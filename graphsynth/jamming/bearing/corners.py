@@ -145,7 +145,7 @@ def interference_values(
 ) -> Interval:
     """Enclose the interference (mm) elementwise for intervals of sine, radius, half height, clearance, half hole.
 
-    Condition "general" is ``min(gA, gB / C)``: the pin jams where it would both as a short bearing in a long hole and
+    Condition "general" is ``min(gA, gB / C)``: the pin binds where it would both as a short bearing in a long hole and
     as a long shaft in a hole of this length (theory/bearing-contact 4).
     """
     C = cosine(S)
@@ -215,7 +215,7 @@ def critical_sines(box: ToleranceBox, condition: Condition) -> Interval:
 
     Condition A: grows with c and R, falls with h, and exists where ``h^2 > c (2R + c)``, decided exactly; equality,
     contact without overlap, counts in the lower bound only.  Condition B: grows with c, falls with R and h.  General:
-    the larger one of both, since the pin jams where both do.
+    the larger one of both, since the pin binds where both do.
     """
     check_condition(box, condition)
     if condition == "B":
@@ -262,7 +262,7 @@ def _exists(box: ToleranceBox, height: str, corner: int, condition: str) -> bool
 
 
 def onset(box: ToleranceBox, critical: Interval, tilt: Tilt) -> tuple[float, float]:
-    """Bounds of kappa over the box: the bearing jams where ``|sin(f - psi1)| > kappa`` (theory/jam-arcs 1).
+    """Bounds of kappa over the box: the bearing binds where ``|sin(f - psi1)| > kappa`` (theory/jam-arcs 1).
 
     Infinite where there is no critical tilt or no tilt.
     """
@@ -336,14 +336,10 @@ Mask = NDArray[np.bool_]
 
 
 class Pose(NamedTuple):
-    """Enclosures over pieces of the turn, for all parameters of a box.
+    """Enclosures over pieces of the rotation, for all parameters of a box.
 
-    Attributes
-    ----------
-    assembled, missing : ndarray of bool
-        Proved that the linkage can be assembled at every point of the piece, or at none, for every parameter vector.
-    sine : Interval
-        Sine of the tilt, without sign.
+    ``assembled``, ``missing``: proved that the linkage can be assembled at every point of the piece, or at none.
+    ``sine``:  of the tilt, without sign.
     """
 
     assembled: Mask
@@ -360,28 +356,11 @@ def turn_pieces(count: int) -> Interval:
 def turns_freely(box: ToleranceBox, amplitude: float) -> bool:
     """Whether a few exact inequalities prove that every parameter vector is assembled at every crank angle.
 
-    Parameters
-    ----------
-    box : ToleranceBox
-        The linkage.
-    amplitude : float
-        Upper bound over the box of the largest ``|A_z| / l3`` of a turn.
-
-    Returns
-    -------
-    bool
-        True is a proof; False says nothing (then `pose` decides piece by piece).
-
-    Notes
-    -----
-    With ``z`` the largest ``|A_z|``: the pin runs at a plan radius in ``[sqrt(l2^2 - z^2), l2]``, the plan length s3 of
-    the coupler lies in ``[sqrt(l3^2 - z^2), l3]``, and ``sqrt(1 - x^2) >= 1 - x^2`` keeps all bounds rational.  Then
-    ``|l4 - s3| <= D <= l4 + s3`` (theory/four-bar-and-tilt 3, 7) holds for every D between the bounds of ``|A - C|``.
-
-    Examples
-    --------
-    >>> turns_freely(ToleranceBox(), 0.014), turns_freely(ToleranceBox(2, 1, 1, 1), 0.0)
-    (True, False)
+    ``amplitude`` is an upper bound over the box of z, the largest ``|A_z| / l3`` of a rotation.  True is a proof; False
+    says nothing (then `pose` decides piece by piece).  The pin runs at a plan radius in ``[sqrt(l2^2 - z^2), l2]``, the
+    plan length s3 of the coupler lies in ``[sqrt(l3^2 - z^2), l3]``, and ``sqrt(1 - x^2) >= 1 - x^2`` keeps all bounds
+    rational.  Then ``|l4 - s3| <= D <= l4 + s3`` (theory/four-bar-and-tilt 3, 7) holds for every D between the bounds
+    of ``|A - C|``.
     """
     if not amplitude < 1.0:
         return False
@@ -395,16 +374,7 @@ def turns_freely(box: ToleranceBox, amplitude: float) -> bool:
 
 
 def pose(box: ToleranceBox, f: Interval) -> Pose:
-    """Enclose assembly and tilt over pieces ``f`` (shape (m,)) of the turn.
-
-    Guarantee: certified for every parameter vector of the box.
-
-    Examples
-    --------
-    >>> found = pose(ToleranceBox(alpha="1/30"), turn_pieces(256))
-    >>> bool(found.assembled.all()), bool(found.missing.any())
-    (True, False)
-    """
+    """Enclose assembly and tilt over pieces ``f`` (m,) of the rotation (certified for all parameters of the box)."""
     # one shape for all, so that every operation takes it
     l1, l2, l3, l4, turn = (_spread(box.outer(name), f) for name in ("l1", "l2", "l3", "l4", "azimuth"))
     n1, n2, n3, alpha = (_spread(value, f) for value in _direction(box))

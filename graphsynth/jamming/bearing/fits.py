@@ -19,40 +19,38 @@ from graphsynth.jamming.bearing.certify import certify_jamming
 from graphsynth.jamming.bearing.parameters import Given, Range, ToleranceBox
 from graphsynth.jamming.verdict import Verdict
 
-_SIZES = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
+
+def _numbers(row: str) -> tuple[int, ...]:
+    return tuple(map(int, row.split()))
+
+
+_SIZES = _numbers("3 6 10 18 30 50 80 120 180 250 315 400 500")  # upper ends, mm
 _GRADES = {  # micrometres
-    5: (4, 5, 6, 8, 9, 11, 13, 15, 18, 20, 23, 25, 27),
-    6: (6, 8, 9, 11, 13, 16, 19, 22, 25, 29, 32, 36, 40),
-    7: (10, 12, 15, 18, 21, 25, 30, 35, 40, 46, 52, 57, 63),
-    8: (14, 18, 22, 27, 33, 39, 46, 54, 63, 72, 81, 89, 97),
-    9: (25, 30, 36, 43, 52, 62, 74, 87, 100, 115, 130, 140, 155),
-    10: (40, 48, 58, 70, 84, 100, 120, 140, 160, 185, 210, 230, 250),
-    11: (60, 75, 90, 110, 130, 160, 190, 220, 250, 290, 320, 360, 400),
+    5: _numbers("4 5 6 8 9 11 13 15 18 20 23 25 27"),
+    6: _numbers("6 8 9 11 13 16 19 22 25 29 32 36 40"),
+    7: _numbers("10 12 15 18 21 25 30 35 40 46 52 57 63"),
+    8: _numbers("14 18 22 27 33 39 46 54 63 72 81 89 97"),
+    9: _numbers("25 30 36 43 52 62 74 87 100 115 130 140 155"),
+    10: _numbers("40 48 58 70 84 100 120 140 160 185 210 230 250"),
+    11: _numbers("60 75 90 110 130 160 190 220 250 290 320 360 400"),
 }
 _BELOW = {  # distance of the upper limit of the shaft below the nominal size, micrometres
-    "d": (20, 30, 40, 50, 65, 80, 100, 120, 145, 170, 190, 210, 230),
-    "e": (14, 20, 25, 32, 40, 50, 60, 72, 85, 100, 110, 125, 135),
-    "f": (6, 10, 13, 16, 20, 25, 30, 36, 43, 50, 56, 62, 68),
-    "g": (2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 18, 20),
+    "d": _numbers("20 30 40 50 65 80 100 120 145 170 190 210 230"),
+    "e": _numbers("14 20 25 32 40 50 60 72 85 100 110 125 135"),
+    "f": _numbers("6 10 13 16 20 25 30 36 43 50 56 62 68"),
+    "g": _numbers("2 4 5 6 7 9 10 12 14 15 17 18 20"),
     "h": (0,) * 13,
 }
-_FINE_SIZES = (
-    3, 6, 10, 18, 30, 40, 50, 65, 80, 100, 120, 140, 160, 180, 200, 225, 250, 280, 315, 355, 400, 450, 500,
-)  # fmt: skip
+_FINE_SIZES = _numbers("3 6 10 18 30 40 50 65 80 100 120 140 160 180 200 225 250 280 315 355 400 450 500")
 _FINE_BELOW = {
-    "a": (270, 270, 280, 290, 300, 310, 320, 340, 360, 380, 410, 460, 520, 580, 660, 740, 820, 920, 1050, 1200, 1350,
-          1500, 1650),
-    "b": (140, 140, 150, 150, 160, 170, 180, 190, 200, 220, 240, 260, 280, 310, 340, 380, 420, 480, 540, 600, 680, 760,
-          840),
-    "c": (60, 70, 80, 95, 110, 120, 130, 140, 150, 170, 180, 200, 210, 230, 240, 260, 280, 300, 330, 360, 400, 440,
-          480),
-}  # fmt: skip
+    "a": _numbers("270 270 280 290 300 310 320 340 360 380 410 460 520 580 660 740 820 920 1050 1200 1350 1500 1650"),
+    "b": _numbers("140 140 150 150 160 170 180 190 200 220 240 260 280 310 340 380 420 480 540 600 680 760 840"),
+    "c": _numbers("60 70 80 95 110 120 130 140 150 170 180 200 210 230 240 260 280 300 330 360 400 440 480"),
+}
 
+_COMMON = "H6/h5 H7/h6 H7/g6 H8/h7 H7/f7 H8/f7 H8/e8 H9/e9 H9/d9 H10/d10 H11/d11 H11/c11 H11/b11 H11/a11"
 #: Common clearance fits of the hole-basis system, from tight to loose.
-STANDARD_FITS = (
-    "H6/h5", "H7/h6", "H7/g6", "H8/h7", "H7/f7", "H8/f7", "H8/e8", "H9/e9", "H9/d9", "H10/d10", "H11/d11", "H11/c11",
-    "H11/b11", "H11/a11",
-)  # fmt: skip
+STANDARD_FITS = tuple(_COMMON.split())
 
 
 @checked
@@ -140,8 +138,8 @@ class FitVerdict:
     fit : Fit
         The fit.
     verdict : Verdict
-        ``CERTIFIED_FREE``: every pair of parts is free; ``CERTIFIED_JAMMED``: every pair jams;
-        ``CERTIFIED_JAMMED_FOR_SOME``: the tightest pair jams, others may not; else ``UNDECIDED``.
+        ``CERTIFIED_FREE``: every pair of parts is free; ``CERTIFIED_JAMMED``: every pair binds;
+        ``CERTIFIED_JAMMED_FOR_SOME``: the tightest pair binds, others may not; else ``UNDECIDED``.
     clearance_left : float
         Lower bound of the clearance left for the worst pair (mm); negative if something is missing.
     """
@@ -163,9 +161,12 @@ class FitVerdict:
         """Plain values for a table."""
         c = self.fit.clearance
         return {
-            "fit": self.fit.name, "smallest clearance [mm]": float(c.lower), "largest clearance [mm]": float(c.upper),
-            "verdict": self.verdict.name, "clearance left [mm]": self.clearance_left,
-        }  # fmt: skip
+            "fit": self.fit.name,
+            "smallest clearance [mm]": float(c.lower),
+            "largest clearance [mm]": float(c.upper),
+            "verdict": self.verdict.name,
+            "clearance left [mm]": self.clearance_left,
+        }
 
 
 @checked

@@ -1,7 +1,7 @@
 """Inverse questions: how much misalignment, how little clearance, how much height is still free (theory/jam-arcs 4).
 
 Closed forms in double precision are estimates.  The certified answers are brackets: the value ``works`` is certified to
-leave the whole turn free for the whole tolerance box, the value ``fails`` to bind for at least one parameter vector.
+leave the full rotation free for the whole tolerance box, the value ``fails`` to bind for at least one parameter vector.
 The closed form proposes the edge; only the certificates on both sides count, so that an error in it could widen the
 bracket but not falsify it.
 """
@@ -35,7 +35,7 @@ class Limit:
 
 @checked
 def largest_misalignment(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Limit:
-    """Largest alpha (radians) for which the whole turn is free; None if every alpha is free, or none.
+    """Largest alpha (radians) for which the full rotation is free; None if every alpha is free, or none.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _tilt(linkage: TiltedFourBar) -> tuple[float, float]:
 
 @checked
 def smallest_clearance(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Limit:
-    """Smallest radial clearance (mm) for which the whole turn is free, for the radius and height of ``bearing``.
+    """Smallest radial clearance (mm) for which the full rotation is free, for the radius and height of ``bearing``.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def smallest_clearance(linkage: TiltedFourBar, bearing: Bearing, condition: Cond
 
 @checked
 def largest_height(linkage: TiltedFourBar, bearing: Bearing, condition: Condition = "A") -> Limit:
-    """Largest height Hb (mm) for which the whole turn is free, for the radius and clearance of ``bearing``.
+    """Largest height Hb (mm) for which the full rotation is free, for the radius and clearance of ``bearing``.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class CertifiedLimit:
     Attributes
     ----------
     works : float or None
-        Certified free over the whole turn and the whole box (and for every milder value, see ``covers``).
+        Certified free over the full rotation and the whole box (and for every milder value, see ``covers``).
     fails : float or None
         Certified to jam for at least one parameter vector of the box.
     unit : str

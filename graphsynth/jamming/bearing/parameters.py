@@ -309,8 +309,22 @@ class ToleranceBox:
         if not isinstance(b, Bearing):
             raise GeometryError(f"bearing = {b!r} is no Bearing; give Bearing(Rb, Hb, clearance), or none")
         k = linkage
-        return cls(k.l1, k.l2, k.l3, k.l4, k.alpha, k.axis, 0, b.Rb, b.Hb, b.clearance, b.hole_length,
-                   sgn=k.sgn, rod=k.rod, convention=k.convention)  # fmt: skip
+        return cls(
+            k.l1,
+            k.l2,
+            k.l3,
+            k.l4,
+            k.alpha,
+            k.axis,
+            0,
+            b.Rb,
+            b.Hb,
+            b.clearance,
+            b.hole_length,
+            sgn=k.sgn,
+            rod=k.rod,
+            convention=k.convention,
+        )
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         raise AttributeError(f"a ToleranceBox does not change; make another with replace({name}=...)")
@@ -381,9 +395,16 @@ class ToleranceBox:
         n2 = m["n1"] * math.sin(turn) + m["n2"] * math.cos(turn)
         axis = (m["n1"], m["n2"], m["n3"]) if turn == 0.0 else (n1, n2, m["n3"])
         linkage = TiltedFourBar(
-            m["l1"], m["l2"], m["l3"], m["l4"], self.sgn, alpha=m["alpha"], axis=axis, rod=self.rod,
+            m["l1"],
+            m["l2"],
+            m["l3"],
+            m["l4"],
+            self.sgn,
+            alpha=m["alpha"],
+            axis=axis,
+            rod=self.rod,
             convention=self.convention,
-        )  # fmt: skip
+        )
         return linkage, Bearing(m["Rb"], m["Hb"], m["clearance"], m.get("hole_length"))
 
     def describe(self) -> dict[str, str]:

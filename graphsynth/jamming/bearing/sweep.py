@@ -50,7 +50,7 @@ class TurnPartition:
     Attributes
     ----------
     free : tuple of Span
-        Certified: no parameter vector jams.
+        Certified: no parameter vector binds.
     inner : tuple of Span
         Certified: assembled and jammed for every parameter vector.
     undecided : tuple of Span

@@ -21,8 +21,14 @@ from graphsynth.core.errors import IntervalError
 from graphsynth.intervals.boxes import Status
 from graphsynth.intervals.guard import check_rounding
 from graphsynth.intervals.interval import Interval
-from graphsynth.jamming.intersection.hull import IntersectionHull, exact_hull, mirrored, spectral_radius
-from graphsynth.jamming.intersection.problem import CircleEllipse, Reason
+from graphsynth.jamming.intersection.hull import (
+    CircleEllipse,
+    IntersectionHull,
+    Reason,
+    exact_hull,
+    mirrored,
+    spectral_radius,
+)
 
 Array = NDArray[np.float64]
 #: Boxes treated between two looks at the clock.
@@ -43,15 +49,8 @@ class IntersectionBoxes:
         ``EXISTS``: at least one for every choice, but boxes are left that may hold more; ``UNDECIDED``: see
         ``reasons``.
     reasons : tuple of Reason
-    proved : Interval, shape (P, 2)
-        Enclosures of intersections that exist and are unique in the matching row of ``domains``.
-    domains : Interval, shape (P, 2)
-    inner : Interval, shape (M, 2)
-        Boxes of which every point is a solution for some choice of the parameters.
-    boundary : Interval, shape (N, 2)
-        Boxes about which nothing is proved: the layer around a thick solution set, and boxes not treated.
     rows : four ndarrays, shape (K, 4)
-        The same four as bounds x lo, x hi, y lo, y hi.
+        ``proved``, ``domains``, ``inner``, ``boundary`` as bounds x lo, x hi, y lo, y hi.
     finished : bool
         False if a limit ended the search; all boxes together hold every solution all the same.
     tested, seconds : int, float
@@ -68,22 +67,22 @@ class IntersectionBoxes:
 
     @cached_property
     def proved(self) -> Interval:
-        """Enclosures of the intersections that are proved, shape (P, 2)."""
+        """Enclosures of intersections that exist and are unique in the matching row of ``domains``, shape (P, 2)."""
         return _intervals(self.rows[0])
 
     @cached_property
     def domains(self) -> Interval:
-        """Boxes in which each of them is the only intersection, shape (P, 2)."""
+        """Boxes in which each of the proved ones is the only intersection, shape (P, 2)."""
         return _intervals(self.rows[1])
 
     @cached_property
     def inner(self) -> Interval:
-        """Boxes of solutions, shape (M, 2)."""
+        """Boxes of which every point is a solution for some choice of the parameters, shape (M, 2)."""
         return _intervals(self.rows[2])
 
     @cached_property
     def boundary(self) -> Interval:
-        """Boxes about which nothing is proved, shape (N, 2)."""
+        """Boxes about which nothing is proved: a layer around a thick solution set, boxes not treated; shape (N, 2)."""
         return _intervals(self.rows[3])
 
     @property
@@ -192,7 +191,7 @@ def krawczyk_boxes(
 
     Examples
     --------
-    >>> from graphsynth.jamming.intersection import circle_ellipse
+    >>> from graphsynth.jamming.intersection.hull import circle_ellipse
     >>> found = krawczyk_boxes(circle_ellipse(5, 6, 4, eps="1e-9"))
     >>> found.status.name, len(found.four), found.finished
     ('UNIQUE', 4, True)
@@ -321,7 +320,7 @@ def cross_check(problem: CircleEllipse, **limits: Any) -> CrossCheck:
 
     Examples
     --------
-    >>> from graphsynth.jamming.intersection import circle_ellipse
+    >>> from graphsynth.jamming.intersection.hull import circle_ellipse
     >>> found = cross_check(circle_ellipse(5, 6, 4, eps="1e-6"))
     >>> found.consistent, found.hull.status is found.boxes.status
     (True, True)

@@ -1,4 +1,4 @@
-"""Branch and prune for the crossing of a circle and an ellipse in the first quadrant, compiled.
+"""Branch and prune for the intersection of a circle and an ellipse in the first quadrant, compiled.
 
 Data of the problem: ``data = (ql, qh, el, eh, al, ah, bl, bh)`` with ``x^2 + y^2`` in [ql, qh] and
 ``alpha x^2 + beta y^2`` in [el, eh], alpha in [al, ah], beta in [bl, bh].
@@ -122,7 +122,7 @@ def contract(box, data, out):
 
 @kernel
 def inflate(domain, data, out, factor):
-    """Prove the crossing near a box: test boxes around the image, enlarged by ``factor``; ``domain`` is the last."""
+    """Prove the intersection near a box: test boxes around the image, grown by ``factor``; ``domain`` is the last."""
     for _ in range(INFLATIONS):
         norm = image(domain[0], domain[1], domain[2], domain[3], data, out)
         if not norm < 1.0:
@@ -140,7 +140,7 @@ def inflate(domain, data, out, factor):
 
 @kernel
 def polish(domain, data, out, row):
-    """Shrink the enclosure of the crossing that is proved in ``domain``; domain and enclosure go into ``row``."""
+    """Shrink the enclosure of the intersection that is proved in ``domain``; domain and enclosure go into ``row``."""
     row[:4] = domain
     lo0, hi0, lo1, hi1 = max(domain[0], out[0]), min(domain[1], out[1]), max(domain[2], out[2]), min(domain[3], out[3])
     for _ in range(POLISH):
@@ -155,7 +155,7 @@ def polish(domain, data, out, row):
 
 @kernel
 def known(box, proved, count):
-    """Whether a box lies in a domain in which the only crossing has been found."""
+    """Whether a box lies in a domain in which the only intersection has been found."""
     for k in range(count):
         row = proved[k]
         if row[0] <= box[0] and box[1] <= row[1] and row[2] <= box[2] and box[3] <= row[3]:
@@ -175,9 +175,11 @@ def search(queue, state, kept, inner, proved, data, tolerance, limit):
         state[TESTED] += 1
         if known(box, proved, state[PROVED]):
             continue
+        # shrink by Krawczyk's test while that gains
         kind, norm = contract(box, data, out)
         if kind == EMPTY:
             continue
+        # a contracting map whose image does not lie inside may prove one intersection in a box around it
         found = kind == UNIQUE
         if not found and kind == UNDECIDED and norm < 1.0:
             for factor in (2.0, 1.2):
@@ -187,12 +189,14 @@ def search(queue, state, kept, inner, proved, data, tolerance, limit):
                     break
         elif found:
             domain[:] = box
+        # a new intersection is kept once, with the domain in which it is the only one
         if found and state[PROVED] < proved.shape[0]:
             if not known(out, proved, state[PROVED]):
                 polish(domain, data, out, proved[state[PROVED]])
                 state[PROVED] += 1
             if known(box, proved, state[PROVED]):
                 continue
+        # what is solved throughout, small enough or too narrow for doubles is kept; the rest is halved
         wide, high = box[1] - box[0], box[3] - box[2]
         middle = 0.5 * (box[0] + box[1]) if wide >= high else 0.5 * (box[2] + box[3])
         side = 0 if wide >= high else 2

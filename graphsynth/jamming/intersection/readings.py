@@ -1,4 +1,9 @@
-"""The four readings of "the ellipse" of the source (theory/circle-and-ellipse 1)."""
+"""What the source can mean and what it sums up: four readings of "the ellipse", the interval shoelace sum.
+
+The readings are those of theory/circle-and-ellipse 1.  The interval shoelace sum is kept as a warning: its width does
+not shrink with finer boxes, because every vertex appears in two products and the dependency error is hundreds of times
+the area (theory/circle-and-ellipse 5).
+"""
 
 from __future__ import annotations
 
@@ -11,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite_array
 from graphsynth.core.errors import GeometryError
+from graphsynth.intervals.interval import Interval
 from graphsynth.jamming.bearing.areas import CrescentAreas, ellipse_circle_stable, lid_area, surrogate_areas
 from graphsynth.jamming.bearing.bearing import Bearing
-from graphsynth.jamming.intersection.problem import (
+from graphsynth.jamming.intersection.hull import (
     CircleEllipse,
     Exact,
     bearing_radii,
@@ -49,11 +55,7 @@ class Reading(Enum):
 
 
 class TiltedEllipse(NamedTuple):
-    """Ellipse in the plane perpendicular to the other part's axis, the direction of the tilt first; mm.
-
-    ``centre``: place of the centre along the tilt; ``along``, ``across``: semi-axes; ``circle``: radius of the circle
-    that it is compared with.
-    """
+    """Ellipse in the plane across the other part's axis, the direction of the tilt first, and its circle; mm."""
 
     centre: Array
     along: Array
@@ -69,31 +71,9 @@ def _tilt(sine: ArrayLike, cosine: ArrayLike) -> tuple[Array, Array]:
 def reading_ellipse(
     bearing: Bearing, sine: ArrayLike, cosine: ArrayLike, reading: Reading = Reading.LID, lid: int = 1
 ) -> TiltedEllipse:
-    """Return the ellipse of a reading for the sine and cosine of the tilt.
+    """Return the ellipse of a reading for sine and cosine of the tilt, mm (estimated: floating point).
 
-    Parameters
-    ----------
-    bearing : Bearing
-    sine, cosine : array_like, shape (...)
-    reading : Reading
-    lid : {1, -1}
-        For E3: the lid at which the shift is ``+h sin t`` or ``-h sin t``.
-
-    Returns
-    -------
-    TiltedEllipse
-        Centre and semi-axes, mm, of the same shape (estimated: floating point).
-
-    Raises
-    ------
-    GeometryError
-        For another ``lid``.
-
-    Examples
-    --------
-    >>> found = reading_ellipse(Bearing(), 0.6, 0.8)
-    >>> float(found.centre), round(float(found.along), 9)
-    (3.0, 14.024)
+    ``lid``, +1 or -1, tells at which lid the shift of E3 is ``h sin t``.
     """
     if lid not in (1, -1):
         raise GeometryError(f"lid = {lid!r} must be +1 or -1")
@@ -118,20 +98,6 @@ def reading_areas(
 
     For E2 the interference is the ellipse outside the circle, for the others the circle outside the ellipse.  NaN where
     the ellipse does not exist.
-
-    Parameters
-    ----------
-    bearing : Bearing
-        Dimensions in millimetres.
-    sine, cosine : array_like, shape (...)
-        Of the tilt.
-    reading : Reading, optional
-        Which ellipse; the lid E3 by default.
-
-    Returns
-    -------
-    CrescentAreas
-        Of the same shape, mm^2.
 
     Examples
     --------
@@ -162,32 +128,14 @@ def _masked(areas: CrescentAreas, defined: NDArray[np.bool_]) -> CrescentAreas:
 def reading_problem(
     bearing: Bearing, sine: Any, reading: Reading, e1: Any = 0, e2: Any = 0, *, eps: Any = None
 ) -> CircleEllipse:
-    """Pose the intersection problem for a centred reading: E1, E2 or E4, with x along the long axis.
+    """Pose the intersection problem for a centred reading (E1, E2 or E4), with x along the long axis.
 
-    Parameters
-    ----------
-    bearing : Bearing
-        Its dimensions are read as the decimals they print as.
-    sine : number, text or Interval
-        Sine of the tilt.
-    reading : Reading
-        One of the centred ones.
-    e1, e2, eps : as for `circle_ellipse`
-
-    Returns
-    -------
-    CircleEllipse
-        The problem, its numbers exact.
+    The dimensions of the bearing are read as the decimals they print as; e1, e2 and eps are those of `circle_ellipse`.
 
     Raises
     ------
     GeometryError
         For E3, whose ellipse is not centred; for a tilt at which the ellipse does not exist.
-
-    Examples
-    --------
-    >>> round(float(reading_problem(Bearing(), "0.6", Reading.IMAGE).b.lo), 9)
-    14.024
     """
     if reading is Reading.LID:
         raise GeometryError("the ellipse of reading E3 (LID) is not centred; use lid_area, or E4 (SURROGATE)")
@@ -203,3 +151,40 @@ def reading_problem(
     if reading is Reading.IMAGE:
         return circle_ellipse(R, Rh, (Rh * cosine.lo, Rh * cosine.hi), e1, e2, eps=eps)
     return circle_ellipse(Rh, (R / cosine.hi, R / cosine.lo), R, e1, e2, eps=eps)
+
+
+def crescent_boxes(R1: float, a: float, b: float, count: int = 250) -> Interval:
+    """Boxes that tile the boundary of one crescent of the ellipse outside the circle, ``b < R1 < a``, in order.
+
+    Half of them lie on the ellipse, half on the circle: bounding boxes of neighbouring points of the boundary, shape (2
+    (count // 2), 2), in double precision: a demonstration, not a certificate.
+    """
+    points = crescent_points(R1, a, b, count)
+    after = np.roll(points, -1, axis=0)
+    return Interval.from_bounds(np.minimum(points, after), np.maximum(points, after))
+
+
+def crescent_points(R1: float, a: float, b: float, count: int) -> Array:
+    """Points on the boundary of `crescent_boxes`, counter-clockwise, shape (2 (count // 2), 2)."""
+    if not 0.0 < b < R1 < a:
+        raise GeometryError(f"b = {b}, R1 = {R1}, a = {a}: a crescent needs 0 < b < R1 < a")
+    if count < 4:
+        raise GeometryError(f"count = {count} is too small; give at least 4 boxes")
+    x0 = a * np.sqrt((R1 - b) * (R1 + b) / ((a - b) * (a + b)))
+    y0 = b * np.sqrt((a - R1) * (a + R1) / ((a - b) * (a + b)))
+    sweep = np.linspace(-1.0, 1.0, count // 2 + 1)
+    outer, inner = np.arctan2(y0 / b, x0 / a) * sweep, np.arctan2(y0, x0) * sweep[::-1]
+    ellipse = np.column_stack([a * np.cos(outer), b * np.sin(outer)])
+    circle = R1 * np.column_stack([np.cos(inner), np.sin(inner)])
+    return np.concatenate([ellipse[:-1], circle[:-1]])
+
+
+def interval_shoelace(vertices: Interval) -> Interval:
+    """Half the sum ``x_i y_{i+1} - x_{i+1} y_i`` over a closed chain of boxes (n, 2).
+
+    The signed area of every polygon with one vertex in each box: a true enclosure, and a useless one, see the module.
+    """
+    x, y = vertices[:, 0], vertices[:, 1]
+    after = np.roll(np.arange(len(vertices)), -1)
+    twice: Interval = x * y[after] - x[after] * y
+    return twice.sum() / 2

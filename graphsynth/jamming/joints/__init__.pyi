@@ -11,13 +11,11 @@ from .limits import (
 )
 from .scale import (
     DirectionMap as DirectionMap,
+    LimitSensitivity as LimitSensitivity,
     ScaleCertificate as ScaleCertificate,
+    SensitivityTable as SensitivityTable,
+    compare_sensitivities as compare_sensitivities,
     direction_map as direction_map,
     largest_scale as largest_scale,
 )
 from .search import MemberWitness as MemberWitness
-from .sensitivity import (
-    LimitSensitivity as LimitSensitivity,
-    SensitivityTable as SensitivityTable,
-    compare_sensitivities as compare_sensitivities,
-)

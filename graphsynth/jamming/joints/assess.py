@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.checks import checked
-from graphsynth.core.shown import Printed
 from graphsynth.jamming.bearing.bearing import Condition
 from graphsynth.jamming.joints.limits import Misalignment
 from graphsynth.jamming.joints.program import Bearings, JointProblem, PoseSolution, check_motion, problem
-from graphsynth.jamming.verdict import METHOD_CERTIFIED, Verdict
+from graphsynth.jamming.verdict import METHOD_CERTIFIED, Assessment, Verdict
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.certify import TurnCertificate
@@ -42,7 +41,7 @@ class Sensitivity(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CoupledReport(Printed):
+class CoupledReport(Assessment):
     """Result of `assess_coupled`; arrays over the n inputs, NaN where the mechanism is not assembled.
 
     Attributes
@@ -53,11 +52,11 @@ class CoupledReport(Printed):
     inputs : ndarray, shape (n,)
     factor : ndarray, shape (n,)
         T*: the least factor on all tilt limits with which the pose can be assembled, axial clearances as they are;
-        above 1 it jams, infinite if no factor helps.
+        above 1 it binds, infinite if no factor helps.
     duality_gap : ndarray, shape (n,)
         Primal minus dual value of T*, relative: the factor is known to this (estimated: rounding only).
     allowed_scale : ndarray, shape (n,)
-        Factor by which all misalignments may grow before the pose jams; below 1 where it jams, infinite if never.
+        Factor by which all misalignments may grow before the pose binds; below 1 where it binds, infinite if never.
     consumption : ndarray, shape (n, blocks)
         ``|tau| / (T* t)`` of every limit on tilt: 1 where it is used up.  One optimal sharing; joints that are not
         binding may have others.
@@ -109,16 +108,20 @@ class CoupledReport(Printed):
     seconds: float = field(default=0.0, compare=False)
     small_tilts: str = "L1 with small tilts (first order): neglects terms of relative order alpha squared"
 
-    def __repr__(self) -> str:
-        rows = [(*one.joint, one.what, one.gain) for one in self.sensitivities[:3]]
-        lines = [
-            self.statement,
-            f"  factor on the limits, at most: {self.worst_factor:.6g} at input {self.worst_input:.6g} (binds above 1)",
-            f"  misalignments may grow by: {self.smallest_scale:.6g} at input {self.smallest_scale_input:.6g}",
-            *(f"  joint {a}-{b}, {what}: sensitivity {value:.3f}" for a, b, what, value in rows),
-            "  more: .sensitivities, .certificate, .summary(), .to_pandas()",
+    def _figures(self) -> list[tuple[str, str]]:
+        rows = [
+            (
+                "limits",
+                f"used to {100.0 * self.worst_factor:.4g} % at most, at input {self.worst_input:.6g}",
+            ),
+            (
+                "misalignments",
+                f"may be {self.smallest_scale:.6g} times as large, by input {self.smallest_scale_input:.6g}",
+            ),
         ]
-        return "\n".join(lines)
+        for (a, b), what, gain in self.sensitivities[:3]:
+            rows.append((f"joint {a}-{b}", f"1 % more {what} allows at most {gain:.3f} % more misalignment"))
+        return rows
 
     @property
     def model(self) -> str:
@@ -127,7 +130,7 @@ class CoupledReport(Printed):
 
     @property
     def method(self) -> str:
-        """How the verdict was had."""
+        """How the verdict is known."""
         return METHOD_CERTIFIED if self.certificate is not None else METHOD_SAMPLES
 
     @property
@@ -164,8 +167,11 @@ class CoupledReport(Printed):
         import pandas as pd
 
         columns: dict[str, Array] = {
-            "input": self.inputs, "factor": self.factor, "gap": self.duality_gap, "allowed_scale": self.allowed_scale,
-        }  # fmt: skip
+            "input": self.inputs,
+            "factor": self.factor,
+            "gap": self.duality_gap,
+            "allowed_scale": self.allowed_scale,
+        }
         for k, ((a, b), what) in enumerate(self.names):
             columns[f"consumption_{a}_{b}_{what}"] = self.consumption[:, k]
             columns[f"price_{a}_{b}_{what}"] = self.shadow_price[:, k]
@@ -255,9 +261,13 @@ def _with_proof(
     # where nothing is proved, what the samples say is still worth reading
     notes = (*report.notes, f"at the samples: {report.reason}") if proof.verdict is Verdict.UNDECIDED else report.notes
     return replace(
-        report, verdict=proof.verdict, reason=proof.reason, certificate=proof, notes=notes,
+        report,
+        verdict=proof.verdict,
+        reason=proof.reason,
+        certificate=proof,
+        notes=notes,
         seconds=report.seconds + perf_counter() - begin,
-    )  # fmt: skip
+    )
 
 
 def _spread(values: Array, keep: NDArray[np.intp], count: int) -> Array:

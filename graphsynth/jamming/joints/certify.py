@@ -2,8 +2,8 @@
 
 A piece is free if the tilts found at its middle can be corrected to close every loop, inside the limits, for every
 input, position and tolerance in it; it binds if the wrenches found at its middle prove so for all of them.  The
-positions are proved by `graphsynth.jamming.joints.tubes`.  The search is that of the small-tilt model L1; the verdict
-counts only pieces for which the terms of second order, which that model neglects, are proved not to change it.
+positions are proved by `graphsynth.jamming.joints.positions`.  The search is that of the small-tilt model L1; the
+verdict counts only pieces for which the terms of second order, which that model neglects, are proved not to change it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MODEL = (
 
 
 def states(pieces: Found) -> States:
-    """+1 where with small tilts every member of the boxes is free, -1 where every one jams, 0 elsewhere."""
+    """+1 where with small tilts every member of the boxes is free, -1 where every one binds, 0 elsewhere."""
     return np.where(pieces.lower > 1.0, -1, np.where(pieces.upper < 1.0, 1, 0)).astype(np.int8)
 
 
@@ -112,8 +112,8 @@ class TurnCertificate:
     ----------
     verdict : Verdict
         CERTIFIED_FREE: no jam at any input of the range (between the samples too), for any value in the tolerance
-        boxes.  CERTIFIED_JAMMED: at every input of the pieces marked so it jams, for every value in the boxes.
-        CERTIFIED_JAMMED_FOR_SOME: the member ``witness`` of the boxes jams.  UNDECIDED otherwise, also where small
+        boxes.  CERTIFIED_JAMMED: at every input of the pieces marked so it binds, for every value in the boxes.
+        CERTIFIED_JAMMED_FOR_SOME: the member ``witness`` of the boxes binds.  UNDECIDED otherwise, also where small
         tilts would decide but the terms of second order that they neglect may change it.
     reason : str
     low, high : ndarray, shape (pieces,)
@@ -128,7 +128,7 @@ class TurnCertificate:
     one_branch : bool
         All pieces are proved to belong to one continuous branch.
     witness : MemberWitness or None
-        The member that jams, for CERTIFIED_JAMMED_FOR_SOME.
+        The member that binds, for CERTIFIED_JAMMED_FOR_SOME.
     evaluated : int
         Pieces evaluated.
     seconds : float
@@ -203,7 +203,7 @@ def certify_coupled(
     max_pieces: int = 20_000,
     seconds: float = 20.0,
 ) -> TurnCertificate:
-    """Prove where a mechanism is free and where it jams, between the first and the last input of a motion.
+    """Prove where a mechanism is free and where it binds, between the first and the last input of a motion.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def certify_coupled(
     resolution : float
         Width of a piece, over the range, below which it is left undecided.
     max_pieces, seconds : optional
-        Limits of the work; what is not decided within them stays undecided.  A member that jams is looked for after it.
+        Limits of the work; what is not decided within them stays undecided.  A binding member is sought after it.
 
     Returns
     -------
@@ -262,9 +262,10 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
     lost = np.flatnonzero(pieces.proved & ~own)
     # of another branch, perhaps: nothing is said about the motion
     pieces = pieces._replace(
-        lower=np.where(own, pieces.lower, 0.0), upper=np.where(own, pieces.upper, np.inf),
+        lower=np.where(own, pieces.lower, 0.0),
+        upper=np.where(own, pieces.upper, np.inf),
         sure=np.where(own, pieces.sure, 0).astype(np.int8),
-    )  # fmt: skip
+    )
     if lost.size and not stopped:
         stopped = (
             f"the pose near the input {float(pieces.lo[lost[0]])!r} is not proved to be on the branch of the motion"
@@ -277,9 +278,19 @@ def _proved(work: Work, budget: Budget, pieces: Found, stopped: str) -> TurnCert
     if small.is_certified and small is not verdict:
         reason = f"{reason}; with small tilts (first order): {first_order}"
     return TurnCertificate(
-        verdict, reason, pieces.lo, pieces.hi, state, pieces.lower, pieces.upper, branch, witness, work.evaluated,
-        perf_counter() - budget.begin, small,
-    )  # fmt: skip
+        verdict,
+        reason,
+        pieces.lo,
+        pieces.hi,
+        state,
+        pieces.lower,
+        pieces.upper,
+        branch,
+        witness,
+        work.evaluated,
+        perf_counter() - budget.begin,
+        small,
+    )
 
 
 def _nothing(motion: Motion, reason: str, seconds: float) -> TurnCertificate:

@@ -36,23 +36,12 @@ ROUND, ROLL, PITCH = 0, 1, 2
 class Layout:
     """What does not change with the pose.
 
-    Attributes
-    ----------
-    joints : tuple of int
-        Joints with any limit, by their number in the mechanism; the others are no part of the program.
-    pairs : ndarray, shape (joints, 2)
-        Bodies a and b.
-    incidence : ndarray, shape (loops, joints)
-        +1 where the loop passes the joint from a to b, -1 from b to a, else 0.
-    block_joint, block_axis : ndarray, shape (blocks,)
-        Every limit on tilt: its joint (position in ``joints``) and whether it is round, on roll, or on pitch.
-    limit, end_float : ndarray, shape (blocks,) and (joints,)
-        Nominal limits; 0 is rigid, infinite is none.
-    limit_range, end_float_range : ndarray, shape (2, blocks) and (2, joints)
-        Tolerance boxes.
-    misalignments : tuple of (int, Misalignment)
-        Position in ``joints`` and the misalignment, turned so that it is of b against a.
-    frame, bodies : int
+    ``joints``: joints with any limit, by their number in the mechanism; the others are no part of the program.
+    ``pairs`` (joints, 2): bodies a and b.  ``incidence`` (loops, joints): +1 where the loop passes the joint from a to
+    b, -1 from b to a.  ``block_joint``, ``block_axis`` (blocks,): of every limit on tilt its joint (position in
+    ``joints``) and whether it is round, on roll, or on pitch.  ``limit`` (blocks,), ``end_float`` (joints,): nominal
+    limits; 0 is rigid, infinite is none; their ``_range`` (2, ...) are tolerance boxes.  ``misalignments``: position in
+    ``joints``, sign that makes it one of b against a, and the misalignment.
     """
 
     joints: tuple[int, ...]
@@ -95,12 +84,19 @@ def lay_out(mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misal
             tilt = by_pair[joint.pair]
             turned.append((place, 1.0 if tilt.base == joint.a else -1.0, tilt))
     return Layout(
-        joints=tuple(kept), pairs=pairs, incidence=_loops(pairs, mechanism.graph.links, mechanism.frame),
-        block_joint=table[:, 0].astype(np.intp), block_axis=table[:, 1].astype(np.intp), limit=table[:, 2],
-        end_float=np.array([limits[k].axial_clearance for k in kept]), limit_range=table[:, 3:].T.copy(),
+        joints=tuple(kept),
+        pairs=pairs,
+        incidence=_loops(pairs, mechanism.graph.links, mechanism.frame),
+        block_joint=table[:, 0].astype(np.intp),
+        block_axis=table[:, 1].astype(np.intp),
+        limit=table[:, 2],
+        end_float=np.array([limits[k].axial_clearance for k in kept]),
+        limit_range=table[:, 3:].T.copy(),
         end_float_range=np.array([_of(limits[k].axial_clearance_range) for k in kept]).reshape(-1, 2).T.copy(),
-        misalignments=tuple(turned), frame=mechanism.frame, bodies=mechanism.graph.links,
-    )  # fmt: skip
+        misalignments=tuple(turned),
+        frame=mechanism.frame,
+        bodies=mechanism.graph.links,
+    )
 
 
 def _of(bounds: tuple[float, float] | None) -> tuple[float, float]:

@@ -41,20 +41,9 @@ class ConeSolution(NamedTuple):
 
 
 def solve_cones(M: Array, F: Array, W: Array) -> ConeSolution:
-    """Solve N programs of one shape.
+    """Solve N programs of one shape (estimated): M (N, blocks, 2, k), F (N, forces, k), W (N, k) of the order of 1.
 
-    Parameters
-    ----------
-    M : ndarray, shape (N, blocks, 2, k)
-        Full column rank when stacked; a second row of zeros makes a block one-dimensional.
-    F : ndarray, shape (N, forces, k)
-    W : ndarray, shape (N, k)
-        Of the order of 1.
-
-    Returns
-    -------
-    ConeSolution
-        Estimated (floating point).
+    M has full column rank when stacked; a second row of zeros makes a block one-dimensional.
     """
     program = _Program(M, F, W)
     x, s, z = program.start()
@@ -269,9 +258,15 @@ def polish(M: Array, F: Array, W: Array, found: ConeSolution, *, robust: bool = 
 
 
 def _shared(
-    M: Array, F: Array, W: Array, q: Array, tau: Array, zeta: Array,
-    loaded: NDArray[np.bool_], pushed: NDArray[np.bool_],
-) -> tuple[Array, Array]:  # fmt: skip
+    M: Array,
+    F: Array,
+    W: Array,
+    q: Array,
+    tau: Array,
+    zeta: Array,
+    loaded: NDArray[np.bool_],
+    pushed: NDArray[np.bool_],
+) -> tuple[Array, Array]:
     """Put loaded joints at their limit for the T of q; let the idle ones close the loops with the least change."""
     count, blocks, _, k = M.shape
     m, f = _moments(M, q), (F @ q[:, :, None])[..., 0]

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from graphsynth.intervals import Dual, Interval, cos, sin
 from graphsynth.jamming.joints.closure import PITCH, ROLL, ROUND, Layout, moment_rows
+from graphsynth.jamming.joints.positions import enclosed_solve, points
 from graphsynth.jamming.joints.program import PoseSolution, Units
-from graphsynth.jamming.joints.tubes import enclosed_solve, points
 
 if TYPE_CHECKING:
     from graphsynth.jamming.joints.exact import Neglected
@@ -72,26 +72,16 @@ def shifts_enclosed(layout: Layout, base: Interval) -> Interval:
 
 
 def factor_bounds(layout: Layout, at: Pieces, found: PoseSolution) -> tuple[Array, Array]:
-    """Certified bounds of the factor (mode "scale") over boxes of positions, misalignments and limits.
+    """Certified bounds of the factor (mode "scale") over boxes of positions, misalignments and limits, (N,) each.
 
-    Parameters
-    ----------
-    layout : Layout
-        Its ``limit_range`` and ``end_float_range`` are part of the box.
-    at : Pieces
-    found : PoseSolution
-        Of `solve_poses` with mode "scale" near the middle of the boxes; any numbers give valid bounds.
-
-    Returns
-    -------
-    lower, upper : ndarray, shape (N,)
-        For every member of the box ``lower <= T <= upper``; 0 and infinity where nothing is proved.
+    The limits' ranges of the layout are part of the box.  ``found`` is of `solve_poses` near the middle of the boxes;
+    any numbers give valid bounds: ``lower <= T <= upper`` for every member, 0 and infinity where nothing is proved.
     """
     return lower_bounds(layout, at, found), upper_bounds(layout, at, found)
 
 
 def lower_bounds(layout: Layout, at: Pieces, found: PoseSolution, exact: Neglected | None = None) -> Array:
-    """Bounds from equilibrium; see `factor_bounds`.  With ``exact`` above 1 only where exact tilts jam too."""
+    """Bounds from equilibrium; see `factor_bounds`.  With ``exact`` above 1 only where exact tilts bind too."""
     if layout.loops == 0:
         return np.zeros(len(at.r))
     length = found.units.length
@@ -211,8 +201,10 @@ def _forbidden(layout: Layout, r: Interval, e: Interval) -> Interval | None:
             wanted = (tuple(plain[0][i] * a + plain[1][i] * b for i in range(3)),)  # type: ignore[assignment]
         for row in wanted:
             add([[value * s for value in row] for s in signs])
-    columns = {tuple((c * (c[np.flatnonzero(c)[0]] if c.any() else 1.0)).tolist())
-               for c in layout.incidence.T[np.isinf(layout.end_float)]}  # fmt: skip
+    columns = {
+        tuple((c * (c[np.flatnonzero(c)[0]] if c.any() else 1.0)).tolist())
+        for c in layout.incidence.T[np.isinf(layout.end_float)]
+    }
     for column in sorted(columns):
         if any(column):
             add([[zero, zero, Interval(int(s))] for s in column])
@@ -405,9 +397,14 @@ def _off(layout: Layout, at: Pieces, scaled: Interval, tau: Interval, zeta: Inte
         layout, _columns((moving.r - centre) / length), _columns(moving.e), tau, zeta, length, _columns(moving.d)
     )
     sums = _closure(
-        layout, _moving_columns(scaled, moving.r_slope / length), _moving_columns(at.e, moving.e_slope), tau, zeta,
-        length, _moving_columns(at.d, moving.d_slope),
-    )  # fmt: skip
+        layout,
+        _moving_columns(scaled, moving.r_slope / length),
+        _moving_columns(at.e, moving.e_slope),
+        tau,
+        zeta,
+        length,
+        _moving_columns(at.d, moving.d_slope),
+    )
     zero = Interval.zeros((len(tau),))
     slopes = [value.grad[0] if isinstance(value, Dual) else zero for value in sums]
     straight = _stacked([m + slope * moving.step for m, slope in zip(at_middle, slopes)])

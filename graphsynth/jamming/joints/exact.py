@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 from graphsynth.intervals import Dual, Interval, Status, image, variables
 from graphsynth.intervals.dual import jacobian_of
 from graphsynth.jamming.joints.closure import ROUND, Layout
-from graphsynth.jamming.joints.positions import Moved, Positions
-from graphsynth.jamming.joints.tubes import enclosed_solve
+from graphsynth.jamming.joints.positions import PLANE, Moved, Positions, enclosed_solve
+from graphsynth.mechanism.equations import Pair
 from graphsynth.mechanism.joints import Gear, PinSlot, Prismatic, Revolute
 
 if TYPE_CHECKING:
-    from graphsynth.jamming.joints.tubes import Tubes
+    from graphsynth.jamming.joints.positions import Tubes
 
 
 Array = NDArray[np.float64]
@@ -78,19 +78,10 @@ class _Angles(NamedTuple):
 def neglected(
     system: Positions, layout: Layout, tubes: Tubes, u: Interval, counted: Array, assumed: Array
 ) -> Neglected:
-    """Bound what the small-tilt closure neglects over pieces of the input.
+    """Bound what the small-tilt closure neglects over N pieces u of the input with proved tubes.
 
-    Parameters
-    ----------
-    system : Positions
-    layout : Layout
-    tubes : Tubes
-        Proved, (N,).
-    u : Interval, shape (N,)
-    counted : ndarray, shape (N, closing)
-    assumed : ndarray, shape (N, blocks)
-        Tilts below which a proof of freedom will keep all blocks, so that their limits need not be looked at; infinity
-        for a proof of a jam.
+    ``assumed`` (N, blocks) are tilts below which a proof of freedom will keep all blocks, so that their limits need not
+    be looked at; infinity for a proof of binding.
     """
     count = len(tubes.r)
     blocks = np.minimum(layout.limit_range[1], assumed)
@@ -155,9 +146,7 @@ def _lengths(system: Positions, tubes: Tubes, u: Interval) -> Array:
     at = system.place([tubes.tight[:, k] for k in range(system.size)], system.driven(u))
     for k, joint in enumerate(mechanism.joints):
         if isinstance(joint, Prismatic | PinSlot):
-            A, B = system.ends(k, at)
-            way = ((B[0] - A[0]).sqr() + (B[1] - A[1]).sqr()).sqrt().hi
-            found[:, joint.a] += way / np.cos(LARGEST)
+            found[:, joint.a] += PLANE.length(system.seen(k, at).d).hi / np.cos(LARGEST)
     return found * _ROUNDING
 
 
@@ -265,7 +254,7 @@ def _movements(
         for k in layout.joints:
             A, B = system.ends(k, at)
             ends = (A, B) if isinstance(system.mechanism.joints[k], Revolute) else (B,)
-            moves.append(np.max([np.hypot(size(x), size(y)) for x, y in ends], axis=0))
+            moves.append(np.max([np.hypot(size(p.x), size(p.y)) for p in ends], axis=0))
     r = np.stack(moves, axis=1) if moves else np.zeros((count, 0))
     return r * _ROUNDING, turned * _ROUNDING, sound
 
@@ -278,7 +267,8 @@ def _beside(first: Interval, second: Interval) -> Interval:
 
 def _moved(values: list[Any]) -> Moved:
     third = len(values) // 3
-    return list(zip(values[:third], values[third : 2 * third], values[2 * third :]))
+    offsets = map(Pair, values[:third], values[third : 2 * third])
+    return list(zip(offsets, values[2 * third :]))
 
 
 # -- out of the plane --------------------------------------------------------------------------------------------------

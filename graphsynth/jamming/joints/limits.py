@@ -236,9 +236,11 @@ def bearing_limits(
 
 
 def complete(
-    joints: tuple[JointGeometry, ...], given: Bearing | Limits | Mapping[tuple[int, int], Bearing | Limits],
-    misaligned: Mapping[tuple[int, int], Misalignment], condition: Condition,
-) -> tuple[Limits, ...]:  # fmt: skip
+    joints: tuple[JointGeometry, ...],
+    given: Bearing | Limits | Mapping[tuple[int, int], Bearing | Limits],
+    misaligned: Mapping[tuple[int, int], Misalignment],
+    condition: Condition,
+) -> tuple[Limits, ...]:
     """Limits of every joint: those named, else those given for all; contacts of gears, cams and slots are free."""
     table: dict[tuple[int, int], Bearing | Limits] = {}
     common: Bearing | Limits | None = None

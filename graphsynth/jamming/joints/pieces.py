@@ -24,9 +24,8 @@ from graphsynth.jamming.joints.closure import Layout
 from graphsynth.jamming.joints.enclosure import Moving, Pieces, lower_bounds, shifts_enclosed, start_tilts, upper_bounds
 from graphsynth.jamming.joints.exact import neglected
 from graphsynth.jamming.joints.limits import Misalignment
-from graphsynth.jamming.joints.positions import Positions
+from graphsynth.jamming.joints.positions import Positions, Tubes, linked, points, prove_tubes, slopes
 from graphsynth.jamming.joints.program import JointProblem, PoseSolution, check_motion
-from graphsynth.jamming.joints.tubes import Tubes, linked, points, prove_tubes, slopes
 
 if TYPE_CHECKING:
     from graphsynth.kinematics.engine.result import Motion
@@ -102,7 +101,7 @@ def _sharp(tilt: Misalignment, alpha: float, direction: float) -> Misalignment:
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-#: Pieces of a whole turn at first, of any range at least, and parts into which one is cut.
+#: Pieces of a full rotation at first, of any range at least, and parts into which one is cut.
 FIRST, FEWEST, PARTS = 128, 16, 4
 #: In a proof of freedom a joint may tilt so much more than the tilt found, in its own share and that of the largest.
 _ROOM, _SHARE, _LEAST = 1.25, 0.25, 1e-4
@@ -113,7 +112,7 @@ _Bound: TypeAlias = tuple[Layout, Pieces, PoseSolution]
 class Found(NamedTuple):
     """Pieces evaluated: inputs, bounds of the factor, whether positions are proved, and the boxes they lie in.
 
-    ``sure`` tells what exact tilts prove: +1 free, -1 jams, 0 nothing; the bounds of the factor are of first order.
+    ``sure`` tells what exact tilts prove: +1 free, -1 binds, 0 nothing; the bounds of the factor are of first order.
     """
 
     lo: Array
@@ -128,9 +127,15 @@ class Found(NamedTuple):
     def take(self, rows: Mask | NDArray[np.intp]) -> Found:
         """Return some of the pieces."""
         return Found(
-            self.lo[rows], self.hi[rows], self.lower[rows], self.upper[rows], self.proved[rows],
-            self.box_lo[rows], self.box_hi[rows], self.sure[rows],
-        )  # fmt: skip
+            self.lo[rows],
+            self.hi[rows],
+            self.lower[rows],
+            self.upper[rows],
+            self.proved[rows],
+            self.box_lo[rows],
+            self.box_hi[rows],
+            self.sure[rows],
+        )
 
     @staticmethod
     def join(parts: list[Found]) -> Found:
@@ -206,9 +211,15 @@ class Work:
             """Positions and misalignments, with what the mean value theorem needs where it is proved."""
             r_slope, e_slope, base_slope, fine = rates
             moving = Moving(
-                middle.r, middle.e, shifts_enclosed(own, middle.base), r_slope, e_slope,
-                shifts_enclosed(own, base_slope), step, middle.proved & fine,
-            )  # fmt: skip
+                middle.r,
+                middle.e,
+                shifts_enclosed(own, middle.base),
+                r_slope,
+                e_slope,
+                shifts_enclosed(own, base_slope),
+                step,
+                middle.proved & fine,
+            )
             return Pieces(tubes.r, tubes.e, shifts_enclosed(own, tubes.base), moving)
 
         upper = np.zeros(len(poses))
@@ -228,7 +239,7 @@ class Work:
     def _sure(
         self, lower: Array, upper: Array, below: _Bound, above: list[_Bound], tubes: Tubes, u: Interval, counted: Array
     ) -> NDArray[np.int8]:
-        """Tell where exact tilts prove a jam (-1) or freedom (+1), among the pieces that small tilts decide."""
+        """Tell where exact tilts prove binding (-1) or freedom (+1), among the pieces that small tilts decide."""
         sure = np.zeros(len(lower), dtype=np.int8)
         rows = np.flatnonzero(lower > 1.0)
         if rows.size:

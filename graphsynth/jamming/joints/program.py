@@ -83,23 +83,10 @@ def units_of(r: Array, d: Array, layout: Layout) -> Units:
 
 
 def solve_poses(layout: Layout, r: Array, e: Array, d: Array, mode: Mode = "tilt") -> PoseSolution:
-    """Solve the program at N poses.
+    """Solve the program at N poses (theory/joints-that-share-a-tilt 3, 4; loop form); estimated.
 
-    Parameters
-    ----------
-    layout : Layout
-    r, e, d : ndarray, shape (N, joints, 2)
-        Positions, guide directions, misalignments (radians).
-    mode : {"tilt", "scale"}
-
-    Returns
-    -------
-    PoseSolution
-        Estimated; ``lower == upper == inf`` where no factor is enough.
-
-    Notes
-    -----
-    See theory/joints-that-share-a-tilt 3, 4; loop form.
+    Positions r, guide directions e and misalignments d (radians) are (N, joints, 2).  ``lower == upper == inf`` where
+    no factor is enough.
 
     Raises
     ------
@@ -112,10 +99,16 @@ def solve_poses(layout: Layout, r: Array, e: Array, d: Array, mode: Mode = "tilt
     units = units_of(r, d, layout)
     rows = _Rows(layout, (r - units.centre) / units.length, e, d / units.tilt, units)
     out = PoseSolution(
-        np.zeros(count), np.zeros(count), np.zeros((count, 3 * layout.loops)),
-        np.zeros((count, len(layout.limit), 2)), np.zeros((count, len(layout.joints))),
-        np.zeros((count, len(layout.limit))), np.zeros((count, len(layout.joints))), units, 0,
-    )  # fmt: skip
+        np.zeros(count),
+        np.zeros(count),
+        np.zeros((count, 3 * layout.loops)),
+        np.zeros((count, len(layout.limit), 2)),
+        np.zeros((count, len(layout.joints))),
+        np.zeros((count, len(layout.limit))),
+        np.zeros((count, len(layout.joints))),
+        units,
+        0,
+    )
     if layout.loops == 0 or count == 0:
         return out
     rounds = 0
@@ -289,9 +282,13 @@ def _bounds(M: Array, F: Array, W: Array, found: ConeSolution) -> tuple[Array, A
 
 
 def _write(
-    rows: _Rows, poses: NDArray[np.intp], y: Array, found: tuple[Array, Array, Array] | None, mode: Mode,
+    rows: _Rows,
+    poses: NDArray[np.intp],
+    y: Array,
+    found: tuple[Array, Array, Array] | None,
+    mode: Mode,
     out: PoseSolution,
-) -> None:  # fmt: skip
+) -> None:
     t, s = rows.t, rows.s
     costly, pushed = np.isfinite(t) & (t > 0.0), np.isfinite(s) & (s > 0.0)
     out.tau[np.ix_(poses, np.flatnonzero(np.isinf(t)))] = np.nan

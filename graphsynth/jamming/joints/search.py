@@ -156,7 +156,7 @@ class MemberWitness:
     Attributes
     ----------
     input : float
-        Where it jams.
+        Where it binds.
     factor : float
         Proved lower bound of the factor on limits and plays there; above 1.
     misalignments, limits : tuple
@@ -245,9 +245,12 @@ def _tightest(limit: Limits) -> Limits:
 
 def _sharp(tilt: Misalignment, alpha: float | None = None, direction: float | None = None) -> Misalignment:
     return Misalignment(
-        tilt.base, tilt.link, tilt.alpha if alpha is None else alpha,
-        tilt.direction if direction is None else direction, tilt.rigid,
-    )  # fmt: skip
+        tilt.base,
+        tilt.link,
+        tilt.alpha if alpha is None else alpha,
+        tilt.direction if direction is None else direction,
+        tilt.rigid,
+    )
 
 
 def _member(work: Work, mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misalignment, ...]) -> Work:
@@ -293,10 +296,13 @@ def _worst_dimensions(work: Work, member: Work, at: NDArray[np.float64]) -> Work
     def moved(signs: NDArray[np.float64]) -> Work:
         grow = (1.0 + step * signs).reshape(-1, 4)
         joints = [
-            replace(joint, at_a=(joint.at_a[0] * g[0], joint.at_a[1] * g[1]),
-                    at_b=(joint.at_b[0] * g[2], joint.at_b[1] * g[3]))
+            replace(
+                joint,
+                at_a=(joint.at_a[0] * g[0], joint.at_a[1] * g[1]),
+                at_b=(joint.at_b[0] * g[2], joint.at_b[1] * g[3]),
+            )
             for joint, g in zip(mechanism.joints, grow.tolist())
-        ]  # fmt: skip
+        ]
         other = replace(mechanism, joints=tuple(joints))
         return _member(work, other, member.given.limits, member.given.misalignments)
 

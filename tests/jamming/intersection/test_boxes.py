@@ -11,8 +11,9 @@ from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import IntervalError
 from graphsynth.intervals import Interval, Status
-from graphsynth.jamming.intersection import Reason, circle_ellipse, cross_check, exact_hull, kernels, krawczyk_boxes
-from graphsynth.jamming.intersection.boxes import _agree, _bounds, _carried, krawczyk_data
+from graphsynth.jamming.intersection import kernels
+from graphsynth.jamming.intersection.boxes import _agree, _bounds, _carried, cross_check, krawczyk_boxes, krawczyk_data
+from graphsynth.jamming.intersection.hull import Reason, circle_ellipse, exact_hull
 
 
 def surrogate(t):

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from graphsynth.core.errors import GeometryError
 from graphsynth.intervals import Interval, Status
 from graphsynth.jamming.bearing.bearing import Bearing
-from graphsynth.jamming.intersection import Reason, circle_ellipse, exact_hull, mirrored, surrogate_problem
+from graphsynth.jamming.intersection.hull import Reason, circle_ellipse, exact_hull, mirrored, surrogate_problem
 
 B90 = "17.4617879639289313590283215334"
 ULP = 4e-16

@@ -26,9 +26,8 @@ from graphsynth.jamming.joints import (
 from graphsynth.jamming.joints.closure import joint_places, shifts
 from graphsynth.jamming.joints.enclosure import Pieces, factor_bounds
 from graphsynth.jamming.joints.pieces import FEWEST, PARTS, Work
-from graphsynth.jamming.joints.positions import Positions
+from graphsynth.jamming.joints.positions import Positions, prove_tubes, slopes
 from graphsynth.jamming.joints.program import problem
-from graphsynth.jamming.joints.tubes import prove_tubes, slopes
 from graphsynth.mechanism.laws import Harmonic, Table
 
 T_A = 0.006064396559156420060266102798724801172486

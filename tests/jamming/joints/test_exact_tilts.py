@@ -24,8 +24,8 @@ from graphsynth.jamming.joints.closure import joint_places, shifts
 from graphsynth.jamming.joints.enclosure import Pieces, lower_bounds, upper_bounds
 from graphsynth.jamming.joints.exact import Neglected, _movements, neglected
 from graphsynth.jamming.joints.pieces import Work
+from graphsynth.jamming.joints.positions import prove_tubes
 from graphsynth.jamming.joints.program import problem, solve_poses
-from graphsynth.jamming.joints.tubes import prove_tubes
 
 FREE, JAMMED = Verdict.CERTIFIED_FREE, Verdict.CERTIFIED_JAMMED
 NEAR_WORST = np.linspace(1.5, 1.64, 3)
