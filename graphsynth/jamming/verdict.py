@@ -19,8 +19,7 @@ METHOD_CERTIFIED = "certified: interval arithmetic with outward rounding"
 class Verdict(Enum):
     """Verdict over a full rotation of the crank, or the range of a motion, and all parameters of a tolerance box.
 
-    One vocabulary for both models: one tilted bearing (L0) and joints that share the misalignment (L1).  What is
-    proved, in the words of theory/jam-arcs 5:
+    One vocabulary for both models: one tilted bearing (L0) and joints that share the misalignment (L1).
 
     What is proved (theory/jam-arcs 5, theory/extreme-cases 1), and the names of the theory:
 
