@@ -20,7 +20,6 @@ MARK = re.compile(r"<!-- api: ([^>]*?) -->")
 MODULES = (
     "graphsynth.core.errors",
     "graphsynth.structure.assur",
-    "graphsynth.jamming.intersection",
     "graphsynth.mechanism.joints",
     "graphsynth.mechanism.laws",
     "graphsynth.mechanism.files",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from graphsynth.atlas.building import BuildStep
     from graphsynth.atlas.catalogue import Catalogue
+    from graphsynth.atlas.evaluating import EvaluationStep
 
 DIFFERENT = 1
 #: Chains from which all cores draw the atlas page.
@@ -217,7 +218,11 @@ def _evaluate(options: argparse.Namespace) -> int:
     with Catalogue(options.file) as catalogue:
         try:
             with processes(console.workers_for(options.workers, False)) as executor, console.counting() as bar:
-                watch = bar and (lambda step: bar("evaluating", step.done, step.total))
+
+                def watch(step: EvaluationStep) -> None:
+                    if bar:
+                        bar("evaluating", step.done, step.total)
+
                 done = catalogue.evaluate(
                     options.links,
                     options.mobility,

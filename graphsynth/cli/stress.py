@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from graphsynth.cli import console
 
 if TYPE_CHECKING:
-    from graphsynth.evidence.stress import StressReport
+    from graphsynth.evidence.stress import Case, StressReport
 
 WRONG = 1
 INTERRUPTED = 130
@@ -48,7 +48,11 @@ def run(options: argparse.Namespace) -> int:
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be written is refused now, not at the end
     with console.counting() as bar:
-        told = bar and (lambda case, number, total: bar(f"{case.name} {case.title}", number, total))
+
+        def told(case: Case, number: int, total: int) -> None:
+            if bar:
+                bar(f"{case.name} {case.title}", number, total)
+
         report = run_stress(_names(options), slow=not options.fast, files=options.cases, progress=told)
     if options.out:
         from graphsynth.evidence.stress.page import write_report

@@ -44,12 +44,4 @@ from .bearing.limits import (
 )
 from .bearing.parameters import Range as Range, ToleranceBox as ToleranceBox, spread as spread
 from .bearing.sweep import TurnPartition as TurnPartition, sweep_linkage as sweep_linkage, sweep_turn as sweep_turn
-from .intersection.boxes import IntersectionBoxes as IntersectionBoxes, krawczyk_boxes as krawczyk_boxes
-from .intersection.hull import (
-    CircleEllipse as CircleEllipse,
-    IntersectionHull as IntersectionHull,
-    circle_ellipse as circle_ellipse,
-    exact_hull as exact_hull,
-    surrogate_problem as surrogate_problem,
-)
 from .verdict import Verdict as Verdict
