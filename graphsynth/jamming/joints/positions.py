@@ -239,7 +239,8 @@ class Positions:
 
 def guide(joint: Prismatic | PinSlot, at: Placement) -> Pair:
     """Direction of a straight guide."""
-    return PLANE.turned(PLANE.unit(Interval(joint.angle_a)), at.turn[joint.a])
+    along: Pair = PLANE.turned(PLANE.unit(Interval(joint.angle_a)), at.turn[joint.a])
+    return along
 
 
 def _box(at: tuple[float, float], tolerance: float) -> Pair:
