@@ -66,7 +66,7 @@ def _from_file(place: Path, options: argparse.Namespace) -> _Found:
     import numpy as np
 
     from graphsynth.core.textfiles import read_bytes
-    from graphsynth.drawing.reach import motion_over_reach
+    from graphsynth.drawing.frames import motion_over_reach
     from graphsynth.kinematics.simulation import simulate
     from graphsynth.mechanism.files import JSON_MAX
     from graphsynth.mechanism.model import Mechanism
@@ -135,7 +135,7 @@ def _write(found: _Found, path: Path, suffix: str, frames: int) -> None:
 
     motion = with_trace_points(found.motion)
     if suffix == ".gif":
-        from graphsynth.drawing.gif import save_gif
+        from graphsynth.drawing.animation import save_gif
 
         save_gif(motion, path, frames=frames)
         return

@@ -1,7 +1,8 @@
-"""Moving pictures: a self-contained HTML page with a player, and an SVG that moves by itself.
+"""Moving pictures of one stage: an HTML page with a player, an SVG that moves by itself, a GIF.
 
-Every link is a group of shapes that is shifted and turned as a whole, so the file holds three numbers for each link and
-frame, whatever the links look like.
+The stage is a sketch whose links are carried through the frames.  In the page and the SVG every link is a group of
+shapes that is shifted and turned as a whole, so the file holds three numbers for each link and frame, whatever the
+links look like; a GIF is drawn frame by frame through matplotlib, with one palette for all, and written by Pillow.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from itertools import groupby
+from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -21,11 +23,12 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.bodies import bodies
+from graphsynth.drawing.canvas import figure_of
 from graphsynth.drawing.diagram import mechanism_sketch
 from graphsynth.drawing.frames import Frames, frames_of, shown_coordinate
 from graphsynth.drawing.moving import Moving
 from graphsynth.drawing.pages import policy
-from graphsynth.drawing.palette import STYLE, TRACE_COLOURS, VARIABLES
+from graphsynth.drawing.palette import LIGHT, STYLE, TRACE_COLOURS, VARIABLES
 from graphsynth.drawing.shapes import FIXED, Point, Shape, Text
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.drawing.svg import element, number, picture, words
@@ -49,6 +52,11 @@ class _Stage:
         shown = [body.vertices() for body in bodies(mechanism, frames.poses, 0.0)]
         self.middle: list[Point] = [sum(points) / len(points) if points else 0j for points in shown]
         self.ends = shown
+
+    @property
+    def lines(self) -> list[str]:
+        """The note under the picture, in lines of its width."""
+        return wrap(self.frames.note, max(20, int(self.sketch.width / 6.6)))
 
     def local(self, link: int, point: Point) -> tuple[float, float]:
         """Pixels from the origin of a link's group, y down."""
@@ -252,7 +260,7 @@ def animated_svg(
     last = len(shown.poses) - 1
     # round, or to and fro: one clock moves everything, so it runs over the whole period
     order = list(range(last + 1)) if shown.loops else [*range(last + 1), *range(last - 1, -1, -1)]
-    lines = wrap(shown.note, max(20, int(stage.sketch.width / 6.6)))
+    lines = stage.lines
     tall = stage.sketch.height + _LINE * len(lines) + (8.0 if lines else 0.0)
     drawing = Moving(stage.sketch.width, tall, seconds if shown.loops else 2.0 * seconds)
     for layer, link, shapes in stage.layers():
@@ -270,3 +278,95 @@ def animated_svg(
     for k, line in enumerate(lines):
         drawing.fixed(words(line, 12.0, stage.sketch.height + _LINE * k + 6.0, size=12.5, colour="b"))
     return drawing.svg(title)
+
+
+def save_gif(
+    motion: Motion,
+    path: str | Path,
+    *,
+    frames: int = 60,
+    title: str = "",
+    seconds: float = 5.0,
+    width: float = 440.0,
+    height: float = 380.0,
+) -> int:
+    """Write an endless GIF of a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        One that does not close is shown to and fro over the part it reaches, with the reason underneath.
+    path : path-like
+    frames : int
+        Pictures of one pass, 2..2000.
+    title : str
+        Written above the picture.
+    seconds : float
+        Time of one pass; a GIF counts hundredths of a second, and most viewers show at most 50 pictures a second.
+    width, height : float
+        Largest size of the picture in pixels.
+
+    Returns
+    -------
+    int
+        Number of pictures in the file.
+
+    Raises
+    ------
+    GeometryError
+        Nothing of the motion is assembled, or a number is out of its bounds.
+    """
+    _check_seconds(seconds)
+    shown = frames_of(motion, frames)
+    stage = _Stage(shown, width, height, title)
+    pictures = _pictures(stage, title)
+    passes = max(len(shown.poses) - 1, 1)
+    duration = max(20, round(seconds / passes * 100.0) * 10)
+    first, *rest = [pictures[k] for k in shown.order]
+    first.save(
+        Path(path),
+        format="GIF",
+        save_all=True,
+        append_images=rest,
+        duration=duration,
+        loop=0,
+        optimize=True,
+        disposal=1,
+    )
+    return 1 + len(rest)
+
+
+def _pictures(stage: _Stage, title: str) -> list[Any]:
+    """Draw every frame once."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    poses = stage.frames.poses.tolist()
+    figure, (canvas,) = figure_of([stage.sketch], poses[:1], above=title, below=stage.lines)
+    agg = FigureCanvasAgg(figure)
+    found: list[Any] = []
+    palette = _palette()
+    for pose in poses:
+        canvas.move(pose)
+        agg.draw()
+        image = Image.fromarray(np.asarray(agg.buffer_rgba())).convert("RGB")
+        found.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    return found
+
+
+def _palette() -> Any:
+    """Every ink in seven steps to the paper, and the ink of links in steps to the fill of plates."""
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    inks = dict.fromkeys(LIGHT[name] for name in ("link", "soft", "note", "a", "b", "c", "d"))
+    pairs = [(ink, LIGHT["paper"]) for ink in inks] + [(LIGHT["link"], LIGHT["fill"])]
+    colours = dict.fromkeys(
+        tuple(round(255 * (p * k + q * (6 - k)) / 6) for p, q in zip(to_rgb(ink), to_rgb(ground)))
+        for ink, ground in pairs
+        for k in range(7)
+    )
+    # Pillow looks colours up in boxes of eight: nothing may lie as close to the paper as the edge of a plate
+    image = Image.new("P", (1, 1))
+    image.putpalette([value for colour in colours for value in colour])
+    return image

@@ -130,8 +130,7 @@ def plot_motion(motion: Motion, of: str | int | None, order: int) -> Chart:
 
 def animate_motion(motion: Motion, path: str | Path | None, **options: Any) -> Drawing:
     """Work of `Motion.animate`."""
-    from graphsynth.drawing.animation import animated_svg, animation_html
-    from graphsynth.drawing.gif import save_gif
+    from graphsynth.drawing.animation import animated_svg, animation_html, save_gif
 
     def write(file: Path) -> None:
         suffix = file.suffix.lower()

@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
+#: Every colour on a light page and on a dark one; names that share the first value share the second.
+_PAIRS = {
+    "ink": ("#1b2733", "#e6edf3"),
+    "soft": ("#8794a1", "#8b98a5"),
+    "note": ("#55626f", "#a5b1bd"),
+    "paper": ("#ffffff", "#12181f"),
+    "link": ("#1b2733", "#e6edf3"),
+    "fill": ("#dbe4ee", "#2b3a49"),
+    "a": ("#0072b2", "#56b4e9"),
+    "b": ("#d55e00", "#f0a060"),
+    "c": ("#009e73", "#3ecf9f"),
+    "d": ("#aa4499", "#dd88cc"),
+    "jam": ("#d55e00", "#f0a060"),
+    "pale": ("#e3e7ec", "#28333e"),
+    "bad": ("#aa0044", "#ff7096"),
+}
 #: Values on a light page, and of pictures without pages (PNG, PDF, GIF).  SVG elements carry them as plain attributes.
-LIGHT = {
-    "ink": "#1b2733",
-    "soft": "#8794a1",
-    "note": "#55626f",
-    "paper": "#ffffff",
-    "link": "#1b2733",
-    "fill": "#dbe4ee",
-    "a": "#0072b2",
-    "b": "#d55e00",
-    "c": "#009e73",
-    "d": "#aa4499",
-    "jam": "#d55e00",
-    "pale": "#e3e7ec",
-    "bad": "#aa0044",
-}
-#: Values on a dark page; names that share a value of `LIGHT` share it here.
-DARK = {
-    "ink": "#e6edf3",
-    "soft": "#8b98a5",
-    "note": "#a5b1bd",
-    "paper": "#12181f",
-    "link": "#e6edf3",
-    "fill": "#2b3a49",
-    "a": "#56b4e9",
-    "b": "#f0a060",
-    "c": "#3ecf9f",
-    "d": "#dd88cc",
-    "jam": "#f0a060",
-    "pale": "#28333e",
-    "bad": "#ff7096",
-}
+LIGHT = {name: light for name, (light, _) in _PAIRS.items()}
+#: Values on a dark page.
+DARK = {name: dark for name, (_, dark) in _PAIRS.items()}
 #: White that stays white on dark pages: lines and letters on a coloured map.
 WHITE = "#fefefe"
 #: Colours of paths, in order of use.

@@ -168,7 +168,8 @@ def _stadium(guide: Guide, half: float) -> list[complex]:
 
 def draw_joints(plan: Plan) -> list[tuple[complex, complex]]:
     """Draw every turning pair and pin once; return where ground stands and which way it points."""
-    sketch, grounds = plan.sketch, []
+    sketch = plan.sketch
+    grounds: list[tuple[complex, complex]] = []
     for joint in plan.mechanism.joints:
         name = f"{joint.a}-{joint.b}"
         if isinstance(joint, Revolute):
@@ -177,10 +178,11 @@ def draw_joints(plan: Plan) -> list[tuple[complex, complex]]:
             if any(map(plan.fixed, links)):
                 own, other = (joint.a, joint.b) if plan.fixed(joint.a) else (joint.b, joint.a)
                 at = complex(*(joint.at_a if own == joint.a else joint.at_b))
-                down = _ground_direction(plan, at, other)
-                grounds.append((at, down))
-                sketch.on(own, "ground", f"ground {name}")
-                sketch.ground(at, direction=down, joint=False)
+                if all(abs(at - place) > plan.px for place, _ in grounds):  # a multiple joint stands on one
+                    down = _ground_direction(plan, at, other)
+                    grounds.append((at, down))
+                    sketch.on(own, "ground", f"ground {name}")
+                    sketch.ground(at, direction=down, joint=False)
                 sketch.on(own, "joint", f"joint {name}")
             else:
                 sketch.on(joint.a, "joint", f"joint {name}")

@@ -21,12 +21,10 @@ import pytest
 
 import graphsynth
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.animation import animated_svg, animation_html
+from graphsynth.drawing.animation import animated_svg, animation_html, save_gif
 from graphsynth.drawing.diagram import mechanism_sketch
-from graphsynth.drawing.frames import frames_of, with_trace_points
-from graphsynth.drawing.gif import save_gif
+from graphsynth.drawing.frames import frames_of, motion_over_reach, with_trace_points
 from graphsynth.drawing.motion_charts import coupler_curves
-from graphsynth.drawing.reach import motion_over_reach
 from graphsynth.drawing.shapes import FIXED
 from graphsynth.kinematics import simulate
 from graphsynth.mechanism.joints import PinSlot, Prismatic, Revolute

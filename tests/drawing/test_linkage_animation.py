@@ -8,7 +8,7 @@ import pytest
 
 from graphsynth import LambdaLinkage
 from graphsynth.core.errors import GeometryError
-from graphsynth.drawing.linkage_animation import Bar, linkage_animation
+from graphsynth.drawing.moving import Bar, linkage_animation
 from graphsynth.drawing.palette import LIGHT
 from graphsynth.drawing.sketch import Sketch
 from graphsynth.systems.lambda_linkage.pictures import lambda_animation

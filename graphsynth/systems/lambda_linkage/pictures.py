@@ -105,7 +105,7 @@ def lambda_animation(
     full turn those at which it is assembled. `width`: pixels. `seconds`: time of a turn. Raises `GeometryError` if the
     linkage cannot be assembled at any of them.
     """
-    from graphsynth.drawing.linkage_animation import Bar, linkage_animation
+    from graphsynth.drawing.moving import Bar, linkage_animation
 
     f = np.linspace(0.0, math.tau, frames + 1)
     turn = linkage.positions(f)
@@ -126,7 +126,6 @@ def lambda_animation(
         dots=("M",),
         notes=notes,
         seconds=seconds,
-        title="Lambda linkage in motion",
     )
 
 

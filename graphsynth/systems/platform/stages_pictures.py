@@ -90,7 +90,7 @@ def animations(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture,
     motion = _first(motions)
     if motion is None:
         return ()
-    from graphsynth.drawing.linkage_animation import Bar, linkage_animation
+    from graphsynth.drawing.moving import Bar, linkage_animation
 
     steps = slice(None, None, max(1, len(motion.F) // _FRAMES))
     tracks: dict[str, ArrayLike] = {}
@@ -111,7 +111,6 @@ def animations(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture,
         bars=bars,
         plates=[("F0", "F1", "F2"), *((f"C{k}", f"D{k}", f"A{k}") for k in range(3))],
         joints=list(tracks),
-        title="Single-motor platform in motion",
     )
     return (Picture("One turn of the wheels", svg, "The motor turns them; the curves are the corners' paths.", "wide"),)
 
