@@ -4,7 +4,7 @@ from .closed_form import (
     ModelComparison as ModelComparison,
     PointingModes as PointingModes,
 )
-from .folds import DeadPoint as DeadPoint, Fold as Fold
+from .folds import Fold as Fold
 from .loop_equations import (
     ChartReport as ChartReport,
     LoopSolution as LoopSolution,
@@ -13,7 +13,6 @@ from .loop_equations import (
 )
 from .mechanism import PointingMechanism as PointingMechanism
 from .model import Poses as Poses, PoseStatus as PoseStatus
+from .motion import DeadPoint as DeadPoint, PointingSweep as PointingSweep, Rates as Rates
 from .precise import ApproachToFold as ApproachToFold
-from .rates import Rates as Rates
-from .sweep import PointingSweep as PointingSweep
 from .tolerance import Tolerance as Tolerance

@@ -44,28 +44,10 @@ def pointing_animation(
     seconds: float = 8.0,
     title: str = "Antenna pointing mechanism",
 ) -> str:
-    """Draw the mechanism over the crank angles of a scan that ends where it began.
+    """Draw the mechanism over the crank angles of a scan that ends where it began, as one SVG.
 
-    Parameters
-    ----------
-    mechanism : PointingMechanism
-    phi_x, phi_y : array_like, shape (n,)
-        Crank angles, radians.
-    s_y, s_x : {+1, -1}
-        Assembly mode.
-    seconds : float
-        Time of one pass.
-    title : str
-
-    Returns
-    -------
-    str
-        One SVG.
-
-    Raises
-    ------
-    GeometryError
-        Some pose cannot be assembled.
+    `phi_x` and `phi_y` of shape (n,), radians, on the assembly mode `s_y`, `s_x`; one pass takes so many `seconds`. A
+    `GeometryError` says that some pose cannot be assembled.
     """
     poses = mechanism.poses(phi_x, phi_y, s_y, s_x)
     if poses.a.ndim != 1 or poses.a.size < 2 or not poses.assembled.all():

@@ -29,7 +29,7 @@ _ORDER = (_CLOSED, _NEWTON, _SCIPY)
 
 def poses(context: Any, effort: Effort) -> Problem:
     """Poses over the sweep of the scene."""
-    from graphsynth.systems.antenna.stages import antenna_of
+    from graphsynth.systems.antenna.scene import antenna_of
 
     return pose_problem(antenna_of(context), context.scene.mechanism.sweep.largest, effort)
 
@@ -37,15 +37,8 @@ def poses(context: Any, effort: Effort) -> Problem:
 def rod_angles(mechanism: PointingMechanism, phi_x: float, phi_y: float, near: tuple[float, float]) -> tuple[Any, Any]:
     """Elevation and azimuth with 50 digits from two equations: each rod is as long as it is.
 
-    Nothing of the closed form is used: the ends of the cranks, the turned ends on the reflector, their distances.
-
-    Parameters
-    ----------
-    mechanism : PointingMechanism
-    phi_x, phi_y : float
-        Angles of the cranks of legs Y and X, radians, taken as the doubles they are.
-    near : (float, float)
-        Elevation and azimuth near by, which choose the assembly mode.
+    Nothing of the closed form is used: the ends of the cranks, the turned ends on the reflector, their distances. Crank
+    angles are taken as the doubles they are; `near` (elevation, azimuth) chooses the assembly mode.
 
     Examples
     --------
@@ -80,28 +73,11 @@ def pointing_errors(
 ) -> tuple[Row, ...]:
     """Error against run time of every way to a pose, over equal crank angles up to ``largest`` on the mode at rest.
 
-    Ways: the closed form in bulk and pose by pose, Newton's method on the twelve equations in bulk, scipy's ``root`` on
-    the same equations pose by pose with several tolerances.
+    Ways: the closed form in bulk (timed with 100 000 poses) and pose by pose, Newton's method on the twelve equations
+    in bulk, scipy's ``root`` on the same equations pose by pose with several tolerances.
 
-    Parameters
-    ----------
-    mechanism : PointingMechanism
-    largest : float
-        Radians.
-    poses : int
-        Poses of the comparison, at least 2; the closed form in bulk is timed with 100 000.
-    rounds : int
-        Runs for the wall time, of which the shortest counts.
-
-    Returns
-    -------
-    tuple of Row
-        Largest errors of elevation and azimuth (radians; NaN after a failure); seconds for one pose.
-
-    Raises
-    ------
-    GeometryError
-        Fewer than two poses or one round, or the mechanism cannot be assembled throughout.
+    Rows hold the largest errors of elevation and azimuth (radians; NaN after a failure) and the seconds for one pose. A
+    `GeometryError` refuses fewer than two poses or one round, and a mechanism that cannot be assembled throughout.
 
     Examples
     --------

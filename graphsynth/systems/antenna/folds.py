@@ -1,4 +1,4 @@
-"""Folds (output singularities) and dead-centre positions (input singularities) of each leg (theory/antenna 7).
+"""Folds of each leg: output singularities (theory/antenna 7).
 
 Where a discriminant vanishes, two assembly modes or two crank settings meet.  For the leg that is solved first it is a
 product of two sinusoids of the crank angle, for the other leg a trigonometric polynomial of degree two: all of its
@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from graphsynth.core.checks import choice, finite
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.antenna.model import Leg, PointingDimensions, scale_of, solution_order
-from graphsynth.systems.antenna.rates import rates
 
+#: Coefficients of ``1, cos t, sin t, cos 2t, sin 2t``.
+Coefficients = tuple[float, float, float, float, float]
 #: A local extremum of this part of the sum of the coefficients counts as a double root.
 TOUCH = 1e-13
 #: The turn is cut here beyond pi, at no special angle, so that no root of a simple problem lies on the cut.
@@ -49,7 +50,7 @@ def sinusoid_roots(a: float, b: float, c: float) -> list[TrigRoot]:
     return sorted(TrigRoot(math.atan2(b * c + s * a * root, a * c - s * b * root), 1) for s in (-1.0, 1.0))
 
 
-def quadratic_roots(coefficients: tuple[float, float, float, float, float]) -> list[TrigRoot]:
+def quadratic_roots(coefficients: Coefficients) -> list[TrigRoot]:
     """Roots of ``c0 + c1 cos t + s1 sin t + c2 cos 2t + s2 sin 2t``, at most four counted with their order.
 
     Brackets between the critical points (eigenvalues of a companion matrix) make every sign change found; a critical
@@ -276,47 +277,25 @@ class Fold:
         return f"fold of leg {self.leg} at {where}, {output} deg: modes {first} and {second} {what}"
 
 
-@dataclass(frozen=True)
-class DeadPoint:
-    """A dead point: crank and rod lie in one plane with the crank axis, the reflector cannot drive the crank.
-
-    Attributes
-    ----------
-    leg : str
-        "Y" (input ``phi_x``) or "X" (input ``phi_y``): the input that loses control.
-    phi_x, phi_y, a, b : float
-        The pose, radians.
-    kind : str
-        "stretched" (crank points to the cardan) or "folded" (it points away).
-    s_y, s_x : int
-        Assembly mode; 0 where the other leg does not reach (its output and the transmission are NaN then).
-    transmission : float
-        Derivative of the leg's output by its own crank angle as computed at this pose: 0 up to rounding.
-    """
-
-    leg: str
-    phi_x: float
-    phi_y: float
-    a: float
-    b: float
-    kind: str
-    s_y: int
-    s_x: int
-    transmission: float
-
-
-def _coefficients(leg: Leg, l1: float, c: float) -> tuple[float, float, float, float, float]:
-    """``P^2 + c^2 Q^2 - K^2`` as a trigonometric polynomial of the leg's own crank angle."""
-    k, p, q = leg.crank, l1 - leg.crank, leg.side * leg.rod
-    k0, kc, ks = (l1 * l1 + p * p + k * k) / (2 * l1), p * k / l1, q * k / l1
-    c2 = c * c
+def less_square(c0: float, c1: float, s1: float, twice: float, k: tuple[float, float, float]) -> Coefficients:
+    """``c0 + c1 cos t + s1 sin t + (twice / 2) cos 2t`` less the square of ``k0 + kc cos t + ks sin t``."""
+    k0, kc, ks = k
     return (
-        p * p + 0.5 * k * k + c2 * (q * q + 0.5 * k * k) - k0 * k0 - 0.5 * (kc * kc + ks * ks),
-        2 * p * k - 2 * k0 * kc,
-        2 * c2 * q * k - 2 * k0 * ks,
-        0.5 * (k * k * (1 - c2) - kc * kc + ks * ks),
+        c0 - k0 * k0 - 0.5 * (kc * kc + ks * ks),
+        c1 - 2 * k0 * kc,
+        s1 - 2 * k0 * ks,
+        0.5 * (twice - kc * kc + ks * ks),
         -kc * ks,
     )
+
+
+def _coefficients(leg: Leg, l1: float, c: float) -> Coefficients:
+    """``P^2 + c^2 Q^2 - K^2`` as a trigonometric polynomial of the leg's own crank angle."""
+    k, p, q = leg.crank, l1 - leg.crank, leg.side * leg.rod
+    square = (l1 * l1 + p * p + k * k) / (2 * l1), p * k / l1, q * k / l1
+    c2 = c * c
+    c0 = p * p + 0.5 * k * k + c2 * (q * q + 0.5 * k * k)
+    return less_square(c0, 2 * p * k, 2 * c2 * q * k, k * k * (1 - c2), square)
 
 
 def _planar_folds(leg: Leg, l1: float) -> list[TrigRoot]:
@@ -330,141 +309,57 @@ def _planar_folds(leg: Leg, l1: float) -> list[TrigRoot]:
     return sorted(found)
 
 
-def _first_output(mechanism: PointingDimensions, leg: Leg, phi: float, sign: int) -> float:
-    """Angle u of the leg that is solved first."""
-    angles = {"X": (0.0, phi), "Y": (phi, 0.0)}[leg.name]
-    signs = (1, sign) if leg.name == "X" else (sign, -1)
-    # its own equation does not contain the other crank; only a pose in reach of both legs gives both outputs
+class OneLeg(NamedTuple):
+    """A leg whose crank turns while the other one stays: whether it is solved first, l1 (scaled), the other's branch.
 
-    return Path(mechanism, angles, (0.0, 0.0), *signs).first(0.0)
+    ``u`` is the angle of the gimbal axis that the other leg holds if that one is solved first; NaN otherwise.
+    """
+
+    leg: Leg
+    l1: float
+    is_first: bool
+    u: float
+    sign: int
+
+
+def one_leg(mechanism: PointingDimensions, leg: str, phi_other: float, s_other: int | None) -> OneLeg:
+    """Return a leg with what the other one holds; `GeometryError` for a crank angle out of the other's reach."""
+    choice("leg", leg, ("Y", "X"))
+    scale = scale_of(mechanism)
+    l1 = mechanism.l1 / scale
+    first, second = solution_order(mechanism, scale)
+    if first.name == leg:
+        return OneLeg(first, l1, True, math.nan, second.rest if s_other is None else s_other)
+    sign = first.rest if s_other is None else s_other
+    angles = {"X": (0.0, phi_other), "Y": (phi_other, 0.0)}[first.name]
+    signs = (1, sign) if first.name == "X" else (sign, -1)
+    # its own equation does not contain the other crank; only a pose in reach of both legs gives both outputs
+    u = Path(mechanism, angles, (0.0, 0.0), *signs).first(0.0)
+    if math.isnan(u):
+        raise GeometryError(
+            f"leg {first.name} does not reach at phi_other = {phi_other}; choose a crank angle in its reach"
+        )
+    return OneLeg(second, l1, False, u, sign)
 
 
 def folds(mechanism: PointingDimensions, leg: str, phi_other: float, s_other: int | None) -> tuple[Fold, ...]:
-    """All folds of one leg over a turn of its crank; see `PointingMechanism.folds`.
-
-    Raises
-    ------
-    GeometryError
-        A crank angle out of the reach of the other leg.
-    """
-    choice("leg", leg, ("Y", "X"))
+    """All folds of one leg over a turn of its crank; see `PointingMechanism.folds`."""
     other_angle = finite("phi_other", phi_other)
-    scale = scale_of(mechanism)
-    l1 = mechanism.l1 / scale
-    first, second = solution_order(mechanism, scale)
-    own, other = (first, second) if first.name == leg else (second, first)
-    sign = other.rest if s_other is None else s_other
-    if own is first:
-        roots = _planar_folds(own, l1)
-    else:
-        u = _first_output(mechanism, first, other_angle, sign)
-        if math.isnan(u):
-            raise GeometryError(
-                f"leg {other.name} does not reach at phi_other = {other_angle}; choose a crank angle in its reach"
-            )
-        roots = quadratic_roots(_coefficients(own, l1, math.cos(u)))
+    own = one_leg(mechanism, leg, other_angle, s_other)
+    polynomial = _coefficients(own.leg, own.l1, math.cos(own.u))
+    roots = _planar_folds(own.leg, own.l1) if own.is_first else quadratic_roots(polynomial)
     offset = (0.0, other_angle) if leg == "Y" else (other_angle, 0.0)
     direction = (1.0, 0.0) if leg == "Y" else (0.0, 1.0)
-    signs = (1, sign) if leg == "Y" else (sign, -1)
-    return tuple(fold_on_path(mechanism, leg, root.angle, offset, direction, *signs, root.order) for root in roots)
+    signs = (1, own.sign) if leg == "Y" else (own.sign, -1)
+    path = Path(mechanism, offset, direction, *signs)
+    return tuple(fold_on_path(path, leg, root.angle, root.order) for root in roots)
 
 
-def fold_on_path(
-    mechanism: PointingDimensions,
-    leg: str,
-    parameter: float,
-    offset: tuple[float, float],
-    direction: tuple[float, float],
-    s_y: int,
-    s_x: int,
-    multiplicity: int = 1,
-) -> Fold:
+def fold_on_path(path: Path, leg: str, parameter: float, multiplicity: int = 1) -> Fold:
     """Describe a fold whose place on a path is known."""
-    path = Path(mechanism, offset, direction, s_y, s_x)
     at = path.at_fold(leg, parameter)
-    merging = ((1, s_x), (-1, s_x)) if leg == "Y" else ((s_y, 1), (s_y, -1))
-    phi_x, phi_y = (offset[i] + parameter * direction[i] for i in (0, 1))
-    simple = multiplicity == 1
-    return Fold(
-        leg, parameter, offset, direction, phi_x, phi_y, at.a, at.b, at.coefficient if simple else math.nan,
-        at.side if simple else 0, 2 if simple else 1, merging,
-    )  # fmt: skip
-
-
-def dead_points(
-    mechanism: PointingDimensions, leg: str, phi_other: float, s_other: int | None
-) -> tuple[DeadPoint, ...]:
-    """All dead points of one crank; see `PointingMechanism.dead_points`.
-
-    Raises
-    ------
-    GeometryError
-        A crank angle out of the reach of the other leg.
-    """
-    choice("leg", leg, ("Y", "X"))
-    other_angle = finite("phi_other", phi_other)
-    scale = scale_of(mechanism)
-    l1 = mechanism.l1 / scale
-    first, second = solution_order(mechanism, scale)
-    own, other = (first, second) if first.name == leg else (second, first)
-    cosine = 1.0
-    if own is second:
-        u = _first_output(mechanism, first, other_angle, other.rest if s_other is None else s_other)
-        if math.isnan(u):
-            raise GeometryError(
-                f"leg {other.name} does not reach at phi_other = {other_angle}; choose a crank angle in its reach"
-            )
-        cosine = math.cos(u)
-    else:
-        u = math.nan
-    k, p, q = own.crank, l1 - own.crank, own.side * own.rod
-    k0, kc, ks = (l1 * l1 + p * p + k * k) / (2 * k), -l1 * p / k, -l1 * cosine * q / k
-    square = l1 * l1
-    roots = quadratic_roots(
-        (
-            0.5 * square * (1 + cosine * cosine) + p * p + q * q - k0 * k0 - 0.5 * (kc * kc + ks * ks),
-            -2 * l1 * p - 2 * k0 * kc,
-            -2 * l1 * cosine * q - 2 * k0 * ks,
-            0.5 * (square * (1 - cosine * cosine) - kc * kc + ks * ks),
-            -kc * ks,
-        )
-    )
-    found = []
-    for root in roots:
-        v = root.angle
-        dp, dq = l1 * math.cos(v) - p, l1 * cosine * math.sin(v) - q
-        toward = math.copysign(1.0, k0 + kc * math.cos(v) + ks * math.sin(v))
-        phi = math.atan2(toward * dq, toward * dp)
-        found.append(_dead_point(mechanism, leg, phi, other_angle, v, u, toward, s_other))
-    return tuple(found)
-
-
-def _dead_point(
-    mechanism: PointingDimensions,
-    leg: str,
-    phi: float,
-    other_angle: float,
-    output: float,
-    other_output: float,
-    toward: float,
-    s_other: int | None,
-) -> DeadPoint:
-    phi_x, phi_y = (phi, other_angle) if leg == "Y" else (other_angle, phi)
-    candidates = [
-        (s_y, s_x) for s_y in (1, -1) for s_x in (1, -1) if s_other is None or (s_x if leg == "Y" else s_y) == s_other
-    ]
-    rest = -1 if leg == "Y" else 1
-    candidates.sort(key=lambda signs: (signs[1] if leg == "Y" else signs[0]) != rest)
-    best: tuple[float, int, int, float, float, float] | None = None
-    for s_y, s_x in candidates:
-        got = rates(mechanism, phi_x, phi_y, (0.0, 0.0), (0.0, 0.0), s_y, s_x)
-        a, b = float(got.poses.a), float(got.poses.b)
-        miss = abs(math.remainder((a if leg == "Y" else b) - output, math.tau))
-        slope = float(got.jacobian[0, 0] if leg == "Y" else got.jacobian[1, 1])
-        if miss < 1e-6 and (best is None or miss < best[0] - 1e-9):
-            best = (miss, s_y, s_x, a, b, slope)
-    kind = "stretched" if toward > 0.0 else "folded"
-    if best is None:
-        a, b = (output, other_output) if leg == "Y" else (other_output, output)
-        return DeadPoint(leg, phi_x, phi_y, a, b, kind, 0, 0, math.nan)
-    return DeadPoint(leg, phi_x, phi_y, best[3], best[4], kind, best[1], best[2], best[5])
+    merging = ((1, path.s_x), (-1, path.s_x)) if leg == "Y" else ((path.s_y, 1), (path.s_y, -1))
+    phi_x, phi_y = (path.offset[i] + parameter * path.direction[i] for i in (0, 1))
+    pose = (phi_x, phi_y, at.a, at.b)
+    end = (at.coefficient, at.side, 2) if multiplicity == 1 else (math.nan, 0, 1)
+    return Fold(leg, parameter, path.offset, path.direction, *pose, *end, merging)

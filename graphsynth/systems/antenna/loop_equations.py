@@ -180,27 +180,9 @@ def loop_equations(
 ) -> LoopEquations:
     """Evaluate the twelve equations and their derivatives.
 
-    Parameters
-    ----------
-    mechanism : PointingDimensions
-    x : ndarray, shape (n, 12)
-        Unknowns ``x1 ... x12``, radians.
-    phi : ndarray, shape (n, 2)
-        Crank angles ``phi_x, phi_y``, radians.
-    chart : {"corrected", "printed"}
-        Angles of the ball joint of leg Y.
-    scaled : bool
-        Divide the position rows by ``l1``.
-
-    Returns
-    -------
-    LoopEquations
-        Rows: three positions of leg Y, three of leg X, direction z of both legs (two each), direction x of both.
-
-    Raises
-    ------
-    GeometryError
-        A chart that does not exist.
+    Unknowns ``x1 ... x12`` of shape (n, 12) and crank angles ``phi_x, phi_y`` of shape (n, 2), radians; `chart` is one
+    of `CHARTS`, `scaled` divides the position rows by ``l1``. Rows: three positions of leg Y, three of leg X, direction
+    z of both legs (two each), direction x of both.
     """
     if chart not in CHARTS:
         raise GeometryError(f"chart = {chart!r} is unknown; use one of {', '.join(map(repr, CHARTS))}")
@@ -454,13 +436,7 @@ def solve_loops(
 def survey_roots(
     mechanism: PointingDimensions, phi_x: float, phi_y: float, starts: int, seed: int, chart: str
 ) -> RootSurvey:
-    """Newton's method from random starts at one pose; see `PointingMechanism.survey_roots`.
-
-    Raises
-    ------
-    GeometryError
-        A number of starts below 1.
-    """
+    """Newton's method from random starts at one pose; see `PointingMechanism.survey_roots`."""
     if starts < 1:
         raise GeometryError(f"starts = {starts} must be at least 1; give a number of random starts")
     random = np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, 12))

@@ -14,12 +14,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graphsynth.systems.antenna.closed_form import Convention, CrankAngles, ModelComparison, PointingModes
-    from graphsynth.systems.antenna.folds import DeadPoint, Fold
+    from graphsynth.systems.antenna.folds import Fold
     from graphsynth.systems.antenna.loop_equations import ChartReport, LoopSolution, PassiveAngles, RootSurvey
     from graphsynth.systems.antenna.model import Poses
+    from graphsynth.systems.antenna.motion import DeadPoint, PointingSweep, Rates
     from graphsynth.systems.antenna.precise import ApproachToFold
-    from graphsynth.systems.antenna.rates import Rates
-    from graphsynth.systems.antenna.sweep import PointingSweep
     from graphsynth.systems.antenna.tolerance import Tolerance
 
 
@@ -192,13 +191,13 @@ class PointingMechanism(PointingDimensions):
         >>> PointingMechanism().rates(np.radians(15), np.radians(15)).jacobian.round(9).tolist()
         [[0.583946582, 0.01261739], [0.0, 0.579026781]]
         """
-        from graphsynth.systems.antenna.rates import rates
+        from graphsynth.systems.antenna.motion import rates
 
         return rates(self, phi_x, phi_y, (dphi_x, dphi_y), (ddphi_x, ddphi_y), s_y, s_x)
 
     def passive_rates(self, poses: Poses, dphi_x: ArrayLike, dphi_y: ArrayLike) -> NDArray[np.float64]:
         """Rates of the twelve unknowns for crank speeds, shape (..., 12), from the 12 x 12 Jacobian."""
-        from graphsynth.systems.antenna.rates import passive_rates
+        from graphsynth.systems.antenna.motion import passive_rates
 
         return passive_rates(self, poses, dphi_x, dphi_y)
 
@@ -241,7 +240,7 @@ class PointingMechanism(PointingDimensions):
 
         Parameters are those of `folds`.
         """
-        from graphsynth.systems.antenna.folds import dead_points
+        from graphsynth.systems.antenna.motion import dead_points
 
         return dead_points(self, leg, phi_other, s_other)
 
@@ -277,7 +276,7 @@ class PointingMechanism(PointingDimensions):
         >>> np.degrees([sweep.fold.parameter, sweep.fold.a]).round(9).tolist(), round(sweep.fold.coefficient, 9)
         ([69.394627605, 150.578155425], 2.869433008)
         """
-        from graphsynth.systems.antenna.sweep import sweep
+        from graphsynth.systems.antenna.motion import sweep
 
         return sweep(self, t, direction, offset, s_y, s_x)
 

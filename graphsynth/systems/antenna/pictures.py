@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,11 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.drawing.palette import LIGHT, WHITE
-from graphsynth.drawing.plots import new_figure
+from graphsynth.drawing.plots import Line, new_figure, themed_svg
+from graphsynth.pipeline.display import chart, unit_in
+from graphsynth.pipeline.products import Picture
+from graphsynth.pipeline.stages import Context
+from graphsynth.systems.antenna.scene import antenna_of, other_model, table_of, widths_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,6 +23,7 @@ if TYPE_CHECKING:
     from graphsynth.systems.antenna.closed_form import Convention, ModelComparison
     from graphsynth.systems.antenna.mechanism import PointingMechanism
     from graphsynth.systems.antenna.model import Poses
+    from graphsynth.systems.antenna.stages import AntennaMotion
 
 Array = NDArray[np.float64]
 
@@ -50,26 +56,8 @@ def pointing_picture(
 ) -> Figure:
     """Draw the mechanism in space in one pose: reflector, gimbal axes, both legs, rest position of the reflector.
 
-    Parameters
-    ----------
-    mechanism : PointingMechanism
-    phi_x, phi_y : float
-        Crank angles, radians.
-    s_y, s_x : {+1, -1}
-        Assembly mode.
-    size : tuple of float, optional
-        Inches.
-    plain : bool, optional
-        Leave out the legend and the axes, for small pictures.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    GeometryError
-        The mechanism cannot be assembled at these crank angles.
+    Crank angles in radians; `s_y`, `s_x` choose the assembly mode; `plain` leaves out the legend and the axes, for
+    small pictures. A `GeometryError` says that the mechanism cannot be assembled there.
 
     Examples
     --------
@@ -166,30 +154,10 @@ def comparison_picture(
 
     Curves: 1 elevation, 2 azimuth, 3 and 4 the means of the two models, with their difference in minutes of arc.
 
-    Parameters
-    ----------
-    mechanism : PointingMechanism
-        Model of panel b (analytical).
-    other : PointingMechanism, optional
-        Model of panel a (block diagram); by default the same lengths with the other gimbal order.
-    reading, other_reading : Convention, optional
-        Conventions of each model.
-    largest : float
-        Crank angle at the end of the sweep, radians.
-    samples : int
-    working : float
-        Working limit, radians: a dotted line.
-    size : tuple of float, optional
-        Inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    `mechanism` is the model of panel b (analytical), `other` that of panel a (block diagram): by default the same
+    lengths with the other gimbal order. The sweep ends at `largest`; a dotted line marks `working` (radians).
     """
-    from dataclasses import replace
-
-    if other is None:
-        other = replace(mechanism, order="XY" if mechanism.order == "YX" else "YX")
+    other = _second(mechanism, other)
     phi = np.linspace(0.0, largest, samples)
     found = mechanism.compare(other, phi, reading=reading, other_reading=other_reading)
     degrees = np.degrees(phi)
@@ -245,39 +213,37 @@ def difference_map_picture(
 ) -> Figure:
     """Draw the difference of two models over both crank angles, minutes of arc: of the means, and of the beams.
 
-    Parameters
-    ----------
-    mechanism, other, reading, other_reading
-        As for `comparison_picture`.
-    span : float
-        Largest crank angle, radians.
-    nodes : int
-        Grid points along each axis.
-    size : tuple of float, optional
-        Inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Left: difference of the means of elevation and azimuth.  Right: angle between the normals of the reflectors.
+    Models as for `comparison_picture`; `span` is the largest crank angle, radians, `nodes` the grid points along each
+    axis. Left: difference of the means of elevation and azimuth. Right: angle between the normals of the reflectors.
     """
-    from dataclasses import replace
-
-    if nodes < 2:
-        raise GeometryError(f"nodes = {nodes} must be at least 2")
-    if other is None:
-        other = replace(mechanism, order="XY" if mechanism.order == "YX" else "YX")
-    grid = np.linspace(-_span(span), span, nodes)
+    grid = _grid(span, nodes)
+    other = _second(mechanism, other)
     found = mechanism.compare(other, grid[:, None], grid[None, :], reading=reading, other_reading=other_reading)
-    values = (found.arcminutes, _between_beams(found, (mechanism.order, other.order)))
+    beams = _between_beams(found, (mechanism.order, other.order))
+    drawn = []
+    for values, title, colours in (
+        (found.arcminutes, "difference of the means", "RdBu_r"),
+        (beams, "angle between the two beams", "magma_r"),
+    ):
+        largest = max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-9)
+        drawn.append(
+            (values, title, {"cmap": colours, "vmin": -largest if values is not beams else 0.0, "vmax": largest})
+        )
+    return _maps(grid, drawn, "arc-minutes", size)
+
+
+def _second(mechanism: PointingMechanism, other: PointingMechanism | None) -> PointingMechanism:
+    return other or replace(mechanism, order="XY" if mechanism.order == "YX" else "YX")
+
+
+def _maps(grid: Array, drawn: Any, label: str, size: tuple[float, float]) -> Figure:
+    """Draw maps over both crank angles side by side: values, title and options of each."""
     figure, degrees = new_figure(size), np.degrees(grid)
-    for axes, drawn, name in zip(figure.subplots(1, 2, sharey=True), values, ("means", "beams")):
-        largest = max(float(np.nanmax(np.abs(drawn), initial=0.0)), 1e-9)
-        low, colours = (-largest, "RdBu_r") if name == "means" else (0.0, "magma_r")
+    for axes, (values, title, options) in zip(figure.subplots(1, len(drawn), squeeze=False, sharey=True)[0], drawn):
         axes.set_facecolor(LIGHT["pale"])
-        image = axes.pcolormesh(degrees, degrees, drawn.T, cmap=colours, vmin=low, vmax=largest, rasterized=True)
-        figure.colorbar(image, ax=axes, label="arc-minutes")
-        axes.set_title("difference of the means" if name == "means" else "angle between the two beams", fontsize=10)
+        image = axes.pcolormesh(degrees, degrees, values.T, rasterized=True, **options)
+        figure.colorbar(image, ax=axes, label=label)
+        axes.set_title(title, fontsize=10)
         axes.set_xlabel("φx, crank of leg Y [deg]")
         axes.set_aspect("equal")
     figure.axes[0].set_ylabel("φy, crank of leg X [deg]")
@@ -293,10 +259,13 @@ def _between_beams(found: ModelComparison, orders: tuple[str, str]) -> Array:
     return np.asarray(60.0 * np.degrees(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))))
 
 
-def _span(span: float) -> float:
+def _grid(span: float, nodes: int, least: int = 2) -> Array:
+    """Crank angles from minus to plus the span, radians."""
     if not (math.isfinite(span) and 0.0 < span <= math.pi):
         raise GeometryError(f"span = {span} must be above 0 and at most pi; give the largest crank angle in radians")
-    return span
+    if nodes < least:
+        raise GeometryError(f"nodes = {nodes} must be at least {least}")
+    return np.linspace(-span, span, nodes)
 
 
 def fold_map_picture(
@@ -310,42 +279,22 @@ def fold_map_picture(
 ) -> Figure:
     """Draw how far the mechanism is from a fold over both crank angles, with the folds and dead points themselves.
 
-    Parameters
-    ----------
-    mechanism : PointingMechanism
-    span : float
-        Largest crank angle, radians.
-    nodes : int
-        Grid points along each axis; at least 16.
-    s_y, s_x : {+1, -1}
-        Assembly mode.
-    size : tuple of float, optional
-        Inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Colour: sine of the angle to the nearest fold; white: cannot be assembled.
+    `span` is the largest crank angle, radians; at least 16 `nodes` along each axis. Colour: sine of the angle to the
+    nearest fold; white: cannot be assembled.
     """
-    if nodes < 16:
-        raise GeometryError(f"nodes = {nodes} must be at least 16")
-    grid = np.linspace(-_span(span), span, nodes)
+    grid = _grid(span, nodes, 16)
     poses = mechanism.poses(grid[:, None], grid[None, :], s_y, s_x)
     margin = np.where(poses.assembled, np.minimum(poses.margin_y, poses.margin_x), np.nan)
-    figure = new_figure(size)
-    axes = figure.add_subplot()
-    degrees = np.degrees(grid)
-    image = axes.pcolormesh(degrees, degrees, margin.T, cmap="viridis", vmin=0.0, vmax=1.0, rasterized=True)
-    figure.colorbar(image, ax=axes, label="sine of the angle to the nearest fold [–]")
-    _singular_points(axes, mechanism, grid, s_y, s_x)
-    axes.set_xlim(degrees[0], degrees[-1])
-    axes.set_ylim(degrees[0], degrees[-1])
-    axes.set_aspect("equal")
-    axes.set_xlabel("φx, crank of leg Y [deg]")
-    axes.set_ylabel("φy, crank of leg X [deg]")
     mode = f"mode ({'+' if s_y > 0 else '−'} {'+' if s_x > 0 else '−'})"
     share = 100.0 * float(poses.assembled.mean())
-    axes.set_title(f"order {mechanism.order}, {mode}: {share:.1f} % of this square can be assembled", fontsize=10)
+    title = f"order {mechanism.order}, {mode}: {share:.1f} % of this square can be assembled"
+    drawn = [(margin, title, {"cmap": "viridis", "vmin": 0.0, "vmax": 1.0})]
+    figure = _maps(grid, drawn, "sine of the angle to the nearest fold [–]", size)
+    axes = figure.axes[0]
+    axes.set_facecolor(WHITE)
+    _singular_points(axes, mechanism, grid, s_y, s_x)
+    ends = (math.degrees(grid[0]), math.degrees(grid[-1]))
+    axes.set(xlim=ends, ylim=ends)
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=2, fontsize=8, frameon=False, markerscale=2.0)
     return figure
 
@@ -383,43 +332,127 @@ def tolerance_map_picture(
 ) -> Figure:
     """Draw the largest certified deviation of each output over both crank angles, seconds of arc (mean-value form).
 
-    Parameters
-    ----------
-    mechanism : PointingMechanism
-    widths : float or tuple of five floats
-        Tolerances of the lengths.
-    span : float
-        Largest crank angle, radians.
-    nodes : int
-        Grid points along each axis; every one is an interval proof of about ten milliseconds.
-    size : tuple of float, optional
-        Inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Cells that are undecided (a fold in the box of lengths, or no pose) are hatched.
+    `widths` are the tolerances of the lengths, one or five; `span` is the largest crank angle, radians; each of the
+    `nodes` along both axes is an interval proof of about ten milliseconds. Undecided cells (a fold in the box, or no
+    pose) are hatched.
     """
-    if nodes < 2:
-        raise GeometryError(f"nodes = {nodes} must be at least 2")
-    grid = np.linspace(-_span(span), span, nodes)
+    grid = _grid(span, nodes)
     worst = np.full((2, nodes, nodes), np.nan)
     for i, x in enumerate(grid.tolist()):
         for j, y in enumerate(grid.tolist()):
             found = mechanism.tolerance(x, y, widths, method="mean_value")
             worst[:, i, j] = [max(map(abs, bounds.deviation)) for bounds in (found.a, found.b)]
-    figure = new_figure(size)
-    degrees = np.degrees(grid)
-    for axes, values, name in zip(figure.subplots(1, 2, sharey=True), worst, ("elevation", "azimuth")):
-        axes.set_facecolor(LIGHT["pale"])
+    names = (f"{name}, order {mechanism.order}" for name in ("elevation", "azimuth"))
+    drawn = [(values, name, {"cmap": "magma_r", "shading": "nearest"}) for values, name in zip(worst, names)]
+    figure = _maps(grid, drawn, "largest certified deviation [arc-seconds]", size)
+    for axes in figure.axes[:2]:
         axes.patch.set_hatch("////")
-        image = axes.pcolormesh(degrees, degrees, values.T, cmap="magma_r", shading="nearest", rasterized=True)
-        figure.colorbar(image, ax=axes, label="largest certified deviation [arc-seconds]")
-        axes.set_title(f"{name}, order {mechanism.order}", fontsize=10)
-        axes.set_xlabel("φx, crank of leg Y [deg]")
-        axes.set_aspect("equal")
-    figure.axes[0].set_ylabel("φy, crank of leg X [deg]")
     given = (widths,) if isinstance(widths, int | float) else tuple(dict.fromkeys(widths))
     text = f"{given[0]:g}" if len(given) == 1 else ", ".join(f"{w:g}" for w in np.ravel(widths))
     figure.suptitle(f"lengths ±{text}; hatched: undecided", fontsize=11)
     return figure
+
+
+_FRAMES = 97
+
+
+def sketches(context: Context) -> tuple[Picture, ...]:
+    """Draw the mechanism in space, then every assembly mode at the same crank angles."""
+    antenna, shown = antenna_of(context), table_of(context).shown
+    x, y = shown
+    modes = antenna.solve(x, y)
+    there = [signs for k, signs in enumerate(modes.signs) if modes.distinct[k]]
+    at = f"cranks at {math.degrees(x):g}° and {math.degrees(y):g}°"
+    pictures = []
+    if (1, -1) in there:
+        caption = (
+            "Leg Y (crank axis parallel to x) gives the elevation, leg X the azimuth. Squares are cardans, open "
+            "circles ball joints, dotted circles the paths of the crank pins."
+        )
+        pictures.append(
+            Picture(f"The mechanism in space, {at}", themed_svg(pointing_picture(antenna, x, y)), caption, "wide")
+        )
+    for sy, sx in there:
+        name = f"Assembly mode ({'+' if sy > 0 else '−'}, {'+' if sx > 0 else '−'})"
+        svg = themed_svg(pointing_picture(antenna, x, y, s_y=sy, s_x=sx, size=(4.4, 4.0), plain=True))
+        pictures.append(Picture(name, svg, "The rest pose lies on it." if (sy, sx) == (1, -1) else ""))
+    return tuple(pictures)
+
+
+def animations(context: Context, motion: AntennaMotion) -> tuple[Picture, ...]:
+    """Let the reflector scan a figure of eight, or follow equal cranks where a fold forbids that."""
+    from graphsynth.systems.antenna.animation import pointing_animation
+
+    antenna, largest = antenna_of(context), table_of(context).sweep.largest
+    turn = np.linspace(0.0, math.tau, _FRAMES)
+    x, y = largest * np.sin(turn), largest * np.sin(2.0 * turn)
+    words = "The cranks swing by the largest angle of the sweep, leg X twice as fast as leg Y"
+    clear = antenna.poses(np.linspace(-largest, largest, 25)[:, None], np.linspace(-largest, largest, 25))
+    if not (clear.assembled.all() and antenna.poses(x, y).assembled.all()):
+        far = float(motion.phi[motion.path.reached].max(initial=0.0))
+        if far == 0.0:
+            return ()
+        x = y = far * 0.5 * (1.0 - np.cos(turn))
+        words = f"Equal cranks, to and fro up to {math.degrees(far):.4g}°: beyond that the mechanism folds"
+    caption = f"{words}. Right: where the beam goes."
+    return (Picture("A scan", pointing_animation(antenna, x, y), caption, "wide"),)
+
+
+def plots(context: Context, motion: AntennaMotion, comparison: ModelComparison) -> tuple[Picture, ...]:
+    """Draw Figure 4, the growth of the difference, velocities, passive angles, maps of tolerances and folds."""
+    table, antenna = table_of(context), antenna_of(context)
+    other, reading = other_model(context)
+    largest = table.sweep.largest
+    figure4 = comparison_picture(
+        antenna, other, other_reading=reading, largest=largest, samples=table.sweep.samples,
+        working=table.sweep.working, size=(8.6, 3.7),
+    )  # fmt: skip
+    pictures = [
+        Picture(
+            "Figure 4: two models over equal crank angles", themed_svg(figure4),
+            "a: second model; b: first model; c: the means of both and their difference. Dotted: working limit.",
+            "wide",
+        ),
+        *_curves(motion, comparison),
+    ]  # fmt: skip
+    drawn = difference_map_picture(antenna, other, other_reading=reading, span=largest)
+    words = "Left: what the article compares. Right: how far apart the two models really point."
+    pictures.append(Picture("Map of the difference of the two models", themed_svg(drawn), words, "wide"))
+    if any(widths_of(context)):
+        drawn = tolerance_map_picture(
+            antenna, tuple(widths_of(context)), span=largest, nodes=table.tolerances.map_nodes
+        )  # fmt: skip
+        pictures.append(
+            Picture("Map of the certified deviations", themed_svg(drawn), "Mean-value form at every node.", "wide")
+        )
+    drawn = fold_map_picture(antenna, nodes=61, size=(6.4, 6.2))
+    pictures.append(Picture("Map of folds and dead points", themed_svg(drawn), "Of the mode of the rest pose.", "wide"))
+    return tuple(pictures)
+
+
+def _curves(motion: AntennaMotion, comparison: ModelComparison) -> list[Picture]:
+    phi, poses, J, passive = motion.phi, motion.path.poses, motion.rates.jacobian, motion.passive.x
+    x, minute = "crank angle [°]", unit_in("[′]").to_si(1.0)
+    growth = [
+        Line(phi, comparison.arcminutes * minute, "means of two models", "a"),
+        Line(phi, poses.a - poses.b, "a − b of one model", "b", "--"),
+    ]
+    slopes = [
+        Line(phi, J[:, row, column], f"∂{angle}/∂φ{crank}", colour, style)
+        for (row, column, angle, crank), colour, style in zip(
+            ((0, 0, "a", "x"), (0, 1, "a", "y"), (1, 0, "b", "x"), (1, 1, "b", "y")), "abcd", ("-", "--", ":", "-.")
+        )
+    ]
+    ratios = "Of the reflector (a elevation, b azimuth) to the cranks (φx leg Y, φy leg X)."
+    leg_y, leg_x = _lines(phi, passive, range(5)), _lines(phi, passive, range(6, 11))
+    return [
+        chart("Growth of the differences", growth, x, "difference [′]", "Equal cranks; a: elevation, b: azimuth."),
+        chart("Velocity ratios", slopes, x, "velocity ratio", ratios),
+        chart("Passive angles of leg Y", leg_y, x, "angle [°]", "x1, x2: cardan; x3, x4, x5: ball joint."),
+        chart("Passive angles of leg X", leg_x, x, "angle [°]", "x7, x8: cardan; x9, x10, x11: ball joint."),
+    ]
+
+
+def _lines(x: Any, columns: Any, which: range) -> list[Any]:
+    colours, styles = ("a", "b", "c", "d", "note"), ("-", "--", "-.", ":", "-")
+    return [Line(x, columns[:, k], f"x{k + 1}", colours[i], styles[i]) for i, k in enumerate(which)]

@@ -112,21 +112,9 @@ def _linear(mp: Any, a: Any, b: Any, k: Any, sign: int) -> Any:
 def precise_angles(
     mechanism: PointingDimensions, phi_x: Any, phi_y: Any, s_y: int = 1, s_x: int = -1, digits: int = 50
 ) -> tuple[Any, Any]:
-    """Elevation and azimuth with ``digits`` digits.
+    """Elevation and azimuth with so many digits; both NaN where the mechanism cannot be assembled.
 
-    Parameters
-    ----------
-    mechanism : PointingDimensions
-    phi_x, phi_y : float, str or mpmath number
-        Crank angles, radians.
-    s_y, s_x : {+1, -1}
-        Assembly mode.
-    digits : int
-
-    Returns
-    -------
-    tuple of mpmath numbers
-        Both NaN where the mechanism cannot be assembled.
+    Crank angles in radians: floats, text or mpmath numbers; `s_y`, `s_x` choose the assembly mode.
 
     Examples
     --------
@@ -155,14 +143,9 @@ def _outputs(mp: Any, mechanism: PointingDimensions, phi: dict[str, Any], signs:
 
 
 def precise_fold(mechanism: PointingDimensions, fold: Fold, digits: int = 50) -> PreciseFold:
-    """Place, outputs and square-root coefficient of a simple fold with ``digits`` digits.
+    """Place, outputs and square-root coefficient of a simple fold with ``digits`` digits; others are refused.
 
     The discriminant is a smooth function of the path parameter with a simple zero there, so the secant method is safe.
-
-    Raises
-    ------
-    GeometryError
-        A fold that is not simple.
     """
     from mpmath import mp
 
@@ -277,13 +260,7 @@ def deviations(path: Path, leg: str, place: float, step: float) -> tuple[float, 
 
 
 def approach(mechanism: PointingDimensions, fold: Fold, distances: ArrayLike, branch: int) -> ApproachToFold:
-    """Compare three ways to compute the output near a fold; see `PointingMechanism.approach`.
-
-    Raises
-    ------
-    GeometryError
-        Distances that are not positive, or a fold that is not simple.
-    """
+    """Compare three ways to compute the output near a fold; see `PointingMechanism.approach`."""
     from mpmath import mp
 
     distance = np.atleast_1d(finite_array("distances", distances))

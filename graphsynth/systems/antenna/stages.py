@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.pipeline.display import quantity_table, table, unit_in
 from graphsynth.pipeline.products import Quantity, Record, Table
 from graphsynth.pipeline.stages import Context
-from graphsynth.systems.antenna.system import AntennaTable
+from graphsynth.systems.antenna.scene import LENGTH_NAMES, antenna_of, other_model, table_of, widths_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
         Tolerance,
     )
 
-#: Keys of the lengths in the order l1 to l5.
-LENGTH_NAMES = ("cardan", "rod_y", "crank_y", "rod_x", "crank_x")
 _CHECKED_POSES = 9
 _STARTS = 60
 _ROWS = 8
@@ -72,44 +70,6 @@ class SingularPoses:
     sweep_message: str
 
 
-def table_of(context: Context) -> AntennaTable:
-    """Return ``[mechanism]`` of the scene."""
-    table = context.scene.mechanism
-    assert isinstance(table, AntennaTable)
-    return table
-
-
-def antenna_of(context: Context) -> PointingMechanism:
-    """Build the mechanism of the scene, lengths in metres."""
-    from graphsynth.systems.antenna import PointingMechanism
-
-    table = table_of(context)
-    try:
-        l1, l2, l3, l4, l5 = (getattr(table.lengths, name) for name in LENGTH_NAMES)
-        return PointingMechanism(l1, l2, l3, l4, l5, order=table.order)
-    except GeometryError as error:
-        raise (context.scene.place / "mechanism" / "lengths").error(f"cannot be built: {error}") from error
-
-
-def widths_of(context: Context) -> list[float]:
-    """Tolerances of the five lengths, metres."""
-    table = table_of(context).tolerances
-    return [getattr(table, name) for name in LENGTH_NAMES]
-
-
-def other_model(context: Context) -> tuple[PointingMechanism, Convention]:
-    """Return the second model and its conventions."""
-    from dataclasses import replace
-
-    from graphsynth.systems.antenna import Convention
-
-    c = table_of(context).comparison
-    return (
-        replace(antenna_of(context), order=c.order),
-        Convention(c.sense_y, c.sense_x, c.side_y, c.side_x, c.output),
-    )
-
-
 def _equal_cranks(context: Context) -> NDArray[np.float64]:
     import numpy as np
 
@@ -119,8 +79,6 @@ def _equal_cranks(context: Context) -> NDArray[np.float64]:
 
 def sweep(context: Context) -> AntennaMotion:
     """Turn both cranks together on the assembly mode of the rest pose; beyond a fold everything is NaN."""
-    from dataclasses import replace
-
     import numpy as np
 
     antenna, phi = antenna_of(context), _equal_cranks(context)
@@ -327,8 +285,6 @@ def _sweep_table(motion: AntennaMotion, comparison: ModelComparison) -> Table:
 
 def _conventions_table(context: Context) -> Table:
     """Compare other conventions and length errors: which of them could explain a difference that was seen."""
-    from dataclasses import replace
-
     import numpy as np
 
     from graphsynth.systems.antenna import Convention

@@ -194,13 +194,7 @@ class LengthBoxProblem:
         return output, gradient
 
     def enclose(self, box: tuple[Any, ...]) -> OutputEnclosure:
-        """Enclose both outputs and their gradients over a box of lengths.
-
-        Raises
-        ------
-        NoProof
-            A fold lies in the box, or so near that no proof is found.
-        """
+        """Enclose both outputs and their gradients over a box of lengths; `NoProof` if a fold is in or near it."""
         first, second = self.legs
         middle = middle_of(box)
         starts = self.nominal(tuple(float(length.a) for length in middle))
@@ -368,13 +362,7 @@ def tolerance(
     mechanism: PointingDimensions, phi_x: float, phi_y: float, widths: ArrayLike, s_y: int, s_x: int, method: str,
     converted: bool = False,
 ) -> Tolerance:  # fmt: skip
-    """Bound both outputs; see `PointingMechanism.tolerance`.
-
-    Raises
-    ------
-    GeometryError
-        Not one width or five, or a width that reaches the length.
-    """
+    """Bound both outputs; see `PointingMechanism.tolerance`."""
     choice("method", method, ("mixed", "mean_value"))
     given = finite_array("widths", widths)
     if given.shape not in ((), (5,)):
