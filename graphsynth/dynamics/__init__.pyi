@@ -20,8 +20,8 @@ from .motors import (
     IdealTorque as IdealTorque,
     LinearCharacteristic as LinearCharacteristic,
     SynchronousMotor as SynchronousMotor,
+    Train as Train,
 )
 from .reactions import Reactions as Reactions
 from .result import DynamicMotion as DynamicMotion
 from .start import StartReport as StartReport, consistent_start as consistent_start
-from .trains import Train as Train

@@ -13,8 +13,7 @@ from typing import Any, Literal
 
 from graphsynth.core.checks import Point, finite, link_number, point, positive
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.motors import DCMotor, IdealTorque, LinearCharacteristic, Motor, SynchronousMotor
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import DCMotor, IdealTorque, LinearCharacteristic, Motor, SynchronousMotor, Train
 
 #: (t, place, velocity of the point) -> (fx, fy), world coordinates.
 ForceLaw = Callable[[float, Point, Point], Sequence[float]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,20 +13,28 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.checks import finite, finite_array
 from graphsynth.core.errors import GeometryError
 from graphsynth.core.extras import need
-from graphsynth.dynamics.energies import Balance, balance_at, checks_of, electric_error, motor_histories, warnings_of
-from graphsynth.dynamics.friction.history import FrictionAt, friction_at, friction_history
+from graphsynth.dynamics.checks import (
+    Balance,
+    balance_at,
+    checks_of,
+    electric_error,
+    motor_histories,
+    newton_euler_difference,
+    second_accelerations,
+    warnings_of,
+)
+from graphsynth.dynamics.friction.motion import FrictionAt, friction_at, friction_history
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.motors import current_scale
 from graphsynth.dynamics.result import DynamicEvent, DynamicMotion
-from graphsynth.dynamics.second import newton_euler_difference, second_accelerations
 from graphsynth.dynamics.start import StartReport, check_start, start_compiled
-from graphsynth.dynamics.stepping import StepOptions, Trail, integrate
-from graphsynth.dynamics.switching import starting_modes
+from graphsynth.dynamics.stepping import Form, SolverStatistics, StepOptions
+from graphsynth.dynamics.switching import integrate, starting_modes
 from graphsynth.dynamics.tables import Compiled, compile_model
 
 if TYPE_CHECKING:
+    from graphsynth.dynamics.friction.loads import FrictionRows
     from graphsynth.dynamics.friction.problem import Senses
-    from graphsynth.dynamics.friction.rows import FrictionRows
 
 Array = NDArray[np.float64]
 FormName = Literal["auto", "one-coordinate", "partitioned", "augmented"]
@@ -130,9 +138,7 @@ def _times(times: ArrayLike) -> Array:
     return grid
 
 
-def _options(
-    method: str, rtol: float, atol: float | None, outputs: str, project: bool, max_steps: int
-) -> StepOptions:  # fmt: skip
+def _options(method: str, rtol: float, atol: float | None, outputs: str, project: bool, max_steps: int) -> StepOptions:
     if isinstance(max_steps, bool) or not isinstance(max_steps, int) or max_steps < 1:
         raise GeometryError(f"max_steps = {max_steps!r} is not a number of steps; give an integer of at least 1")
     absolute = None if atol is None else finite("atol", atol)
@@ -156,31 +162,6 @@ def _check_options(form: str, outputs: str, options: StepOptions) -> None:
         raise GeometryError(f"atol = {options.atol} must be positive; leave it out for the natural scales")
 
 
-class Form(Protocol):
-    """What a formulation gives the integrator."""
-
-    name: str
-    compiled: Compiled
-    why: str
-    stall: str
-    loss: float
-    pivot: float
-    contraction: float
-    changes: list[tuple[float, str]]
-
-    def begin(self) -> Array:
-        """State of the form at the start."""
-
-    def rates(self, t: float, y: Array) -> Array:
-        """Rate of that state."""
-
-    def accept(self, t: float, y: Array) -> Array:
-        """State that the next step starts from."""
-
-    def state(self, t: float, y: Array) -> tuple[Array, Array]:
-        """Coordinates and velocities of the mechanism."""
-
-
 @dataclass
 class _Run:
     """States at the output times; a workspace."""
@@ -193,7 +174,7 @@ class _Run:
     tail: Array
     modes: NDArray[np.int64]
     done: int
-    trail: Trail
+    stats: SolverStatistics
     form: Form
     seconds: float
     events: list[DynamicEvent] = field(default_factory=list)
@@ -235,9 +216,9 @@ def _once(compiled: Compiled, report: StartReport, grid: Array, name: str, optio
         return other
     if name == "auto" and chosen == "one-coordinate" and run.done < len(grid) and not compiled.model.massless:
         other = _run(compiled, report, grid, "augmented", options)
-        why = run.form.why or run.trail.message
-        text = f"the one-coordinate form ends at t = {run.trail.time:.9g} s ({why}); augmented form used"
-        other.events.insert(0, DynamicEvent("fold", run.trail.time, abs(run.trail.last_step), text))
+        why = run.form.why or run.stats.message
+        text = f"the one-coordinate form ends at t = {run.stats.time:.9g} s ({why}); augmented form used"
+        other.events.insert(0, DynamicEvent("fold", run.stats.time, abs(run.stats.last_step), text))
         return other
     return run
 
@@ -249,11 +230,19 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
     form = make_form(compiled, report, name, options.project)
     n, count = compiled.n, len(grid)
     run = _Run(
-        name, np.full((count, n), np.nan), np.full((count, n), np.nan), [None] * count,
-        np.zeros((count, len(report.slots))), np.full((count, len(compiled.tail)), np.nan),
-        np.zeros((count, *compiled.tables.modes.shape), dtype=np.int64), 0, Trail(), form, 0.0,
+        name,
+        np.full((count, n), np.nan),
+        np.full((count, n), np.nan),
+        [None] * count,
+        np.zeros((count, len(report.slots))),
+        np.full((count, len(compiled.tail)), np.nan),
+        np.zeros((count, *compiled.tables.modes.shape), dtype=np.int64),
+        0,
+        SolverStatistics(),
+        form,
+        0.0,
         senses=[None] * count,
-    )  # fmt: skip
+    )
 
     def show(form: Form, k: int, t: float, y: Array, senses: Senses | None) -> None:
         run.q[k], run.v[k] = form.state(t, y)
@@ -268,37 +257,46 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
         if compiled.tables.friction.size:
             _with_friction(compiled, report, grid, options, run, show)
         else:
-            run.trail = integrate(
-                form, grid, compiled.model.breaks, options.method, options.rtol,
-                scales(compiled, report, form) * options.rtol * 0.01 if options.atol is None else options.atol,
-                options.exact, options.max_steps, lambda k, t, y: show(form, k, t, y, None),
-            )  # fmt: skip
+            run.stats = integrate(
+                form,
+                grid,
+                compiled.model.breaks,
+                options.scaled(scales(compiled, report, form)),
+                lambda k, t, y: show(form, k, t, y, None),
+            )
     run.seconds = perf_counter() - begin
     lost = np.flatnonzero(~np.isfinite(run.q[: run.done]).all(axis=1) | ~np.isfinite(run.v[: run.done]).all(axis=1))
     if lost.size:  # an interpolated state that the formulation cannot place is a failure, not a gap
         run.done = int(lost[0])
-        run.trail.time = min(run.trail.time, float(grid[run.done]))
-        run.trail.message = f"the state at the output time {float(grid[run.done]):.9g} s has no pose"
+        run.stats.time = min(run.stats.time, float(grid[run.done]))
+        run.stats.message = f"the state at the output time {float(grid[run.done]):.9g} s has no pose"
         run.q[run.done :], run.v[run.done :], run.tail[run.done :] = np.nan, np.nan, np.nan
-    run.events += run.trail.events
+    run.events += run.stats.events
     run.events += [DynamicEvent("change of coordinates", t, 0.0, text) for t, text in run.form.changes]
     return run
 
 
 def _with_friction(
-    compiled: Compiled, report: StartReport, grid: Array, options: StepOptions, run: _Run,
+    compiled: Compiled,
+    report: StartReport,
+    grid: Array,
+    options: StepOptions,
+    run: _Run,
     show: Callable[[Form, int, float, Array, Senses | None], None],
-) -> None:  # fmt: skip
+) -> None:
     """Integrate a model with friction in its joints."""
+    from graphsynth.dynamics.friction.loads import FrictionRows
     from graphsynth.dynamics.friction.motion import DryMotion
-    from graphsynth.dynamics.friction.rows import FrictionRows
 
     run.rows = FrictionRows(compiled)
     dry = DryMotion(
-        run.rows, report, lambda piece, start: make_form(piece, start, run.name, options.project),
-        lambda form: scales(compiled, report, form), show,
-    )  # fmt: skip
-    run.trail = dry.go(grid, compiled.model.breaks, options)
+        run.rows,
+        report,
+        lambda piece, start: make_form(piece, start, run.name, options.project),
+        lambda form: scales(compiled, report, form),
+        show,
+    )
+    run.stats = dry.go(grid, compiled.model.breaks, options)
     assert dry.form is not None
     run.form = dry.form
     run.form.loss, run.form.contraction, run.form.changes = dry.loss, dry.contraction, dry.changes
@@ -347,14 +345,22 @@ def _result(
     second = run.own[:done]
     if run.name == "augmented":
         second = _by_mode(
-            compiled, run.modes[:done],
+            compiled,
+            run.modes[:done],
             lambda own, at: second_accelerations(own, report, grid[at], run.q[at], run.v[at], currents[at]),
-        )  # fmt: skip
+        )
     motors = motor_histories(compiled, run.v, currents, run.modes)
     checks = checks_of(
-        compiled, grid, balances, work, second, _newton(compiled, run, grid, a, lam), run.form.loss,
-        run.form.contraction, electric_error(compiled, grid, run.tail, motors),
-    )  # fmt: skip
+        compiled,
+        grid,
+        balances,
+        work,
+        second,
+        _newton(compiled, run, grid, a, lam),
+        run.form.loss,
+        run.form.contraction,
+        electric_error(compiled, grid, run.tail, motors),
+    )
     poses, velocities, accelerations = compiled.to_links(run.q, run.v, a)
     for array in (poses, velocities, accelerations):
         array[done:] = np.nan
@@ -364,17 +370,44 @@ def _result(
     friction = None if run.rows is None else friction_history(run.rows, count, fits)
     warnings, backend = warnings_of(checks, options.rtol, friction), _backend(options.method)
     return DynamicMotion(
-        compiled.model, compiled, grid, poses, velocities, accelerations, run.q, run.v, a, lam, run.slots, kinetic,
-        potential, work, "completed" if completed else "failed", message, run.trail.time,
-        events, report, checks, warnings, estimate, run.name, options.method, backend, options.rtol,
-        run.trail.evaluations, run.trail.steps, run.seconds,
-        perf_counter() - begin, friction, motors,
-    )  # fmt: skip
+        compiled.model,
+        compiled,
+        grid,
+        poses,
+        velocities,
+        accelerations,
+        run.q,
+        run.v,
+        a,
+        lam,
+        run.slots,
+        kinetic,
+        potential,
+        work,
+        "completed" if completed else "failed",
+        message,
+        run.stats.time,
+        events,
+        report,
+        checks,
+        warnings,
+        estimate,
+        run.name,
+        options.method,
+        backend,
+        options.rtol,
+        run.stats.evaluations,
+        run.stats.steps,
+        run.seconds,
+        perf_counter() - begin,
+        friction,
+        motors,
+    )
 
 
 def _failure(run: _Run, grid: Array) -> str:
-    why = run.trail.message if run.rows is not None and run.trail.message else run.form.why or run.trail.message
-    return f"the integration stopped at t = {run.trail.time:.9g} of {grid[-1]:.9g} s: {why}"
+    why = run.stats.message if run.rows is not None and run.stats.message else run.form.why or run.stats.message
+    return f"the integration stopped at t = {run.stats.time:.9g} of {grid[-1]:.9g} s: {why}"
 
 
 def _backend(method: str) -> str:

@@ -10,15 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import finite_array
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics.checks import newton_euler_difference
 from graphsynth.dynamics.elements import MotorDrive
-from graphsynth.dynamics.friction.loads import fitting_loads, sliding_loads
+from graphsynth.dynamics.friction.loads import FrictionElement, FrictionRows, fitting_loads, sliding_loads
 from graphsynth.dynamics.friction.problem import joint_names
-from graphsynth.dynamics.friction.rows import FrictionElement, FrictionRows
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.motors import torque_constant
 from graphsynth.dynamics.reactions import Reactions, reactions_from_multipliers
 from graphsynth.dynamics.result import MotorHistory
-from graphsynth.dynamics.second import newton_euler_difference
 from graphsynth.dynamics.tables import Compiled, compile_model
 from graphsynth.dynamics.values import applied_loads, jacobians
 from graphsynth.mechanism.laws import Driver
@@ -129,10 +128,15 @@ def inverse_dynamics(
     efforts, power = _efforts(compiled, reactions, motion, rates)
     second = _second_way(compiled, instants, (q, v, a, lam))
     return InverseDynamics(
-        motion.inputs, instants, efforts, reactions, power, power_error,
+        motion.inputs,
+        instants,
+        efforts,
+        reactions,
+        power,
+        power_error,
         second,
         _motors(model, motion, efforts, rates),
-    )  # fmt: skip
+    )
 
 
 def _second_way(compiled: Compiled, times: Array, states: tuple[Array, Array, Array, Array]) -> float:
@@ -300,7 +304,7 @@ def _loads(
 
 
 def _efforts(compiled: Compiled, reactions: Reactions, motion: Motion, rates: Array) -> tuple[Array, Array]:
-    from graphsynth.dynamics.forms.one_coordinate import joint_coordinate
+    from graphsynth.dynamics.values import joint_coordinate
     from graphsynth.mechanism.joints import Revolute
 
     mechanism = motion.mechanism

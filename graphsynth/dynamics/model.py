@@ -18,7 +18,7 @@ from graphsynth.dynamics.elements import (
     TorqueSource,
     TorsionSpring,
     not_negative,
-)  # fmt: skip
+)
 from graphsynth.mechanism.joints import JointGeometry, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism

@@ -163,10 +163,20 @@ def reactions_from_multipliers(
     for index, joint in enumerate(joints):
         a, b = _ends(compiled, joint)
         at = points[index]
-        found.append(JointReaction(
-            a, b, kind_of(joint), wrench[index, :, :2], wrench[index, :, 2], np.column_stack([at.real, at.imag]),
-            determined[index], angles[a], angles[b], apart[index],
-        ))  # fmt: skip
+        found.append(
+            JointReaction(
+                a,
+                b,
+                kind_of(joint),
+                wrench[index, :, :2],
+                wrench[index, :, 2],
+                np.column_stack([at.real, at.imag]),
+                determined[index],
+                angles[a],
+                angles[b],
+                apart[index],
+            )
+        )
     return Reactions(times, tuple(found))
 
 

@@ -179,14 +179,14 @@ class DynamicMotion:
 
         more = None
         if self.friction is not None and self.friction.shared:
-            from graphsynth.dynamics.friction.history import open_shares
+            from graphsynth.dynamics.friction.problem import open_shares
 
             more = open_shares(self.compiled, self.times, self.q, self.v, self.slots, self.friction.state)
         return reactions_from_multipliers(self.compiled, self.q, self.v, self.multipliers, self.times, more)
 
     def coordinate(self, base: int, link: int) -> tuple[Array, Array]:
         """Coordinate of an R or P joint and its rate over time, each (n,)."""
-        from graphsynth.dynamics.forms.one_coordinate import joint_coordinate
+        from graphsynth.dynamics.values import joint_coordinate
 
         return joint_coordinate(self.model.mechanism, base, link, self.poses, self.velocities)
 

@@ -1,7 +1,16 @@
-"""Singular poses: classified at a start, with the branches that meet; why an integration does not get past one."""
+"""Singular poses: classified at a start, with the branches that meet; crossed by a collocation step; or not passed.
+
+The motion is smooth along its branch although the equations lose their digits there.  Off the constraints the
+accelerations are singular at a change point, so an explicit step cannot come near.  One step of Gauss' collocation
+method leads across the pose, which lies between its stages: every stage is a state on the constraints at a regular
+pose, and the pose itself, where the accelerations are not determined, is never asked.  A polynomial through past
+states (Hermite) gives the first guess, which also chooses the branch.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -157,3 +166,196 @@ def _least(J: Array) -> float:
     """Smallest singular value over the largest; 1 without rows."""
     S = np.linalg.svd(J, compute_uv=False) if J.size else np.ones(1)
     return float(S[min(J.shape) - 1] / S[0]) if J.size and S[0] > 0.0 else 1.0
+
+
+#: Stages of the step over a pose: an even number keeps the middle free.  The order is twice as high.
+STAGES = 8
+_ROUNDS = 40
+
+
+@cache
+def _tables() -> tuple[Array, Array, Array]:
+    """Nodes in (0, 1), Lagrange polynomials of the nodes (coefficients, ascending), integrals to every node."""
+    nodes = np.asarray(0.5 * (np.polynomial.legendre.leggauss(STAGES)[0] + 1.0), dtype=np.float64)
+    basis = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    powers = nodes[:, None] ** np.arange(1, STAGES + 1) / np.arange(1, STAGES + 1)
+    return nodes, np.asarray(basis), np.asarray(powers @ basis.T)
+
+
+class GaussStep:
+    """The collocation polynomial: accelerations (stages, n) and rates of the tail over ``[t, t + h]`` from ``y``."""
+
+    def __init__(self, t: float, h: float, y: Array, a: Array, tail: Array) -> None:
+        self._t, self._h, self._y = t, h, y
+        _, basis, _ = _tables()
+        self._a, self._tail = basis.T @ a, basis.T @ tail
+
+    def __call__(self, t: float) -> Array:
+        """State (q, v, work) at time t."""
+        n, x, h = self._a.shape[1], (t - self._t) / self._h, self._h
+        k = np.arange(1, STAGES + 1)
+        once, twice = x**k / k, x ** (k + 1) / (k * (k + 1))
+        q, v = self._y[:n], self._y[n : 2 * n]
+        return np.concatenate(
+            [
+                q + x * h * v + h * h * (twice @ self._a),
+                v + h * (once @ self._a),
+                self._y[2 * n :] + h * (once @ self._tail),
+            ]
+        )
+
+
+def gauss_step(
+    evaluate: Callable[[float, Array, Array, Array], tuple[Array, Array]],
+    t: float,
+    y: Array,
+    h: float,
+    guess: Callable[[float], Array],
+    unit: Array,
+) -> GaussStep | None:
+    """Solve the collocation equations by fixed-point iteration; None if it does not settle.
+
+    Parameters
+    ----------
+    evaluate : callable
+        ``(t, q, v, tail)`` near the constraints to accelerations and rates of the tail at the nearest state on them.
+    guess : callable
+        State at a time, on the branch wanted.
+    unit : ndarray
+        Units of the coordinates.
+    """
+    nodes, _, A = _tables()
+    n = len(unit)
+    q0, v0 = y[:n], y[n : 2 * n]
+    first = [guess(t + h * c) for c in nodes]
+    Q, V, tails = (np.array([s[part] for s in first]) for part in (slice(n), slice(n, 2 * n), slice(2 * n, None)))
+    last = np.inf
+    for _ in range(_ROUNDS):
+        found = [evaluate(t + h * c, *state) for c, *state in zip(nodes, Q, V, tails)]
+        a, rates = np.array([part[0] for part in found]), np.array([part[1] for part in found])
+        if not np.isfinite(a).all():
+            return None
+        fresh = q0 + h * nodes[:, None] * v0 + h * h * (A @ (A @ a))
+        V, moved = v0 + h * (A @ a), y[2 * n :] + h * (A @ rates)
+        change = float(np.abs((fresh - Q) / unit).max())
+        if tails.shape[1] > 1:  # currents act back on the motion
+            change = max(change, float(np.abs((moved - tails) / (np.abs(moved).max(axis=0) + 1e-300)).max()))
+        Q, tails = fresh, moved
+        if change < 1e-14 or (change < 1e-10 and change > 0.5 * last):
+            return GaussStep(t, h, y, a, rates)
+        last = change
+    return None
+
+
+class HermiteGuess:
+    """Polynomials through states ``(q, v, work)`` and their rates at several times."""
+
+    def __init__(self, n: int, times: list[float], states: list[Array], rates: list[Array]) -> None:
+        self._n = n
+        self._centre, self._unit = times[-1], times[-1] - times[0]
+        nodes = (np.array(times) - self._centre) / self._unit
+        u = self._unit
+        places = [[y[:n], u * y[n : 2 * n], 0.5 * u * u * f[n : 2 * n]] for y, f in zip(states, rates)]
+        works = [[y[2 * n :], u * f[2 * n :]] for y, f in zip(states, rates)]
+        self._place, self._place_nodes = _divided(nodes, places)
+        self._work, self._work_nodes = _divided(nodes, works)
+
+    def __call__(self, t: float) -> Array:
+        """State at time t."""
+        x = (t - self._centre) / self._unit
+        place, slope = _value(self._place, self._place_nodes, x)
+        work, _ = _value(self._work, self._work_nodes, x)
+        return np.concatenate([place, slope / self._unit, work])
+
+
+def _divided(nodes: Array, data: list[list[Array]]) -> tuple[Array, Array]:
+    """Newton's divided differences with repeated nodes; ``data`` holds Taylor coefficients at every node."""
+    order = len(data[0])
+    x = np.repeat(nodes, order)
+    table = np.array([data[k // order][0] for k in range(len(x))])
+    found = [table[0]]
+    for column in range(1, len(x)):
+        fresh = []
+        for k in range(len(x) - column):
+            gap = x[k + column] - x[k]
+            fresh.append(data[k // order][column] if gap == 0.0 else (table[k + 1] - table[k]) / gap)
+        table = np.array(fresh)
+        found.append(table[0])
+    return np.array(found), x
+
+
+def _value(coefficients: Array, nodes: Array, x: float) -> tuple[Array, Array]:
+    """Newton's form and its derivative by Horner's rule."""
+    value, slope = coefficients[-1].copy(), np.zeros_like(coefficients[-1])
+    for k in range(len(coefficients) - 2, -1, -1):
+        slope = value + (x - nodes[k]) * slope
+        value = coefficients[k] + (x - nodes[k]) * value
+    return value, slope
+
+
+#: Smallest pivot over the largest seen: below the first a pose counts as singular, below the second as nearly so.
+_SINGULAR, _NEARLY = 1e-5, 1e-2
+#: Rounds of sampling; each is ten times finer.
+_ZOOMS = 7
+
+
+def passed_singular_pose(
+    form: Any, start: float, middle: float, end: float, first: Any, second: Any, largest: float
+) -> list[tuple[str, float, float, str]]:
+    """Locate the minimum of the smallest pivot over two steps with interpolants ``first`` and ``second``.
+
+    Kind, time, its uncertainty and a statement of the pose passed, if there is one.
+    """
+
+    def pivot(t: float) -> float:
+        return float(form.pivot_at(t, np.asarray((first if t <= middle else second)(t)))[0])
+
+    width = end - start
+    t, least = _lowest(pivot, start, end)
+    least /= largest
+    if least > _NEARLY:
+        return []
+    y = np.asarray((first if t <= middle else second)(t))
+    _, q = form.pivot_at(t, y)
+    n = form.compiled.n
+    if least > _SINGULAR:
+        text = f"nearly singular pose at t = {t:.9g} s: smallest pivot {least:.2g} of the largest; large reactions"
+        return [("nearly singular pose", t, 1e-9 * width, text)]
+    text = f"singular pose passed at t = {t:.9g} s"
+    return [("singular pose", t, 1e-7 * width, text + _branches(form, t, q, y[n : 2 * n]))]
+
+
+def _lowest(pivot: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
+    """Return the minimum of a function with a sharp bend there, kinks elsewhere: by ever finer samples."""
+    t, least, step = low, np.inf, (high - low) / 40.0
+    for _ in range(_ZOOMS):
+        for at in np.arange(low, high + 0.5 * step, step):
+            value = pivot(float(at))
+            if value < least:
+                t, least = float(at), value
+        low, high, step = max(t - step, low), min(t + step, high), 0.1 * step
+    return t, least
+
+
+def _branches(form: Any, t: float, q: Array, v: Array) -> str:
+    """Say which branches meet, and which one the motion follows."""
+    values = Values(form.compiled, t, form.slots)
+    U, S, Vt = np.linalg.svd(values.scaled_jacobian(q))
+    count = int(np.sum(1e-4 * S[0] > S)) + max(0, U.shape[0] - len(S))
+    kept = U.shape[0] - count
+    tangents = branch_tangents(values, q, U[:, kept:], Vt[kept:].T)
+    if tangents is None or tangents.kind != "change point":
+        return "; what meets there is not resolved"
+    rate = form.compiled.to_links(q, v, np.zeros_like(v))[1]
+    unit = np.array([form.compiled.tables.size, form.compiled.tables.size, 1.0])
+    along = [
+        abs(float(((motion / unit) * (rate / unit)).sum())) / float(np.linalg.norm(motion / unit))
+        for motion in tangents.motions
+    ]
+    size = float(np.linalg.norm(rate / unit)) or 1.0
+    own = int(np.argmax(along))
+    return (
+        f"; two branches meet; the motion goes on along its own velocity, branch {own} "
+        f"(cosines {along[0] / size:.6f}, {along[1] / size:.6f}): the other one would need an impulse; a change of the "
+        "start by rounding does not change this choice, but close to rest it may"
+    )

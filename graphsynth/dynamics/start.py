@@ -173,9 +173,14 @@ def consistent_start(
 
 
 def start_compiled(
-    compiled: Compiled, pose: ArrayLike | None, rates: ArrayLike | None, keep: Keys | None, keep_rates: Keys | None,
-    modes: Mapping[int, int] | None, time: float,
-) -> StartReport:  # fmt: skip
+    compiled: Compiled,
+    pose: ArrayLike | None,
+    rates: ArrayLike | None,
+    keep: Keys | None,
+    keep_rates: Keys | None,
+    modes: Mapping[int, int] | None,
+    time: float,
+) -> StartReport:
     """Do what `consistent_start` says for a compiled model."""
     keep, keep_rates = _keys("keep", keep), _keys("keep_rates", keep_rates)
     q0 = compiled.to_coordinates(_guess(compiled, pose, keep, modes, time))
@@ -192,10 +197,13 @@ def start_compiled(
         worst = {name: float(value) for name, value in zip(names, residual) if not abs(value) < 1e-12}
         worst_name = names[int(np.argmax(scaled))]
         return replace(
-            report, status="violated", violated=worst, pose_class="not tested",
+            report,
+            status="violated",
+            violated=worst,
+            pose_class="not tested",
             message=f"the constraints do not close: '{worst_name}' is open by {abs(residual[np.argmax(scaled)]):.6g} "
             f"{units[int(np.argmax(scaled))]}; correct the dimensions or the kept coordinates",
-        )  # fmt: skip
+        )
     report = classify(values, report)
     v0 = np.zeros(compiled.n) if rates is None else compiled.to_rates(q, _checked(compiled, rates, "rates"))
     return _velocities(values, report, v0, _kept(values, keep_rates), [f"kept {key}" for key in keep_rates])
@@ -319,10 +327,32 @@ def _blank(values: Values, q: Array, q0: Array) -> StartReport:
     count = len(compiled.info)
     moved = float(np.abs((q - q0) / values.column_scale).max(initial=0.0))
     return StartReport(
-        compiled.model, "consistent", "", values.time, pose, rate, second, q, nan, nan, np.full(count, np.nan),
-        np.zeros(count, dtype=np.bool_), tuple(info.name for info in compiled.info), moved, float("nan"), 0, 0,
-        np.empty(0), float("nan"), (), {}, "not tested", 0, None, values.slots,
-    )  # fmt: skip
+        compiled.model,
+        "consistent",
+        "",
+        values.time,
+        pose,
+        rate,
+        second,
+        q,
+        nan,
+        nan,
+        np.full(count, np.nan),
+        np.zeros(count, dtype=np.bool_),
+        tuple(info.name for info in compiled.info),
+        moved,
+        float("nan"),
+        0,
+        0,
+        np.empty(0),
+        float("nan"),
+        (),
+        {},
+        "not tested",
+        0,
+        None,
+        values.slots,
+    )
 
 
 def classify(values: Values, report: StartReport) -> StartReport:
@@ -339,10 +369,17 @@ def classify(values: Values, report: StartReport) -> StartReport:
         sets = _dependent(left, report.rows)
         pose_class, nearby, tangents = classify_pose(values, report.q, rank, left, Vt[rank:].T, RANK)
     return replace(
-        report, rank=rank, freedom=values.compiled.n - rank, singular_values=S, redundant=sets,
-        condition=largest / float(S[rank - 1]) if rank else 1.0, pose_class=pose_class, nearby_rank=nearby,
-        tangents=tangents, determined=np.abs(left).max(axis=1, initial=0.0) < 1e-8,
-    )  # fmt: skip
+        report,
+        rank=rank,
+        freedom=values.compiled.n - rank,
+        singular_values=S,
+        redundant=sets,
+        condition=largest / float(S[rank - 1]) if rank else 1.0,
+        pose_class=pose_class,
+        nearby_rank=nearby,
+        tangents=tangents,
+        determined=np.abs(left).max(axis=1, initial=0.0) < 1e-8,
+    )
 
 
 def _dependent(left: Array, names: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
@@ -383,18 +420,28 @@ def _velocities(
             name: float(value) for name, value in zip(all_names, residual) if abs(value) > 1e-12 * max(speed, _REST)
         }
         return replace(
-            report, status="contradicting rates", violated=found,
+            report,
+            status="contradicting rates",
+            violated=found,
             message=f"the rates contradict the joints: '{all_names[worst]}' is missed by {abs(residual[worst]):.6g} "
             f"{_row_units(values, kept)[worst]}/s; keep fewer rates or correct them",
-        )  # fmt: skip
+        )
     moved = float(np.abs(step / values.column_scale).max(initial=0.0))
-    a, lam, text, status = values.accelerations(report.q, v, applied_loads(compiled, values.time, report.q, v))
+    a, lam, text, status = _accelerations(values, report.q, v, applied_loads(compiled, values.time, report.q, v))
     pose, rate, second = compiled.to_links(report.q, v, a)
     message = _sentence(report) + text if status == "consistent" else text
     return replace(
-        report, status=status, v=v, a=a, multipliers=lam, velocities=rate, accelerations=second, poses=pose,
-        velocity_correction=moved, message=message,
-    )  # fmt: skip
+        report,
+        status=status,
+        v=v,
+        a=a,
+        multipliers=lam,
+        velocities=rate,
+        accelerations=second,
+        poses=pose,
+        velocity_correction=moved,
+        message=message,
+    )
 
 
 def _nearest_rates(values: Values, matrix: Array, right: Array) -> Array:
@@ -420,3 +467,36 @@ def _sentence(report: StartReport) -> str:
         if report.tangents is not None:
             text += f", {report.tangents.kind}"
     return text
+
+
+def _accelerations(values: Values, q: Array, v: Array, applied: Array) -> tuple[Array, Array, str, str]:
+    """Accelerations and multipliers, what to say about them, and the status of a start from there.
+
+    NaN with massless links, and where friction leaves no or several motions.
+    """
+    from graphsynth.dynamics import kernels
+
+    T = values.compiled.tables
+    nothing = np.full(len(q), np.nan), np.full(len(values.compiled.info), np.nan)
+    if not T.lower.size:
+        return *nothing, "; accelerations of massless links: one-coordinate form only", "consistent"
+    x = kernels.state_rows(T, q, v)
+    Q, _, _, _, good = kernels.load_vector(T, x, applied, values.compiled.currents)
+    if not good:
+        return *nothing, "; a spring has length 0, so its direction is not defined", "consistent"
+    if T.friction.size:
+        from graphsynth.dynamics.friction.loads import FrictionRows
+        from graphsynth.dynamics.friction.problem import FrictionProblem
+        from graphsynth.dynamics.friction.state import decide
+
+        problem = FrictionProblem(FrictionRows(values.compiled), values.time, q, v, values.slots)
+        found = decide(problem, problem.moving(), problem.resting)
+        if found.solution is None:
+            return *nothing, found.message, f"friction: {found.kind}"
+        return found.solution.a, found.solution.multipliers, "", "consistent"
+    _, J, gam, _ = kernels.constraint_system(T, x, values.slots, values.driven)
+    out = np.zeros(7)
+    a, lam = kernels.accelerate(T, x, J, gam, Q, out)
+    if values.blind(q, int(out[0])):
+        return *nothing, f"; accelerations are not known: {values.compiled.spread_words}", "consistent"
+    return a, lam, "", "consistent"

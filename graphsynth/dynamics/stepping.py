@@ -1,22 +1,23 @@
-"""The integration loop: scipy's steppers, projection after every step, breaks, outputs, singular poses."""
+"""Integration over a smooth piece: the steppers of scipy, DOP853 with compiled stages, CVODE (extra ``stiff``)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass, field, replace
+from functools import cache
+from io import StringIO
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GraphsynthError
+from graphsynth.core.extras import need
 from graphsynth.dynamics.result import DynamicEvent
 from graphsynth.dynamics.singular import lock, stalled
-from graphsynth.dynamics.switching import KINDS, Switches
-
-if TYPE_CHECKING:
-    from graphsynth.dynamics.friction.guard import Guard
-    from graphsynth.dynamics.integrate import Form
+from graphsynth.dynamics.tables import Compiled
 
 Array = NDArray[np.float64]
 Output = Callable[[int, float, Array], None]
@@ -27,8 +28,6 @@ _RUNGE_KUTTA = ("DOP853", "RK45", "RK23")
 _STALL, _STALLED = 1e-2, 200
 #: The same for steps shorter than this part of the whole time.
 _TINY = 1e-5
-#: Events of one motion.
-_EVENTS = 2_000
 
 
 @dataclass(frozen=True)
@@ -37,14 +36,18 @@ class StepOptions:
 
     method: str
     rtol: float
-    atol: float | None
+    atol: Array | float | None
     exact: bool
     project: bool
     max_steps: int
 
+    def scaled(self, sizes: Array) -> StepOptions:
+        """Return the options with an absolute tolerance: by default a hundredth of the relative one, in these sizes."""
+        return self if self.atol is not None else replace(self, atol=sizes * self.rtol * 0.01)
+
 
 @dataclass
-class Trail:
+class SolverStatistics:
     """How an integration went; a workspace."""
 
     time: float = 0.0
@@ -55,68 +58,69 @@ class Trail:
     events: list[DynamicEvent] = field(default_factory=list)
 
 
-def integrate(
-    form: Form, grid: Array, breaks: Sequence[float], method: str, rtol: float, atol: Array | float, exact: bool,
-    max_steps: int, output: Output,
-) -> Trail:  # fmt: skip
-    """Integrate a formulation over the output times; how far it came is in the trail.
+class Form(Protocol):
+    """What a formulation gives the integrator."""
 
-    Parameters
-    ----------
-    breaks : sequence of float
-        Times that no step crosses; loads are taken from their own side of them.
-    exact : bool
-        End a step at every output time.
-    output : callable
-        Called with index, time and state at every output time reached.
-    """
-    trail = Trail(time=float(grid[0]))
-    y = form.begin()
-    output(0, trail.time, y)
-    inner = [t for t in breaks if grid[0] < t < grid[-1]]
-    for t in inner:
-        trail.events.append(DynamicEvent("break", t, 0.0, f"loads are not smooth at t = {t:.9g} s"))
-    ends = [*inner, float(grid[-1])]
-    watching = any(drive.switches for drive in form.compiled.drives)
-    flipped: list[tuple[int, int]] = []
-    while ends:
-        began = trail.time
-        guard = Switches(form, trail.time, y, flipped) if watching else None
-        stepper = Stepper(form, trail, method, rtol, atol, exact, ends[0], at_break=ends[0] in inner, guard=guard)
-        last = stepper.run(y, grid, max_steps, output)
-        if last is None:
-            break
-        y = last
-        if trail.time > began:
-            flipped = []
-        if guard is not None and guard.hit is not None:
-            flipped.append(guard.hit)
-            if len(trail.events) >= _EVENTS:
-                trail.message = f"Zeno behaviour: more than {_EVENTS} events by t = {trail.time:.9g} s"
-                break
-            kind = KINDS[guard.hit[1]]
-            trail.events.append(DynamicEvent(kind, trail.time, 4.0 * np.spacing(trail.time), guard.flip(trail.time, y)))
-        if trail.time >= ends[0]:
-            ends.pop(0)
-    return trail
+    name: str
+    compiled: Compiled
+    why: str
+    stall: str
+    loss: float
+    pivot: float
+    contraction: float
+    changes: list[tuple[float, str]]
+
+    def begin(self) -> Array:
+        """State of the form at the start."""
+
+    def rates(self, t: float, y: Array) -> Array:
+        """Rate of that state."""
+
+    def accept(self, t: float, y: Array) -> Array:
+        """State that the next step starts from."""
+
+    def state(self, t: float, y: Array) -> tuple[Array, Array]:
+        """Coordinates and velocities of the mechanism."""
+
+
+class Finding(NamedTuple):
+    """What to do after a step: go on (nothing), again with a step, up to an event, or stop with a message."""
+
+    step: float | None = None
+    event: float | None = None
+    message: str = ""
+
+
+class Watch(Protocol):
+    """What watches the steps of one piece of a motion, and ends it at an event."""
+
+    def longest(self) -> float:
+        """Longest step allowed."""
+
+    def look(self, stepper: Stepper, t0: float, y0: Array, solver: Any) -> Finding:
+        """Look at a step from ``(t0, y0)`` that the solver has made."""
 
 
 class Stepper:
     """Integration over one smooth piece."""
 
     def __init__(
-        self, form: Form, trail: Trail, method: str, rtol: float, atol: Array | float, exact: bool, end: float,
-        at_break: bool, guard: Guard | Switches | None = None,
-    ) -> None:  # fmt: skip
-        self.form, self.trail, self.method, self.rtol, self.atol = form, trail, method, rtol, atol
+        self,
+        form: Form,
+        stats: SolverStatistics,
+        options: StepOptions,
+        end: float,
+        at_break: bool,
+        guard: Watch | None = None,
+    ) -> None:
+        self.form, self.stats, self.options, self.end, self.guard = form, stats, options, end, guard
         self.longest, self.stalled, self.lost = 0.0, 0, False
-        self.exact = exact or method not in (*_RUNGE_KUTTA, "Radau")
-        self.end, self.guard = end, guard
+        self.exact = options.exact or options.method not in (*_RUNGE_KUTTA, "Radau")
         self.latest = float(np.nextafter(end, -np.inf)) if at_break else np.inf
 
     def rates(self, t: float, y: Array) -> Array:
         """Rates of the form, seen from this side of the next break."""
-        self.trail.evaluations += 1
+        self.stats.evaluations += 1
         found = self.form.rates(min(t, self.latest), y)
         self.lost = self.lost or not np.isfinite(found).all()
         return found
@@ -125,19 +129,18 @@ class Stepper:
         """Return a solver of the method from a state to a bound."""
         from scipy import integrate as scipy_integrate
 
-        if self.method == "CVODE":
-            from graphsynth.dynamics.steppers import CvodeStepper
-
-            return CvodeStepper(self.rates, t, y, bound, self.rtol, self.atol)
-        stages = getattr(self.form, "stages", None)
-        if self.method == "DOP853" and stages is not None:
-            from graphsynth.dynamics.steppers import compiled_stepper
-
-            return compiled_stepper(stages, self.rates, t, y, bound, self.rtol, self.atol, first, self.trail)
-        options: dict[str, Any] = {"rtol": self.rtol, "atol": self.atol}
+        method = self.options.method
+        options: dict[str, Any] = {"rtol": self.options.rtol, "atol": self.options.atol}
+        if method == "CVODE":
+            return CvodeStepper(self.rates, t, y, bound, **options)
         if first is not None:
             options["first_step"] = min(first, bound - t)
-        return getattr(scipy_integrate, self.method)(self.rates, t, y, bound, **options)
+        stages = getattr(self.form, "stages", None)
+        if method != "DOP853" or stages is None:
+            return getattr(scipy_integrate, method)(self.rates, t, y, bound, **options)
+        solver = _stepper_class()(self.rates, t, y, bound, **options)
+        solver.stages, solver.stats = stages, self.stats
+        return solver
 
     def reached(self, t0: float, y0: Array, t: float) -> Array | None:
         """State at a time, by steps of their own from a node; None if they fail."""
@@ -146,56 +149,56 @@ class Stepper:
             solver.step()
         return None if solver.status == "failed" else np.asarray(solver.y)
 
-    def run(self, y: Array, grid: Array, max_steps: int, output: Output) -> Array | None:
+    def run(self, y: Array, grid: Array, output: Output) -> Array | None:
         """Integrate to the end of the piece, or to where the guard ends it; None if that fails."""
-        trail = self.trail
-        if not np.isfinite(self.rates(trail.time, y)).all():
-            trail.message = "the equations of motion have no value at the start"
+        stats = self.stats
+        if not np.isfinite(self.rates(stats.time, y)).all():
+            stats.message = "the equations of motion have no value at the start"
             return None
-        k = int(np.searchsorted(grid, trail.time, side="right"))
+        k = int(np.searchsorted(grid, stats.time, side="right"))
         solver = None
         step: float | None = None
-        while trail.time < self.end:
+        while stats.time < self.end:
             bound = min(float(grid[k]), self.end) if self.exact and k < len(grid) else self.end
             if solver is None or solver.status == "finished":
-                solver = self._next(solver, trail.time, y, bound, step)
-            before = trail.time
-            cross = self._cross(solver) if self.method == "DOP853" else None
+                solver = self._next(solver, stats.time, y, bound, step)
+            before = stats.time
+            cross = self._cross(solver) if self.options.method == "DOP853" else None
             if cross is not None:
-                trail.time, y, path = cross
-                while k < len(grid) and grid[k] <= trail.time:
+                stats.time, y, path = cross
+                while k < len(grid) and grid[k] <= stats.time:
                     output(k, float(grid[k]), path(float(grid[k])))
                     k += 1
-                step, solver = trail.last_step or None, None
+                step, solver = stats.last_step or None, None
                 continue
             if self.guard is not None and hasattr(solver, "h_abs"):
                 solver.h_abs = min(solver.h_abs, self.guard.longest())
             message = self._step(solver)
-            trail.steps += 1
+            stats.steps += 1
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 said = str(message or "the solver gave no finite state").rstrip(".")
-                trail.message = ": ".join(filter(None, (said, lock(self.form, before, y))))
+                stats.message = ": ".join(filter(None, (said, lock(self.form, before, y))))
                 return None
             if self._stalls(float(solver.t) - before, float(grid[-1] - grid[0])):
-                trail.message = f"no way past t = {float(solver.t):.9g} s: {stalled(self.form, before, y)}"
+                stats.message = f"no way past t = {float(solver.t):.9g} s: {stalled(self.form, before, y)}"
                 return None
-            if trail.steps >= max_steps:
-                trail.message = f"more than {max_steps} steps"
+            if stats.steps >= self.options.max_steps:
+                stats.message = f"more than {self.options.max_steps} steps"
                 return None
             if self.guard is not None:
                 found = self.guard.look(self, before, y, solver)
                 if found.message:
-                    trail.message = found.message
+                    stats.message = found.message
                     return None
                 if found.step is not None:  # again from here, shorter; to the event if there is one
                     self.end = self.end if found.event is None else found.event
                     solver, step = None, found.step
                     continue
             if self._refused(solver):
-                trail.message = "the formulation does not hold beyond this time"
+                stats.message = "the formulation does not hold beyond this time"
                 return None
             k = self._outputs(solver, before, grid, k, output)
-            trail.time, trail.last_step = float(solver.t), float(solver.t) - before
+            stats.time, stats.last_step = float(solver.t), float(solver.t) - before
             y, step, keep = self._accepted(solver, step)
             self._watch(before, solver)
             solver = solver if keep else None
@@ -223,8 +226,8 @@ class Stepper:
         propose = getattr(self.form, "proposed_step", None)
         if propose is None:
             return None
-        solver.h_abs = propose(self.trail.time, solver.h_abs)
-        found: Any = getattr(self.form, "cross", lambda *_: None)(self.trail, self.end)
+        solver.h_abs = propose(self.stats.time, solver.h_abs)
+        found: Any = getattr(self.form, "cross", lambda *_: None)(self.stats, self.end)
         return found
 
     def _refused(self, solver: Any) -> bool:
@@ -234,7 +237,7 @@ class Stepper:
 
     def _next(self, solver: Any, t: float, y: Array, bound: float, step: float | None) -> Any:
         """Return a solver to go on; a Runge-Kutta solver is taken on with its proposed step."""
-        if solver is not None and self.method in _RUNGE_KUTTA:
+        if solver is not None and self.options.method in _RUNGE_KUTTA:
             solver.t_bound, solver.status = bound, "running"
             if step is not None:
                 solver.h_abs = max(solver.h_abs, step)
@@ -261,21 +264,141 @@ class Stepper:
         """
         t, y = float(solver.t), np.asarray(solver.y)
         finished = solver.status == "finished"
-        if self.method not in (*_RUNGE_KUTTA, "Radau") and not finished and self.form.name == "augmented":
+        if self.options.method not in (*_RUNGE_KUTTA, "Radau") and not finished and self.form.name == "augmented":
             return y, step, True
         changed = self.form.accept(t, y)
         proposed = float(getattr(solver, "h_abs", 0.0))
         step = max(proposed, step or 0.0) if finished else proposed
         if changed is y:
             return y, step or None, True
-        if self.method in _RUNGE_KUTTA:
+        if self.options.method in _RUNGE_KUTTA:
             solver.y = changed
             solver.f = self.rates(t, changed)
             return changed, step or None, True
-        return changed, (step or None) if self.method == "Radau" else None, False
+        return changed, (step or None) if self.options.method == "Radau" else None, False
 
     def _watch(self, before: float, solver: Any) -> None:
         """Let the formulation look for singular poses in the step just made."""
         watch = getattr(self.form, "watch", None)
-        if watch is not None and self.method in _RUNGE_KUTTA:
-            watch(self.trail, before, solver)
+        if watch is not None and self.options.method in _RUNGE_KUTTA:
+            watch(self.stats, before, solver)
+
+
+#: ``(t, y, h, A, K) -> new state``: fills the rows of K after the first with the rates at ``y + h A[s] K``.
+Stages = Callable[[float, Array, float, Array, Array], Array]
+#: The table of a "step" that only evaluates the rates at a state.
+ONE_STAGE: Array = np.zeros((1, 1))
+
+# of scipy.integrate's Runge-Kutta methods
+_SAFETY, _LEAST, _MOST = 0.9, 0.2, 10.0
+
+
+@cache
+def _stepper_class() -> Any:
+    from scipy.integrate import DOP853
+
+    A = np.vstack([DOP853.A, DOP853.B])  # the last row leads to the new state
+
+    class CompiledDOP853(DOP853):  # type: ignore[misc]  # scipy has no types
+        """The step of `scipy.integrate.DOP853` with compiled stages."""
+
+        stages: Stages
+        stats: SolverStatistics
+
+        t: float
+        y: Array
+        f: Array
+        h_abs: float
+
+        def _step_impl(self) -> tuple[bool, str | None]:
+            t, y = self.t, self.y
+            least = 10.0 * abs(np.nextafter(t, np.inf) - t)
+            size, rejected = min(max(self.h_abs, least), self.max_step), False
+            while True:
+                if size < least:
+                    return False, self.TOO_SMALL_STEP
+                fresh_t = min(t + size, self.t_bound)
+                h = fresh_t - t
+                size = abs(h)
+                self.K[0] = self.f
+                fresh = self.stages(t, y, h, A, self.K)
+                self.stats.evaluations += self.n_stages
+                scale = self.atol + np.maximum(np.abs(y), np.abs(fresh)) * self.rtol
+                error = self._estimate_error_norm(self.K, h, scale)
+                if error < 1.0:
+                    factor = _MOST if error == 0.0 else min(_MOST, _SAFETY * error**self.error_exponent)
+                    self.h_previous, self.y_old = h, y
+                    self.h_abs = size * (min(1.0, factor) if rejected else factor)
+                    self.t, self.y, self.f = fresh_t, fresh, self.K[-1].copy()
+                    return True, None
+                size *= max(_LEAST, _SAFETY * error**self.error_exponent) if error == error else _LEAST
+                rejected = True
+
+    return CompiledDOP853
+
+
+#: Where SUNDIALS is told to write its warnings, read when a solver is made.
+_WARNINGS = "SUNLOGGER_WARNING_FILENAME"
+
+
+@contextmanager
+def _collected() -> Iterator[StringIO]:
+    """Collect what the solver prints of a failure, and drop its warnings: the result says what happened.
+
+    Somebody who has told SUNDIALS where to write its warnings gets them there.
+    """
+    own = _WARNINGS not in os.environ
+    if own:
+        os.environ[_WARNINGS] = os.devnull
+    try:
+        with redirect_stdout(StringIO()) as said:
+            yield said
+    finally:
+        if own:
+            os.environ.pop(_WARNINGS, None)
+
+
+class CvodeStepper:
+    """One internal step of CVODE a call, the last one ending at the bound.
+
+    Parameters
+    ----------
+    rates : callable
+        Rates of the state at a time and a state.
+    t, bound : float
+        Where to begin and where to end.
+    y : ndarray
+        State at ``t``.
+    rtol, atol : float or ndarray
+        Tolerances of CVODE.
+
+    Raises
+    ------
+    MissingExtraError
+        If scikit-sundae is not installed.
+    """
+
+    def __init__(
+        self, rates: Callable[[float, Array], Array], t: float, y: Array, bound: float, rtol: float, atol: Array | float
+    ) -> None:
+        CVODE = need("sksundae.cvode", "stiff", "method 'CVODE'").CVODE
+
+        def right_hand_side(time: float, state: Array, found: Array) -> None:
+            found[:] = rates(time, np.array(state))
+
+        with _collected():
+            self._solver: Any = CVODE(right_hand_side, rtol=rtol, atol=atol, method="BDF")
+            self._solver.init_step(t, np.array(y))
+        self.t, self.y, self.t_bound, self.status = t, np.array(y), bound, "running"
+
+    def step(self) -> str | None:
+        """Take one step; the status is "failed" if the solver could not, "finished" at the bound."""
+        with _collected() as said:
+            found = self._solver.step(self.t_bound, method="onestep", tstop=self.t_bound)
+        if not found.success:
+            self.status = "failed"
+            return " ".join(f"{found.message} {said.getvalue()}".split())
+        self.t, self.y = float(found.t), np.asarray(found.y)
+        if self.t >= self.t_bound:
+            self.t, self.status = self.t_bound, "finished"
+        return None

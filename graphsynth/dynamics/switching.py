@@ -1,25 +1,25 @@
-"""Motors whose equations switch: voltage limits and the direction of the power flow, at located events."""
+"""The integration loop over breaks and over motors that switch: voltage limits, the direction of the power flow."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
+from graphsynth.dynamics.result import DynamicEvent
+from graphsynth.dynamics.stepping import Finding, Form, Output, SolverStatistics, StepOptions, Stepper
 from graphsynth.dynamics.tables import Compiled
-
-if TYPE_CHECKING:
-    from graphsynth.dynamics.integrate import Form
-    from graphsynth.dynamics.stepping import Stepper
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 LIMIT, FLOW = 0, 1
+#: Events of one motion.
+_EVENTS = 2_000
 KINDS = ("voltage limit", "direction of power flow")
 #: Places inside a step where the switches are looked at, as parts of it; the last is its end.
 _INSIDE = (0.25, 0.5, 0.75, 1.0)
@@ -27,14 +27,6 @@ _INSIDE = (0.25, 0.5, 0.75, 1.0)
 _SHORTEST = 64.0
 #: Rounding of a voltage, relative to its limit.
 _ROUNDING = 1e-13
-
-
-class Finding(NamedTuple):
-    """What to do after a step: go on (nothing), again with a step, up to an event, or stop with a message."""
-
-    step: float | None = None
-    event: float | None = None
-    message: str = ""
 
 
 def shaft_speeds(compiled: Compiled, v: Array) -> Array:
@@ -92,9 +84,11 @@ class Switches:
         self.flipped = flipped
         self.form, self.compiled = form, form.compiled
         self.watched = [
-            (k, what) for k, drive in enumerate(self.compiled.drives) for what in (LIMIT, FLOW)
+            (k, what)
+            for k, drive in enumerate(self.compiled.drives)
+            for what in (LIMIT, FLOW)
             if (drive.train.efficiency < 1.0 if what == FLOW else _limit(drive.motor) < math.inf)
-        ]  # fmt: skip
+        ]
         self.hit: tuple[int, int] | None = None
         self.value = self._values(t, y)
 
@@ -178,3 +172,42 @@ class Switches:
         shaft = float(shaft_speeds(self.compiled, self.form.state(t, y)[1])[k])
         modes[k, LIMIT] = 0 if modes[k, LIMIT] else int(math.copysign(1, _asked(drive.motor, shaft)))
         return f"the voltage of {name} {'is at its limit' if modes[k, LIMIT] else 'is below its limit'} from here on"
+
+
+def integrate(
+    form: Form, grid: Array, breaks: Sequence[float], options: StepOptions, output: Output
+) -> SolverStatistics:
+    """Integrate a formulation over the output times; how far it came is in the result.
+
+    No step crosses a break; loads are taken from their own side of it.  ``output`` is called with index, time and state
+    at every output time reached.
+    """
+    stats = SolverStatistics(time=float(grid[0]))
+    y = form.begin()
+    output(0, stats.time, y)
+    inner = [t for t in breaks if grid[0] < t < grid[-1]]
+    for t in inner:
+        stats.events.append(DynamicEvent("break", t, 0.0, f"loads are not smooth at t = {t:.9g} s"))
+    ends = [*inner, float(grid[-1])]
+    watching = any(drive.switches for drive in form.compiled.drives)
+    flipped: list[tuple[int, int]] = []
+    while ends:
+        began = stats.time
+        guard = Switches(form, stats.time, y, flipped) if watching else None
+        stepper = Stepper(form, stats, options, ends[0], ends[0] in inner, guard)
+        last = stepper.run(y, grid, output)
+        if last is None:
+            break
+        y = last
+        if stats.time > began:
+            flipped = []
+        if guard is not None and guard.hit is not None:
+            flipped.append(guard.hit)
+            if len(stats.events) >= _EVENTS:
+                stats.message = f"Zeno behaviour: more than {_EVENTS} events by t = {stats.time:.9g} s"
+                break
+            kind = KINDS[guard.hit[1]]
+            stats.events.append(DynamicEvent(kind, stats.time, 4.0 * np.spacing(stats.time), guard.flip(stats.time, y)))
+        if stats.time >= ends[0]:
+            ends.pop(0)
+    return stats

@@ -229,18 +229,40 @@ def compile_model(model: DynamicModel) -> Compiled:
     springs, torsions, forces, sources = _loads(model, centres)
     motors, motor_table, modes = _motors(model)
     tables = Tables(
-        column, rows, table, slots, mass, lower, diagonal, np.array(model.gravity), *springs, *torsions, *forces,
-        *sources, motors, motor_table, modes, *_frictions(model, joints, first), _size(model),
-    )  # fmt: skip
+        column,
+        rows,
+        table,
+        slots,
+        mass,
+        lower,
+        diagonal,
+        np.array(model.gravity),
+        *springs,
+        *torsions,
+        *forces,
+        *sources,
+        motors,
+        motor_table,
+        modes,
+        *_frictions(model, joints, first),
+        _size(model),
+    )
     applied = tuple(
-        element for element in model.elements
+        element
+        for element in model.elements
         if (isinstance(element, Force) and callable(element.force))
         or (isinstance(element, Torque | TorqueSource) and callable(element.torque))
-    )  # fmt: skip
+    )
     return Compiled(
-        model, tables, tuple(info), tuple(joints), tuple(first), centres,
-        tuple(_Remembered(driver) for driver in model.prescribed), applied,
-    )  # fmt: skip
+        model,
+        tables,
+        tuple(info),
+        tuple(joints),
+        tuple(first),
+        centres,
+        tuple(_Remembered(driver) for driver in model.prescribed),
+        applied,
+    )
 
 
 def _size(model: DynamicModel) -> float:
@@ -294,9 +316,7 @@ def _moved(joint: Any, centres: Array) -> Any:
     """Return the joint with its points given from the centres of mass."""
     if isinstance(joint, Rack):
         return replace(joint, centre=_shifted(joint.centre, centres[joint.pinion]))
-    return replace(
-        joint, at_a=_shifted(joint.at_a, centres[joint.a]), at_b=_shifted(joint.at_b, centres[joint.b])
-    )  # fmt: skip
+    return replace(joint, at_a=_shifted(joint.at_a, centres[joint.a]), at_b=_shifted(joint.at_b, centres[joint.b]))
 
 
 def joint_rows(joint: Any, frame: int) -> list[tuple[int, int, int, list[float]]]:

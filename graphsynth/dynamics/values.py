@@ -15,6 +15,8 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Force, TorqueSource
 from graphsynth.dynamics.tables import RACK, Compiled
 from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.joints import Prismatic, Revolute
+from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 
@@ -209,34 +211,27 @@ class Values:
         S = np.linalg.svd(self.scaled_jacobian(q), compute_uv=False)
         return bool(S.size) and rank < int(np.sum(1e-10 * S[0] < S))
 
-    def accelerations(self, q: Array, v: Array, applied: Array) -> tuple[Array, Array, str, str]:
-        """Accelerations and multipliers, what to say about them, and the status of a start from there.
 
-        NaN with massless links, and where friction leaves no or several motions.
-        """
-        from graphsynth.dynamics import kernels
+def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, rates: Array) -> tuple[Array, Array]:
+    """Coordinate and rate of an R or P joint at link poses and velocities (..., links, 3).
 
-        T = self.compiled.tables
-        nothing = np.full(len(q), np.nan), np.full(len(self.compiled.info), np.nan)
-        if not T.lower.size:
-            return *nothing, "; accelerations of massless links: one-coordinate form only", "consistent"
-        x = kernels.state_rows(T, q, v)
-        Q, _, _, _, good = kernels.load_vector(T, x, applied, self.compiled.currents)
-        if not good:
-            return *nothing, "; a spring has length 0, so its direction is not defined", "consistent"
-        if T.friction.size:
-            from graphsynth.dynamics.friction.problem import FrictionProblem
-            from graphsynth.dynamics.friction.rows import FrictionRows
-            from graphsynth.dynamics.friction.state import decide
-
-            problem = FrictionProblem(FrictionRows(self.compiled), self.time, q, v, self.slots)
-            found = decide(problem, problem.moving(), problem.resting)
-            if found.solution is None:
-                return *nothing, found.message, f"friction: {found.kind}"
-            return found.solution.a, found.solution.multipliers, "", "consistent"
-        _, J, gam, _ = kernels.constraint_system(T, x, self.slots, self.driven)
-        out = np.zeros(7)
-        a, lam = kernels.accelerate(T, x, J, gam, Q, out)
-        if self.blind(q, int(out[0])):
-            return *nothing, f"; accelerations are not known: {self.compiled.spread_words}", "consistent"
-        return a, lam, "", "consistent"
+    Raises
+    ------
+    GeometryError
+        If the links have no joint, or one without coordinate.
+    """
+    joint = mechanism.joint(base, link)
+    if isinstance(joint, Revolute):
+        return poses[..., link, 2] - poses[..., base, 2], rates[..., link, 2] - rates[..., base, 2]
+    if not isinstance(joint, Prismatic):
+        raise GeometryError(f"joint {base}-{link} is {joint.kind}; only R and P joints have one coordinate")
+    sign = 1.0 if base == joint.a else -1.0
+    place, speed = [], []
+    for end, at in ((joint.a, joint.at_a), (joint.b, joint.at_b)):
+        arm = np.exp(1j * poses[..., end, 2]) * complex(*at)
+        place.append(poses[..., end, 0] + 1j * poses[..., end, 1] + arm)
+        speed.append(rates[..., end, 0] + 1j * rates[..., end, 1] + 1j * rates[..., end, 2] * arm)
+    t = np.exp(1j * (poses[..., joint.a, 2] + joint.angle_a))
+    apart, moving = place[1] - place[0], speed[1] - speed[0]
+    rate = np.conj(t) * (moving - 1j * rates[..., joint.a, 2] * apart)
+    return sign * (np.conj(t) * apart).real, sign * rate.real

@@ -17,7 +17,7 @@ from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.run import run
 from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
 from graphsynth.dynamics.motors import IdealSpeed, Motor, whole
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import Train
 from graphsynth.evidence.choice import seconds_text
 from graphsynth.evidence.precise_drive import NAME, Shape, precise_drive, shape_of_series
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
@@ -209,7 +209,7 @@ def drive_problem(
     --------
     >>> from graphsynth.dynamics.driven.setup import Plant
     >>> from graphsynth.dynamics.motors import DCMotor
-    >>> from graphsynth.dynamics.trains import Train
+    >>> from graphsynth.dynamics.motors import Train
     >>> motor = DCMotor(1.0, 0.2, 0.1, 0.1, gain=20.0, speed=20.0)
     >>> found = drive_problem(Plant(np.zeros((1, 1)), 1.0), motor, Train(), 0.2, Effort(rounds=1, quick=True))
     >>> found.methods, found.rows[0].status.value

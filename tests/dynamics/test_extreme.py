@@ -18,11 +18,11 @@ from graphsynth.dynamics import (
     effective_inertia,
     simulate_dynamics,
 )
-from graphsynth.dynamics.energies import warnings_of
+from graphsynth.dynamics.checks import warnings_of
 from graphsynth.dynamics.forms.one_coordinate import OneCoordinateForm
 from graphsynth.dynamics.integrate import make_form
 from graphsynth.dynamics.result import Checks
-from graphsynth.dynamics.steppers import CvodeStepper
+from graphsynth.dynamics.stepping import CvodeStepper
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Linear

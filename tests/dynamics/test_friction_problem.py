@@ -11,8 +11,8 @@ from dynamic_models import slider_crank
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics import Body, DynamicModel, Force, JointFriction, Torque, consistent_start, simulate_dynamics
+from graphsynth.dynamics.friction.loads import FrictionRows
 from graphsynth.dynamics.friction.problem import FrictionProblem
-from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.tables import compile_model
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver

@@ -10,8 +10,7 @@ import pytest
 
 from graphsynth.core.errors import GeometryError, SpecError
 from graphsynth.dynamics import Body, DynamicModel, Torque, simulate_dynamics
-from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import DCMotor, SynchronousMotor, Train
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from dynamic_models import bar, g1
 
-import graphsynth.dynamics.second as second_form
+import graphsynth.dynamics.checks as second_form
 from graphsynth.dynamics import DynamicModel, JointFriction, kernels
+from graphsynth.dynamics.checks import warnings_of
 from graphsynth.dynamics.driven.kernels import radau, systems
-from graphsynth.dynamics.energies import warnings_of
 from graphsynth.dynamics.friction.loads import _real_roots
 from graphsynth.dynamics.integrate import scales
 from graphsynth.dynamics.kernels.rubbing import friction_unit

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
-from graphsynth.dynamics.motors import DCMotor, number, numbers
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import DCMotor, Train, number, numbers
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.run import DriveRun, RunStatus
 from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
-from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, number
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import IdealSpeed, LinearCharacteristic, Train, number
 
 Array = NDArray[np.float64]
 #: Largest angle of a panel of the quadrature that checks the energy, rad.

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.run import DriveRun, run
 from graphsynth.dynamics.driven.setup import Plant, output_times
-from graphsynth.dynamics.motors import DCMotor, Motor, SynchronousMotor, number
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import DCMotor, Motor, SynchronousMotor, Train, number
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.setup import Plant, Prepared, output_times, prepare
-from graphsynth.dynamics.motors import DCMotor, IdealTorque, Motor, SynchronousMotor, number, whole
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import DCMotor, IdealTorque, Motor, SynchronousMotor, Train, number, whole
 
 Array = NDArray[np.float64]
 _EVENTS = {2: "dead centre", 3: "stall", 4: "voltage limit", 5: "direction of power flow"}

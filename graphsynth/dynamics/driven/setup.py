@@ -15,10 +15,10 @@ from graphsynth.dynamics.motors import (
     LinearCharacteristic,
     Motor,
     SynchronousMotor,
+    Train,
     number,
     numbers,
 )
-from graphsynth.dynamics.trains import Train
 
 Array = NDArray[np.float64]
 

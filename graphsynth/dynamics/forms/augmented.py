@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.dynamics.crossing import GaussStep, HermiteGuess, gauss_step, passed_singular_pose
 from graphsynth.dynamics.friction.problem import NO_LOADS
+from graphsynth.dynamics.result import DynamicEvent
+from graphsynth.dynamics.singular import GaussStep, HermiteGuess, gauss_step, passed_singular_pose
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.steppers import ONE_STAGE, Stages
+from graphsynth.dynamics.stepping import ONE_STAGE, Stages
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.stepping import Trail
+    from graphsynth.dynamics.stepping import SolverStatistics
 
 Array = NDArray[np.float64]
 
@@ -197,9 +198,11 @@ class AugmentedForm:
 
         low = t if k == 0 else times[k - 1]
         found = minimize_scalar(
-            lambda at: self.pivot_at(at, guess(at))[0], bounds=(low, times[k + 1]), method="bounded",
+            lambda at: self.pivot_at(at, guess(at))[0],
+            bounds=(low, times[k + 1]),
+            method="bounded",
             options={"xatol": 1e-3 * step},
-        )  # fmt: skip
+        )
         if found.fun < _SINGULAR * self._largest:
             self._due = float(found.x) - t
         return step
@@ -226,9 +229,9 @@ class AugmentedForm:
             self._due = _AWAY / speed
         return step
 
-    def cross(self, trail: Trail, bound: float) -> tuple[float, Array, GaussStep] | None:
+    def cross(self, stats: SolverStatistics, bound: float) -> tuple[float, Array, GaussStep] | None:
         """Time and state beyond a singular pose, and the polynomial that leads there; None if no cross is due."""
-        ahead, t = self._due, trail.time
+        ahead, t = self._due, stats.time
         if not ahead > 0.0:
             return None
         self._due, starts = 0.0, len(self._nodes) == 1
@@ -238,9 +241,9 @@ class AugmentedForm:
             found = self._across(t, h, guess) if h > (0.1 if starts else 1.2) * ahead else None
             if found is not None:
                 landing, fresh, pivot, path = found
-                event = None if starts else passed_singular_pose(self, t, t + ahead, landing, path, path, self._largest)
-                if event is not None:
-                    trail.events.append(event)
+                if not starts:
+                    passed = passed_singular_pose(self, t, t + ahead, landing, path, path, self._largest)
+                    stats.events += [DynamicEvent(*event) for event in passed]
                 self._history, self._dense, self.pivot = [(landing, pivot)], None, pivot
                 self._largest = max(self._largest, pivot)
                 self._note(landing, fresh)
@@ -277,8 +280,10 @@ class AugmentedForm:
         )
         fresh = np.concatenate([q, v, raw[2 * n :]])
         speed = float(np.abs(v / self._unit).max())
-        missed = max(float(np.abs((q - raw[:n]) / self._unit).max()),
-                     float(np.abs((v - raw[n : 2 * n]) / self._unit).max()) / speed)  # fmt: skip
+        missed = max(
+            float(np.abs((q - raw[:n]) / self._unit).max()),
+            float(np.abs((v - raw[n : 2 * n]) / self._unit).max()) / speed,
+        )
         kept = abs(self._energy(t + h, fresh) - self._energy(t, y) - float(raw[-1] - y[-1]))
         if not missed < _LANDED or not kept <= _KEPT * float(v @ self.compiled.tables.mass @ v):
             return None
@@ -293,7 +298,7 @@ class AugmentedForm:
         )
         return 0.5 * float(v @ T.mass @ v) + float(potential)
 
-    def watch(self, trail: Trail, before: float, solver: Any) -> None:
+    def watch(self, stats: SolverStatistics, before: float, solver: Any) -> None:
         """Find singular poses passed: minima of the smallest pivot."""
         self._largest = max(self._largest, self._history[-1][1] if self._history else 0.0)
         if len(self._history) < 3:
@@ -301,7 +306,6 @@ class AugmentedForm:
         (t0, p0), (_, p1), (t2, p2) = self._history[-3:]
         largest = self._largest
         if p1 <= p0 and p1 < p2 and p1 < _LOW * largest and self._dense is not None:
-            event = passed_singular_pose(self, t0, float(before), t2, self._dense, solver.dense_output(), largest)
-            if event is not None:
-                trail.events.append(event)
+            passed = passed_singular_pose(self, t0, float(before), t2, self._dense, solver.dense_output(), largest)
+            stats.events += [DynamicEvent(*event) for event in passed]
         self._dense = solver.dense_output() if p2 < _LOW * largest else None

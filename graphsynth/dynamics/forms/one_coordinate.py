@@ -10,19 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked
 from graphsynth.core.errors import GeometryError
+from graphsynth.dynamics.friction.loads import FrictionRows
 from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem
-from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.steppers import ONE_STAGE, Stages
+from graphsynth.dynamics.stepping import ONE_STAGE, Stages
 from graphsynth.dynamics.tables import Compiled
-from graphsynth.dynamics.values import applied_loads, initial_slots
+from graphsynth.dynamics.values import applied_loads, initial_slots, joint_coordinate
 from graphsynth.kinematics.engine.follow import Trace, Tracker
 from graphsynth.kinematics.engine.program import Program, compile_program
 from graphsynth.kinematics.engine.start import started
-from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.laws import Linear
-from graphsynth.mechanism.model import Mechanism
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -110,31 +108,6 @@ def free_program(model: DynamicModel) -> Program:
     return compile_program(replace(model.mechanism, drivers=(replace(driver, law=Linear()),)))
 
 
-def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, rates: Array) -> tuple[Array, Array]:
-    """Coordinate and rate of an R or P joint at link poses and velocities (..., links, 3).
-
-    Raises
-    ------
-    GeometryError
-        If the links have no joint, or one without coordinate.
-    """
-    joint = mechanism.joint(base, link)
-    if isinstance(joint, Revolute):
-        return poses[..., link, 2] - poses[..., base, 2], rates[..., link, 2] - rates[..., base, 2]
-    if not isinstance(joint, Prismatic):
-        raise GeometryError(f"joint {base}-{link} is {joint.kind}; only R and P joints have one coordinate")
-    sign = 1.0 if base == joint.a else -1.0
-    place, speed = [], []
-    for end, at in ((joint.a, joint.at_a), (joint.b, joint.at_b)):
-        arm = np.exp(1j * poses[..., end, 2]) * complex(*at)
-        place.append(poses[..., end, 0] + 1j * poses[..., end, 1] + arm)
-        speed.append(rates[..., end, 0] + 1j * rates[..., end, 1] + 1j * rates[..., end, 2] * arm)
-    t = np.exp(1j * (poses[..., joint.a, 2] + joint.angle_a))
-    apart, moving = place[1] - place[0], speed[1] - speed[0]
-    rate = np.conj(t) * (moving - 1j * rates[..., joint.a, 2] * apart)
-    return sign * (np.conj(t) * apart).real, sign * rate.real
-
-
 class OneCoordinateForm:
     """State ``(theta, omega, currents, work)``; a solver workspace, not a result.
 
@@ -210,9 +183,19 @@ class OneCoordinateForm:
 
     def _run(self, y: Array, h: float, A: Array, K: Array, low: int, high: int) -> Array:
         found = self._kernels.one_coordinate_stages(
-            self.compiled.tables, self.E, self.S, self.compiled.centres, self._none, np.ascontiguousarray(y), h, A, K,
-            low, high, self._out,
-        )  # fmt: skip
+            self.compiled.tables,
+            self.E,
+            self.S,
+            self.compiled.centres,
+            self._none,
+            np.ascontiguousarray(y),
+            h,
+            A,
+            K,
+            low,
+            high,
+            self._out,
+        )
         return np.asarray(found)
 
     def _good(self) -> bool:
@@ -239,10 +222,11 @@ class OneCoordinateForm:
             return np.full(len(y), np.nan)
         if self.S.done[0] == 2:
             self.why = (
-                "a spring has length 0, so its direction is not defined" if self._out[3] == 0.0
+                "a spring has length 0, so its direction is not defined"
+                if self._out[3] == 0.0
                 else f"the effective inertia is {self._out[0]:.3g} at the input {y[0]:.9g}: give a link on the way "
                 "some mass"
-            )  # fmt: skip
+            )
         else:
             self.why = (
                 f"the coordinate cannot go beyond {self.S.u[0]:.9g}: at a fold next to it two assembly modes merge, "
@@ -357,10 +341,31 @@ def engine_tables(tracker: Tracker) -> EngineTables:
     p = tracker.program
     empty4, empty3, none = np.empty((0, 0, 0, 0)), np.empty((0, 0, 0)), np.empty(0, np.int64)
     return EngineTables(
-        p.step_table, p.touched, p.rows, p.row_table, p.core, p.eliminated, p.eliminated_table, p.drives,
-        p.drive_table, p.need_angle, np.ones(p.mechanism.graph.links, dtype=np.bool_), tracker.modes, empty3,
-        np.empty((0, 0)), none, none, empty4, empty4, empty4, empty3, 1, p.Lc, p.far, True,
-    )  # fmt: skip
+        p.step_table,
+        p.touched,
+        p.rows,
+        p.row_table,
+        p.core,
+        p.eliminated,
+        p.eliminated_table,
+        p.drives,
+        p.drive_table,
+        p.need_angle,
+        np.ones(p.mechanism.graph.links, dtype=np.bool_),
+        tracker.modes,
+        empty3,
+        np.empty((0, 0)),
+        none,
+        none,
+        empty4,
+        empty4,
+        empty4,
+        empty3,
+        1,
+        p.Lc,
+        p.far,
+        True,
+    )
 
 
 def engine_buffers(trace: Trace, n: int) -> EngineState:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.friction.problem import NO_LOADS
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.steppers import Stages
+from graphsynth.dynamics.stepping import Stages
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads, initial_slots
 
@@ -147,9 +147,21 @@ class PartitionedForm:
 
         def run(t: float, y: Array, h: float, A: Array, K: Array) -> Array:
             fresh = self._kernels.partitioned_stages(
-                self.compiled.tables, y, h, A, K, 1, len(A), self.chosen, self._near, self._metric, self.slots,
-                self.compiled.driven_at(t + h * A.sum(axis=1)), self._none, self.out,
-            )  # fmt: skip
+                self.compiled.tables,
+                y,
+                h,
+                A,
+                K,
+                1,
+                len(A),
+                self.chosen,
+                self._near,
+                self._metric,
+                self.slots,
+                self.compiled.driven_at(t + h * A.sum(axis=1)),
+                self._none,
+                self.out,
+            )
             self._look()
             return np.asarray(fresh)
 

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from graphsynth.dynamics.friction.problem import FrictionProblem
 from graphsynth.dynamics.friction.state import Piece, decide, state_values
-from graphsynth.dynamics.switching import Finding
+from graphsynth.dynamics.stepping import Finding
 from graphsynth.dynamics.values import initial_slots
 
 if TYPE_CHECKING:
-    from graphsynth.dynamics.integrate import Form
-    from graphsynth.dynamics.stepping import Stepper
+    from graphsynth.dynamics.stepping import Form, Stepper
 
 Array = NDArray[np.float64]
 
@@ -50,14 +49,17 @@ class Guard:
         self._fresh = np.array([bool(s) and not s * rates[f] > 1e-300 for f, s in enumerate(piece.senses)])
         self.value[self._fresh] = 0.0
         self._held = [
-            f for f, e in enumerate(piece.rows.elements)
+            f
+            for f, e in enumerate(piece.rows.elements)
             if not piece.senses[f] and f not in piece.stuck and not e.smooth and e.static > 0.0
-        ]  # fmt: skip
+        ]
         # sliding speeds over which friction falls, in the unit of the rates
-        self._narrow = np.array([
-            e.stribeck / e.lever if e.static > e.kinetic and e.stribeck > 0.0 and not e.smooth else np.inf
-            for e in piece.rows.elements
-        ])  # fmt: skip
+        self._narrow = np.array(
+            [
+                e.stribeck / e.lever if e.static > e.kinetic and e.stribeck > 0.0 and not e.smooth else np.inf
+                for e in piece.rows.elements
+            ]
+        )
 
     def longest(self) -> float:
         """Return the longest step that does not jump over the rise of friction at rest."""
@@ -93,9 +95,10 @@ class Guard:
                 return self._shorter(t0, h, 0.5)
         dense = _Dense(solver)
         found = [
-            (at, f) for f in (*np.flatnonzero(sliding), *self.piece.stuck, *self._held)
+            (at, f)
+            for f in (*np.flatnonzero(sliding), *self.piece.stuck, *self._held)
             if (at := self._crossing(int(f), t0, t1, value, slope, dense, bool(sliding[f]), stepper.latest)) is not None
-        ]  # fmt: skip
+        ]
         if found:
             guess, self.hit = min(found)
             event = self._located(stepper, t0, y0, t1, guess, int(self.hit))

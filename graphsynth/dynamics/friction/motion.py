@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.friction.guard import Guard
+from graphsynth.dynamics.friction.loads import FrictionRows
 from graphsynth.dynamics.friction.problem import NO_LOADS, FrictionProblem, Senses
-from graphsynth.dynamics.friction.rows import FrictionRows
 from graphsynth.dynamics.friction.state import Piece, decide, make_piece, state_values
-from graphsynth.dynamics.result import DynamicEvent
+from graphsynth.dynamics.result import DynamicEvent, FrictionHistory
 from graphsynth.dynamics.start import StartReport
-from graphsynth.dynamics.stepping import StepOptions, Stepper, Trail
+from graphsynth.dynamics.stepping import SolverStatistics, StepOptions, Stepper
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import initial_slots
 
 if TYPE_CHECKING:
     from graphsynth.dynamics.friction.guard import Guard
-    from graphsynth.dynamics.integrate import Form
+    from graphsynth.dynamics.stepping import Form
 
 Array = NDArray[np.float64]
 
@@ -131,130 +131,134 @@ class DryMotion:
     contraction: float = 0.0
     changes: list[tuple[float, str]] = field(default_factory=list)
     form: Form | None = None
+    stats: SolverStatistics = field(default_factory=SolverStatistics)
 
-    def go(self, grid: Array, breaks: Sequence[float], options: StepOptions) -> Trail:
-        """Integrate over the output times; how far it came is in the trail."""
-        trail = Trail(time=float(grid[0]))
+    def go(self, grid: Array, breaks: Sequence[float], options: StepOptions) -> SolverStatistics:
+        """Integrate over the output times; how far it came is in the self.stats."""
+        self.stats.time = float(grid[0])
         self._q, self._v, self._work = self.report.q, self.report.v, 0.0
         self._slots = self.report.slots
         self._speed = 0.0
         inner = [t for t in breaks if grid[0] < t < grid[-1]]
-        trail.events += [DynamicEvent("break", t, 0.0, f"loads are not smooth at t = {t:.9g} s") for t in inner]
+        self.stats.events += [DynamicEvent("break", t, 0.0, f"loads are not smooth at t = {t:.9g} s") for t in inner]
         ends = [*inner, float(grid[-1])]
         self._recent = [-np.inf] * _WINDOW
         self._short = 0
-        resting, sliding = self._problem(trail.time).resting, self._problem(trail.time).moving()
-        self._stop(trail.time, resting)
-        piece = self._decided(trail, self._problem(trail.time), sliding, resting)
-        self.form = self.make(self.rows.compiled, self.report) if piece is None else self._made(trail, piece)
-        self.show(self.form, 0, trail.time, self.form.begin(), None if piece is None else piece.senses)
+        resting, sliding = self._problem(self.stats.time).resting, self._problem(self.stats.time).moving()
+        self._stop(self.stats.time, resting)
+        piece = self._decided(self._problem(self.stats.time), sliding, resting)
+        self.form = self.make(self.rows.compiled, self.report) if piece is None else self._made(piece)
+        self.show(self.form, 0, self.stats.time, self.form.begin(), None if piece is None else piece.senses)
         while piece is not None and ends:
-            if trail.time >= ends[0]:
+            if self.stats.time >= ends[0]:
                 del ends[0]
                 if ends:  # loads may have changed
-                    problem = self._problem(trail.time)
-                    piece = self._next(trail, problem, piece, [*piece.stuck], {}, None)
+                    problem = self._problem(self.stats.time)
+                    piece = self._next(problem, piece, [*piece.stuck], {}, None)
                 continue
-            hit = self._piece(trail, piece, grid, ends, options)
-            if trail.message:
+            hit = self._piece(piece, grid, ends, options)
+            if self.stats.message:
                 break
             if hit is not None:
-                piece = self._turn(trail, piece, *hit)
-        return trail
+                piece = self._turn(piece, *hit)
+        return self.stats
 
     def _problem(self, t: float) -> FrictionProblem:
         return FrictionProblem(self.rows, t, self._q, self._v, self._slots, self._speed)
 
-    def _piece(
-        self, trail: Trail, piece: Piece, grid: Array, ends: list[float], options: StepOptions
-    ) -> tuple[int, float] | None:
+    def _piece(self, piece: Piece, grid: Array, ends: list[float], options: StepOptions) -> tuple[int, float] | None:
         """Integrate one piece; the element whose state ends with it and the error of that time, or None."""
         try:
-            form = self.form = self._made(trail, piece)
+            form = self.form = self._made(piece)
         except GeometryError as error:
-            trail.message = str(error)
+            self.stats.message = str(error)
             return None
         y = form.begin()
         y[-1] = self._work
-        guard = Guard(piece, form, trail.time, self._q, self._v, self._slots)
+        guard = Guard(piece, form, self.stats.time, self._q, self._v, self._slots)
 
         def output(k: int, t: float, state: Array) -> None:
             self.show(form, k, t, state, piece.senses)
 
-        for k in np.flatnonzero(grid[1:] == trail.time):  # the state from here on, where it changes
-            output(int(k) + 1, trail.time, y)
+        for k in np.flatnonzero(grid[1:] == self.stats.time):  # the state from here on, where it changes
+            output(int(k) + 1, self.stats.time, y)
         if piece.still:
-            found = rest_until(guard, trail.time, ends[0], grid[0], grid[-1])
-            for k in np.flatnonzero((grid > trail.time) & (grid <= found)):
+            found = rest_until(guard, self.stats.time, ends[0], grid[0], grid[-1])
+            for k in np.flatnonzero((grid > self.stats.time) & (grid <= found)):
                 output(int(k), float(grid[k]), y)
-            trail.time = found
+            self.stats.time = found
             return None if guard.hit is None else (guard.hit, guard.uncertainty)
-        at_break = len(ends) > 1
-        atol = self.scales(form) * options.rtol * 0.01 if options.atol is None else options.atol
-        stepper = Stepper(
-            form, trail, options.method, options.rtol, atol, options.exact, ends[0], at_break, guard
-        )  # fmt: skip
-        last = stepper.run(y, grid, options.max_steps, output)
+        scaled = options.scaled(self.scales(form))
+        last = Stepper(form, self.stats, scaled, ends[0], len(ends) > 1, guard).run(y, grid, output)
         self.loss += getattr(form, "loss", 0.0)
         self.contraction = max(self.contraction, form.contraction, guard.factor)
         self.changes += form.changes
         if last is None:
             if guard.message:
-                trail.message = guard.message
+                self.stats.message = guard.message
             elif form.why or max(form.contraction, guard.factor) > _NEARLY:
-                trail.message = NO_LOADS if max(form.contraction, guard.factor) > _NEARLY else form.why
+                self.stats.message = NO_LOADS if max(form.contraction, guard.factor) > _NEARLY else form.why
             return None
-        q, v = form.state(trail.time, last)
+        q, v = form.state(self.stats.time, last)
         self._q, self._v, self._work = q.copy(), v.copy(), float(last[-1])
         followed = getattr(form, "slots", None)
         self._slots = initial_slots(self.rows.compiled, q) if followed is None else followed
-        self._speed = max(self._speed, self._problem(trail.time).speed)
+        self._speed = max(self._speed, self._problem(self.stats.time).speed)
         return None if guard.hit is None else (guard.hit, guard.uncertainty)
 
-    def _made(self, trail: Trail, piece: Piece) -> Form:
+    def _made(self, piece: Piece) -> Form:
         """Return the formulation of a piece, from the present state on."""
         if piece.still:
             self._v = np.zeros_like(self._v)
             return RestForm(piece.compiled, self._q, self._slots)
         poses, rates, _ = self.rows.compiled.to_links(self._q, self._v, np.zeros_like(self._q))
         start = replace(
-            self.report, time=trail.time, q=self._q, v=self._v, slots=self._slots,
-            pose_class=self.report.pose_class if trail.steps == 0 else "regular", poses=poses, velocities=rates,
-        )  # fmt: skip
+            self.report,
+            time=self.stats.time,
+            q=self._q,
+            v=self._v,
+            slots=self._slots,
+            pose_class=self.report.pose_class if self.stats.steps == 0 else "regular",
+            poses=poses,
+            velocities=rates,
+        )
         return self.make(piece.compiled, start)
 
     def _decided(
-        self, trail: Trail, problem: FrictionProblem, sliding: dict[int, int], resting: Sequence[int],
+        self,
+        problem: FrictionProblem,
+        sliding: dict[int, int],
+        resting: Sequence[int],
         begun: Sequence[int] = (),
-    ) -> Piece | None:  # fmt: skip
-        """Return the piece from here on; None, with a message in the trail, if there is none or no single one."""
+    ) -> Piece | None:
+        """Return the piece from here on; None, with a message in the self.stats, if there is none or no single one."""
         found = decide(problem, sliding, resting, begun)
         if found.solution is None:
-            trail.message = found.message or "the equations of motion have no value here"
+            self.stats.message = found.message or "the equations of motion have no value here"
             return None
-        _, _, _, coordinates, _ = self.rows.directions(trail.time, self._q, self._v, self._slots)
+        _, _, _, coordinates, _ = self.rows.directions(self.stats.time, self._q, self._v, self._slots)
         return make_piece(self.rows, problem, found.solution, coordinates, 1e3 * problem.noise + _QUIET)
 
-    def _turn(self, trail: Trail, piece: Piece, hit: int, uncertainty: float) -> Piece | None:
+    def _turn(self, piece: Piece, hit: int, uncertainty: float) -> Piece | None:
         """Decide what follows the end of an element's sliding or sticking."""
         released: dict[int, int] = {}
         resting = list(piece.stuck)
         if piece.senses[hit] == 0 and hit not in piece.stuck:  # held so far by what is no friction
-            problem = self._problem(trail.time)
+            problem = self._problem(self.stats.time)
         elif hit in piece.stuck:
-            problem = self._problem(trail.time)
+            problem = self._problem(self.stats.time)
             fit = problem.at(piece.senses, within=False)
             if fit is None:
-                trail.message = "the friction of the joints that stick is not determined at the release"
+                self.stats.message = "the friction of the joints that stick is not determined at the release"
                 return None
             along = [f for f in piece.stuck if f == hit or (f in piece.shared and self._with(problem, f, hit))]
             released = {f: -int(np.sign(fit.forces[f])) or 1 for f in along}
             resting = [f for f in piece.stuck if f not in released]
         else:
-            self._stop(trail.time, [hit, *piece.kept])
-            problem = self._problem(trail.time)
+            self._stop(self.stats.time, [hit, *piece.kept])
+            problem = self._problem(self.stats.time)
             resting.append(hit)
-        return self._next(trail, problem, piece, resting, released, (hit, uncertainty))
+        return self._next(problem, piece, resting, released, (hit, uncertainty))
 
     def _with(self, problem: FrictionProblem, f: int, hit: int) -> bool:
         """Whether two elements can move together only."""
@@ -274,15 +278,20 @@ class DryMotion:
         self._v = v - problem._part.G[:, kept] @ np.linalg.solve(problem.A[np.ix_(kept, kept)], W @ v)
 
     def _next(
-        self, trail: Trail, problem: FrictionProblem, piece: Piece, resting: list[int], released: dict[int, int],
+        self,
+        problem: FrictionProblem,
+        piece: Piece,
+        resting: list[int],
+        released: dict[int, int],
         event: tuple[int, float] | None,
-    ) -> Piece | None:  # fmt: skip
+    ) -> Piece | None:
         """Return the next piece, and note what changed."""
         slow = np.abs(problem.rates) <= problem.noise
         sliding = {
-            f: s for f, s in enumerate(piece.senses)
+            f: s
+            for f, s in enumerate(piece.senses)
             if f not in resting and f not in released and (s or self.rows.elements[f].smooth)
-        }  # fmt: skip
+        }
         for f, e in enumerate(self.rows.elements):
             if piece.senses[f] == 0 and f not in piece.stuck and not e.smooth and e.static > 0.0:
                 if slow[f]:
@@ -295,16 +304,16 @@ class DryMotion:
                 resting.append(f)
                 del sliding[f]
         begun = [*released, *(f for f in sliding if slow[f])]
-        fresh = self._decided(trail, problem, {**sliding, **released}, resting, begun)
+        fresh = self._decided(problem, {**sliding, **released}, resting, begun)
         if fresh is not None and event is not None:
-            self._note(trail, piece.senses, fresh, event[1])
+            self._note(piece.senses, fresh, event[1])
         elif fresh is not None and fresh.senses != piece.senses:
-            self._note(trail, piece.senses, fresh, 0.0)
+            self._note(piece.senses, fresh, 0.0)
         return fresh
 
-    def _note(self, trail: Trail, before: Senses, piece: Piece, uncertainty: float) -> None:
+    def _note(self, before: Senses, piece: Piece, uncertainty: float) -> None:
         """Record an event, and stop where they come too fast."""
-        t = trail.time
+        t = self.stats.time
         changed = [f for f, s in enumerate(piece.senses) if s != before[f]]
         if not changed:
             return
@@ -312,12 +321,58 @@ class DryMotion:
         kinds = {("stick" if piece.senses[f] == 0 else "slip" if before[f] == 0 else "reversal") for f in changed}
         kind = "stick" if "stick" in kinds else "slip" if "slip" in kinds else "reversal"
         text = {"stick": "stick", "slip": "slide", "reversal": "slide the other way"}[kind]
-        trail.events.append(DynamicEvent(kind, t, uncertainty, f"{names}: {text} from t = {t:.9g} s on"))
+        self.stats.events.append(DynamicEvent(kind, t, uncertainty, f"{names}: {text} from t = {t:.9g} s on"))
         count = self._recent
         self._short = self._short + 1 if t - count[-1] < _DWELL * np.spacing(t) else 0
         self._recent = [*count[1:], t]
         if self._short >= 3 or t - self._recent[0] < _WINDOW / _RATE:
-            trail.message = (
+            self.stats.message = (
                 f"Zeno behaviour: more than {_RATE:g} changes between sticking and sliding a second at t = {t:.9g} s; "
                 "give the friction a smoothing_velocity"
             )
+
+
+class FrictionAt(NamedTuple):
+    """Friction at one state: accelerations, multipliers, generalised force, and per element state, rate, force, load.
+
+    ``shared`` names elements that stick together in a loop.
+    """
+
+    a: Array
+    multipliers: Array
+    rubbing: Array
+    senses: tuple[int, ...]
+    rates: Array
+    forces: Array
+    loads: Array
+    shared: tuple[str, ...]
+
+
+def friction_at(
+    rows: FrictionRows, t: float, q: Array, v: Array, slots: Array, senses: tuple[int, ...] | None
+) -> FrictionAt | None:
+    """Solve the friction problem at a state whose senses are known; None if there is no single solution."""
+    if senses is None:
+        return None
+    problem = FrictionProblem(rows, t, q, v, slots)
+    fit = problem.at(senses)
+    if fit is None:
+        return None
+    rests = np.array([s == 0 and not e.smooth for s, e in zip(senses, rows.elements)])
+    rates = np.where(rests | (np.abs(problem.rates) <= problem.noise), 0.0, problem.rates)
+    names = tuple(dict.fromkeys(rows.elements[f].name for f in fit.shared))
+    return FrictionAt(fit.a, fit.multipliers, problem.W.T @ fit.forces, senses, rates, fit.forces, fit.loads, names)
+
+
+def friction_history(rows: FrictionRows, count: int, fits: list[FrictionAt | None]) -> FrictionHistory:
+    """Collect the friction of all output times."""
+    shape = (count, len(rows.elements))
+    state = np.zeros(shape, dtype=np.int64)
+    rates, forces, loads = (np.full(shape, np.nan) for _ in range(3))
+    shared: dict[tuple[str, ...], None] = {}
+    for k, fit in enumerate(fits):
+        if fit is not None:
+            state[k], rates[k], forces[k], loads[k] = fit.senses, fit.rates, fit.forces, fit.loads
+            if fit.shared:
+                shared[fit.shared] = None
+    return FrictionHistory(tuple(e.name for e in rows.elements), state, rates, forces, loads, tuple(shared))

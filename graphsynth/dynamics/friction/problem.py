@@ -14,9 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.dynamics.friction.linear import respond
-from graphsynth.dynamics.friction.loads import fitting_loads
-from graphsynth.dynamics.friction.rows import FrictionRows
+from graphsynth.dynamics.friction.loads import FrictionRows, fitting_loads
 from graphsynth.dynamics.tables import Compiled
 from graphsynth.dynamics.values import applied_loads
 
@@ -102,9 +100,10 @@ class FrictionProblem:
     def resting(self) -> list[int]:
         """Elements at rest that could stick."""
         return [
-            f for f, e in enumerate(self.elements)
+            f
+            for f, e in enumerate(self.elements)
             if not e.smooth and e.static > 0.0 and abs(self.rates[f]) <= self.noise[f]
-        ]  # fmt: skip
+        ]
 
     def moving(self) -> dict[int, int]:
         """Senses of the elements that slide."""
@@ -138,10 +137,12 @@ class FrictionProblem:
         """Bound of how much the loads change with the loads when all elements slide; below 1 they are unique."""
         if not self.elements:
             return 0.0
-        K = np.array([
-            [e.load(self._part.B[:, g]) * other.static * other.lever for g, other in enumerate(self.elements)]
-            for e in self.elements
-        ])  # fmt: skip
+        K = np.array(
+            [
+                [e.load(self._part.B[:, g]) * other.static * other.lever for g, other in enumerate(self.elements)]
+                for e in self.elements
+            ]
+        )
         return float(np.abs(np.linalg.eigvals(K)).max())
 
     def solutions(
@@ -193,9 +194,9 @@ class FrictionProblem:
         free, part = _Hold(self, []), self._part
 
         def forces(use: float) -> Array:
-            ratio = np.array([
-                use * e.static * e.lever if g == f else self._ratio(g, moving[g], begun, g in at_rest) for g in D
-            ])  # fmt: skip
+            ratio = np.array(
+                [use * e.static * e.lever if g == f else self._ratio(g, moving[g], begun, g in at_rest) for g in D]
+            )
             fits, _ = fitting_loads([self.elements[g] for g in D], part.lam0, part.B[:, D] * ratio)
             return free.forces(ratio * fits[0], D)
 
@@ -279,9 +280,13 @@ class FrictionProblem:
     def _made(self, forces: Array, moving: Mapping[int, int], shared: tuple[int, ...]) -> FrictionSolution:
         lam = self._part.lam0 + self._part.B @ forces
         return FrictionSolution(
-            tuple(moving.get(f, 0) for f in range(len(self.elements))), forces,
-            np.array([e.load(lam) for e in self.elements]), self._part.a0 + self._part.G @ forces, lam, shared,
-        )  # fmt: skip
+            tuple(moving.get(f, 0) for f in range(len(self.elements))),
+            forces,
+            np.array([e.load(lam) for e in self.elements]),
+            self._part.a0 + self._part.G @ forces,
+            lam,
+            shared,
+        )
 
     def _independent(self, stuck: list[int]) -> list[int]:
         """Return elements enough to hold all that stick."""
@@ -375,9 +380,13 @@ def _least_use(rows: Array, need: Array, limits: Array) -> Array | None:
     size = max(float(np.abs(scaled).max()), 1e-300)
     sides = np.vstack([np.hstack([np.eye(n), -np.ones((n, 1))]), np.hstack([-np.eye(n), -np.ones((n, 1))])])
     solved = linprog(
-        [*np.zeros(n), 1.0], sides, np.zeros(2 * n), np.hstack([scaled / size, np.zeros((len(rows), 1))]), need / size,
+        [*np.zeros(n), 1.0],
+        sides,
+        np.zeros(2 * n),
+        np.hstack([scaled / size, np.zeros((len(rows), 1))]),
+        need / size,
         bounds=[(None, None)] * n + [(0.0, None)],
-    )  # fmt: skip
+    )
     return np.asarray(limits * solved.x[:n]) if solved.status == 0 else None
 
 
@@ -390,3 +399,80 @@ def joint_names(compiled: Compiled, touched: NDArray[np.bool_]) -> tuple[str, ..
             name = name.removesuffix(part)
         names.append(name)
     return tuple(dict.fromkeys(names))
+
+
+#: Singular values of the joints' rows below this part of the largest count as zero.
+_RANK = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class LinearResponse:
+    """``a = a0 + G phi, lam = lam0 + B phi``, and the null vectors of the multipliers."""
+
+    a0: Array
+    G: Array
+    lam0: Array
+    B: Array
+    null: Array
+    sizes: Array
+
+
+def respond(rows: FrictionRows, J: Array, gam: Array, Q: Array, W: Array) -> LinearResponse:
+    """Solve ``M a + J^T lam = Q + W^T phi, J a = gam`` for loads alone and for every unit friction."""
+    T, count = rows.compiled.tables, len(W)
+    loads = np.column_stack([Q, W.T])
+    sides = np.column_stack([gam, np.zeros((len(gam), count))])
+    if not T.lower.size:
+        return _respond_massless(rows, J, sides, loads)
+    inverse = rows.lower_inverse
+    Y = inverse @ J.T
+    sizes = np.linalg.norm(Y, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    U, S, Vt = np.linalg.svd(Y / sizes)
+    rank = int(np.sum(_RANK * S[0] < S)) if S.size else 0
+    free = inverse.T @ (inverse @ loads)
+    z = (Vt[:rank] @ ((sides - J @ free) / sizes[:, None])) / S[:rank, None]
+    a = free + inverse.T @ (U[:, :rank] @ z)
+    lam = -(Vt[:rank].T @ (z / S[:rank, None])) / sizes[:, None]
+    return LinearResponse(a[:, 0], a[:, 1:], lam[:, 0], lam[:, 1:], Vt[rank:].T / sizes[:, None], sizes)
+
+
+def _respond_massless(rows: FrictionRows, J: Array, sides: Array, loads: Array) -> LinearResponse:
+    """Return the same with links without mass, from the whole system; accelerations must be determined."""
+    compiled = rows.compiled
+    T, m = compiled.tables, len(J)
+    unit = np.tile([T.size, T.size, 1.0], compiled.n // 3)
+    row = np.array([1.0 if info.angular else T.size for info in compiled.info])
+    mass = (T.mass * unit) * unit[:, None]
+    weight = float(np.abs(mass).max())
+    Js = J * unit / row[:, None]
+    n = compiled.n
+    matrix = np.block([[mass / weight, Js.T], [Js, np.zeros((m, m))]])
+    right = np.vstack([loads * unit[:, None] / weight, sides / row[:, None]])
+    found = np.linalg.lstsq(matrix, right, rcond=1e-13)[0]
+    U, S, _ = np.linalg.svd(Js)
+    rank = int(np.sum(_RANK * S[0] < S)) if S.size else 0
+    return LinearResponse(
+        found[:n, 0] * unit,
+        found[:n, 1:] * unit[:, None],
+        found[n:, 0] * weight / row,
+        found[n:, 1:] * (weight / row)[:, None],
+        U[:, rank:] / row[:, None],
+        row,
+    )
+
+
+def open_shares(
+    compiled: Compiled, times: Array, q: Array, v: Array, slots: Array, state: NDArray[np.int64]
+) -> dict[int, Array]:
+    """Return changes of the multipliers that joints which stick together leave open, by index of the instant."""
+    rows, found = FrictionRows(compiled), {}
+    for k in range(len(times)):
+        stuck = np.flatnonzero([s == 0 and not e.smooth for s, e in zip(state[k], rows.elements)])
+        if len(stuck) < 2 or not np.isfinite(q[k]).all():
+            continue
+        problem = FrictionProblem(rows, float(times[k]), q[k], v[k], slots[k])
+        changes = problem.open_shares([int(f) for f in stuck])
+        if changes.shape[1]:
+            found[k] = changes
+    return found

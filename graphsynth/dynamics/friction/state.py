@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.dynamics.friction.loads import FrictionRows, locked
 from graphsynth.dynamics.friction.problem import MOST, FrictionProblem, FrictionSolution, Senses
-from graphsynth.dynamics.friction.rows import FrictionRows, locked
 from graphsynth.dynamics.kernels import accelerate, constraint_system, load_vector, state_rows
 from graphsynth.dynamics.tables import BY_SPEED, Compiled
 
@@ -63,9 +63,10 @@ def decide(
         if len(found) != 1 or not known:
             return _refused(problem, found, known)
         falls = {
-            f: found[0].senses[f] for f in still
+            f: found[0].senses[f]
+            for f in still
             if found[0].senses[f] and problem.elements[f].onset < problem.elements[f].static
-        }  # fmt: skip
+        }
         if not falls:
             return _begun(problem, found[0], fresh)
         sliding.update(falls)
@@ -143,9 +144,10 @@ def make_piece(
     """Lock what sticks and fix the senses of what slides; ``quiet`` are rates that count as 0."""
     base = rows.compiled
     stuck = [
-        f for f, e in enumerate(rows.elements)
+        f
+        for f, e in enumerate(rows.elements)
         if solution.senses[f] == 0 and not e.smooth and e.static > 0.0 and not problem.idle(f)
-    ]  # fmt: skip
+    ]
     kept = problem._independent(stuck)
     held = locked(base, rows, kept, coordinates[kept])
     table = held.tables.friction_table.copy()

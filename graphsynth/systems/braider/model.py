@@ -27,7 +27,7 @@ from graphsynth.dynamics.motors import (
     number,
     whole,
 )
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import Train
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism, TracePoint

@@ -18,7 +18,7 @@ from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, i
 from graphsynth.dynamics.driven.run import DriveRun, run
 from graphsynth.dynamics.driven.setup import Plant, load_coefficients
 from graphsynth.dynamics.motors import IdealSpeed, Motor, check_motor, number
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import Train
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform

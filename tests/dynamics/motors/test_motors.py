@@ -12,8 +12,7 @@ from graphsynth.dynamics.driven.closed_form import linear_response
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.run import run
 from graphsynth.dynamics.driven.setup import Plant
-from graphsynth.dynamics.motors import DCMotor, IdealSpeed, IdealTorque, LinearCharacteristic, SynchronousMotor
-from graphsynth.dynamics.trains import Train
+from graphsynth.dynamics.motors import DCMotor, IdealSpeed, IdealTorque, LinearCharacteristic, SynchronousMotor, Train
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
 DC = {"torque_constant": 0.1, "emf_constant": 0.1, "gain": 20.0, "speed": 20.0}
