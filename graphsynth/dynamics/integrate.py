@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -123,8 +124,7 @@ def simulate_dynamics(
     if estimate_error:
         tighter = replace(options, rtol=max(options.rtol / 100.0, 2.3e-14), atol=None if atol is None else atol / 100.0)
         again = _once(compiled, report, grid, run.name, tighter)
-        unit = np.tile([compiled.tables.size, compiled.tables.size, 1.0], compiled.n // 3)
-        estimate = np.abs((run.q - again.q) / unit).max(axis=1)
+        estimate = np.abs((run.q - again.q) / compiled.unit).max(axis=1)
     return _result(compiled, report, grid, run, options, estimate)
 
 
@@ -162,24 +162,30 @@ def _check_options(form: str, outputs: str, options: StepOptions) -> None:
         raise GeometryError(f"atol = {options.atol} must be positive; leave it out for the natural scales")
 
 
-@dataclass
 class _Run:
     """States at the output times; a workspace."""
 
-    name: str
-    q: Array
-    v: Array
-    own: list[Array | None]
-    slots: Array
-    tail: Array
-    modes: NDArray[np.int64]
-    done: int
-    stats: SolverStatistics
-    form: Form
-    seconds: float
-    events: list[DynamicEvent] = field(default_factory=list)
-    rows: FrictionRows | None = None
-    senses: list[Senses | None] = field(default_factory=list)
+    def __init__(self, compiled: Compiled, report: StartReport, name: str, count: int, form: Form) -> None:
+        self.name, self.form, self.done, self.seconds, self.stats = name, form, 0, 0.0, SolverStatistics()
+        self.compiled, self.report = compiled, report
+        self.q, self.v = (np.full((count, compiled.n), np.nan) for _ in range(2))
+        self.slots = np.zeros((count, len(report.slots)))
+        self.tail = np.full((count, len(compiled.tail)), np.nan)
+        self.modes = np.zeros((count, *compiled.tables.modes.shape), dtype=np.int64)
+        self.own: list[Array | None] = [None] * count
+        self.senses: list[Senses | None] = [None] * count
+        self.events: list[DynamicEvent] = []
+        self.rows: FrictionRows | None = None
+
+    def show(self, form: Form, k: int, t: float, y: Array, senses: Senses | None = None) -> None:
+        """Keep the state at an output time."""
+        self.q[k], self.v[k] = form.state(t, y)
+        self.slots[k] = getattr(form, "slots", self.report.slots)
+        self.tail[k], self.modes[k] = y[len(y) - len(self.compiled.tail) :], form.compiled.tables.modes
+        own = getattr(form, "accelerations", None)
+        self.own[k] = None if own is None else own(t, y)
+        self.senses[k] = senses
+        self.done = k + 1
 
 
 def make_form(compiled: Compiled, report: StartReport, name: str, project: bool) -> Form:
@@ -227,43 +233,14 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
     begin = perf_counter()
     if compiled.drives:
         compiled = compiled.with_modes(starting_modes(compiled, report.v))
-    form = make_form(compiled, report, name, options.project)
-    n, count = compiled.n, len(grid)
-    run = _Run(
-        name,
-        np.full((count, n), np.nan),
-        np.full((count, n), np.nan),
-        [None] * count,
-        np.zeros((count, len(report.slots))),
-        np.full((count, len(compiled.tail)), np.nan),
-        np.zeros((count, *compiled.tables.modes.shape), dtype=np.int64),
-        0,
-        SolverStatistics(),
-        form,
-        0.0,
-        senses=[None] * count,
-    )
-
-    def show(form: Form, k: int, t: float, y: Array, senses: Senses | None) -> None:
-        run.q[k], run.v[k] = form.state(t, y)
-        run.slots[k] = getattr(form, "slots", report.slots)
-        run.tail[k], run.modes[k] = y[len(y) - len(compiled.tail) :], form.compiled.tables.modes
-        own = getattr(form, "accelerations", None)
-        run.own[k] = None if own is None else own(t, y)
-        run.senses[k] = senses
-        run.done = k + 1
-
+    run = _Run(compiled, report, name, len(grid), make_form(compiled, report, name, options.project))
     with np.errstate(all="ignore"):
         if compiled.tables.friction.size:
-            _with_friction(compiled, report, grid, options, run, show)
+            _with_friction(run, grid, options)
         else:
-            run.stats = integrate(
-                form,
-                grid,
-                compiled.model.breaks,
-                options.scaled(scales(compiled, report, form)),
-                lambda k, t, y: show(form, k, t, y, None),
-            )
+            scaled, form = options.scaled(scales(compiled, report, run.form)), run.form
+            output = partial(run.show, form)
+            run.stats = integrate(form, grid, compiled.model.breaks, scaled, output)
     run.seconds = perf_counter() - begin
     lost = np.flatnonzero(~np.isfinite(run.q[: run.done]).all(axis=1) | ~np.isfinite(run.v[: run.done]).all(axis=1))
     if lost.size:  # an interpolated state that the formulation cannot place is a failure, not a gap
@@ -276,27 +253,15 @@ def _run(compiled: Compiled, report: StartReport, grid: Array, name: str, option
     return run
 
 
-def _with_friction(
-    compiled: Compiled,
-    report: StartReport,
-    grid: Array,
-    options: StepOptions,
-    run: _Run,
-    show: Callable[[Form, int, float, Array, Senses | None], None],
-) -> None:
+def _with_friction(run: _Run, grid: Array, options: StepOptions) -> None:
     """Integrate a model with friction in its joints."""
     from graphsynth.dynamics.friction.loads import FrictionRows
     from graphsynth.dynamics.friction.motion import DryMotion
 
-    run.rows = FrictionRows(compiled)
-    dry = DryMotion(
-        run.rows,
-        report,
-        lambda piece, start: make_form(piece, start, run.name, options.project),
-        lambda form: scales(compiled, report, form),
-        show,
-    )
-    run.stats = dry.go(grid, compiled.model.breaks, options)
+    run.rows = FrictionRows(run.compiled)
+    make = partial(make_form, name=run.name, project=options.project)
+    dry = DryMotion(run.rows, run.report, make, partial(scales, run.compiled, run.report), run.show)
+    run.stats = dry.go(grid, run.compiled.model.breaks, options)
     assert dry.form is not None
     run.form = dry.form
     run.form.loss, run.form.contraction, run.form.changes = dry.loss, dry.contraction, dry.changes
@@ -304,8 +269,7 @@ def _with_friction(
 
 def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
     """Natural size of every component of the state: lengths, angles, rates, work."""
-    T = compiled.tables
-    unit = np.tile([T.size, T.size, 1.0], compiled.n // 3)
+    T, unit = compiled.tables, compiled.unit
     speed = float(np.abs(report.v / unit).max(initial=0.0))
     turn = np.sqrt(float(np.abs(np.nan_to_num(report.a) / unit).max(initial=0.0)))
     gravity = np.sqrt(float(np.abs(T.gravity).max()) / T.size)
@@ -322,60 +286,47 @@ def scales(compiled: Compiled, report: StartReport, form: Form) -> Array:
 def _result(
     compiled: Compiled, report: StartReport, grid: Array, run: _Run, options: StepOptions, estimate: Array | None
 ) -> DynamicMotion:
-    begin = perf_counter()
-    count, done = len(grid), run.done
+    from graphsynth.dynamics.values import initial_slots
+
+    begin, count, done = perf_counter(), len(grid), run.done
     work, currents = run.tail[:, -1], run.tail[:, : len(compiled.currents)]
+    a, lam = np.full((count, compiled.n), np.nan), np.full((count, len(compiled.info)), np.nan)
+    kinetic, potential = np.full((2, count), np.nan)
     balances: list[Balance] = []
     fits: list[FrictionAt | None] = []
-    for k in range(done):
-        slots = run.slots[k]
-        if run.name != "augmented":
-            from graphsynth.dynamics.values import initial_slots
-
-            slots = initial_slots(compiled, run.q[k])
-        t = float(grid[k])
-        fit = None if run.rows is None else friction_at(run.rows, t, run.q[k], run.v[k], slots, run.senses[k])
-        own = compiled.with_modes(run.modes[k])
-        balances.append(balance_at(own, t, run.q[k], run.v[k], currents[k], slots, run.own[k], fit))
+    for k, t in enumerate(grid[:done].tolist()):
+        q, v = run.q[k], run.v[k]
+        slots = run.slots[k] if run.name == "augmented" else initial_slots(compiled, q)
+        fit = None if run.rows is None else friction_at(run.rows, t, q, v, slots, run.senses[k])
+        found = balance_at(compiled.with_modes(run.modes[k]), t, q, v, currents[k], slots, run.own[k], fit)
+        a[k], lam[k], kinetic[k], potential[k] = found.a, found.multipliers, found.kinetic, found.potential
+        balances.append(found)
         fits.append(fit)
-    a, lam = np.full((count, compiled.n), np.nan), np.full((count, len(compiled.info)), np.nan)
-    kinetic, potential = np.full(count, np.nan), np.full(count, np.nan)
-    for k, b in enumerate(balances):
-        a[k], lam[k], kinetic[k], potential[k] = b.a, b.multipliers, b.kinetic, b.potential
     second = run.own[:done]
     if run.name == "augmented":
-        second = _by_mode(
-            compiled,
-            run.modes[:done],
-            lambda own, at: second_accelerations(own, report, grid[at], run.q[at], run.v[at], currents[at]),
-        )
+
+        def other(own: Compiled, at: NDArray[np.intp]) -> list[Array | None]:
+            return second_accelerations(own, report, grid[at], run.q[at], run.v[at], currents[at])
+
+        second = _by_mode(compiled, run.modes[:done], other)
     motors = motor_histories(compiled, run.v, currents, run.modes)
-    checks = checks_of(
-        compiled,
-        grid,
-        balances,
-        work,
-        second,
-        _newton(compiled, run, grid, a, lam),
-        run.form.loss,
-        run.form.contraction,
-        electric_error(compiled, grid, run.tail, motors),
-    )
-    poses, velocities, accelerations = compiled.to_links(run.q, run.v, a)
-    for array in (poses, velocities, accelerations):
+    checks = checks_of(compiled, grid, balances, work, second)
+    if balances:
+        checks = checks._replace(
+            newton_euler=_newton(compiled, run, grid, a, lam),
+            projection_loss=run.form.loss,
+            contraction=run.form.contraction,
+            electric=electric_error(compiled, grid, run.tail, motors),
+        )
+    links = compiled.to_links(run.q, run.v, a)
+    for array in links:
         array[done:] = np.nan
-    completed = done == count
-    message = "completed" if completed else _failure(run, grid)
-    events = tuple(sorted(run.events, key=lambda event: event.time))
     friction = None if run.rows is None else friction_history(run.rows, count, fits)
-    warnings, backend = warnings_of(checks, options.rtol, friction), _backend(options.method)
+    completed = done == count
     return DynamicMotion(
-        compiled.model,
         compiled,
         grid,
-        poses,
-        velocities,
-        accelerations,
+        *links,
         run.q,
         run.v,
         a,
@@ -384,24 +335,24 @@ def _result(
         kinetic,
         potential,
         work,
-        "completed" if completed else "failed",
-        message,
-        run.stats.time,
-        events,
-        report,
-        checks,
-        warnings,
-        estimate,
-        run.name,
-        options.method,
-        backend,
-        options.rtol,
-        run.stats.evaluations,
-        run.stats.steps,
-        run.seconds,
-        perf_counter() - begin,
-        friction,
-        motors,
+        status="completed" if completed else "failed",
+        message="completed" if completed else _failure(run, grid),
+        reached=run.stats.time,
+        events=tuple(sorted(run.events, key=lambda event: event.time)),
+        start=report,
+        checks=checks,
+        warnings=warnings_of(checks, options.rtol, friction),
+        error_estimate=estimate,
+        form=run.name,
+        method=options.method,
+        backend=_backend(options.method),
+        rtol=options.rtol,
+        evaluations=run.stats.evaluations,
+        steps=run.stats.steps,
+        seconds=run.seconds,
+        seconds_checks=perf_counter() - begin,
+        friction=friction,
+        motors=motors,
     )
 
 

@@ -116,7 +116,7 @@ def inverse_dynamics(
     q = compiled.to_coordinates(motion.poses)
     rates = motion.velocities * rate
     v = compiled.to_rates(q, rates)
-    a = _accelerations(compiled, motion.poses, rates, motion.accelerations * rate**2 + motion.velocities * second)
+    a = compiled.to_rates(q, rates, motion.accelerations * rate**2 + motion.velocities * second)
     lam = np.full((n, len(compiled.info)), np.nan)
     there = np.flatnonzero(motion.assembled & np.isfinite(a).all(axis=1))
     found = balance(compiled, instants[there], q[there], v[there], a[there])
@@ -207,28 +207,11 @@ def _times(compiled: Compiled, motion: Motion, rate: Array, second: Array, given
         return np.where(rate == 0.0, 0.0, motion.inputs / rate) if steady else np.full(len(rate), np.nan)
 
 
-def _accelerations(compiled: Compiled, poses: Array, rates: Array, seconds: Array) -> Array:
-    """Accelerations of the centres of mass from those of the link frames."""
-    moving = compiled.moving
-    arm = np.exp(1j * poses[:, moving, 2]) * (compiled.centres[moving] @ [1.0, 1j])
-    extra = (1j * seconds[:, moving, 2] - rates[:, moving, 2] ** 2) * arm
-    found = seconds[:, moving, :].copy()
-    found[..., 0] += extra.real
-    found[..., 1] += extra.imag
-    return np.asarray(found.reshape(len(poses), compiled.n))
-
-
 class Balance(NamedTuple):
     """Balance of all bodies at n samples.
 
-    Attributes
-    ----------
-    multipliers : ndarray, shape (n, rows)
-        The drivers' included; NaN where a sample is refused.
-    error, size : ndarray, shape (n,)
-        Of the power along the velocity, W.
-    refusals : dict of int to GeometryError
-        Why friction leaves no loads, several, or needs an open reaction, by sample.
+    Multipliers (n, rows), the drivers' included, NaN where a sample is refused; error and size of the power along the
+    velocity (n,), W; why friction leaves no loads, several, or needs an open reaction, by sample.
     """
 
     multipliers: Array
@@ -256,7 +239,7 @@ def balance(compiled: Compiled, times: Array, q: Array, v: Array, a: Array) -> B
         for f in range(len(elements)):
             kernels.friction_unit(T, x, J[k], f, units[k, f])
     inertial = a @ T.mass
-    unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
+    unit = compiled.unit / T.size
     U, S, Vt = np.linalg.svd((J * unit).swapaxes(1, 2), full_matrices=False)
     kept = 1e-12 * S[:, :1] < S
     right = np.concatenate([(loads - inertial)[:, None], units], axis=1) * unit

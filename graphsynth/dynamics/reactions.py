@@ -121,15 +121,10 @@ class Reactions:
 def reactions_from_multipliers(
     compiled: Compiled, q: Array, v: Array, multipliers: Array, times: Array, more: Mapping[int, Array] | None = None
 ) -> Reactions:
-    """Wrenches ``-C_q^T lam`` of every joint, moved to its point.
+    """Wrenches ``-C_q^T lam`` of every joint, moved to its point, at n instants.
 
-    Parameters
-    ----------
-    q, v : ndarray, shape (n, coordinates)
-    multipliers : ndarray, shape (n, rows)
-    times : ndarray, shape (n,)
-    more : mapping of int to ndarray, optional
-        At some instants, changes of the multipliers that joints which stick together leave open, shape (rows, changes).
+    ``more`` are, at some instants, changes of the multipliers that joints which stick together leave open, shape
+    (rows, changes).
     """
     from graphsynth.dynamics.values import Values, jacobians
 
@@ -206,12 +201,12 @@ def _ends(compiled: Compiled, joint: Any) -> tuple[int, int]:
 def _open_changes(values: Values, J: Array, found: dict[int, Array]) -> Array:
     """Columns: changes of the multipliers that the balance leaves open, filled up with zeros, (n, rows, changes)."""
     n, m, _ = J.shape
-    scaled = J * values.column_scale / values.row_scale[:, None]
+    scaled = J * values.compiled.unit / values.compiled.row_unit[:, None]
     S = np.linalg.svd(scaled, compute_uv=False) if scaled.size else np.zeros((n, 1))
     ranks = (1e-10 * S[:, :1] < S).sum(axis=1)
     for k in np.flatnonzero(ranks < m).tolist():
         U = np.linalg.svd(scaled[k])[0]
-        parts = [U[:, ranks[k] :] / values.row_scale[:, None], *([found[k]] if k in found else [])]
+        parts = [U[:, ranks[k] :] / values.compiled.row_unit[:, None], *([found[k]] if k in found else [])]
         found[k] = np.hstack(parts)
     left = np.zeros((n, m, max((part.shape[1] for part in found.values()), default=0)))
     for k, part in found.items():

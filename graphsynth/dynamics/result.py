@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from graphsynth.dynamics.start import StartReport
 
 if TYPE_CHECKING:
+    from graphsynth.dynamics.model import DynamicModel
     from graphsynth.dynamics.reactions import Reactions
     from graphsynth.dynamics.tables import Compiled
 
@@ -76,16 +78,16 @@ class Checks(NamedTuple):
     in play; NaN without currents.
     """
 
-    position_drift: float
-    velocity_drift: float
-    energy: float
-    power: float
-    dalembert: float
-    second_form: float
-    newton_euler: float
-    projection_loss: float
-    contraction: float
-    electric: float
+    position_drift: float = math.nan
+    velocity_drift: float = math.nan
+    energy: float = math.nan
+    power: float = math.nan
+    dalembert: float = math.nan
+    second_form: float = math.nan
+    newton_euler: float = math.nan
+    projection_loss: float = math.nan
+    contraction: float = math.nan
+    electric: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,6 @@ class DynamicMotion:
         In the order of the elements.
     """
 
-    model: Any
     compiled: Compiled
     times: Array
     poses: Array
@@ -161,6 +162,11 @@ class DynamicMotion:
 
     #: How the numbers were had.
     label = "estimated"
+
+    @property
+    def model(self) -> DynamicModel:
+        """The model that moves."""
+        return self.compiled.model
 
     @property
     def completed(self) -> bool:

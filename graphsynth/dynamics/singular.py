@@ -43,16 +43,13 @@ def classify_pose(
 ) -> tuple[PoseClass, int, BranchTangents | None]:
     """Compare the rank at ``q`` with that at nearby poses on the constraints (theory/planar-dynamics 6, step 3).
 
-    Parameters
-    ----------
-    left, null : ndarray
-        Left and right null vectors of the scaled Jacobian, in columns.
+    ``left`` and ``null`` are the left and right null vectors of the scaled Jacobian, in columns.
     """
     directions = [*null.T, *(null @ np.array([np.cos(t), np.sin(t)]) for t in (0.7, 2.1) if null.shape[1] == 2)]
     nearby = rank
     for direction in directions:
         for sense in (1.0, -1.0):
-            found = _returned(values, q + sense * _NEARBY * values.column_scale * direction)
+            found = _returned(values, q + sense * _NEARBY * values.compiled.unit * direction)
             if found is not None:
                 S = np.linalg.svd(values.scaled_jacobian(found), compute_uv=False)
                 nearby = max(nearby, int(np.sum(tolerance * S[0] < S)))
@@ -64,12 +61,12 @@ def classify_pose(
 def _returned(values: Values, q: Array) -> Array | None:
     """Return to the constraints from a point close to them; None if that does not converge."""
     for _ in range(30):
-        C = values.system(q, np.zeros_like(q))[0] / values.row_scale
+        C = values.system(q, np.zeros_like(q))[0] / values.compiled.row_unit
         if np.abs(C).max() < 1e-14:
             return q
         step = np.linalg.lstsq(values.scaled_jacobian(q), -C, rcond=1e-13)[0]
         size = float(np.abs(step).max())
-        q = q + values.column_scale * step * min(1.0, 0.1 / max(size, 1e-300))
+        q = q + values.compiled.unit * step * min(1.0, 0.1 / max(size, 1e-300))
     return q if np.abs(C).max() < 1e-12 else None
 
 
@@ -78,11 +75,11 @@ def branch_tangents(values: Values, q: Array, left: Array, null: Array) -> Branc
     special = left
     if null.shape[1] != 2 or special.shape[1] != 1:
         return None
-    scale = values.column_scale
+    scale = values.compiled.unit
 
     def form(direction: Array) -> float:
         gam = values.system(q, scale * direction)[2] + _driver_part(values)
-        return float(special[:, 0] @ (-gam / values.row_scale))
+        return float(special[:, 0] @ (-gam / values.compiled.row_unit))
 
     n1, n2 = null[:, 0], null[:, 1]
     a, c = form(n1), form(n2)
@@ -215,14 +212,9 @@ def gauss_step(
 ) -> GaussStep | None:
     """Solve the collocation equations by fixed-point iteration; None if it does not settle.
 
-    Parameters
-    ----------
-    evaluate : callable
-        ``(t, q, v, tail)`` near the constraints to accelerations and rates of the tail at the nearest state on them.
-    guess : callable
-        State at a time, on the branch wanted.
-    unit : ndarray
-        Units of the coordinates.
+    ``evaluate`` leads from ``(t, q, v, tail)`` near the constraints to accelerations and rates of the tail at the
+    nearest state on them; ``guess`` gives the state at a time, on the branch wanted; ``unit`` are the units of the
+    coordinates.
     """
     nodes, _, A = _tables()
     n = len(unit)

@@ -218,12 +218,8 @@ def _keys(name: str, given: Keys | None) -> Keys:
 def check_start(model: DynamicModel, start: StartReport, first: float | None = None, *parts: str) -> None:
     """Refuse what is no consistent start of a model: its coordinates would be taken for those of this one.
 
-    Parameters
-    ----------
-    first : float, optional
-        The time that the start is to be for.
-    *parts : str
-        Of the model, besides mechanism and bodies, that must be those of the start.
+    ``first`` is the time that the start is to be for; ``parts`` of the model, besides mechanism and bodies, must be its
+    own.
     """
     if not isinstance(model, DynamicModel):
         raise GeometryError(
@@ -288,7 +284,7 @@ def _kept(values: Values, keep: Mapping[Any, float]) -> tuple[list[Any], Array]:
 
 def _units(values: Values, kept: tuple[list[Any], Array]) -> Array:
     """Return the unit of every row: the characteristic length, or 1 for angles."""
-    own = values.row_scale
+    own = values.compiled.row_unit
     return np.concatenate([own, [1.0 if row[4] else values.size for row in kept[0]]])
 
 
@@ -299,7 +295,7 @@ def _row_units(values: Values, kept: tuple[list[Any], Array]) -> list[str]:
 
 def _close(values: Values, kept: tuple[list[Any], Array], q0: Array) -> tuple[Array, Array]:
     """Nearest point to q0 on the constraints, by Gauss-Newton; also the residual of every row."""
-    q, scale = q0.copy(), values.column_scale
+    q, scale = q0.copy(), values.compiled.unit
     size = np.inf
     unit = _units(values, kept)
     for _ in range(_ROUNDS):
@@ -325,7 +321,7 @@ def _blank(values: Values, q: Array, q0: Array) -> StartReport:
     nan = np.full(compiled.n, np.nan)
     pose, rate, second = compiled.to_links(q, nan, nan)
     count = len(compiled.info)
-    moved = float(np.abs((q - q0) / values.column_scale).max(initial=0.0))
+    moved = float(np.abs((q - q0) / values.compiled.unit).max(initial=0.0))
     return StartReport(
         compiled.model,
         "consistent",
@@ -409,10 +405,10 @@ def _velocities(
     _, Jk = values.extra(report.q, rows, np.zeros(len(rows)))
     matrix, right = np.vstack([J, Jk]), np.concatenate([vel, wanted])
     unit = _units(values, kept)
-    step = _nearest_rates(values, (matrix * values.column_scale) / unit[:, None], (right - matrix @ v0) / unit)
+    step = _nearest_rates(values, (matrix * values.compiled.unit) / unit[:, None], (right - matrix @ v0) / unit)
     v = v0 + step
     residual = matrix @ v - right
-    speed = max(float(np.abs(v / values.column_scale).max(initial=0.0)), float(np.abs(right / unit).max(initial=0.0)))
+    speed = max(float(np.abs(v / values.compiled.unit).max(initial=0.0)), float(np.abs(right / unit).max(initial=0.0)))
     if float(np.abs(residual / unit).max(initial=0.0)) > 1e-9 * max(speed, _REST):
         all_names = [*report.rows, *names]
         worst = int(np.argmax(np.abs(residual / unit)))
@@ -426,7 +422,7 @@ def _velocities(
             message=f"the rates contradict the joints: '{all_names[worst]}' is missed by {abs(residual[worst]):.6g} "
             f"{_row_units(values, kept)[worst]}/s; keep fewer rates or correct them",
         )
-    moved = float(np.abs(step / values.column_scale).max(initial=0.0))
+    moved = float(np.abs(step / values.compiled.unit).max(initial=0.0))
     a, lam, text, status = _accelerations(values, report.q, v, applied_loads(compiled, values.time, report.q, v))
     pose, rate, second = compiled.to_links(report.q, v, a)
     message = _sentence(report) + text if status == "consistent" else text
@@ -452,8 +448,8 @@ def _nearest_rates(values: Values, matrix: Array, right: Array) -> Array:
     """
     U, S, Vt = np.linalg.svd(matrix)
     rank = int(np.sum(RANK * S[0] < S)) if S.size else 0
-    step = values.column_scale * (Vt[:rank].T @ ((U.T @ right)[:rank] / S[:rank]))
-    free = values.column_scale[:, None] * Vt[rank:].T
+    step = values.compiled.unit * (Vt[:rank].T @ ((U.T @ right)[:rank] / S[:rank]))
+    free = values.compiled.unit[:, None] * Vt[rank:].T
     root = np.linalg.solve(values.mass_root_inverse, np.column_stack([free, step]))
     return np.asarray(step - free @ np.linalg.lstsq(root[:, :-1], root[:, -1], rcond=None)[0])
 

@@ -359,24 +359,7 @@ def _collected() -> Iterator[StringIO]:
 
 
 class CvodeStepper:
-    """One internal step of CVODE a call, the last one ending at the bound.
-
-    Parameters
-    ----------
-    rates : callable
-        Rates of the state at a time and a state.
-    t, bound : float
-        Where to begin and where to end.
-    y : ndarray
-        State at ``t``.
-    rtol, atol : float or ndarray
-        Tolerances of CVODE.
-
-    Raises
-    ------
-    MissingExtraError
-        If scikit-sundae is not installed.
-    """
+    """One internal step of CVODE a call, the last one ending at the bound."""
 
     def __init__(
         self, rates: Callable[[float, Array], Array], t: float, y: Array, bound: float, rtol: float, atol: Array | float

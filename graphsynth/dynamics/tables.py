@@ -103,37 +103,45 @@ class Compiled:
         """Number of coordinates."""
         return 3 * len(self.model.bodies)
 
+    @cached_property
+    def unit(self) -> Array:
+        """Unit of every coordinate: the characteristic length, or 1 for angles."""
+        return np.tile([self.tables.size, self.tables.size, 1.0], self.n // 3)
+
+    @cached_property
+    def row_unit(self) -> Array:
+        """Unit of every row: the characteristic length, or 1 for angles."""
+        return np.array([1.0 if info.angular else self.tables.size for info in self.info])
+
+    def _carried(self, sense: float, *parts: Array) -> list[Array]:
+        """Places, velocities, accelerations (as many as given) of centres from those of frames (+1), or back (-1)."""
+        arm = sense * np.exp(1j * parts[0][..., 2]) * (self.centres[self.moving] @ [1.0, 1j])
+        turns = [part[..., 2] for part in parts[1:]]
+        arms = [arm, *(1j * turn * arm for turn in turns)]
+        if len(turns) > 1:
+            arms[2] -= turns[0] ** 2 * arm
+        return [np.stack([p[..., 0] + r.real, p[..., 1] + r.imag, p[..., 2]], axis=-1) for p, r in zip(parts, arms)]
+
     def to_coordinates(self, poses: ArrayLike) -> Array:
         """Coordinates of the centres of mass, shape (..., n), from link poses (..., links, 3)."""
         pose = np.asarray(poses, dtype=np.float64)[..., self.moving, :]
-        arm = np.exp(1j * pose[..., 2]) * (self.centres[self.moving] @ [1.0, 1j])
-        q = np.stack([pose[..., 0] + arm.real, pose[..., 1] + arm.imag, pose[..., 2]], axis=-1)
-        return q.reshape(*pose.shape[:-2], self.n)
+        return self._carried(1.0, pose)[0].reshape(*pose.shape[:-2], self.n)
 
-    def to_rates(self, q: ArrayLike, rates: ArrayLike) -> Array:
-        """Velocities of the centres of mass (..., n) from link velocities (..., links, 3)."""
-        rate = np.asarray(rates, dtype=np.float64)[..., self.moving, :]
-        angle = np.asarray(q, dtype=np.float64).reshape(*rate.shape)[..., 2]
-        arm = 1j * np.exp(1j * angle) * (self.centres[self.moving] @ [1.0, 1j]) * rate[..., 2]
-        v = np.stack([rate[..., 0] + arm.real, rate[..., 1] + arm.imag, rate[..., 2]], axis=-1)
-        return v.reshape(*rate.shape[:-2], self.n)
+    def to_rates(self, q: ArrayLike, *rates: ArrayLike) -> Array:
+        """Velocities of the centres of mass (..., n) from link velocities (..., links, 3); with both, accelerations."""
+        parts = [np.asarray(part, dtype=np.float64)[..., self.moving, :] for part in rates]
+        shape = parts[0].shape
+        found = self._carried(1.0, np.asarray(q, dtype=np.float64).reshape(shape), *parts)
+        return found[-1].reshape(*shape[:-2], self.n)
 
     def to_links(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
         """Poses, velocities and accelerations of the link frames, each (..., links, 3)."""
         shape = np.shape(q)[:-1]
         parts = [np.asarray(part, dtype=np.float64).reshape(*shape, -1, 3) for part in (q, v, a)]
-        pose, rate, second = (np.zeros((*shape, self.links, 3)) for _ in range(3))
-        arm = -np.exp(1j * parts[0][..., 2]) * (self.centres[self.moving] @ [1.0, 1j])
-        speed, turn = parts[1][..., 2], parts[2][..., 2]
-        for target, part, extra in (
-            (pose, parts[0], arm),
-            (rate, parts[1], 1j * speed * arm),
-            (second, parts[2], (1j * turn - speed**2) * arm),
-        ):
-            target[..., self.moving, 0] = part[..., 0] + extra.real
-            target[..., self.moving, 1] = part[..., 1] + extra.imag
-            target[..., self.moving, 2] = part[..., 2]
-        return pose, rate, second
+        found = np.zeros((3, *shape, self.links, 3))
+        for target, part in zip(found, self._carried(-1.0, *parts)):
+            target[..., self.moving, :] = part
+        return found[0], found[1], found[2]
 
     @cached_property
     def drives(self) -> tuple[MotorDrive, ...]:
@@ -163,7 +171,7 @@ class Compiled:
     @property
     def spread(self) -> float:
         """Largest mass over the smallest, inertias taken by the characteristic length; infinite without mass."""
-        sizes = np.diag(self.tables.mass) * np.tile([1.0, 1.0, self.tables.size**-2], self.n // 3)
+        sizes = np.diag(self.tables.mass) * (self.unit / self.tables.size) ** 2
         return float(sizes.max() / sizes.min()) if sizes.min() > 0.0 else math.inf
 
     @property
@@ -205,13 +213,7 @@ class _Remembered:
 
 
 def compile_model(model: DynamicModel) -> Compiled:
-    """Compile a model.
-
-    Raises
-    ------
-    GeometryError
-        If a mass or an inertia is too small to be told from zero beside the others.
-    """
+    """Compile a model."""
     if not isinstance(model, DynamicModel):
         raise GeometryError(f"model = {model!r} is not a DynamicModel; build one from a mechanism and its bodies")
     mechanism = model.mechanism
@@ -362,12 +364,7 @@ def driver_row(model: DynamicModel, driver: Driver, centres: Array, slot: int) -
 def coordinate_row(compiled: Compiled, key: Sequence[Any], slot: int) -> tuple[int, int, int, list[float], bool]:
     """Row that prescribes a coordinate: ``(link, "x" | "y" | "theta")`` or ``(base, link)`` of a joint.
 
-    Returns kind, a, b, parameters and whether it is an angle.
-
-    Raises
-    ------
-    GeometryError
-        If the key names nothing that can be kept.
+    Kind, a, b, parameters and whether it is an angle; `GeometryError` for a key that names nothing.
     """
     model, frame = compiled.model, compiled.model.mechanism.frame
     try:

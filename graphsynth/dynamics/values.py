@@ -22,13 +22,7 @@ Array = NDArray[np.float64]
 
 
 def applied_loads(compiled: Compiled, t: float, q: Array, v: Array) -> Array:
-    """Generalised force of all loads given as functions, shape (n,).
-
-    Raises
-    ------
-    GeometryError
-        If a function returns something that is not a finite number (for a force: two of them).
-    """
+    """Generalised force of all loads given as functions, shape (n,); `GeometryError` unless they give finite numbers."""
     Q = np.zeros(compiled.n)
     column = compiled.tables.column
     for element in compiled.applied:
@@ -151,21 +145,11 @@ class Values:
         return self.compiled.driven(self.time)
 
     @cached_property
-    def row_scale(self) -> Array:
-        """Unit of every row: the characteristic length; 1 for angles."""
-        return np.array([1.0 if info.angular else self.size for info in self.compiled.info])
-
-    @cached_property
-    def column_scale(self) -> Array:
-        """Unit of every coordinate."""
-        return np.tile([self.size, self.size, 1.0], self.compiled.n // 3)
-
-    @cached_property
     def mass_root_inverse(self) -> Array:
         """``L^-T`` of the mass matrix; the units of the coordinates if there are massless links."""
         lower = self.compiled.tables.lower
         if not lower.size:
-            return np.diag(self.column_scale)
+            return np.diag(self.compiled.unit)
         return np.asarray(np.linalg.inv(lower).T)
 
     def system(self, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
@@ -179,7 +163,7 @@ class Values:
     def scaled_jacobian(self, q: Array) -> Array:
         """Jacobian without units."""
         J = self.system(q, np.zeros_like(q))[1]
-        return np.asarray(J * self.column_scale / self.row_scale[:, None])
+        return np.asarray(J * self.compiled.unit / self.compiled.row_unit[:, None])
 
     def extra(self, q: Array, rows: list[Any], wanted: Array) -> tuple[Array, Array]:
         """Values and Jacobian of additional prescribed coordinates."""
@@ -213,13 +197,7 @@ class Values:
 
 
 def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, rates: Array) -> tuple[Array, Array]:
-    """Coordinate and rate of an R or P joint at link poses and velocities (..., links, 3).
-
-    Raises
-    ------
-    GeometryError
-        If the links have no joint, or one without coordinate.
-    """
+    """Coordinate and rate of an R or P joint at link poses and velocities (..., links, 3)."""
     joint = mechanism.joint(base, link)
     if isinstance(joint, Revolute):
         return poses[..., link, 2] - poses[..., base, 2], rates[..., link, 2] - rates[..., base, 2]

@@ -39,15 +39,7 @@ _LENGTHS, _NODES = (2.0, 1.75, 2.3), 3
 class AugmentedForm:
     """State ``(q, v, currents, work)``; a solver workspace, not a result.
 
-    Attributes
-    ----------
-    loss : float
-        Kinetic energy removed by velocity projection so far (J).
-
-    Raises
-    ------
-    GeometryError
-        A body without mass or inertia.
+    ``loss`` is the kinetic energy removed by velocity projection so far (J).
     """
 
     name = "augmented"
@@ -84,7 +76,7 @@ class AugmentedForm:
         self._kernels = kernels
         self._fixed = compiled.driven(0.0)
         self._none, self._one = np.zeros(compiled.n), np.empty((1, 2 * compiled.n + len(compiled.tail)))
-        self._unit = np.tile([compiled.tables.size, compiled.tables.size, 1.0], compiled.n // 3)
+        self._unit = compiled.unit
         self._begin = np.concatenate([start.q, start.v, compiled.tail])
 
     def begin(self) -> Array:

@@ -109,13 +109,7 @@ def free_program(model: DynamicModel) -> Program:
 
 
 class OneCoordinateForm:
-    """State ``(theta, omega, currents, work)``; a solver workspace, not a result.
-
-    Raises
-    ------
-    GeometryError
-        A model without a one-coordinate form; the message says why.
-    """
+    """State ``(theta, omega, currents, work)``; a solver workspace, not a result."""
 
     name = "one-coordinate"
     loss = 0.0
@@ -419,12 +413,7 @@ def effective_inertia(model: DynamicModel, inputs: ArrayLike, **options: object)
     motion = simulate(replace(model.mechanism, drivers=(driver,)), inputs, events=False, **options)  # type: ignore[arg-type]
     q = compiled.to_coordinates(motion.poses)
     first = compiled.to_rates(q, motion.velocities)
-    arm = np.exp(1j * motion.poses[:, compiled.moving, 2]) * (compiled.centres[compiled.moving] @ [1.0, 1j])
-    w, e = motion.velocities[:, compiled.moving, 2], motion.accelerations[:, compiled.moving, 2]
-    extra = (1j * e - w**2) * arm
-    second = motion.accelerations[:, compiled.moving, :].copy()
-    second[..., 0] += extra.real
-    second[..., 1] += extra.imag
+    second = compiled.to_rates(q, motion.velocities, motion.accelerations)
     weighted = first @ compiled.tables.mass
     inertia = (weighted * first).sum(axis=1)
-    return InertiaCurve(motion.inputs, inertia, 2.0 * (weighted * second.reshape(first.shape)).sum(axis=1))
+    return InertiaCurve(motion.inputs, inertia, 2.0 * (weighted * second).sum(axis=1))

@@ -64,9 +64,8 @@ class PartitionedForm:
         self.contraction = 0.0
         self.pivot = 1.0
         self._kernels = kernels
-        T = compiled.tables
-        self._scale = np.tile([T.size, T.size, 1.0], compiled.n // 3)
-        self._row_scale = np.array([1.0 if info.angular else T.size for info in compiled.info])
+        self._scale = compiled.unit
+        self._row_scale = compiled.row_unit
         self._metric = np.diag(1.0 / self._scale)
         self._fixed, self._none, self.out = compiled.driven(0.0), np.zeros(compiled.n), np.zeros(7)
         self._near = start.q.copy()

@@ -26,20 +26,12 @@ _ROUNDS = 400
 
 
 def fitting_loads(elements: Sequence[FrictionElement], start: Array, slopes: Array) -> tuple[list[Array], bool]:
-    """Return all loads that fit, and whether these are known to be all.
+    """Return all loads of elements that slide which fit, and whether these are known to be all.
 
-    Where loads return to themselves with a factor below 1 there is one set, by substitution and Newton's method.
-    Beyond, guides are taken piece by piece (their loads are piecewise linear), and pins by the roots of quadratics;
-    with three pins or more that act on each other so strongly, not all solutions are known to be found.
-
-    Parameters
-    ----------
-    elements : sequence of FrictionElement
-        That slide.
-    start : ndarray, shape (m,)
-        Multipliers without their friction.
-    slopes : ndarray, shape (m, elements)
-        Change of the multipliers with the load of each.
+    ``start`` (m,) are the multipliers without their friction, ``slopes`` (m, elements) their change with each
+    load.  Where loads return to themselves with a factor below 1 there is one set, by substitution and Newton's
+    method.  Beyond, guides are taken piece by piece (their loads are piecewise linear), and pins by the roots of
+    quadratics; with three pins or more that act on each other so strongly, not all solutions are known to be found.
     """
     count = len(elements)
     if not count:
@@ -68,12 +60,7 @@ def fitting_loads(elements: Sequence[FrictionElement], start: Array, slopes: Arr
 def sliding_loads(elements: Sequence[FrictionElement], start: Array, slopes: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the loads of n samples at once, and where they are found: guides with one normal force that contract.
 
-    Parameters
-    ----------
-    elements : sequence of FrictionElement
-    start : ndarray, shape (n, m)
-    slopes : ndarray, shape (n, m, elements)
-        As in `fitting_loads`, for every sample.
+    ``start`` (n, m) and ``slopes`` (n, m, elements) are those of `fitting_loads`, for every sample.
     """
     if any(e.pin or e.length > 0.0 for e in elements):
         return np.zeros((len(start), len(elements))), np.zeros(len(start), dtype=np.bool_)

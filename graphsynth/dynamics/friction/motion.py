@@ -110,16 +110,8 @@ _QUIET = 1e-12
 class DryMotion:
     """The motion of a model with dry friction; a workspace.
 
-    Parameters
-    ----------
-    rows : FrictionRows
-    report : StartReport
-    make : callable
-        ``(compiled, report) -> Form``.
-    scales : callable
-        ``form -> natural sizes of its state``.
-    show : callable
-        ``(form, index, time, state, senses)`` at every output time.
+    ``make`` gives the formulation of a compiled model and a start, ``scales`` the natural sizes of its state; ``show``
+    is called with form, index, time, state and senses at every output time.
     """
 
     rows: FrictionRows

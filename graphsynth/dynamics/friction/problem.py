@@ -60,15 +60,8 @@ class FrictionSolution:
 class FrictionProblem:
     """The friction problem of a model at one state.
 
-    Parameters
-    ----------
-    rows : FrictionRows
-    t : float
-    q, v : ndarray, shape (n,)
-    slots : ndarray
-        Of gears and racks.
-    speed : float, optional
-        Largest velocity so far (characteristic lengths or radians per second), beside which rounding is judged.
+    ``speed`` is the largest velocity so far (characteristic lengths or radians per second), beside which rounding is
+    judged.
     """
 
     def __init__(self, rows: FrictionRows, t: float, q: Array, v: Array, slots: Array, speed: float = 0.0) -> None:
@@ -82,14 +75,14 @@ class FrictionProblem:
             T, kernels.state_rows(T, q, v), applied_loads(compiled, t, q, v), compiled.currents
         )
         self.rates = self.W @ v
-        size = np.tile([T.size, T.size, 1.0], compiled.n // 3)
+        size = compiled.unit
         self.speed = max(speed, float(np.abs(v / size).max()))
         self.noise = AT_REST * self.speed * (np.abs(self.W) @ size) + 1e-300
         self.speeds = self.rates * np.array([e.lever for e in self.elements])
         self._part = respond(rows, self._J, gam, Q, self.W)
         self.A = self.W @ self._part.G
         self.b = self.W @ self._part.a0 + offset
-        unit = np.tile([1.0, 1.0, 1.0 / T.size], compiled.n // 3)
+        unit = compiled.unit / T.size
         inertial = T.mass @ self._part.a0
         self._force = max(float(np.abs(part * unit).max()) for part in (Q, inertial, self._J.T @ self._part.lam0))
         inertia = np.diag(T.mass)
@@ -150,14 +143,8 @@ class FrictionProblem:
     ) -> tuple[list[FrictionSolution], bool]:
         """Return all solutions, and whether that is known to be all of them.
 
-        Parameters
-        ----------
-        sliding : mapping of int to int
-            Elements that slide, with their senses.
-        resting : iterable of int
-            Elements that stick or start to slide.
-        onset : iterable of int
-            Those of ``sliding`` that have just begun, with the friction of that instant.
+        ``sliding`` are elements that slide, with their senses, ``resting`` those that stick or start to slide;
+        ``onset`` are those of ``sliding`` that have just begun, with the friction of that instant.
         """
         begun = set(onset)
         free = [f for f in resting if not self.idle(f)]
@@ -441,8 +428,8 @@ def _respond_massless(rows: FrictionRows, J: Array, sides: Array, loads: Array) 
     """Return the same with links without mass, from the whole system; accelerations must be determined."""
     compiled = rows.compiled
     T, m = compiled.tables, len(J)
-    unit = np.tile([T.size, T.size, 1.0], compiled.n // 3)
-    row = np.array([1.0 if info.angular else T.size for info in compiled.info])
+    unit = compiled.unit
+    row = compiled.row_unit
     mass = (T.mass * unit) * unit[:, None]
     weight = float(np.abs(mass).max())
     Js = J * unit / row[:, None]

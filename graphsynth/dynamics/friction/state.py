@@ -31,20 +31,11 @@ class Decision:
 def decide(
     problem: FrictionProblem, sliding: dict[int, int], resting: Iterable[int], begun: Iterable[int] = ()
 ) -> Decision:
-    """Decide which elements stick and which slide from here on.
+    """Decide which of the elements at rest stick and which slide from here on.
 
-    An element that starts under its static friction goes on under the friction of sliding; where that is less at
-    once (two coefficients), others may start in turn.
-
-    Parameters
-    ----------
-    problem : FrictionProblem
-    sliding : dict of int to int
-        Elements that slide, with senses.
-    resting : iterable of int
-        Elements at rest.
-    begun : iterable of int
-        Those of ``sliding`` that begin to slide at this instant.
+    ``sliding`` elements have senses; those ``begun`` at this instant are among them.  An element that starts under its
+    static friction goes on under the friction of sliding; where that is less at once (two coefficients), others may
+    start in turn.
     """
     if not problem.good or not np.isfinite(problem.b).all():
         return Decision("", "")
