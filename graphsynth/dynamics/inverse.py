@@ -126,7 +126,7 @@ def inverse_dynamics(
     power_error = float(np.fmax.reduce(found.error, initial=0.0) / np.fmax.reduce(found.size, initial=1e-300))
     reactions = reactions_from_multipliers(compiled, q, v, lam, instants)
     efforts, power = _efforts(compiled, reactions, motion, rates)
-    second = _second_way(compiled, instants, (q, v, a, lam))
+    equilibrium = _equilibrium_error(compiled, instants, (q, v, a, lam))
     return InverseDynamics(
         motion.inputs,
         instants,
@@ -134,12 +134,12 @@ def inverse_dynamics(
         reactions,
         power,
         power_error,
-        second,
+        equilibrium,
         _motors(model, motion, efforts, rates),
     )
 
 
-def _second_way(compiled: Compiled, times: Array, states: tuple[Array, Array, Array, Array]) -> float:
+def _equilibrium_error(compiled: Compiled, times: Array, states: tuple[Array, Array, Array, Array]) -> float:
     """Difference to body-by-body equilibrium at up to 40 samples: coordinates, rates, accelerations, multipliers."""
     good = np.flatnonzero(np.isfinite(states[3]).all(axis=1))
     some = good[np.unique(np.linspace(0, len(good) - 1, min(len(good), 40)).astype(int))] if len(good) else good

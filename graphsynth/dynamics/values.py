@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def applied_loads(compiled: Compiled, t: float, q: Array, v: Array) -> Array:
-    """Generalised force of all loads given as functions, shape (n,); `GeometryError` unless they give finite numbers."""
+    """Generalised force (n,) of all loads given as functions; `GeometryError` unless they give finite numbers."""
     Q = np.zeros(compiled.n)
     column = compiled.tables.column
     for element in compiled.applied:

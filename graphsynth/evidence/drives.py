@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.run import run
 from graphsynth.dynamics.driven.setup import Plant, output_times, prepare
-from graphsynth.dynamics.motors import IdealSpeed, Motor, whole
-from graphsynth.dynamics.motors import Train
+from graphsynth.dynamics.motors import IdealSpeed, Motor, Train, whole
 from graphsynth.evidence.choice import seconds_text
 from graphsynth.evidence.precise_drive import NAME, Shape, precise_drive, shape_of_series
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of

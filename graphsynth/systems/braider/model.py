@@ -23,11 +23,11 @@ from graphsynth.dynamics.motors import (
     LinearCharacteristic,
     Motor,
     SynchronousMotor,
+    Train,
     check_motor,
     number,
     whole,
 )
-from graphsynth.dynamics.motors import Train
 from graphsynth.mechanism.joints import Revolute
 from graphsynth.mechanism.laws import Driver
 from graphsynth.mechanism.model import Mechanism, TracePoint

@@ -30,8 +30,7 @@ def table_of(context: Context) -> BraiderTable:
 
 def braider_of(context: Context) -> Braider:
     """Build the mechanism of the scene; a number that makes no sense is an error of the scene."""
-    from graphsynth.dynamics.motors import SynchronousMotor
-    from graphsynth.dynamics.motors import Train
+    from graphsynth.dynamics.motors import SynchronousMotor, Train
     from graphsynth.systems.braider.linkage import FourBar
     from graphsynth.systems.braider.model import Braider, Thread
 

@@ -17,8 +17,7 @@ from graphsynth.dynamics.driven.prescribed import prescribed_run
 from graphsynth.dynamics.driven.reduction import ReductionStudy, choose_motor, inductance_study, reduction_error
 from graphsynth.dynamics.driven.run import DriveRun, run
 from graphsynth.dynamics.driven.setup import Plant, load_coefficients
-from graphsynth.dynamics.motors import IdealSpeed, Motor, check_motor, number
-from graphsynth.dynamics.motors import Train
+from graphsynth.dynamics.motors import IdealSpeed, Motor, Train, check_motor, number
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform

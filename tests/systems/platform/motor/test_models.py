@@ -12,8 +12,7 @@ from graphsynth.core.errors import SpecError
 from graphsynth.dynamics.driven.inertia import EffectiveInertia
 from graphsynth.dynamics.driven.run import RunStatus, run
 from graphsynth.dynamics.driven.setup import Plant
-from graphsynth.dynamics.motors import DCMotor, LinearCharacteristic
-from graphsynth.dynamics.motors import Train
+from graphsynth.dynamics.motors import DCMotor, LinearCharacteristic, Train
 from graphsynth.systems.platform.motor_model import MotorDrivenPlatform
 
 SOURCE = MotorDrivenPlatform.source
