@@ -123,7 +123,7 @@ CALLS: dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]] = {
     "closure of a platform": lambda: (of("rank_check", "platform_loop_closure"), turn()),
     "small crank": lambda: (of("small_crank", "small_crank"), {"mechanism": DRIVEN}),
     "rockers": lambda: (of("small_crank", "small_crank")(DRIVEN).rockers, {"psi": [0.0]}),
-    "sweep": lambda: (of("sweep", "cold_sweep"), {"mechanism": DRIVEN, "samples": 8}),
+    "sweep": lambda: (of("small_crank", "cold_sweep"), {"mechanism": DRIVEN, "samples": 8}),
     "workspace": lambda: (of("workspace", "constant_orientation_workspace"), ON | {"sigma": SIGMA, "tolerance": 1e-9}),
     "points of a workspace": lambda: (
         of("workspace", "constant_orientation_workspace")(G1, 0.1).contains, {"points": [1j]},
