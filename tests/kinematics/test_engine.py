@@ -18,7 +18,7 @@ from graphsynth.mechanism.joints import Gear, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver, Harmonic, Linear
 from graphsynth.mechanism.model import Mechanism
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.systems.platform.plane import directions
+from graphsynth.systems.platform.parallel_platform import directions
 from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 TURN = np.linspace(0.0, math.tau, 361)

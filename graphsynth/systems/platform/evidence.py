@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from inspect import signature
@@ -16,6 +16,7 @@ from graphsynth.core.errors import GeometryError, GraphsynthError
 from graphsynth.evidence.choice import seconds_text
 from graphsynth.evidence.rows import Effort, Problem, Row, RowStatus, best_of
 from graphsynth.systems.platform.evidence_direct import Proved, assessed, eigenvalue_modes, precise_modes, proof_row
+from graphsynth.systems.platform.motion import distance
 
 if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
@@ -119,7 +120,7 @@ def precise_branch(mechanism: SingleMotorPlatform, psi: Array, near: Array) -> A
                 anchors.append((mpmath.mpc(mechanism.pivot[k]) + arm) * turn[k])
             vertices = [mpmath.mpc(mechanism.vertex[k]) * turn[k] for k in range(3)]
             modes = precise_modes(anchors, vertices, mechanism.l2)
-            found.append(modes[int(np.argmin(_apart(modes, guess, mechanism.Lc)))])
+            found.append(modes[int(np.argmin(distance(modes, guess, mechanism.Lc)))])
     return np.array(found)
 
 
@@ -136,12 +137,6 @@ def _circle(pin: Any, pivot: Any, mechanism: SingleMotorPlatform, k: int) -> Any
     return w / D * mpmath.expj(mechanism.tau[k] * mpmath.acos(cosine))
 
 
-def _apart(poses: Array, guess: Array, Lc: float) -> Array:
-    d = np.atleast_2d(poses) - guess
-    turn = np.angle(np.exp(1j * d[..., 2]))
-    return np.asarray(np.sqrt((d[..., 0] ** 2 + d[..., 1] ** 2) / Lc**2 + turn**2))
-
-
 def turn_problem(mechanism: SingleMotorPlatform, effort: Effort | None = None) -> Problem:
     """Compare continuation, the full turn with all modes, the modes alone and the certificate.
 
@@ -153,52 +148,34 @@ def turn_problem(mechanism: SingleMotorPlatform, effort: Effort | None = None) -
     if not followed.complete:
         raise GeometryError(f"the branch ends within the turn: {followed.reason}")
     truth = precise_branch(mechanism, psi, followed.pose)
-    rows: list[Row] = []
-    for count in (13, 37, 73) if effort.quick else (13, 37, 361, 3601, 36_001):
-        grid = np.linspace(0.0, math.tau, count)
-        rows.append(_turn_row(mechanism, "continuation", count, truth, effort, partial(_swept, mechanism, grid)))
-    for count in (13, 37, 73) if effort.quick else (37, 361, 3601):
-        grid = np.linspace(0.0, math.tau, count)
-        rows.append(
-            _turn_row(
-                mechanism,
-                "continuation, all modes compared, events",
-                count,
-                truth,
-                effort,
-                partial(_turned, mechanism, grid),
-            )
-        )
+    quick, rows = (13, 37, 73), list[Row]()
+    ways = (
+        ("continuation", mechanism.sweep, quick if effort.quick else (13, 37, 361, 3601, 36_001)),
+        ("continuation, all modes compared, events", mechanism.full_turn, quick if effort.quick else (37, 361, 3601)),
+    )
+    for method, follow, counts in ways:
+        rows += [_turn_row(mechanism, method, follow, count, truth, effort) for count in counts]
     limit = _default_boxes()
     rows += [_proof(mechanism, boxes, truth, psi, effort) for boxes in sorted({40, 400, limit})]
     question = "The home branch of the platform of the scene over a turn of the wheels"
     return Problem("turn", question, "relative", tuple(rows), "position")
 
 
-def _swept(mechanism: SingleMotorPlatform, psi: Array) -> Array:
-    return mechanism.sweep(psi).pose
-
-
-def _turned(mechanism: SingleMotorPlatform, psi: Array) -> Array:
-    return mechanism.full_turn(psi).pose
-
-
-def _turn_row(mechanism: SingleMotorPlatform, method: str, count: int, truth: Array, effort: Effort, run: Any) -> Row:
-    found, seconds, rounds = best_of(run, effort)
+def _turn_row(
+    mechanism: SingleMotorPlatform,
+    method: str,
+    follow: Callable[[Array], Any],
+    count: int,
+    truth: Array,
+    effort: Effort,
+) -> Row:
+    grid = np.linspace(0.0, math.tau, count)
+    found, seconds, rounds = best_of(lambda: follow(grid).pose, effort)
     nodes = found[:: (count - 1) // _NODES]
     whole = len(found) == count and bool(np.isfinite(nodes).all())
-    error = float(_apart(nodes, truth, mechanism.Lc).max()) if whole else math.nan
-    return Row(
-        method,
-        f"{count} positions",
-        error,
-        seconds / count,
-        rounds,
-        _KIND,
-        _REFERENCE,
-        RowStatus.OK if whole else RowStatus.FAILED,
-        "" if whole else "the branch is lost",
-    )
+    error = float(distance(nodes, truth, mechanism.Lc).max()) if whole else math.nan
+    verdict = (RowStatus.OK, "") if whole else (RowStatus.FAILED, "the branch is lost")
+    return Row(method, f"{count} positions", error, seconds / count, rounds, _KIND, _REFERENCE, *verdict)
 
 
 def _default_boxes() -> int:
@@ -216,32 +193,19 @@ def _proof(mechanism: SingleMotorPlatform, boxes: int, truth: Array, psi: Array,
         found, seconds, rounds = best_of(lambda: certify_full_turn(mechanism, max_boxes=boxes), effort)
     except GraphsynthError as error:
         return Row(method, f"{boxes} boxes", math.nan, math.nan, 0, kind, "", RowStatus.FAILED, str(error))
-    default, setting = boxes == _default_boxes(), f"up to {boxes} boxes"
+    flags, setting = (boxes == _default_boxes(), True), f"up to {boxes} boxes"
     if not found.certified:
-        return Row(
-            method, setting, math.nan, seconds, rounds, kind, "", RowStatus.FAILED, found.statement, default, True
-        )
-    radii, why = [], ""
+        verdict = (RowStatus.FAILED, found.statement)
+        return Row(method, setting, math.nan, seconds, rounds, kind, "", *verdict, *flags)
+    radii, verdict = [], (RowStatus.OK, "")
     for angle, right in zip(psi[:-1], truth):
         pose, radius = found.enclosure(float(angle))
         scaled = float(np.linalg.norm(np.asarray(radius) / [mechanism.Lc, mechanism.Lc, 1.0]))
-        if _apart(np.asarray(pose), right, mechanism.Lc).max() > scaled + 1e-15:
-            why = "the reference lies outside of what is proved"
+        if distance(np.asarray(pose), right, mechanism.Lc) > scaled + 1e-15:
+            verdict = (RowStatus.FAILED, "the reference lies outside of what is proved")
         radii.append(scaled)
-    status = RowStatus.FAILED if why else RowStatus.OK
-    return Row(
-        method,
-        setting,
-        max(radii),
-        seconds,
-        rounds,
-        kind,
-        "none needed; checked to hold the pose with 50 digits",
-        status,
-        why,
-        default,
-        True,
-    )
+    reference = "none needed; checked to hold the pose with 50 digits"
+    return Row(method, setting, max(radii), seconds, rounds, kind, reference, *verdict, *flags)
 
 
 def double_root_problem(effort: Effort | None = None) -> Problem:

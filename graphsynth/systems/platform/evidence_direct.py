@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from inspect import signature
 from typing import TYPE_CHECKING, Any
@@ -57,20 +58,9 @@ def assessed(
     gaps = [_away(np.asarray(one), right, size) for one, right in zip(found, truth)]
     wrong = sum(not math.isfinite(gap) for gap in gaps)
     error = max((gap for gap in gaps if math.isfinite(gap)), default=math.nan)
-    if wrong:
-        return Row(
-            method,
-            setting,
-            math.nan,
-            seconds,
-            rounds,
-            _KIND,
-            _REFERENCE,
-            RowStatus.FAILED,
-            f"another number of modes than the reference in {wrong} of {len(gaps)} problems",
-            **more,
-        )
-    return Row(method, setting, error, seconds, rounds, _KIND, _REFERENCE, **more)
+    why = f"another number of modes than the reference in {wrong} of {len(gaps)} problems" if wrong else ""
+    status, error = (RowStatus.FAILED, math.nan) if wrong else (RowStatus.OK, error)
+    return Row(method, setting, error, seconds, rounds, _KIND, _REFERENCE, status, why, **more)
 
 
 def _split(problem: NDArray[np.intp], poses: Array, count: int) -> list[Array]:
@@ -122,20 +112,10 @@ def _one_mode(
         run = partial(_fsolve, platform, [(theta[k], truth[k][0]) for k in which], size, tol)
         found, seconds, rounds = best_of(run, effort)
         worst = max(_away(X[None], truth[k][:1], size) for X, k in zip(found, which))
-        lost = worst > 1e-3
-        rows.append(
-            Row(
-                "scipy fsolve, one mode",
-                f"tol {tol:.0e}",
-                worst,
-                seconds / len(which),
-                rounds,
-                _KIND,
-                _REFERENCE,
-                RowStatus.UNRELIABLE if lost else RowStatus.OK,
-                "it ends at another mode or at none" if lost else "",
-            )
-        )
+        lost = (RowStatus.UNRELIABLE, "it ends at another mode or at none")
+        verdict = lost if worst > 1e-3 else (RowStatus.OK, "")
+        cost = (seconds / len(which), rounds)
+        rows.append(Row("scipy fsolve, one mode", f"tol {tol:.0e}", worst, *cost, _KIND, _REFERENCE, *verdict))
     return rows
 
 
@@ -162,31 +142,13 @@ def _proved_rows(
     rows = []
     for many in (n, 4 * n) if effort.quick else (1, n, 10 * n):
         tiled = np.resize(theta, (many, 3))
-        rows.append(
-            proof_row(
-                "certified, balls of doubles",
-                f"{many} at once",
-                partial(_batch, platform, tiled, size),
-                truth[: min(many, n)],
-                size,
-                many,
-                effort,
-            )
-        )
-    few = min(n, 2 if effort.quick else 6)
-    rows += [
-        proof_row(
-            "certified, one by one",
-            f"up to {bits} bits",
-            partial(_singly, platform, theta[:few], bits, size),
-            truth[:few],
-            size,
-            few,
-            effort,
-            default=bits == signature(certify_direct).parameters["max_bits"].default,
-        )
-        for bits in (64, 128, 512)
-    ]
+        run, right = partial(_batch, platform, tiled, size), truth[: min(many, n)]
+        rows.append(proof_row("certified, balls of doubles", f"{many} at once", run, right, size, many, effort))
+    few, usual = min(n, 2 if effort.quick else 6), signature(certify_direct).parameters["max_bits"].default
+    for bits in (64, 128, 512):
+        run = partial(_singly, platform, theta[:few], bits, size)
+        row = proof_row("certified, one by one", f"up to {bits} bits", run, truth[:few], size, few, effort)
+        rows.append(replace(row, default=bits == usual))
     return rows
 
 
@@ -225,15 +187,13 @@ def proof_row(
     size: float,
     many: int,
     effort: Effort,
-    *,
-    default: bool = False,
 ) -> Row:
     """Row of a method that proves: its radius, and whether the reference lies within."""
     kind = "largest proved radius"
     try:
         found, seconds, rounds = best_of(run, effort)
     except GraphsynthError as error:  # the extra is not installed
-        return Row(method, setting, math.nan, math.nan, 0, kind, "", RowStatus.FAILED, str(error), default)
+        return Row(method, setting, math.nan, math.nan, 0, kind, "", RowStatus.FAILED, str(error))
     reference = f"none needed; checked to hold the modes with {DIGITS} digits"
     open_ = sum(one is None for one in found[: len(truth)])
     why = f"undecided in {open_} of {len(truth)} problems" if open_ else ""
@@ -241,20 +201,9 @@ def proof_row(
         if one is not None and not _away(one[0], right, size) <= one[1] + 1e-15:
             why = "the reference lies outside of what is proved"
     radius = max((one[1] for one in found if one is not None), default=math.nan)
-    status = RowStatus.FAILED if why else RowStatus.OK
-    return Row(
-        method,
-        setting,
-        math.nan if why else radius,
-        seconds / many,
-        rounds,
-        kind,
-        reference,
-        status,
-        why,
-        default,
-        True,
-    )
+    verdict = (RowStatus.FAILED if why else RowStatus.OK, why)
+    radius = math.nan if why else radius
+    return Row(method, setting, radius, seconds / many, rounds, kind, reference, *verdict, proved=True)
 
 
 def precise_modes(anchors: Sequence[Any], vertices: Sequence[complex], lengths: Sequence[float]) -> Array:

@@ -35,8 +35,7 @@ from graphsynth.systems.platform.motion import (
     track,
     wheel_angles,
 )
-from graphsynth.systems.platform.parallel_platform import ParallelPlatform
-from graphsynth.systems.platform.plane import directions
+from graphsynth.systems.platform.parallel_platform import ParallelPlatform, directions
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph

@@ -16,10 +16,15 @@ from numpy.typing import NDArray
 
 from graphsynth.core.checks import checked, finite, whole
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.conic import BoundaryCircle, leg_circles
-from graphsynth.systems.platform.field import characteristic_length, determinant, pose_grid, working_mode
-from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform
-from graphsynth.systems.platform.plane import cross
+from graphsynth.systems.platform.field import (
+    BoundaryCircle,
+    characteristic_length,
+    determinant,
+    leg_circles,
+    pose_grid,
+    working_mode,
+)
+from graphsynth.systems.platform.parallel_platform import WORKING_MODES, ParallelPlatform, cross
 from graphsynth.systems.platform.workspace import Arc, constant_orientation_workspace
 
 Array = NDArray[np.float64]

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.core.checks import checked, finite, finite_array, positive, three
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.conic import BoundaryCircle, Limits, leg_circles, meet
-from graphsynth.systems.platform.field import working_mode
+from graphsynth.systems.platform.field import BoundaryCircle, Limits, leg_circles, meet, working_mode
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
 
 #: Circles closer to tangency than this fraction of the largest length are treated and reported as tangent.

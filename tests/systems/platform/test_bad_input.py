@@ -10,7 +10,7 @@ import pytest
 
 from graphsynth.core.errors import GeometryError
 from graphsynth.systems.platform.attainable import ellipticity
-from graphsynth.systems.platform.conic import singular_conic
+from graphsynth.systems.platform.field import singular_conic
 from graphsynth.systems.platform.inverse_design import linear_design, rotation_about, translation_along
 from graphsynth.systems.platform.maps import aspects, platform_map, quality
 from graphsynth.systems.platform.orientations import orientations, reachable_workspace

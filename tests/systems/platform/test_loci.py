@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from graphsynth.core.errors import GeometryError
-from graphsynth.systems.platform.conic import singular_conic
+from graphsynth.systems.platform.field import singular_conic
 from graphsynth.systems.platform.maps import aspects
 from graphsynth.systems.platform.orientations import orientations, reachable_workspace, total_orientation_workspace
 from graphsynth.systems.platform.parallel_platform import ParallelPlatform
