@@ -46,26 +46,14 @@ class Spent:
         self.most, self.count = most, 0
 
     def add(self, attributes: Mapping[str, str], place: str) -> None:
-        """Count the values of an element.
-
-        Raises
-        ------
-        FormatError
-            If they are too many.
-        """
+        """Count the values of an element; refuse too many."""
         self.count += sum(map(len, attributes.values()))
         if self.count > self.most:
             raise FormatError(f"the attributes, defaults included, have more than {self.most} characters", place)
 
 
 def attributes_of(item: Item) -> tuple[MechanismGraph, dict[str, str], list[dict[str, str]]]:
-    """Return the graph, its attributes, and those of its joints in the order of ``graph.joints``.
-
-    Raises
-    ------
-    GeometryError
-        If a driver has a law that cannot be written.
-    """
+    """Return the graph, its attributes, and those of its joints in the order of ``graph.joints``."""
     graph = item.graph if isinstance(item, Mechanism) else item
     own = {"space": str(graph.space)}
     if graph.frame is not None:
@@ -84,14 +72,9 @@ def _compact(value: object) -> str:
 
 
 def item_from(nodes: Sequence[str], edges: Sequence[Edge], own: Mapping[str, str], place: str, spent: Spent) -> Item:
-    """Build what :func:`attributes_of` describes.
+    """Build what :func:`attributes_of` describes; anything else is a `FormatError`, with the place.
 
     Vertices named 0..N-1 keep their number; others are numbered in their order.  ``spent`` bounds the work.
-
-    Raises
-    ------
-    FormatError
-        Anything that is no graph or no mechanism, with the place.
     """
     if not 1 <= len(nodes) <= LINKS_MAX:
         raise FormatError(f"{len(nodes)} vertices; a mechanism graph has 1 to {LINKS_MAX} links", place)

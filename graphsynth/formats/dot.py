@@ -193,18 +193,7 @@ class _Reader:
 
 
 def parse(text: str) -> Iterator[Item]:
-    """Read every graph of a DOT text.
-
-    Raises
-    ------
-    FormatError
-        For anything that is not DOT of simple undirected graphs, with the line.
-
-    Examples
-    --------
-    >>> next(parse('graph { frame=a; a -- b -- c -- a [mobility=1] }')).to_text()
-    'Bw f0'
-    """
+    """Read every graph of a DOT text; anything else is a `FormatError`, with the line."""
     reader = _Reader(text)
     if not reader.tokens:
         raise FormatError("the text holds no graph", "end")

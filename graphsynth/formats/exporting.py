@@ -51,7 +51,7 @@ def carrier_of(model: DynamicModel, gear: Gear) -> int:
 
 
 def _bears(model: DynamicModel, link: int, wheel: int, centre: Point) -> bool:
-    """Whether the centre of a wheel is fixed in a link: turning pairs of both, at one point of one link."""
+    """Whether the centre of a wheel is fixed in a link: revolute joints of both, at one point of one link."""
     for middle, spot in [(wheel, centre), *_hinges(model, wheel, centre)]:
         if middle == link or any(other == link for other, _ in _hinges(model, middle, spot)):
             return True
@@ -115,10 +115,10 @@ class SpanningTree:
 
 @checked
 def spanning_tree(mechanism: Mechanism) -> SpanningTree:
-    """Choose the tree: sliding pairs and slots stay in it, turning pairs are cut, the depth is small (exact).
+    """Choose the tree: prismatic joints and slots stay in it, revolute joints are cut, the depth is small (exact).
 
-    A cut turning pair is one pair of points that coincide, which every engine knows; a cut sliding pair is not.  So
-    the tree holds as many sliding pairs and slots as it can, and the rest is filled breadth first from the frame.
+    A cut revolute joint is one pair of points that coincide, which every engine knows; a cut prismatic joint is not.
+    So the tree holds as many prismatic joints and slots as it can, and the rest is filled breadth first from the frame.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def spanning_tree(mechanism: Mechanism) -> SpanningTree:
             layer.extend(_component(joints, slides, other, seen, edges))
     missing = sorted(set(range(mechanism.graph.links)) - seen)
     if missing:
-        raise GraphError(f"links {missing} hang on gears or cams alone; give each a turning or sliding pair")
+        raise GraphError(f"links {missing} hang on gears or cams alone; give each a revolute or prismatic joint")
     used = {index for *_, index in edges}
     return SpanningTree(tuple(edges), tuple(k for k in range(len(joints)) if k not in used))
 
@@ -173,7 +173,7 @@ def _across(joint: JointGeometry, link: int) -> int | None:
 
 
 def _forest(mechanism: Mechanism) -> set[int]:
-    """Sliding pairs, then slots, without a cycle (Kruskal)."""
+    """Prismatic joints, then slots, without a cycle (Kruskal)."""
     root = list(range(mechanism.graph.links))
 
     def find(link: int) -> int:
@@ -253,17 +253,28 @@ class EngineRun:
         return self.status == "completed"
 
 
+def finished(
+    engine: str,
+    version: str,
+    settings: Any,
+    times: Array,
+    motion: tuple[Array, Array],
+    message: str,
+    steps: int,
+    seconds: float,
+) -> EngineRun:
+    """Return a run; it failed if there is a message."""
+    status, said = ("failed", message) if message else ("completed", "reached the last output time")
+    return EngineRun(engine, version, settings.text, settings.step, times, *motion, status, said, steps, seconds)
+
+
 def load_engine(name: str) -> Any:
     """Import an engine; `MissingExtraError` if it is not installed."""
     return need(name, "crosscheck", "a run in another engine")
 
 
 def steps_between(times: ArrayLike, step: float) -> tuple[Array, list[int]]:
-    """Return the times and the whole numbers of steps from the first to each of them.
-
-    >>> steps_between([0.0, 0.5, 2.0], 0.25)[1]
-    [0, 2, 8]
-    """
+    """Return the times and the whole numbers of steps from the first to each of them."""
     grid = finite_array("times", times, nan=True)
     if grid.ndim != 1 or grid.size < 2 or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
         raise GeometryError("times must be a list of two or more finite numbers that increase; sort them")

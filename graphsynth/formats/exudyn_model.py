@@ -24,6 +24,7 @@ from graphsynth.formats.exporting import (
     check_common,
     check_settings,
     constant_torque,
+    finished,
     gear_weights,
     load_engine,
     steps_between,
@@ -121,27 +122,28 @@ class _Work:
     def angle(self, link: int) -> float:
         return float(self.start.poses[link, 2])
 
+    def add(self, kind: str, **fields: Any) -> Any:
+        """Add an item of the engine; its kind begins with Node, Object, Marker, Load or Sensor."""
+        what = next(what for what in ("Node", "Object", "Marker", "Load", "Sensor") if kind.startswith(what))
+        return getattr(self.system, f"Add{what}")(getattr(self.items, kind)(**fields))
+
     def spot(self, link: int, at: Point) -> Any:
         """Marker at a point of a link."""
         body = self.model.bodies.get(link)
         x, y = (at[0] - body.centre[0], at[1] - body.centre[1]) if body else at
-        return self.system.AddMarker(
-            self.items.MarkerBodyRigid(bodyNumber=self.export.bodies[link], localPosition=[x, y, 0.0])
-        )
+        return self.add("MarkerBodyRigid", bodyNumber=self.export.bodies[link], localPosition=[x, y, 0.0])
 
     def turning(self, link: int) -> Any:
         """Marker at the angle of a link."""
         coordinate = 2 if link != self.model.mechanism.frame else 0
-        return self.system.AddMarker(
-            self.items.MarkerNodeCoordinate(nodeNumber=self.export.nodes[link], coordinate=coordinate)
-        )
+        return self.add("MarkerNodeCoordinate", nodeNumber=self.export.nodes[link], coordinate=coordinate)
 
 
 def to_exudyn(model: DynamicModel, start: StartReport) -> ExudynModel:
     """Assemble a model in exudyn (floating point; the engine's own types).
 
     One rigid body for each link, R and P joints and slots as 2D joints, gear pairs as constraints between two angles,
-    springs, dampers, constant forces and torques, drivers of turning pairs on velocity level.
+    springs, dampers, constant forces and torques, drivers of revolute joints on velocity level.
 
     Parameters
     ----------
@@ -156,7 +158,7 @@ def to_exudyn(model: DynamicModel, start: StartReport) -> ExudynModel:
     ------
     GeometryError
         What is not exported: cams, racks, gear pairs among three moving links, joint friction, loads that are
-        functions, driven sliding pairs, rotors between two moving links, massless links; an inconsistent start.
+        functions, driven prismatic joints, rotors between two moving links, massless links; an inconsistent start.
     GraphsynthError
         exudyn is not installed.
 
@@ -178,31 +180,24 @@ def to_exudyn(model: DynamicModel, start: StartReport) -> ExudynModel:
 
 
 def _add_bodies(work: _Work) -> None:
-    items, system, export, start = work.items, work.system, work.export, work.start
-    frame = work.model.mechanism.frame
-    export.nodes[frame] = system.AddNode(items.NodePointGround())
-    export.bodies[frame] = system.AddObject(items.ObjectGround())
+    export, start, frame = work.export, work.start, work.model.mechanism.frame
+    kind = work.exu.OutputVariableType
+    export.nodes[frame], export.bodies[frame] = work.add("NodePointGround"), work.add("ObjectGround")
     for k, (link, body) in enumerate(work.model.bodies.items()):
         place, rate = start.q[3 * k : 3 * k + 3], start.v[3 * k : 3 * k + 3]
-        node = system.AddNode(
-            items.NodeRigidBody2D(
-                referenceCoordinates=[float(place[0]), float(place[1]), work.angle(link)],
-                initialCoordinates=[0.0, 0.0, 0.0],
-                initialVelocities=[float(v) for v in rate],
-            )
+        node = export.nodes[link] = work.add(
+            "NodeRigidBody2D",
+            referenceCoordinates=[float(place[0]), float(place[1]), work.angle(link)],
+            initialCoordinates=[0.0, 0.0, 0.0],
+            initialVelocities=[float(v) for v in rate],
         )
         inertia = body.inertia + _rotor(work.model, link)
-        export.nodes[link] = node
-        export.bodies[link] = system.AddObject(
-            items.ObjectRigidBody2D(mass=body.mass, inertia=inertia, nodeNumber=node)
-        )
+        export.bodies[link] = work.add("ObjectRigidBody2D", mass=body.mass, inertia=inertia, nodeNumber=node)
         gravity = [body.mass * g for g in (*work.model.gravity, 0.0)]
-        system.AddLoad(items.LoadForceVector(markerNumber=work.spot(link, body.centre), loadVector=gravity))
-        kind = work.exu.OutputVariableType
+        work.add("LoadForceVector", markerNumber=work.spot(link, body.centre), loadVector=gravity)
+        kept = {"nodeNumber": node, "storeInternal": True, "writeToFile": False}
         first, second = (
-            system.AddSensor(
-                items.SensorNode(nodeNumber=node, storeInternal=True, writeToFile=False, outputVariableType=variable)
-            )
+            work.add("SensorNode", outputVariableType=variable, **kept)
             for variable in (kind.Coordinates, kind.Coordinates_t)
         )
         export.sensors[link] = (first, second)
@@ -221,22 +216,19 @@ def _rotor(model: DynamicModel, link: int) -> float:
 
 
 def _add_joint(work: _Work, joint: Any) -> None:
-    items, system = work.items, work.system
     if isinstance(joint, Revolute | Rigid):
         spots = [work.spot(joint.a, joint.at_a), work.spot(joint.b, joint.at_b)]
-        system.AddObject(items.ObjectJointRevolute2D(markerNumbers=spots))
+        work.add("ObjectJointRevolute2D", markerNumbers=spots)
         if isinstance(joint, Rigid):
-            turns = [work.turning(joint.a), work.turning(joint.b)]
-            system.AddObject(items.ObjectConnectorCoordinate(markerNumbers=turns))
+            work.add("ObjectConnectorCoordinate", markerNumbers=[work.turning(joint.a), work.turning(joint.b)])
     elif isinstance(joint, Prismatic | PinSlot):
         along = turn(joint.angle_b, (1.0, 0.0)) if isinstance(joint, Prismatic) else (1.0, 0.0)
-        system.AddObject(
-            items.ObjectJointPrismatic2D(  # the line belongs to the second marker
-                markerNumbers=[work.spot(joint.b, joint.at_b), work.spot(joint.a, joint.at_a)],
-                axisMarker0=[*along, 0.0],
-                normalMarker1=[*turn(joint.angle_a, (0.0, 1.0)), 0.0],
-                constrainRotation=isinstance(joint, Prismatic),
-            )
+        work.add(
+            "ObjectJointPrismatic2D",  # the line belongs to the second marker
+            markerNumbers=[work.spot(joint.b, joint.at_b), work.spot(joint.a, joint.at_a)],
+            axisMarker0=[*along, 0.0],
+            normalMarker1=[*turn(joint.angle_a, (0.0, 1.0)), 0.0],
+            constrainRotation=isinstance(joint, Prismatic),
         )
     elif isinstance(joint, Gear):
         _add_gear(work, joint)
@@ -250,21 +242,17 @@ def _add_gear(work: _Work, gear: Gear) -> None:
     if len(weights) != 2:
         raise GeometryError(f"gear pair {gear.a}-{gear.b} turns with a moving carrier: exported to MuJoCo only")
     (k, wk), (m, wm) = weights.items()
-    work.system.AddObject(
-        work.items.ObjectConnectorCoordinate(markerNumbers=[work.turning(k), work.turning(m)], factor1=-wm / wk)
-    )
+    work.add("ObjectConnectorCoordinate", markerNumbers=[work.turning(k), work.turning(m)], factor1=-wm / wk)
 
 
 def _add_element(work: _Work, element: Element) -> None:
-    items, system = work.items, work.system
     if isinstance(element, Spring):
-        system.AddObject(
-            items.ObjectConnectorSpringDamper(
-                markerNumbers=[work.spot(element.a, element.at_a), work.spot(element.b, element.at_b)],
-                referenceLength=element.free_length,
-                stiffness=element.stiffness,
-                damping=element.damping,
-            )
+        work.add(
+            "ObjectConnectorSpringDamper",
+            markerNumbers=[work.spot(element.a, element.at_a), work.spot(element.b, element.at_b)],
+            referenceLength=element.free_length,
+            stiffness=element.stiffness,
+            damping=element.damping,
         )
     elif isinstance(element, TorsionSpring):
         rest = element.free_angle - (work.angle(element.b) - work.angle(element.a))
@@ -274,23 +262,15 @@ def _add_element(work: _Work, element: Element) -> None:
     elif isinstance(element, Force):
         if callable(element.force):
             raise GeometryError(f"force on link {element.link} is a function; an exported one must be constant")
-        system.AddLoad(
-            items.LoadForceVector(
-                markerNumber=work.spot(element.link, element.at),
-                loadVector=[*element.force, 0.0],
-                bodyFixed=element.frame == "body",
-            )
-        )
+        where, load = work.spot(element.link, element.at), [*element.force, 0.0]
+        work.add("LoadForceVector", markerNumber=where, loadVector=load, bodyFixed=element.frame == "body")
     else:
         raise GeometryError(f"{type(element).__name__} is not exported to exudyn; leave it out")
 
 
 def _torsion(work: _Work, a: int, b: int, stiffness: float, damping: float, rest: float) -> None:
-    work.system.AddObject(
-        work.items.ObjectConnectorCoordinateSpringDamper(
-            markerNumbers=[work.turning(a), work.turning(b)], stiffness=stiffness, damping=damping, offset=rest
-        )
-    )
+    spring = {"stiffness": stiffness, "damping": damping, "offset": rest}
+    work.add("ObjectConnectorCoordinateSpringDamper", markerNumbers=[work.turning(a), work.turning(b)], **spring)
 
 
 def _add_torque(work: _Work, element: Torque | TorqueSource) -> None:
@@ -299,22 +279,19 @@ def _add_torque(work: _Work, element: Torque | TorqueSource) -> None:
         _torsion(work, element.a, element.b, 0.0, damping, 0.0)
     for link, load in ((element.a, -torque), (element.b, torque)):
         if link != work.model.mechanism.frame:
-            work.system.AddLoad(work.items.LoadCoordinate(markerNumber=work.turning(link), load=load))
+            work.add("LoadCoordinate", markerNumber=work.turning(link), load=load)
 
 
 def _add_driver(work: _Work, driver: Driver) -> None:
     if not isinstance(work.model.mechanism.joint(*driver.pair), Revolute):
-        raise GeometryError(f"driver {driver.base}-{driver.link} of a sliding pair is not exported to exudyn")
+        raise GeometryError(f"driver {driver.base}-{driver.link} of a prismatic joint is not exported to exudyn")
 
     def rate(system: Any, t: float, item: int, offset: float) -> float:
         return float(driver.law(np.array([t]))[1][0])
 
     turns = [work.turning(driver.base), work.turning(driver.link)]
-    work.system.AddObject(
-        work.items.ObjectConnectorCoordinate(
-            markerNumbers=turns, velocityLevel=True, offsetUserFunction_t=rate, offsetUserFunction=lambda *_: 0.0
-        )
-    )
+    held = {"velocityLevel": True, "offsetUserFunction_t": rate, "offsetUserFunction": lambda *_: 0.0}
+    work.add("ObjectConnectorCoordinate", markerNumbers=turns, **held)
 
 
 def run_exudyn(
@@ -365,19 +342,8 @@ def run_exudyn(
     poses, rates = _collect(export, model, start, grid, [n // every for n in counts])
     if not message and not np.isfinite(poses).all():
         message = "the solver ended before the last output time"
-    return EngineRun(
-        "exudyn",
-        exu.config.Version(),
-        settings.text,
-        settings.step,
-        grid,
-        poses,
-        rates,
-        "failed" if message else "completed",
-        message or "reached the last output time",
-        counts[-1],
-        seconds,
-    )
+    version = exu.config.Version()
+    return finished("exudyn", version, settings, grid, (poses, rates), message, counts[-1], seconds)
 
 
 def _options(exu: Any, start: StartReport, settings: ExudynSettings, steps: int, every: int) -> Any:

@@ -26,18 +26,7 @@ def record_of(graph: MechanismGraph) -> dict[str, Any]:
 
 
 def graph_of(record: Any, place: str = "record") -> MechanismGraph:
-    """Build a graph from a record; keys besides links, joints, frame and space must be known ones.
-
-    Raises
-    ------
-    FormatError
-        For anything that is not the record of a graph.
-
-    Examples
-    --------
-    >>> graph_of({"links": 3, "joints": [[0, 1], [1, 2, 2]]}).to_text()
-    'Bg 2:1-2'
-    """
+    """Build a graph from a record; keys besides links, joints, frame and space must be known ones."""
     if not isinstance(record, dict):
         raise FormatError(f"the record of a graph is an object, not {_name(record)}", place)
     for name in record:

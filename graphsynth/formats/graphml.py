@@ -189,18 +189,7 @@ _HANDLED = {"key", "default", "graph", "node", "edge", "hyperedge", "data"}
 
 
 def parse(blocks: Iterable[bytes]) -> Iterator[Item]:
-    """Read every ``<graph>``.
-
-    Parameters
-    ----------
-    blocks : iterable of bytes
-        The text in pieces, UTF-8.
-
-    Raises
-    ------
-    FormatError
-        For anything that is not GraphML of simple undirected graphs, with the line.
-    """
+    """Read every graph of the blocks of a GraphML document; anything else is a `FormatError`, with the line."""
     from xml.parsers import expat
 
     parser = expat.ParserCreate("UTF-8", namespace_separator=" ")

@@ -29,7 +29,7 @@ _NUMBERS = re.compile(r"(?:[0-9]{1,4}+(?:\s++|\Z))*+", re.ASCII)
 _NUMBER = re.compile(r"[0-9]{1,4}", re.ASCII)
 
 
-class Row(NamedTuple):
+class NumberRow(NamedTuple):
     """The numbers of a line, and which line it is."""
 
     numbers: list[int]
@@ -42,16 +42,8 @@ def head_of(graph: MechanismGraph) -> str:
     return f"# links {graph.links}\n{frame}# space {graph.space}\n"
 
 
-def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], list[Row]]:
-    """Return the head and the rows.
-
-    Parameters
-    ----------
-    text : str
-    most : int
-        Rows that a graph can have.
-    opening : str
-        Characters that are read as spaces, besides commas and semicolons.
+def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], list[NumberRow]]:
+    """Return the head and the rows, at most ``most``; ``opening`` are characters read as spaces besides commas.
 
     Raises
     ------
@@ -62,7 +54,7 @@ def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], 
         raise FormatError(f"{len(text)} characters; at most {LENGTH_MAX} are read", "length")
     spaces = str.maketrans(dict.fromkeys(",;" + opening, " "))
     head: dict[str, int] = {}
-    rows: list[Row] = []
+    rows: list[NumberRow] = []
     lines = text.split("\n", LINES_MAX)
     if len(lines) > LINES_MAX:
         raise FormatError(f"more than {LINES_MAX} lines; no mechanism graph needs so many", f"line {LINES_MAX + 1}")
@@ -81,7 +73,7 @@ def read_rows(text: str, most: int, opening: str = "") -> tuple[dict[str, int], 
         if numbers and len(rows) >= most:
             raise FormatError(f"more than {most} rows; no mechanism graph needs so many", place)
         if numbers:
-            rows.append(Row(numbers, place))
+            rows.append(NumberRow(numbers, place))
     return head, rows
 
 
@@ -115,18 +107,7 @@ def compose_edges(graphs: Iterable[MechanismGraph]) -> Iterator[str]:
 
 
 def parse_edges(text: str) -> list[MechanismGraph]:
-    r"""Read one graph; without ``# links`` it has one link more than its highest number.
-
-    Raises
-    ------
-    FormatError
-        For anything else, with the line.
-
-    Examples
-    --------
-    >>> parse_edges("0 1\n1 2\n0 2 2\n")[0].to_text()
-    'Bw 2:0-2'
-    """
+    """Read one graph; without ``# links`` it has one link more than its highest number."""
     head, rows = read_rows(_DICTIONARY.sub(lambda match: match[1] or "", text), _MOST)
     for row in rows:
         if len(row.numbers) not in (2, 3):
@@ -303,7 +284,7 @@ def parse_incidence(text: str) -> list[MechanismGraph]:
     return [graph_from_incidence([row.numbers for row in rows], frame=head.get("frame"), space=head.get("space", 3))]
 
 
-def _matrix(text: str) -> tuple[dict[str, int], list[Row]]:
+def _matrix(text: str) -> tuple[dict[str, int], list[NumberRow]]:
     """Return the head and rows of equal length; a bracket that closes ends a row."""
     head, rows = read_rows(text.replace("]", "\n") if "]" in text else text, LINKS_MAX, "[()")
     if not rows and "links" not in head:

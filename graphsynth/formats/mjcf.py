@@ -272,8 +272,8 @@ def to_mjcf(model: DynamicModel, start: StartReport, settings: MujocoSettings | 
     ------
     GeometryError
         What MuJoCo cannot say: cams, joint friction, loads that are functions, prescribed motion, massless links, a
-        loop of sliding pairs and slots alone, a gear pair without carrier, a rotor between links on different branches
-        of the tree; an inconsistent start, or one that is none.
+        loop of prismatic joints and slots alone, a gear pair without carrier, a rotor between links on different
+        branches of the tree; an inconsistent start, or one that is none.
 
     References
     ----------
@@ -440,7 +440,7 @@ def _close(work: Work, joint: JointGeometry, tendon: ET.Element, equality: ET.El
     elif isinstance(joint, Gear):
         _gear(work, joint, name, tendon, equality)
     elif isinstance(joint, Prismatic | PinSlot):
-        raise GeometryError(f"{joint.kind} joint {joint.a}-{joint.b} closes a loop of sliding pairs; use exudyn for it")
+        raise GeometryError(f"{joint.kind} {joint.a}-{joint.b} closes a loop of prismatic joints; use exudyn for it")
     else:
         raise GeometryError(f"{joint.kind} joint {joint.a}-{joint.b}: MuJoCo has no such joint; leave it out")
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graphsynth.dynamics.model import DynamicModel
 from graphsynth.dynamics.start import StartReport, check_start
-from graphsynth.formats.exporting import EngineRun, check_settings, load_engine, steps_between
+from graphsynth.formats.exporting import EngineRun, check_settings, finished, load_engine, steps_between
 from graphsynth.formats.mjcf import MjcfModel, MujocoSettings, to_mjcf
 
 Array = NDArray[np.float64]
@@ -65,19 +65,8 @@ def run_mujoco(
             if message:
                 break
             poses[k], rates[k] = _state(mujoco, engine, data, export)
-    return EngineRun(
-        "MuJoCo",
-        mujoco.__version__,
-        settings.text,
-        settings.step,
-        grid,
-        poses,
-        rates,
-        "failed" if message else "completed",
-        message or "reached the last output time",
-        counts[-1],
-        seconds,
-    )
+    version = mujoco.__version__
+    return finished("MuJoCo", version, settings, grid, (poses, rates), message, counts[-1], seconds)
 
 
 @contextmanager

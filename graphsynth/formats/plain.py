@@ -93,13 +93,7 @@ def compose_csv(graphs: Iterable[MechanismGraph]) -> Iterator[str]:
 
 
 def parse_csv(lines: Iterable[str]) -> Iterator[MechanismGraph]:
-    """Read the column ``text`` (or ``key``, or ``graph6``) of every row; the other columns are not looked at.
-
-    Raises
-    ------
-    FormatError
-        For anything else, with the line.
-    """
+    """Read the column ``text`` (or ``key``, or ``graph6``) of every row; the other columns are not looked at."""
     source = _Rows(lines)
     reader = csv.reader(source, strict=True)
     column, name = -1, ""

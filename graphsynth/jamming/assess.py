@@ -194,7 +194,7 @@ class JammingReport(Assessment):
             "arcs": [[arc.start, arc.stop] for arc in self.arcs.arcs],
             "touching": list(self.arcs.touching),
             "kappa": self.arcs.kappa,
-            "worst_gap_mm": self.worst_interference,
+            "worst_interference_mm": self.worst_interference,
             "worst_angle": self.worst_angle,
             "largest_tilt": self.largest_tilt,
             "critical_tilt": self.critical_tilt,

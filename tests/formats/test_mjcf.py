@@ -165,7 +165,7 @@ def test_refusals_are_sentences(start):
         to_mjcf(g1(elements=[Force(1, lambda t, place, velocity: (0.0, 0.0))]), start)
     with pytest.raises(GeometryError, match="prescribed motion of joint 0-1"):
         to_mjcf(g1(prescribed=[Driver(0, 1)]), start)
-    with pytest.raises(GeometryError, match="closes a loop of sliding pairs"):
+    with pytest.raises(GeometryError, match="closes a loop of prismatic joints"):
         to_mjcf(*models.wedges())
     with pytest.raises(GeometryError, match="additional Prismatic"):
         to_mjcf(*models.two_guides())

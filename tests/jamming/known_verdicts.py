@@ -99,7 +99,8 @@ def random_case(rng, kind="moderate", margins=(-9.0, -0.5)) -> Case | None:
         if abs(alpha) >= F("1.57"):
             return None
     box = ToleranceBox(
-        frame, l2, l3, rocker, alpha * int(rng.choice([-1, 1])), n, F(int(rng.integers(-300, 301)), 100), R, H, c, hole,
+        frame, l2, l3, rocker, alpha * int(rng.choice([-1, 1])), n, azimuth=F(int(rng.integers(-300, 301)), 100),
+        Rb=R, Hb=H, clearance=c, hole_length=hole,
         sgn=int(rng.choice([-1, 1])), convention=str(rng.choice(["spec", "deck"])),
     )  # fmt: skip
     return Case(box, condition, bool(margin > 0), float(margin))
@@ -219,8 +220,9 @@ def random_lengths(rng) -> ToleranceBox:
         axis[1] = F(1)
     H = log_uniform(rng, 0.3, 1.7)
     return ToleranceBox(
-        *ratio, alpha, axis, F(int(rng.integers(-30, 31)), 10), log_uniform(rng, 0.7, 1.5), H,
-        log_uniform(rng, -4.0, 0.3), H * log_uniform(rng, -0.5, 0.2), sgn=int(rng.choice([-1, 1])),
+        *ratio, alpha, axis, azimuth=F(int(rng.integers(-30, 31)), 10), Rb=log_uniform(rng, 0.7, 1.5), Hb=H,
+        clearance=log_uniform(rng, -4.0, 0.3), hole_length=H * log_uniform(rng, -0.5, 0.2),
+        sgn=int(rng.choice([-1, 1])),
     )  # fmt: skip
 
 

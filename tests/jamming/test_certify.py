@@ -125,7 +125,7 @@ lengths = st.fractions(F(1, 2), 4, max_denominator=1000)
 def test_verdicts_and_enclosures_against_sixty_digits(alpha, axis, l2, l3, R, H, c, condition):
     hole = H / 3
     gap, S, phase = reference(alpha, axis, (l2, l3), R, H, c, condition, hole)
-    box = ToleranceBox(6, l2, l3, 6, alpha, axis, 0, R, H, c, hole)
+    box = ToleranceBox(6, l2, l3, 6, alpha, axis, Rb=R, Hb=H, clearance=c, hole_length=hole)
     found = certify_jamming(box, condition)
     assert found.largest_interference.lo <= gap <= found.largest_interference.hi
     assert found.largest_interference.width <= 1e-14 * float(R + H)

@@ -332,7 +332,7 @@ class JamArcs:
     phase : float
         psi1 with tilt proportional to ``sin(f - psi1)``, radians.
     condition, method, reason : str
-        Contact condition used, how the arcs were had, and why there are none or what is special.
+        Contact condition used, how the arcs are known, and why there are none or what is special.
     """
 
     arcs: tuple[JamArc, ...]

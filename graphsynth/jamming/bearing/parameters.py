@@ -220,6 +220,17 @@ def _short(value: Fraction) -> str:
 
 #: Names of the ranges of a box, in a fixed order.
 PARAMETERS = ("l1", "l2", "l3", "l4", "alpha", "n1", "n2", "n3", "azimuth", "Rb", "Hb", "clearance", "hole_length")
+#: What a box takes by keyword alone, with its defaults.
+_OTHERS: dict[str, Any] = {
+    "azimuth": 0,
+    "Rb": "17.5",
+    "Hb": 10,
+    "clearance": "0.03",
+    "hole_length": None,
+    "sgn": 1,
+    "rod": "rigid",
+    "convention": "spec",
+}
 
 
 class ToleranceBox:
@@ -237,14 +248,11 @@ class ToleranceBox:
         Tilt of the motor axis, radians.
     axis : sequence of three
         Direction about which the motor axis is tilted; need not be normalised, each component may be a range.
-    azimuth : Given
-        Further turn of that direction about the normal of the plane, radians.
-    Rb, Hb, clearance : Given
-        Radius and height of the bearing, radial clearance, millimetres.
-    hole_length : Given, optional
-        Length of the hole for condition "general", millimetres.
-    sgn, rod, convention
-        As for `TiltedFourBar`.
+    **others
+        ``azimuth``: further turn of that direction about the normal of the plane, radians (0).  ``Rb``, ``Hb``,
+        ``clearance``: radius and height of the bearing, radial clearance, millimetres (17.5, 10, 0.03).
+        ``hole_length``: length of the hole for condition "general", millimetres.  ``sgn``, ``rod``, ``convention``: as
+        for `TiltedFourBar`.
 
     Raises
     ------
@@ -272,27 +280,19 @@ class ToleranceBox:
         l4: Given = "2.5",
         alpha: Given = 0,
         axis: Any = (1, 0, 0),
-        azimuth: Given = 0,
-        Rb: Given = "17.5",
-        Hb: Given = 10,
-        clearance: Given = "0.03",
-        hole_length: Given | None = None,
-        *,
-        sgn: int = 1,
-        rod: str = "rigid",
-        convention: str = "spec",
+        **others: Any,
     ) -> None:
-        given = {"l1": l1, "l2": l2, "l3": l3, "l4": l4, "alpha": alpha, "azimuth": azimuth}
-        given |= {"Rb": Rb, "Hb": Hb, "clearance": clearance}
-        given |= _components(axis)
-        if hole_length is not None:
-            given["hole_length"] = hole_length
+        if unknown := set(others) - set(_OTHERS):
+            raise GeometryError(f"{unknown.pop()!r} is no parameter of a box; use {', '.join(_OTHERS)}")
+        given = {"l1": l1, "l2": l2, "l3": l3, "l4": l4, "alpha": alpha, **_components(axis), **_OTHERS, **others}
+        if given["hole_length"] is None:
+            del given["hole_length"]
         ranges = {name: Range.read(name, given[name]) for name in PARAMETERS if name in given}
         _check(ranges)
         object.__setattr__(self, "_ranges", ranges)
-        object.__setattr__(self, "sgn", sign("sgn", sgn))
-        object.__setattr__(self, "rod", choice("rod", rod, ("rigid", "deck")))
-        object.__setattr__(self, "convention", choice("convention", convention, ("spec", "deck")))
+        object.__setattr__(self, "sgn", sign("sgn", given["sgn"]))
+        object.__setattr__(self, "rod", choice("rod", given["rod"], ("rigid", "deck")))
+        object.__setattr__(self, "convention", choice("convention", given["convention"], ("spec", "deck")))
 
     @classmethod
     def of(cls, linkage: TiltedFourBar, bearing: Bearing | None = None) -> ToleranceBox:
@@ -309,22 +309,9 @@ class ToleranceBox:
         if not isinstance(b, Bearing):
             raise GeometryError(f"bearing = {b!r} is no Bearing; give Bearing(Rb, Hb, clearance), or none")
         k = linkage
-        return cls(
-            k.l1,
-            k.l2,
-            k.l3,
-            k.l4,
-            k.alpha,
-            k.axis,
-            0,
-            b.Rb,
-            b.Hb,
-            b.clearance,
-            b.hole_length,
-            sgn=k.sgn,
-            rod=k.rod,
-            convention=k.convention,
-        )
+        bearing_of = {"Rb": b.Rb, "Hb": b.Hb, "clearance": b.clearance, "hole_length": b.hole_length}
+        options = {"sgn": k.sgn, "rod": k.rod, "convention": k.convention}
+        return cls(k.l1, k.l2, k.l3, k.l4, k.alpha, k.axis, **bearing_of, **options)
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         raise AttributeError(f"a ToleranceBox does not change; make another with replace({name}=...)")

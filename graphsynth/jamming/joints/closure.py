@@ -54,8 +54,6 @@ class Layout:
     limit_range: Array
     end_float_range: Array
     misalignments: tuple[tuple[int, float, Misalignment], ...]
-    frame: int
-    bodies: int
 
     @property
     def loops(self) -> int:
@@ -94,8 +92,6 @@ def lay_out(mechanism: Mechanism, limits: tuple[Limits, ...], tilts: tuple[Misal
         limit_range=table[:, 3:].T.copy(),
         end_float_range=np.array([_of(limits[k].axial_clearance_range) for k in kept]).reshape(-1, 2).T.copy(),
         misalignments=tuple(turned),
-        frame=mechanism.frame,
-        bodies=mechanism.graph.links,
     )
 
 
@@ -202,26 +198,3 @@ def work_row(layout: Layout, r: Array, d: Array) -> Array:
     rows[:, :, 0], rows[:, :, 1] = d[:, :, 0] @ C.T, d[:, :, 1] @ C.T
     rows[:, :, 2] = (d[:, :, 1] * r[:, :, 0] - d[:, :, 0] * r[:, :, 1]) @ C.T
     return rows.reshape(len(r), -1)
-
-
-def body_rows(layout: Layout, r: Array, e: Array) -> tuple[Array, Array]:
-    """Body form: tilts of the blocks (N, blocks, 2, 3 bodies) and slips (N, joints, 3 bodies) by ``(omega, w)``."""
-    count = len(r)
-    slip = np.zeros((count, len(layout.joints), layout.bodies, 3))
-    tilt = np.zeros((count, len(layout.joints), 2, layout.bodies, 3))
-    for place, (a, b) in enumerate(layout.pairs.tolist()):
-        for body, sign in ((a, -1.0), (b, 1.0)):
-            if body == layout.frame:
-                continue
-            tilt[:, place, 0, body, 0] = tilt[:, place, 1, body, 1] = sign
-            slip[:, place, body, 0], slip[:, place, body, 1] = sign * r[:, place, 1], -sign * r[:, place, 0]
-            slip[:, place, body, 2] = sign
-    at = layout.block_joint
-    flat = tilt.reshape(count, len(layout.joints), 2, -1)[:, at]
-    lean = e[:, at]
-    along = lean[:, :, 0, None] * flat[:, :, 0] + lean[:, :, 1, None] * flat[:, :, 1]
-    across = -lean[:, :, 1, None] * flat[:, :, 0] + lean[:, :, 0, None] * flat[:, :, 1]
-    for kind, value in ((ROLL, along), (PITCH, across)):
-        mask = layout.block_axis == kind
-        flat[:, mask, 0], flat[:, mask, 1] = value[:, mask], 0.0
-    return flat, slip.reshape(count, len(layout.joints), -1)

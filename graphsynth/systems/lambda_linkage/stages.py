@@ -110,7 +110,7 @@ def assess(
         report = reports[condition]
         limits.update({c: _limits(context, c) for c in _CONDITIONS})
         margins = _margins(report, limits[condition], _nominal(context, condition))
-        return f"{report.verdict.value}, condition {condition}", report.verdict.is_free, margins
+        return f"{report.verdict.value}; contact condition {condition}", report.verdict.is_free, margins
 
     records = records_of(recognised, assessments, verdict)
     done = next((a for a in assessments if not a.failed), None)

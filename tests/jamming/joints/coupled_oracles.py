@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from graphsynth import Driver, Mechanism, MechanismGraph, Revolute, enumerate_chains
+from graphsynth.jamming.joints.closure import PITCH, ROLL
 from graphsynth.kinematics.dimensional import embody
 
 SIDES = 96
@@ -152,3 +153,26 @@ def single_loop(points, limits, a, origin, slip, digits=30):
 
             best = max(best, -narrowest(quotient, mpmath.mpf("1e-6") / reach, 1000 / reach))
         return best
+
+
+def body_rows(given, r, e):
+    """Body form: tilts of the blocks (N, blocks, 2, 3 bodies) and slips (N, joints, 3 bodies) by ``(omega, w)``."""
+    layout, bodies, frame, count = given.layout, given.mechanism.graph.links, given.mechanism.frame, len(r)
+    slip = np.zeros((count, len(layout.joints), bodies, 3))
+    tilt = np.zeros((count, len(layout.joints), 2, bodies, 3))
+    for place, (a, b) in enumerate(layout.pairs.tolist()):
+        for body, sign in ((a, -1.0), (b, 1.0)):
+            if body == frame:
+                continue
+            tilt[:, place, 0, body, 0] = tilt[:, place, 1, body, 1] = sign
+            slip[:, place, body, 0], slip[:, place, body, 1] = sign * r[:, place, 1], -sign * r[:, place, 0]
+            slip[:, place, body, 2] = sign
+    at = layout.block_joint
+    flat = tilt.reshape(count, len(layout.joints), 2, -1)[:, at]
+    lean = e[:, at]
+    along = lean[:, :, 0, None] * flat[:, :, 0] + lean[:, :, 1, None] * flat[:, :, 1]
+    across = -lean[:, :, 1, None] * flat[:, :, 0] + lean[:, :, 0, None] * flat[:, :, 1]
+    for kind, value in ((ROLL, along), (PITCH, across)):
+        mask = layout.block_axis == kind
+        flat[:, mask, 0], flat[:, mask, 1] = value[:, mask], 0.0
+    return flat, slip.reshape(count, len(layout.joints), -1)

@@ -6,7 +6,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
-from coupled_oracles import driven_pair, embodied, four_bar, polygon_bounds, single_loop
+from coupled_oracles import body_rows, driven_pair, embodied, four_bar, polygon_bounds, single_loop
 from hypothesis import given, settings, strategies as st
 from scipy.optimize import minimize
 
@@ -24,7 +24,7 @@ from graphsynth.jamming.joints import (
     bearing_limits,
     direction_map,
 )
-from graphsynth.jamming.joints.closure import body_rows, joint_places, shifts
+from graphsynth.jamming.joints.closure import joint_places, shifts
 from graphsynth.jamming.joints.program import problem
 
 
@@ -65,7 +65,7 @@ def test_against_a_general_optimiser():
     given_ = problem(mechanism, JointLimits(1.0), Misalignment(base, link, 0.5, 0.4))
     found = given_.solve(motion.poses)
     r, e, own = joint_places(mechanism, given_.layout.joints, motion.poses)
-    tilts, slips = body_rows(given_.layout, r, e)
+    tilts, slips = body_rows(given_, r, e)
     d = shifts(given_.layout, own)
     free = given_.layout.limit > 0.0
     for k in range(2):
@@ -116,7 +116,7 @@ def test_loop_and_body_form_agree(links, number):
     motion = simulate(mechanism, np.linspace(0.0, 6.0, 25))
     found = given_.solve(motion.poses)
     r, e, own = joint_places(mechanism, given_.layout.joints, motion.poses)
-    tilts, slips = body_rows(given_.layout, r, e)
+    tilts, slips = body_rows(given_, r, e)
     d = shifts(given_.layout, own)[:, given_.layout.block_joint]
     rows = np.concatenate([tilts.reshape(25, -1, tilts.shape[-1]), slips], axis=1)
     values = np.concatenate([(found.tau + d).reshape(25, -1), found.zeta], axis=1)
