@@ -56,25 +56,10 @@ def ask(
 ) -> Answer:
     """Answer a question that only reads.
 
-    Parameters
-    ----------
-    connection : sqlite3.Connection
-    path : Path
-    text : str
-    parameters : sequence
-    limit : int, optional
-        Read so many rows at most, and whether there are more.
-    seconds : float, optional
-        Give up after this time; None: never.
-
-    Raises
-    ------
-    SpecError
-        If SQLite refuses the question, it would do more than read (attach or write files), or it takes too much.
-    FormatError
-        If the file is damaged.
-    GraphsynthError
-        If the catalogue is closed.
+    ``limit``: read so many rows at most, and whether there are more; ``seconds``: give up after this time; None:
+    never. Raises `SpecError` if SQLite refuses the question, it would do more than read (attach or write files), or
+    it takes too much. Raises `FormatError` if the file is damaged. Raises `GraphsynthError` if the catalogue is
+    closed.
     """
     if isinstance(parameters, str | bytes):
         raise SpecError(f"parameters = {parameters!r} must be a list of values, one for each '?'")

@@ -30,10 +30,7 @@ class BuildStep:
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     """All or nothing; what the disk or another process prevents becomes one sentence.
 
-    Raises
-    ------
-    GraphsynthError
-        If SQLite cannot write: a full disk, a read-only file, another writer.
+    Raises `GraphsynthError` if SQLite cannot write: a full disk, a read-only file, another writer.
     """
     try:
         connection.execute("BEGIN IMMEDIATE")
@@ -64,10 +61,7 @@ class Writer:
     def write(self, family_id: int, mobility: int, piece: int, rows: Rows) -> None:
         """Write a piece, inside a transaction.
 
-        Raises
-        ------
-        GraphsynthError
-            If the piece is there already: somebody else is writing the file.
+        Raises `GraphsynthError` if the piece is there already: somebody else is writing the file.
         """
         execute = self.connection.execute
         if execute("SELECT 1 FROM pieces WHERE (family_id, piece) = (?, ?)", (family_id, piece)).fetchone():
@@ -149,16 +143,8 @@ def open_family(
 ) -> tuple[int, bool]:
     """Return (number, whether it is complete) of a family, begun if it is not there.
 
-    Parameters
-    ----------
-    connection : sqlite3.Connection
-    question : (mobility, links, fractionated)
-    row : (pieces, cut, shard, expected)
-
-    Raises
-    ------
-    GraphsynthError
-        If the file holds the family in another way: with or without fractionated chains, another part, another cut.
+    ``question`` is (mobility, links, fractionated), ``row`` (pieces, cut, shard, expected).  Raises `GraphsynthError`
+    if the file holds the family in another way: with or without fractionated chains, another part, another cut.
     """
     mobility, links, fractionated = question
     select = "SELECT family_id, complete, fractionated, cut, shard FROM families WHERE (mobility, links) = (?, ?)"
@@ -194,15 +180,8 @@ def build_family(
 ) -> None:
     """Write the pieces of a family that are not there yet.
 
-    Parameters
-    ----------
-    connection : sqlite3.Connection
-    family_id, mobility : int
-    pieces : list of (number, weight)
-    results : callable
-        Gives the rows of the pieces at some places of ``pieces``, in their order.
-    watch : callable, optional
-        Told ``(chains written, share of the work done)`` after every piece.
+    ``pieces`` are (number, weight); ``results`` gives the rows of the pieces at some places of ``pieces``, in
+    their order; ``watch`` is told ``(chains written, share of the work done)`` after every piece.
     """
     writer = Writer(connection)
     done = {row[0] for row in connection.execute("SELECT piece FROM pieces WHERE family_id = ?", (family_id,))}
@@ -223,10 +202,7 @@ def build_family(
 def finish_family(connection: sqlite3.Connection, family_id: int) -> None:
     """Give the chains of a family their labels, rank by key within an assortment, and mark it complete.
 
-    Raises
-    ------
-    GraphsynthError
-        If the number of chains is not what counting without listing gives.
+    Raises `GraphsynthError` if the number of chains is not what counting without listing gives.
     """
     held, expected = connection.execute(
         "SELECT (SELECT COUNT(*) FROM chains c WHERE c.family_id = f.family_id), expected FROM families f "

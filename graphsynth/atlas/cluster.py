@@ -15,19 +15,9 @@ from graphsynth.core.ordered import RETRIES, Again
 def dask_executor(address: str, timeout: float = 20.0) -> Iterator[Executor]:
     """Connect to a dask scheduler and give its workers as an executor.
 
-    Parameters
-    ----------
-    address : str
-        For example ``tcp://node1:8786``; workers need the same version of graphsynth.
-    timeout : float
-        Seconds to wait for the scheduler.
-
-    Raises
-    ------
-    MissingExtraError
-        If the extra ``cluster`` is not installed.
-    GraphsynthError
-        If the scheduler does not answer, or has a different graphsynth.
+    ``address``: for example ``tcp://node1:8786``; workers need the same version of graphsynth; ``timeout``: seconds
+    to wait for the scheduler. Raises `MissingExtraError` if the extra ``cluster`` is not installed. Raises
+    `GraphsynthError` if the scheduler does not answer, or has a different graphsynth.
     """
     need("distributed", "cluster", "a dask cluster")
     from distributed import Client, KilledWorker

@@ -94,16 +94,8 @@ def _stream(links: int) -> int:
 def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
     """Compute the facts of a block of planar chains with mobility-1 joints (exact).
 
-    Parameters
-    ----------
-    links, mobility : int
-    packed : ndarray of uint8, shape (chains, 3 joints)
-        Joints ``a, b, 1``, as the enumerator packs them.
-
-    Raises
-    ------
-    TooLargeError
-        For more links than the kernels are laid out for.
+    ``packed`` uint8, shape (chains, 3 joints): joints ``a, b, 1``, as the enumerator packs them. Raises
+    `TooLargeError` for more links than the kernels are laid out for.
     """
     from graphsynth.atlas.kernels.facts import MOST_LINKS, WORDS, analyse
 
@@ -336,8 +328,6 @@ def _group_key(links: int, form: int) -> str:
 def group_graph(form: GroupForm) -> MechanismGraph:
     """Return the graph of a structural group, its base as frame (link 0).
 
-    Examples
-    --------
     >>> group_graph((2, 7)).joints
     (Joint(a=0, b=1, mobility=1), Joint(a=0, b=2, mobility=1), Joint(a=1, b=2, mobility=1))
     """

@@ -19,10 +19,7 @@ _NAMES = bytes.fromhex("d9d505f920a163d7")  # the end of a journal that names an
 def unfinished(path: Path) -> list[str]:
     """Names of the journals with content beside a file.
 
-    Raises
-    ------
-    FormatError
-        If one is no plain file, or names another file, as those of a catalogue never do.
+    Raises `FormatError` if one is no plain file, or names another file, as those of a catalogue never do.
     """
     real, found = path.resolve(), []
     for journal in (real.with_name(real.name + end) for end in ("-journal", "-wal")):

@@ -81,10 +81,7 @@ class _Plan:
 def _plans(parts: list[Path]) -> list[_Plan]:
     """Find every piece of every family, one shard after the other.
 
-    Raises
-    ------
-    GraphsynthError
-        If a piece is missing or twice there, or the shards are of different cuts.
+    Raises `GraphsynthError` if a piece is missing or twice there, or the shards are of different cuts.
     """
     plans: dict[tuple[int, int, int], _Plan] = {}
     for part in parts:
@@ -111,10 +108,8 @@ def _plans(parts: list[Path]) -> list[_Plan]:
 def _trust(shard: sqlite3.Connection, part: Path) -> None:
     """Refuse a shard that was not copied whole, or changed: what is merged gets a new seal.
 
-    Raises
-    ------
-    FormatError
-        If its bytes are not those of its seal, or it holds values of another form than its columns have.
+    Raises `FormatError` if its bytes are not those of its seal, or it holds values of another form than its columns
+    have.
     """
     found = broken_seal(shard)
     if found:

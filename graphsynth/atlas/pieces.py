@@ -44,10 +44,7 @@ class Task:
 def problem_of(links: int, mobility: int, fractionated: bool) -> Problem:
     """State the enumeration of a family.
 
-    Raises
-    ------
-    SpecError, TooLargeError
-        For numbers out of their bounds.
+    Raises `SpecError, TooLargeError` for numbers out of their bounds.
     """
     from graphsynth.synthesis.problem import Problem
 
@@ -107,10 +104,7 @@ def fingerprint(problem: Problem, tasks: list[Task]) -> str:
 def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
     """Return the tasks of shard i of m, a run of consecutive ones.
 
-    Raises
-    ------
-    SpecError
-        For i out of 1..m.
+    Raises `SpecError` for i out of 1..m.
     """
     from graphsynth.synthesis import shards
 

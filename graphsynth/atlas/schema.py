@@ -27,11 +27,8 @@ GARBAGE = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, 
 def connect(path: Path, *, create: bool = False, readonly: bool = False) -> sqlite3.Connection:
     """Open a catalogue file; it holds the tables of this version and nothing else, no triggers or other views.
 
-    Raises
-    ------
-    FormatError
-        If the file is missing, is no catalogue, or was written by another version; when it is opened for writing, also
-        if it was changed by another program.
+    Raises `FormatError` if the file is missing, is no catalogue, or was written by another version; when it is opened
+    for writing, also if it was changed by another program.
     """
     if not create and not path.is_file():
         raise FormatError("there is no such catalogue: build one with 'graphsynth catalog build'", str(path))
@@ -103,16 +100,8 @@ def _distrust(connection: sqlite3.Connection) -> None:
 def readable(path: Path, *garbage: type[Exception]) -> Iterator[None]:
     """Turn what a damaged file does to a reader into one sentence.
 
-    Parameters
-    ----------
-    path : Path
-    *garbage : exception types
-        What values that nobody wrote may cause, beside the errors of SQLite.
-
-    Raises
-    ------
-    FormatError
-        If the file is damaged.
+    ``*garbage``: what values that nobody wrote may cause, beside the errors of SQLite. Raises `FormatError` if the
+    file is damaged.
     """
     damage: tuple[type[Exception], ...] = (sqlite3.Error, *garbage)
     try:
@@ -132,10 +121,7 @@ def readable(path: Path, *garbage: type[Exception]) -> Iterator[None]:
 def screen(connection: sqlite3.Connection, path: Path) -> None:
     """Read the whole file and hold every value against what its column may hold: labels, keys, edges, numbers.
 
-    Raises
-    ------
-    FormatError
-        If a value is of another form; the sentence names the table.
+    Raises `FormatError` if a value is of another form; the sentence names the table.
     """
     with readable(path, *GARBAGE):
         found = [str(row[0]) for row in connection.execute("PRAGMA quick_check(1)")]

@@ -25,10 +25,7 @@ def unseal(connection: sqlite3.Connection) -> None:
 def seal(connection: sqlite3.Connection) -> None:
     """Seal a file that has none; nothing happens while it has a log beside it.
 
-    Raises
-    ------
-    sqlite3.Error, OSError
-        If it cannot be read or written.
+    Raises `sqlite3.Error, OSError` if it cannot be read or written.
     """
     if connection.execute("SELECT COUNT(*) FROM meta").fetchone()[0] or _log(connection):
         return

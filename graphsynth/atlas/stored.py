@@ -42,11 +42,8 @@ class StoredMechanism:
 def data_of(text: str) -> Any:
     """Return the data of an evaluation, as :func:`json.loads` does.
 
-    Raises
-    ------
-    ValueError
-        If the text is not JSON, or lists and objects lie more than a hundred deep in one another: whoever writes such
-        data out again would run out of stack.
+    Raises `ValueError` if the text is not JSON, or lists and objects lie more than a hundred deep in one another:
+    whoever writes such data out again would run out of stack.
     """
     try:
         data = json.loads(text)
@@ -92,10 +89,7 @@ def fingerprint(mechanism: dict[str, Any]) -> str:
 def fingerprint_at(connection: sqlite3.Connection, place: tuple[int, int, int | str]) -> str | None:
     """Return the name of the dimensions stored for (chain, frame, driver); None where there are none.
 
-    Raises
-    ------
-    ValueError
-        If the row is not JSON.
+    Raises `ValueError` if the row is not JSON.
     """
     row = connection.execute(
         "SELECT data FROM evaluations WHERE (chain_id, frame, driver, kind) = (?, ?, ?, 'dimensions')", place
@@ -115,16 +109,7 @@ ORDER BY d.chain_id, t.value DESC, d.frame, CAST(d.driver AS TEXT)
 def stored_mechanisms(connection: sqlite3.Connection, chain_id: int | None = None) -> Iterator[StoredMechanism]:
     """Yield the mechanisms with stored dimensions, chain by chain, those of the best transmission first.
 
-    Parameters
-    ----------
-    connection : sqlite3.Connection
-    chain_id : int, optional
-        Only those of this chain.
-
-    Raises
-    ------
-    ValueError
-        If a row is not JSON: the file is damaged.
+    ``chain_id``: only those of this chain. Raises `ValueError` if a row is not JSON: the file is damaged.
     """
     for number, frame, driver, data in connection.execute(_SELECT, (chain_id, chain_id)):
         mechanism = mechanism_in(data_of(data))

@@ -90,10 +90,7 @@ class Turning:
     def assembled(self, pose: Array, u: Array) -> Array:
         """Solve for the poses at inputs, from poses close to them, shape (n, links, 3).
 
-        Raises
-        ------
-        ValueError
-            If the joints cannot be closed.
+        Raises `ValueError` if the joints cannot be closed.
         """
         bound = _GAP * max(1.0, self.size)
         for _ in range(_ITERATIONS):
@@ -109,10 +106,7 @@ class Turning:
 
         Every fifth degree is reached from the one before, the poses between from their neighbours.
 
-        Raises
-        ------
-        ValueError
-            If a joint opens, a link jumps, or the last pose is not the first.
+        Raises `ValueError` if a joint opens, a link jumps, or the last pose is not the first.
         """
         coarse = np.linspace(0.0, math.tau, _STEPS // _STRIDE + 1)
         found = [self.assembled(self.start[None], coarse[:1])[0]]
@@ -137,11 +131,7 @@ class Turning:
         A bar is a link with two joints in its group.  Let it grow at unit rate while the drivers rest: its ends part
         with a velocity w that is 1 along the bar, and sin mu = 1 / |w|; for a dyad mu is the angle of its links.
 
-        Parameters
-        ----------
-        poses : ndarray, shape (n, links, 3)
-        groups : sequence of set of int
-            Links of the groups in the order of assembly.
+        ``poses`` have shape (n, links, 3); ``groups``: links of the groups in the order of assembly.
         """
         inverse = np.asarray(np.linalg.inv(self.jacobian(poses)), np.float64)
         arms = self._turned(poses)

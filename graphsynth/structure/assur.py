@@ -435,10 +435,7 @@ def contour_class(joints: Iterable[tuple[int, int, int]]) -> int:
     group.  Of the loops those of a minimum cycle basis count; their lengths do not depend on the basis.  A joint of
     mobility 2 or more counts as a link with two joints in its place.
 
-    Parameters
-    ----------
-    joints : iterable of (a, b, mobility)
-        Inner joints, and outer joints with -1 for ``b``.
+    ``joints`` (a, b, mobility): inner joints, and outer joints with -1 for ``b``.
 
     Examples
     --------

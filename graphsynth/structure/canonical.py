@@ -71,13 +71,8 @@ def link_colours(graph: MechanismGraph) -> list[int]:
 def label(graph: MechanismGraph) -> Labelling:
     """Label a graph canonically.
 
-    Raises
-    ------
-    TooLargeError
-        For more than 64 links that are too symmetric (a hundred equal parts).
+    Raises `TooLargeError` for more than 64 links that are too symmetric (a hundred equal parts).
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> label(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)])).order
     8
@@ -154,8 +149,6 @@ def key(graph: MechanismGraph) -> str:
     by column; and, when some joint has another mobility than 1, three bits ``mobility - 1`` per joint sorted by
     ``(a, b)``; zero bits fill the last byte.  A frame is link 0.
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> key(MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)]))
     '1BAN4'
@@ -182,13 +175,8 @@ def key(graph: MechanismGraph) -> str:
 def decode_key(text: object) -> tuple[int, list[tuple[int, int, int]], int | None, int]:
     """Return ``(links, joints, frame, space)`` of a key; whether they are canonical is not checked here.
 
-    Raises
-    ------
-    FormatError
-        For anything that no graph has as its key, as far as its form shows.
+    Raises `FormatError` for anything that no graph has as its key, as far as its form shows.
 
-    Examples
-    --------
     >>> decode_key("1BAN4")
     (4, [(0, 2, 1), (0, 3, 1), (1, 2, 1), (1, 3, 1)], None, 3)
     """

@@ -30,22 +30,10 @@ def bits(mask: int) -> list[int]:
 def breadth_first(neighbours: Sequence[int], start: int, within: int = -1) -> list[int]:
     """Return the breadth-first levels from one link as bit masks.
 
-    Parameters
-    ----------
-    neighbours : sequence of int
-        For each link the bit mask of the links jointed to it.
-    start : int
-        The link that makes level 0.
-    within : int, optional
-        Bit mask of the links that may be visited; all by default.
+    ``neighbours``: for each link the bit mask of the links jointed to it; ``start``: the link that makes level 0;
+    ``within``: bit mask of the links that may be visited; all by default. Returns one bit mask per level; links that
+    cannot be reached are in none.
 
-    Returns
-    -------
-    list of int
-        One bit mask per level; links that cannot be reached are in none.
-
-    Examples
-    --------
     >>> breadth_first([0b0010, 0b0101, 0b1010, 0b0100], 0)
     [1, 2, 4, 8]
     """

@@ -16,8 +16,6 @@ def to_networkx(graph: MechanismGraph) -> Any:
 
     Edges carry ``mobility``; the graph carries ``space`` and, if chosen, ``frame``.
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> sorted(to_networkx(MechanismGraph(3, [(0, 1), (1, 2, 2)])).edges(data="mobility"))
     [(0, 1, 1), (1, 2, 2)]
@@ -35,10 +33,8 @@ def to_networkx(graph: MechanismGraph) -> Any:
 def from_networkx(graph: Any) -> tuple[int, list[tuple[int, int, Any]], Any, Any]:
     """Return ``(links, joints, frame, space)`` of a ``networkx.Graph``, still to be checked by the constructor.
 
-    Raises
-    ------
-    FormatError
-        If it is no undirected simple graph, has too many nodes, or names a frame that is not one of them.
+    Raises `FormatError` if it is no undirected simple graph, has too many nodes, or names a frame that is not one of
+    them.
     """
     import networkx
 

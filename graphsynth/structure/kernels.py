@@ -384,10 +384,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
 def canon_packed(links, packed, colours):
     """Label one graph of at most 64 links given by joints ``a, b, mobility``; return (lab, generators, index, orbits).
 
-    Parameters
-    ----------
-    packed : uint8[3 * joints]
-    colours : int64[links]
+    ``packed`` is uint8[3 * joints], ``colours`` int64[links].
     """
     layers = np.int64(1)
     for place in range(2, packed.shape[0], 3):

@@ -136,24 +136,11 @@ class PebbleGame:
 def first_violation(links: int, joints: Iterable[Sequence[int]], space: int, within: int = -1) -> int:
     """Return the bit mask of a set with DOF 0 or less, or 0 if there is none (exact).
 
-    Parameters
-    ----------
-    links : int
-        Number of links.
-    joints : iterable of (a, b, mobility)
-        Parallel joints are allowed.
-    space : int
-        Pi, 2 to 6.
-    within : int, optional
-        Only links of this bit mask count.
+    ``links``: number of links; ``joints`` iterable of (a, b, mobility): parallel joints are allowed; ``space``: Pi, 2
+    to 6; ``within``: only links of this bit mask count. When an edge is refused, the vertices that oriented edges
+    lead to from its ends are the smallest tight set around it: no edge leaves a tight set whose spare pebbles lie on
+    the two ends.
 
-    Notes
-    -----
-    When an edge is refused, the vertices that oriented edges lead to from its ends are the smallest tight set around
-    it: no edge leaves a tight set whose spare pebbles lie on the two ends.
-
-    Examples
-    --------
     >>> first_violation(4, [(0, 1, 1), (1, 2, 1), (0, 2, 1), (2, 3, 1)], 3)
     7
     """
@@ -202,13 +189,8 @@ remove or free one of the joints 0-1, 0-2, 1-2
 def rigid_bodies(links: int, joints: Iterable[Sequence[int]], space: int, within: int = -1) -> list[int]:
     """Return the sets of two links or more that generically move as one body, as bit masks (exact).
 
-    Parameters
-    ----------
-    links, joints, space, within
-        As in :func:`first_violation`.
+    ``links``, ``joints``, ``space``, ``within``: as in :func:`first_violation`.
 
-    Examples
-    --------
     >>> rigid_bodies(6, [(0, 1, 1), (1, 2, 1), (0, 2, 1), (2, 3, 1), (3, 4, 1), (4, 5, 1), (0, 5, 1)], 3)
     [7]
     """

@@ -132,10 +132,7 @@ class Search:
     def run(self) -> Search:
         """Search the whole tree and return self.
 
-        Raises
-        ------
-        TooLargeError
-            After ``WORK_MAX`` looks.
+        Raises `TooLargeError` after ``WORK_MAX`` looks.
         """
         self._root()
         level = 0

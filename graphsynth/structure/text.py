@@ -30,20 +30,9 @@ _JOINT = re.compile(r"([0-9]{1,3})-([0-9]{1,3})")
 def encode_graph6(links: int, packed: bytes) -> str:
     """Write a graph as graph6; joint mobilities are not written.
 
-    Parameters
-    ----------
-    links : int
-        Number of links, 1 to 255.
-    packed : bytes
-        Three bytes ``a, b, mobility`` per joint, ``a < b``.
+    ``links``: number of links, 1 to 255; ``packed``: three bytes ``a, b, mobility`` per joint, ``a < b``. Returns
+    printable ASCII, without a header or a line end.
 
-    Returns
-    -------
-    str
-        Printable ASCII, without a header or a line end.
-
-    Examples
-    --------
     >>> encode_graph6(4, bytes([0, 1, 1, 0, 3, 1, 1, 2, 1, 2, 3, 1]))
     'Cl'
     """
@@ -60,25 +49,10 @@ def encode_graph6(links: int, packed: bytes) -> str:
 def decode_graph6(text: str | bytes) -> tuple[int, bytes]:
     r"""Read graph6.
 
-    Parameters
-    ----------
-    text : str or bytes
-        One graph; the optional header ``>>graph6<<`` and one line end are accepted.
+    The optional header ``>>graph6<<`` and one line end are accepted.  Returns the number of links, and the joints of
+    mobility 1, three bytes each, sorted by ``(a, b)``.  Raises `FormatError` for anything else, with the byte where
+    reading stopped.
 
-    Returns
-    -------
-    links : int
-        Number of links.
-    packed : bytes
-        Joints of mobility 1, three bytes each, sorted by ``(a, b)``.
-
-    Raises
-    ------
-    FormatError
-        For anything else, with the byte where reading stopped.
-
-    Examples
-    --------
     >>> decode_graph6("Bw")
     (3, b'\x00\x01\x01\x00\x02\x01\x01\x02\x01')
     """
@@ -159,8 +133,6 @@ def _read_joints(links: int, values: list[int], start: int) -> bytes:
 def encode_text(links: int, packed: bytes, frame: int | None, space: int) -> str:
     """Write a coloured graph as one line.
 
-    Examples
-    --------
     >>> encode_text(3, bytes([0, 1, 1, 0, 2, 1, 1, 2, 2]), 0, 3)
     'Bw f0 2:1-2'
     """
@@ -181,20 +153,9 @@ def encode_text(links: int, packed: bytes, frame: int | None, space: int) -> str
 def decode_text(text: str | bytes) -> tuple[int, list[tuple[int, int, int]], int | None, int]:
     """Read the one-line form.
 
-    Returns
-    -------
-    links : int
-    joints : list of (a, b, mobility)
-    frame : int or None
-    space : int
+    Returns the links, the joints as (a, b, mobility), the frame, and the space.  Raises `FormatError` for anything
+    that is not the one-line form, with the field where reading stopped.
 
-    Raises
-    ------
-    FormatError
-        For anything that is not the one-line form, with the field where reading stopped.
-
-    Examples
-    --------
     >>> decode_text("Bw f0 2:1-2")
     (3, [(0, 1, 1), (0, 2, 1), (1, 2, 2)], 0, 3)
     """

@@ -132,10 +132,7 @@ class Alphabet:
     def labels(self, multiplicity: int, marked: bool) -> list[Label]:
         """List the labels of a class of the given multiplicity.
 
-        Raises
-        ------
-        TooLargeError
-            More labels than the kernels are laid out for.
+        Raises `TooLargeError` for more labels than the kernels are laid out for.
         """
         zero = (0,) * len(self.limits)
         if not marked:
@@ -165,10 +162,7 @@ class Alphabet:
     def labellings(self, pattern: tuple[int, ...]) -> float:
         """Count the labellings of a contracted graph, sparsity and symmetry ignored.
 
-        Parameters
-        ----------
-        pattern : tuple of int
-            ``pattern[mu - 1]`` classes consist of mu parallel paths.
+        ``pattern``: ``pattern[mu - 1]`` classes consist of mu parallel paths.
         """
         exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
         return sum(count for used, count in self._ways(pattern).items() if used[:exact] == self.limits[:exact])
@@ -237,10 +231,7 @@ class Alphabet:
     def tables(self) -> Tables:
         """The same for the kernels.
 
-        Raises
-        ------
-        TooLargeError
-            More resource states than the kernels are laid out for.
+        Raises `TooLargeError` for more resource states than the kernels are laid out for.
         """
         if any(limit > 100 for limit in self.limits) or self.resources > 50_000:
             raise TooLargeError(f"{self.resources} resource states (bound 50000): ask for fewer links or higher pairs")

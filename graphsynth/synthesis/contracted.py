@@ -43,10 +43,7 @@ def encode(layers: Layers) -> bytes:
 def decode(data: bytes) -> Layers:
     """Unpack what ``encode`` packed.
 
-    Raises
-    ------
-    FormatError
-        If the data are not a list of contracted graphs.
+    Raises `FormatError` if the data are not a list of contracted graphs.
     """
     try:
         return _unpacked(lzma.decompress(data))
@@ -111,18 +108,9 @@ def _made(loops: int, vertices: int) -> NDArray[np.uint8]:
 def contracted_graphs(loops: int, vertices: int) -> NDArray[np.uint8]:
     """Return all contracted graphs with the given numbers of loops (at least 2) and vertices.
 
-    Returns
-    -------
-    (graphs, k, k) uint8
-        Multiplicity matrices, in the order of their canonical codes; shared and read-only.
+    Returns the multiplicity matrices, in the order of their canonical codes; shared and read-only. Raises
+    `TooLargeError` for more loops than there are lists for.
 
-    Raises
-    ------
-    TooLargeError
-        For more loops than there are lists for.
-
-    Examples
-    --------
     >>> [len(contracted_graphs(3, k)) for k in (2, 3, 4)]
     [1, 1, 2]
     """
@@ -158,19 +146,9 @@ def generate(loops: int, vertices: int | None = None, smaller: dict[int, Layers]
     such a multigraph on k - 1 vertices (with as many loops less as there were parallel edges besides the first), so
     splitting vertices reaches all of them.
 
-    Parameters
-    ----------
-    loops : int
-        Largest number of loops.
-    vertices : int, optional
-        Largest number of vertices; default ``2 * (loops - 1)``, which makes the lists complete.
-    smaller : dict, optional
-        Lists that are known already; completed in place and returned.
-
-    Returns
-    -------
-    dict
-        ``result[loops][vertices]``: the multiplicity matrices, in the order of their canonical codes.
+    ``loops``: largest number of loops; ``vertices``: largest number of vertices; default ``2 * (loops - 1)``, which
+    makes the lists complete; ``smaller``: lists that are known already; completed in place and returned. Returns
+    ``result[loops][vertices]``: the multiplicity matrices, in the order of their canonical codes.
     """
     from graphsynth.synthesis.kernels.splitting import split_all
 

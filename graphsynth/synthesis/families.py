@@ -110,10 +110,7 @@ def chain_numbers(
 ) -> tuple[int, int, int, dict[int, int]]:
     """Return N, W >= ``least``, Pi and the numbers of joints by mobility as plain integers within their bounds.
 
-    Raises
-    ------
-    SpecError
-        For anything else.
+    Raises `SpecError` for anything else.
     """
     links = whole(links, "links", 2, MOST_LINKS)
     if least and whole(mobility, "mobility", 0, 50) == 0:
@@ -214,8 +211,6 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
     Any two links of a ring are apart by at least one joint, so every ring of mobility W >= 1 is admissible; mobility 0
     gives the ring that is a Baranov truss.  Two links and their only joint count as the smallest chain.
 
-    Examples
-    --------
     >>> [graph.to_text() for graph in rings(4, 1, 3, {}, True)]
     ['Cl f0']
     """

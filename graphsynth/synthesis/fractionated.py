@@ -120,8 +120,6 @@ def _trees(links: int, mobility: int, space: int, higher: Higher) -> tuple[Mecha
 def fractionated_chains(links: int, mobility: int, space: int, higher: Higher) -> Iterator[MechanismGraph]:
     """Yield the fractionated chains without loose ends and without rigid sub-chains, each once.
 
-    Examples
-    --------
     >>> sum(1 for _ in fractionated_chains(7, 2, 3, ()))
     1
     """

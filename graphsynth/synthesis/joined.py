@@ -33,8 +33,6 @@ Cycles = tuple[tuple[int, int], ...]
 def count_fractionated(links: int, mobility: int, space: int, higher: Higher, framed: bool = False) -> int:
     """Count the fractionated chains without loose ends and without rigid sub-chains (with every frame, if ``framed``).
 
-    Examples
-    --------
     >>> count_fractionated(7, 2, 3, ()), count_fractionated(9, 2, 3, ())
     (1, 5)
     """

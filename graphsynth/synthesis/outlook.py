@@ -26,10 +26,7 @@ def refuse(
 ) -> NoReturn:
     """Refuse what cannot finish.
 
-    Raises
-    ------
-    TooLargeError
-        Always: with an estimate of what it would take.
+    Always raises `TooLargeError`, with an estimate of what it would take.
     """
     count = extrapolated(loops, links, mobility, space, higher, framed=framed)
     what = "mechanisms" if framed and mobility else "groups" if framed else "chains" if mobility else "trusses"
@@ -64,8 +61,6 @@ def extrapolated(
 ) -> float:
     """Estimate a number of non-fractionated chains (trusses, for mobility 0; with every frame, if ``framed``).
 
-    Examples
-    --------
     >>> 1e11 < extrapolated(9, 20, 1, 3, {}) < 2e11
     True
     """

@@ -165,12 +165,8 @@ class Problem:
     def groups(cls, moving: int, space: int) -> Problem:
         """State the enumeration of Assur groups with a number of moving links.
 
-        Raises
-        ------
-        SpecError
-            A number of links out of its bounds.
-        TooLargeError
-            More loops than there are contracted graphs.
+        Raises `SpecError` for a number of links out of its bounds, `TooLargeError` for more loops than there are
+        contracted graphs.
         """
         return cls.trusses(whole(moving, "moving links", 1, MOST_LINKS - 1) + 1, space, True)
 
@@ -178,12 +174,8 @@ class Problem:
     def trusses(cls, links: int, space: int, framed: bool) -> Problem:
         """State the enumeration of Baranov trusses (of Assur groups, if ``framed``).
 
-        Raises
-        ------
-        SpecError
-            A number of links out of its bounds.
-        TooLargeError
-            More loops than there are contracted graphs.
+        Raises `SpecError` for a number of links out of its bounds, `TooLargeError` for more loops than there are
+        contracted graphs.
         """
         links, _, space, _ = chain_numbers(links, 0, space, None, least=0)
         joints = chain_joints(links, 0, space, {})
@@ -211,10 +203,7 @@ def _check_loops(loops: int, links: int, mobility: int, space: int, higher: Mapp
 def check_symmetry(symmetry: int | None) -> int:
     """Return the required order, 0 for none.
 
-    Raises
-    ------
-    SpecError
-        For an order that is not a small prime.
+    Raises `SpecError` for an order that is not a small prime.
     """
     if symmetry is None:
         return 0

@@ -32,12 +32,8 @@ _PAIRS = 1 << 16
 def sample(problem: Problem, k: int, seed: int) -> list[MechanismGraph]:
     """Draw k graphs of a problem, independently and exactly uniformly.
 
-    Raises
-    ------
-    SpecError
-        If k is negative, the seed no whole number, or the problem asks for a symmetry or for levels.
-    InfeasibleSpecError
-        If there is nothing to draw from.
+    Raises `SpecError` if k is negative, the seed no whole number, or the problem asks for a symmetry or for levels.
+    Raises `InfeasibleSpecError` if there is nothing to draw from.
     """
     k, seed = whole(k, "k", 0, 10**9), whole(seed, "seed", -(10**100), 10**100)  # None would draw others every time
     if problem.symmetry or any(family.levels for family in problem.families):

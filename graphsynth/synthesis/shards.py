@@ -33,19 +33,9 @@ _EFFORT = 10.0  # the same in chains of a catalogue
 def shard_of(pieces: Sequence[Piece], shard: Shard | None, *, listing: bool = True) -> list[Piece]:
     """Return shard i of m (1 <= i <= m): a run of the work; the shards one after the other are the whole.
 
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        All pieces of a problem; one of several contracted graphs may be cut between them.
-    shard : (int, int) or None
-        Which share; None is everything.
-    listing : bool
-        Whether the pieces are to be listed, not counted.
-
-    Raises
-    ------
-    SpecError
-        For i out of 1..m.
+    ``pieces``: all pieces of a problem; one of several contracted graphs may be cut between them; ``shard`` (int,
+    int) or None: which share; None is everything; ``listing``: whether the pieces are to be listed, not counted.
+    Raises `SpecError` for i out of 1..m.
     """
     if shard is None:
         return list(pieces)
@@ -63,10 +53,7 @@ def shard_of(pieces: Sequence[Piece], shard: Shard | None, *, listing: bool = Tr
 def share_of(pieces: Sequence[Piece], shard: Shard | None) -> range:
     """Return which pieces are shard i of m of a catalogue: a run of whole ones.
 
-    Raises
-    ------
-    SpecError
-        For i out of 1..m.
+    Raises `SpecError` for i out of 1..m.
     """
     if shard is None or not pieces:
         return range(len(pieces))

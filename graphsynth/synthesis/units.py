@@ -99,10 +99,7 @@ def cut(families: Sequence[Family], *, listing: bool, symmetry: int = 0) -> list
 def count_each(family: Family, start: int, stop: int) -> NDArray[np.int64]:
     """Count the chains of each contracted graph (exact).
 
-    Raises
-    ------
-    TooLargeError
-        If one contracted graph carries more than 2**62 chains.
+    Raises `TooLargeError` if one contracted graph carries more than 2**62 chains.
     """
     alphabet = family.alphabet
     out = np.zeros(stop - start, np.int64)

@@ -74,27 +74,11 @@ def write_listing(
 ) -> int:
     """List a problem to a file, one graph a line; return the number of lines.
 
-    Parameters
-    ----------
-    problem : Problem
-        What to list.
-    path : Path
-        ``.jsonl`` gives JSON lines; anything else the text form (graph6 for chains of mobility-1 joints).
-    shard : (int, int), optional
-        Shard i of m.
-    resume : bool
-        Go on with an interrupted file of the same problem; of a complete one nothing is left to do.
-    overwrite : bool
-        Replace a file that exists.
-    executor : concurrent.futures.Executor, optional
-        Who does the work; the bytes are the same for any.
-    watch : callable, optional
-        Called after each piece.
-
-    Raises
-    ------
-    GraphsynthError
-        If the file exists and is neither resumed nor overwritten, or belongs to another problem.
+    ``path``: ``.jsonl`` gives JSON lines; anything else the text form (graph6 for chains
+    of mobility-1 joints); ``shard`` (int, int), optional: shard i of m; ``resume``: go on with an interrupted file of
+    the same problem; of a complete one nothing is left to do; ``overwrite``: replace a file that exists;
+    ``executor``: who does the work; the bytes are the same for any; ``watch``: called after each piece. Raises
+    `GraphsynthError` if the file exists and is neither resumed nor overwritten, or belongs to another problem.
     """
     form = _form(path)
     note = path.with_name(path.name + ".progress")
@@ -185,10 +169,7 @@ def _cut_back(file: BinaryIO, journal: Journal, pieces: int) -> int:
 def _graphs_of_complete(path: Path, pieces: Sequence[Piece], form: str) -> int:
     """Return the number of lines of a file that is the whole listing, as far as its first and last lines tell.
 
-    Raises
-    ------
-    GraphsynthError
-        If it is not.
+    Raises `GraphsynthError` if it is not.
     """
     with path.open("rb") as file:
         size = file.seek(0, os.SEEK_END)
@@ -214,12 +195,8 @@ def count_with_checkpoint(
 ) -> int:
     """Count a problem; with a checkpoint file the pieces already counted there are not counted again (exact).
 
-    Raises
-    ------
-    GraphsynthError
-        If the checkpoint belongs to another problem, or another process writes it.
-    FormatError
-        If it is no checkpoint, or somebody changed it.
+    Raises `GraphsynthError` if the checkpoint belongs to another problem, or another process writes it. Raises
+    `FormatError` if it is no checkpoint, or somebody changed it.
     """
     pieces = shard_of(problem.pieces(listing=False), shard, listing=False)
     total = sum(piece.weight for piece in pieces) or 1.0

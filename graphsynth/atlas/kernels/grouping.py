@@ -72,17 +72,9 @@ def assign(joints, placed, base, ends, owner, free, came, stack):
 def groups_of(n, joints, placed, ends, owner, free, came, stack, reach, groups):
     """Write the groups as masks of links, in the order of assembly; returns their number, or -1 if there are none.
 
-    Parameters
-    ----------
-    n : int64
-        Links, at most 64.
-    joints : integer[joints, 2]
-        Planar, mobility 1.
-    placed : uint64
-        Mask of the frame and the driven links.
-    ends, owner, free, came, stack, reach : scratch
-        ``int64[2 joints, 2]``, ``int64[2 joints]``, ``int64[n]`` (three times), ``uint64[n]``.
-    groups : uint64[n], output
+    ``n``: links, at most 64; ``joints`` integer[joints, 2]: planar, mobility 1; ``placed`` uint64: mask of the frame
+    and the driven links; ``ends``, ``owner``, ``free``, ``came``, ``stack``, ``reach`` scratch: ``int64[2 joints,
+    2]``, ``int64[2 joints]``, ``int64[n]`` (three times), ``uint64[n]``; ``groups`` (uint64[n], output).
     """
     base = np.int64(lowest_bit(placed))
     for v in range(n):

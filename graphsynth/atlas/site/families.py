@@ -66,10 +66,7 @@ def families(connection: sqlite3.Connection) -> list[Family]:
 def _check_key(row: sqlite3.Row, family: sqlite3.Row) -> None:
     """Compare a key, which is the chain itself, with its row: links, joints, assortment, so that label and sketch fit.
 
-    Raises
-    ------
-    ValueError
-        If they are not.
+    Raises `ValueError` if they are not.
     """
     links, joints, frame, space = decode_key(row["key"])
     degrees = Counter(Counter(link for a, b, _ in joints for link in (a, b)).values())

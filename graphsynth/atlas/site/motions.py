@@ -58,8 +58,6 @@ class ShownMotion:
 def choice_of(chain: MechanismGraph, most: int) -> list[tuple[int, list[int]]]:
     """Return the best frames with their drivers, in the numbers of the chain.
 
-    Examples
-    --------
     >>> from graphsynth.structure.graph import MechanismGraph
     >>> choice_of(MechanismGraph.from_key("1BAN4"), 1)
     [(0, [2])]
@@ -79,14 +77,7 @@ def choice_of(chain: MechanismGraph, most: int) -> list[tuple[int, list[int]]]:
 def motion_of(task: MotionTask) -> ShownMotion:
     """Show a chain moving, with stored dimensions or with such as are found; the numbers of the links are the key's.
 
-    Parameters
-    ----------
-    task : MotionTask
-
-    Returns
-    -------
-    ShownMotion
-        Deterministic.  Where nothing is accepted the page is empty and the statement says why.
+    Deterministic.  Where nothing is accepted the page is empty and the statement says why.
     """
     shown = _stored(task) if task.stored is not None else None
     if shown is not None:

@@ -22,10 +22,8 @@ def replaced(folder: Path) -> Iterator[tuple[Path, Path]]:
 
     Whatever happens, the older page stays until the new one is whole, and no other file is touched.
 
-    Raises
-    ------
-    GraphsynthError
-        At once, if the folder cannot be made or replaced, or holds other files; later, if the disk is full.
+    Raises `GraphsynthError` at once, if the folder cannot be made or replaced, or holds other files; later, if the
+    disk is full.
     """
     target = folder.resolve()
     _check(folder, target)

@@ -19,8 +19,6 @@ def places_of(keys: Sequence[str]) -> list[str]:
 
     The larger side of the drawing is 4095 units; y is upwards.
 
-    Examples
-    --------
     >>> [len(places) for places in places_of(["1BAN4", "1BgMw8g"])]  # four digits a joint
     [16, 28]
     """

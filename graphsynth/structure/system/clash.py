@@ -39,12 +39,8 @@ def explain(problem: Problem, *, default_space: bool, default_mobilities: bool) 
     deletion filter).  Dropping an equation or a value only ever enlarges the set of solutions, so what is left is a
     true contradiction.
 
-    Parameters
-    ----------
-    problem : Problem
-        A question without solutions.
-    default_space, default_mobilities : bool
-        Whether Pi = 3 and the joint mobilities are defaults and not the user's words.
+    ``problem``: a question without solutions; ``default_space``, ``default_mobilities``: whether Pi = 3 and the joint
+    mobilities are defaults and not the user's words.
     """
     items = [_Item(_text(symbol, own), symbol) for symbol, own in problem.ranges if symbol != "Pi"]
     items.append(_Item(_text("Pi", problem.range("Pi")), "Pi", default_space))

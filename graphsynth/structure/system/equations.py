@@ -141,10 +141,7 @@ def _meet(first: Range, second: Range) -> Range:
 def propagate(problem: Problem, domains: Domains, rows: list[Row], natural: Iterable[str] = NATURAL) -> bool:
     """Shrink ``domains`` in place by every row until nothing changes.
 
-    Returns
-    -------
-    bool
-        False if some domain is empty: then there is no integer solution.  True proves nothing.
+    Returns False if some domain is empty: then there is no integer solution.  True proves nothing.
     """
     if any(lo is not None and hi is not None and lo > hi for lo, hi in domains.values()):
         return False

@@ -17,22 +17,9 @@ _Terms = dict[str, Fraction]
 def maximum(objective: Mapping[str, int], rows: Iterable[Row], domains: Mapping[str, Range]) -> Fraction | None:
     """Maximise ``sum coefficient * variable`` over the rows and domains, in rational numbers.
 
-    Returns
-    -------
-    Fraction or None
-        The exact maximum; None if it is infinite.
-
-    Raises
-    ------
-    ValueError
-        If no rational point satisfies the rows.
-
-    Notes
-    -----
+    Returns the exact maximum; None if it is infinite. Raises `ValueError` if no rational point satisfies the rows.
     Two-phase tableau simplex with Bland's rule (R. G. Bland, Math. Oper. Res. 2 (1977) 103), which cannot cycle.
 
-    Examples
-    --------
     >>> maximum({"x": 1}, [Row("", (("x", 2), ("y", 1)), None, 7)], {"x": (0, None), "y": (1, None)})
     Fraction(3, 1)
     >>> maximum({"y": 1}, [Row("", (("x", 1), ("y", -1)), 0, None)], {"x": (0, None), "y": (1, None)}) is None

@@ -23,13 +23,9 @@ _WORDS = {"n": "n (moving links)", "p": "p (joints)", "W": "W (mobility)"}
 def solutions(problem: Problem) -> Iterator[LinkAssortment]:
     """Yield every integer solution, lexicographically by (W, Pi, n, p, p_1.., t0, v_ct, n_2, n_3, ...).
 
-    Raises
-    ------
-    SpecError
-        Before the first solution, if the question does not bound the search; names the variable to bound.
+    Raises `SpecError` before the first solution, if the question does not bound the search; names the variable to
+    bound.
 
-    Examples
-    --------
     >>> next(solutions(Problem((("Pi", (3, 3)), ("W", (1, 1)), ("n", (3, 3)))))).frame_joints
     2
     """
@@ -128,14 +124,8 @@ def _of_size(problem: Problem, space: int, mobility: int, links: int, joints: in
 def number_of_solutions(problem: Problem, enough: int) -> int:
     """Count the solutions without listing them: exactly, or the first number beyond ``enough`` that is found.
 
-    Parameters
-    ----------
-    problem : Problem
-    enough : int
-        A larger number need not be the exact one.
+    A number above ``enough`` need not be the exact one.
 
-    Examples
-    --------
     >>> question = Problem((("Pi", (3, 3)), ("n", (40, 40)), ("p", (59, 59))))
     >>> number_of_solutions(question, 10**6)
     93339
@@ -232,21 +222,9 @@ def compositions(
 ) -> Iterator[dict[int, int]]:
     """Yield every way to choose x_a >= 0 with sum x_a = number and sum a*x_a = total.
 
-    Parameters
-    ----------
-    number, total : int
-    smallest, largest : int
-        smallest <= a <= largest.
-    ranges : mapping
-        Bounds of single x_a; kinds not listed are free.
+    ``smallest``, ``largest``: smallest <= a <= largest; ``ranges``: bounds of single x_a; kinds not listed are free.
+    Yields non-zero x_a by a, in lexicographic order of (x_smallest, x_smallest+1, ...).
 
-    Yields
-    ------
-    dict
-        Non-zero x_a by a, in lexicographic order of (x_smallest, x_smallest+1, ...).
-
-    Examples
-    --------
     >>> [list(found.values()) for found in compositions(14, 37, 2, 4, {})]
     [[5, 9], [6, 7, 1], [7, 5, 2], [8, 3, 3], [9, 1, 4]]
     """

@@ -66,17 +66,9 @@ def is_variable(symbol: str) -> bool:
 def read_range(symbol: str, value: Any) -> Range:
     """Read a fixed value or a pair of bounds.
 
-    Parameters
-    ----------
-    symbol : str
-        The variable, for the message and the natural bounds.
-    value : int or pair
-        An integer, or ``(lo, hi)`` where either side may be None.
-
-    Raises
-    ------
-    SpecError
-        If the value is not an integer or a pair, is out of its natural range, or the pair is empty.
+    ``symbol``: the variable, for the message and the natural bounds; ``value``: an integer, or ``(lo, hi)`` where
+    either side may be None. Raises `SpecError` if the value is not an integer or a pair, is out of its natural range,
+    or the pair is empty.
     """
     if isinstance(value, (tuple, list)):
         if len(value) != 2:
@@ -111,8 +103,6 @@ def _integer(symbol: str, value: Any) -> int:
 def show_range(value: Range) -> str:
     """Write a range the way :meth:`StructuralSpec.from_assignments` reads it.
 
-    Examples
-    --------
     >>> show_range((3, 3)), show_range((0, 2)), show_range((None, 2))
     ('3', '0..2', '..2')
     """

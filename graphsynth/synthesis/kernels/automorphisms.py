@@ -77,19 +77,9 @@ def _search_order(k, mult, colour):
 def automorphisms(k, mult, perms):
     """Write every automorphism of the multigraph ``mult`` into ``perms``; the identity comes first.
 
-    Parameters
-    ----------
-    k : int
-        Number of vertices.
-    mult : (k, k) uint8
-        Symmetric matrix of edge multiplicities.
-    perms : (capacity, k) uint8
-        Output: ``perms[g, v]`` is the image of v.
-
-    Returns
-    -------
-    int
-        The order of the group, or -1 when it exceeds the capacity.
+    ``k``: number of vertices; ``mult`` (k, k) uint8: symmetric matrix of edge multiplicities; ``perms`` (capacity, k)
+    uint8: output: ``perms[g, v]`` is the image of v. Returns the order of the group, or -1 when it exceeds the
+    capacity.
     """
     for v in range(k):
         perms[0, v] = v

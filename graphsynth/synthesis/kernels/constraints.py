@@ -24,27 +24,11 @@ def critical_sets(k, m, class_u, class_v, class_dmax, space, need, best, set_mas
     sum of D_e inside U <= Pi (|U| - 1) - 1 reads: sum of y_e inside U >= need(U).  U is dropped when need(U) <= 0 or
     when a proper subset needs at least as much.  The whole vertex set is dropped too: there the sum is prescribed.
 
-    Parameters
-    ----------
-    k, m : int
-        Numbers of vertices and of classes.
-    class_u, class_v : (m,) int64
-        End vertices of each class, u < v.
-    class_dmax : (m,) int64
-        Largest weight a class can take.
-    space : int
-        Mobility Pi of the space.
-    need, best : (2**k,) int16
-        Workspace.
-    set_mask : (capacity,) int64
-        Output: for each critical set, the bit mask of the classes inside it.
-    set_need : (capacity,) int64
-        Output: the need of each critical set.
-
-    Returns
-    -------
-    int
-        Number of critical sets, or -1 when the capacity is exceeded.
+    ``k``, ``m``: numbers of vertices and of classes; ``class_u``, ``class_v`` (m,) int64: end vertices of each class,
+    u < v; ``class_dmax`` (m,) int64: largest weight a class can take; ``space``: mobility Pi of the space; ``need``,
+    ``best`` (2**k,) int16: workspace; ``set_mask`` (capacity,) int64: output: for each critical set, the bit mask of
+    the classes inside it; ``set_need`` (capacity,) int64: output: the need of each critical set. Returns the number of
+    critical sets, or -1 when the capacity is exceeded.
     """
     size = 1 << k
     first = np.zeros(k + 1, np.int64)

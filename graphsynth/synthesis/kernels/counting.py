@@ -97,10 +97,7 @@ def count_states(count, sets, tables, work):
     A state is what each critical set still needs (a byte each, never below 0) and the resources left.  States in
     which no set needs anything are finished by ``work.tables[WAYS]``.
 
-    Returns
-    -------
-    int
-        The number, TOO_LARGE when the arithmetic does not suffice, or NO_ROOM when the workspace is too small.
+    Returns the number, TOO_LARGE when the arithmetic does not suffice, or NO_ROOM when the workspace is too small.
     """
     work.state[STEPS] = 0
     if sets == 0:

@@ -372,23 +372,10 @@ def rewind(start, part, parts, work):
 def list_rows(k, mults, stop, frame_modes, frame_degree, symmetry, tables, work, rows):
     """Fill ``rows`` with the next labellings of the contracted graphs up to number ``stop``.
 
-    Parameters
-    ----------
-    k : int
-        Number of vertices of the contracted graphs.
-    mults : (graphs, k, k) uint8
-        Their multiplicity matrices.
-    frame_modes, frame_degree : int
-        As in ``count_block``.
-    symmetry : int
-        0, or the prime order of a required automorphism.
-    rows : (capacity, HEADER + classes) int32
-        Output: graph, frame mode, frame, label of each class.
-
-    Returns
-    -------
-    int
-        Number of rows written; fewer than the capacity only at the end of the stream; TOO_LARGE on overflow.
+    ``k``: number of vertices of the contracted graphs; ``mults`` (graphs, k, k) uint8: their multiplicity matrices;
+    ``frame_modes``, ``frame_degree``: as in ``count_block``; ``symmetry``: 0, or the prime order of a required
+    automorphism; ``rows`` (capacity, HEADER + classes) int32: output: graph, frame mode, frame, label of each class.
+    Returns the number of rows written; fewer than the capacity only at the end of the stream; TOO_LARGE on overflow.
     """
     n = np.int64(0)
     while n < rows.shape[0]:

@@ -34,25 +34,10 @@ def split_all(k, mults, start, joined, layers, codes):
 
     Only results of minimum degree 3 are made; they are 2-connected because both halves keep a neighbour.
 
-    Parameters
-    ----------
-    k : int
-        Number of vertices before the split.
-    mults : (graphs, k, k) uint8
-        Multiplicity matrices.
-    start : int
-        First graph to split.
-    joined : int
-        Parallel edges between the two halves.
-    layers : int
-        Bound of the multiplicities.
-    codes : (capacity, k (k + 1) / 2) uint8
-        Output: canonical upper triangles of the results, with repetitions.
-
-    Returns
-    -------
-    (int, int)
-        The graph to go on with, and the number of codes written.
+    ``k``: number of vertices before the split; ``mults`` (graphs, k, k) uint8: multiplicity matrices; ``start``:
+    first graph to split; ``joined``: parallel edges between the two halves; ``layers``: bound of the multiplicities;
+    ``codes`` (capacity, k (k + 1) / 2) uint8: output: canonical upper triangles of the results, with repetitions.
+    Returns the graph to go on with, and the number of codes written.
     """
     n = k + 1
     lab, form, gens, index, orbits, wi, wu = canon_workspace(n, layers)

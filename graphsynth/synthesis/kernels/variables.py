@@ -210,10 +210,7 @@ def unconstrained_ways(count, yes_or_no, tables, work):
 
     With ``yes_or_no`` the table only tells whether there are any (and cannot overflow).
 
-    Returns
-    -------
-    float
-        The number of choices of all variables, resources ignored; above 2**62 the table may have overflowed.
+    Returns the number of choices of all variables, resources ignored; above 2**62 the table may have overflowed.
     """
     resources = tables.resources.shape[1]
     top = 1.0

@@ -25,8 +25,6 @@ def ready(strategy: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
 def check_range(name: str, low: int, high: int, least: int, most: int) -> None:
     """Refuse sizes that are not ordered or beyond what the strategy can draw.
 
-    Examples
-    --------
     >>> check_range("links", 4, 8, 4, 10)
     """
     for word, value in (("smallest", low), ("largest", high)):

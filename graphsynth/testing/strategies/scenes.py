@@ -14,8 +14,6 @@ _PRINTABLE = st.characters(exclude_categories=("C", "Z"), include_characters=" "
 def toml_text(tables: Mapping[str, Any]) -> str:
     """Write nested tables of strings, numbers, booleans and lists as TOML.
 
-    Examples
-    --------
     >>> print(toml_text({"scene": {"name": "x", "run": {"steps": [1, 2.5]}}}))
     [scene]
     name = "x"
