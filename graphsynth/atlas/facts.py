@@ -15,36 +15,11 @@ from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.canonical import KEY_VERSION
 
 if TYPE_CHECKING:
-    from graphsynth.structure.graph import MechanismGraph
+    from graphsynth.atlas.kernels.facts import Block
 
 Bytes = NDArray[np.uint8]
 
-#: A group as (moving links, upper triangle of base and links as a number).
-GroupForm = tuple[int, int]
-
 _FRAMED = 8  # flag in the second byte of a key
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Block:
-    """Arrays of :func:`graphsynth.atlas.kernels.facts.analyse`, chain by chain along the first axis."""
-
-    links: int
-    joints: Bytes
-    keys: Bytes
-    order: NDArray[np.int64]
-    orbit: Bytes
-    girth: Bytes
-    cuts: NDArray[np.uint64]
-    levels: Bytes
-    count: NDArray[np.int64]
-    frames: Bytes
-    drives: NDArray[np.uint64]
-    sizes: Bytes
-    outers: Bytes
-    forms: NDArray[np.uint64]
-    parents: Bytes
-    contracted: Bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +72,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
     ``packed`` uint8, shape (chains, 3 joints): joints ``a, b, 1``, as the enumerator packs them. Raises
     `TooLargeError` for more links than the kernels are laid out for.
     """
-    from graphsynth.atlas.kernels.facts import MOST_LINKS, WORDS, analyse
+    from graphsynth.atlas.kernels.facts import MOST_LINKS, WORDS, Block, analyse
 
     if links > MOST_LINKS:
         raise TooLargeError(f"a catalogue holds chains of at most {MOST_LINKS} links, not {links}: count or list them")
@@ -107,7 +82,6 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
     choices = np.array([comb(degree, mobility) for degree in range(links)])
     room = int(choices[degrees].sum(axis=1).max(initial=1))
     block = Block(
-        links=links,
         joints=np.zeros((chains, joints, 2), np.uint8),
         keys=np.zeros((chains, _stream(links)), np.uint8),
         order=np.zeros(chains, np.int64),
@@ -124,11 +98,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
         parents=np.zeros((chains, half, _stream(links) + 1), np.uint8),
         contracted=np.zeros((chains, 1 + links * links), np.uint8),
     )
-    analyse(
-        links, mobility, packed, block.joints, block.keys, block.order, block.orbit, block.girth, block.cuts,
-        block.levels, block.count, block.frames, block.drives, block.sizes, block.outers, block.forms, block.parents,
-        block.contracted,
-    )  # fmt: skip
+    analyse(links, mobility, packed, block)
     return block
 
 
@@ -136,9 +106,7 @@ def rows_of(block: Block, rows: Rows) -> None:
     """Append the rows of a block; what is in ``rows`` already keeps its place."""
     start = len(rows.chains)
     contracted = _contracted(block, rows)
-    rows.chains += [
-        (*fact, shape) for fact, shape in zip(zip(*_columns(block)), contracted)
-    ]  # fmt: skip
+    rows.chains += [(*fact, shape) for fact, shape in zip(zip(*_columns(block)), contracted)]
     for c, orbit in enumerate(block.orbit.tolist()):
         own = sorted(set(orbit))
         levels = block.levels[c].tolist()
@@ -151,7 +119,7 @@ def rows_of(block: Block, rows: Rows) -> None:
 
 def _columns(block: Block) -> Iterator[Iterable[Any]]:
     """Columns of the chains, without the last one."""
-    n, count = block.links, len(block.keys)
+    count, n = block.orbit.shape
     joints = block.joints.shape[1]
     yield [_key(n, stream) for stream in _lines(block.keys)]
     yield _graph6(n, block.keys)
@@ -228,7 +196,7 @@ def edges_text(vertices: int, matrix: bytes) -> str:
 
 
 def _dyads(block: Block, start: int, rows: Rows) -> None:
-    n = block.links
+    n = block.orbit.shape[1]
     own = _stream(n - 2)
     chains, places = np.nonzero(block.parents[:, :, 0])
     streams = _lines(block.parents[chains, places, 1 : 1 + own]) if len(chains) else []
@@ -323,16 +291,3 @@ def _group_key(links: int, form: int) -> str:
     width = -(-size // 8) * 8
     stream = int(f"{form:0{size}b}"[::-1].ljust(width, "0"), 2).to_bytes(width // 8, "big")
     return _key(links + 1, stream, _FRAMED)
-
-
-def group_graph(form: GroupForm) -> MechanismGraph:
-    """Return the graph of a structural group, its base as frame (link 0).
-
-    >>> group_graph((2, 7)).joints
-    (Joint(a=0, b=1, mobility=1), Joint(a=0, b=2, mobility=1), Joint(a=1, b=2, mobility=1))
-    """
-    from graphsynth.structure.graph import MechanismGraph
-
-    size, bits = form
-    pairs: list[tuple[int, Any]] = [(a, b) for b in range(1, size + 1) for a in range(b)]
-    return MechanismGraph(size + 1, [pair for k, pair in enumerate(pairs) if bits >> k & 1], frame=0)

@@ -90,7 +90,7 @@ def expected_of(problem: Problem, executor: Executor | None) -> int:
     """Count the chains of a family without listing them."""
     from graphsynth.synthesis.problem import counts
 
-    return sum(counts(problem.pieces(listing=False), executor))
+    return sum(counts(problem.work_items(listing=False), executor))
 
 
 def processes(workers: int) -> AbstractContextManager[Executor | None]:
@@ -102,9 +102,8 @@ def processes(workers: int) -> AbstractContextManager[Executor | None]:
 
 def _compile_kernels() -> None:
     from graphsynth.atlas.pieces import problem_of, rows_of_task, tasks_of
-    from graphsynth.synthesis.problem import count_piece
 
     for task in tasks_of(6, 1, False):
         rows_of_task(task)
-    for piece in problem_of(6, 1, False).pieces(listing=False):
-        count_piece(piece)
+    for piece in problem_of(6, 1, False).work_items(listing=False):
+        piece.count()

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from graphsynth.atlas.facts import Rows, analyse_block, rows_of
 
 if TYPE_CHECKING:
+    from graphsynth.synthesis.chunks import Chunk
     from graphsynth.synthesis.families import Family
-    from graphsynth.synthesis.problem import Piece, Problem
-    from graphsynth.synthesis.units import Unit
+    from graphsynth.synthesis.problem import Problem, WorkItem
 
 #: Bound on the labellings of a piece; about a quarter of them are chains.  A piece takes a second at most.
 PIECE = 8000.0
@@ -33,7 +33,7 @@ class Task:
     number: int
     links: int
     mobility: int
-    piece: Piece
+    piece: WorkItem
 
     @property
     def weight(self) -> float:
@@ -53,17 +53,17 @@ def problem_of(links: int, mobility: int, fractionated: bool) -> Problem:
 
 def tasks_of(links: int, mobility: int, fractionated: bool) -> list[Task]:
     """Cut a family; the cut depends on the family alone."""
-    whole = problem_of(links, mobility, fractionated).pieces(listing=True)
+    whole = problem_of(links, mobility, fractionated).work_items(listing=True)
     size = max(PIECE, sum(piece.weight for piece in whole) / MOST_PIECES)
     pieces = [part for piece in whole for part in _finer(piece, size)]
     return [Task(number, links, mobility, piece) for number, piece in enumerate(pieces)]
 
 
-def _finer(piece: Piece, size: float) -> Iterator[Piece]:
+def _finer(piece: WorkItem, size: float) -> Iterator[WorkItem]:
     """Cut a piece of many contracted graphs at their bounds, and that of a single one by its search prefixes."""
-    from graphsynth.synthesis.units import Unit
+    from graphsynth.synthesis.chunks import Chunk
 
-    if not isinstance(piece, Unit) or piece.weight <= size:
+    if not isinstance(piece, Chunk) or piece.weight <= size:
         yield piece
         return
     if piece.stop - piece.start == 1:
@@ -83,12 +83,12 @@ def _finer(piece: Piece, size: float) -> Iterator[Piece]:
 @lru_cache(maxsize=2)
 def _bounds(family: Family) -> NDArray[np.float64]:
     """Bounds on the chains of each contracted graph, computed once for all pieces of a family."""
-    from graphsynth.synthesis.units import estimates
+    from graphsynth.synthesis.chunks import estimates
 
     return estimates(family)
 
 
-def _parts(piece: Unit, size: float) -> Iterator[Unit]:
+def _parts(piece: Chunk, size: float) -> Iterator[Chunk]:
     """Cut a single contracted graph that is far too big: part p of P becomes p, p + P, ... of a multiple of P."""
     times = ceil(piece.weight / size / 2) if piece.weight > 4 * size else 1
     for k in range(times):
@@ -121,11 +121,11 @@ def rows_of_task(task: Task) -> Rows:
     return rows
 
 
-def _packed(piece: Piece) -> Iterator[NDArray[np.uint8]]:
-    from graphsynth.synthesis.units import Unit, packed_of
+def _packed(piece: WorkItem) -> Iterator[NDArray[np.uint8]]:
+    from graphsynth.synthesis.chunks import Chunk
 
-    if isinstance(piece, Unit):
-        yield from packed_of(piece)
+    if isinstance(piece, Chunk):
+        yield from piece.packed()
         return
     graphs = [graph.packed for graph in piece.graphs()]
     if graphs:

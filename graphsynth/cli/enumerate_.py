@@ -35,13 +35,13 @@ def run(options: argparse.Namespace) -> int:
     problem = problem_of(options)
     if problem.reason:
         console.note(f"nothing to list: {problem.reason}")
-    weight = sum(piece.weight for piece in problem.pieces(listing=True))
+    weight = sum(piece.weight for piece in problem.work_items(listing=True))
     with processes(console.workers_for(options.workers, weight > BIG)) as executor:
         if options.output is None:
             from graphsynth.synthesis.problem import texts
             from graphsynth.synthesis.shards import shard_of
 
-            for data, _ in texts(shard_of(problem.pieces(listing=True), options.shard), executor):
+            for data, _ in texts(shard_of(problem.work_items(listing=True), options.shard), executor):
                 sys.stdout.buffer.write(data)
             return 0
         if entry is not None and (options.resume or options.json):
@@ -110,7 +110,7 @@ def _write_whole(problem: Problem, options: argparse.Namespace, executor: Execut
 
     if options.output.exists() and not options.force:
         raise GraphsynthError(f"{options.output} exists; choose another name, or replace it with --force")
-    blocks = texts(shard_of(problem.pieces(listing=True), options.shard), executor)
+    blocks = texts(shard_of(problem.work_items(listing=True), options.shard), executor)
     return write((graph for data, _ in blocks for graph in read_stream(BytesIO(data), "text")), options.output)
 
 

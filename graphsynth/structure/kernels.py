@@ -82,10 +82,12 @@ def _refine(n, layers, masks, lab, keys, starts, active):
         place = np.int64(lowest_bit(active))
         active &= active - ONE
         end = _cell_end(starts, place, n)
+        # The vertices of an active cell.
         splitter = ZERO
         for i in range(place, end):
             splitter |= ONE << np.uint64(lab[i])
         state = _mix(state, (np.uint64(place) << EIGHT) | np.uint64(end - place))
+        # Split every cell by the edges of each colour into this one.
         low = 0
         while low < n:
             high = _cell_end(starts, low, n)
@@ -114,6 +116,7 @@ def _refine(n, layers, masks, lab, keys, starts, active):
             if same:
                 state = _mix(_mix(state, np.uint64(low)), keys[low])
             else:
+                # All fragments become active but the first largest; that too if the cell was.
                 was_active = (active >> np.uint64(low)) & ONE
                 largest = low
                 size = 0
@@ -238,11 +241,13 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
     first_trace = wu[FIRST_TRACE]
     best_trace = wu[BEST_TRACE]
     keys = wu[KEYS]
+    # The first leaf: its level, and the deepest level on the path to it that is not done.
     first_length = 0
     on_first = -1
     have_leaf = False
     merging = 0
     others = 0
+    # The root: vertices by colour.
     for v in range(n):
         orbits[v] = v
         index[v] = 1
@@ -274,6 +279,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
             target = level - 1
             _permuted(n, layers, masks, wi[level], position, wu, leaf_form)
             take = False
+            # The first leaf is kept; an equal one, or one equal to the best, is an automorphism.
             if not have_leaf:
                 have_leaf = True
                 take = True
@@ -305,6 +311,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
                 else:
                     take = versus_best[level] > 0
                 if found > 0:
+                    # Generators that join orbits stay; of the others the last n, for pruning.
                     row = n + others % n
                     for i in range(n):
                         gens[row, first_lab[i] if found == 1 else lab[i]] = wi[level, i]
@@ -314,7 +321,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
                         merging += 1
                     else:
                         others += 1
-            if take:
+            if take:  # the best leaf so far
                 for c in range(layers):
                     for i in range(n):
                         form[c, i] = wu[leaf_form + c, i]
@@ -329,6 +336,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
         elif not expand:
             level -= 1
         if expand:
+            # The target cell: the first of the smallest that are not single.
             starts = wu[STARTS, level]
             best = 0
             size = n + 1
@@ -352,6 +360,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
                 vertex, left[level] = _next(n, level, on_path, left[level], path, parent, orbits, gens, merging, others)
                 if vertex >= 0:
                     break
+            # A level of the first path is done: the orbit of its vertex is a factor of the order.
             if level == on_first:
                 root = _find(orbits, first_path[level])
                 count = 0
@@ -363,6 +372,7 @@ def canon(n, layers, masks, colours, lab, form, gens, index, orbits, wi, wu):
             level -= 1
         if level < 0:
             break
+        # Make the vertex a cell of its own, and refine.
         place = cell[level]
         path[level] = vertex
         for i in range(n):

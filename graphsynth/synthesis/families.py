@@ -1,4 +1,4 @@
-"""Families: sets of chains that one kind of contracted graph and one alphabet of labels generate; and rings.
+"""Families: sets of chains that one kind of contracted graph and one edge_labels of labels generate; and rings.
 
 A ring of links has a single loop and no contracted graph; rings are told apart by the order of their joint mobilities.
 """
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.core.wording import shown, whole
-from graphsynth.synthesis.alphabet import Alphabet, alphabet_for
 from graphsynth.synthesis.contracted import contracted_graphs
+from graphsynth.synthesis.edge_labels import EdgeLabels, edge_labels_for
 from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
 
 if TYPE_CHECKING:
@@ -84,9 +84,9 @@ class Family:
         return self.frames != FRAME_NONE
 
     @property
-    def alphabet(self) -> Alphabet:
+    def edge_labels(self) -> EdgeLabels:
         """The labels of the paths."""
-        return alphabet_for(self.space, self.mobility, self.binary_links, self.higher, self.loops, self.vertices)
+        return edge_labels_for(self.space, self.mobility, self.binary_links, self.higher, self.loops, self.vertices)
 
     @property
     def graphs(self) -> NDArray[np.uint8]:
@@ -138,24 +138,21 @@ def chain_joints(links: int, mobility: int, space: int, higher: Mapping[int, int
     return joints
 
 
-def _layers(links: int, mobility: int, space: int, higher: Mapping[int, int], frames: int) -> Iterator[Family]:
+def chain_families(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> list[Family]:
+    """List the families of non-fractionated chains with two or more loops (with every frame, if ``framed``).
+
+    With mobility 0 they are Baranov trusses, or Assur groups.
+    """
     lower = chain_joints(links, mobility, space, higher)
     if lower is None:
-        return
+        return []
+    frames = FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE
     placed = tuple(sorted((i, count) for i, count in higher.items() if i > 1 and count))
     loops = lower + sum(count for _, count in placed) - links + 1
-    for vertices in range(2, min(2 * (loops - 1), links) + 1):
-        yield Family(space, mobility, loops, vertices, links - vertices, placed, frames)
-
-
-def chain_families(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> list[Family]:
-    """List the families of non-fractionated chains with two or more loops (with every frame, if ``framed``)."""
-    return list(_layers(links, mobility, space, higher, FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE))
-
-
-def truss_families(links: int, space: int, framed: bool) -> list[Family]:
-    """List the families of Baranov trusses with two or more loops (of Assur groups, if ``framed``)."""
-    return list(_layers(links, 0, space, {}, FRAME_VERTEX + FRAME_PATH if framed else FRAME_NONE))
+    return [
+        Family(space, mobility, loops, vertices, links - vertices, placed, frames)
+        for vertices in range(2, min(2 * (loops - 1), links) + 1)
+    ]
 
 
 def mechanism_families(assortment: LinkAssortment, levels: Levels = ()) -> list[Family]:
@@ -184,7 +181,7 @@ def mechanism_families(assortment: LinkAssortment, levels: Levels = ()) -> list[
     ]
 
 
-def _words(content: dict[int, int]) -> Iterator[tuple[int, ...]]:
+def _sequences(content: dict[int, int]) -> Iterator[tuple[int, ...]]:
     """Yield every arrangement of a multiset, in lexicographic order."""
     if not any(content.values()):
         yield ()
@@ -192,16 +189,16 @@ def _words(content: dict[int, int]) -> Iterator[tuple[int, ...]]:
     for value in sorted(content):
         if content[value]:
             content[value] -= 1
-            for rest in _words(content):
+            for rest in _sequences(content):
                 yield (value, *rest)
             content[value] += 1
 
 
-def _is_first(word: tuple[int, ...], framed: bool) -> bool:
+def _is_first(sequence: tuple[int, ...], framed: bool) -> bool:
     """Tell whether no symmetry of the ring (only the reflection that keeps the frame, if framed) makes it smaller."""
-    shifts = range(1) if framed else range(len(word))
-    back = word[::-1]
-    return all(word <= turned[i:] + turned[:i] for turned in (word, back) for i in shifts)
+    shifts = range(1) if framed else range(len(sequence))
+    back = sequence[::-1]
+    return all(sequence <= turned[i:] + turned[:i] for turned in (sequence, back) for i in shifts)
 
 
 def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> Iterator[MechanismGraph]:
@@ -227,7 +224,7 @@ def rings(links: int, mobility: int, space: int, higher: Mapping[int, int], fram
         yield MechanismGraph(2, [(0, 1, mobility)], frame=0 if framed else None, space=space)
     if links < 3 or sum(content.values()) != links:
         return
-    for word in _words(content):
-        if _is_first(word, framed):
-            joints = [(i, (i + 1) % links, f) for i, f in enumerate(word)]
+    for sequence in _sequences(content):
+        if _is_first(sequence, framed):
+            joints = [(i, (i + 1) % links, f) for i, f in enumerate(sequence)]
             yield MechanismGraph(links, joints, frame=0 if framed else None, space=space)

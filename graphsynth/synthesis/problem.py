@@ -1,4 +1,4 @@
-"""A problem: everything one call enumerates or counts, cut into pieces that can be done anywhere in any order."""
+"""A problem: everything one call enumerates or counts, cut into work items that can be done anywhere in any order."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from fractions import Fraction
 from functools import lru_cache
 from hashlib import sha256
 from itertools import chain
+from operator import methodcaller
 from typing import TYPE_CHECKING
 
-from graphsynth.core.errors import InfeasibleSpecError, SpecError
+from graphsynth.core.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.core.ordered import in_order, processes as processes_of
 from graphsynth.core.wording import shown, whole
-from graphsynth.synthesis.contracted import has_contracted_graphs
+from graphsynth.synthesis.chunks import Chunk, cut
+from graphsynth.synthesis.contracted import FOLDER_VARIABLE, SHIPPED_LOOPS, has_contracted_graphs
 from graphsynth.synthesis.families import (
     MOST_LINKS,
     Family,
@@ -24,10 +26,8 @@ from graphsynth.synthesis.families import (
     chain_joints,
     chain_numbers,
     mechanism_families,
-    truss_families,
 )
-from graphsynth.synthesis.one_by_one import OneByOne
-from graphsynth.synthesis.units import Unit, count_unit, cut, graphs_of, text_of
+from graphsynth.synthesis.fractionated import OneByOne
 
 if TYPE_CHECKING:
     from graphsynth.structure.graph import MechanismGraph
@@ -35,9 +35,13 @@ if TYPE_CHECKING:
     from graphsynth.structure.system.spec import StructuralSpec
 
 _PRIMES = (2, 3, 5, 7, 11, 13)
+_LISTED_PER_SECOND = 1e6  # order of magnitude, one core
+_MOST_LOOPS = 10  # what the kernels are laid out for
+_COUNTED_LOOPS = 6  # counts of so many loops take a moment
+# 1-DOF planar chains with 2, 3, ..., 8 loops (published and recomputed): where there is nothing smaller to count
+_KNOWN = (2, 16, 230, 6856, 318162, 19819281, 1535380884)
 
-
-Piece = Unit | OneByOne
+WorkItem = Chunk | OneByOne
 
 
 @dataclass(frozen=True)
@@ -69,10 +73,10 @@ class Problem:
         """A short text that differs between problems."""
         return sha256(repr(self).encode()).hexdigest()[:16]
 
-    def pieces(self, *, listing: bool) -> list[Piece]:
+    def work_items(self, *, listing: bool) -> list[WorkItem]:
         """Cut the problem; the cut depends on the problem alone."""
         listing = listing or bool(self.symmetry) or any(family.levels for family in self.families)
-        return list(_pieces(self, listing))
+        return list(_work_items(self, listing))
 
     @classmethod
     def chains(
@@ -104,7 +108,7 @@ class Problem:
         loops = -1 if joints is None else joints + sum(count for _, count in placed) - links + 1
         if loops < (links > 2):
             return cls(title, (), reason=_reason(links, mobility, space, higher))
-        _check_loops(loops, links, mobility, space, higher, framed=framed)
+        check_loops(loops, links, mobility, space, higher, framed=framed)
         common = (links, mobility, space, placed, framed)
         one_by_one = [OneByOne("rings", *common, symmetry=order)]
         if fractionated and mobility > 1:
@@ -150,7 +154,7 @@ class Problem:
                 )
             higher = tuple((i, count) for i, count in enumerate(assortment.p_i, 1) if i > 1 and count)
             numbers = assortment.loops, assortment.links, assortment.mobility, assortment.space
-            _check_loops(*numbers, dict(higher), framed=True)
+            check_loops(*numbers, dict(higher), framed=True)
             families += mechanism_families(assortment, levels)
             common = (assortment.moving_links + 1, assortment.mobility, assortment.space, higher, True)
             if assortment.loops == 1:
@@ -182,22 +186,78 @@ class Problem:
         title = f"{'Assur groups, n=' + str(links - 1) if framed else 'Baranov trusses, N=' + str(links)} Pi={space}"
         if joints is None:
             return cls(title, (), reason=_reason(links, 0, space, {}))
-        _check_loops(joints - links + 1, links, 0, space, {}, framed=framed)
+        check_loops(joints - links + 1, links, 0, space, {}, framed=framed)
         ring = OneByOne("rings", links, 0, space, (), framed)
-        return cls(title, tuple(truss_families(links, space, framed)), (ring,))
+        return cls(title, tuple(chain_families(links, 0, space, {}, framed)), (ring,))
 
 
 @lru_cache(maxsize=4)
-def _pieces(problem: Problem, listing: bool) -> tuple[Piece, ...]:
+def _work_items(problem: Problem, listing: bool) -> tuple[WorkItem, ...]:
     return (*problem.one_by_one, *cut(problem.families, listing=listing, symmetry=problem.symmetry))
 
 
-def _check_loops(loops: int, links: int, mobility: int, space: int, higher: Mapping[int, int], *, framed: bool) -> None:
-    """Refuse at once what has more loops than there are contracted graphs for, with an estimate."""
-    if not has_contracted_graphs(loops, links):
-        from graphsynth.synthesis.outlook import refuse
+def check_loops(loops: int, links: int, mobility: int, space: int, higher: Mapping[int, int], *, framed: bool) -> None:
+    """Refuse what has more loops than there are contracted graphs for: `TooLargeError` with an estimate of the work."""
+    if has_contracted_graphs(loops, links):
+        return
+    count = extrapolated(loops, links, mobility, space, higher, framed=framed)
+    what = "mechanisms" if framed and mobility else "groups" if framed else "chains" if mobility else "trusses"
+    estimate = f"about {count:.0e} {what} answer it, by those with fewer loops; listing them would take "
+    estimate += _duration(count / _LISTED_PER_SECOND) + " on one core"
+    if loops <= _MOST_LOOPS:
+        takes = "five minutes and 1.5 GB" if loops == 9 else "hours and tens of GB"
+        remedy = (
+            f"make their contracted graphs once with 'python -m graphsynth.synthesis.regenerate {loops} FOLDER' "
+            f"({takes}), set {FOLDER_VARIABLE}=FOLDER, and share the work out with --shard i/m over m machines"
+        )
+    else:
+        remedy = (
+            f"contracted graphs with more than {_MOST_LOOPS} loops cannot be made: ask for fewer links, or fix more of "
+            "the question"
+        )
+    raise TooLargeError(
+        f"{links} links make {loops} independent loops, more than the bound of {SHIPPED_LOOPS}: {estimate}; {remedy}",
+        count,
+    )
 
-        refuse(loops, links, mobility, space, higher, framed=framed)
+
+def _duration(seconds: float) -> str:
+    for size, name in ((3.15e7, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {name}" if seconds < 1e4 * size else f"{seconds / size:.0e} {name}"
+    return "a minute or two" if seconds > 20 else "seconds"
+
+
+def extrapolated(
+    loops: int, links: int, mobility: int, space: int, higher: Mapping[int, int], *, framed: bool = False
+) -> float:
+    """Estimate a number of non-fractionated chains (trusses, for mobility 0; with every frame, if ``framed``).
+
+    A question with one loop less has Pi - 1 links less, and the same mobility, space and higher pairs.  Such smaller
+    questions are counted, and the ratio of one number to the next, which grows by about as much each time, is
+    continued.
+
+    >>> 1e11 < extrapolated(9, 20, 1, 3, {}) < 2e11
+    True
+    """
+    first = [loops - _COUNTED_LOOPS, loops - _COUNTED_LOOPS + 1, loops - _COUNTED_LOOPS + 2]
+    known = [_smaller(links - (space - 1) * fewer, mobility, space, higher, framed) for fewer in reversed(first)]
+    if not all(known):
+        factor = links if framed else 1
+        known, at = [factor * n for n in _KNOWN[-3:]], SHIPPED_LOOPS
+    else:
+        at = _COUNTED_LOOPS
+    ratio, growth = known[2] / known[1], known[2] / known[1] - known[1] / known[0]
+    count = float(known[2])
+    for _ in range(at, loops):
+        ratio += max(growth, 0.0)
+        count = min(count * ratio, 1e300)
+    return count
+
+
+def _smaller(links: int, mobility: int, space: int, higher: Mapping[int, int], framed: bool) -> int:
+    families = chain_families(links, mobility, space, higher, framed) if links > 2 else []
+    return sum(chunk.count() for chunk in cut(families, listing=False))
 
 
 def check_symmetry(symmetry: int | None) -> int:
@@ -244,50 +304,29 @@ def _reason(links: int, mobility: int, space: int, higher: Mapping[int, int]) ->
     return f"{asked}, too few for a loop: ask for more links or a smaller mobility"
 
 
-def count_piece(piece: Piece) -> int:
-    """Count the graphs of a piece (exact)."""
-    return count_unit(piece) if isinstance(piece, Unit) else piece.count()
-
-
-def graphs_of_piece(piece: Piece) -> Iterator[MechanismGraph]:
-    """Stream the graphs of a piece."""
-    return graphs_of(piece) if isinstance(piece, Unit) else piece.graphs()
-
-
-def text_of_piece(piece: Piece) -> Iterator[tuple[bytes, int]]:
-    """Stream a piece as (lines of the text form, number of lines)."""
-    if isinstance(piece, Unit):
-        yield from text_of(piece)
-        return
-    lines = [graph.to_text() + "\n" for graph in piece.graphs()]
-    if lines:
-        yield "".join(lines).encode("ascii"), len(lines)
-
-
-def _text(piece: Piece) -> tuple[bytes, int]:
-    blocks = list(text_of_piece(piece))
+def _text(item: WorkItem) -> tuple[bytes, int]:
+    blocks = list(item.texts())
     return b"".join(block for block, _ in blocks), sum(lines for _, lines in blocks)
 
 
-def _packed(piece: Piece) -> list[MechanismGraph]:
-    return list(graphs_of_piece(piece))
+def _graphs(item: WorkItem) -> list[MechanismGraph]:
+    return list(item.graphs())
 
 
-def counts(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[int]:
-    """Yield the number of graphs of each piece."""
-    return in_order(executor, count_piece, pieces)
+def counts(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[int]:
+    """Yield the number of graphs of each work item."""
+    return in_order(executor, methodcaller("count"), items)
 
 
-def texts(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[tuple[bytes, int]]:
-    """Yield each piece as (lines of the text form, number of lines)."""
-    return in_order(executor, _text, pieces)
+def texts(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[tuple[bytes, int]]:
+    """Yield each work item as (lines of the text form, number of lines)."""
+    return in_order(executor, _text, items)
 
 
-def graphs(pieces: Iterable[Piece], executor: Executor | None) -> Iterator[MechanismGraph]:
-    """Yield the graphs of all pieces, in order."""
-    return chain.from_iterable(
-        map(graphs_of_piece, pieces) if executor is None else in_order(executor, _packed, pieces)
-    )
+def graphs(items: Iterable[WorkItem], executor: Executor | None) -> Iterator[MechanismGraph]:
+    """Yield the graphs of all work items, in order."""
+    made = map(methodcaller("graphs"), items) if executor is None else in_order(executor, _graphs, items)
+    return chain.from_iterable(made)
 
 
 def processes(workers: int) -> AbstractContextManager[Executor | None]:
@@ -301,7 +340,7 @@ def processes(workers: int) -> AbstractContextManager[Executor | None]:
 
 def _compile_kernels() -> None:
     smallest = Problem.chains(6, 1, 3, None, False, None)
-    for piece in smallest.pieces(listing=False):
-        count_piece(piece)
-    for piece in smallest.pieces(listing=True):
-        _text(piece)
+    for item in smallest.work_items(listing=False):
+        item.count()
+    for item in smallest.work_items(listing=True):
+        _text(item)

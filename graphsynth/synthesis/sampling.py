@@ -18,13 +18,12 @@ import numpy as np
 from graphsynth.core.errors import InfeasibleSpecError, SpecError, TooLargeError
 from graphsynth.core.wording import whole
 from graphsynth.structure.graph import MechanismGraph
+from graphsynth.synthesis.chunks import count_each, expansion_of
 from graphsynth.synthesis.families import Family
-from graphsynth.synthesis.kernels.drawing_lots import decode_fixed, fixed_table, open_fixed
+from graphsynth.synthesis.kernels.counting import decode_fixed, fixed_table, open_fixed
 from graphsynth.synthesis.kernels.expanding import expand_packed
-from graphsynth.synthesis.kernels.layout import Work, make_work
-from graphsynth.synthesis.kernels.listing import HEADER
+from graphsynth.synthesis.kernels.layout import HEADER, Work, make_work
 from graphsynth.synthesis.problem import Problem
-from graphsynth.synthesis.units import count_each, spelling_of
 
 _PAIRS = 1 << 16
 
@@ -64,8 +63,8 @@ def _work(resources: int) -> Work:
 
 
 def _draw(family: Family, h: int, random: Random) -> MechanismGraph:
-    tables = family.alphabet.tables
-    work = _work(family.alphabet.resources)
+    tables = family.edge_labels.tables
+    work = _work(family.edge_labels.resources)
     mult = family.graphs[h]
     table = np.empty((_PAIRS, 5), np.int64)
     count = fixed_table(family.vertices, mult, family.frames, family.frame_degree, tables, work, table)
@@ -82,5 +81,6 @@ def _draw(family: Family, h: int, random: Random) -> MechanismGraph:
         pass
     row[0, :HEADER] = h, mode, frame
     out = np.empty((1, 3 * family.joints), np.uint8)
-    expand_packed(family.vertices, family.links, family.graphs, row, 1, spelling_of(family), out)
+    expansion = expansion_of(family.edge_labels, family.levels)
+    expand_packed(family.vertices, family.links, family.graphs, row, 1, expansion, out)
     return MechanismGraph._unchecked(family.links, out.tobytes(), 0 if family.framed else None, family.space)

@@ -1,4 +1,4 @@
-"""Sharing the pieces of a problem out: runs of contracted graphs that cost about the same work.
+"""Sharing the items of a problem out: runs of contracted graphs that cost about the same work.
 
 The work of a contracted graph is estimated from the number of its labellings and its symmetries (to list), from the
 states of its dynamic program (to count), or is the number of its chains (to make a catalogue); of a family of many
@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from graphsynth.core.errors import SpecError
 from graphsynth.core.wording import shown, whole
+from graphsynth.synthesis.chunks import Chunk, estimates, workspace
 from graphsynth.synthesis.families import Family
-from graphsynth.synthesis.joined import count_fractionated
+from graphsynth.synthesis.fractionated import OneByOne, count_fractionated
 from graphsynth.synthesis.kernels.counting import COUNTING, LISTING, MAKING, weigh_block
-from graphsynth.synthesis.one_by_one import OneByOne
-from graphsynth.synthesis.problem import Piece
-from graphsynth.synthesis.units import Unit, estimates, workspace
+from graphsynth.synthesis.problem import WorkItem
 
 Shard = tuple[int, int]
 Costs = NDArray[np.float64]
@@ -30,34 +29,34 @@ _MADE = 1000.0  # work of a chain that is made one by one, as the kernel weighs
 _EFFORT = 10.0  # the same in chains of a catalogue
 
 
-def shard_of(pieces: Sequence[Piece], shard: Shard | None, *, listing: bool = True) -> list[Piece]:
+def shard_of(items: Sequence[WorkItem], shard: Shard | None, *, listing: bool = True) -> list[WorkItem]:
     """Return shard i of m (1 <= i <= m): a run of the work; the shards one after the other are the whole.
 
-    ``pieces``: all pieces of a problem; one of several contracted graphs may be cut between them; ``shard`` (int,
-    int) or None: which share; None is everything; ``listing``: whether the pieces are to be listed, not counted.
+    ``items``: all items of a problem; one of several contracted graphs may be cut between them; ``shard`` (int,
+    int) or None: which share; None is everything; ``listing``: whether the items are to be listed, not counted.
     Raises `SpecError` for i out of 1..m.
     """
     if shard is None:
-        return list(pieces)
+        return list(items)
     i, m = _checked(shard)
-    atoms = _atoms(tuple(pieces), LISTING if listing else COUNTING)
+    atoms = _atoms(tuple(items), LISTING if listing else COUNTING)
     ends = np.cumsum([0, *map(len, atoms)])
     first, last = _run(np.concatenate([*atoms, np.zeros(0)]), i, m)
     return [
-        _trimmed(piece, max(first - start, 0), min(last, stop) - start, costs)
-        for piece, start, stop, costs in zip(pieces, ends[:-1].tolist(), ends[1:].tolist(), atoms)
+        _trimmed(item, max(first - start, 0), min(last, stop) - start, costs)
+        for item, start, stop, costs in zip(items, ends[:-1].tolist(), ends[1:].tolist(), atoms)
         if start < last and first < stop
     ]
 
 
-def share_of(pieces: Sequence[Piece], shard: Shard | None) -> range:
-    """Return which pieces are shard i of m of a catalogue: a run of whole ones.
+def share_of(items: Sequence[WorkItem], shard: Shard | None) -> range:
+    """Return which items are shard i of m of a catalogue: a run of whole ones.
 
     Raises `SpecError` for i out of 1..m.
     """
-    if shard is None or not pieces:
-        return range(len(pieces))
-    costs = np.array([costs.sum() for costs in _atoms(tuple(pieces), MAKING)])
+    if shard is None or not items:
+        return range(len(items))
+    costs = np.array([costs.sum() for costs in _atoms(tuple(items), MAKING)])
     return range(*_run(costs, *_checked(shard)))
 
 
@@ -73,11 +72,11 @@ def _checked(shard: Shard) -> Shard:
     return i, m
 
 
-def _trimmed(piece: Piece, start: int, stop: int, costs: Costs) -> Piece:
-    if not isinstance(piece, Unit) or stop - start == len(costs):
-        return piece
+def _trimmed(item: WorkItem, start: int, stop: int, costs: Costs) -> WorkItem:
+    if not isinstance(item, Chunk) or stop - start == len(costs):
+        return item
     share = float(costs[start:stop].sum() / costs.sum())
-    return replace(piece, start=piece.start + start, stop=piece.start + stop, weight=piece.weight * share)
+    return replace(item, start=item.start + start, stop=item.start + stop, weight=item.weight * share)
 
 
 def _run(costs: Costs, i: int, m: int) -> tuple[int, int]:
@@ -106,24 +105,24 @@ def _ends(sums: Costs, most: float, m: int) -> list[int]:
 
 
 @lru_cache(maxsize=4)
-def _atoms(pieces: tuple[Piece, ...], purpose: int) -> list[Costs]:
-    """Estimate the work of each piece, contracted graph by contracted graph where it may be cut."""
-    graphs = sum(piece.stop - piece.start for piece in pieces if isinstance(piece, Unit))
+def _atoms(items: tuple[WorkItem, ...], purpose: int) -> list[Costs]:
+    """Estimate the work of each item, contracted graph by contracted graph where it may be cut."""
+    graphs = sum(item.stop - item.start for item in items if isinstance(item, Chunk))
     share = min(1.0, _WEIGHED / max(graphs, 1))
     known: dict[Family, Costs] = {}
     atoms = []
-    for piece in pieces:
-        if isinstance(piece, OneByOne):
-            atoms.append(np.array([_made(piece, purpose)]))
+    for item in items:
+        if isinstance(item, OneByOne):
+            atoms.append(np.array([_made(item, purpose)]))
             continue
-        if piece.symmetry:  # few labellings are searched; nobody knows how many
-            atoms.append(np.ceil([piece.weight]))
+        if item.symmetry:  # few labellings are searched; nobody knows how many
+            atoms.append(np.ceil([item.weight]))
             continue
-        family = piece.family
+        family = item.family
         if family not in known:
             known[family] = works(family, share, LISTING if family.levels and purpose == COUNTING else purpose)
-        costs = known[family][piece.start : piece.stop]
-        atoms.append(costs if piece.parts == 1 else np.ceil(costs / piece.parts))
+        costs = known[family][item.start : item.stop]
+        atoms.append(costs if item.parts == 1 else np.ceil(costs / item.parts))
     return atoms
 
 
@@ -149,8 +148,8 @@ def works(family: Family, share: float, purpose: int) -> Costs:
     every = max(1, round(1 / share))
     chosen = order[rank % every == 0]  # of each kind the first, and every so many
     found = np.empty(len(chosen))
-    alphabet = family.alphabet
-    weigh_block(family.vertices, graphs, chosen, purpose, alphabet.tables, workspace(alphabet), found)
+    edge_labels = family.edge_labels
+    weigh_block(family.vertices, graphs, chosen, purpose, edge_labels.tables, workspace(edge_labels), found)
     found = np.where(found < 0, np.ceil(bounds[chosen]), found)
     per_kind = np.bincount(kinds[chosen], found, len(sizes)) / np.bincount(kinds[chosen], minlength=len(sizes))
     costs: Costs = np.rint(per_kind[kinds])  # whole numbers: sums are exact, and the same on every machine

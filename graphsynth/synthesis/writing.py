@@ -1,7 +1,7 @@
 """Writing long listings to a file that survives an interruption, and counting with a checkpoint.
 
 Beside ``FILE`` stands ``FILE.progress`` until the work is done: a journal with the bytes, the lines and a checksum of
-each piece.  A resumed run cuts the file back to whole pieces and goes on, so the result is the same to the byte.
+each item.  A resumed run cuts the file back to whole items and goes on, so the result is the same to the byte.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from graphsynth.core.errors import GraphsynthError
 from graphsynth.core.journal import Journal, Work, digest_of
 from graphsynth.core.ordered import in_order
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.synthesis.problem import Piece, Problem, counts, graphs, graphs_of_piece, text_of_piece, texts
+from graphsynth.synthesis.chunks import Chunk
+from graphsynth.synthesis.problem import Problem, WorkItem, counts, graphs, texts
 from graphsynth.synthesis.shards import shard_of
-from graphsynth.synthesis.units import Unit
 
-_SAMPLED = 16  # pieces made to estimate the size of a listing
+_SAMPLED = 16  # items made to estimate the size of a listing
 
 
 @dataclass(frozen=True)
@@ -36,16 +36,16 @@ class Step:
     graphs : int
         Graphs counted or written so far.
     done : float
-        Share of the work done, 0..1, by the bounds on the pieces.
+        Share of the work done, 0..1, by the bounds on the items.
     """
 
     graphs: int
     done: float
 
 
-def _work(problem: Problem, pieces: Sequence[Piece], form: str, remedy: str, again: str = "the same command") -> Work:
+def _work(problem: Problem, items: Sequence[WorkItem], form: str, remedy: str, again: str = "the same command") -> Work:
     """State what a journal is of: the question and its cut."""
-    cut = [(repr(piece.weight), *(getattr(piece, name, 0) for name in ("start", "stop", "part"))) for piece in pieces]
+    cut = [(repr(item.weight), *(getattr(item, name, 0) for name in ("start", "stop", "part"))) for item in items]
     return Work(form, problem.title, digest_of(problem.signature, form, cut), remedy=remedy, again=again)
 
 
@@ -57,8 +57,8 @@ def _json_line(graph: MechanismGraph) -> str:
     return json.dumps(record) + "\n"
 
 
-def _json_lines(piece: Piece) -> tuple[bytes, int]:
-    lines = list(map(_json_line, graphs_of_piece(piece)))
+def _json_lines(item: WorkItem) -> tuple[bytes, int]:
+    lines = list(map(_json_line, item.graphs()))
     return "".join(lines).encode(), len(lines)
 
 
@@ -77,37 +77,37 @@ def write_listing(
     ``path``: ``.jsonl`` gives JSON lines; anything else the text form (graph6 for chains
     of mobility-1 joints); ``shard`` (int, int), optional: shard i of m; ``resume``: go on with an interrupted file of
     the same problem; of a complete one nothing is left to do; ``overwrite``: replace a file that exists;
-    ``executor``: who does the work; the bytes are the same for any; ``watch``: called after each piece. Raises
+    ``executor``: who does the work; the bytes are the same for any; ``watch``: called after each item. Raises
     `GraphsynthError` if the file exists and is neither resumed nor overwritten, or belongs to another problem.
     """
     form = _form(path)
     note = path.with_name(path.name + ".progress")
-    pieces = shard_of(problem.pieces(listing=True), shard)
+    items = shard_of(problem.work_items(listing=True), shard)
     if not path.parent.is_dir():
         raise GraphsynthError(f"the folder {path.parent} does not exist: create it, or name another file")
     if path.exists() and not note.exists() and not overwrite:
         if not resume:
             raise GraphsynthError(f"{path} exists: name another file, or replace it with --force")
-        return _graphs_of_complete(path, pieces, form)
+        return _graphs_of_complete(path, items, form)
     remedy, again = "give the same options, or start anew with --force", "the same command with --resume"
-    with Journal(note, _work(problem, pieces, form, remedy, again), fresh=overwrite and not resume) as journal:
+    with Journal(note, _work(problem, items, form, remedy, again), fresh=overwrite and not resume) as journal:
         if journal.entries and not resume:
             raise GraphsynthError(f"{path} is an interrupted listing: go on with --resume, or start anew with --force")
         with journal.writing(path):
             file = path.open("r+b" if path.exists() else "w+b")
         with closing(file):
             with journal.writing(path):
-                graphs = _cut_back(file, journal, len(pieces))
-            done = sum(piece.weight for piece in pieces[: len(journal.entries)])
-            total = sum(piece.weight for piece in pieces) or 1.0
-            rest = pieces[len(journal.entries) :]
-            for piece, (data, lines) in zip(rest, _blocks(rest, form, executor)):
+                graphs = _cut_back(file, journal, len(items))
+            done = sum(item.weight for item in items[: len(journal.entries)])
+            total = sum(item.weight for item in items) or 1.0
+            rest = items[len(journal.entries) :]
+            for item, (data, lines) in zip(rest, _blocks(rest, form, executor)):
                 with journal.writing(path):
                     file.write(data)
                     file.flush()
                 journal.append(json.dumps([len(data), lines, zlib.crc32(data)]))
                 graphs += lines
-                done += piece.weight
+                done += item.weight
                 if watch:
                     watch(Step(graphs, done / total))
             with journal.writing(path):
@@ -116,8 +116,8 @@ def write_listing(
     return graphs
 
 
-def _blocks(pieces: Sequence[Piece], form: str, executor: Executor | None) -> Iterator[tuple[bytes, int]]:
-    return in_order(executor, _json_lines, pieces) if form == "jsonl" else texts(pieces, executor)
+def _blocks(items: Sequence[WorkItem], form: str, executor: Executor | None) -> Iterator[tuple[bytes, int]]:
+    return in_order(executor, _json_lines, items) if form == "jsonl" else texts(items, executor)
 
 
 def estimated_size(
@@ -125,20 +125,20 @@ def estimated_size(
 ) -> tuple[float, float]:
     """Return about how many graphs, and bytes, a listing to a file has; their bounds if these bytes are enough.
 
-    The bounds on the graphs are sure; pieces all over the listing, made for that, tell what share of them there is.
+    The bounds on the graphs are sure; items all over the listing, made for that, tell what share of them there is.
     What is made one by one (rings, fractionated chains) is little and left out.
     """
-    units = [piece for piece in shard_of(problem.pieces(listing=True), shard) if isinstance(piece, Unit)]
-    weight = sum(unit.weight for unit in units)
-    links = max((unit.family.links for unit in units), default=1)
+    chunks = [item for item in shard_of(problem.work_items(listing=True), shard) if isinstance(item, Chunk)]
+    weight = sum(chunk.weight for chunk in chunks)
+    links = max((chunk.family.links for chunk in chunks), default=1)
     line = links * links / 12 + 24 if _form(path) == "text" else 60.0 * links  # bytes at most
-    if weight * line <= enough or not units:
+    if weight * line <= enough or not chunks:
         return weight, weight * line
-    chosen = units[:: max(1, len(units) // _SAMPLED)]
-    made = [sum(lines for _, lines in text_of_piece(unit)) for unit in chosen]
-    some = [next(graphs([unit], None)) for unit, lines in zip(chosen, made) if lines]
+    chosen = chunks[:: max(1, len(chunks) // _SAMPLED)]
+    made = [sum(lines for _, lines in chunk.texts()) for chunk in chosen]
+    some = [next(graphs([chunk], None)) for chunk, lines in zip(chosen, made) if lines]
     size = sum(map(len, map(_json_line if _form(path) == "jsonl" else _text_line, some))) / max(len(some), 1)
-    number = weight * sum(made) / sum(unit.weight for unit in chosen)
+    number = weight * sum(made) / sum(chunk.weight for chunk in chosen)
     return number, number * size
 
 
@@ -150,10 +150,10 @@ def _form(path: Path) -> str:
     return "jsonl" if path.suffix.lower() in (".jsonl", ".ndjson") else "text"
 
 
-def _cut_back(file: BinaryIO, journal: Journal, pieces: int) -> int:
-    """Cut a file, and the journal of it, back to the whole pieces that are in it; return the number of its lines."""
+def _cut_back(file: BinaryIO, journal: Journal, items: int) -> int:
+    """Cut a file, and the journal of it, back to the whole items that are in it; return the number of its lines."""
     graphs = place = 0
-    noted = [json.loads(entry) for entry in journal.entries[:pieces]]
+    noted = [json.loads(entry) for entry in journal.entries[:items]]
     kept = 0
     for size, lines, check in noted:
         data = file.read(size)
@@ -166,14 +166,14 @@ def _cut_back(file: BinaryIO, journal: Journal, pieces: int) -> int:
     return graphs
 
 
-def _graphs_of_complete(path: Path, pieces: Sequence[Piece], form: str) -> int:
+def _graphs_of_complete(path: Path, items: Sequence[WorkItem], form: str) -> int:
     """Return the number of lines of a file that is the whole listing, as far as its first and last lines tell.
 
     Raises `GraphsynthError` if it is not.
     """
     with path.open("rb") as file:
         size = file.seek(0, os.SEEK_END)
-        ends = [next((data for data, _ in _blocks(some, form, None) if data), b"") for some in (pieces, pieces[::-1])]
+        ends = [next((data for data, _ in _blocks(some, form, None) if data), b"") for some in (items, items[::-1])]
         for data, place in zip(ends, (0, size - len(ends[1]))):
             file.seek(max(0, place))
             if file.read(len(data)) != data or (size and not data):
@@ -193,21 +193,21 @@ def count_with_checkpoint(
     executor: Executor | None = None,
     watch: Callable[[Step], None] | None = None,
 ) -> int:
-    """Count a problem; with a checkpoint file the pieces already counted there are not counted again (exact).
+    """Count a problem; with a checkpoint file the items already counted there are not counted again (exact).
 
     Raises `GraphsynthError` if the checkpoint belongs to another problem, or another process writes it. Raises
     `FormatError` if it is no checkpoint, or somebody changed it.
     """
-    pieces = shard_of(problem.pieces(listing=False), shard, listing=False)
-    total = sum(piece.weight for piece in pieces) or 1.0
-    with Journal(checkpoint, _work(problem, pieces, "count", "name another file")) as journal:
+    items = shard_of(problem.work_items(listing=False), shard, listing=False)
+    total = sum(item.weight for item in items) or 1.0
+    with Journal(checkpoint, _work(problem, items, "count", "name another file")) as journal:
         known = [int(entry) for entry in journal.entries]
         count = sum(known)
-        done = sum(piece.weight for piece in pieces[: len(known)])
-        rest = pieces[len(known) :]
-        for piece, found in zip(rest, counts(rest, executor)):
+        done = sum(item.weight for item in items[: len(known)])
+        rest = items[len(known) :]
+        for item, found in zip(rest, counts(rest, executor)):
             count += found
-            done += piece.weight
+            done += item.weight
             journal.append(str(found))
             if watch:
                 watch(Step(count, done / total))

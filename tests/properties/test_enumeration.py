@@ -25,10 +25,10 @@ from graphsynth import (
     enumerate_mechanisms,
     sample_mechanisms,
 )
-from graphsynth.synthesis.families import chain_families, truss_families
+from graphsynth.synthesis.chunks import Chunk, cut
+from graphsynth.synthesis.families import chain_families
 from graphsynth.synthesis.problem import Problem, texts
 from graphsynth.synthesis.shards import shard_of
-from graphsynth.synthesis.units import Unit, cut, graphs_of, text_of
 from graphsynth.testing import chains, specs
 
 EXACT = settings(deadline=None)  # the first example may compile
@@ -248,12 +248,12 @@ PROBLEMS = [
 
 @cache
 def _text(at):
-    return b"".join(data for data, _ in texts(PROBLEMS[at].pieces(listing=True), None))
+    return b"".join(data for data, _ in texts(PROBLEMS[at].work_items(listing=True), None))
 
 
 def _atoms(piece):
     """What a piece consists of that no shard cuts: contracted graphs, parts of one, a handful."""
-    if not isinstance(piece, Unit) or piece.parts > 1:
+    if not isinstance(piece, Chunk) or piece.parts > 1:
         return [piece]
     return [(piece.family, graph) for graph in range(piece.start, piece.stop)]
 
@@ -261,7 +261,7 @@ def _atoms(piece):
 @EXACT
 @given(st.integers(0, len(PROBLEMS) - 1), st.integers(1, 40))
 def test_shards_one_after_the_other_are_the_whole(at, shards):
-    pieces = PROBLEMS[at].pieces(listing=True)
+    pieces = PROBLEMS[at].work_items(listing=True)
     cuts = [shard_of(pieces, (i, shards)) for i in range(1, shards + 1)]
     assert [atom for shard in cuts for piece in shard for atom in _atoms(piece)] == [
         atom for piece in pieces for atom in _atoms(piece)
@@ -273,28 +273,28 @@ def test_shards_one_after_the_other_are_the_whole(at, shards):
 def test_text_is_the_text_of_the_graphs(at):
     from graphsynth.synthesis.problem import graphs
 
-    lines = [g.to_text() for g in graphs(PROBLEMS[at].pieces(listing=True), None)]
+    lines = [g.to_text() for g in graphs(PROBLEMS[at].work_items(listing=True), None)]
     assert "".join(f"{line}\n" for line in lines).encode() == _text(at)
-    assert sum(lines for _, lines in texts(PROBLEMS[at].pieces(listing=True), None)) == len(lines)
+    assert sum(lines for _, lines in texts(PROBLEMS[at].work_items(listing=True), None)) == len(lines)
 
 
 @settings(EXACT, max_examples=25)
 @given(st.integers(2, 60), st.integers(0, 10**6))
 def test_a_contracted_graph_may_be_cut_into_any_parts(parts, pick):
-    families = [f for f in chain_families(10, 1, 3, {}, True) + truss_families(11, 3, False) if len(f.graphs)]
+    families = [f for f in chain_families(10, 1, 3, {}, True) + chain_families(11, 0, 3, {}, False) if len(f.graphs)]
     family = families[pick % len(families)]
     at = pick // len(families) % len(family.graphs)
-    whole = [g.packed for g in graphs_of(Unit(family, at, at + 1))]
-    pieces = [g.packed for part in range(parts) for g in graphs_of(Unit(family, at, at + 1, part, parts))]
+    whole = [g.packed for g in Chunk(family, at, at + 1).graphs()]
+    pieces = [g.packed for part in range(parts) for g in Chunk(family, at, at + 1, part, parts).graphs()]
     assert sorted(pieces) == sorted(whole)
 
 
 @pytest.mark.parametrize("size", [1.0, 50.0, 3000.0])
 def test_the_size_of_pieces_does_not_matter(monkeypatch, size):
     families = chain_families(10, 1, 3, {}, False)
-    whole = b"".join(data for unit in cut(families, listing=True) for data, _ in text_of(unit))
-    monkeypatch.setattr("graphsynth.synthesis.units.LISTING_SIZE", size)
-    small = [data for unit in cut(families, listing=True) for data, _ in text_of(unit)]
+    whole = b"".join(data for chunk in cut(families, listing=True) for data, _ in chunk.texts())
+    monkeypatch.setattr("graphsynth.synthesis.chunks.LISTING_SIZE", size)
+    small = [data for chunk in cut(families, listing=True) for data, _ in chunk.texts()]
     assert sorted(b"".join(small).splitlines()) == sorted(whole.splitlines())
 
 

@@ -14,8 +14,8 @@ from graphsynth import (
     sample_mechanisms,
 )
 from graphsynth.core.errors import SpecError
-from graphsynth.synthesis import units
-from graphsynth.synthesis.problem import Problem, text_of_piece
+from graphsynth.synthesis import chunks
+from graphsynth.synthesis.problem import Problem
 
 SIX = StructuralSpec(W=1, links=6)
 
@@ -56,9 +56,9 @@ def test_no_moving_links(links):
 )  # fmt: skip
 def test_texts_of_many_links_are_those_of_few(problem, monkeypatch):
     """Beyond 62 links graph6 writes their number in four bytes: the graph writes itself then."""
-    pieces = problem.pieces(listing=True)
-    expected = b"".join(text for piece in pieces for text, _ in text_of_piece(piece))
-    monkeypatch.setattr(units, "_ONE_BYTE", 1)
-    blocks = [block for piece in pieces for block in text_of_piece(piece)]
+    pieces = problem.work_items(listing=True)
+    expected = b"".join(text for piece in pieces for text, _ in piece.texts())
+    monkeypatch.setattr(chunks, "_ONE_BYTE", 1)
+    blocks = [block for piece in pieces for block in piece.texts()]
     assert b"".join(text for text, _ in blocks) == expected
     assert sum(lines for _, lines in blocks) == expected.count(b"\n")

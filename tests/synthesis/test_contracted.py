@@ -15,6 +15,7 @@ from networkx.algorithms.isomorphism import GraphMatcher, numerical_edge_match
 
 from graphsynth import MechanismGraph
 from graphsynth.core.errors import FormatError, TooLargeError
+from graphsynth.synthesis.chunks import count_each
 from graphsynth.synthesis.contracted import (
     FOLDER_VARIABLE,
     SHIPPED_LOOPS,
@@ -25,7 +26,6 @@ from graphsynth.synthesis.contracted import (
     generate,
 )
 from graphsynth.synthesis.families import chain_families
-from graphsynth.synthesis.units import count_each
 
 PUBLISHED = tomllib.loads((Path(__file__).parents[2] / "catalog/counts/published.toml").read_text(encoding="utf-8"))
 CONTRACTED = PUBLISHED["contracted"]

@@ -9,8 +9,7 @@ from graphsynth.cli import main
 from graphsynth.core.errors import TooLargeError
 from graphsynth.structure.system.solving import number_of_solutions, solutions
 from graphsynth.synthesis.contracted import contracted_graphs, generate
-from graphsynth.synthesis.outlook import extrapolated
-from graphsynth.synthesis.problem import Problem
+from graphsynth.synthesis.problem import Problem, extrapolated
 
 
 @pytest.fixture(autouse=True)

@@ -30,7 +30,7 @@ def digest(executor):
         sha.update(f"{graph.to_text()}\n".encode())
     for graph in enumerate_chains(9, 2, fractionated=True, executor=executor):
         sha.update(f"{graph.to_text()}\n".encode())
-    for data, _ in parallel.texts(LONG.pieces(listing=True), executor):
+    for data, _ in parallel.texts(LONG.work_items(listing=True), executor):
         sha.update(data)
     sha.update(f"{count_chains(12, executor=executor)} {count_mechanisms(QUESTION, executor=executor)}".encode())
     return sha.hexdigest()
@@ -42,7 +42,7 @@ def alone():
 
 
 def test_there_is_something_to_share():
-    assert len(LONG.pieces(listing=True)) >= 14
+    assert len(LONG.work_items(listing=True)) >= 14
 
 
 @pytest.mark.parametrize("workers", [1, 2, 7])
@@ -147,7 +147,7 @@ def test_shard_files_one_after_the_other_are_the_whole_file(tmp_path, shards):
 @pytest.mark.parametrize("shard", [(0, 2), (3, 2), (1, 0), (-1, 2)])
 def test_shards_out_of_bounds(shard):
     with pytest.raises(SpecError, match=f"{shard[0]}/{shard[1]}"):
-        shard_of(LONG.pieces(listing=True), shard)
+        shard_of(LONG.work_items(listing=True), shard)
 
 
 class Interrupted(Exception):

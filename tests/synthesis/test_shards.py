@@ -12,19 +12,19 @@ import pytest
 from graphsynth import StructuralSpec
 from graphsynth.atlas.pieces import share_of, tasks_of
 from graphsynth.core.errors import SpecError
+from graphsynth.synthesis.chunks import Chunk, count_each, estimates
 from graphsynth.synthesis.kernels.counting import LISTING
-from graphsynth.synthesis.kernels.layout import make_work
-from graphsynth.synthesis.kernels.listing import HEADER, VISITED, list_rows, rewind
-from graphsynth.synthesis.problem import Problem, count_piece
+from graphsynth.synthesis.kernels.layout import HEADER, make_work
+from graphsynth.synthesis.kernels.listing import VISITED, list_rows, rewind
+from graphsynth.synthesis.problem import Problem
 from graphsynth.synthesis.shards import shard_of, works
-from graphsynth.synthesis.units import Unit, count_each, estimates, packed_of, text_of
 
 FOURTEEN = Problem.chains(14, 1, 3, None, False, None)
 MECHANISMS = Problem.mechanisms(StructuralSpec(W=1, links=12), None)
 
 
 def cuts(problem, shards, *, listing=True):
-    pieces = problem.pieces(listing=listing)
+    pieces = problem.work_items(listing=listing)
     return [shard_of(pieces, (i, shards), listing=listing) for i in range(1, shards + 1)]
 
 
@@ -38,7 +38,7 @@ def test_shards_are_about_equal_and_none_is_empty(problem):
     weighed = {family: works(family, 1.0, LISTING) for family in problem.families}
     found = cuts(problem, 32)
     loads = [
-        sum(float(weighed[piece.family][piece.start : piece.stop].sum()) for piece in shard if isinstance(piece, Unit))
+        sum(float(weighed[piece.family][piece.start : piece.stop].sum()) for piece in shard if isinstance(piece, Chunk))
         for shard in found
     ]
     assert all(found)
@@ -64,8 +64,8 @@ def room(resources):
 
 def visited(unit):
     """Labellings that the search meets: a count of the work that is the same on every machine, however busy."""
-    family, tables = unit.family, unit.family.alphabet.tables
-    work = room(family.alphabet.resources)
+    family, tables = unit.family, unit.family.edge_labels.tables
+    work = room(family.edge_labels.resources)
     rows = np.zeros((4096, HEADER + family.loops + family.vertices), np.int32)
     rewind(unit.start, unit.part, unit.parts, work)
     search = family.vertices, family.graphs, unit.stop, family.frames, family.frame_degree, 0, tables
@@ -85,7 +85,7 @@ def has_no_symmetry(mult):
 def test_the_estimate_is_what_is_visited():
     """By listing every contracted graph; without symmetry every labelling is met, and the number is exact."""
     for family in FOURTEEN.families:
-        met = np.array([visited(Unit(family, at, at + 1)) for at in range(len(family.graphs))])
+        met = np.array([visited(Chunk(family, at, at + 1)) for at in range(len(family.graphs))])
         alone = [has_no_symmetry(mult) for mult in family.graphs]
         estimated = (works(family, 1.0, LISTING) - 35) * 60 / (48 + family.vertices)
         assert (abs(estimated - met)[alone] < 2).all()
@@ -98,7 +98,7 @@ def test_the_estimate_is_what_is_visited():
 def test_visits_of_shards(links, shards):
     """Cut by labellings and the order of the group, the largest had 1.15 and 1.43 times the mean."""
     found = cuts(Problem.chains(links, 1, 3, None, False, None), shards)
-    loads = [sum(visited(piece) for piece in own if isinstance(piece, Unit)) for own in found]
+    loads = [sum(visited(piece) for piece in own if isinstance(piece, Chunk)) for own in found]
     assert all(found)
     assert spread(loads) < 1.12
 
@@ -112,12 +112,12 @@ def test_chains_of_shards_of_a_catalogue():
 
 
 def packed(task):
-    return packed_of(task.piece) if isinstance(task.piece, Unit) else ()
+    return task.piece.packed() if isinstance(task.piece, Chunk) else ()
 
 
 def test_lines_of_shards():
     lines = [
-        sum(count for piece in shard if isinstance(piece, Unit) for _, count in text_of(piece))
+        sum(count for piece in shard if isinstance(piece, Chunk) for _, count in piece.texts())
         for shard in cuts(FOURTEEN, 32)
     ]
     assert sum(lines) == 318162 and spread(lines) < 1.6
@@ -126,7 +126,7 @@ def test_lines_of_shards():
 @pytest.mark.parametrize("shards", [1, 5, 32, 100])
 def test_counts_of_shards(shards):
     found = cuts(FOURTEEN, shards, listing=False)
-    assert sum(count_piece(piece) for shard in found for piece in shard) == 318162
+    assert sum(piece.count() for shard in found for piece in shard) == 318162
     assert all(found)
 
 
@@ -134,7 +134,7 @@ def test_more_shards_than_graphs():
     problem = Problem.chains(6, 1, 3, None, False, None)
     found = cuts(problem, 50)
     assert sum(map(bool, found)) == sum(len(family.graphs) for family in problem.families) + 1  # and the rings
-    assert sum(count_piece(piece) for shard in found for piece in shard) == 2
+    assert sum(piece.count() for shard in found for piece in shard) == 2
 
 
 def test_a_share_of_a_large_family_stands_for_all():
@@ -148,4 +148,4 @@ def test_a_share_of_a_large_family_stands_for_all():
 @pytest.mark.parametrize("shard", [(0, 3), (4, 3), (1.5, 3), ("1", 3), (1,), 7, (1, 10**7)])
 def test_what_is_no_shard(shard):
     with pytest.raises(SpecError, match="must be i/m with 1 <= i <= m"):
-        shard_of(FOURTEEN.pieces(listing=True), shard)
+        shard_of(FOURTEEN.work_items(listing=True), shard)

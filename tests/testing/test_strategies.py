@@ -20,9 +20,9 @@ from graphsynth.kinematics.triad.leg import LegStatus
 from graphsynth.mechanism.rotatability import type_of
 from graphsynth.pipeline.scene import Scene
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.testing.strategies.four_bars import CLASSES
-from graphsynth.testing.strategies.scenes import toml_text
-from graphsynth.testing.strategies.specs import _values
+from graphsynth.testing.files import toml_text
+from graphsynth.testing.linkages import CLASSES
+from graphsynth.testing.structures import _values
 
 MANY = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 #: find() may look long for a corner that is drawn seldom

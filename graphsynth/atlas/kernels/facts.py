@@ -4,7 +4,10 @@ Planar chains of mobility-1 joints with at most ``MOST_LINKS`` links.  Links are
 leaves this module, so that they are those of the graph read back from the key.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.atlas.kernels.grouping import groups_of
 from graphsynth.core.compilation import kernel
@@ -16,6 +19,29 @@ MOST_LINKS = 18
 WORDS = 3
 #: 18 links make 8 loops at most, and so 9 parallel paths.
 MOST_PATHS = 9
+
+
+class Block(NamedTuple):
+    """Facts of chains, chain by chain along the first axis; links as in the key.
+
+    Of mechanisms K rows, at least the number of all (frame, driven links); ``sizes`` is 0 beyond the last group.
+    """
+
+    joints: NDArray[np.uint8]  # (chains, joints, 2)
+    keys: NDArray[np.uint8]  # (chains, bytes)
+    order: NDArray[np.int64]  # (chains,) of the automorphism group
+    orbit: NDArray[np.uint8]  # (chains, n) smallest link of the orbit
+    girth: NDArray[np.uint8]  # (chains,)
+    cuts: NDArray[np.uint64]  # (chains,) mask of the cut links
+    levels: NDArray[np.uint8]  # (chains, n, n) links on each level from each frame
+    count: NDArray[np.int64]  # (chains,) mechanisms
+    frames: NDArray[np.uint8]  # (chains, K)
+    drives: NDArray[np.uint64]  # (chains, K) masks of the driven links
+    sizes: NDArray[np.uint8]  # (chains, K, n // 2) links of each group
+    outers: NDArray[np.uint8]  # (chains, K, n // 2) outer joints
+    forms: NDArray[np.uint64]  # (chains, K, n // 2, WORDS) canonical adjacency
+    parents: NDArray[np.uint8]  # (chains, n // 2, bytes + 1) first byte 1 where there is one
+    contracted: NDArray[np.uint8]  # (chains, 1 + n n) vertices, then multiplicities
 
 
 @kernel
@@ -339,8 +365,9 @@ def canonical_contracted(n, rows, local, small, colours, space, out):
 
 
 @kernel
-def grouped(n, joints, rows, placed, scratch, local, small, colours, space, sizes, outers, forms):
+def grouped(n, joints, rows, placed, scratch, local, small, colours, space, out):
     """Write the groups of one mechanism; returns False if these drivers cannot move it."""
+    sizes, outers, forms = out
     ends, owner, free, came, stack, reach, groups = scratch
     lab, form, gens, index, orbits, wi, wu = space
     found = groups_of(n, joints, placed, ends, owner, free, came, stack, reach, groups)
@@ -360,48 +387,82 @@ def grouped(n, joints, rows, placed, scratch, local, small, colours, space, size
 
 
 @kernel
-def analyse(
-    n,
-    mobility,
-    packed,
-    joints,
-    keys,
-    order,
-    orbit,
-    girth,
-    cuts,
-    levels,
-    count,
-    frames,
-    drives,
-    sizes,
-    outers,
-    forms,
-    parents,
-    contracted,
-):
-    """Facts of a block of chains; see :func:`graphsynth.atlas.facts.analyse_block` for the arrays.
+def renumber(n, c, generators, space, local, rows, image, block):
+    """Take over what the canonical labelling says of chain c: order, orbits, rows, generators in the new numbers."""
+    lab, form, gens, index, orbits, _, _ = space
+    block.order[c] = 1
+    for i in range(n):
+        block.order[c] *= index[i]
+        local[lab[i]] = i
+        rows[i] = form[0, i]
+    for g in range(generators):
+        for v in range(n):
+            image[g, local[v]] = local[gens[g, v]]
+    for i in range(n):
+        block.orbit[c, i] = n
+        for v in range(n):
+            if orbits[v] == orbits[lab[i]]:
+                block.orbit[c, i] = min(block.orbit[c, i], local[v])
 
-    ``packed`` uint8[chains, 3 joints]; the rest is output.  ``joints`` uint8[chains, joints, 2], ``keys`` uint8[chains,
-    bytes], ``order`` int64[chains], ``orbit`` uint8[chains, n], ``girth`` uint8[chains], ``cuts`` uint64[chains],
-    ``levels`` uint8[chains, n, n].  Of mechanisms ``count`` int64[chains], ``frames`` uint8[chains, K], ``drives``
-    uint64[chains, K], ``sizes``, ``outers`` uint8[chains, K, n // 2] (sizes 0 beyond the last group), ``forms``
-    uint64[chains, K, n // 2, WORDS]; K at least the number of all (frame, driven links).  ``parents`` uint8[chains,
-    n // 2, bytes + 1] (first byte 1 where there is one), ``contracted`` uint8[chains, 1 + n n].
-    """
-    most, joint_count, room = max(n, 16), packed.shape[1] // 3, frames.shape[1]
+
+@kernel
+def chain_facts(n, c, rows, distance, queue, block):
+    """Write key, joints, girth, cut links and adjacency levels of chain c."""
+    spell(n, rows, block.keys[c])
+    at = 0
+    for a in range(n):
+        for b in range(a + 1, n):
+            if rows[a] >> np.uint64(b) & ONE != ZERO:
+                block.joints[c, at, 0], block.joints[c, at, 1] = a, b
+                at += 1
+    block.girth[c] = girth_of(n, rows, distance, queue)
+    block.cuts[c] = ZERO
+    for v in range(n):
+        if not connected_without(n, rows, ONE << np.uint64(v)):
+            block.cuts[c] |= ONE << np.uint64(v)
+        level_sizes(n, rows, v, block.levels[c, v])
+
+
+@kernel
+def mechanism_facts(n, c, rows, found, drives, scratch, local, small, colours, space, block):
+    """Write the groups of one mechanism of each orbit of (frame, driven links); ``drives`` as `list_drives` says."""
+    all_frames, all_drives, low = drives
+    frames, driven, sizes = block.frames[c], block.drives[c], block.sizes[c]
+    outers, forms = block.outers[c], block.forms[c]
+    at = 0
+    for k in range(found):
+        if low[k] != k:
+            continue
+        placed = ONE << np.uint64(all_frames[k]) | all_drives[k]
+        frames[at], driven[at] = all_frames[k], all_drives[k]
+        known = -1  # a mechanism with the same links placed has the same groups
+        for i in range(at):
+            if ONE << np.uint64(frames[i]) | driven[i] == placed:
+                known = i
+        if known >= 0:
+            sizes[at], outers[at], forms[at] = sizes[known], outers[known], forms[known]
+            at += 1
+        else:
+            own = sizes[at], outers[at], forms[at]
+            at += grouped(n, block.joints[c], rows, placed, scratch, local, small, colours, space, own)
+    block.count[c] = at
+
+
+@kernel
+def analyse(n, mobility, packed, block):
+    """Facts of a block of chains, ``packed`` uint8[chains, 3 joints]; all else is output, see `Block`."""
+    most, joint_count, room = max(n, 16), packed.shape[1] // 3, block.frames.shape[1]
     space = canon_workspace(most, MOST_PATHS)
     lab, form, gens, index, orbits, wi, wu = space
     masks, small = np.zeros((1, most), np.uint64), np.zeros((MOST_PATHS, most), np.uint64)
     plain, colours, local = np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most, np.int64)
     rows, image = np.zeros(n, np.uint64), np.zeros((2 * n, n), np.int64)
     distance, queue, first = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
-    all_frames, all_drives, low = np.zeros(room, np.int64), np.zeros(room, np.uint64), np.zeros(room, np.int64)
-    scratch = (
-        np.zeros((2 * joint_count, 2), np.int64), np.zeros(2 * joint_count, np.int64), np.zeros(n, np.int64),
-        np.zeros(n, np.int64), np.zeros(n + 1, np.int64), np.zeros(n, np.uint64), np.zeros(n, np.uint64),
-    )  # fmt: skip
+    drives = np.zeros(room, np.int64), np.zeros(room, np.uint64), np.zeros(room, np.int64)
+    ends, owner, free = np.zeros((2 * joint_count, 2), np.int64), np.zeros(2 * joint_count, np.int64), queue.copy()
+    scratch = ends, owner, free, queue.copy(), np.zeros(n + 1, np.int64), rows.copy(), rows.copy()
     for c in range(packed.shape[0]):
+        # the chain as it comes, its canonical numbers, and all that follows from these
         for v in range(n):
             masks[0, v] = ZERO
         for j in range(joint_count):
@@ -409,62 +470,10 @@ def analyse(
             masks[0, a] |= ONE << np.uint64(b)
             masks[0, b] |= ONE << np.uint64(a)
         generators = canon(n, np.int64(1), masks, plain, lab, form, gens, index, orbits, wi, wu)
-        order[c] = 1
-        for i in range(n):
-            order[c] *= index[i]
-            local[lab[i]] = i
-            rows[i] = form[0, i]
-        for g in range(generators):
-            for v in range(n):
-                image[g, local[v]] = local[gens[g, v]]
-        for i in range(n):
-            orbit[c, i] = n
-            for v in range(n):
-                if orbits[v] == orbits[lab[i]]:
-                    orbit[c, i] = min(orbit[c, i], local[v])
-        spell(n, rows, keys[c])
-        at = 0
-        for a in range(n):
-            for b in range(a + 1, n):
-                if rows[a] >> np.uint64(b) & ONE != ZERO:
-                    joints[c, at, 0], joints[c, at, 1] = a, b
-                    at += 1
-        girth[c] = girth_of(n, rows, distance, queue)
-        cuts[c] = ZERO
-        for v in range(n):
-            if not connected_without(n, rows, ONE << np.uint64(v)):
-                cuts[c] |= ONE << np.uint64(v)
-            level_sizes(n, rows, v, levels[c, v])
-        found = list_drives(n, mobility, rows, all_frames, all_drives)
-        drive_orbits(found, all_frames, all_drives, image, generators, first, low)
-        at = 0
-        for k in range(found):
-            if low[k] != k:
-                continue
-            placed = ONE << np.uint64(all_frames[k]) | all_drives[k]
-            frames[c, at], drives[c, at] = all_frames[k], all_drives[k]
-            known = -1  # a mechanism with the same links placed has the same groups
-            for i in range(at):
-                if ONE << np.uint64(frames[c, i]) | drives[c, i] == placed:
-                    known = i
-            if known >= 0:
-                sizes[c, at], outers[c, at], forms[c, at] = sizes[c, known], outers[c, known], forms[c, known]
-                at += 1
-            elif grouped(
-                n,
-                joints[c],
-                rows,
-                placed,
-                scratch,
-                local,
-                small,
-                colours,
-                space,
-                sizes[c, at],
-                outers[c, at],
-                forms[c, at],
-            ):
-                at += 1
-        count[c] = at
-        fresh_parents(n, joints[c], rows, local, small, plain, space, parents[c])
-        canonical_contracted(n, rows, local, small, colours, space, contracted[c])
+        renumber(n, c, generators, space, local, rows, image, block)
+        chain_facts(n, c, rows, distance, queue, block)
+        found = list_drives(n, mobility, rows, drives[0], drives[1])
+        drive_orbits(found, drives[0], drives[1], image, generators, first, drives[2])
+        mechanism_facts(n, c, rows, found, drives, scratch, local, small, colours, space, block)
+        fresh_parents(n, block.joints[c], rows, local, small, plain, space, block.parents[c])
+        canonical_contracted(n, rows, local, small, colours, space, block.contracted[c])

@@ -1,8 +1,9 @@
-"""Counting the labellings of contracted graphs up to symmetry, without visiting them one by one.
+"""Counting the labellings of contracted graphs up to symmetry, without visiting them one by one; drawing one.
 
 Burnside: the number of orbits is the average, over the automorphisms g, of the number of labellings fixed by g.  For
 each g the variables are taken one by one, and partial choices that leave the same needs and the same resources are
-merged into one state with a count; as soon as no critical set needs anything, the rest is read from a table.
+merged into one state with a count; as soon as no critical set needs anything, the rest is read from a table.  To draw
+uniformly, the labellings fixed by one automorphism are numbered without regard to sparsity.
 """
 
 from __future__ import annotations
@@ -10,22 +11,32 @@ from __future__ import annotations
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.synthesis.kernels.automorphisms import automorphisms
+from graphsynth.synthesis.kernels.contracted import automorphisms
 from graphsynth.synthesis.kernels.layout import (
     BYTE,
+    COEF,
     COPIES,
     DIGITS,
     ENTRY,
+    FLIP,
     GAIN,
     GAINS,
+    HEADER,
+    HEAVIEST,
     INDEX,
     KIND,
     LABELS,
     LABELS_END,
+    LEFT,
     NEED,
     ONES,
+    OWN,
     PACKED,
+    REP,
     REVERSE,
+    ROW,
+    SET,
+    SIZE,
     SLOT,
     STAMP,
     SUM,
@@ -45,6 +56,7 @@ from graphsynth.synthesis.kernels.variables import (
     lay_lanes,
     load_graph,
     plain_entries,
+    start_needs,
     unconstrained_ways,
 )
 
@@ -107,6 +119,7 @@ def count_states(count, sets, tables, work):
     if not lay_lanes(count, sets, needs, work):
         return np.int64(TOO_LARGE)
     lay_gains(count, tables, work)
+    # the first layer: one state, all needs and all resources
     capacity = work.states.shape[1]
     key = np.zeros(words, np.uint64)
     for s in range(sets):
@@ -116,6 +129,7 @@ def count_states(count, sets, tables, work):
     shift = np.int64(0)
     states = _store(key, words, np.int64(0), work.state[1], shift, np.int64(1), work)
     total = np.int64(0)
+    # from layer to layer by the choices of one variable
     for j in range(count):
         coefs = 2 * j * needs
         rests = coefs + needs
@@ -137,6 +151,7 @@ def count_states(count, sets, tables, work):
                     continue
                 gain = np.uint64(work.entries[GAIN, g])
                 cap = np.uint64(min(work.tables[GAINS, j + 1, index], BYTE)) * ONES
+                # eight sets at a time: needs less gains, not below 0; later variables must be able to give the rest
                 alive = TOP
                 open_ = np.uint64(0)
                 for i in range(needs):
@@ -149,7 +164,7 @@ def count_states(count, sets, tables, work):
                     key[i] = need
                 if alive != TOP:
                     continue
-                if open_ == 0:
+                if open_ == 0:  # nothing is needed any more: the table counts the rest
                     total += value * work.entries[COPIES, g] * ways
                     continue
                 key[needs] = np.uint64(index)
@@ -332,3 +347,106 @@ def weigh_block(k, mults, chosen, purpose, tables, work, out):
             out[i] = np.floor(12.0 + (np.int64(1) << k) / 100.0 + order * sets * m / 12.0 + work.state[STEPS] / 25.0)
         else:
             out[i] = np.floor(1.0 + fixed / order)
+
+
+@kernel
+def fixed_table(k, mult, frame_modes, frame_degree, tables, work, out):
+    """Write a row (mode, frame, automorphism, automorphisms that keep the frame, labellings fixed) for each pair.
+
+    Returns the number of rows, or a negative outcome as ``count_block``.
+    """
+    order = automorphisms(k, mult, work.perms)
+    m, sets = load_graph(k, mult, tables, work)
+    if order < 0 or sets < 0:
+        return TOO_LARGE
+    n = 0
+    for mode in (FRAME_NONE, FRAME_VERTEX, FRAME_PATH):
+        if not frame_modes & mode:
+            continue
+        frames = 1 if mode == FRAME_NONE else (k if mode == FRAME_VERTEX else m)
+        for frame in range(frames):
+            if mode == FRAME_VERTEX and frame_degree and degree_of(k, mult, frame) != frame_degree:
+                continue
+            kept = frame_stabiliser(order, mode, frame, work)
+            if mode == FRAME_PATH:
+                work.classes[KIND, frame] += 1
+            for i in range(kept):
+                if n == out.shape[0]:
+                    return TOO_LARGE
+                fixed = fixed_by(work.members[i], m, sets, tables, work)
+                if fixed < 0:
+                    return fixed
+                out[n, 0] = mode
+                out[n, 1] = frame
+                out[n, 2] = work.members[i]
+                out[n, 3] = kept
+                out[n, 4] = fixed
+                n += 1
+            if mode == FRAME_PATH:
+                work.classes[KIND, frame] -= 1
+    return n
+
+
+@kernel
+def open_fixed(k, mult, mode, frame, member, tables, work):
+    """Lay out the labellings fixed by one automorphism; return (variables, classes, sets, ways without sparsity)."""
+    automorphisms(k, mult, work.perms)
+    m, sets = load_graph(k, mult, tables, work)
+    if mode == FRAME_PATH:
+        work.classes[KIND, frame] += 1
+    count = build_variables(m, sets, work.perms[member], tables, work)
+    plain_entries(count, tables, work)
+    unconstrained_ways(count, np.bool_(False), tables, work)
+    return count, m, sets, work.tables[WAYS, 0, tables.target]
+
+
+@inner
+def _nth_label(j, g, rank, tables, work):
+    """Return label number ``rank`` of those that entry g of variable j stands for."""
+    kind = work.classes[KIND, work.variables[REP, j]]
+    heaviest = work.classes[HEAVIEST, work.variables[REP, j]]
+    packed = work.entries[PACKED, g]
+    for label in range(tables.kinds[LABELS, kind], tables.kinds[LABELS_END, kind]):
+        if work.variables[OWN, j] and tables.labels[REVERSE, label] != label:
+            continue
+        if heaviest - tables.labels[WEIGHT, label] != work.entries[GAIN, g]:
+            continue
+        if tables.labels[PACKED, label] * work.variables[SIZE, j] != packed:
+            continue
+        if rank == 0:
+            return label
+        rank -= 1
+    return np.int64(-1)
+
+
+@kernel
+def decode_fixed(count, m, sets, number, tables, work, row):
+    """Write labelling ``number`` of those laid out by ``open_fixed``; return whether it is admissible."""
+    start_needs(sets, work)
+    index = np.int64(tables.target)
+    chosen = np.empty(count, np.int64)
+    for j in range(count):
+        for g in range(work.variables[ENTRY, j], work.variables[ENTRY, j + 1]):
+            if not fits(tables.resources[DIGITS, index], work.entries[PACKED, g], tables.guard):
+                continue
+            ways = work.tables[WAYS, j + 1, index - work.entries[INDEX, g]]
+            block = work.entries[COPIES, g] * ways
+            if number >= block:
+                number -= block
+                continue
+            chosen[j] = _nth_label(j, g, number // ways, tables, work)
+            number %= ways
+            index -= work.entries[INDEX, g]
+            for q in range(work.variables[ROW, j], work.variables[ROW, j + 1]):
+                s = work.rows[SET, q]
+                work.sets[LEFT, s] -= work.rows[COEF, q] * work.entries[GAIN, g]
+            break
+    for s in range(sets):
+        if work.sets[LEFT, s] > 0:
+            return False
+    for e in range(m):
+        label = chosen[work.classes[VAR, e]]
+        if work.classes[FLIP, e]:
+            label = tables.labels[REVERSE, label]
+        row[HEADER + e] = label
+    return True

@@ -9,24 +9,23 @@ from numpy.typing import NDArray
 
 from graphsynth.core.compilation import kernel
 from graphsynth.synthesis.kernels.counting import FRAME_NONE, FRAME_PATH, FRAME_VERTEX
-from graphsynth.synthesis.kernels.layout import inner
-from graphsynth.synthesis.kernels.listing import HEADER
+from graphsynth.synthesis.kernels.layout import HEADER, inner
 
 
-class Spelling(NamedTuple):
-    """What the labels of an alphabet say."""
+class Expansion(NamedTuple):
+    """What the labels of a family stand for."""
 
-    label_words: NDArray[np.int32]  # (labels, multiplicity) word numbers, the marked one first
-    label_mark: NDArray[np.int32]  # (labels,) position of the frame in the first word, 0: none
-    word_length: NDArray[np.int32]  # (words,) number of joints
-    word_joints: NDArray[np.uint8]  # (words, longest) joint mobilities
+    label_paths: NDArray[np.int32]  # (labels, multiplicity) numbers of path types, the marked one first
+    label_mark: NDArray[np.int32]  # (labels,) position of the frame in the first path, 0: none
+    path_length: NDArray[np.int32]  # (path types,) number of joints
+    path_joints: NDArray[np.uint8]  # (path types, longest) joint mobilities
     level_index: NDArray[np.int64]  # wanted sizes of adjacency levels: which (negative: from the end)
     level_low: NDArray[np.int64]
     level_high: NDArray[np.int64]
 
 
 @inner
-def _spell(k, mult, row, spelling, ends):
+def _expand(k, mult, row, expansion, ends):
     """Write the joints of one row as columns (link, link, mobility) of ``ends``; return (links, frame, joints)."""
     links = k
     frame = row[2] if row[1] == FRAME_VERTEX else -1
@@ -38,10 +37,10 @@ def _spell(k, mult, row, spelling, ends):
             if copies == 0:
                 continue
             label = row[HEADER + e]
-            mark = spelling.label_mark[label]
+            mark = expansion.label_mark[label]
             for i in range(copies):
-                word = spelling.label_words[label, i]
-                length = spelling.word_length[word]
+                path = expansion.label_paths[label, i]
+                length = expansion.path_length[path]
                 at = u
                 for j in range(length):
                     if j + 1 < length:
@@ -53,7 +52,7 @@ def _spell(k, mult, row, spelling, ends):
                         to = v
                     ends[0, joints] = at
                     ends[1, joints] = to
-                    ends[2, joints] = spelling.word_joints[word, j]
+                    ends[2, joints] = expansion.path_joints[path, j]
                     joints += 1
                     at = to
             e += 1
@@ -101,25 +100,25 @@ def _level_order(links, frame, joints, order, level):
 
 
 @inner
-def _levels_fit(links, levels, level, spelling):
+def _levels_fit(links, levels, level, expansion):
     """Check the wanted sizes of the adjacency levels."""
-    for i in range(spelling.level_index.shape[0]):
-        which = spelling.level_index[i]
+    for i in range(expansion.level_index.shape[0]):
+        which = expansion.level_index[i]
         if which < 0:
             which += levels
         size = 0
         for v in range(links):
             if level[v] == which:
                 size += 1
-        if size < spelling.level_low[i] or size > spelling.level_high[i]:
+        if size < expansion.level_low[i] or size > expansion.level_high[i]:
             return False
     return True
 
 
 @inner
-def _arrange(k, mult, row, spelling, ends, matrix, order, level):
-    """Spell one row and order its links; return (links, frame), links = 0 when the levels do not fit."""
-    links, frame, joints = _spell(k, mult, row, spelling, ends)
+def _arrange(k, mult, row, expansion, ends, matrix, order, level):
+    """Expand one row and order its links; return (links, frame), links = 0 when the levels do not fit."""
+    links, frame, joints = _expand(k, mult, row, expansion, ends)
     for a in range(links):
         order[a] = a
         for b in range(links):
@@ -130,13 +129,13 @@ def _arrange(k, mult, row, spelling, ends, matrix, order, level):
     if frame < 0:
         return links, frame
     levels = _level_order(links, frame, matrix, order, level)
-    if not _levels_fit(links, levels, level, spelling):
+    if not _levels_fit(links, levels, level, expansion):
         return 0, frame
     return links, frame
 
 
 @kernel
-def expand_packed(k, total, mults, rows, count, spelling, out):
+def expand_packed(k, total, mults, rows, count, expansion, out):
     """Write the joints of rows (of ``total`` links) as byte triples (a, b, mobility), a < b, sorted.
 
     Link 0 is the frame if there is one.
@@ -149,7 +148,7 @@ def expand_packed(k, total, mults, rows, count, spelling, out):
     level = np.empty(total, np.int64)
     kept = 0
     for r in range(count):
-        links, _ = _arrange(k, mults[rows[r, 0]], rows[r], spelling, ends, matrix, order, level)
+        links, _ = _arrange(k, mults[rows[r, 0]], rows[r], expansion, ends, matrix, order, level)
         if links == 0:
             continue
         at = 0
@@ -178,7 +177,7 @@ def _put_number(out, at, n):
 
 
 @kernel
-def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
+def expand_text(k, total, mults, rows, count, expansion, space, highest, out):
     """Write rows (of ``total`` links) as lines of the text form; return (bytes, lines).
 
     A line is graph6, then the frame, the joints of higher mobility, and the space unless it is the plane.
@@ -191,13 +190,13 @@ def expand_text(k, total, mults, rows, count, spelling, space, highest, out):
     kept = 0
     for r in range(count):
         if highest == 1 and space == 3 and rows[r, 1] == FRAME_NONE:
-            links, frame, joints = _spell(k, mults[rows[r, 0]], rows[r], spelling, ends)
+            links, frame, joints = _expand(k, mults[rows[r, 0]], rows[r], expansion, ends)
             at = _put_plain(links, joints, ends, out, at)
             out[at] = 10
             at += 1
             kept += 1
             continue
-        links, frame = _arrange(k, mults[rows[r, 0]], rows[r], spelling, ends, matrix, order, level)
+        links, frame = _arrange(k, mults[rows[r, 0]], rows[r], expansion, ends, matrix, order, level)
         if links == 0:
             continue
         out[at] = 63 + links

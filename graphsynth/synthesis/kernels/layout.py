@@ -22,6 +22,7 @@ MAX_CLASSES = 48
 MAX_SETS = 1024
 MAX_ENTRIES = 1 << 18
 MAX_PAIRS = 64
+HEADER = 3  # columns of a listed row before the labels: graph, frame mode, frame
 
 # a byte for each critical set: the largest number, the top bits, the lowest bits
 BYTE = 127
@@ -61,7 +62,7 @@ def glue(function: Any) -> Any:
 
 
 class Tables(NamedTuple):
-    """Labels of classes, by kind ``t = 2 * multiplicity + marked`` (made by ``graphsynth.synthesis.alphabet``).
+    """Labels of classes, by kind ``t = 2 * multiplicity + marked`` (made by ``graphsynth.synthesis.edge_labels``).
 
     Resources (binary links, higher pairs, ...) are counted both as a mixed-radix index and packed eight bits a digit.
     """

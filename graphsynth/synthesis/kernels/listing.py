@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from graphsynth.core.compilation import kernel
-from graphsynth.synthesis.kernels.automorphisms import automorphisms
+from graphsynth.synthesis.kernels.contracted import automorphisms
 from graphsynth.synthesis.kernels.counting import (
     FRAME_NONE,
     FRAME_PATH,
@@ -27,6 +27,7 @@ from graphsynth.synthesis.kernels.layout import (
     FLIP,
     FOLD,
     GAINS,
+    HEADER,
     HEAVIEST,
     INDEX,
     KIND,
@@ -68,7 +69,6 @@ from graphsynth.synthesis.kernels.variables import (
 GRAPH, MODE, FRAME, WITNESS, ACTIVE, DEPTH, ORDER, CLASSES, SETS, KEPT, COUNT, PART, PARTS, MET, WORDS = range(2, 17)
 VISITED = 18  # labellings met since ``rewind``, a measure of the work
 PREFIX = 5  # variables that number the parts of one contracted graph
-HEADER = 3  # columns of a row before the labels: graph, frame mode, frame
 
 
 @inner
@@ -148,7 +148,7 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
     st = work.state
     while st[GRAPH] < stop:
         mult = mults[st[GRAPH]]
-        if st[ORDER] == 0:
+        if st[ORDER] == 0:  # a new contracted graph
             st[ORDER] = automorphisms(k, mult, work.perms)
             st[CLASSES], st[SETS] = load_graph(k, mult, tables, work)
             if st[ORDER] < 0 or st[SETS] < 0:
@@ -157,6 +157,7 @@ def _next_search(k, mults, stop, frame_modes, frame_degree, symmetry, tables, wo
             st[FRAME] = -1
             st[KEPT] = 0
         m = st[CLASSES]
+        # next witness for this frame; without a required symmetry there is one search
         st[WITNESS] += 1
         witnesses = 0
         if st[KEPT]:
@@ -319,6 +320,7 @@ def _search(k, symmetry, tables, work, rows, n):
         label = variables[AT, depth]
         index = left
         descend = False
+        # the next label of this variable that leaves a labelling possible
         while label < end and n < rows.shape[0]:
             index = left - labels[INDEX, label] * size
             usable = fits(resources[DIGITS, left], labels[PACKED, label] * size, guard)
@@ -341,7 +343,7 @@ def _search(k, symmetry, tables, work, rows, n):
                     break
                 n = _emit(k, symmetry, tables, work, rows, n)
             label += 1
-        if descend:
+        if descend:  # the next variable starts with its first label
             depth += 1
             variables[USED, depth] = index
             variables[AT, depth] = kinds[LABELS, classes[KIND, variables[REP, depth]]]
@@ -350,7 +352,7 @@ def _search(k, symmetry, tables, work, rows, n):
             variables[AT, depth] = label
             st[DEPTH] = depth
             return n
-        depth -= 1
+        depth -= 1  # no label is left: the variable before takes its next one
         if depth >= 0:
             variables[AT, depth] += 1
     st[ACTIVE] = 0

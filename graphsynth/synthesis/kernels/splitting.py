@@ -11,8 +11,9 @@ _ONE = np.uint64(1)
 
 
 @kernel
-def _canonical_code(n, layers, mult, masks, colours, lab, form, gens, index, orbits, wi, wu, out):
+def _canonical_code(n, layers, mult, masks, colours, space, out):
     """Write the upper triangle of the canonically relabelled multiplicity matrix."""
+    lab, form, gens, index, orbits, wi, wu = space
     for c in range(layers):
         for v in range(n):
             masks[c, v] = 0
@@ -40,7 +41,7 @@ def split_all(k, mults, start, joined, layers, codes):
     Returns the graph to go on with, and the number of codes written.
     """
     n = k + 1
-    lab, form, gens, index, orbits, wi, wu = canon_workspace(n, layers)
+    space = canon_workspace(n, layers)
     masks = np.zeros((layers, n), np.uint64)
     colours = np.zeros(n, np.int64)
     mult = np.zeros((n, n), np.uint8)
@@ -51,6 +52,7 @@ def split_all(k, mults, start, joined, layers, codes):
     while h < mults.shape[0]:
         before = count
         full = False
+        # every vertex v, and every way to give some of its edges to a new vertex k
         for v in range(k):
             degree = 0
             neighbours = 0
@@ -79,6 +81,7 @@ def split_all(k, mults, start, joined, layers, codes):
                 if count == codes.shape[0]:
                     full = True
                     break
+                # the split graph
                 for a in range(k):
                     for b in range(k):
                         mult[a, b] = mults[h, a, b]
@@ -92,13 +95,11 @@ def split_all(k, mults, start, joined, layers, codes):
                     mult[w, k] = given[i]
                 mult[k, v] = joined
                 mult[v, k] = joined
-                _canonical_code(
-                    n, layers, mult, masks, colours, lab, form, gens, index, orbits, wi, wu, codes[count]
-                )  # fmt: skip
+                _canonical_code(n, layers, mult, masks, colours, space, codes[count])
                 count += 1
             if full:
                 break
-        if full:
+        if full:  # this graph is split again in the next call
             return h, before
         h += 1
     return h, count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.synthesis.kernels.constraints import critical_sets, popcount
+from graphsynth.synthesis.kernels.contracted import critical_sets, popcount
 from graphsynth.synthesis.kernels.layout import (
     BYTE,
     COEF,
@@ -61,11 +61,7 @@ def lay_classes(k, mult, tables, work):
 def load_graph(k, mult, tables, work):
     """Lay out a contracted graph; return the number of its classes and of its critical sets."""
     m = lay_classes(k, mult, tables, work)
-    sets = critical_sets(
-        k, m, work.classes[U], work.classes[V], work.classes[HEAVIEST], tables.space,
-        work.subsets[0], work.subsets[1], work.sets[MASK], work.sets[NEED],
-    )  # fmt: skip
-    return m, sets
+    return m, critical_sets(k, m, work.classes, tables.space, work.subsets, work.sets)
 
 
 @inner
@@ -79,6 +75,7 @@ def build_variables(m, sets, perm, tables, work):
         work.classes[VAR, e] = -1
     count = np.int64(0)
     masks = np.empty(m, np.int64)
+    # cycles of classes under the automorphism
     for e in range(m):
         if work.classes[VAR, e] >= 0:
             continue
@@ -103,6 +100,7 @@ def build_variables(m, sets, perm, tables, work):
         work.variables[OWN, count] = flip
         masks[count] = mask
         count += 1
+    # variables in the order in which they are chosen
     order = _smallest_sets_first(count, sets, masks, work)
     rank = np.empty(count, np.int64)
     rep = work.variables[REP, :count].copy()
@@ -113,8 +111,10 @@ def build_variables(m, sets, perm, tables, work):
         work.variables[REP, j] = rep[order[j]]
         work.variables[SIZE, j] = size_[order[j]]
         work.variables[OWN, j] = own[order[j]]
+    # their new numbers
     for e in range(m):
         work.classes[VAR, e] = rank[work.classes[VAR, e]]
+    # the critical sets that each variable serves, and how often
     at = 0
     for j in range(count):
         work.variables[ROW, j] = at

@@ -10,14 +10,13 @@ import numpy as np
 
 from graphsynth.core.errors import SpecError
 from graphsynth.intervals import Interval
-from graphsynth.testing.strategies.extra import st
+from graphsynth.testing.extra import st
 
 #: Doubles at which arithmetic changes its behaviour.
 SPECIAL = (
-    0.0, -0.0, 1.0, -1.0, 0.1, 1 / 3, 5e-324, -5e-324, 2.0**-1022, -(2.0**-1022), 1.7976931348623157e308,
-    -1.7976931348623157e308, 1e160, -1e160, 1e-160, 2.0**-960, math.nextafter(1.0, 2.0), math.nextafter(1.0, 0.0),
-    math.pi, 9007199254740993.0,
-)  # fmt: skip
+    *(sign * x for x in (0.0, 1.0, 5e-324, 2.0**-1022, 1.7976931348623157e308, 1e160) for sign in (1.0, -1.0)),
+    *(0.1, 1 / 3, 1e-160, 2.0**-960, math.nextafter(1.0, 2.0), math.nextafter(1.0, 0.0), math.pi, 9007199254740993.0),
+)
 
 
 def finite_numbers() -> st.SearchStrategy[float]:

@@ -1,9 +1,9 @@
-"""Paths of binary links as words, parallel paths as labels: the alphabets of the enumerator.
+"""Labels of the edges of contracted graphs: types of paths of binary links, and multisets of them.
 
-A path of l binary links between two vertices of the contracted graph is written as the word of its l + 1 joint
-mobilities.  It adds Pi*l - sum(Pi - f) = F - Pi = -d to the mobility of the chain, d = Pi - F being its weight.  All
-paths between two vertices together form a class; its label is the multiset of their words, read from the lower
-vertex to the higher one.  In a mechanism whose frame is a binary link, one link of one word is marked.
+A path of l binary links between two vertices of the contracted graph is of the type given by its l + 1 joint
+mobilities, in order.  It adds Pi*l - sum(Pi - f) = F - Pi = -d to the mobility of the chain, d = Pi - F being its
+weight.  All paths between two vertices together form a class; its label is the multiset of their types, read from the
+lower vertex to the higher one.  In a mechanism whose frame is a binary link, one link of one path is marked.
 """
 
 from __future__ import annotations
@@ -21,41 +21,37 @@ from numpy.typing import NDArray
 from graphsynth.core.errors import TooLargeError
 from graphsynth.synthesis.kernels.layout import Tables
 
-Word = tuple[int, ...]
+PathType = tuple[int, ...]
 _MAX_LABELS = 2_000_000
 _DIGIT = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Label:
-    """What a class carries: its words, and the marked (frame) link if any.
+class EdgeLabel:
+    """What a class carries: the types of its parallel paths, and the marked (frame) link if any.
 
-    Attributes
-    ----------
-    words : tuple of Word
-        One per parallel path; the marked word first, the others sorted.
-    mark : int
-        0, or the position 1..l of the frame among the binary links of the first word.
+    The marked path comes first, the others sorted; ``mark`` is 0, or the position 1..l of the frame among the binary
+    links of the first path.
     """
 
-    words: tuple[Word, ...]
+    paths: tuple[PathType, ...]
     mark: int
 
-    def reversed(self) -> Label:
+    def reversed(self) -> EdgeLabel:
         """Return the label read from the other end."""
-        words = [word[::-1] for word in self.words]
+        paths = [path[::-1] for path in self.paths]
         if self.mark:
-            return Label((words[0], *sorted(words[1:])), len(words[0]) - self.mark)
-        return Label(tuple(sorted(words)), 0)
+            return EdgeLabel((paths[0], *sorted(paths[1:])), len(paths[0]) - self.mark)
+        return EdgeLabel(tuple(sorted(paths)), 0)
 
     def fold(self) -> int:
         """Return the largest number of equal paths, the marked one excluded."""
-        free = self.words[1:] if self.mark else self.words
+        free = self.paths[1:] if self.mark else self.paths
         return max(Counter(free).values(), default=0)
 
 
 @dataclass(frozen=True)
-class Alphabet:
+class EdgeLabels:
     """All labels that can occur in chains of one kind.
 
     Parameters
@@ -87,62 +83,62 @@ class Alphabet:
         lend = (self.mobility - 1,) if self.mobility > 1 else ()
         return (self.binary_links, *(count for _, count in self.higher), *lend)
 
-    def _cost(self, word: Word) -> tuple[int, ...]:
-        lend = (max(0, sum(word) - self.space),) if self.mobility > 1 else ()
-        return (len(word) - 1, *(word.count(i) for i, _ in self.higher), *lend)
+    def _cost(self, path: PathType) -> tuple[int, ...]:
+        lend = (max(0, sum(path) - self.space),) if self.mobility > 1 else ()
+        return (len(path) - 1, *(path.count(i) for i, _ in self.higher), *lend)
 
     def _fits(self, cost: tuple[int, ...]) -> bool:
         return all(c <= limit for c, limit in zip(cost, self.limits))
 
     @cached_property
-    def words(self) -> tuple[Word, ...]:
-        """Every word that fits the limits, in lexicographic order."""
+    def path_types(self) -> tuple[PathType, ...]:
+        """Every path that fits the limits, in lexicographic order."""
         lightest = 1 if self.mobility == 0 else 1 - self.mobility
         mobilities = (1, *(i for i, _ in self.higher))
         longest = min(self.space - lightest, self.binary_links + 1)
         found = [
-            word
+            path
             for length in range(1, longest + 1)
-            for word in product(mobilities, repeat=length)
-            if self.space - sum(word) >= lightest and self._fits(self._cost(word))
+            for path in product(mobilities, repeat=length)
+            if self.space - sum(path) >= lightest and self._fits(self._cost(path))
         ]
         return tuple(sorted(found))
 
     def _multisets(
         self, count: int, first: int, cost: tuple[int, ...], weight: int, direct: bool
-    ) -> Iterator[tuple[Word, ...]]:
+    ) -> Iterator[tuple[PathType, ...]]:
         if count == 0:
             yield ()
             return
-        for i in range(first, len(self.words)):
-            word = self.words[i]
-            if len(word) == 1 and direct:
+        for i in range(first, len(self.path_types)):
+            path = self.path_types[i]
+            if len(path) == 1 and direct:
                 continue
-            total = tuple(a + b for a, b in zip(cost, self._cost(word)))
-            heavier = weight + max(0, self.space - sum(word))
+            total = tuple(a + b for a, b in zip(cost, self._cost(path)))
+            heavier = weight + max(0, self.space - sum(path))
             if heavier > self._heaviest or not self._fits(total):
                 continue
-            for rest in self._multisets(count - 1, i, total, heavier, direct or len(word) == 1):
-                yield (word, *rest)
+            for rest in self._multisets(count - 1, i, total, heavier, direct or len(path) == 1):
+                yield (path, *rest)
 
     @property
     def _heaviest(self) -> int:
         return self.space if self.mobility == 0 and self.whole else self.space - 1
 
-    def labels(self, multiplicity: int, marked: bool) -> list[Label]:
+    def labels(self, multiplicity: int, marked: bool) -> list[EdgeLabel]:
         """List the labels of a class of the given multiplicity.
 
         Raises `TooLargeError` for more labels than the kernels are laid out for.
         """
         zero = (0,) * len(self.limits)
         if not marked:
-            found = [Label(words, 0) for words in self._multisets(multiplicity, 0, zero, 0, False)]
+            found = [EdgeLabel(paths, 0) for paths in self._multisets(multiplicity, 0, zero, 0, False)]
         else:
             found = []
-            for word in self.words:
-                weight = max(0, self.space - sum(word))
-                for words in self._multisets(multiplicity - 1, 0, self._cost(word), weight, False):
-                    found.extend(Label((word, *words), mark) for mark in range(1, len(word)))
+            for path in self.path_types:
+                weight = max(0, self.space - sum(path))
+                for paths in self._multisets(multiplicity - 1, 0, self._cost(path), weight, False):
+                    found.extend(EdgeLabel((path, *paths), mark) for mark in range(1, len(path)))
         if len(found) > _MAX_LABELS:
             raise TooLargeError(
                 f"{len(found)} kinds of {multiplicity} parallel paths (bound {_MAX_LABELS}): "
@@ -150,13 +146,13 @@ class Alphabet:
             )
         return found
 
-    def weight(self, label: Label) -> int:
+    def weight(self, label: EdgeLabel) -> int:
         """Return D, the weight that counts in the sparsity conditions."""
-        return sum(max(0, self.space - sum(word)) for word in label.words)
+        return sum(max(0, self.space - sum(path)) for path in label.paths)
 
-    def cost(self, label: Label) -> tuple[int, ...]:
+    def cost(self, label: EdgeLabel) -> tuple[int, ...]:
         """Return the resources a label uses."""
-        costs = [self._cost(word) for word in label.words]
+        costs = [self._cost(path) for path in label.paths]
         return tuple(map(sum, zip(*costs)))
 
     def labellings(self, pattern: tuple[int, ...]) -> float:
@@ -213,17 +209,17 @@ class Alphabet:
         return sum(c << (_DIGIT * i) for i, c in enumerate(cost))
 
     @cached_property
-    def by_kind(self) -> list[list[Label]]:
+    def by_kind(self) -> list[list[EdgeLabel]]:
         """Labels by kind ``2 * multiplicity + marked``; empty for multiplicities that do not occur."""
         top = max(self.multiplicities, default=0)
-        kinds: list[list[Label]] = []
+        kinds: list[list[EdgeLabel]] = []
         for kind in range(2 * top + 2):
             multiplicity, marked = divmod(kind, 2)
             kinds.append(self.labels(multiplicity, bool(marked)) if multiplicity in self.multiplicities else [])
         return kinds
 
     @cached_property
-    def flat(self) -> list[Label]:
+    def flat(self) -> list[EdgeLabel]:
         """All labels, in the numbering of the kernels."""
         return [label for labels in self.by_kind for label in labels]
 
@@ -235,73 +231,56 @@ class Alphabet:
         """
         if any(limit > 100 for limit in self.limits) or self.resources > 50_000:
             raise TooLargeError(f"{self.resources} resource states (bound 50000): ask for fewer links or higher pairs")
-        return _tables(self)
+        alike = [(self.weight(own), self._index(self.cost(own)), self._pack(self.cost(own))) for own in self.flat]
+        reverse: list[int] = []
+        kinds, group_kinds = [], []
+        groups: list[tuple[int, ...]] = []
+        heaviest = [0] * (max(self.multiplicities, default=0) + 1)
+        for kind, labels in enumerate(self.by_kind):
+            start = len(reverse)
+            number = {label: start + i for i, label in enumerate(labels)}
+            reverse += [number[label.reversed()] for label in labels]
+            kinds.append((start, len(reverse)))
+            if kind % 2 == 0:
+                heaviest[kind // 2] = max((alike[i][0] for i in number.values()), default=0)
+            for own_reverse in (False, True):
+                found = Counter(alike[i] for i in number.values() if not own_reverse or reverse[i] == i)
+                group_kinds.append((len(groups), len(groups) + len(found)))
+                groups += [(*own, count) for own, count in sorted(found.items())]
+        packed_of, final = self._resource_states()
+        labels_of = [(*own, back, label.fold()) for own, back, label in zip(alike, reverse, self.flat)]
+        return Tables(
+            kinds=_columns(kinds, 2),
+            labels=_columns(labels_of, 5),
+            group_kinds=_columns(group_kinds, 2),
+            groups=_columns(groups, 4),
+            heaviest=np.array(heaviest, np.int64),
+            resources=np.array([packed_of, final], np.int64),
+            space=np.int64(self.space),
+            target=np.int64(self._index(self.limits)),
+            guard=np.int64(self._pack((0x80,) * len(self.limits))),
+        )
+
+    def _resource_states(self) -> tuple[list[int], list[int]]:
+        exact = len(self.limits) - (self.mobility > 1)  # freedom to lend may be left over
+        packed_of, final = [], []
+        for state in range(self.resources):
+            digits = [state // step % (limit + 1) for step, limit in zip(self.radix, self.limits)]
+            packed_of.append(self._pack(tuple(digits)))
+            final.append(int(not any(digits[:exact])))
+        return packed_of, final
 
 
-def _tables(alphabet: Alphabet) -> Tables:
-    lo, hi, weight, index, packed, reverse, fold = [], [], [], [], [], [], []
-    g_lo, g_hi, g_weight, g_index, g_packed = [], [], [], [], []
-    g_count: list[int] = []
-    start = 0
-    for labels in alphabet.by_kind:
-        number = {label: start + i for i, label in enumerate(labels)}
-        lo.append(start)
-        for label in labels:
-            cost = alphabet.cost(label)
-            weight.append(alphabet.weight(label))
-            index.append(alphabet._index(cost))
-            packed.append(alphabet._pack(cost))
-            reverse.append(number[label.reversed()])
-            fold.append(label.fold())
-        start += len(labels)
-        hi.append(start)
-        for own_reverse in (False, True):
-            groups = Counter(
-                (weight[i], index[i], packed[i]) for i in range(lo[-1], hi[-1]) if not own_reverse or reverse[i] == i
-            )
-            g_lo.append(len(g_count))
-            for (w, i, p), count in sorted(groups.items()):
-                g_weight.append(w)
-                g_index.append(i)
-                g_packed.append(p)
-                g_count.append(count)
-            g_hi.append(len(g_count))
-    heaviest = [
-        max(weight[lo[2 * mu] : hi[2 * mu]], default=0) for mu in range(max(alphabet.multiplicities, default=0) + 1)
-    ]
-    packed_of, final = _resource_states(alphabet)
-
-    def ints(values: list[int] | list[list[int]]) -> NDArray[np.int64]:
-        return np.array(values, dtype=np.int64)
-
-    return Tables(
-        kinds=ints([lo, hi]),
-        labels=ints([weight, index, packed, reverse, fold]),
-        group_kinds=ints([g_lo, g_hi]),
-        groups=ints([g_weight, g_index, g_packed, g_count]),
-        heaviest=ints(heaviest),
-        resources=ints([packed_of, final]),
-        space=np.int64(alphabet.space),
-        target=np.int64(alphabet._index(alphabet.limits)),
-        guard=np.int64(alphabet._pack((0x80,) * len(alphabet.limits))),
-    )
-
-
-def _resource_states(alphabet: Alphabet) -> tuple[list[int], list[int]]:
-    exact = len(alphabet.limits) - (alphabet.mobility > 1)  # freedom to lend may be left over
-    packed_of, final = [], []
-    for state in range(alphabet.resources):
-        digits = [state // step % (limit + 1) for step, limit in zip(alphabet.radix, alphabet.limits)]
-        packed_of.append(alphabet._pack(tuple(digits)))
-        final.append(int(not any(digits[:exact])))
-    return packed_of, final
+def _columns(rows: list[tuple[int, ...]], width: int) -> NDArray[np.int64]:
+    """Rows of numbers as an array of their columns."""
+    return np.ascontiguousarray(np.array(rows, np.int64).reshape(-1, width).T)
 
 
 @lru_cache(maxsize=256)
-def alphabet_for(
+def edge_labels_for(
     space: int, mobility: int, binary_links: int, higher: tuple[tuple[int, int], ...], loops: int, vertices: int
-) -> Alphabet:
-    """Return the alphabet for all contracted graphs with the given numbers of loops and vertices."""
+) -> EdgeLabels:
+    """Return the labels for all contracted graphs with the given numbers of loops and vertices."""
     most = loops + 1 if vertices == 2 else loops  # parallel paths between two of the vertices
     multiplicities = (loops + 1,) if vertices == 2 else tuple(range(1, most))
-    return Alphabet(space, mobility, binary_links, higher, multiplicities, vertices == 2)
+    return EdgeLabels(space, mobility, binary_links, higher, multiplicities, vertices == 2)

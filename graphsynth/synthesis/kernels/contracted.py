@@ -1,10 +1,10 @@
-"""All automorphisms of a small edge-weighted graph."""
+"""What is laid out once of a contracted graph: its automorphisms, and the few sparsity conditions that can bind."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from graphsynth.synthesis.kernels.layout import inner
+from graphsynth.synthesis.kernels.layout import HEAVIEST, MASK, NEED, U, V, inner
 
 _GOLDEN = np.int64(-7046029254386353131)
 _MIX = np.int64(-4658895280553007687)
@@ -94,13 +94,14 @@ def automorphisms(k, mult, perms):
     depth = 0
     while depth >= 0:
         v = order[depth]
+        # take back the image that was tried, and look for the next one
         if image[v] >= 0:
             used[image[v]] = False
             image[v] = -1
         w = candidate[depth]
         while w < k:
             if not used[w] and colour[w] == colour[v]:
-                fits = True
+                fits = True  # as far as the vertices placed before are concerned
                 for i in range(depth):
                     u = order[i]
                     if mult[v, u] != mult[w, image[u]]:
@@ -119,6 +120,7 @@ def automorphisms(k, mult, perms):
             depth += 1
             candidate[depth] = 0
             continue
+        # every vertex has its image: an automorphism; the identity is there already
         identity = True
         for u in range(k):
             if image[u] != u:
@@ -130,4 +132,90 @@ def automorphisms(k, mult, perms):
             for u in range(k):
                 perms[count, u] = image[u]
             count += 1
+    return count
+
+
+@inner
+def popcount(x):
+    """Count the set bits of a non-negative 64-bit integer."""
+    x = x - ((x >> 1) & 0x5555555555555555)
+    x = (x & 0x3333333333333333) + ((x >> 2) & 0x3333333333333333)
+    x = (x + (x >> 4)) & 0x0F0F0F0F0F0F0F0F
+    return ((x * 0x0101010101010101) >> 56) & 0xFF
+
+
+@inner
+def critical_sets(k, m, classes, space, subsets, sets):
+    """Find the vertex sets whose sparsity condition is neither automatic nor implied by a smaller set.
+
+    A class e (all parallel paths between two vertices) has weight D_e = HEAVIEST_e - y_e with y_e >= 0.  The condition
+    sum of D_e inside U <= Pi (|U| - 1) - 1 reads: sum of y_e inside U >= need(U).  U is dropped when need(U) <= 0 or
+    when a proper subset needs at least as much.  The whole vertex set is dropped too: there the sum is prescribed.
+
+    ``classes`` and ``subsets`` (workspace) are those of ``Work``; of each critical set ``sets`` takes the bit mask of
+    the classes inside it (MASK) and its need (NEED).  Returns the number of critical sets, or -1 when there is no room.
+    """
+    need, best = subsets[0], subsets[1]
+    size = 1 << k
+    # classes by their lower vertex
+    first = np.zeros(k + 1, np.int64)
+    other = np.empty(m, np.int64)
+    weight = np.empty(m, np.int64)
+    at = 0
+    for u in range(k):
+        first[u] = at
+        for e in range(m):
+            if classes[U, e] == u:
+                other[at] = classes[V, e]
+                weight[at] = classes[HEAVIEST, e]
+                at += 1
+    first[k] = at
+    # need[] first holds the sum of HEAVIEST inside U minus Pi |U|; the lowest vertex of U is added last
+    need[0] = 0
+    for u in range(1, size):
+        low = 0
+        while not (u >> low) & 1:
+            low += 1
+        acc = need[u & (u - 1)] - space
+        for i in range(first[low], first[low + 1]):
+            if (u >> other[i]) & 1:
+                acc += weight[i]
+        need[u] = acc
+    # best[] becomes the largest need of a subset; single vertices and the empty set need nothing
+    for u in range(size):
+        need[u] += space + 1
+        best[u] = need[u]
+    best[0] = 0
+    for v in range(k):
+        best[1 << v] = 0
+        need[1 << v] = 0
+    need[0] = 0
+    for v in range(k):
+        bit = 1 << v
+        for base in range(0, size, 2 * bit):
+            for u in range(base, base + bit):
+                if best[u] > best[u + bit]:
+                    best[u + bit] = best[u]
+    # keep the sets that need more than each of their subsets
+    count = 0
+    for u in range(3, size - 1):
+        n = need[u]
+        if n <= 0 or best[u] > n:
+            continue
+        implied = False
+        for v in range(k):
+            if (u >> v) & 1 and best[u ^ (1 << v)] >= n:
+                implied = True
+                break
+        if implied:
+            continue
+        if count == sets.shape[1]:
+            return -1
+        mask = np.int64(0)
+        for e in range(m):
+            if (u >> classes[U, e]) & 1 and (u >> classes[V, e]) & 1:
+                mask |= np.int64(1) << e
+        sets[MASK, count] = mask
+        sets[NEED, count] = n
+        count += 1
     return count

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
-from graphsynth.testing.strategies.extra import st
+from graphsynth.testing.extra import st
 
 #: Titles hold any printable character, quotes and backslashes included.
 _PRINTABLE = st.characters(exclude_categories=("C", "Z"), include_characters=" ")
@@ -29,42 +30,27 @@ def _tables(tables: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
     plain = {key: value for key, value in tables.items() if not isinstance(value, Mapping)}
     found = []
     if path and (plain or not tables):
-        lines = [f"[{'.'.join(path)}]", *(f"{key} = {_value(value)}" for key, value in plain.items())]
-        found.append("\n".join(lines) + "\n")
+        lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in plain.items()]
+        found.append("\n".join([f"[{'.'.join(path)}]", *lines]) + "\n")
     for key, value in tables.items():
         if isinstance(value, Mapping):
             found += _tables(value, (*path, key))
     return found
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-        return f'"{escaped}"'
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_value, value))}]"
-    return repr(value)
-
-
 def _lambda_linkage(draw: st.DrawFn) -> dict[str, Any]:
     """Linkage, tilt and bearing, whether or not it can be assembled."""
     number = st.integers(1, 40).map(lambda k: k / 8.0)
-    bearing = {
-        "radius_mm": draw(st.floats(1.0, 40.0)), "height_mm": draw(st.floats(0.5, 40.0)),
-        "clearance_mm": draw(st.sampled_from((0, 0.03)) | st.floats(1e-9, 1.0)),
-        "condition": draw(st.sampled_from("AB")),
-    }  # fmt: skip
+    bearing = {"radius_mm": draw(st.floats(1.0, 40.0)), "height_mm": draw(st.floats(0.5, 40.0))}
+    bearing["clearance_mm"] = draw(st.sampled_from((0, 0.03)) | st.floats(1e-9, 1.0))
+    alpha = draw(st.sampled_from((0, 1e-8, 1.5)) | st.floats(1e-9, 1.5) | st.floats(-1.5, -1e-9))
     return {
-        "module": "lambda_linkage", "positions": draw(st.integers(8, 400)),
+        "module": "lambda_linkage",
+        "positions": draw(st.integers(8, 400)),
         "lengths": {name: draw(number) for name in ("frame", "crank", "coupler", "rocker")},
-        "tilt": {
-            "alpha_rad": draw(st.sampled_from((0, 1e-8, 1.5)) | st.floats(1e-9, 1.5) | st.floats(-1.5, -1e-9)),
-            "axis": draw(st.sampled_from(([1, 0, 0], [0, 1, 0], [2, -1, 2], [0, 0, 1]))),
-        },
-        "bearing": bearing,
-    }  # fmt: skip
+        "tilt": {"alpha_rad": alpha, "axis": draw(st.sampled_from(([1, 0, 0], [0, 1, 0], [2, -1, 2], [0, 0, 1])))},
+        "bearing": {**bearing, "condition": draw(st.sampled_from("AB"))},
+    }
 
 
 def _tribometer(draw: st.DrawFn) -> dict[str, Any]:
@@ -74,13 +60,9 @@ def _tribometer(draw: st.DrawFn) -> dict[str, Any]:
     if draw(st.booleans()):
         friction["stribeck_m_s"] = draw(st.floats(0.001, 0.1))
     radius, speed = draw(st.integers(1, 50)), draw(st.integers(-50, 50).filter(bool)) / 10
-    drive = draw(
-        st.sampled_from((
-            {"kind": "crank", "radius_mm": radius, "rod_mm": radius * 2, "speed_rad_s": speed},
-            {"kind": "harmonic", "radius_mm": radius, "speed_rad_s": speed},
-            {"kind": "belt", "belt_m_s": speed},
-        ))
-    )  # fmt: skip
+    crank = {"kind": "crank", "radius_mm": radius, "rod_mm": radius * 2, "speed_rad_s": speed}
+    harmonic = {"kind": "harmonic", "radius_mm": radius, "speed_rad_s": speed}
+    drive = draw(st.sampled_from((crank, harmonic, {"kind": "belt", "belt_m_s": speed})))
     platform = {"mass_kg": draw(st.floats(0.1, 10.0)), "stiffness_N_per_m": draw(st.floats(1.0, 1e5))}
     run = {"duration_s": draw(st.integers(1, 20)), "samples": draw(st.integers(20, 500))}
     return {"module": "tribometer", "platform": platform, "friction": friction, "drive": drive, "run": run}
