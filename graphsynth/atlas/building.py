@@ -73,11 +73,11 @@ class Writer:
         many(
             "INSERT INTO chains VALUES (?, ?, ?, NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             (
-                (number, family_id, chain[0], chain[1], mobility, *chain[2:9], contracted[chain[11]][1], *chain[9:11],
-                 contracted[chain[11]][0])
-                for number, chain in enumerate(rows.chains, start)
+                (at, family_id, *own[:2], mobility, *own[2:9], planar, *own[9:11], shape)
+                for at, own in enumerate(rows.chains, start)
+                for shape, planar in (contracted[own[11]],)
             ),
-        )  # fmt: skip
+        )
         many("INSERT INTO dyads VALUES (?, ?)", ((start + at, parent) for at, parent in rows.dyads))
         many("INSERT INTO inversions VALUES (?, ?, ?, ?)", ((start + at, *rest) for at, *rest in rows.inversions))
         many(

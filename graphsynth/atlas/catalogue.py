@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from graphsynth.atlas.building import BuildStep
 from graphsynth.atlas.opened import OpenCatalogue
@@ -21,6 +22,13 @@ if TYPE_CHECKING:
     from graphsynth.atlas.verifying import Verification
     from graphsynth.mechanism.model import Mechanism
     from graphsynth.structure.graph import MechanismGraph
+
+
+class SearchOptions(TypedDict, total=False):
+    """How dimensions are searched for."""
+
+    seed: int
+    tries: int
 
 
 class Catalogue(OpenCatalogue):
@@ -159,7 +167,7 @@ class Catalogue(OpenCatalogue):
         SpecError
             If the catalogue does not hold it.
         """
-        from graphsynth.atlas.entry import entry
+        from graphsynth.atlas.stored import entry
 
         with self.reading():
             return entry(self.connection, self._fetch(name))
@@ -205,11 +213,10 @@ class Catalogue(OpenCatalogue):
         *,
         per_chain: int = 1,
         limit: int | None = None,
-        seed: int = 0,
-        tries: int = 4,
         jamming: tuple[float, float] | None = None,
         executor: Executor | None = None,
         watch: Callable[[EvaluationStep], None] | None = None,
+        **search: Unpack[SearchOptions],
     ) -> int:
         """Give mechanisms dimensions with which they turn, and store these with their transmission and verdict.
 
@@ -224,8 +231,6 @@ class Catalogue(OpenCatalogue):
             So many mechanisms of each chain, those of the smallest groups first; 0: all.
         limit : int, optional
             Evaluate at most so many now.
-        seed, tries : int
-            Of :func:`graphsynth.embody`, with its default goals: a full turn.
         jamming : (tilt, joint_limit), optional
             Prove also whether the mechanism jams when the axis of its first driver is tilted by at most ``tilt``, in
             any direction, and every joint takes up ``joint_limit`` (radians, below 0.1; model L1).
@@ -233,6 +238,8 @@ class Catalogue(OpenCatalogue):
             Who computes; one process writes.  The same results for any.
         watch : callable, optional
             Told an ``EvaluationStep`` after every mechanism.
+        **search
+            ``seed`` (0) and ``tries`` (4) of :func:`graphsynth.embody`, with its default goals: a full turn.
 
         Returns
         -------
@@ -258,7 +265,9 @@ class Catalogue(OpenCatalogue):
         """
         from graphsynth.atlas.evaluating import Settings, evaluate
 
-        settings = Settings(seed, tries) if jamming is None else Settings(seed, tries, *jamming)
+        settings = Settings(**search)
+        if jamming is not None:
+            settings = replace(settings, tilt=jamming[0], joint_limit=jamming[1])
         with readable(self.path), self._written():
             return evaluate(self.path, links, mobility, per_chain, limit, settings, executor, watch)
 

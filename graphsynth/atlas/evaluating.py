@@ -41,27 +41,14 @@ VERDICTS = {
 class Settings:
     """How mechanisms are evaluated.
 
-    Parameters
-    ----------
-    seed : int
-        Of the search for dimensions.
-    tries : int
-        Searches for each mechanism, 1 to 1000.
-    tilt : float, optional
-        Largest misalignment of the axis of the first driver, in any direction, radians; None: no verdict on jamming.
-    joint_limit : float
-        Tilt that every joint takes up, radians.
-
-    Raises
-    ------
-    SpecError
-        For values out of these bounds.
+    Raises `SpecError` for values out of these bounds.
     """
 
-    seed: int = 0
-    tries: int = 4
+    seed: int = 0  # of the search for dimensions
+    tries: int = 4  # searches for each mechanism, 1 to 1000
+    #: largest misalignment of the axis of the first driver, in any direction, radians; None: no verdict on jamming
     tilt: float | None = None
-    joint_limit: float = math.radians(0.3)
+    joint_limit: float = math.radians(0.3)  # tilt that every joint takes up, radians
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -218,10 +205,9 @@ def _dimensions(task: Task) -> list[Evaluation]:
         "min_transmission_angle": found.goals.min_transmission_angle,
         "max_length_ratio": found.goals.max_length_ratio,
     }
-    data = {
-        **settings, "statement": found.statement, "goals": goals, "length_ratio": found.figures.length_ratio,
-        "mechanism": json.loads(found.mechanism.to_json()),
-    }  # fmt: skip
+    data: dict[str, Any] = {**settings, "statement": found.statement, "goals": goals}
+    data["length_ratio"] = found.figures.length_ratio
+    data["mechanism"] = json.loads(found.mechanism.to_json())
     named = fingerprint(data["mechanism"])
     guarantee = "certified" if turn_is_proved(found.motion) else "estimated"
     angle, turn = found.figures.transmission_angle, {"range": [0.0, math.tau], "dimensions": named}

@@ -21,10 +21,7 @@ from graphsynth.atlas.schema import connect, settle
 from graphsynth.atlas.stored import TIED, data_of, fingerprint, fingerprint_at, mechanism_in
 from graphsynth.core.errors import SpecError
 
-#: Kinds that every entry lists, computed or not; others may be stored too.
-KINDS = ("dimensions", "transmission", "jamming")
 GUARANTEES = ("exact", "certified", "estimated")
-NOT_COMPUTED = "not computed"
 #: As the columns of the table ask for, see :mod:`graphsynth.atlas.tables`.
 _WORD = re.compile(r"(?![=+@-])[^\x00-\x1f\x7f-\x9f]{1,200}")
 _MOST_DATA = 1_000_000

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from hashlib import sha256
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from graphsynth.atlas.tables import SCHEMA
 from graphsynth.core.errors import GraphsynthError, SpecError
 from graphsynth.core.extras import need
+from graphsynth.core.wholefiles import replacing
 
 _CHAIN = "c.mobility, c.links, c.key"
 
@@ -93,28 +96,19 @@ def export(connection: sqlite3.Connection, folder: Path, form: str) -> list[Path
     write = {"parquet": _write_parquet, "csv": _write_csv, "jsonl": _write_jsonl}[form]
     _prepare(connection)
     written: list[Path] = []
-    unfinished = folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for table, select in TABLES.items():
-            path = folder / f"{table}.{form}"
-            unfinished = path.with_name(path.name + ".new")
+            written.append(folder / f"{table}.{form}")
             cursor = connection.execute(select)
-            try:
-                write(unfinished, [column[0] for column in cursor.description], _blocks(cursor))
-                unfinished.replace(path)
-            except BaseException:
-                unfinished.unlink(missing_ok=True)
-                raise
-            written.append(path)
+            with replacing(written[-1]) as fresh:
+                write(fresh, [column[0] for column in cursor.description], _blocks(cursor))
     except OSError as error:
+        place = error.filename or (written or [folder])[-1]
         raise GraphsynthError(
-            f"{error.filename or unfinished} cannot be written ({error.strerror or error}): make room or take another"
+            f"{place} cannot be written ({error.strerror or error}): make room or take another"
         ) from None
     return written
-
-
-_Write = Callable[[Path, list[str], Iterator[list[tuple[Any, ...]]]], None]
 
 
 def _write_csv(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:
@@ -131,10 +125,7 @@ def _write_jsonl(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any
             file.writelines(json.dumps(dict(zip(columns, row))) + "\n" for row in block)
 
 
-_INTEGERS = (
-    "mobility", "links", "fractionated", "expected", "complete", "group", "order", "class", "joints", "loops",
-    "automorphisms", "inversions", "planar", "girth", "contracted_vertices", "frame", "frame_joints",
-)  # fmt: skip
+_INTEGERS = {*re.findall(r'(\w+)"? INTEGER', SCHEMA), "group", "contracted_vertices"}
 
 
 def _write_parquet(path: Path, columns: list[str], blocks: Iterator[list[tuple[Any, ...]]]) -> None:

@@ -34,29 +34,20 @@ class GroupRow:
 
 @dataclass(slots=True)
 class Rows:
-    """Rows of some chains for the store, without the numbers that only the store can give.
+    """Rows of some chains for the store, without the numbers that only the store can give."""
 
-    Parameters
-    ----------
-    chains : list of tuple
-        ``(key, graph6, links, joints, loops, assortment, automorphisms, link_orbits, inversions, girth, fractionated,
-        contracted)``; ``contracted`` is an index into the next list.
-    contracted : list of (vertices, edges)
-    dyads : list of (chain, key of the parent)
-        Chains as indices into ``chains``, here and below.
-    inversions : list of (chain, frame, joints of the frame, levels)
-    mechanisms : list of (chain, frame, driver, structure)
-        ``driver`` is a link, or text such as ``'1,3'`` for several; ``structure`` an index into the next list.
-    structures : list of tuple of int
-        Groups in the order of assembly, as indices into ``groups``.
-    groups : list of GroupRow
-    """
-
+    #: ``(key, graph6, links, joints, loops, assortment, automorphisms, link_orbits, inversions, girth, fractionated,
+    #: contracted)``; ``contracted`` is an index into the next list
     chains: list[tuple[Any, ...]] = field(default_factory=list)
-    contracted: list[tuple[int, str]] = field(default_factory=list)
+    contracted: list[tuple[int, str]] = field(default_factory=list)  # list of (vertices, edges)
+    #: list of (chain, key of the parent): chains as indices into ``chains``, here and below
     dyads: list[tuple[int, str]] = field(default_factory=list)
+    #: list of (chain, frame, joints of the frame, levels)
     inversions: list[tuple[int, int, int, str]] = field(default_factory=list)
+    #: list of (chain, frame, driver, structure): ``driver`` is a link, or text such as ``'1,3'`` for several;
+    #: ``structure`` an index into the next list
     mechanisms: list[tuple[int, int, int | str, int]] = field(default_factory=list)
+    #: groups in the order of assembly, as indices into ``groups``
     structures: list[tuple[int, ...]] = field(default_factory=list)
     groups: list[GroupRow] = field(default_factory=list)
 
@@ -89,7 +80,7 @@ def analyse_block(links: int, mobility: int, packed: Bytes) -> Block:
         girth=np.zeros(chains, np.uint8),
         cuts=np.zeros(chains, np.uint64),
         levels=np.zeros((chains, links, links), np.uint8),
-        count=np.zeros(chains, np.int64),
+        mechanisms=np.zeros(chains, np.int64),
         frames=np.zeros((chains, room), np.uint8),
         drives=np.zeros((chains, room), np.uint64),
         sizes=np.zeros((chains, room, half), np.uint8),
@@ -205,7 +196,7 @@ def _dyads(block: Block, start: int, rows: Rows) -> None:
 
 def _mechanisms(block: Block, start: int, rows: Rows) -> None:
     """Append mechanisms, and the structures and groups they are the first to have."""
-    filled = np.arange(block.frames.shape[1]) < block.count[:, None]
+    filled = np.arange(block.frames.shape[1]) < block.mechanisms[:, None]
     chains = np.nonzero(filled)[0]
     if not len(chains):
         return

@@ -1,4 +1,4 @@
-"""Making a catalogue file: families one after the other, work shared out, the file settled at the end."""
+"""Making a catalogue file: families cut into pieces that depend on the question alone, shared out, the file settled."""
 
 from __future__ import annotations
 
@@ -6,16 +6,27 @@ import sqlite3
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from hashlib import sha256
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from graphsynth.atlas.building import BuildStep, build_family, finish_family, open_family
+from graphsynth.atlas.facts import Rows, analyse_block, rows_of
 from graphsynth.atlas.schema import connect, settle
 from graphsynth.core.errors import SpecError, TooLargeError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.facts import Rows
-    from graphsynth.synthesis.problem import Problem
+    from graphsynth.synthesis.chunks import Chunk
+    from graphsynth.synthesis.families import Family
+    from graphsynth.synthesis.problem import Problem, WorkItem
+
 
 Watch = Callable[[BuildStep], None]
 
@@ -59,7 +70,6 @@ def _family(
     watch: Watch | None,
 ) -> None:
     """Make or continue one family; nothing happens for numbers without any chain."""
-    from graphsynth.atlas.pieces import fingerprint, problem_of, rows_of_task, share_of, tasks_of
     from graphsynth.core.ordered import in_order
 
     problem, whole = problem_of(links, mobility, fractionated), tasks_of(links, mobility, fractionated)
@@ -101,9 +111,122 @@ def processes(workers: int) -> AbstractContextManager[Executor | None]:
 
 
 def _compile_kernels() -> None:
-    from graphsynth.atlas.pieces import problem_of, rows_of_task, tasks_of
-
     for task in tasks_of(6, 1, False):
         rows_of_task(task)
     for piece in problem_of(6, 1, False).work_items(listing=False):
         piece.count()
+
+
+#: Bound on the labellings of a piece; about a quarter of them are chains.  A piece takes a second at most.
+PIECE = 8000.0
+
+#: A family of very many chains is cut into so many pieces, of more work each.
+MOST_PIECES = 100_000
+
+_CHAINS_AT_ONCE = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One piece of a family: its number, and what to list."""
+
+    number: int
+    links: int
+    mobility: int
+    piece: WorkItem
+
+    @property
+    def weight(self) -> float:
+        """Bound on the work."""
+        return self.piece.weight
+
+
+def problem_of(links: int, mobility: int, fractionated: bool) -> Problem:
+    """State the enumeration of a family.
+
+    Raises `SpecError, TooLargeError` for numbers out of their bounds.
+    """
+    from graphsynth.synthesis.problem import Problem
+
+    return Problem.chains(links, mobility, 3, None, fractionated, None)
+
+
+def tasks_of(links: int, mobility: int, fractionated: bool) -> list[Task]:
+    """Cut a family; the cut depends on the family alone."""
+    whole = problem_of(links, mobility, fractionated).work_items(listing=True)
+    size = max(PIECE, sum(piece.weight for piece in whole) / MOST_PIECES)
+    pieces = [part for piece in whole for part in _finer(piece, size)]
+    return [Task(number, links, mobility, piece) for number, piece in enumerate(pieces)]
+
+
+def _finer(piece: WorkItem, size: float) -> Iterator[WorkItem]:
+    """Cut a piece of many contracted graphs at their bounds, and that of a single one by its search prefixes."""
+    from graphsynth.synthesis.chunks import Chunk
+
+    if not isinstance(piece, Chunk) or piece.weight <= size:
+        yield piece
+        return
+    if piece.stop - piece.start == 1:
+        yield from _parts(piece, size)
+        return
+    bounds = _bounds(piece.family)[piece.start : piece.stop]
+    at = 0
+    while at < len(bounds):
+        sums = np.cumsum(bounds[at:])
+        count = min(int(np.searchsorted(sums, size)) + 1, len(sums))
+        count -= count > 1 and bool(bounds[at + count - 1] > size)  # a big one alone
+        part = replace(piece, start=piece.start + at, stop=piece.start + at + count, weight=float(sums[count - 1]))
+        yield from _parts(part, size) if count == 1 else (part,)
+        at += count
+
+
+@lru_cache(maxsize=2)
+def _bounds(family: Family) -> NDArray[np.float64]:
+    """Bounds on the chains of each contracted graph, computed once for all pieces of a family."""
+    from graphsynth.synthesis.chunks import estimates
+
+    return estimates(family)
+
+
+def _parts(piece: Chunk, size: float) -> Iterator[Chunk]:
+    """Cut a single contracted graph that is far too big: part p of P becomes p, p + P, ... of a multiple of P."""
+    times = ceil(piece.weight / size / 2) if piece.weight > 4 * size else 1
+    for k in range(times):
+        part = piece.part + piece.parts * k
+        yield replace(piece, part=part, parts=piece.parts * times, weight=piece.weight / times)
+
+
+def fingerprint(problem: Problem, tasks: list[Task]) -> str:
+    """Short text that differs when the question or its cut differ: pieces of two cuts are never mixed."""
+    return sha256(f"{problem.signature} {len(tasks)} {[task.weight for task in tasks]}".encode()).hexdigest()[:16]
+
+
+def share_of(tasks: list[Task], shard: tuple[int, int] | None) -> list[Task]:
+    """Return the tasks of shard i of m, a run of consecutive ones.
+
+    Raises `SpecError` for i out of 1..m.
+    """
+    from graphsynth.synthesis import shards
+
+    own = shards.share_of([task.piece for task in tasks], shard)
+    return tasks[own.start : own.stop]
+
+
+def rows_of_task(task: Task) -> Rows:
+    """Return the rows of all chains of a piece (computed in the worker)."""
+    rows = Rows()
+    for packed in _packed(task.piece):
+        for at in range(0, len(packed), _CHAINS_AT_ONCE):
+            rows_of(analyse_block(task.links, task.mobility, packed[at : at + _CHAINS_AT_ONCE]), rows)
+    return rows
+
+
+def _packed(piece: WorkItem) -> Iterator[NDArray[np.uint8]]:
+    from graphsynth.synthesis.chunks import Chunk
+
+    if isinstance(piece, Chunk):
+        yield from piece.packed()
+        return
+    graphs = [graph.packed for graph in piece.graphs()]
+    if graphs:
+        yield np.frombuffer(b"".join(graphs), np.uint8).reshape(len(graphs), -1)

@@ -12,8 +12,7 @@ from typing import Any
 
 from graphsynth.atlas.building import build_family, finish_family, open_family, transaction
 from graphsynth.atlas.facts import GroupRow, Rows
-from graphsynth.atlas.making import expected_of
-from graphsynth.atlas.pieces import problem_of
+from graphsynth.atlas.making import expected_of, problem_of
 from graphsynth.atlas.schema import GARBAGE, connect, readable, screen, settle
 from graphsynth.atlas.sealing import broken_seal
 from graphsynth.atlas.statement import PUBLISHED

@@ -5,24 +5,26 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graphsynth.atlas.evaluating import VERDICTS, jamming_proof, motion_of, turn_is_proved
 from graphsynth.atlas.references import Reference
 from graphsynth.atlas.stored import TIED, data_of, fingerprint
-from graphsynth.atlas.turning import Turning
 
 if TYPE_CHECKING:
     from graphsynth.mechanism.model import Mechanism
+
 
 #: ``same(field, where, stored, recomputed)``
 Same = Callable[[str, str, Any, Any], None]
 
 _ANGLE = 1e-6  # radians
+
 _DIRECTIONS, _SAMPLES = 4, 13
 
 
@@ -152,3 +154,156 @@ def _has_flint() -> bool:
     from importlib.util import find_spec
 
     return find_spec("flint") is not None
+
+
+Array = NDArray[np.float64]
+
+#: Steps of a turn: half a degree, the grid of :mod:`graphsynth.kinematics.dimensional.verify`.
+_STEPS = 720
+
+_STRIDE = 10
+
+_ITERATIONS = 30
+
+#: Largest gap of a joint over the largest length, and largest change of an angle within a step, radians.
+_GAP, _JUMP = 1e-11, 0.1
+
+
+class Turning:
+    """A mechanism of turning joints, as its JSON document gives it.
+
+    Parameters
+    ----------
+    document : dict
+        As :meth:`graphsynth.Mechanism.to_json` writes it; R joints, drivers that follow the input.
+    frame : int
+    drivers : tuple of int
+        Driven links, jointed to the frame.
+
+    Raises
+    ------
+    ValueError
+        If the document holds other drivers, or joints and laws of other kinds.
+    """
+
+    def __init__(self, document: dict[str, Any], frame: int, drivers: tuple[int, ...]) -> None:
+        joints, laws = document["joints"], document["drivers"]
+        if any(joint["kind"] != "R" for joint in joints):
+            raise ValueError("only turning joints are recomputed")
+        if sorted((own["base"], own["link"]) for own in laws) != [(frame, link) for link in sorted(drivers)]:
+            raise ValueError(f"the mechanism is not driven by the links {drivers} on frame {frame}")
+        if any(own["law"]["kind"] != "linear" or own["law"]["rate"] != 1.0 for own in laws):
+            raise ValueError("only drivers that follow the input are recomputed")
+        self.frame = frame
+        self.driven = np.array([own["link"] for own in laws])
+        self.offsets = np.array([float(own["law"]["offset"]) for own in laws])
+        self.ends = np.array([(joint["a"], joint["b"]) for joint in joints])
+        self.arms = np.array([(joint["at_a"], joint["at_b"]) for joint in joints], float)
+        self.start = np.array(document["pose"], float)
+        self.size = float(np.abs(self.arms).max())
+
+    def _turned(self, pose: Array) -> Array:
+        """Arms from the origins of their links to the joints, turned with the links; shape (..., joints, 2, 2)."""
+        angle = pose[..., self.ends, 2]
+        c, s, x, y = np.cos(angle), np.sin(angle), self.arms[..., 0], self.arms[..., 1]
+        return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+    def residual(self, pose: Array, u: Array) -> Array:
+        """Gaps of all joints, the frame at rest, and the drivers at the inputs, for poses of shape (n, links, 3)."""
+        points = pose[:, self.ends, :2] + self._turned(pose)
+        gaps = (points[..., 0, :] - points[..., 1, :]).reshape(len(pose), -1)
+        angles = pose[:, self.driven, 2] - pose[:, [self.frame], 2] - self.offsets - u[:, None]
+        return np.concatenate([gaps, pose[:, self.frame], angles], axis=1)
+
+    def jacobian(self, pose: Array) -> Array:
+        """Differentiate the residual by (x, y, theta) of every link, for poses of shape (..., links, 3)."""
+        *many, links, _ = pose.shape
+        arms, count = self._turned(pose), len(self.ends)
+        found = np.zeros((*many, 2 * count + 3 + len(self.driven), 3 * links))
+        x, y = 2 * np.arange(count), 2 * np.arange(count) + 1
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            column = 3 * self.ends[:, side]
+            found[..., x, column] = found[..., y, column + 1] = sign
+            found[..., x, column + 2] = -sign * arms[..., :, side, 1]
+            found[..., y, column + 2] = sign * arms[..., :, side, 0]
+        base = 3 * self.frame
+        found[..., 2 * count + np.arange(3), base + np.arange(3)] = 1.0
+        row = 2 * count + 3 + np.arange(len(self.driven))
+        found[..., row, 3 * self.driven + 2] = 1.0
+        found[..., row, base + 2] = -1.0
+        return found
+
+    def assembled(self, pose: Array, u: Array) -> Array:
+        """Solve for the poses at inputs, from poses close to them, shape (n, links, 3).
+
+        Raises `ValueError` if the joints cannot be closed.
+        """
+        bound = _GAP * max(1.0, self.size)
+        for _ in range(_ITERATIONS):
+            gap = self.residual(pose, u)
+            worst = np.abs(gap).max(axis=1)
+            if worst.max() <= bound:
+                return pose
+            pose = pose - np.linalg.solve(self.jacobian(pose), gap[..., None]).reshape(pose.shape)
+        raise ValueError(f"the joints do not close at the input {u[int(worst.argmax())]:.4f}")
+
+    def turn(self) -> Array:
+        """Return the poses of a full turn of all drivers, shape (721, links, 3).
+
+        Every fifth degree is reached from the one before, the poses between from their neighbours.
+
+        Raises `ValueError` if a joint opens, a link jumps, or the last pose is not the first.
+        """
+        coarse = np.linspace(0.0, math.tau, _STEPS // _STRIDE + 1)
+        found = [self.assembled(self.start[None], coarse[:1])[0]]
+        for u in coarse[1:]:
+            found.append(self.assembled(found[-1][None], np.array([u]))[0])
+        poses, u = np.array(found), np.linspace(0.0, math.tau, _STEPS + 1)
+        part = (np.arange(_STEPS) % _STRIDE / _STRIDE)[:, None, None]
+        first, second = np.repeat(poses[:-1], _STRIDE, axis=0), np.repeat(poses[1:], _STRIDE, axis=0)
+        poses = np.concatenate([self.assembled((1.0 - part) * first + part * second, u[:-1]), poses[-1:]])
+        steps = np.abs(np.diff(poses[..., 2], axis=0)).max(axis=1)
+        if not steps.max() < _JUMP:
+            raise ValueError(f"a link jumps behind the input {u[int(steps.argmax())]:.4f}")
+        change = poses[-1] - poses[0]
+        change[:, 2] -= math.tau * np.round(change[:, 2] / math.tau)
+        if not np.abs(change).max() < 1e-8 * max(1.0, self.size):
+            raise ValueError("the mechanism does not come back to its first pose after the turn")
+        return np.asarray(poses, np.float64)
+
+    def transmission(self, poses: Array, groups: Sequence[set[int]]) -> float:
+        """Smallest transmission angle over poses and bars, radians; pi/2 without bars.
+
+        A bar is a link with two joints in its group.  Let it grow at unit rate while the drivers rest: its ends part
+        with a velocity w that is 1 along the bar, and sin mu = 1 / |w|; for a dyad mu is the angle of its links.
+
+        ``poses`` have shape (n, links, 3); ``groups``: links of the groups in the order of assembly.
+        """
+        inverse = np.asarray(np.linalg.inv(self.jacobian(poses)), np.float64)
+        arms = self._turned(poses)
+        least = 1.0
+        placed = {self.frame, *map(int, self.driven)}
+        for group in groups:
+            placed |= group
+            for link in group:
+                joints = [k for k, pair in enumerate(self.ends) if link in pair and set(map(int, pair)) <= placed]
+                if len(joints) == 2:
+                    least = min(least, float(self._sines(inverse, arms, link, joints).min()))
+        return math.asin(least)
+
+    def _sines(self, inverse: Array, arms: Array, link: int, joints: list[int]) -> Array:
+        """Sine of the transmission angle of a bar at every pose."""
+        first, second = ((k, 0 if self.ends[k, 0] == link else 1) for k in joints)
+        along = arms[:, second[0], second[1]] - arms[:, first[0], first[1]]
+        along /= np.linalg.norm(along, axis=-1, keepdims=True)
+        sign = 1.0 if second[1] == 0 else -1.0
+        rows = inverse[:, :, 2 * second[0] : 2 * second[0] + 2]
+        velocity = -sign * np.einsum("nij,nj->ni", rows, along)
+
+        def at(k: int, side: int) -> Array:
+            """Velocity of the joint as a point of the other link."""
+            own, arm = 3 * int(self.ends[k, 1 - side]), arms[:, k, 1 - side]
+            turning: Array = velocity[:, own + 2, None] * np.stack([-arm[:, 1], arm[:, 0]], axis=-1)
+            return np.asarray(turning + velocity[:, own : own + 2], np.float64)
+
+        return np.asarray(1.0 / np.maximum(np.linalg.norm(at(*second) - at(*first), axis=-1), 1.0), np.float64)

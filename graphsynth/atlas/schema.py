@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
-from graphsynth.atlas.leftovers import take_back, unfinished
-from graphsynth.atlas.sealing import broken_seal, seal
+from graphsynth.atlas.sealing import broken_seal, seal, take_back, unfinished
 from graphsynth.atlas.tables import APPLICATION_ID, EDGES, INDEXES, SCHEMA, SCHEMA_VERSION, wrong_rows
 from graphsynth.core.errors import FormatError, GraphsynthError
 from graphsynth.core.wording import plain

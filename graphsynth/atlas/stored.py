@@ -13,30 +13,23 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
+#: Kinds that every entry lists, computed or not; others may be stored too.
+KINDS = ("dimensions", "transmission", "jamming")
+NOT_COMPUTED = "not computed"
 #: Kinds of evaluations that hold for one set of dimensions only.
 TIED = ("transmission", "jamming")
+
 _DEEPEST = 100
 
 
 @dataclass(frozen=True, slots=True)
 class StoredMechanism:
-    """A mechanism with its dimensions, as a catalogue holds it.
+    """A mechanism with its dimensions, as a catalogue holds it."""
 
-    Parameters
-    ----------
-    chain_id : int
-        Number of the chain in the file.
-    frame : int
-    driver : int or str
-        As in the table of mechanisms.
-    text : str
-        What :meth:`graphsynth.Mechanism.from_json` reads.
-    """
-
-    chain_id: int
+    chain_id: int  # number of the chain in the file
     frame: int
-    driver: int | str
-    text: str
+    driver: int | str  # as in the table of mechanisms
+    text: str  # What :meth:`graphsynth.Mechanism.from_json` reads
 
 
 def data_of(text: str) -> Any:
@@ -115,3 +108,47 @@ def stored_mechanisms(connection: sqlite3.Connection, chain_id: int | None = Non
         mechanism = mechanism_in(data_of(data))
         if mechanism is not None:
             yield StoredMechanism(number, frame, driver, json.dumps(mechanism))
+
+
+def entry(connection: sqlite3.Connection, chain: dict[str, Any]) -> dict[str, Any]:
+    """Return everything known of a chain, ready for JSON; see :meth:`graphsynth.atlas.catalogue.Catalogue.entry`."""
+    number = chain["chain_id"]
+
+    def rows(select: str, value: Any = number) -> list[dict[str, Any]]:
+        return _rows(connection, select, value)
+
+    found: dict[str, Any] = {
+        name: value for name, value in chain.items() if name not in ("chain_id", "family_id", "contracted_id")
+    }
+    found |= {"planar": bool(chain["planar"]), "fractionated": bool(chain["fractionated"])}
+    shape = "SELECT vertices, edges FROM contracted WHERE contracted_id = ?"
+    found["contracted"] = rows(shape, chain["contracted_id"])[0]
+    parents = rows("SELECT parent_key AS key FROM dyads WHERE chain_id = ? ORDER BY parent_key")
+    children = rows(
+        "SELECT c.key FROM dyads d JOIN chains c USING (chain_id) WHERE d.parent_key = ? ORDER BY c.links, c.key",
+        chain["key"],
+    )
+    found["parents"], found["children"] = ([row["key"] for row in own] for own in (parents, children))
+    found["inversions"] = rows("SELECT frame, frame_joints, levels FROM inversions WHERE chain_id = ? ORDER BY frame")
+    evaluated: dict[tuple[int, int | str], dict[str, Any]] = {}
+    for row in rows(
+        "SELECT frame, driver, kind, status, value, unit, guarantee, data FROM evaluations WHERE chain_id = ?"
+    ):
+        place = row.pop("frame"), row.pop("driver")
+        row["data"] = None if row["data"] is None else data_of(row["data"])
+        evaluated.setdefault(place, {})[row.pop("kind")] = row
+    found["mechanisms"] = rows(
+        'SELECT frame, driver, class, "order", levels, groups FROM mechanisms WHERE chain_id = ? ORDER BY frame, driver'
+    )
+    group = 'SELECT key, links, "order", class FROM groups WHERE group_id = ?'
+    for row in found["mechanisms"]:
+        row["groups"] = [rows(group, int(own))[0] for own in row["groups"].split()]
+        row["evaluations"] = dict.fromkeys(KINDS, NOT_COMPUTED) | evaluated.get((row["frame"], row["driver"]), {})
+    return found
+
+
+def _rows(connection: sqlite3.Connection, select: str, value: Any) -> list[dict[str, Any]]:
+    """Rows with names."""
+    cursor = connection.execute(select, (value,))
+    names = [column[0] for column in cursor.description]
+    return [dict(zip(names, row)) for row in cursor]

@@ -33,24 +33,13 @@ _labelled_without_kernel = 0
 
 @dataclass(frozen=True, slots=True)
 class Labelling:
-    """Result of one canonical labelling (exact).
+    """Result of one canonical labelling (exact)."""
 
-    Parameters
-    ----------
-    permutation : tuple of int
-        Canonical position of each link.
-    generators : tuple of tuple of int
-        Automorphisms, link to link, that generate the whole automorphism group; fewer than N.
-    order : int
-        Order of the automorphism group.
-    orbits : tuple of int
-        Smallest link in the orbit of each link.
-    """
-
-    permutation: tuple[int, ...]
+    permutation: tuple[int, ...]  # canonical position of each link
+    #: automorphisms, link to link, that generate the whole automorphism group; fewer than N
     generators: tuple[tuple[int, ...], ...]
-    order: int
-    orbits: tuple[int, ...]
+    order: int  # order of the automorphism group
+    orbits: tuple[int, ...]  # smallest link in the orbit of each link
 
 
 def link_colours(graph: MechanismGraph) -> list[int]:

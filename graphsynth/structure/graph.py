@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from graphsynth.core.errors import FormatError, GraphError
 from graphsynth.core.shown import work
-from graphsynth.structure.checks import integer, packed_joints
 from graphsynth.structure.connectivity import bits, breadth_first, component_of, components_of
+from graphsynth.structure.exchange import integer, packed_joints
 from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, encode_graph6, encode_text
 
 if TYPE_CHECKING:
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from graphsynth.drawing.methods import Drawing
     from graphsynth.structure.canonical import Labelling
-    from graphsynth.structure.loop_rank import GenericMobility
-    from graphsynth.structure.rigidity import RigidSubchain
+    from graphsynth.structure.rigidity import GenericMobility, RigidSubchain
 
 _T = TypeVar("_T")
 
@@ -360,9 +359,9 @@ class MechanismGraph:
     def generic_mobility(self, seed: int = 0) -> GenericMobility:
         """Return the mobility at random geometry, W = G - rank of the loop matrix.
 
-        See :func:`graphsynth.structure.loop_rank.generic_mobility`.
+        See :func:`graphsynth.structure.rigidity.generic_mobility`.
         """
-        from graphsynth.structure.loop_rank import generic_mobility
+        from graphsynth.structure.rigidity import generic_mobility
 
         return generic_mobility(self, seed)
 

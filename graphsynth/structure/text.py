@@ -13,7 +13,6 @@ Source of graph6: B. D. McKay, *Description of graph6, sparse6 and digraph6 enco
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from math import isqrt
 
 from graphsynth.core.errors import FormatError
@@ -210,8 +209,3 @@ def _colour(mobility: dict[tuple[int, int], int], value: int, rest: str, place: 
 def _shown(text: str) -> str:
     """Return a short quotation fit for a message."""
     return repr(text if len(text) <= 24 else text[:21] + "...")
-
-
-def pack(joints: Iterable[tuple[int, int, int]]) -> bytes:
-    """Return joints ``(a, b, mobility)`` as bytes, sorted by ``(a, b)``; no checks."""
-    return b"".join(bytes(joint) for joint in sorted(joints))

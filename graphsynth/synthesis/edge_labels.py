@@ -9,7 +9,7 @@ lower vertex to the higher one.  In a mechanism whose frame is a binary link, on
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
@@ -52,29 +52,14 @@ class EdgeLabel:
 
 @dataclass(frozen=True)
 class EdgeLabels:
-    """All labels that can occur in chains of one kind.
+    """All labels that can occur in chains of one kind."""
 
-    Parameters
-    ----------
-    space : int
-        Mobility Pi of the space, 2..6.
-    mobility : int
-        W of the chain; 0 stands for Baranov trusses, where every path has d >= 1.
-    binary_links : int
-        Number of binary links to place on the paths.
-    higher : tuple of (int, int)
-        ``(i, p_i)`` for every joint mobility i >= 2 with p_i > 0.
-    multiplicities : tuple of int
-        Numbers of parallel paths that occur.
-    whole : bool
-        The two end vertices are the whole contracted graph (only then may a Baranov truss have weight Pi there).
-    """
-
-    space: int
-    mobility: int
-    binary_links: int
-    higher: tuple[tuple[int, int], ...]
-    multiplicities: tuple[int, ...]
+    space: int  # mobility Pi of the space, 2..6
+    mobility: int  # W of the chain; 0 stands for Baranov trusses, where every path has d >= 1
+    binary_links: int  # number of binary links to place on the paths
+    higher: tuple[tuple[int, int], ...]  # ``(i, p_i)`` for every joint mobility i >= 2 with p_i > 0
+    multiplicities: tuple[int, ...]  # numbers of parallel paths that occur
+    #: the two end vertices are the whole contracted graph (only then may a Baranov truss have weight Pi there)
     whole: bool
 
     @property
@@ -271,7 +256,7 @@ class EdgeLabels:
         return packed_of, final
 
 
-def _columns(rows: list[tuple[int, ...]], width: int) -> NDArray[np.int64]:
+def _columns(rows: Sequence[tuple[int, ...]], width: int) -> NDArray[np.int64]:
     """Rows of numbers as an array of their columns."""
     return np.ascontiguousarray(np.array(rows, np.int64).reshape(-1, width).T)
 

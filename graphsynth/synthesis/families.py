@@ -31,42 +31,18 @@ Levels = tuple[tuple[int, int, int], ...]
 
 @dataclass(frozen=True)
 class Family:
-    """All chains (or mechanisms) with given numbers of loops, of links with three or more joints, and of joints.
+    """All chains (or mechanisms) with given numbers of loops, of links with three or more joints, and of joints."""
 
-    Parameters
-    ----------
-    space : int
-        Mobility Pi of the space.
-    mobility : int
-        W; 0 for Baranov trusses.
-    loops : int
-        Independent loops, at least 2.
-    vertices : int
-        Vertices of the contracted graph.
-    binary_links : int
-        Binary links on its edges (a binary frame included).
-    higher : tuple of (int, int)
-        ``(i, p_i)`` for mobilities i >= 2 that occur.
-    frames : int
-        Sum of FRAME_NONE (chains), FRAME_VERTEX, FRAME_PATH (binary frame).
-    frame_degree : int
-        Joints of a frame that is a vertex of the contracted graph; 0: any.
-    degrees : tuple of int, optional
-        The sorted degrees the contracted graph must have.
-    levels : tuple, optional
-        Wanted sizes of adjacency levels.
-    """
-
-    space: int
-    mobility: int
-    loops: int
-    vertices: int
-    binary_links: int
-    higher: tuple[tuple[int, int], ...]
-    frames: int = FRAME_NONE
-    frame_degree: int = 0
-    degrees: tuple[int, ...] | None = None
-    levels: Levels = ()
+    space: int  # mobility Pi of the space
+    mobility: int  # W; 0 for Baranov trusses
+    loops: int  # independent loops, at least 2
+    vertices: int  # vertices of the contracted graph
+    binary_links: int  # binary links on its edges (a binary frame included)
+    higher: tuple[tuple[int, int], ...]  # ``(i, p_i)`` for mobilities i >= 2 that occur
+    frames: int = FRAME_NONE  # sum of FRAME_NONE (chains), FRAME_VERTEX, FRAME_PATH (binary frame)
+    frame_degree: int = 0  # joints of a frame that is a vertex of the contracted graph; 0: any
+    degrees: tuple[int, ...] | None = None  # the sorted degrees the contracted graph must have
+    levels: Levels = ()  # wanted sizes of adjacency levels
 
     @property
     def links(self) -> int:

@@ -46,26 +46,13 @@ WorkItem = Chunk | OneByOne
 
 @dataclass(frozen=True)
 class Problem:
-    """What to enumerate or to count.
+    """What to enumerate or to count."""
 
-    Parameters
-    ----------
-    title : str
-        One line for people; also identifies the problem when interrupted work is resumed.
-    families : tuple of Family
-        What the search kernels generate.
-    one_by_one : tuple of OneByOne
-        What is made one by one; listed first.
-    symmetry : int
-        0, or the prime order of a required automorphism.
-    reason : str
-        Why there is nothing, where the structural formula says so already.
-    """
-
-    title: str
-    families: tuple[Family, ...]
-    one_by_one: tuple[OneByOne, ...] = ()
-    symmetry: int = 0
+    title: str  # one line for people; also identifies the problem when interrupted work is resumed
+    families: tuple[Family, ...]  # what the search kernels generate
+    one_by_one: tuple[OneByOne, ...] = ()  # what is made one by one; listed first
+    symmetry: int = 0  # 0, or the prime order of a required automorphism
+    #: why there is nothing, where the structural formula says so already
     reason: str = field(default="", repr=False, compare=False)
 
     @property

@@ -29,18 +29,10 @@ _SAMPLED = 16  # items made to estimate the size of a listing
 
 @dataclass(frozen=True)
 class Step:
-    """How far the work is.
+    """How far the work is."""
 
-    Attributes
-    ----------
-    graphs : int
-        Graphs counted or written so far.
-    done : float
-        Share of the work done, 0..1, by the bounds on the items.
-    """
-
-    graphs: int
-    done: float
+    graphs: int  # graphs counted or written so far
+    done: float  # share of the work done, 0..1, by the bounds on the items
 
 
 def _work(problem: Problem, items: Sequence[WorkItem], form: str, remedy: str, again: str = "the same command") -> Work:

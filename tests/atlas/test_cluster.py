@@ -10,7 +10,7 @@ import socket
 import distributed
 import pytest
 
-from graphsynth.atlas import pieces
+from graphsynth.atlas import making
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.cluster import dask_executor
 from graphsynth.cli import main
@@ -23,14 +23,14 @@ FINE = 10.0
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pieces, "PIECE", FINE)
+        patch.setattr(making, "PIECE", FINE)
         with Catalogue.build(tmp_path_factory.mktemp("alone") / "x.sqlite", range(4, 11)) as catalogue:
             yield catalogue
 
 
 @pytest.fixture
 def fine(monkeypatch):
-    monkeypatch.setattr(pieces, "PIECE", FINE)
+    monkeypatch.setattr(making, "PIECE", FINE)
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,9 @@ import pytest
 
 from graphsynth.atlas import evaluating
 from graphsynth.atlas.catalogue import Catalogue
+from graphsynth.atlas.rechecking import Turning
 from graphsynth.atlas.references import Reference
 from graphsynth.atlas.sealing import seal
-from graphsynth.atlas.turning import Turning
 from graphsynth.cli import main
 from graphsynth.core.errors import SpecError
 from graphsynth.kinematics.simulation import simulate

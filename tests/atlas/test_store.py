@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from graphsynth.atlas import building, pieces
+from graphsynth.atlas import building, making
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.schema import connect
@@ -55,14 +55,14 @@ FINE = 10.0
 
 @pytest.fixture
 def fine(monkeypatch):
-    monkeypatch.setattr(pieces, "PIECE", FINE)
+    monkeypatch.setattr(making, "PIECE", FINE)
 
 
 @pytest.fixture(scope="module")
 def many(tmp_path_factory):
     """Four to ten links in many pieces."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pieces, "PIECE", FINE)
+        patch.setattr(making, "PIECE", FINE)
         with Catalogue.build(tmp_path_factory.mktemp("many") / "x.sqlite", range(4, 11)) as catalogue:
             assert catalogue.sql("SELECT SUM(pieces) AS n FROM families")["n"][0] > 20
             yield catalogue
@@ -214,11 +214,11 @@ def test_the_parquet_export_holds_what_the_catalogue_holds(small, tmp_path):
 @pytest.mark.parametrize(("piece", "most"), [(3.0, 100_000), (0.5, 100_000), (3.0, 10)])
 def test_however_small_the_pieces_each_chain_comes_once(piece, most, monkeypatch):
     """Also when single contracted graphs are cut by their search prefixes."""
-    monkeypatch.setattr(pieces, "PIECE", piece)
-    monkeypatch.setattr(pieces, "MOST_PIECES", most)
-    tasks = pieces.tasks_of(10, 1, False)
+    monkeypatch.setattr(making, "PIECE", piece)
+    monkeypatch.setattr(making, "MOST_PIECES", most)
+    tasks = making.tasks_of(10, 1, False)
     assert most == 10 or max(getattr(task.piece, "parts", 1) for task in tasks) > 10
-    keys = [chain[0] for task in tasks for chain in pieces.rows_of_task(task).chains]
+    keys = [chain[0] for task in tasks for chain in making.rows_of_task(task).chains]
     assert len(keys) == len(set(keys)) == 230
 
 
@@ -248,11 +248,11 @@ def test_an_interrupted_build_goes_on(many, tmp_path, fine, stop):
 # One process imports everything and waits; each build is a child that it forks.
 SCRIPT = """
 import os, sys
-from graphsynth.atlas import pieces
+from graphsynth.atlas import making
 from graphsynth.atlas.catalogue import Catalogue
-for task in pieces.tasks_of(6, 1, False):
-    pieces.rows_of_task(task)
-pieces.PIECE = {fine}
+for task in making.tasks_of(6, 1, False):
+    making.rows_of_task(task)
+making.PIECE = {fine}
 for path in sys.stdin:
     child = os.fork()
     if child == 0:
@@ -335,9 +335,9 @@ def test_a_full_disk_is_one_sentence_and_the_build_goes_on(many, tmp_path, fine,
 
 LIMITED = """
 import resource, signal, sys
-from graphsynth.atlas import pieces
+from graphsynth.atlas import making
 from graphsynth.cli import main
-pieces.PIECE = {fine}
+making.PIECE = {fine}
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
 sys.exit(main(["catalog", "build", "--links", "4..10", "--workers", "1", "-o", sys.argv[1]]))

@@ -7,7 +7,7 @@ import networkx as nx
 import pytest
 
 from graphsynth.core.errors import FormatError, GraphError
-from graphsynth.structure.checks import integer
+from graphsynth.structure.exchange import integer
 from graphsynth.structure.graph import Joint, MechanismGraph
 
 FOUR_BAR = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (3, 0)], frame=0)

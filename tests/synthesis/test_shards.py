@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from graphsynth import StructuralSpec
-from graphsynth.atlas.pieces import share_of, tasks_of
+from graphsynth.atlas.making import share_of, tasks_of
 from graphsynth.core.errors import SpecError
 from graphsynth.synthesis.chunks import Chunk, count_each, estimates
 from graphsynth.synthesis.kernels.counting import LISTING

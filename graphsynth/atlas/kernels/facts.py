@@ -34,7 +34,7 @@ class Block(NamedTuple):
     girth: NDArray[np.uint8]  # (chains,)
     cuts: NDArray[np.uint64]  # (chains,) mask of the cut links
     levels: NDArray[np.uint8]  # (chains, n, n) links on each level from each frame
-    count: NDArray[np.int64]  # (chains,) mechanisms
+    mechanisms: NDArray[np.int64]  # (chains,) how many
     frames: NDArray[np.uint8]  # (chains, K)
     drives: NDArray[np.uint64]  # (chains, K) masks of the driven links
     sizes: NDArray[np.uint8]  # (chains, K, n // 2) links of each group
@@ -445,7 +445,7 @@ def mechanism_facts(n, c, rows, found, drives, scratch, local, small, colours, s
         else:
             own = sizes[at], outers[at], forms[at]
             at += grouped(n, block.joints[c], rows, placed, scratch, local, small, colours, space, own)
-    block.count[c] = at
+    block.mechanisms[c] = at
 
 
 @kernel

@@ -2,36 +2,37 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from graphsynth.atlas.site.families import Family, contents, families, family_script, groups_script, relatives_script
+from graphsynth.atlas.site.families import (
+    PER_FILE,
+    Family,
+    contents,
+    families,
+    family_script,
+    groups_script,
+    relatives_script,
+    sketch_scripts,
+)
 from graphsynth.atlas.site.motions import MotionTask, motion_of
-from graphsynth.atlas.site.place import MARK, replaced, unwritten
-from graphsynth.atlas.site.sketches import PER_FILE, sketch_scripts
 from graphsynth.atlas.stored import stored_mechanisms
 from graphsynth.core.errors import GraphsynthError, SpecError
 
 if TYPE_CHECKING:
     from graphsynth.atlas.catalogue import Catalogue
 
-#: Scripts of the page, in the order in which they are loaded.
-SCRIPTS = (
-    "graph", "markup", "canonical", "groups", "reading", "drawing", "store", "glossary", "writing", "browse", "entry",
-    "editor", "find", "about", "main",
-)  # fmt: skip
-#: What the page may do, whatever its data hold: its own scripts run, and none else.  Opened from a disk it has no
-#: origin in some browsers: then its files are those of "file:".
-_POLICY = (
-    "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'self' file: 'unsafe-inline'; "
-    "script-src 'self' file:; frame-src 'self' file:; img-src 'self' file: data:"
-)
+
 #: Data of the first load in bytes; families beyond it are loaded when they are asked for.
 _FIRST_LOAD = 450_000
+
 #: Told ``(what is done now, steps done, steps in all)``.
 Watch = Callable[[str, int, int], None]
 
@@ -159,10 +160,8 @@ def _write(
     _put(folder / MARK, "This folder is written by 'graphsynth catalog site' and replaced by it.\n")
     everything = [path for path in folder.rglob("*") if path.is_file()]
     shown = sum("frame" in facts for facts in motions.values())
-    return (
-        chains, shown, len(everything), sum(path.stat().st_size for path in everything),
-        sum(path.stat().st_size for path in loaded),
-    )  # fmt: skip
+    size, first_load = (sum(path.stat().st_size for path in paths) for paths in (everything, loaded))
+    return chains, shown, len(everything), size, first_load
 
 
 def _best_stored(catalogue: Catalogue) -> dict[int, str]:
@@ -206,17 +205,21 @@ def _write_families(
 
 def _write_pages(folder: Path, first: list[str]) -> list[Path]:
     """Write the page itself; return the files that it loads at once."""
+    from jinja2 import Environment, StrictUndefined
+
     source = files("graphsynth.atlas.site").joinpath("pages")
-    style = source.joinpath("style.css").read_text("utf-8")
-    _put(folder / "style.css", style)
-    _put(folder / "atlas.js", "".join(source.joinpath(f"{name}.js").read_text("utf-8") for name in SCRIPTS))
-    data = "".join(
-        f'<script src="data/{name}.js"></script>\n' for name in ("contents", *(f"family-{n}" for n in first))
-    )
-    _put(folder / "theme.js", source.joinpath("theme.js").read_text("utf-8"))
-    page = source.joinpath("index.html").read_text("utf-8").replace("@POLICY@", _POLICY).replace("@DATA@", data)
-    _put(folder / "index.html", page)
-    return [folder / name for name in ("index.html", "style.css", "theme.js", "atlas.js")]
+    texts = {path.name: path.read_text("utf-8") for path in source.iterdir() if path.is_file()}
+    data = ["contents", *(f"family-{name}" for name in first)]
+    page = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, keep_trailing_newline=True)
+    loaded = {
+        "style.css": texts["style.css"],
+        "theme.js": texts["theme.js"],
+        "atlas.js": "".join(texts[f"{name}.js"] for name in texts["order.txt"].split()),
+        "index.html": page.from_string(texts["index.html"]).render(data=data),
+    }
+    for name, text in loaded.items():
+        _put(folder / name, text)
+    return [folder / name for name in loaded]
 
 
 def _put(path: Path, text: str) -> None:
@@ -224,3 +227,84 @@ def _put(path: Path, text: str) -> None:
         path.write_text(text, "utf-8", newline="\n")
     except OSError as error:
         raise unwritten(error, path) from None
+
+
+#: In every folder that was written as a page.
+MARK = "atlas-page.txt"
+
+#: What pages consist of; a folder with anything else is somebody's.
+_OWN = {".": (".html", ".css", ".js"), "data": (".js",), "motions": (".html", ".toml")}
+
+
+@contextmanager
+def replaced(folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Give (the folder, an empty one beside it); when the block ends well, the second takes the place of the first.
+
+    Whatever happens, the older page stays until the new one is whole, and no other file is touched.
+
+    Raises `GraphsynthError` at once, if the folder cannot be made or replaced, or holds other files; later, if the
+    disk is full.
+    """
+    target = folder.resolve()
+    _check(folder, target)
+    try:
+        # a name that nobody has, beside the folder: moving it is then one step
+        beside = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    except OSError as error:
+        raise unwritten(error, target.parent) from None
+    try:
+        new = beside / "new"
+        new.mkdir()
+        yield target, new
+        _check(folder, target)  # it may have changed meanwhile
+        _exchange(target, new, beside / "old")
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def _exchange(target: Path, new: Path, old: Path) -> None:
+    try:
+        if target.exists():
+            target.rename(old)
+        new.rename(target)
+    except OSError as error:
+        if old.exists() and not target.exists():
+            old.rename(target)
+        raise unwritten(error, target) from None
+
+
+def unwritten(error: OSError, place: Path) -> GraphsynthError:
+    """Return the error of a file that cannot be written: its name and the remedy."""
+    return GraphsynthError(
+        f"{error.filename or place} cannot be written ({error.strerror or error}): make room or name another folder; "
+        "an older page stays as it was"
+    )
+
+
+def _check(folder: Path, target: Path) -> None:
+    """Refuse before anything is computed what could not be replaced at the end."""
+    parent = target.parent
+    if not parent.is_dir():
+        raise GraphsynthError(f"{folder}: the folder {parent} does not exist; make it first")
+    if target.exists() and not target.is_dir():
+        raise GraphsynthError(f"{folder} is a file; name a folder")
+    if target.is_mount() or target == parent:
+        raise GraphsynthError(f"{folder} is the root of a file system, which cannot be replaced; name a folder in it")
+    if target.is_dir() and any(target.iterdir()):
+        other = _other(target)
+        if other:
+            raise GraphsynthError(f"{folder} holds other files ({other}); name an empty or a new folder")
+
+
+def _other(target: Path) -> str:
+    """First thing in a folder that is not of a page; empty if there is none."""
+    if not (target / MARK).is_file():
+        return min(own.name for own in target.iterdir())
+    for own in sorted(target.rglob("*")):
+        inside = own.relative_to(target)
+        plain = not own.is_symlink()
+        if own.is_dir() and plain and str(inside) in _OWN:
+            continue
+        if not (own.is_file() and plain and (str(inside) == MARK or own.suffix in _OWN.get(str(inside.parent), ()))):
+            return str(inside)
+    return ""

@@ -17,42 +17,23 @@ _SAMPLES = 721
 
 @dataclass(frozen=True, slots=True)
 class MotionTask:
-    """A chain to be shown in motion.
-
-    Parameters
-    ----------
-    label, key : str
-    stored : str, optional
-        A mechanism of the chain with dimensions, as JSON, from the evaluations of the catalogue.
-    search : bool
-        Look for dimensions where none are stored, or where those stored do not turn.
-    """
+    """A chain to be shown in motion."""
 
     label: str
     key: str
+    #: a mechanism of the chain with dimensions, as JSON, from the evaluations of the catalogue
     stored: str | None = None
-    search: bool = True
+    search: bool = True  # look for dimensions where none are stored, or where those stored do not turn
 
 
 @dataclass(frozen=True, slots=True)
 class ShownMotion:
-    """A chain in motion.
-
-    Parameters
-    ----------
-    label : str
-    page : str
-        HTML; empty where no dimensions were accepted.
-    mechanism : str
-        The mechanism as TOML.
-    facts : dict
-        Frame, drivers, statement and figures for the page.
-    """
+    """A chain in motion."""
 
     label: str
-    page: str
-    mechanism: str
-    facts: dict[str, Any]
+    page: str  # HTML; empty where no dimensions were accepted
+    mechanism: str  # the mechanism as TOML
+    facts: dict[str, Any]  # frame, drivers, statement and figures for the page
 
 
 def choice_of(chain: MechanismGraph, most: int) -> list[tuple[int, list[int]]]:

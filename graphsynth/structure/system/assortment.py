@@ -9,9 +9,13 @@ from typing import Any
 
 from graphsynth.core.errors import SpecError
 from graphsynth.core.wording import shown, whole
-from graphsynth.structure.system.variables import LARGEST, Counts
+from graphsynth.structure.system.variables import ALIASES, LARGEST, Counts
 
 _KIND = re.compile(r"([np])([1-9][0-9]{0,3})")
+#: Symbol -> field.
+_NAMES = {
+    symbol: name for name, symbol in ALIASES.items() if name not in ("links", "joints_by_mobility", "links_by_joints")
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,61 +77,6 @@ class LinkAssortment:
     frame_parts: int = 1
 
     @property
-    def W(self) -> int:
-        """Mobility."""
-        return self.mobility
-
-    @property
-    def Pi(self) -> int:
-        """Mobility of the space."""
-        return self.space
-
-    @property
-    def n(self) -> int:
-        """Moving links."""
-        return self.moving_links
-
-    @property
-    def N(self) -> int:
-        """Links, with the frame."""
-        return self.moving_links + 1
-
-    @property
-    def links(self) -> int:
-        """Links, with the frame (N)."""
-        return self.moving_links + 1
-
-    @property
-    def p(self) -> int:
-        """Joints."""
-        return self.joints
-
-    @property
-    def v(self) -> int:
-        """Independent loops."""
-        return self.loops
-
-    @property
-    def v_ct(self) -> int:
-        """Loops through the frame."""
-        return self.frame_loops
-
-    @property
-    def v_P(self) -> int:
-        """Loops among moving links."""
-        return self.moving_loops
-
-    @property
-    def t0(self) -> int:
-        """Joints on the frame."""
-        return self.frame_joints
-
-    @property
-    def G(self) -> int:
-        """Sub-edges: a joint of mobility i counts i."""
-        return self.sub_edges
-
-    @property
     def joints_by_mobility(self) -> Counts:
         """Joints of each mobility, a mapping ``{i: p_i}``."""
         return Counts(enumerate(self.p_i, start=1))
@@ -143,6 +92,11 @@ class LinkAssortment:
         return max(self.n_a)
 
     def __getattr__(self, name: str) -> int:
+        if name in ("N", "links"):
+            return self.moving_links + 1
+        if name in _NAMES:
+            value: int = getattr(self, _NAMES[name])
+            return value
         kind = _KIND.fullmatch(name)
         if kind is None:
             raise AttributeError(f"'LinkAssortment' object has no attribute {name!r}")
@@ -150,6 +104,9 @@ class LinkAssortment:
         if kind[1] == "n":
             return self.n_a[number]
         return self.p_i[number - 1] if number <= len(self.p_i) else 0
+
+    def __dir__(self) -> list[str]:
+        return [*object.__dir__(self), "N", "links", *_NAMES]
 
     def check(self) -> None:
         """Verify all eight equations and the natural bounds again.

@@ -40,24 +40,13 @@ _HUGE = 10**9  # a vertex of the system has far smaller coordinates: a lower bou
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A structural question with every rule of reading it made explicit.
+    """A structural question with every rule of reading it made explicit."""
 
-    Attributes
-    ----------
-    ranges : tuple of (symbol, range)
-        What the question fixes or bounds; ``n`` instead of ``N``, ``Pi`` always present.
-    mobilities : tuple of int
-        Joint mobilities i whose p_i may be positive.
-    link_limit : int or None
-        Most joints on a moving link; None for the natural bound alone.
-    fractionated : bool
-        Whether the mechanism may fall apart (c >= 1 parts) without its frame.
-    """
-
+    #: tuple of (symbol, range): What the question fixes or bounds; ``n`` instead of ``N``, ``Pi`` always present
     ranges: tuple[tuple[str, Range], ...]
-    mobilities: tuple[int, ...] = (1,)
-    link_limit: int | None = None
-    fractionated: bool = False
+    mobilities: tuple[int, ...] = (1,)  # joint mobilities i whose p_i may be positive
+    link_limit: int | None = None  # most joints on a moving link; None for the natural bound alone
+    fractionated: bool = False  # Whether the mechanism may fall apart (c >= 1 parts) without its frame
 
     def range(self, symbol: str) -> Range:
         """Return what the question says about ``symbol``."""

@@ -12,8 +12,8 @@ from graphsynth import MechanismGraph
 from graphsynth.atlas.catalogue import Catalogue
 from graphsynth.atlas.evaluations import Evaluation
 from graphsynth.atlas.site import build_site
+from graphsynth.atlas.site.families import places_of
 from graphsynth.atlas.site.motions import choice_of
-from graphsynth.atlas.site.sketches import places_of
 from graphsynth.cli import main
 from graphsynth.core.errors import GraphsynthError, SpecError
 from graphsynth.kinematics.dimensional.sketch import layout
