@@ -27,8 +27,8 @@ _MOST_COLUMNS = 100
 _ALLOWED = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_FUNCTION, sqlite3.SQLITE_RECURSIVE}
 _PRAGMAS = re.compile(r"table_x?info|(table|index)_list|index_info|(integrity|quick|foreign_key)_check|data_version")
 #: Tables and views that a user may ask for.
-TABLES = ("chains", "inversions", "mechanisms", "groups", "structures", "contracted", "dyads", "relatives")
-TABLES += ("evaluations", "families")
+_STRUCTURE = ("chains", "inversions", "mechanisms", "groups", "structures", "contracted", "dyads", "relatives")
+TABLES = (*_STRUCTURE, "evaluations", "families")
 #: Errors that are of the file, though SQLite calls them errors of the question.
 _OF_THE_FILE = ("disk I/O", "malformed", "decode to UTF-8", "not a database", "locked")
 
@@ -168,16 +168,6 @@ class OpenCatalogue:
     """What an open file answers whatever its tables mean; base of :class:`graphsynth.Catalogue`.
 
     One may be used from several threads: they take turns.
-
-    Parameters
-    ----------
-    path : str or Path
-        A file made by :meth:`graphsynth.Catalogue.build`; opened read-only.
-
-    Raises
-    ------
-    FormatError
-        If the file is missing or is no catalogue.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -210,15 +200,8 @@ class OpenCatalogue:
     def reading(self, *, screened: bool = False) -> Iterator[None]:
         """Tell of what a damaged file holds, whatever that is, in one sentence; other threads wait.
 
-        Parameters
-        ----------
-        screened : bool
-            Hold every value of the file against what its column may hold, before anything is done with them.
-
-        Yields
-        ------
-        None
-            Errors of SQLite, and those that values cause which nobody wrote, leave the block as `FormatError`.
+        With ``screened``, every value of the file is first held against what its column may hold.  Errors of SQLite,
+        and those that values cause which nobody wrote, leave the block as `FormatError`.
         """
         with self._turn, readable(self.path, *GARBAGE):
             if screened:

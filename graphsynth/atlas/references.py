@@ -30,10 +30,10 @@ def search_key(links: int, pairs: list[tuple[int, int]], frame: int | None = Non
     """Canonical key by the search in plain Python, whatever the number of graphs labelled before."""
     from graphsynth.structure.canonical import link_colours
     from graphsynth.structure.graph import MechanismGraph
-    from graphsynth.structure.search import Search
+    from graphsynth.structure.search import CanonicalSearch
 
     graph = MechanismGraph(links, pairs, frame=frame)
-    found = Search(links, [list(graph.neighbours)], link_colours(graph)).run()
+    found = CanonicalSearch(links, [list(graph.neighbours)], link_colours(graph)).run()
     place = {link: position for position, link in enumerate(found.order_of_vertices)}
     moved = graph.relabelled([place[link] for link in range(links)])
     return _encoded(links, [(joint.a, joint.b) for joint in moved.joints], frame is not None)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from graphsynth.core.errors import FormatError
 from graphsynth.structure.connectivity import bits, breadth_first
-from graphsynth.structure.search import Search
+from graphsynth.structure.search import CanonicalSearch
 from graphsynth.structure.text import LINKS_MAX
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _label_python(graph: MechanismGraph, colours: list[int]) -> Labelling:
     for a, b, mobility in graph.joints:
         layers[mobility - 1][a] |= 1 << b
         layers[mobility - 1][b] |= 1 << a
-    found = Search(graph.links, layers, colours, twins=graph.links > _KERNEL_LINKS_MAX).run()
+    found = CanonicalSearch(graph.links, layers, colours, twins=graph.links > _KERNEL_LINKS_MAX).run()
     return _labelling(found.order_of_vertices, found.generators, found.index, found.orbits)
 
 

@@ -16,7 +16,7 @@ from graphsynth.structure.text import LINKS_MAX, decode_graph6, decode_text, enc
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from graphsynth.drawing.methods import Drawing
+    import graphsynth as gs
     from graphsynth.structure.canonical import Labelling
     from graphsynth.structure.rigidity import GenericMobility, RigidSubchain
 
@@ -398,13 +398,13 @@ class MechanismGraph:
         links, joints, frame, space = decode_text(text)
         return cls(links, joints, frame=frame, space=space)
 
-    def draw(self, path: str | Path | None = None, **options: Any) -> Drawing:
+    def draw(self, path: str | Path | None = None, **options: Any) -> gs.Drawing:
         """Draw its kinematic diagram, and write it to a file (.svg, .png, .pdf, .tikz, .dxf) if a path is given.
 
         ``driver``, ``width``, ``height``, ``numbers`` and ``title`` are those of
         :func:`graphsynth.drawing.graphs.graph_sketch`.
         """
-        found: Drawing = work("draw graph")(self, path, **options)
+        found: gs.Drawing = work("draw graph")(self, path, **options)
         return found
 
     def _repr_svg_(self) -> str:

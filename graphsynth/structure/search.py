@@ -69,7 +69,7 @@ def _merge(parent: list[int], permutation: Sequence[int]) -> bool:
     return joined
 
 
-class Search:
+class CanonicalSearch:
     """One canonical labelling; make it, call :meth:`run`, read the results.
 
     Parameters
@@ -129,7 +129,7 @@ class Search:
         self.form: list[list[int]] = []
         self.order_of_vertices: list[int] = []
 
-    def run(self) -> Search:
+    def run(self) -> CanonicalSearch:
         """Search the whole tree and return self.
 
         Raises `TooLargeError` after ``WORK_MAX`` looks.

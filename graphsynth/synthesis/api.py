@@ -271,10 +271,8 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
     ----------
     links : int
         Number of moving links.
-    space : int, optional
-        Mobility of the space; 3 is the plane.
-    executor : concurrent.futures.Executor, optional
-        Where pieces of the work are computed; here by default.  The result does not depend on it.
+    space, executor
+        As for `enumerate_chains`.
 
     Returns
     -------
@@ -282,10 +280,8 @@ def enumerate_assur_groups(links: int, *, space: int = 3, executor: Executor | N
 
     Raises
     ------
-    SpecError
-        For a value out of its bounds.
-    TooLargeError
-        For more loops than the shipped contracted graphs have (8), at once.
+    SpecError, TooLargeError
+        As for `enumerate_chains`.
 
     Examples
     --------
@@ -300,12 +296,8 @@ def count_assur_groups(links: int, *, space: int = 3, executor: Executor | None 
 
     Parameters
     ----------
-    links : int
-        Number of moving links.
-    space : int, optional
-        Mobility of the space; 3 is the plane.
-    executor : concurrent.futures.Executor, optional
-        Where pieces of the work are computed; here by default.  The result does not depend on it.
+    links, space, executor
+        As for `enumerate_assur_groups`.
 
     Returns
     -------
@@ -331,10 +323,8 @@ def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor 
     ----------
     links : int
         Number of links.
-    space : int, optional
-        Mobility of the space; 3 is the plane.
-    executor : concurrent.futures.Executor, optional
-        Where pieces of the work are computed; here by default.  The result does not depend on it.
+    space, executor
+        As for `enumerate_chains`.
 
     Returns
     -------
@@ -342,10 +332,8 @@ def enumerate_baranov_trusses(links: int, *, space: int = 3, executor: Executor 
 
     Raises
     ------
-    SpecError
-        For a value out of its bounds.
-    TooLargeError
-        For more loops than the shipped contracted graphs have (8), at once.
+    SpecError, TooLargeError
+        As for `enumerate_chains`.
 
     Examples
     --------
@@ -360,12 +348,8 @@ def count_baranov_trusses(links: int, *, space: int = 3, executor: Executor | No
 
     Parameters
     ----------
-    links : int
-        Number of links.
-    space : int, optional
-        Mobility of the space; 3 is the plane.
-    executor : concurrent.futures.Executor, optional
-        Where pieces of the work are computed; here by default.  The result does not depend on it.
+    links, space, executor
+        As for `enumerate_baranov_trusses`.
 
     Returns
     -------

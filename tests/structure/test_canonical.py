@@ -13,13 +13,13 @@ import pytest
 from graphsynth.core.errors import FormatError
 from graphsynth.structure import canonical, kernels
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.search import Search
+from graphsynth.structure.search import CanonicalSearch
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "canonical_keys.tsv"
 
 
 def compiled(n, layers, colours):
-    """Run the kernel on the arguments of Search; return the same results as Search."""
+    """Run the kernel on the arguments of CanonicalSearch; return the same results as CanonicalSearch."""
     workspace = kernels.canon_workspace(n, len(layers))
     count = kernels.canon(
         n, len(layers), np.array(layers, dtype=np.uint64), np.array(colours, dtype=np.int64), *workspace
@@ -121,7 +121,7 @@ def test_symmetric_graphs(name):
     lab, form, generators, found, orbits = compiled(n, layers, [0] * n)
     assert found == order
     shuffled = random.Random(1).sample(range(n), n)
-    other = Search(n, layers_of(nx.relabel_nodes(graph, dict(enumerate(shuffled)))), [0] * n).run()
+    other = CanonicalSearch(n, layers_of(nx.relabel_nodes(graph, dict(enumerate(shuffled)))), [0] * n).run()
     assert other.form == form
     assert prod(other.index) == order
     assert sorted(lab) == list(range(n))
@@ -150,7 +150,7 @@ def test_kernel_and_plain_search_are_the_same():
     for _ in range(600):
         graph, layers, colours = random_coloured(rng, 12, rng.randint(1, 12))
         n = len(graph)
-        plain = Search(n, layers, colours).run()
+        plain = CanonicalSearch(n, layers, colours).run()
         lab, form, generators, order, orbits = compiled(n, layers, colours)
         assert (lab, form, generators, order, orbits) == (
             plain.order_of_vertices,
@@ -178,7 +178,7 @@ def test_every_generator_joins_orbits(graph):
     """There are at most as many as vertices less orbits: an automorphism that joins nothing new is no generator."""
     for seed in range(6):
         own, n = relabelled(graph, seed), len(graph)
-        plain = Search(n, layers_of(own), [0] * n).run()
+        plain = CanonicalSearch(n, layers_of(own), [0] * n).run()
         for generators, orbits in ((plain.generators, plain.orbits), compiled(n, layers_of(own), [0] * n)[2::2]):
             joined = nx.Graph()
             joined.add_nodes_from(range(n))
@@ -192,7 +192,7 @@ def test_every_generator_joins_orbits(graph):
 @pytest.mark.parametrize("seed", range(4))
 def test_kernel_and_plain_search_on_larger_graphs(seed):
     graph = nx.random_regular_graph(3, 64, seed=seed) if seed % 2 else nx.gnp_random_graph(64, 0.1, seed=seed)
-    plain = Search(64, layers_of(graph), [0] * 64).run()
+    plain = CanonicalSearch(64, layers_of(graph), [0] * 64).run()
     assert compiled(64, layers_of(graph), [0] * 64)[:3] == (plain.order_of_vertices, plain.form, plain.generators)
 
 

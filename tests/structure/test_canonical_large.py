@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from graphsynth.core.errors import TooLargeError
 from graphsynth.structure import search
 from graphsynth.structure.graph import MechanismGraph
-from graphsynth.structure.search import Search
+from graphsynth.structure.search import CanonicalSearch
 
 
 @st.composite
@@ -44,8 +44,8 @@ def blown_up(draw: st.DrawFn) -> tuple[int, list[list[int]], list[int]]:
 @given(blown_up())
 def test_exchanging_twins_changes_nothing(case: tuple[int, list[list[int]], list[int]]) -> None:
     n, layers, colours = case
-    plain = Search(n, layers, colours).run()
-    quick = Search(n, layers, colours, twins=True).run()
+    plain = CanonicalSearch(n, layers, colours).run()
+    quick = CanonicalSearch(n, layers, colours, twins=True).run()
     assert quick.form == plain.form and quick.order_of_vertices == plain.order_of_vertices
     assert quick.orbits == plain.orbits and prod(quick.index) == prod(plain.index)
     for generator in quick.generators:  # automorphisms, of the colours too
