@@ -86,13 +86,13 @@ def _nothing():
 def test_the_platform_is_the_one_that_the_stage_moves():
     context = Context(load_scene("didenko"))
     found, table = platform._mechanism(context), context.scene.mechanism
-    assert found.crank == table.crank_mm and found.l1 == (table.arm_mm,) * 3
+    assert found.crank == table.crank and found.l1 == (table.arm,) * 3
     assert (found.gears.z1, found.gears.z2) == (table.pinion_teeth, table.wheel_teeth)
 
 
 def test_a_platform_that_cannot_be_assembled_is_a_reason():
     scene = load_scene("didenko")
-    apart = replace(scene, mechanism=replace(scene.mechanism, coupler_mm=1.0))
+    apart = replace(scene, mechanism=replace(scene.mechanism, coupler=1e-3))
     with pytest.raises(GeometryError):
         platform.turn(Context(apart), QUICK)
 

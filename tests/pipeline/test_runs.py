@@ -166,10 +166,10 @@ def test_didenko_turn_reproduces_the_published_poses(moved: Any) -> None:
     motion = moved.motion
     for angle, *pose, determinant in TURN:
         i = round(angle * 180)
-        assert np.allclose(motion.pose[i][:2], pose[:2], rtol=0, atol=2e-13)
+        assert np.allclose(1e3 * motion.pose[i][:2], pose[:2], rtol=0, atol=2e-13)  # published in mm
         assert abs(motion.pose[i][2] - pose[2]) < 1e-14
-        assert math.isclose(motion.determinant[i], determinant, rel_tol=1e-12)
-    assert np.allclose(motion.pose[-1], motion.pose[0], rtol=0, atol=1e-12)
+        assert math.isclose(1e12 * motion.determinant[i], determinant, rel_tol=1e-12)
+    assert np.allclose(motion.pose[-1], motion.pose[0], rtol=0, atol=1e-15)
 
 
 def test_didenko_joints_keep_their_distances(moved: Any) -> None:
@@ -181,7 +181,7 @@ def test_didenko_joints_keep_their_distances(moved: Any) -> None:
         (moved.O, moved.B, np.array([10.0, 5.0, 0.0])),
         (moved.F, np.roll(moved.F, 1, axis=1), 45 * math.sqrt(3)),
     ]:
-        assert np.allclose(np.abs(one - other), length, rtol=0, atol=1e-12)
+        assert np.allclose(1e3 * np.abs(one - other), length, rtol=0, atol=1e-12)
 
 
 def test_didenko_finds_figure_3_among_46_symmetric_mechanisms(didenko: Any) -> None:

@@ -102,17 +102,18 @@ class MotorDrivenPlatform:
         mass_centre: complex = 0.0,
         wheel_inertia: float = 0.0,
         pinion_inertia: float = 0.0,
-        efficiency: float = 1.0,
+        length: float = 1e-3,
     ) -> MotorDrivenPlatform:
-        """Real geometry in millimetres: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of gears.
+        """Real geometry: ``J_0 = N_g^2 (J_rotor + J_pinion) + 3 J_wheel``, ``N_g = z2/z1`` of the gears.
 
-        Inertia of the rockers or another unit of length: `platform_inertia`; friction and load: `dataclasses.replace`.
+        ``length`` is that of the machine's unit in metres, by default the millimetres of the mock-up.  Inertia of the
+        rockers: `platform_inertia`; friction, load and losses of the gears: `dataclasses.replace`.
         """
-        series = platform_inertia(machine, mass, gyration, mass_centre)
+        series = platform_inertia(machine, mass, gyration, mass_centre, length=length)
         ratio = machine.gears.z2 / machine.gears.z1
         own = ratio**2 * number("pinion_inertia", pinion_inertia, least=0.0)
         own += 3.0 * number("wheel_inertia", wheel_inertia, least=0.0)
-        return cls(series, motor, Train(ratio, efficiency, own))
+        return cls(series, motor, Train(ratio, inertia=own))
 
     @property
     def constant_inertia(self) -> float:

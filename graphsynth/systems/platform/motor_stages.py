@@ -416,9 +416,10 @@ def machine_drive(machine: SingleMotorPlatform, table: MachineDriveTable, resist
         mass_centre=complex(*table.mass_centre),
         wheel_inertia=table.wheel_inertia,
         pinion_inertia=table.pinion_inertia,
-        efficiency=table.efficiency,
+        length=1.0,
     )
-    return replace(model, friction=table.friction, load=table.load)
+    train = replace(model.train, efficiency=table.efficiency)
+    return replace(model, train=train, friction=table.friction, load=table.load)
 
 
 def drive_machine(context: Context, motions: tuple[Attempt, ...]) -> tuple[LabelledRun, ...]:

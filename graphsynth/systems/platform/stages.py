@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from graphsynth.drawing.sketch import Sketch, degrees
 from graphsynth.pipeline.display import table
@@ -21,15 +21,18 @@ if TYPE_CHECKING:
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
 
+T = TypeVar("T")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlatformMotion:
     """One turn of the wheels, with every joint for the pictures.
 
     * `motion`: what the module computed; shorter than asked for if the branch ends.
-    * `O`, `D` (shape (3,), complex): wheel axes and rocker pivots, fixed frame, millimetres.
+    * `O`, `D` (shape (3,), complex): wheel axes and rocker pivots, fixed frame, metres.
     * `B`, `C`, `A`, `F` (shape (n, 3), complex): crank pins, drive joints of the rockers, platform joints of the
       rockers, platform corners.
-    * `wheel_radius`: pitch radius, millimetres.
+    * `wheel_radius`: pitch radius, metres.
     """
 
     mechanism: SingleMotorPlatform
@@ -71,30 +74,26 @@ def platform_of(context: Context) -> SingleMotorPlatform:
 
 
 def _mechanism(table: PlatformTable) -> SingleMotorPlatform:
-    """Embody the scene's dimensions; one leg is repeated three times."""
+    """Embody the scene's dimensions, metres; one leg is repeated three times."""
     from graphsynth.systems.platform.drive import GearTrain
     from graphsynth.systems.platform.single_motor_platform import SingleMotorPlatform
 
-    def thrice(value: float) -> tuple[float, float, float]:
+    def thrice(value: T) -> tuple[T, T, T]:
         return (value, value, value)
 
-    def point(pair: tuple[float, float]) -> tuple[complex, complex, complex]:
-        return (complex(*pair),) * 3
-
-    first, second, third = table.leg_directions
     return SingleMotorPlatform(
-        crank=table.crank_mm,
+        crank=table.crank,
         phase=table.crank_phase,
-        coupler=thrice(table.coupler_mm),
-        rocker=thrice(table.rocker_mm),
-        axis=point(table.wheel_axis_mm),
-        pivot=point(table.rocker_pivot_mm),
-        vertex=point(table.platform_vertex_mm),
-        l1=thrice(table.arm_mm),
-        l2=thrice(table.intermediate_mm),
-        frame_angle=(first, second, third),
+        coupler=thrice(table.coupler),
+        rocker=thrice(table.rocker),
+        axis=thrice(complex(*table.wheel_axis)),
+        pivot=thrice(complex(*table.rocker_pivot)),
+        vertex=thrice(complex(*table.platform_vertex)),
+        l1=thrice(table.arm),
+        l2=thrice(table.intermediate),
+        frame_angle=table.leg_directions,
         delta=thrice(table.rocker_angle),
-        tau=(table.drive_branch,) * 3,
+        tau=thrice(table.drive_branch),
         gears=GearTrain(table.pinion_teeth, table.wheel_teeth),
     )
 
@@ -156,23 +155,21 @@ def _verdict(moved: PlatformMotion) -> tuple[str, bool, tuple[Quantity, ...]]:
 def _margins(motion: Motion) -> tuple[Quantity, ...]:
     import numpy as np
 
-    x, y, alpha = motion.pose.T
-    error = motion.closure_error * motion.Lc if math.isfinite(motion.closure_error) else None
+    travel = np.ptp(motion.pose, axis=0)
+    closure = motion.closure_error * motion.Lc
+    error, turned = (closure, motion.closure_error) if math.isfinite(closure) else (None, None)
+    least = np.abs(motion.determinant / motion.determinant[0]).min()
+    of_si = Quantity.of_si
     return (
-        Quantity("travel in x", float(np.ptp(x)), "mm", "estimated", error),
-        Quantity("travel in y", float(np.ptp(y)), "mm", "estimated", error),
-        Quantity(
-            "swing", float(np.ptp(alpha)), "rad", "estimated", motion.closure_error if error is not None else None
-        ),
-        Quantity("distance to the nearest other assembly mode", float(motion.gap.min()) * motion.Lc, "mm"),
-        Quantity(
-            "least |det JX| of the turn over that at its start",
-            float(np.abs(motion.determinant / motion.determinant[0]).min()),
-        ),
+        of_si("travel in x", travel[0], "mm", error=error),
+        of_si("travel in y", travel[1], "mm", error=error),
+        of_si("swing", travel[2], "rad", error=turned),
+        of_si("distance to the nearest other assembly mode", motion.gap.min() * motion.Lc, "mm"),
+        of_si("least |det JX| of the turn over that at its start", least),
         exact("wheel positions computed", len(motion.psi)),
-        Quantity("least |leg Jacobian|", float(np.abs(motion.leg).min()), "mm^2"),
-        Quantity("closure of the turn", motion.closure_error * motion.Lc, "mm"),
-        Quantity("relative closure residual", motion.residual),
+        of_si("least |leg Jacobian|", np.abs(motion.leg).min(), "mm^2"),
+        of_si("closure of the turn", closure, "mm"),
+        of_si("relative closure residual", motion.residual),
     )
 
 
@@ -181,18 +178,15 @@ def _turn_table(moved: PlatformMotion) -> Table:
     motion, mechanism = moved.motion, moved.mechanism
     drives = ", ".join(turn.kind for turn in mechanism.drive_turns())
     label = motion.label
+    branch = f"tau = {_signs(label.tau)}, sigma = {_signs(label.sigma)}, det JX {_sign(label.sign)}"
     rows = [
         ("drives 1, 2, 3", drives, "exact"),
-        (
-            "branch at the start",
-            f"tau = {_signs(label.tau)}, sigma = {_signs(label.sigma)}, det JX {_sign(label.sign)}",
-            "estimated",
-        ),
-        ("the working mode is kept", "yes" if motion.working_mode_constant else "no", "estimated, at the samples"),
-        *((q.name, q.text, q.guarantee) for q in _margins(motion)),
+        ("branch at the start", branch, "estimated"),
+        ("the working mode is kept", motion.working_mode_constant, "estimated, at the samples"),
+        *((q.name, q, q.guarantee) for q in _margins(motion)),
         ("time of the turn", f"{motion.seconds:.3f} s", "measured once"),
     ]
-    return Table("The full turn", ("quantity", "value", "method"), tuple(rows), f"Method: {motion.method}.")
+    return table("The full turn", ("quantity", "value", "method"), rows, f"Method: {motion.method}.")
 
 
 def _sign(value: int) -> str:
@@ -206,21 +200,19 @@ def _signs(values: tuple[int, ...]) -> str:
 def _pose_table(motion: Motion) -> Table:
     """Give the pose and the determinant every 45 degrees of the wheel, as far as the motion reached."""
     eighths = sorted({round(i * (len(motion.psi) - 1) / 8) for i in range(9)})
-    rows = tuple(
-        (
-            f"{math.degrees(motion.psi[i]):.6g}",
-            *(f"{value:.12g}" for value in motion.pose[i]),
-            f"{motion.determinant[i]:.12g}",
-            "/".join(str(int(s)) for s in _working_mode(motion, i)),
-        )
-        for i in eighths
-    )
-    columns = ("wheel [°]", "x [mm]", "y [mm]", "alpha [rad]", "det JX [mm^4]", "sigma")
-    return Table("Poses over the turn", columns, rows, "Estimated: Newton iteration in double precision.")
+    modes = ("/".join("1" if value > 0 else "-1" for value in motion.leg[i]) for i in eighths)
+    rows = ((motion.psi[i], *motion.pose[i], motion.determinant[i], mode) for i, mode in zip(eighths, modes))
+    return table("Poses over the turn", _POSE_COLUMNS, rows, "Estimated: Newton iteration in double precision.")
 
 
-def _working_mode(motion: Motion, i: int) -> tuple[int, ...]:
-    return tuple(1 if value > 0 else -1 for value in motion.leg[i])
+_POSE_COLUMNS = (
+    "wheel [°] | .6g",
+    "x [mm] | .12g",
+    "y [mm] | .12g",
+    "alpha [rad] | .12g",
+    "det JX [mm^4] | .12g",
+    "sigma",
+)
 
 
 def _event_table(motion: Motion) -> Table:
@@ -311,24 +303,16 @@ def animations(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture,
 
     steps = slice(None, None, max(1, len(motion.F) // _FRAMES))
     tracks: dict[str, ArrayLike] = {}
-    for name, points in {"B": motion.B, "C": motion.C, "A": motion.A, "F": motion.F}.items():
-        tracks |= {f"{name}{k}": points[steps, k] for k in range(3)}
-    for name, places in {"O": motion.O, "D": motion.D}.items():
-        tracks |= {f"{name}{k}": complex(places[k]) for k in range(3)}
-    bars = [
-        bar
-        for k, colour in enumerate(_LEG_COLOURS)
-        for bar in (Bar(f"O{k}", f"B{k}", width=5), Bar(f"B{k}", f"C{k}", colour, 3), Bar(f"A{k}", f"F{k}", colour, 3))
-    ]
+    for name in "BCAFOD":
+        places = getattr(motion, name)
+        tracks |= {f"{name}{k}": places[steps, k] if places.ndim == 2 else complex(places[k]) for k in range(3)}
+    bars = []
+    for k, colour in enumerate(_LEG_COLOURS):
+        bars += [Bar(f"O{k}", f"B{k}", width=5), Bar(f"B{k}", f"C{k}", colour, 3), Bar(f"A{k}", f"F{k}", colour, 3)]
     sketch = Sketch(*_box(motion), 620, 40, "Single-motor platform in motion")
     _surroundings(sketch, motion, 1.6)
-    svg = linkage_animation(
-        sketch,
-        tracks,
-        bars=bars,
-        plates=[("F0", "F1", "F2"), *((f"C{k}", f"D{k}", f"A{k}") for k in range(3))],
-        joints=list(tracks),
-    )
+    plates = [("F0", "F1", "F2"), *((f"C{k}", f"D{k}", f"A{k}") for k in range(3))]
+    svg = linkage_animation(sketch, tracks, bars=bars, plates=plates, joints=list(tracks))
     return (Picture("One turn of the wheels", svg, "The motor turns them; the curves are the corners' paths.", "wide"),)
 
 
@@ -361,11 +345,10 @@ def plots(context: Context, motions: tuple[Attempt, ...]) -> tuple[Picture, ...]
     if motion is None:
         return ()
     from graphsynth.drawing.plots import Line
-    from graphsynth.pipeline.display import TURN, chart, unit_in
+    from graphsynth.pipeline.display import TURN, chart
 
     turn, wheel = motion.motion, "wheel angle [°]"
-    x, y = unit_in("[mm]").to_si(1.0) * turn.pose.T[:2]
-    alpha = turn.pose[:, 2]
+    x, y, alpha = turn.pose.T
     shift = [Line(turn.psi, x, "x", "a"), Line(turn.psi, y, "y", "b", "--")]
     far = [Line(turn.psi, turn.determinant / abs(turn.determinant[0]))]
     zero = Line((), 0.0, "singular", "jam", "--")

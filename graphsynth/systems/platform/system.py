@@ -10,7 +10,8 @@ from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, Positions
 from graphsynth.systems.platform.motor_system import MachineDriveTable
 
-_Length = Annotated[float, In(above=0, why="a length must be positive")]
+_Length = Annotated[float, In("mm", above=0, why="a length must be positive")]
+_Point = Annotated[tuple[float, float], In("mm")]
 _Teeth = Annotated[int, In(above=0, why="a gear needs teeth")]
 
 
@@ -23,14 +24,14 @@ class PlatformTable:
 
     module: Literal["single_motor_platform"]
     leg_directions: Annotated[tuple[float, float, float], In("deg")]
-    wheel_axis_mm: tuple[float, float]
-    rocker_pivot_mm: tuple[float, float]
-    platform_vertex_mm: tuple[float, float]
-    arm_mm: _Length
-    intermediate_mm: _Length
-    rocker_mm: _Length
-    coupler_mm: _Length
-    crank_mm: Annotated[tuple[float, float, float], In(least=0, why="a crank must not be negative")]
+    wheel_axis: _Point
+    rocker_pivot: _Point
+    platform_vertex: _Point
+    arm: _Length
+    intermediate: _Length
+    rocker: _Length
+    coupler: _Length
+    crank: Annotated[tuple[float, float, float], In("mm", least=0, why="a crank must not be negative")]
     crank_phase: Annotated[tuple[float, float, float], In("rad")]
     rocker_angle: Annotated[float, In("deg")]
     pinion_teeth: _Teeth
