@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -102,17 +103,17 @@ class StartReport:
     determined: NDArray[np.bool_]
     rows: tuple[str, ...]
     position_correction: float
-    velocity_correction: float
-    rank: int
-    freedom: int
-    singular_values: Array
-    condition: float
-    redundant: tuple[tuple[str, ...], ...]
-    violated: dict[str, float]
-    pose_class: PoseClass
-    nearby_rank: int
-    tangents: BranchTangents | None
     slots: Array = field(repr=False)
+    velocity_correction: float = math.nan
+    rank: int = 0
+    freedom: int = 0
+    singular_values: Array = field(default_factory=lambda: np.empty(0))
+    condition: float = math.nan
+    redundant: tuple[tuple[str, ...], ...] = ()
+    violated: dict[str, float] = field(default_factory=dict)
+    pose_class: PoseClass = "not tested"
+    nearby_rank: int = 0
+    tangents: BranchTangents | None = None
 
     @property
     def consistent(self) -> bool:
@@ -321,7 +322,7 @@ def _blank(values: Values, q: Array, q0: Array) -> StartReport:
     nan = np.full(compiled.n, np.nan)
     pose, rate, second = compiled.to_links(q, nan, nan)
     count = len(compiled.info)
-    moved = float(np.abs((q - q0) / values.compiled.unit).max(initial=0.0))
+    moved = float(np.abs((q - q0) / compiled.unit).max(initial=0.0))
     return StartReport(
         compiled.model,
         "consistent",
@@ -337,16 +338,6 @@ def _blank(values: Values, q: Array, q0: Array) -> StartReport:
         np.zeros(count, dtype=np.bool_),
         tuple(info.name for info in compiled.info),
         moved,
-        float("nan"),
-        0,
-        0,
-        np.empty(0),
-        float("nan"),
-        (),
-        {},
-        "not tested",
-        0,
-        None,
         values.slots,
     )
 

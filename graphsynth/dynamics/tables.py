@@ -21,7 +21,8 @@ from graphsynth.dynamics.model import DynamicModel, Rack, Rigid
 from graphsynth.dynamics.motors import DCMotor, SynchronousMotor
 from graphsynth.kinematics.engine import codes
 from graphsynth.kinematics.engine.inputs import coordinates
-from graphsynth.mechanism.joints import Cam, Gear, PinSlot, Prismatic, Revolute
+from graphsynth.kinematics.engine.program import ROWS
+from graphsynth.mechanism.joints import Cam, PinSlot, Prismatic, Revolute
 from graphsynth.mechanism.laws import Driver
 
 Array = NDArray[np.float64]
@@ -295,7 +296,7 @@ def _constraints(
         if isinstance(joint, Driver):
             own = [driver_row(model, joint, centres, len(first) - 1 - len(joints) + len(model.prescribed))]
         else:
-            own = joint_rows(_moved(joint, centres), model.mechanism.frame)
+            own = joint_rows(_moved(joint, centres))
         for kind, a, b, parameters in own:
             slots.append(sum(slot >= 0 for slot in slots) if kind in (codes.GEAR, RACK) else -1)
             own_name = _row_name(kind, joint)
@@ -321,30 +322,27 @@ def _moved(joint: Any, centres: Array) -> Any:
     return replace(joint, at_a=_shifted(joint.at_a, centres[joint.a]), at_b=_shifted(joint.at_b, centres[joint.b]))
 
 
-def joint_rows(joint: Any, frame: int) -> list[tuple[int, int, int, list[float]]]:
+def joint_rows(joint: Any) -> list[tuple[int, int, int, list[float]]]:
     """Equations of a joint, in the parameters of the engine's rows."""
     if isinstance(joint, Rack):
         e = [math.cos(joint.angle), math.sin(joint.angle)]
         row = [0.0] * 12
         row[codes.PBX], row[codes.PBY], row[codes.TX], row[codes.TY], row[codes.RA] = *joint.centre, *e, joint.radius
         return [(RACK, joint.rack, joint.pinion, row)]
-    base = [*joint.at_a, *joint.at_b, 1.0, 0.0, *[0.0] * 6]
-    a, b = joint.a, joint.b
-    if isinstance(joint, Gear):
-        base[codes.RA], base[codes.RB], base[codes.SIGN], base[codes.H] = joint.row()[6:10]
-        return [(codes.GEAR, a, b, base)]
-    if isinstance(joint, Cam):
-        base[codes.RA], base[codes.H] = joint.angle_a, joint.radius
-        return [(codes.CAM, a, b, [*base, *(part for pair in joint.harmonics for part in pair), 0.0])]
-    turned = list(base)
-    if isinstance(joint, Revolute | Rigid):
-        found = [(codes.RX, a, b, base), (codes.RY, a, b, base)]
+    if isinstance(joint, Rigid):
+        guide = Prismatic(joint.a, joint.b, joint.at_a, joint.at_b, joint.angle_a, joint.angle_b)
+        size = np.array(guide.row())
+        kinds = [*ROWS["R"](size), *ROWS["P"](size)[1:]]
     else:
-        base[codes.TX], base[codes.TY] = math.cos(joint.angle_a), math.sin(joint.angle_a)
-        found = [(codes.LINE, a, b, base)]
-    if isinstance(joint, Prismatic | Rigid):
-        turned[codes.H] = joint.angle_a - joint.angle_b
-        found.append((codes.ANGLE, a, b, turned))
+        size = np.array(joint.row())
+        kinds = ROWS[joint.kind](size)
+    more = [*(part for pair in joint.harmonics for part in pair), 0.0] if isinstance(joint, Cam) else []
+    found = []
+    for kind, own in kinds:
+        row = [*joint.at_a, *joint.at_b, 1.0, 0.0, *[0.0] * 6]
+        for column, value in own.items():
+            row[column] = float(value)
+        found.append((kind, joint.a, joint.b, [*row, *more]))
     return found
 
 

@@ -15,6 +15,7 @@ from graphsynth.core.errors import GeometryError
 from graphsynth.dynamics.elements import Force, TorqueSource
 from graphsynth.dynamics.tables import RACK, Compiled
 from graphsynth.kinematics.engine import codes
+from graphsynth.mechanism.equations import FLOATS, derivatives, seen
 from graphsynth.mechanism.joints import Prismatic, Revolute
 from graphsynth.mechanism.model import Mechanism
 
@@ -199,17 +200,13 @@ class Values:
 def joint_coordinate(mechanism: Mechanism, base: int, link: int, poses: Array, rates: Array) -> tuple[Array, Array]:
     """Coordinate and rate of an R or P joint at link poses and velocities (..., links, 3)."""
     joint = mechanism.joint(base, link)
-    if isinstance(joint, Revolute):
-        return poses[..., link, 2] - poses[..., base, 2], rates[..., link, 2] - rates[..., base, 2]
-    if not isinstance(joint, Prismatic):
+    if not isinstance(joint, Revolute | Prismatic):
         raise GeometryError(f"joint {base}-{link} is {joint.kind}; only R and P joints have one coordinate")
+    a, b = (tuple(np.moveaxis(poses[..., end, :], -1, 0)) for end in (joint.a, joint.b))
+    at = seen(FLOATS, joint, a, b)
+    value, gradient = joint.coordinate(at)
+    rate = np.zeros(np.shape(value))
+    for end, by in zip((joint.a, joint.b), derivatives(at, [gradient])[0]):
+        rate = rate + sum(rates[..., end, k] * part for k, part in enumerate(by) if part is not None)
     sign = 1.0 if base == joint.a else -1.0
-    place, speed = [], []
-    for end, at in ((joint.a, joint.at_a), (joint.b, joint.at_b)):
-        arm = np.exp(1j * poses[..., end, 2]) * complex(*at)
-        place.append(poses[..., end, 0] + 1j * poses[..., end, 1] + arm)
-        speed.append(rates[..., end, 0] + 1j * rates[..., end, 1] + 1j * rates[..., end, 2] * arm)
-    t = np.exp(1j * (poses[..., joint.a, 2] + joint.angle_a))
-    apart, moving = place[1] - place[0], speed[1] - speed[0]
-    rate = np.conj(t) * (moving - 1j * rates[..., joint.a, 2] * apart)
-    return sign * (np.conj(t) * apart).real, sign * rate.real
+    return sign * value, sign * rate

@@ -55,6 +55,7 @@ def one_coordinate_stages(T, E, S, centres, applied, y, h, A, K, low, high, out)
         run(E.steps, E.touched, E.rows, E.RP, E.core, E.elim, E.EP, E.drv, E.DP, E.need, E.wanted, S.q, S.u, E.modes,
             E.poses, E.centres, S.X, S.TH, S.V, S.W, S.PHI, S.M, E.kept, E.groups, E.OX, E.OV, E.OW, E.OM,
             S.done, S.why, E.first, E.Lc, E.far, E.derivs)  # fmt: skip
+        # no rates where the engine does not reach
         for i in range(K.shape[1]):
             K[s, i] = math.nan
         if S.done[0] < 2:
@@ -66,6 +67,7 @@ def one_coordinate_stages(T, E, S, centres, applied, y, h, A, K, low, high, out)
             v[i] *= w
         x = state_rows(T, q, v)
         Q, _, V, P, good = load_vector(T, x, applied, state[2:])
+        # effective inertia, half its derivative and the loads along the motion
         inertia, half, load = 0.0, 0.0, 0.0
         for i in range(n):
             load += Q[i] * q1[i]

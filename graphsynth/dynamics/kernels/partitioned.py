@@ -89,6 +89,7 @@ def accelerate_partitioned(T, q, v, chosen, metric, phi, qd, applied, currents, 
             N[k, i] = step[i]
             for j in range(n):
                 MN[k, j] += T.mass[i, j] * step[i]
+    # z'' from the reduced masses N^T M N by Cholesky factors
     G, second = np.zeros((c, c)), np.zeros(c)
     for i in range(c):
         for k in range(n):

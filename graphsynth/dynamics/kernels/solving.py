@@ -19,6 +19,7 @@ def factor_rows(L, diagonal, J):
     """
     m, n = J.shape
     B, size, order = np.empty((n, m)), np.empty(m), np.arange(m)
+    # L^-1 J^T row by row, then columns of length 1
     for k in range(m):
         total = 0.0
         for i in range(n):
@@ -43,7 +44,7 @@ def factor_rows(L, diagonal, J):
             if total > big:
                 best, big = k, total
         if not math.sqrt(big) > RANK:
-            break
+            break  # what is left depends on the columns before
         if best != s:
             order[s], order[best] = order[best], order[s]
             for i in range(n):

@@ -152,6 +152,7 @@ def load_vector(T, x, applied, currents):
     n = T.mass.shape[0]
     Qc, Qn = np.zeros(n), applied.copy()
     V, P, good = 0.0, 0.0, True
+    # loads given as functions do work; weights have a potential
     for link in range(T.column.shape[0]):
         k = T.column[link]
         if k >= 0:
@@ -164,6 +165,7 @@ def load_vector(T, x, applied, currents):
                 weight = T.mass[k, k] * T.gravity[c]
                 Qc[k + c] += weight
                 V -= weight * x[link, c]
+    # springs along the line between two points, with dampers
     for s in range(T.springs.shape[0]):
         a, b = T.springs[s, 0], T.springs[s, 1]
         p = T.spring_table[s]
@@ -191,6 +193,7 @@ def load_vector(T, x, applied, currents):
         V += 0.5 * p[0] * turn * turn
         twist(T, Qc, x, a, b, -p[0] * turn)
         P += twist(T, Qn, x, a, b, -p[2] * (x[b, 7] - x[a, 7]))
+    # constant forces, of which some turn with their link; torques behind trains, whose losses are on the driven side
     for s in range(T.forces.shape[0]):
         link, p = T.forces[s, 0], T.force_table[s]
         c, sn = x[link, 2], x[link, 3]
@@ -203,6 +206,7 @@ def load_vector(T, x, applied, currents):
         torque, eta = T.source_table[s, 0], T.source_table[s, 1]
         torque = torque * eta if torque * (x[b, 7] - x[a, 7]) >= 0.0 else torque / eta
         P += twist(T, Qn, x, a, b, torque)
+    # motors, driving or driven by the mode of the piece
     for s in range(T.motors.shape[0]):
         a, b = T.motors[s, 0], T.motors[s, 1]
         ratio, eta = T.motor_table[s, RATIO], T.motor_table[s, EFFICIENCY]
