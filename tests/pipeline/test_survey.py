@@ -28,11 +28,17 @@ from graphsynth.pipeline.runner import execute, run
 from graphsynth.pipeline.scene import BudgetTable, Scene, find_scene, load_scene
 from graphsynth.pipeline.stages import Context
 from graphsynth.systems.four_bar_survey import motion as survey_motion, stages as stages
-from graphsynth.systems.four_bar_survey.jamming import close_form
-from graphsynth.systems.four_bar_survey.lattice import classify, lattice_of
-from graphsynth.systems.four_bar_survey.motion import move
+from graphsynth.systems.four_bar_survey.motion import close_form, move
 from graphsynth.systems.four_bar_survey.results import certify
-from graphsynth.systems.four_bar_survey.stages import QUANTITIES, evaluate_sets, front_of, losses_of, objectives_of
+from graphsynth.systems.four_bar_survey.stages import (
+    QUANTITIES,
+    classify,
+    evaluate_sets,
+    front_of,
+    lattice_of,
+    losses_of,
+    objectives_of,
+)
 
 ROWS = ["records", "ranking", "tables", "rows"]
 
@@ -134,7 +140,7 @@ def test_shards_give_what_the_whole_lattice_gives() -> None:
     survey = report["survey"]
     assert (survey.sets, survey.passing, survey.disagreements) == (1000, len(passing), 0)
     assert set(survey.front) == set(passing[front_of(losses)].tolist()) and len(survey.front) > 3
-    assert sum(survey.classes.values()) == 1000 and sum(survey.turned_down.values()) + survey.passing == 1000
+    assert sum(survey.classes.values()) == 1000 and sum(survey.rejected.values()) + survey.passing == 1000
     assert sum(survey.maps["turning"]) == int(np.sum(whole.kind == KINDS.index("full turn")))
     again = execute(replace(small(shard=1000), outputs=replace(scene.outputs, products=("survey",))))["survey"]
     assert (again.front, again.chosen, again.maps) == (survey.front, survey.chosen, survey.maps)

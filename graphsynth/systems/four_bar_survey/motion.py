@@ -1,22 +1,23 @@
-"""Motion of many four-bars at once by the planar engine, and what the motion tells of each."""
+"""Many four-bars at once: their motion by the planar engine, and the tilted bearing in closed form (model L0)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from graphsynth.jamming.bearing.bearing import Bearing
+from graphsynth.kinematics.engine.batch import simulate_batch
+from graphsynth.mechanism.four_bar import TiltedFourBar
+from graphsynth.mechanism.joints import COLUMNS
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rotatability import KINDS
-from graphsynth.systems.four_bar_survey.lattice import Ints
-
-if TYPE_CHECKING:
-    from graphsynth.mechanism.model import Mechanism
+from graphsynth.systems.four_bar_survey.system import SurveyTable
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _POSITIONS = 180_000  # computed at once: poses stay in the cache, and memory is used again
 #: Squared sine of the transmission angle below which modes meet; sets of the lattice that keep clear are above 1e-9.
@@ -25,19 +26,12 @@ _MEETING = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moved:
-    """What motion says of sets (estimated: floating point at the sampled crank angles).
+    """What motion says of sets (estimated: floating point at the sampled crank angles), arrays of shape (n,).
 
-    Attributes
-    ----------
-    kind : ndarray of int8, shape (n,)
-        As found: place in `KINDS`.
-    transmission : ndarray, shape (n,)
-        Smallest transmission angle over a full turn, radians; NaN where the crank does not turn fully.  The samples
-        contain both positions in which crank and frame are in line, where it is smallest: no sampling error.
-    swing : ndarray, shape (n,)
-        Range of the rocker's angle over the turn, radians; 2 pi if it turns fully; NaN as above.
-    positions : int
-        Crank positions computed.
+    `kind`: as found, place in `KINDS`; `transmission`: smallest transmission angle over a full turn, radians, NaN where
+    the crank does not turn fully (the samples contain both positions in which crank and frame are in line, where it is
+    smallest: no sampling error); `swing`: range of the rocker's angle over the turn, radians, 2 pi if it turns fully,
+    NaN as above; `positions`: computed.
     """
 
     kind: NDArray[np.int8]
@@ -46,31 +40,14 @@ class Moved:
     positions: int
 
 
-@cache
-def four_bar(frame: float = 2.0, crank: float = 1.0, coupler: float = 2.5, rocker: float = 2.5) -> Mechanism:
-    """Return a four-bar driven at its crank, of which all others are dimension sets."""
-    from graphsynth.mechanism.joints import Revolute
-    from graphsynth.mechanism.laws import Driver
-    from graphsynth.mechanism.model import Mechanism
-    from graphsynth.structure.graph import MechanismGraph
-
-    graph = MechanismGraph(4, [(0, 1), (1, 2), (2, 3), (0, 3)], frame=0)
-    joints = (
-        Revolute(0, 1),
-        Revolute(1, 2, (crank, 0.0)),
-        Revolute(2, 3, (coupler, 0.0), (rocker, 0.0)),
-        Revolute(0, 3, (frame, 0.0)),
-    )
-    return Mechanism(graph, joints, (Driver(0, 1),))
+#: A four-bar driven at its crank, of which all others are dimension sets; the branch is that of the motion.
+_FOUR_BAR = Mechanism.four_bar(2.0, 1.0, 2.5, 2.5)
 
 
 def _dimensions(lengths: Array, turned: Array | None = None) -> Array:
-    """Dimension sets of `four_bar`; `turned` turns the line of the frame about the crank's pivot, radians."""
-    from graphsynth.mechanism.joints import COLUMNS
-
-    mechanism = four_bar()
-    place = {joint.pair: k for k, joint in enumerate(mechanism.joints)}
-    found = np.repeat(mechanism.dimensions[None], len(lengths), axis=0)
+    """Dimension sets of the four-bar; `turned` turns the line of the frame about the crank's pivot, radians."""
+    place = {joint.pair: k for k, joint in enumerate(_FOUR_BAR.joints)}
+    found = np.repeat(_FOUR_BAR.dimensions[None], len(lengths), axis=0)
     g, a, b, c = lengths.T
     found[:, place[1, 2], 0], found[:, place[2, 3], 0], found[:, place[2, 3], COLUMNS.index("bx")] = a, b, c
     found[:, place[0, 3], 0] = g if turned is None else g * np.cos(turned)
@@ -80,14 +57,9 @@ def _dimensions(lengths: Array, turned: Array | None = None) -> Array:
 
 
 def move(lengths: Ints, positions: int) -> Moved:
-    """Move sets through a turn of the crank, and find out how far each can turn.
+    """Move sets (frame, crank, coupler, rocker) through a turn of the crank, and find out how far each can turn.
 
-    Parameters
-    ----------
-    lengths : ndarray of int64, shape (n, 4)
-        Frame, crank, coupler, rocker.
-    positions : int
-        Per turn; even.
+    The number of positions per turn is even.
 
     Examples
     --------
@@ -102,11 +74,9 @@ def move(lengths: Ints, positions: int) -> Moved:
 
 
 def _move(lengths: Ints, positions: int) -> Moved:
-    from graphsynth.kinematics.engine.batch import simulate_batch
-
     sizes = lengths.astype(np.float64)
     turn = np.linspace(0.0, math.tau, positions + 1)
-    batch = simulate_batch(four_bar(), turn, _dimensions(sizes), modes={0: 1}, rates=False, keep=[3])
+    batch = simulate_batch(_FOUR_BAR, turn, _dimensions(sizes), modes={0: 1}, rates=False, keep=[3])
     done = batch.completed
     sine2 = np.where(done, batch.margins[..., 0].min(axis=1), np.nan)
     meets = np.where(done, sine2 <= _MEETING, False)
@@ -136,16 +106,14 @@ def _assembled_elsewhere(sizes: Array) -> tuple[NDArray[np.bool_], NDArray[np.bo
     Tried are pi, and the angle at which coupler and rocker are at right angles: a crank that is assembled anywhere is
     assembled at one of the three.
     """
-    from graphsynth.kinematics.engine.batch import simulate_batch
-
     if not len(sizes):
         return np.zeros(0, dtype=np.bool_), np.zeros(0, dtype=np.bool_)
     g, a, b, c = sizes.T
     square = np.clip((g * g + a * a - b * b - c * c) / (2.0 * g * a), -1.0, 1.0)
     across = simulate_batch(
-        four_bar(), [0.0], _dimensions(sizes, -np.arccos(square)), modes={0: 1}, rates=False, keep=[]
+        _FOUR_BAR, [0.0], _dimensions(sizes, -np.arccos(square)), modes={0: 1}, rates=False, keep=[]
     )
-    ahead = simulate_batch(four_bar(), [math.pi], _dimensions(sizes), modes={0: 1}, rates=False, keep=[])
+    ahead = simulate_batch(_FOUR_BAR, [math.pi], _dimensions(sizes), modes={0: 1}, rates=False, keep=[])
     return across.completed | ahead.completed, ahead.completed & (ahead.margins[:, 0, 0] <= _MEETING)
 
 
@@ -155,23 +123,19 @@ def _assembled_beside(sizes: Array, angle: float) -> NDArray[np.bool_]:
     Tried is an angle at which the pin comes nearer or goes farther by less than the dyad can give, if it can give at
     all: ``g a (1 - cos) <= b c / 2``.
     """
-    from graphsynth.kinematics.engine.batch import simulate_batch
-
     if not len(sizes):
         return np.zeros(0, dtype=np.bool_)
     g, a, b, c = sizes.T
     beside = np.minimum(0.5, np.sqrt(b * c / (g * a)))
     turned = _dimensions(sizes, -(angle + beside))
-    return simulate_batch(four_bar(), [0.0], turned, modes={0: 1}, rates=False, keep=[]).completed
+    return simulate_batch(_FOUR_BAR, [0.0], turned, modes={0: 1}, rates=False, keep=[]).completed
 
 
 def _assembled_between(sizes: Array, turn: Array) -> NDArray[np.bool_]:
     """Whether sets that are not determined at crank angle 0 pass all other angles."""
-    from graphsynth.kinematics.engine.batch import simulate_batch
-
     if not len(sizes):
         return np.zeros(0, dtype=np.bool_)
-    batch = simulate_batch(four_bar(), turn[1:-1], _dimensions(sizes), modes={0: 1}, rates=False, keep=[])
+    batch = simulate_batch(_FOUR_BAR, turn[1:-1], _dimensions(sizes), modes={0: 1}, rates=False, keep=[])
     return batch.completed
 
 
@@ -191,3 +155,68 @@ def _extreme(values: Array) -> Array:
     low, top, high = values[row, (k - 1) % n], values[row, k], values[row, (k + 1) % n]
     bend = np.minimum(low - 2.0 * top + high, 0.0)
     return np.asarray(top - np.where(bend < 0.0, (high - low) ** 2 / (8.0 * np.where(bend < 0.0, bend, 1.0)), 0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Jamming:
+    """What the bearing between coupler and rocker does, by set (estimated: closed forms in floating point).
+
+    `tilt`: largest tilt of the coupler over the turn, radians; `part`: of the turn in which the bearing jams, 0 to 1;
+    `axis_tilt`: largest tilt of the motor axis for which the whole turn is free, radians, pi/2 if every tilt is;
+    `clearance`: smallest radial clearance for which the whole turn is free, mm.
+    """
+
+    tilt: Array
+    part: Array
+    axis_tilt: Array
+    clearance: Array
+
+
+def close_form(table: SurveyTable, lengths: NDArray[np.int64]) -> Jamming:
+    """Assess the bearing for sets of lengths (frame, crank, coupler, rocker); only crank over coupler matters.
+
+    As `jam_arcs`, `largest_misalignment` and `smallest_clearance` of :mod:`graphsynth.jamming`, set by set
+    (theory/bearing-contact 7 and theory/jam-arcs 1, 4).
+    """
+    own = table.bearing
+    bearing = Bearing(own.radius_mm, own.height_mm, own.clearance_mm)
+    unit = TiltedFourBar(1.0, 1.0, 1.0, 1.0, alpha=table.tilt.alpha, axis=table.tilt.axis)
+    ratios, which = np.unique(lengths[:, 1] / lengths[:, 2], return_inverse=True)
+    sine = np.minimum(unit.pin_height * ratios, 1.0)
+    critical = bearing.critical_tilt(own.condition)
+    touches_only = bool(critical.reason)
+    if critical.sine is None or touches_only:  # a clearance is never negative here: free at any tilt
+        part, axis = np.zeros(len(ratios)), np.full(len(ratios), 0.5 * math.pi)
+    else:
+        part = _jammed_part(critical.sine, unit.pin_height * ratios)
+        axis = _largest_axis_tilt(critical.sine / ratios, unit.axis)
+    clearance = _smallest_clearance(sine, bearing.Rb, bearing.h, own.condition)
+    return Jamming(np.arcsin(sine)[which], part[which], axis[which], clearance[which])
+
+
+def _jammed_part(critical: float, height: Array) -> Array:
+    """Two arcs of ``2 arccos kappa`` each, kappa the critical sine over the largest (16 units are touching)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        kappa = np.where(height > 0.0, critical / height, np.inf)
+    return np.where(kappa < 1.0 - 16 * 2.0**-52, 2.0 / math.pi * np.arccos(np.minimum(kappa, 1.0)), 0.0)
+
+
+def _largest_axis_tilt(q: Array, axis: tuple[float, float, float]) -> Array:
+    """Tilt of the axis at which the pin is as high as the critical tilt needs: q times the crank."""
+    inclination = axis[0] ** 2 + axis[1] ** 2
+    inside = np.minimum(q, 1.0)
+    deficit = inside * inside / (1.0 + np.sqrt((1.0 - inside) * (1.0 + inside)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(deficit <= 2.0 * inclination, 0.5 * deficit / inclination, np.nan)
+    reached = np.isfinite(share) & (q < 1.0)
+    return np.where(reached, 2.0 * np.arcsin(np.sqrt(np.where(reached, share, 0.0))), 0.5 * math.pi)
+
+
+def _smallest_clearance(sine: Array, radius: float, half: float, condition: str) -> Array:
+    cosine = np.sqrt((1.0 - sine) * (1.0 + sine))
+    bulge = radius * sine * sine / (1.0 + cosine)
+    if condition == "B":
+        with np.errstate(divide="ignore"):
+            return np.where(cosine > 0.0, (half * sine + bulge) / cosine, np.inf)
+    rim = half * half / (math.hypot(radius, half) + radius)
+    return np.where(half * cosine < radius * sine, rim, half * sine - bulge)

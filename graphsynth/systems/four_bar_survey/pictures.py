@@ -6,19 +6,21 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from graphsynth.drawing.palette import WHITE
+from graphsynth.drawing.plots import new_figure, themed_svg
+from graphsynth.mechanism.model import Mechanism
 from graphsynth.mechanism.rotatability import TYPES
 from graphsynth.pipeline.products import Picture, Ranking, Record
 from graphsynth.pipeline.stages import Context
-from graphsynth.systems.four_bar_survey.lattice import Lattice, classify, lattice_of
+from graphsynth.pipeline.units import Unit
 from graphsynth.systems.four_bar_survey.results import Survey
-from graphsynth.systems.four_bar_survey.stages import evaluate_sets
+from graphsynth.systems.four_bar_survey.stages import Lattice, classify, evaluate_sets, lattice_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from graphsynth.mechanism.model import Mechanism
 
 #: Colours of `TYPES`: cranks that turn are strong, the others pale, change points dark.
 #: Not quite those of the palette: on a dark page the map would keep them, and its legend would not.
@@ -39,24 +41,16 @@ def maps(context: Context, survey: Survey) -> tuple[Picture, ...]:
     return tuple(pictures)
 
 
-def _figure(width: float, height: float) -> Figure:
-    from graphsynth.drawing.plots import new_figure
-
-    return new_figure((width, height))
-
-
-def _svg(figure: Figure) -> str:
-    from graphsynth.drawing.plots import themed_svg
-
-    return themed_svg(figure)
-
-
 def _extent(lattice: Lattice) -> tuple[float, float, float, float]:
     """Coupler along, frame up, in crank lengths; half a step around."""
     ends = []
     for lengths in (lattice.coupler, lattice.frame):
         ends += [(lengths[0] - 0.5 * lengths.step) / lattice.crank, (lengths[-1] + 0.5 * lengths.step) / lattice.crank]
     return ends[0], ends[1], ends[2], ends[3]
+
+
+def _image(lattice: Lattice) -> dict[str, Any]:
+    return {"origin": "lower", "extent": _extent(lattice), "aspect": "auto", "interpolation": "nearest"}
 
 
 def _slices(context: Context, lattice: Lattice) -> list[int]:
@@ -69,12 +63,11 @@ def _slices(context: Context, lattice: Lattice) -> list[int]:
 
 
 def _classes(context: Context, lattice: Lattice) -> Picture:
-    import numpy as np
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
 
     rockers = _slices(context, lattice)
-    figure = _figure(3.1 * len(rockers) + 0.3, 4.0)
+    figure = new_figure((3.1 * len(rockers) + 0.3, 4.0))
     axes = figure.subplots(1, len(rockers), sharey=True, squeeze=False)[0]
     frame, coupler = np.meshgrid(lattice.frame, lattice.coupler, indexing="ij")
     seen: set[int] = set()
@@ -84,26 +77,21 @@ def _classes(context: Context, lattice: Lattice) -> Picture:
         seen |= set(types.tolist())
         norm = BoundaryNorm(np.arange(len(TYPES) + 1) - 0.5, len(TYPES))
         image = types.reshape(frame.shape)
-        ax.imshow(image, origin="lower", extent=_extent(lattice), cmap=ListedColormap(_COLOURS), norm=norm,
-                  aspect="auto", interpolation="nearest")  # fmt: skip
+        ax.imshow(image, **_image(lattice), cmap=ListedColormap(_COLOURS), norm=norm)
         ax.set_title(f"rocker {rocker / lattice.crank:g}", fontsize=10)
         ax.set_xlabel("coupler / crank")
     axes[0].set_ylabel("frame / crank")
-    figure.legend(
-        handles=[Patch(facecolor=_COLOURS[k], edgecolor="#888888", label=TYPES[k]) for k in sorted(seen)],
-        loc="outside lower center", ncols=4, frameon=False, fontsize=9,
-    )  # fmt: skip
+    patches = [Patch(facecolor=_COLOURS[k], edgecolor="#888888", label=TYPES[k]) for k in sorted(seen)]
+    figure.legend(handles=patches, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     caption = (
         "Grashof's classes, decided in exact arithmetic. Blue and green: the crank turns fully. Dark lines: change "
         "points; red ones: immovable, they can only lie stretched."
     )
-    return Picture("Classes", _svg(figure), caption, "wide")
+    return Picture("Classes", themed_svg(figure), caption, "wide")
 
 
 def _grid(lattice: Lattice, survey: Survey, name: str) -> Any:
     """Values by (frame, coupler); NaN where there is none."""
-    import numpy as np
-
     grid = np.full((len(lattice.frame), len(lattice.coupler)), math.nan)
     rows = [(length - lattice.frame[0]) // lattice.frame.step for length in survey.maps["frame"]]
     columns = [(length - lattice.coupler[0]) // lattice.coupler.step for length in survey.maps["coupler"]]
@@ -113,9 +101,9 @@ def _grid(lattice: Lattice, survey: Survey, name: str) -> Any:
 
 
 def _map(lattice: Lattice, grid: Any, label: str, cmap: str) -> tuple[Figure, Axes]:
-    figure = _figure(5.4, 4.2)
+    figure = new_figure((5.4, 4.2))
     ax = figure.add_subplot()
-    image = ax.imshow(grid, origin="lower", extent=_extent(lattice), cmap=cmap, aspect="auto", interpolation="nearest")
+    image = ax.imshow(grid, **_image(lattice), cmap=cmap)
     figure.colorbar(image, ax=ax, label=label)
     ax.set_xlabel("coupler / crank")
     ax.set_ylabel("frame / crank")
@@ -128,7 +116,7 @@ def _best_angle(lattice: Lattice, survey: Survey) -> Picture:
     )
     _contour(ax, lattice, _grid(lattice, survey, "transmission angle"), [20, 30, 40, 50, 60, 70, 80])
     caption = "The smallest transmission angle over a turn, with the best rocker for each pair; blank: no crank turns."
-    return Picture("Transmission", _svg(figure), caption)
+    return Picture("Transmission", themed_svg(figure), caption)
 
 
 def _contour(ax: Axes, lattice: Lattice, grid: Any, levels: list[float]) -> None:
@@ -139,19 +127,18 @@ def _contour(ax: Axes, lattice: Lattice, grid: Any, levels: list[float]) -> None
 
 def _best_tilt(context: Context, lattice: Lattice, survey: Survey) -> Picture:
     figure, _ = _map(lattice, _grid(lattice, survey, "largest axis tilt"), "tilt of the axis [°]", "cividis")
-    limits = context.scene.mechanism.limits
+    transmission = round(Unit.parse("deg").from_si(context.scene.mechanism.limits.transmission), 9)
     caption = (
         "The critical tilt of the motor axis: up to it the bearing is free over the whole turn. Only pairs with some "
-        f"rocker that keeps the limits (transmission angle {limits.transmission_deg:g}° and more)."
+        f"rocker that keeps the limits (transmission angle {transmission:g}° and more)."
     )
-    return Picture("Critical tilt", _svg(figure), caption)
+    return Picture("Critical tilt", themed_svg(figure), caption)
 
 
 def _front(context: Context, survey: Survey) -> Picture:
-    import numpy as np
 
     done = evaluate_sets(context, survey.lattice, np.array(survey.front))
-    figure = _figure(5.4, 4.2)
+    figure = new_figure((5.4, 4.2))
     ax = figure.add_subplot()
     x, y = done.quantity("transmission angle"), done.quantity("largest axis tilt")
     dots = ax.scatter(x, y, c=done.size, cmap="viridis", s=14, linewidths=0)
@@ -162,15 +149,11 @@ def _front(context: Context, survey: Survey) -> Picture:
     caption = (
         f"The {len(survey.front)} sets of the Pareto front: none is beaten in one objective without a loss in another."
     )
-    return Picture("What can be had at once", _svg(figure), caption)
+    return Picture("What can be had at once", themed_svg(figure), caption)
 
 
 def _best(context: Context, records: tuple[Record, ...], ranking: Ranking, most: int) -> list[tuple[Record, Mechanism]]:
     """Return the best records with their linkages, lengths in cranks."""
-    import numpy as np
-
-    from graphsynth.systems.four_bar_survey.motion import four_bar
-
     lattice = lattice_of(context)
     by_number = {record.number: record for record in records}
     found = []
@@ -179,7 +162,7 @@ def _best(context: Context, records: tuple[Record, ...], ranking: Ranking, most:
         match = re.match(r"set (\d+):", record.solution)
         assert match is not None  # as `judge` writes it
         g, a, b, c = (lattice.lengths(np.array([int(match[1])]))[0] / lattice.crank).tolist()
-        found.append((record, four_bar(g, a, b, c)))
+        found.append((record, Mechanism.four_bar(g, a, b, c)))
     return found
 
 
@@ -203,8 +186,6 @@ def sketches(context: Context, records: tuple[Record, ...], ranking: Ranking) ->
 
 def animations(context: Context, records: tuple[Record, ...], ranking: Ranking) -> tuple[Picture, ...]:
     """Show the best linkages in motion."""
-    import numpy as np
-
     from graphsynth.drawing.animation import animated_svg
     from graphsynth.kinematics.simulation import simulate
 

@@ -1,20 +1,31 @@
-"""Stages of a four-bar survey over all shards: gather, certify the best, records, tables and the answer."""
+"""Stages of a four-bar survey over all shards: gather, order, certify the best, records, tables and the answer."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from graphsynth.core.ordered import in_order
 from graphsynth.mechanism.rotatability import KINDS, TYPES
-from graphsynth.pipeline.products import Finding, Outcome, Quantity, Record, Table, exact
+from graphsynth.pipeline.display import table
+from graphsynth.pipeline.products import Finding, Outcome, Quantity, Ranking, Record, Table, exact
 from graphsynth.pipeline.stages import Context
-from graphsynth.systems.four_bar_survey.lattice import Lattice, lattice_of
-from graphsynth.systems.four_bar_survey.order import Order, edges_of, order_of
-from graphsynth.systems.four_bar_survey.system import SurveyTable
+from graphsynth.pipeline.steps import DIGITS
+from graphsynth.systems.four_bar_survey.stages import (
+    QUANTITIES,
+    Lattice,
+    evaluate_sets,
+    exactly,
+    front_of,
+    lattice_of,
+    objectives_of,
+    unpacked,
+)
 
 if TYPE_CHECKING:
     from graphsynth.jamming.bearing.parameters import ToleranceBox
@@ -22,24 +33,29 @@ if TYPE_CHECKING:
 _PIECE = 20  # certificates made in one go
 
 
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What `ranking_of` would say of all sets that pass, as far as it is used.
+
+    `ranked`: sets that pass and have all objectives; `front`: those that no other one beats in every objective,
+    ascending; `best`: the first sets of the order; of these `scores`, the weighted mean of the objectives, each scaled
+    to 0 (worst of all that pass) .. 1 (best of all), and `places`: by objective, how many of all that pass are better.
+    """
+
+    ranked: int = 0
+    front: tuple[int, ...] = ()
+    best: tuple[int, ...] = ()
+    scores: tuple[float, ...] = ()
+    places: tuple[tuple[int, ...], ...] = ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
     """All shards together.
 
-    Attributes
-    ----------
-    lattice : Lattice
-    sets, positions, passing : int
-        Dimension sets and crank positions computed, sets that keep the limits.
-    classes : dict of (type, kind, kind found) to int
-        Places in `TYPES` and `KINDS`.
-    turned_down : dict of str to int
-    maps : dict of str to list
-        Columns by pair of frame and coupler.
-    order : Order
-        Of all sets that pass, as far as it is used.
-    failed : tuple of str
-        Shards that failed, with the reason.
+    `sets`, `positions`, `passing`: dimension sets and crank positions computed, sets that keep the limits; `classes`:
+    (type, kind, kind found), places in `TYPES` and `KINDS`, to the number of sets; `maps`: columns by pair of frame and
+    coupler; `failed`: shards that failed, with the reason.
     """
 
     lattice: Lattice
@@ -47,7 +63,7 @@ class Survey:
     positions: int
     passing: int
     classes: dict[tuple[int, int, int], int]
-    turned_down: dict[str, int]
+    rejected: dict[str, int]
     maps: dict[str, list[Any]]
     order: Order
     failed: tuple[str, ...]
@@ -72,12 +88,12 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
     """Put the shards together: counts, maps, the Pareto front of all sets, the best by score."""
     done: list[Any] = [outcome.products["surveyed"] for outcome in outcomes if outcome.status == "assessed"]
     classes: Counter[tuple[int, int, int]] = Counter()
-    turned_down: Counter[str] = Counter()
+    rejected: Counter[str] = Counter()
     maps: dict[str, list[Any]] = {}
     for shard in done:
         for type_, kind, found, count in shard["classes"]:
             classes[type_, kind, found] += count
-        turned_down.update(shard["rejected"])
+        rejected.update(shard["rejected"])
         for name, column in shard["maps"].items():
             maps.setdefault(name, []).extend(column)
     return Survey(
@@ -86,7 +102,7 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
         sum(shard["positions"] for shard in done),
         sum(shard["passing"] for shard in done),
         dict(classes),
-        dict(turned_down),
+        dict(rejected),
         maps,
         order_of(context, done),
         tuple(f"{o.key}: {o.reason}" for o in outcomes if o.status == "failed"),
@@ -97,16 +113,9 @@ def gather(context: Context, outcomes: tuple[Outcome, ...]) -> Survey:
 class Certificate:
     """What is proved about one set, with the tolerances of the scene.
 
-    Attributes
-    ----------
-    verdict, reason : str
-        Of `certify_jamming`.
-    free : bool or None
-        Proved free, proved jammed (for all or for some), or neither.
-    assembles : str
-        At how much of the turn the tilted linkage is proved to be assembled.
-    clearance_left, critical_tilt : tuple of float
-        Bounds of the clearance left at the worst angle (mm), and of the critical tilt (radians).
+    `verdict`, `reason`: of `certify_jamming`; `free`: proved free, proved jammed (for all or for some), or None;
+    `assembles`: at how much of the turn the tilted linkage is proved to be assembled; bounds of the clearance left at
+    the worst angle (mm), and of the critical tilt (radians).
     """
 
     number: int
@@ -120,16 +129,12 @@ class Certificate:
 
 def certify(context: Context, survey: Survey) -> tuple[Certificate, ...]:
     """Prove for the best sets whether the bearing jams, in pieces on the executor."""
-    from graphsynth.core.ordered import in_order
-
     pieces = [survey.chosen[k : k + _PIECE] for k in range(0, len(survey.chosen), _PIECE)]
     work = partial(_prove, replace(context, executor=None), survey.lattice)
     return tuple(proof for piece in in_order(context.executor, work, pieces) for proof in piece)
 
 
 def _prove(context: Context, lattice: Lattice, sets: tuple[int, ...]) -> list[Certificate]:
-    import numpy as np
-
     from graphsynth.jamming.bearing.certify import certify_jamming
 
     condition = context.scene.mechanism.bearing.condition
@@ -155,39 +160,18 @@ def box_of(context: Context, lattice: Lattice, lengths: list[int]) -> ToleranceB
     """Return the exact dimensions of a set with the tolerances of the scene."""
     from graphsynth.jamming.bearing.parameters import ToleranceBox, spread
 
-    table: SurveyTable = context.scene.mechanism
-    relative = _written(context, ("tolerances",), "lengths_percent", table.tolerances) / 100
+    relative = exactly(context, "tolerances", "lengths") / 100
     given: dict[str, Any] = {
         name: spread(length * lattice.unit, 0, relative) for name, length in zip(("l1", "l2", "l3", "l4"), lengths)
     }
-    places = {"Rb": "radius_mm", "Hb": "height_mm", "clearance": "clearance_mm"}
-    for name, field in places.items():
-        nominal = _written(context, ("bearing",), field, table.bearing)
-        given[name] = spread(nominal, _written(context, ("tolerances",), field, table.tolerances), 0)
-    alpha = _written(context, ("tilt",), "alpha_rad", table.tilt)
-    given["alpha"] = spread(alpha, _written(context, ("tolerances",), "alpha_rad", table.tolerances), 0)
-    given["azimuth"] = spread(0, _written(context, ("tolerances",), "azimuth_rad", table.tolerances), 0)
-    return ToleranceBox(**given, axis=list(table.tilt.axis))
-
-
-def _written(context: Context, path: tuple[str, ...], field: str, table: object) -> Fraction:
-    """Return a number as it stands in the file; as the double it is if the scene was changed after reading."""
-    from graphsynth.pipeline.tables import written
-    from graphsynth.pipeline.units import split_suffix
-
-    raw: Any = context.scene.raw.get("mechanism", {})
-    for key in path:
-        raw = raw.get(key, {}) if isinstance(raw, dict) else {}
-    value = float(getattr(table, field if hasattr(table, field) else split_suffix(field)[0]))
-    number = written(raw, field)
-    return number if number is not None and float(number) == value else Fraction(value)
+    for name, own in (("Rb", "radius"), ("Hb", "height"), ("clearance", "clearance")):
+        given[name] = spread(exactly(context, "bearing", f"{own}_mm"), exactly(context, "tolerances", own), 0)
+    for name, nominal in (("alpha", exactly(context, "tilt", "alpha")), ("azimuth", 0)):
+        given[name] = spread(nominal, exactly(context, "tolerances", name), 0)
+    return ToleranceBox(**given, axis=list(context.scene.mechanism.tilt.axis))
 
 
 def _records(context: Context, survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Record, ...]:
-    import numpy as np
-
-    from graphsynth.systems.four_bar_survey.stages import QUANTITIES, evaluate_sets
-
     if not certificates:
         return ()
     done = evaluate_sets(context, survey.lattice, np.array([proof.number for proof in certificates]))
@@ -221,50 +205,45 @@ def _records(context: Context, survey: Survey, certificates: tuple[Certificate, 
     return tuple(records)
 
 
-def _summary(context: Context, survey: Survey) -> Table:
-    table: SurveyTable = context.scene.mechanism
+def _summary(context: Context, survey: Survey, certificates: tuple[Certificate, ...]) -> Table:
     lattice = survey.lattice
     spans = [
         f"{name} {float(r[0] * lattice.unit):g} to {float(r[-1] * lattice.unit):g} ({len(r)})"
         for name, r in (("frame", lattice.frame), ("coupler", lattice.coupler), ("rocker", lattice.rocker))
     ]
     rows = (
-        ("dimension sets", str(survey.sets)),
+        ("dimension sets", survey.sets),
         ("lengths", f"crank {float(lattice.crank * lattice.unit):g}, {', '.join(spans)}"),
-        ("crank positions computed", str(survey.positions)),
+        ("crank positions computed", survey.positions),
         ("motion against the exact class", f"{survey.disagreements} sets of {survey.sets} disagree"),
-        ("keep all limits", str(survey.passing)),
-        ("of these, on the Pareto front", str(len(survey.front))),
-        ("certified", str(len(survey.chosen))),
+        ("keep all limits", survey.passing),
+        ("of these, on the Pareto front", len(survey.front)),
+        ("certified", len(survey.chosen)),
     )
-    note = f"{table.positions} crank positions a turn; the front is that of all sets, not only of the certified ones."
-    return Table("The survey", ("", ""), rows, note)
+    turn = context.scene.mechanism.positions
+    note = f"{turn} crank positions a turn; the front is that of all sets, not only of the certified ones."
+    return table("The survey", ("", ""), rows, note, *findings(survey, certificates))
 
 
 def _class_table(survey: Survey) -> Table:
     """Exact type and kind against the kind found in motion."""
-    rows = [
-        (TYPES[type_], KINDS[kind], KINDS[found], str(count), "yes" if kind == found else "NO")
+    rows = (
+        (TYPES[type_], KINDS[kind], KINDS[found], count, "yes" if kind == found else "NO")
         for (type_, kind, found), count in sorted(survey.classes.items())
-    ]
+    )
     note = (
         "Type and kind are decided in exact arithmetic (Grashof's rule, exact); the motion is that of the engine in "
         "floating point at the sampled crank angles, which contain both positions in line with the frame."
     )
     columns = ("type (exact)", "crank (exact)", "crank (found in motion)", "sets", "agree")
-    return Table("Grashof's classes, proved and found", columns, tuple(rows), note)
-
-
-def _limits_table(survey: Survey) -> Table:
-    rows = tuple((str(count), reason) for reason, count in survey.turned_down.items())
-    return Table("Rejected sets, by limit", ("sets", "first limit missed"), (*rows, (str(survey.passing), "none")))
+    return table("Grashof's classes, proved and found", columns, rows, note)
 
 
 def _proof_table(certificates: tuple[Certificate, ...]) -> Table:
     counts = Counter((proof.verdict, proof.assembles, proof.reason) for proof in certificates)
-    rows = tuple((str(count), *what) for what, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+    rows = ((count, *what) for what, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])))
     note = "For the whole turn and every combination of the tolerances, with outward rounding."
-    return Table("What is proved about the best sets", ("sets", "verdict", "assembled", "reason"), rows, note)
+    return table("What is proved about the best sets", ("sets", "verdict", "assembled", "reason"), rows, note)
 
 
 def assess(
@@ -272,11 +251,16 @@ def assess(
 ) -> tuple[tuple[Record, ...], tuple[Table, ...]]:
     """Give one record per certified set, and the tables of the survey, the first with its answer."""
     records = _records(context, survey, certificates)
-    summary = replace(_summary(context, survey), findings=findings(survey, certificates))
-    tables = [summary, _class_table(survey), _limits_table(survey), _proof_table(certificates)]
+    limits = ((count, reason) for reason, count in (*survey.rejected.items(), ("none", survey.passing)))
+    tables = [
+        _summary(context, survey, certificates),
+        _class_table(survey),
+        table("Rejected sets, by limit", ("sets", "first limit missed"), limits),
+        _proof_table(certificates),
+    ]
     if survey.failed:
-        rows = tuple((text,) for text in survey.failed)
-        tables.insert(0, Table(f"Shards that failed: {len(rows)}", ("shard and reason",), rows))
+        title = f"Shards that failed: {len(survey.failed)}"
+        tables.insert(0, table(title, ("shard and reason",), ((text,) for text in survey.failed)))
     return records, tuple(tables)
 
 
@@ -299,8 +283,6 @@ def findings(survey: Survey, certificates: tuple[Certificate, ...]) -> tuple[Fin
 
 def _edge(survey: Survey) -> list[Finding]:
     """Warn if the best set is at the edge of the lattice."""
-    import numpy as np
-
     if not survey.chosen:
         return []
     lengths = survey.lattice.lengths(np.array(survey.chosen[:1]))[0].tolist()
@@ -317,9 +299,9 @@ def _number(count: int) -> str:
 
 
 def _rejected(survey: Survey) -> Finding:
-    counts = sorted(survey.turned_down.items(), key=lambda item: (-item[1], item[0]))
+    counts = sorted(survey.rejected.items(), key=lambda item: (-item[1], item[0]))
     reasons = "; ".join(f"{_number(count)} because {reason}" for reason, count in counts if count)
-    total = sum(survey.turned_down.values())
+    total = sum(survey.rejected.values())
     share = f"{100.0 * survey.passing / survey.sets:.3g} %" if survey.sets else "none"
     return Finding(
         f"Of {_number(survey.sets)} sets {_number(survey.passing)} ({share}) keep all limits. "
@@ -340,3 +322,67 @@ def _motion(survey: Survey) -> Finding:
         f"{_number(len(survey.chosen))} best, tolerances included; for the others it is estimated in closed form.",
         None if agree else False,
     )
+
+
+def order_of(context: Context, done: list[Any]) -> Order:
+    """Order the sets of all shards."""
+    objectives = objectives_of(context)
+    rows = [unpacked(shard["losses"], 1 + len(objectives)) for shard in done]
+    table = np.concatenate(rows) if rows else np.empty((0, 1 + len(objectives)))
+    table = table[np.isfinite(table).all(axis=1)]
+    if not len(table):
+        return Order()
+    sets, losses = table[:, 0].astype(np.int64), table[:, 1:]
+    leading = np.flatnonzero(np.isin(sets, [number for shard in done for number in shard["front"]]))
+    front = leading[front_of(losses[leading])]
+    low, span = losses.min(axis=0), np.ptp(losses, axis=0)
+    parts = 1.0 - (losses - low) / np.where(span > 0.0, span, 1.0)
+    weights = np.array([objective.weight for objective in objectives])
+    scores = np.round((parts * weights).sum(axis=1) / weights.sum(), DIGITS)
+    behind = np.ones(len(sets), dtype=np.bool_)
+    behind[front] = False
+    best = np.lexsort((sets, -scores, behind))[: context.scene.mechanism.certify]
+    places = [np.searchsorted(np.sort(column), column[best]).tolist() for column in losses.T]
+    return Order(
+        len(sets),
+        tuple(np.sort(sets[front]).tolist()),
+        tuple(sets[best].tolist()),
+        tuple(scores[best].tolist()),
+        tuple(zip(*places, strict=True)),
+    )
+
+
+def rank(context: Context, survey: Any, records: tuple[Record, ...]) -> Ranking:
+    """Give the certified sets with their places among all sets that pass: they do not depend on how many there are."""
+    objectives, order = objectives_of(context), survey.order
+    margins = [{margin.name: margin.value for margin in record.margins} for record in records]
+    front = set(order.front)
+    return Ranking(
+        objectives,
+        tuple(record.number for record in records),
+        order.scores,
+        tuple(record.number for record, number in zip(records, order.best, strict=True) if number in front),
+        tuple(tuple(own.get(o.quantity, math.nan) for o in objectives) for own in margins),
+        places=order.places,
+        ranked=order.ranked,
+        front_size=len(order.front),
+    )
+
+
+def edges_of(lattice: Lattice, lengths: list[int]) -> list[str]:
+    """Say which lengths of a set (frame, crank, coupler, rocker) are the first or last of their ranges.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> edges_of(Lattice(Fraction(1, 2), 2, range(3, 9), range(4, 6), range(4, 5)), [8, 2, 4, 4])
+    ['frame 4 is the longest', 'coupler 2 is the shortest']
+    """
+    found = []
+    for name, span, length in zip(
+        ("frame", "coupler", "rocker"), (lattice.frame, lattice.coupler, lattice.rocker), (lengths[0], *lengths[2:])
+    ):
+        if len(span) > 1 and length in (span[0], span[-1]):
+            end = "shortest" if length == span[0] else "longest"
+            found.append(f"{name} {float(length * lattice.unit):.12g} is the {end}")
+    return found

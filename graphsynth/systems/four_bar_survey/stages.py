@@ -1,24 +1,24 @@
-"""Stages of a four-bar survey for each shard of the lattice: motion, closed-form jamming, what is worth keeping."""
+"""Stages of a four-bar survey for each shard of its lattice of exact lengths: class, motion, bearing, what is kept."""
 
 from __future__ import annotations
 
 import math
 from base64 import b64decode, b64encode
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graphsynth.mechanism.rotatability import KINDS, TYPES
+from graphsynth.mechanism.rotatability import KINDS, TYPES, grashof_type, rotation_kind
 from graphsynth.pipeline.products import Columns, Objective
 from graphsynth.pipeline.stages import Context
-from graphsynth.pipeline.tables import suggest
-from graphsynth.systems.four_bar_survey.jamming import Jamming, close_form
-from graphsynth.systems.four_bar_survey.lattice import Ints, Lattice, classify, lattice_of
-from graphsynth.systems.four_bar_survey.motion import Moved, move
-from graphsynth.systems.four_bar_survey.system import SurveyTable
+from graphsynth.pipeline.tables import exact_number, fields_of, suggest
+from graphsynth.pipeline.units import Unit
+from graphsynth.systems.four_bar_survey.motion import Ints, Jamming, Moved, close_form, move
+from graphsynth.systems.four_bar_survey.system import RangeTable, SurveyTable
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,115 @@ QUANTITIES = {
 }
 _UNITS = QUANTITIES | {"frame": "", "coupler": "", "rocker": "", "type": "", "kind": "", "passes": ""}
 _DEFAULT = (Objective("transmission angle", "max"), Objective("largest axis tilt", "max"), Objective("size", "min"))
+
+
+#: Lengths in units of the lattice: products of four stay exact, and margins stay clear of rounding.
+LONGEST = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Dimension sets by number: the rocker runs fastest, then the coupler, then the frame.
+
+    All lengths are whole multiples of `unit`; the crank and the ranges are in units.
+
+    Examples
+    --------
+    >>> lattice = Lattice(Fraction(1, 2), 2, range(3, 5), range(4, 6), range(4, 7))
+    >>> len(lattice), lattice.lengths(np.array([0, 11])).tolist()
+    (12, [[3, 2, 4, 4], [4, 2, 5, 6]])
+    """
+
+    unit: Fraction
+    crank: int
+    frame: range
+    coupler: range
+    rocker: range
+
+    def __len__(self) -> int:
+        return len(self.frame) * len(self.coupler) * len(self.rocker)
+
+    def lengths(self, sets: Ints) -> Ints:
+        """Return frame, crank, coupler and rocker of sets in units (exact), shape (n, 4)."""
+        rest, rocker = np.divmod(sets, len(self.rocker))
+        frame, coupler = np.divmod(rest, len(self.coupler))
+        parts = [r.start + r.step * k for r, k in ((self.frame, frame), (self.coupler, coupler), (self.rocker, rocker))]
+        return np.stack([parts[0], np.full(len(sets), self.crank), parts[1], parts[2]], axis=1).astype(np.int64)
+
+
+def lattice_of(context: Context) -> Lattice:
+    """Read the lattice from a scene: numbers are the decimals (or fractions) that stand in the file.
+
+    A `SceneError` refuses a range that does not end on a step, and lengths without a common unit that is coarse enough.
+    """
+    table: SurveyTable = context.scene.mechanism
+    place = context.scene.place / "mechanism" / "lengths"
+    crank = exactly(context, "lengths", "crank")
+    ranges: list[tuple[Fraction, Fraction, int]] = []
+    for name in ("frame", "coupler", "rocker"):
+        own: RangeTable = getattr(table.lengths, name)
+        first, last, step = (exactly(context, "lengths", name, key) for key in ("first", "last", "step"))
+        count = (last - first) / step
+        if count.denominator != 1:
+            raise (place / name).error(
+                f"runs from {own.first:g} to {own.last:g} in steps of {own.step:g} and misses its last length; "
+                "let last be first plus a whole number of steps"
+            )
+        ranges.append((first, step, int(count) + 1))
+    unit = _common([crank, *(value for first, step, _ in ranges for value in (first, step))])
+    longest = max(crank, *(first + step * (count - 1) for first, step, count in ranges)) / unit
+    if longest > LONGEST:
+        raise place.error(
+            f"has lengths whose common unit is {float(unit):g}, {float(longest):g} of them in the longest; at most "
+            f"{LONGEST} are exact: give rounder lengths"
+        )
+    spans = []
+    for begin, each, number in ranges:
+        low, apart = int(begin / unit), int(each / unit)
+        spans.append(range(low, low + apart * number, apart))
+    return Lattice(unit, int(crank / unit), *spans)
+
+
+def exactly(context: Context, *path: str) -> Fraction:
+    """Return a number of ``[mechanism]`` as it stands in the file, in the unit of its key.
+
+    If the scene was changed after reading, the double that it is; for a plain number its shortest decimal.
+    """
+    raw: Any = context.scene.raw.get("mechanism", {})
+    own = context.scene.mechanism
+    for key in path[:-1]:
+        raw, own = raw.get(key, {}) if isinstance(raw, Mapping) else {}, getattr(own, key)
+    schema: Any = type(own)
+    field = next(field for field in fields_of(schema) if field.name == path[-1])
+    value, written = getattr(own, field.name), raw.get(field.key, raw.get(field.alias)) if raw else None
+    number = exact_number(written, field.unit)
+    if number is not None and (field.unit.to_si(float(number)) if field.si else float(number)) == value:
+        return number
+    return Fraction(field.unit.from_si(value) if field.si else value if field.unit.text else repr(float(value)))
+
+
+def _common(values: list[Fraction]) -> Fraction:
+    """Return the largest number that all values are whole multiples of."""
+    below = math.lcm(*(value.denominator for value in values))
+    return Fraction(math.gcd(*(int(value * below) for value in values)), below)
+
+
+def classify(lengths: Ints) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Decide in integers whether the crank turns, and Grashof's type (exact): places in `KINDS` and `TYPES`, int8 (n,).
+
+    Lengths of shape (n, 4): frame, crank, coupler, rocker; at most 2**60.
+
+    Examples
+    --------
+    >>> kind, type_ = classify(np.array([[4, 2, 5, 5], [4, 2, 3, 5], [4, 3, 2, 2], [1, 1, 1, 9], [3, 1, 1, 1]]))
+    >>> [KINDS[k] for k in kind], [TYPES[k] for k in type_]
+    ... # doctest: +NORMALIZE_WHITESPACE
+    (['full turn', 'change point', 'limited', 'never assembled', 'immovable'],
+     ['crank-rocker', 'change point', 'triple rocker', 'never assembled', 'immovable'])
+    """
+    g, a, b, c = lengths.T
+    nearest, farthest, least, most = np.abs(g - a), g + a, np.abs(b - c), b + c
+    return rotation_kind(nearest - least, farthest - most, nearest - most, farthest - least), grashof_type(lengths)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,21 +161,10 @@ class Shard:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluated:
-    """Sets of the lattice with everything that is known of each.
+    """Sets of the lattice with everything that is known of each, arrays of shape (n,).
 
-    Attributes
-    ----------
-    sets : ndarray of int64, shape (n,)
-    lengths : ndarray of int64, shape (n, 4)
-        Frame, crank, coupler, rocker in units of the lattice (exact).
-    kind, type : ndarray of int8, shape (n,)
-        Exact; see `classify`.
-    moved : Moved
-    jamming : Jamming
-    size : ndarray, shape (n,)
-        Longest length over the crank.
-    passes : ndarray of bool, shape (n,)
-        Keeps the limits of the scene.
+    `lengths` (n, 4): frame, crank, coupler, rocker in units of the lattice (exact); `kind`, `type`: exact, see
+    `classify`; `size`: longest length over the crank; `passes`: keeps the limits of the scene.
     """
 
     sets: Ints
@@ -80,16 +178,15 @@ class Evaluated:
 
     def quantity(self, name: str) -> Array:
         """Return a margin of `QUANTITIES` by set, in its unit."""
-        found: dict[str, Array] = {
-            "transmission angle": np.degrees(self.moved.transmission),
-            "rocker swing": np.degrees(self.moved.swing),
-            "size": self.size,
-            "largest tilt": np.degrees(self.jamming.tilt),
-            "largest axis tilt": np.degrees(self.jamming.axis_tilt),
-            "smallest clearance": self.jamming.clearance,
-            "jammed part": self.jamming.part,
+        angles = {
+            "transmission angle": self.moved.transmission,
+            "rocker swing": self.moved.swing,
+            "largest tilt": self.jamming.tilt,
+            "largest axis tilt": self.jamming.axis_tilt,
         }
-        return found[name]
+        if name in angles:
+            return Unit.parse(QUANTITIES[name]).from_si(angles[name])
+        return {"size": self.size, "smallest clearance": self.jamming.clearance, "jammed part": self.jamming.part}[name]
 
     def rounded(self, name: str) -> Array:
         """Return a margin to the 9 decimals by which sets are rejected, ranked and stored: rounding decides nothing.
@@ -111,13 +208,7 @@ def shards(context: Context) -> Iterator[Shard]:
 
 
 def objectives_of(context: Context) -> tuple[Objective, ...]:
-    """Return the objectives of ``[ranking]``, or the usual ones.
-
-    Raises
-    ------
-    SceneError
-        If one names no margin of a set.
-    """
+    """Return the objectives of ``[ranking]``, or the usual ones; a `SceneError` if one names no margin of a set."""
     table = context.scene.ranking
     if table is None:
         return _DEFAULT
@@ -131,7 +222,7 @@ def objectives_of(context: Context) -> tuple[Objective, ...]:
 
 
 def evaluate_sets(context: Context, lattice: Lattice, sets: Ints) -> Evaluated:
-    """Classify (exact), move and judge (estimated) some sets of the lattice."""
+    """Classify (exact), move and assess (estimated) some sets of the lattice."""
     table: SurveyTable = context.scene.mechanism
     lengths = lattice.lengths(sets)
     kind, types = classify(lengths)
@@ -144,10 +235,11 @@ def evaluate_sets(context: Context, lattice: Lattice, sets: Ints) -> Evaluated:
 
 def _kept(table: SurveyTable, done: Evaluated) -> dict[str, NDArray[np.bool_]]:
     """Return which sets keep each limit, by the words that reject the others, in the order of asking."""
+    least = round(Unit.parse("deg").from_si(table.limits.transmission), 9)
     return {
         "the crank does not turn fully": done.kind == KINDS.index("full turn"),
         f"not {' or '.join(table.limits.types)}": np.isin(done.type, [TYPES.index(t) for t in table.limits.types]),
-        "the transmission angle is too small": done.rounded("transmission angle") >= table.limits.transmission_deg,
+        "the transmission angle is too small": done.rounded("transmission angle") >= least,
         "the bearing jams at the tilt of the scene": (done.jamming.part == 0.0) | (not table.limits.free),
     }
 

@@ -10,10 +10,11 @@ from graphsynth.evidence.rows import plans
 from graphsynth.pipeline.scene import BearingTable, TiltTable
 from graphsynth.pipeline.system import Stage, System
 from graphsynth.pipeline.tables import In, require
+from graphsynth.pipeline.units import DEGREE
 
 _MOST = 10**8
 _Length = Annotated[float, In(above=0, why="a length must be positive")]
-_Tolerance = Annotated[float, In(least=0, why="a tolerance is zero or more")]
+_LEAST = {"least": 0, "why": "a tolerance is zero or more"}
 
 Grashof = Literal["crank-rocker", "double crank"]
 Column = Literal[
@@ -57,7 +58,7 @@ class SurveyLimits:
     """What a set must keep to be ranked; only sets whose crank turns fully are."""
 
     types: tuple[Grashof, ...] = ("crank-rocker",)
-    transmission_deg: Annotated[float, In(least=0, below=90)] = 30.0
+    transmission: Annotated[float, In("deg", least=0, below=90)] = 30.0 * DEGREE
     free: bool = True
 
     def __post_init__(self) -> None:
@@ -68,12 +69,12 @@ class SurveyLimits:
 class SurveyTolerances:
     """Plus or minus, for the certificates: of all four lengths, the tilt and its azimuth, the bearing."""
 
-    lengths_percent: _Tolerance = 0.0
-    alpha_rad: _Tolerance = 0.0
-    azimuth_rad: _Tolerance = 0.0
-    radius_mm: _Tolerance = 0.0
-    height_mm: _Tolerance = 0.0
-    clearance_mm: _Tolerance = 0.0
+    lengths: Annotated[float, In("%", **_LEAST)] = 0.0
+    alpha: Annotated[float, In("rad", **_LEAST)] = 0.0
+    azimuth: Annotated[float, In("rad", **_LEAST)] = 0.0
+    radius: Annotated[float, In("mm", **_LEAST)] = 0.0
+    height: Annotated[float, In("mm", **_LEAST)] = 0.0
+    clearance: Annotated[float, In("mm", **_LEAST)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +106,7 @@ class SurveyTable:
 
 
 _HERE = "graphsynth.systems.four_bar_survey"
-_RANK = Stage("rank", f"{_HERE}.order:rank", ("survey", "records"), ("ranking",))
+_RANK = Stage("rank", f"{_HERE}.results:rank", ("survey", "records"), ("ranking",))
 SYSTEM = System(
     table=SurveyTable,
     structure="none",
@@ -121,5 +122,5 @@ SYSTEM = System(
         Stage("animate best", f"{_HERE}.pictures:animations", ("records", "ranking"), ("animations",)),
     ),
     more=lambda scene: (_RANK,) if scene.ranking is not None else (),
-    evidence=plans("graphsynth.systems.four_bar_survey.evidence", "many-sets", "arc-ends", "crossing", "dimensions"),
+    evidence=plans(f"{_HERE}.evidence", "many-sets", "arc-ends", "crossing", "dimensions"),
 )
