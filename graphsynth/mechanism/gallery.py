@@ -46,7 +46,7 @@ def chebyshev_lambda() -> Mechanism:
     """Chebyshev's lambda linkage 2 : 1 : 2.5 : 2.5; "P" draws a nearly straight line over half a turn, 4 cranks long.
 
     Source: after P. L. Chebyshev (papers from 1854 on, this linkage 1878); Artobolevsky, volume 1; what the proportions
-    give is computed in docs/explanation/lambda-linkage.md.
+    give is computed in docs/explanation/bearing-jamming.md.
 
     Returns
     -------

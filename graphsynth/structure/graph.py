@@ -221,7 +221,7 @@ class MechanismGraph:
         """Canonical key: equal for two graphs exactly when they are isomorphic, joint mobilities and frame included.
 
         Short printable ASCII, the same on every platform; the first character is the version.  See
-        ``docs/explanation/canonical-key.md``.
+        ``docs/explanation/mechanism-graph.md``.
         """
         from graphsynth.structure.canonical import key
 

@@ -335,7 +335,7 @@ def test_plain_and_compiled_labels_of_a_mechanism_agree():
 
 
 def test_keys_never_change():
-    # The stability promise of docs/explanation/canonical-key.md: a failure here needs a new key version.
+    # The stability promise of docs/explanation/mechanism-graph.md: a failure here needs a new key version.
     lines = GOLDEN.read_text(encoding="ascii").splitlines()
     assert len(lines) >= 40
     for line in lines:

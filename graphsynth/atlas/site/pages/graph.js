@@ -127,7 +127,7 @@ Atlas.fromGraph6 = function (text) {
   return Atlas.graph(n, joints);
 };
 
-// --- canonical keys, version 1: see docs/explanation/canonical-key.md
+// --- canonical keys, version 1: see docs/explanation/mechanism-graph.md
 
 Atlas.KEY_VERSION = "1";
 
