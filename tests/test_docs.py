@@ -74,10 +74,11 @@ def run_session(source, page, line, namespace):
     assert results.failed == 0, said.getvalue()
 
 
-#: Pages whose examples search or sweep for seconds.
+#: Pages whose examples search or sweep for seconds, or repeat what tests/test_newcomer.py, atlas and testing run.
 SLOW_PAGES = (
     *("embody", "point-an-antenna", "jamming-of-any-mechanism", "the-deck-reproduced", "bearing-jamming"),
-    *("certificates", "stick-slip", "gallery"),
+    *("certificates", "stick-slip", "gallery", "choose-a-method"),
+    *("README", "build-a-catalogue", "browse-the-atlas", "draw-and-animate", "property-tests"),
 )
 
 
@@ -255,7 +256,7 @@ def test_dotted_names_exist():
 def test_pictures_are_drawn_by_documented_modules():
     """Every public module of `graphsynth.drawing` that draws something is named in the reference."""
     text = reference_text()
-    helpers = {"bodies", "figures", "lettering", "moving", "pages", "palette", "shapes", "svg", "symbols"}
+    helpers = {"bodies", "canvas", "figures", "lettering", "moving", "pages", "palette", "shapes", "svg", "symbols"}
     drawing = {path.stem for path in (ROOT / "graphsynth" / "drawing").glob("*.py")} - {"__init__"}
     assert [name for name in sorted(drawing - helpers) if f"{name}." not in text and f"`{name}`" not in text] == []
 
